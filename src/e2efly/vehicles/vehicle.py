@@ -1,0 +1,240 @@
+"""The vehicle: one frozen dataclass, read from a TOML file in which every value has a unit and a source.
+
+Rotor order is Betaflight's: rear right, front right, rear left, front left. Body frame FLU.
+"""
+
+import dataclasses
+import hashlib
+import json
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from e2efly.vehicles.names import nearest, unknown
+
+GRAVITY = 9.81
+"""Standard gravity of the paper, m/s^2."""
+
+_HERE = Path(__file__).parent
+
+
+def _quantity(unit: str, shape: tuple[int, ...] = (), at_least: float | None = None, above: float | None = None) -> Any:
+    """A vehicle value: its unit, its shape, and the bound that every entry keeps."""
+    return field(metadata={"unit": unit, "shape": shape, "at_least": at_least, "above": above})
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """Physical parameters of a quadrotor, float64 as loaded.
+
+    In a simulation any field may carry leading batch axes (one value a vehicle): mass `(*n,)`, inertia `(*n, 3)`.
+    """
+
+    name: str = field(metadata={"static": True})
+    """The name of the vehicle: its file's stem."""
+    mass: Any = _quantity("kg", above=0)
+    """Mass."""
+    inertia: Any = _quantity("kg*m^2", (3,), above=0)
+    """Principal moments of inertia about the body axes."""
+    rotor_position: Any = _quantity("m", (4, 2))
+    """Rotor positions in the body's x-y plane."""
+    rotor_spin: Any = _quantity("1", (4,))
+    """Sign of each rotor's reaction torque about body z."""
+    thrust_map: Any = _quantity("N*s^2/rad^2, N*s/rad, N", (3,))
+    """Thrust of a rotor = k2 W^2 + k1 W + k0 at rotor speed W, never below zero: [k2, k1, k0]."""
+    torque_ratio: Any = _quantity("m", at_least=0)
+    """Reaction torque of a rotor over its thrust."""
+    rotor_thrust_max: Any = _quantity("N", above=0)
+    """Largest thrust of one rotor; the tighter of this and `rotor_speed_max` binds."""
+    rotor_speed_max: Any = _quantity("rad/s", above=0)
+    """Largest rotor speed."""
+    rotor_speed_min: Any = _quantity("rad/s", at_least=0)
+    """Idle rotor speed."""
+    motor_time_constant: Any = _quantity("s", above=0)
+    """Time constant of the first-order motor lag."""
+    drag_linear: Any = _quantity("N*s/m", (3,), at_least=0)
+    """Drag an axis of the body over air-relative speed."""
+    drag_quadratic: Any = _quantity("N*s^2/m^2", (3,), at_least=0)
+    """Drag an axis of the body over air-relative speed squared, signed."""
+    body_rate_max: Any = _quantity("rad/s", (3,), above=0)
+    """Largest body rates that are commanded."""
+    rate_gain: Any = _quantity("1/s", (3,), above=0)
+    """Angular acceleration commanded per body-rate error."""
+    attitude_gain: Any = _quantity("1/s", (2,), above=0)
+    """Body rate commanded per attitude error: [tilt, yaw]."""
+    velocity_gain: Any = _quantity("1/s", (3,), above=0)
+    """Acceleration commanded per velocity error, world axes."""
+    position_gain: Any = _quantity("1/s", (3,), above=0)
+    """Velocity commanded per position error, world axes."""
+    tilt_max: Any = _quantity("rad", above=0)
+    """Largest tilt that the controllers command; below pi/2."""
+    acceleration_max: Any = _quantity("m/s^2", (3,), above=0)
+    """Largest acceleration commanded, world axes."""
+    speed_max: Any = _quantity("m/s", (3,), above=0)
+    """Largest velocity commanded, world axes."""
+    control_rate: Any = _quantity("Hz", above=0)
+    """Rate at which the policy is asked."""
+    latency: Any = _quantity("s", at_least=0)
+    """Time from the policy's observation to its command reaching the rate loop."""
+    feet_height: Any = _quantity("m", above=0)
+    """Height of the centre of mass over the feet."""
+    radius: Any = _quantity("m", above=0)
+    """Radius of the sphere that holds the vehicle, for collisions."""
+
+    @property
+    def hash(self) -> str:
+        """First 16 hex digits of the SHA-256 of all values: two vehicles fly alike if and only if it is equal."""
+        values = {f.name: np.asarray(getattr(self, f.name), np.float64).tolist() for f in quantities()}
+        return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
+
+    @property
+    def thrust_range(self) -> tuple[float, float]:
+        """Smallest and largest thrust of one rotor, N: at idle, and at the tighter of the two maxima."""
+        low, high = (self.rotor_thrust(speed) for speed in (self.rotor_speed_min, self.rotor_speed_max))
+        return float(low), float(min(high, self.rotor_thrust_max))
+
+    @property
+    def thrust_to_weight(self) -> float:
+        """Largest collective thrust over weight."""
+        return float(4 * self.thrust_range[1] / (self.mass * GRAVITY))
+
+    @property
+    def hover_rotor_speed(self) -> float:
+        """Rotor speed at which four equal rotors carry the weight, rad/s."""
+        k2, k1, k0 = self.thrust_map
+        return float((-k1 + np.sqrt(k1**2 + 4 * k2 * (self.mass * GRAVITY / 4 - k0))) / (2 * k2))
+
+    def rotor_thrust(self, speed: float) -> float:
+        """Thrust of one rotor, N, at a rotor speed, rad/s."""
+        k2, k1, k0 = self.thrust_map
+        return max(k2 * speed**2 + k1 * speed + k0, 0.0)
+
+
+def quantities() -> tuple[dataclasses.Field, ...]:
+    """The fields of `Vehicle` that have a unit: all but its name."""
+    return tuple(f for f in dataclasses.fields(Vehicle) if "unit" in f.metadata)
+
+
+def vehicle_names() -> list[str]:
+    """The vehicles that the package ships."""
+    return sorted(path.stem for path in _HERE.glob("*.toml"))
+
+
+def load_vehicle(name_or_path: str | Path) -> Vehicle:
+    """Load a shipped vehicle by name, or any vehicle by the path of its TOML file.
+
+    Raises:
+        ValueError: naming the file, the key, the value and what is accepted.
+    """
+    text = str(name_or_path)
+    path = Path(text) if text.endswith(".toml") else _HERE / f"{text.lower().replace('-', '_')}.toml"
+    if not path.is_file():
+        if text.endswith(".toml"):
+            raise ValueError(f"vehicle file {text!r} does not exist")
+        raise ValueError(unknown("vehicle", text, vehicle_names()) + ", or the path of a .toml file")
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not a TOML file: {error}") from None
+    return _from_table(path.stem, table, str(path))
+
+
+def _from_table(name: str, table: dict[str, Any], where: str) -> Vehicle:
+    known = {f.name: f for f in quantities()}
+    for key in table:
+        if key not in known:
+            guess = nearest(key, known)
+            hint = f"; did you mean {guess!r}?" if guess else f" (accepted: {', '.join(known)})"
+            raise ValueError(f"{where}: unknown key {key!r}{hint}")
+    if missing := [key for key in known if key not in table]:
+        raise ValueError(f"{where}: missing key {', '.join(map(repr, missing))}")
+    values = {key: _read(where, f, table[key]) for key, f in known.items()}
+    vehicle = Vehicle(name=name, **values)
+    check(vehicle, where)
+    return vehicle
+
+
+def _read(where: str, f: dataclasses.Field, entry: Any) -> Any:
+    """One value of the file, with its unit, shape and bounds checked."""
+    key, unit, shape = f.name, f.metadata["unit"], f.metadata["shape"]
+    if not isinstance(entry, dict) or set(entry) != {"value", "unit", "source"}:
+        raise ValueError(f"{where}: [{key}] is {entry!r}; accepted: a table with value, unit and source")
+    if entry["unit"] != unit:
+        raise ValueError(f"{where}: {key}.unit is {entry['unit']!r}; accepted: {unit!r}")
+    if not isinstance(entry["source"], str) or not entry["source"].strip():
+        raise ValueError(f"{where}: {key}.source is {entry['source']!r}; accepted: a text that says where it is from")
+    try:
+        value = np.asarray(entry["value"])
+    except ValueError:
+        value = np.asarray("ragged")
+    if value.dtype.kind not in "fi" or value.shape != shape:
+        expected = "a number" if shape == () else f"numbers of shape {shape}"
+        raise ValueError(f"{where}: {key}.value is {entry['value']!r}; accepted: {expected}")
+    value = value.astype(np.float64)
+    at_least, above = f.metadata["at_least"], f.metadata["above"]
+    accepted = f">= {at_least}" if at_least is not None else f"> {above}" if above is not None else "finite"
+    good = np.isfinite(value)
+    if at_least is not None:
+        good &= value >= at_least
+    if above is not None:
+        good &= value > above
+    if not np.all(good):
+        raise ValueError(f"{where}: {key}.value is {entry['value']!r}; accepted: {accepted} {unit}, finite")
+    return value if shape else float(value)
+
+
+def check(vehicle: Vehicle, where: str = "vehicle") -> None:
+    """Check what no single value shows.
+
+    Raises:
+        ValueError: naming the values and what is accepted.
+    """
+    ix, iy, iz = vehicle.inertia
+    if ix + iy < iz or iy + iz < ix or iz + ix < iy:
+        raise ValueError(
+            f"{where}: inertia.value is {list(vehicle.inertia)}; accepted: no moment larger than the sum of the "
+            "other two (the triangle inequality of every rigid body)"
+        )
+    if sorted(vehicle.rotor_spin) != [-1, -1, 1, 1]:
+        raise ValueError(f"{where}: rotor_spin.value is {list(vehicle.rotor_spin)}; accepted: two of +1 and two of -1")
+    if vehicle.tilt_max >= np.pi / 2:
+        raise ValueError(f"{where}: tilt_max.value is {vehicle.tilt_max}; accepted: below pi/2 rad")
+    k2 = vehicle.thrust_map[0]
+    if k2 <= 0:
+        raise ValueError(f"{where}: thrust_map.value is {list(vehicle.thrust_map)}; accepted: k2 > 0")
+    if vehicle.rotor_speed_min >= vehicle.rotor_speed_max:
+        raise ValueError(
+            f"{where}: rotor_speed_min.value is {vehicle.rotor_speed_min}; accepted: below rotor_speed_max "
+            f"({vehicle.rotor_speed_max} rad/s)"
+        )
+    k1, k0 = vehicle.thrust_map[1:]
+    idle_slope = 2 * k2 * vehicle.rotor_speed_min + k1
+    idle_thrust = k2 * vehicle.rotor_speed_min**2 + k1 * vehicle.rotor_speed_min + k0
+    if idle_slope <= 0 or idle_thrust <= 0:
+        raise ValueError(
+            f"{where}: rotor_speed_min.value is {vehicle.rotor_speed_min}; accepted: a speed at which thrust_map "
+            f"{list(vehicle.thrust_map)} is positive and rising (here {idle_thrust:.3g} N, {idle_slope:.3g} N*s/rad)"
+        )
+    if vehicle.thrust_to_weight <= 1.05 or 4 * vehicle.thrust_range[0] >= vehicle.mass * GRAVITY:
+        low, high = vehicle.thrust_range
+        raise ValueError(
+            f"{where}: mass.value is {vehicle.mass} kg and one rotor gives {low:.4g} to {high:.4g} N by thrust_map, "
+            f"rotor_thrust_max and rotor_speed_max: it cannot hover (thrust to weight {vehicle.thrust_to_weight:.2f}; "
+            "accepted: more than 1.05, and less than 1 at idle)"
+        )
+    allocation = allocation_matrix(vehicle)
+    if vehicle.torque_ratio == 0 or np.linalg.cond(allocation / np.abs(allocation).max(1, keepdims=True)) > 1e3:
+        raise ValueError(
+            f"{where}: rotor_position.value {vehicle.rotor_position.tolist()}, rotor_spin and torque_ratio "
+            f"({vehicle.torque_ratio} m) leave an axis without control; accepted: rotors that give independent "
+            "thrust, roll, pitch and yaw"
+        )
+
+
+def allocation_matrix(vehicle: Vehicle) -> np.ndarray:
+    """The 4x4 matrix from rotor thrusts, N, to [collective thrust, N; torque about body x, y, z, N*m]."""
+    x, y = np.asarray(vehicle.rotor_position, np.float64).T
+    return np.stack([np.ones(4), y, -x, np.asarray(vehicle.rotor_spin) * vehicle.torque_ratio])
