@@ -1,0 +1,76 @@
+"""The rigid body: forces and torques on it, and the accelerations that they give (paper, Quadrotor Dynamics)."""
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from e2efly.physics.components import Quat, Vec3
+from e2efly.physics.state import Parts, split4
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle, quantities
+
+Rotors = tuple[Array, Array, Array, Array]
+
+jax.tree_util.register_dataclass(Vehicle, data_fields=[f.name for f in quantities()], meta_fields=["name"])
+
+
+def rotor_thrust(vehicle: Vehicle, rotor_speed: Rotors) -> Rotors:
+    """Thrust of each rotor, N: the quadratic thrust map, never negative."""
+    k2, k1, k0 = (vehicle.thrust_map[..., i] for i in range(3))
+    a, b, c, d = (jnp.maximum((k2 * w + k1) * w + k0, 0.0) for w in rotor_speed)
+    return a, b, c, d
+
+
+def rotor_speed_for(vehicle: Vehicle, thrust: Rotors) -> Rotors:
+    """The rotor speed, rad/s, that gives each thrust, N (at or above the idle thrust)."""
+    k2, k1, k0 = (vehicle.thrust_map[..., i] for i in range(3))
+    half, scale = k1 / (2 * k2), 1 / k2
+    a, b, c, d = (jnp.sqrt(half**2 + (f - k0) * scale) - half for f in thrust)
+    return a, b, c, d
+
+
+def rotor_wrench(vehicle: Vehicle, thrust: Rotors) -> tuple[Array, Vec3]:
+    """Collective thrust along body z, N, and torque about the body axes, N*m: arms times thrust, and reaction."""
+    x, y = (split4(vehicle.rotor_position[..., i]) for i in range(2))
+    spin = split4(vehicle.rotor_spin)
+    collective = thrust[0] + thrust[1] + thrust[2] + thrust[3]
+    roll = sum(y[i] * thrust[i] for i in range(4))
+    pitch = -sum(x[i] * thrust[i] for i in range(4))
+    yaw = vehicle.torque_ratio * sum(spin[i] * thrust[i] for i in range(4))
+    return collective, Vec3(roll, pitch, yaw)
+
+
+def drag(vehicle: Vehicle, air_velocity: Vec3) -> Vec3:
+    """Drag in the body frame, N: -(k1 v + k2 v |v|) an axis of the body-frame air-relative velocity, m/s.
+
+    The paper writes k v v, which has no sign and pushes a vehicle that flies backwards.
+    """
+    k1, k2 = Vec3.of(vehicle.drag_linear), Vec3.of(vehicle.drag_quadratic)
+    return air_velocity.times(k1 + air_velocity.abs().times(k2)) * -1.0
+
+
+def acceleration(vehicle: Vehicle, attitude: Quat, velocity: Vec3, collective: Array, wind: Vec3 | None) -> Vec3:
+    """Acceleration of the centre of mass in the world, m/s^2."""
+    air_velocity = attitude.unrotate(velocity if wind is None else velocity - wind)
+    force = drag(vehicle, air_velocity)
+    force = Vec3(force.x, force.y, force.z + collective)
+    a = attitude.rotate(force) * (1 / vehicle.mass)
+    return Vec3(a.x, a.y, a.z - GRAVITY)
+
+
+def angular_acceleration(vehicle: Vehicle, body_rate: Vec3, torque: Vec3) -> Vec3:
+    """Euler's equation in the body frame, rad/s^2: J^-1 (torque - w x J w)."""
+    inertia = Vec3.of(vehicle.inertia)
+    return (torque - body_rate.cross(inertia.times(body_rate))).over(inertia)
+
+
+def derivative(vehicle: Vehicle, parts: Parts, wind: Vec3 | None) -> Parts:
+    """Time derivative of the body's state at the rotor speeds of `parts`; the rotors' own entry is zero."""
+    collective, torque = rotor_wrench(vehicle, rotor_thrust(vehicle, parts.rotor_speed))
+    zero = jnp.zeros_like(collective)
+    return Parts(
+        position=parts.velocity,
+        velocity=acceleration(vehicle, parts.attitude, parts.velocity, collective, wind),
+        attitude=parts.attitude.derivative(parts.body_rate),
+        body_rate=angular_acceleration(vehicle, parts.body_rate, torque),
+        rotor_speed=(zero, zero, zero, zero),
+    )

@@ -1,0 +1,76 @@
+"""Integrators of one sub-step. The motor lag is exact in each; the rigid body is advanced by the named method."""
+
+import dataclasses
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from e2efly.physics.body import Rotors, acceleration, angular_acceleration, derivative, rotor_thrust, rotor_wrench
+from e2efly.physics.components import Vec3
+from e2efly.physics.state import Parts
+from e2efly.vehicles.vehicle import Vehicle
+
+Integrator = Callable[[Vehicle, Parts, Rotors, Vec3 | None, float], Parts]
+"""(vehicle, state, rotor speed commands, wind, step in s) -> state one step later."""
+
+
+def spin_up(vehicle: Vehicle, speed: Rotors, command: Rotors, dt: float) -> Rotors:
+    """Rotor speeds after `dt` seconds of first-order lag towards a constant command: exact."""
+    return _lag(speed, command, jnp.exp(-dt / vehicle.motor_time_constant))
+
+
+def _lag(speed: Rotors, command: Rotors, decay: Array) -> Rotors:
+    a, b, c, d = (u + (w - u) * decay for w, u in zip(speed, command, strict=True))
+    return a, b, c, d
+
+
+def euler(vehicle: Vehicle, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
+    """Explicit Euler: all rates at the start of the step. First order."""
+    moved = _advance(parts, derivative(vehicle, parts, wind), dt)
+    return _finish(moved, spin_up(vehicle, parts.rotor_speed, command, dt))
+
+
+def semi_implicit(vehicle: Vehicle, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
+    """Semi-implicit (symplectic) Euler: velocities first, poses with the new velocities. First order, most stable."""
+    speed = spin_up(vehicle, parts.rotor_speed, command, dt)
+    collective, torque = rotor_wrench(vehicle, rotor_thrust(vehicle, speed))
+    velocity = parts.velocity + acceleration(vehicle, parts.attitude, parts.velocity, collective, wind) * dt
+    body_rate = parts.body_rate + angular_acceleration(vehicle, parts.body_rate, torque) * dt
+    return Parts(
+        position=parts.position + velocity * dt,
+        velocity=velocity,
+        attitude=(parts.attitude + parts.attitude.derivative(body_rate) * dt).normalized(),
+        body_rate=body_rate,
+        rotor_speed=speed,
+    )
+
+
+def rk4(vehicle: Vehicle, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
+    """Classical Runge-Kutta with the exact rotor speeds at the start, middle and end. Fourth order."""
+    half_decay = jnp.exp(-0.5 * dt / vehicle.motor_time_constant)
+    middle = _lag(parts.rotor_speed, command, half_decay)
+    end = _lag(middle, command, half_decay)
+
+    def rate(at: Parts, speed: Rotors) -> Parts:
+        return derivative(vehicle, dataclasses.replace(at, rotor_speed=speed), wind)
+
+    k1 = rate(parts, parts.rotor_speed)
+    k2 = rate(_advance(parts, k1, dt / 2), middle)
+    k3 = rate(_advance(parts, k2, dt / 2), middle)
+    k4 = rate(_advance(parts, k3, dt), end)
+    mean = jax.tree.map(lambda a, b, c, d: (a + 2 * b + 2 * c + d) / 6, k1, k2, k3, k4)
+    return _finish(_advance(parts, mean, dt), end)
+
+
+def _advance(parts: Parts, rate: Parts, dt: float) -> Parts:
+    return jax.tree.map(lambda x, dx: x + dx * dt, parts, rate)
+
+
+def _finish(parts: Parts, rotor_speed: Rotors) -> Parts:
+    return dataclasses.replace(parts, attitude=parts.attitude.normalized(), rotor_speed=rotor_speed)
+
+
+INTEGRATORS: dict[str, Integrator] = {"euler": euler, "semi_implicit": semi_implicit, "rk4": rk4}
+"""Integrators by name."""

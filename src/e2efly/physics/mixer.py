@@ -1,0 +1,59 @@
+"""From collective thrust and torque to rotor thrusts, with the flight controller's nominal vehicle."""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from e2efly.physics.body import Rotors
+from e2efly.physics.components import Vec3
+from e2efly.vehicles.vehicle import Vehicle, allocation_matrix
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Mixer:
+    """The inverse of the rotor geometry and the thrust limits, of the vehicle that the flight controller believes in."""
+
+    matrix: np.ndarray | Array
+    """(4, 4): rotor thrusts, N, from [collective, N; roll, pitch, yaw torque, N*m]."""
+    thrust_min: float | Array
+    """Thrust of a rotor at idle, N."""
+    thrust_max: float | Array
+    """Largest thrust of a rotor, N."""
+
+    @staticmethod
+    def of(vehicle: Vehicle, dtype: type = np.float32) -> "Mixer":
+        """The mixer of a loaded (not traced) vehicle."""
+        low, high = vehicle.thrust_range
+        return Mixer(np.linalg.inv(allocation_matrix(vehicle)).astype(dtype), dtype(low), dtype(high))
+
+    def limit(self, thrust: Rotors) -> Rotors:
+        """Each rotor's thrust clipped to what it can give."""
+        a, b, c, d = (jnp.clip(f, self.thrust_min, self.thrust_max) for f in thrust)
+        return a, b, c, d
+
+    def thrusts(self, collective: Array, torque: Vec3) -> Rotors:
+        """Rotor thrusts within the limits, N; attitude goes before thrust, as in Betaflight's mixer.
+
+        When the torque asks for more span than a rotor has, all of it is scaled down; then the collective is shifted
+        until every rotor is inside its limits.
+        """
+        m = self.matrix
+        spread = [m[i, 1] * torque.x + m[i, 2] * torque.y + m[i, 3] * torque.z for i in range(4)]
+        span = _max4(spread) - _min4(spread)
+        available = self.thrust_max - self.thrust_min
+        scale = available / jnp.maximum(span, available)
+        asked = [m[i, 0] * collective + scale * spread[i] for i in range(4)]
+        shift = jnp.maximum(self.thrust_min - _min4(asked), 0.0) - jnp.maximum(_max4(asked) - self.thrust_max, 0.0)
+        return self.limit((asked[0] + shift, asked[1] + shift, asked[2] + shift, asked[3] + shift))
+
+
+def _max4(x: list[Array]) -> Array:
+    return jnp.maximum(jnp.maximum(x[0], x[1]), jnp.maximum(x[2], x[3]))
+
+
+def _min4(x: list[Array]) -> Array:
+    return jnp.minimum(jnp.minimum(x[0], x[1]), jnp.minimum(x[2], x[3]))

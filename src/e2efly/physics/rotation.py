@@ -1,0 +1,79 @@
+"""Quaternion algebra on arrays: unit quaternions wxyz, body to world, batched over leading axes."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from e2efly.physics.components import Quat, Vec3, stack
+
+Quaternion = Float[Array, "*n 4"]
+Vector = Float[Array, "*n 3"]
+
+
+def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Hamilton product: turn by `b`, then by `a`."""
+    return Quat.of(a).compose(Quat.of(b)).stack()
+
+
+def conjugate(q: Quaternion) -> Quaternion:
+    """The inverse turn of a unit quaternion."""
+    return Quat.of(q).conjugate().stack()
+
+
+def normalize(q: Quaternion) -> Quaternion:
+    """Scale to unit length."""
+    return Quat.of(q).normalized().stack()
+
+
+def rotate(q: Quaternion, v: Vector) -> Vector:
+    """Body vector to world vector."""
+    return Quat.of(q).rotate(Vec3.of(v)).stack()
+
+
+def unrotate(q: Quaternion, v: Vector) -> Vector:
+    """World vector to body vector."""
+    return Quat.of(q).unrotate(Vec3.of(v)).stack()
+
+
+def to_matrix(q: Quaternion) -> Float[Array, "*n 3 3"]:
+    """Rotation matrix R_world_body."""
+    axes = jnp.eye(3, dtype=q.dtype)
+    return jnp.stack([rotate(q, jnp.broadcast_to(axis, (*q.shape[:-1], 3))) for axis in axes], axis=-1)
+
+
+def from_euler(roll: Array, pitch: Array, yaw: Array) -> Quaternion:
+    """R = Rz(yaw) Ry(pitch) Rx(roll), angles in rad."""
+    return euler_components(roll, pitch, yaw).stack()
+
+
+def euler_components(roll: Array, pitch: Array, yaw: Array) -> Quat:
+    """`from_euler`, taken apart."""
+    cr, sr = jnp.cos(roll / 2), jnp.sin(roll / 2)
+    cp, sp = jnp.cos(pitch / 2), jnp.sin(pitch / 2)
+    cy, sy = jnp.cos(yaw / 2), jnp.sin(yaw / 2)
+    return Quat(
+        cy * cp * cr + sy * sp * sr,
+        cy * cp * sr - sy * sp * cr,
+        cy * sp * cr + sy * cp * sr,
+        sy * cp * cr - cy * sp * sr,
+    )
+
+
+def yaw(q: Quaternion) -> Float[Array, "*n"]:
+    """Heading: the angle about world z of the body's x axis, rad in (-pi, pi]; gradient finite when x points up."""
+    w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    sine, cosine = 2 * (w * z + x * y), 1 - 2 * (y * y + z * z)
+    defined = sine**2 + cosine**2 > 1e-12
+    return jnp.where(defined, jnp.arctan2(jnp.where(defined, sine, 0.0), jnp.where(defined, cosine, 1.0)), 0.0)
+
+
+def cos_tilt(q: Quaternion) -> Float[Array, "*n"]:
+    """Cosine of the angle between the body's z axis and up."""
+    return Quat.of(q).z_axis().z
+
+
+def yaw_pitch_roll(q: Quaternion) -> Vector:
+    """[yaw, pitch, roll] in rad, for people to read (not differentiable at pitch of +-90 deg)."""
+    w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    pitch = jnp.arcsin(jnp.clip(2 * (w * y - z * x), -1, 1))
+    roll = jnp.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    return stack(yaw(q), pitch, roll)

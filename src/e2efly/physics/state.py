@@ -1,0 +1,78 @@
+"""The state of a vehicle."""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from e2efly.physics.components import Quat, Vec3, stack
+from e2efly.vehicles.vehicle import Vehicle
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class State:
+    """What changes in flight. World ENU (z up), body FLU, SI units."""
+
+    position: Float[Array, "*n 3"]
+    """Centre of mass, world, m."""
+    velocity: Float[Array, "*n 3"]
+    """World, m/s."""
+    quaternion: Float[Array, "*n 4"]
+    """Unit quaternion wxyz, body to world."""
+    body_rate: Float[Array, "*n 3"]
+    """Angular velocity in the body frame, rad/s."""
+    rotor_speed: Float[Array, "*n 4"]
+    """Rear right, front right, rear left, front left, rad/s."""
+
+    @staticmethod
+    def hovering(vehicle: Vehicle, position: Float[Array, "*n 3"]) -> "State":
+        """At rest and level at `position`, the rotors carrying the weight."""
+        position = jnp.asarray(position)
+        batch, dtype = position.shape[:-1], position.dtype
+        return State(
+            position=position,
+            velocity=jnp.zeros_like(position),
+            quaternion=jnp.broadcast_to(jnp.array([1.0, 0, 0, 0], dtype), (*batch, 4)),
+            body_rate=jnp.zeros_like(position),
+            rotor_speed=jnp.full((*batch, 4), vehicle.hover_rotor_speed, dtype),
+        )
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Parts:
+    """A `State` taken apart into components."""
+
+    position: Vec3
+    velocity: Vec3
+    attitude: Quat
+    body_rate: Vec3
+    rotor_speed: tuple[Array, Array, Array, Array]
+
+    @staticmethod
+    def of(state: State) -> "Parts":
+        """Take a state apart."""
+        return Parts(
+            Vec3.of(state.position),
+            Vec3.of(state.velocity),
+            Quat.of(state.quaternion),
+            Vec3.of(state.body_rate),
+            split4(state.rotor_speed),
+        )
+
+    def join(self) -> State:
+        """The state again."""
+        return State(
+            self.position.stack(),
+            self.velocity.stack(),
+            self.attitude.stack(),
+            self.body_rate.stack(),
+            stack(*self.rotor_speed),
+        )
+
+
+def split4(array: Float[Array, "*n 4"]) -> tuple[Array, Array, Array, Array]:
+    """The four entries of the last axis."""
+    return array[..., 0], array[..., 1], array[..., 2], array[..., 3]

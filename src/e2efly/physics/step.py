@@ -1,0 +1,109 @@
+"""One control step: physics sub-steps under a command, the rate loop running at each of them."""
+
+import math
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from e2efly.physics.components import Vec3
+from e2efly.physics.control import COMMAND_MODES
+from e2efly.physics.integrate import INTEGRATORS
+from e2efly.physics.mixer import Mixer
+from e2efly.physics.state import Parts, State, split4
+from e2efly.vehicles.names import unknown
+from e2efly.vehicles.vehicle import Vehicle
+
+
+@partial(
+    jax.tree_util.register_dataclass,
+    data_fields=["nominal", "mixer"],
+    meta_fields=["command_mode", "integrator", "control_period", "substeps"],
+)
+@dataclass(frozen=True)
+class Physics:
+    """How the physics is run. The nominal vehicle is what the flight controller believes in."""
+
+    nominal: Vehicle
+    """The vehicle of the control laws and of the action map, as arrays."""
+    mixer: Mixer
+    """The nominal vehicle's mixer."""
+    command_mode: str
+    """A name of `COMMAND_MODES`."""
+    integrator: str
+    """A name of `INTEGRATORS`."""
+    control_period: float
+    """Seconds a control step."""
+    substeps: int
+    """Physics steps a control step."""
+
+    @staticmethod
+    def of(
+        vehicle: Vehicle,
+        command_mode: str = "ctbr",
+        integrator: str = "semi_implicit",
+        control_rate: float | None = None,
+        largest_step: float = 0.005,
+        dtype: type = np.float32,
+    ) -> "Physics":
+        """Physics of a loaded vehicle, with as few equal sub-steps as keep each at most `largest_step` seconds.
+
+        Raises:
+            ValueError: for an unknown mode or integrator, or a rate or step that is not positive.
+        """
+        if command_mode not in COMMAND_MODES:
+            raise ValueError(unknown("command mode", command_mode, COMMAND_MODES))
+        if integrator not in INTEGRATORS:
+            raise ValueError(unknown("integrator", integrator, INTEGRATORS))
+        rate = vehicle.control_rate if control_rate is None else control_rate
+        for name, value in (("control_rate", rate), ("largest_step", largest_step)):
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} is {value}; accepted: a positive number")
+        substeps = math.ceil(1 / (rate * largest_step) - 1e-9)
+        nominal = jax.tree.map(lambda x: np.asarray(x, dtype), vehicle)
+        return Physics(nominal, Mixer.of(vehicle, dtype), command_mode, integrator, 1 / rate, substeps)
+
+
+def step(
+    physics: Physics,
+    vehicle: Vehicle,
+    state: State,
+    command: Float[Array, "*n 4"],
+    *,
+    previous: Float[Array, "*n 4"] | None = None,
+    switch_time: Float[Array, "*n"] | None = None,
+    wind: Float[Array, "*n 3"] | None = None,
+) -> State:
+    """Advance the state by one control period.
+
+    Args:
+        physics: how to integrate and control.
+        vehicle: the plant; any field may be batched.
+        state: where it starts.
+        command: in the units of the command mode.
+        previous: the command that still acts before `switch_time`, for latencies that are no whole steps.
+        switch_time: seconds after the start of the step at which `command` takes over from `previous`, in
+            [0, control_period]. A sub-step that holds the switch gets the time average of the two, which keeps the
+            step differentiable in the latency.
+        wind: velocity of the air in the world, m/s.
+    """
+    law = COMMAND_MODES[physics.command_mode].law
+    integrate = INTEGRATORS[physics.integrator]
+    dt = physics.control_period / physics.substeps
+    air = None if wind is None else Vec3.of(wind)
+    after = split4(command)
+    before = None if previous is None else split4(previous)
+
+    def substep(parts: Parts, index: Array) -> tuple[Parts, None]:
+        acting = after
+        if before is not None:
+            done = jnp.clip((index + 1) - switch_time / dt, 0.0, 1.0).astype(command.dtype)
+            acting = tuple(b + (a - b) * done for a, b in zip(after, before, strict=True))
+        rotor_command = law(physics.nominal, physics.mixer, parts, acting)
+        return integrate(vehicle, parts, rotor_command, air, dt), None
+
+    parts, _ = jax.lax.scan(substep, Parts.of(state), jnp.arange(physics.substeps))
+    return parts.join()
