@@ -28,6 +28,12 @@ def rotor_speed_for(vehicle: Vehicle, thrust: Rotors) -> Rotors:
     return a, b, c, d
 
 
+def hover_rotor_speed(vehicle: Vehicle) -> Array:
+    """The speed, rad/s, at which four equal rotors carry the weight."""
+    f = vehicle.mass * GRAVITY / 4
+    return rotor_speed_for(vehicle, (f, f, f, f))[0]
+
+
 def rotor_wrench(vehicle: Vehicle, thrust: Rotors) -> tuple[Array, Vec3]:
     """Collective thrust along body z, N, and torque about the body axes, N*m: arms times thrust, and reaction."""
     x, y = (split4(vehicle.rotor_position[..., i]) for i in range(2))

@@ -1,0 +1,374 @@
+"""The one environment, for every task and algorithm: pure `reset` and `step`, batched over one leading axis.
+
+A control step: the action joins the queue of the latency, the physics runs its sub-steps under the commands that
+the queue lets through, the task judges, the reward is summed, the policy's observation is built from the (delayed,
+noisy) state, and vehicles whose episode ended start anew. All of it is differentiable but the events.
+"""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+
+from e2efly import rewards
+from e2efly.config import EnvConfig, ImuConfig, NoiseConfig, RewardConfig, TaskConfig
+from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field, past_actions
+from e2efly.physics import COMMAND_MODES, Physics, State, command_limits, step
+from e2efly.physics.body import hover_rotor_speed
+from e2efly.physics.rotation import from_euler, yaw
+from e2efly.sensors import imu, latency
+from e2efly.sensors.noise import add_noise
+from e2efly.tasks import Shape, Task, make_task
+from e2efly.tasks.task import into_ball, uniform
+from e2efly.vehicles import Vehicle, load_vehicle, unknown
+from e2efly.vehicles.vehicle import GRAVITY, quantities
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class EnvState:
+    """Everything that one step hands to the next, each leaf of shape (n, ...) but the key and the tick."""
+
+    vehicle: State
+    memory: Any
+    """The task's own state."""
+    time: Float[Array, " n"]
+    """Since the start of the episode, s."""
+    actions: Float[Array, "n k 4"]
+    """The policy's last actions, newest first."""
+    action_latency: Float[Array, " n"]
+    """s."""
+    plant: dict[str, Array]
+    """The randomised vehicle parameters."""
+    wind: Float[Array, "n 3"] | None
+    """World, m/s."""
+    past: State | None
+    """The last states, newest first, when observations are late."""
+    observation_latency: Float[Array, " n"] | None
+    """s."""
+    imu: imu.ImuState | None
+    """Biases and the last measurement."""
+    key: PRNGKeyArray
+    tick: Int[Array, ""]
+    """Steps since `reset`; with the key it seeds everything random."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Step:
+    """What a step returns beside the new state, each leaf of shape (n, ...)."""
+
+    observation: Float[Array, "n o"]
+    """What to act on next: of a new episode where the last one ended."""
+    final_observation: Float[Array, "n o"]
+    """What was reached, before any new start: the one to bootstrap from."""
+    reward: Float[Array, " n"]
+    terms: dict[str, Float[Array, " n"]]
+    """The weighted terms of the reward."""
+    terminated: Bool[Array, " n"]
+    """The episode ended for good: no value after it."""
+    truncated: Bool[Array, " n"]
+    """The time was out, and nothing else."""
+    success: Bool[Array, " n"]
+    """The episode ended in this step and met the criterion."""
+    error: Float[Array, " n"]
+    """The task's error, m."""
+
+    @property
+    def done(self) -> Bool[Array, " n"]:
+        """Terminated or truncated."""
+        return self.terminated | self.truncated
+
+
+@partial(
+    jax.tree_util.register_dataclass,
+    data_fields=[
+        "physics", "task", "weights", "parameters", "center", "half", "latency_range", "observation_latency_range",
+        "randomize", "wind", "noise", "imu",
+    ],
+    meta_fields=["queue", "seen_actions", "past"],
+)  # fmt: skip
+@dataclass(frozen=True)
+class Env:
+    """Make it with `Env.of`. Its numbers are leaves: pass it to compiled functions, replace them freely."""
+
+    physics: Physics
+    task: Task
+    weights: dict[str, Any]
+    parameters: dict[str, Any]
+    center: Float[Array, "4"]
+    """Command at action 0, of the nominal vehicle."""
+    half: Float[Array, "4"]
+    """Half of the command's range."""
+    latency_range: Float[Array, "2"]
+    observation_latency_range: Float[Array, "2"]
+    randomize: dict[str, Any]
+    """Relative half-width of each randomised vehicle parameter."""
+    wind: Any
+    """Largest wind speed, m/s; None: still air."""
+    noise: NoiseConfig | None
+    imu: ImuConfig | None
+    queue: int
+    """Actions that are kept."""
+    seen_actions: int
+    """Past actions in the observation."""
+    past: int
+    """States that are kept for late observations; 0: none."""
+
+    @staticmethod
+    def of(task: TaskConfig, reward: RewardConfig, config: EnvConfig = EnvConfig(), dtype: type = np.float32) -> "Env":
+        """Build the environment of a configuration.
+
+        Raises:
+            ValueError: naming the field, the value and what is accepted.
+        """
+        vehicle = load_vehicle(config.vehicle)
+        physics = Physics.of(
+            vehicle, config.command_mode, config.integrator, config.control_rate, config.largest_step, dtype
+        )
+        period = physics.control_period
+        _check(config, task)
+        rewards.check(reward.weights, reward.parameters)
+        late = config.action_latency or (vehicle.latency, vehicle.latency)
+        frames = latency.frames(late[1], period)
+        seen = frames if config.past_actions is None else config.past_actions
+        low, high = command_limits(COMMAND_MODES[config.command_mode], vehicle, config.position_range)
+        noisy = config.noise != NoiseConfig()
+        shape = Shape(vehicle.feet_height, vehicle.radius)
+        return Env(
+            physics=physics,
+            task=make_task(task, shape, period),
+            weights=dict(reward.weights),
+            parameters=dict(reward.parameters),
+            center=((low + high) / 2).astype(dtype),
+            half=((high - low) / 2).astype(dtype),
+            latency_range=np.asarray(late, dtype),
+            observation_latency_range=np.asarray(config.observation_latency, dtype),
+            randomize=dict(config.randomize),
+            wind=config.wind or None,
+            noise=config.noise if noisy else None,
+            imu=config.imu,
+            queue=max(frames + 1, seen, 2),
+            seen_actions=seen,
+            past=latency.frames(config.observation_latency[1], period) + 1 if config.observation_latency[1] else 0,
+        )
+
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """The observation, field by field."""
+        sensed = () if self.imu is None else (GYROSCOPE, ACCELEROMETER)
+        last = (past_actions(self.seen_actions),) if self.seen_actions else ()
+        return (*self.task.fields, ATTITUDE, VELOCITY, BODY_RATE, *sensed, *last)
+
+    @property
+    def observation_size(self) -> int:
+        """Numbers of the observation."""
+        return sum(f.size for f in self.fields)
+
+    @property
+    def control_period(self) -> float:
+        """Seconds a step."""
+        return self.physics.control_period
+
+    def command(self, action: Float[Array, "n 4"]) -> Float[Array, "n 4"]:
+        """The nominal action map: [-1, 1] linearly onto the command's range, clipped to it."""
+        return self.center + self.half * jnp.clip(action, -1.0, 1.0)
+
+    def reset(self, key: PRNGKeyArray, n: int) -> tuple[EnvState, Float[Array, "n o"]]:
+        """Start `n` episodes.
+
+        Returns:
+            The state and the first observation.
+        """
+        state = self._start(key, n, jnp.zeros((), jnp.int32))
+        return state, self._observe(state)
+
+    def step(self, state: EnvState, action: Float[Array, "n 4"]) -> tuple[EnvState, Step]:
+        """One control step, with new starts where an episode ended."""
+        reached, out = self.advance(state, action)
+        return self.restart(reached, out)
+
+    def restart(self, state: EnvState, out: Step) -> tuple[EnvState, Step]:
+        """Start anew where `out` says that the episode ended; all of it under a full mask is a reset."""
+
+        def anew(_: None) -> tuple[EnvState, Array]:
+            fresh = self._start(jax.random.fold_in(state.key, state.tick), out.reward.shape[0], state.tick)
+            chosen = _where(out.done, dataclasses.replace(fresh, key=state.key), state)
+            return chosen, self._observe(chosen)
+
+        state, observation = jax.lax.cond(jnp.any(out.done), anew, lambda _: (state, out.final_observation), None)
+        return state, dataclasses.replace(out, observation=observation)
+
+    def advance(self, state: EnvState, action: Float[Array, "n 4"]) -> tuple[EnvState, Step]:
+        """One control step without new starts."""
+        period = self.control_period
+        actions = jnp.concatenate([action[:, None], state.actions[:, :-1]], axis=1)
+        old, new, switch = latency.acting_commands(self.command(actions), state.action_latency, period)
+        before = state.vehicle
+        plant = dataclasses.replace(self.physics.nominal, **state.plant)
+        after = step(self.physics, plant, before, new, previous=old, switch_time=switch, wind=state.wind)
+
+        time = state.time + period
+        late = time >= self.task.episode_s - 1e-3 * period
+        memory, outcome = self.task.advance(state.memory, before, after, time, late)
+        tick = state.tick + 1
+        inertial = state.imu
+        if self.imu is not None and inertial is not None:
+            inertial = imu.measure(
+                self.imu, jax.random.fold_in(state.key, 2 * tick), inertial, before, after, period
+            )
+        reached = EnvState(
+            vehicle=after,
+            memory=memory,
+            time=time,
+            actions=actions,
+            action_latency=state.action_latency,
+            plant=state.plant,
+            wind=state.wind,
+            past=None if state.past is None else _push(state.past, after),
+            observation_latency=state.observation_latency,
+            imu=inertial,
+            key=state.key,
+            tick=tick,
+        )
+        goal_before, goal_now = (self.task.goal(state.memory, t) for t in (state.time, time))
+        wanted_yaw = self.task.desired_yaw(state.memory, after)
+        zero = jnp.zeros_like(wanted_yaw)
+        signals = {
+            "offset": goal_now - after.position,
+            "previous_offset": goal_before - before.position,
+            "velocity": after.velocity,
+            "quaternion": after.quaternion,
+            "body_rate": after.body_rate,
+            "action": action,
+            "previous_action": state.actions[:, 0],
+            "height": after.position[:, 2] - self.task.shape.feet_height,
+            "yaw_error": _wrap(yaw(after.quaternion) - wanted_yaw),
+            "desired_quaternion": from_euler(zero, zero, wanted_yaw),
+            "arrived": outcome.arrived,
+            "crashed": outcome.crashed,
+        }
+        total, terms = rewards.reward(self.weights, self.parameters, signals)
+        observation = self._observe(reached)
+        return reached, Step(
+            observation=observation,
+            final_observation=observation,
+            reward=total,
+            terms=terms,
+            terminated=outcome.terminated,
+            truncated=late & ~outcome.terminated,
+            success=outcome.success,
+            error=outcome.error,
+        )
+
+    def _start(self, key: PRNGKeyArray, n: int, tick: Int[Array, ""]) -> EnvState:
+        task_key, plant_key, wind_key, action_key, observation_key = jax.random.split(key, 5)
+        nominal, dtype = self.physics.nominal, self.center.dtype
+        vehicle, memory = self.task.start(task_key, n)
+        rotor_speed = jnp.broadcast_to(hover_rotor_speed(nominal), (n, 4))
+        vehicle = dataclasses.replace(vehicle, rotor_speed=rotor_speed)
+        vehicle = jax.tree.map(lambda x: x.astype(dtype), vehicle)
+        past = None
+        if self.past:
+            past = jax.tree.map(lambda x: jnp.broadcast_to(x[:, None], (n, self.past, *x.shape[1:])), vehicle)
+        return EnvState(
+            vehicle=vehicle,
+            memory=memory,
+            time=jnp.zeros(n, dtype),
+            actions=jnp.broadcast_to(self.hover_action(), (n, self.queue, 4)).astype(dtype),
+            action_latency=_between(action_key, n, self.latency_range),
+            plant=_perturbed(plant_key, n, nominal, self.randomize),
+            wind=None if self.wind is None else self.wind * into_ball(uniform(wind_key, n, 3)),
+            past=past,
+            observation_latency=_between(observation_key, n, self.observation_latency_range) if self.past else None,
+            imu=None if self.imu is None else imu.ImuState.at(vehicle),
+            key=key,
+            tick=tick,
+        )
+
+    def hover_action(self) -> Float[Array, "4"]:
+        """The action that hovers a level vehicle, where the command mode has one; else the middle of the range."""
+        mass = self.physics.nominal.mass
+        hover = {
+            "ctbr": (GRAVITY, 0.0, 0.0, 0.0),
+            "attitude": (GRAVITY, 0.0, 0.0, 0.0),
+            "rotor_thrust": (mass * GRAVITY / 4,) * 4,
+        }.get(self.physics.command_mode, (0.0,) * 4)
+        return (jnp.stack([jnp.asarray(x) for x in hover]) - self.center) / self.half
+
+    def _observe(self, state: EnvState) -> Float[Array, "n o"]:
+        seen = state.vehicle
+        if state.past is not None and state.observation_latency is not None:
+            seen = latency.delayed_state(state.past, state.observation_latency, self.control_period)
+        if self.noise is not None:
+            seen = add_noise(self.noise, jax.random.fold_in(state.key, 2 * state.tick + 1), seen)
+        n = seen.position.shape[0]
+        targets = self.task.targets(state.memory, state.time) - seen.position[:, None]
+        parts = [targets.reshape(n, -1), seen.quaternion, seen.velocity, seen.body_rate]
+        if state.imu is not None:
+            parts += [state.imu.gyroscope, state.imu.accelerometer]
+        parts.append(state.actions[:, : self.seen_actions].reshape(n, -1))
+        return jnp.concatenate(parts, axis=-1)
+
+
+def _where(mask: Bool[Array, " n"], a: Any, b: Any) -> Any:
+    """Leaf by leaf, `a` where the mask holds; leaves without the batch axis come from `b`."""
+
+    def choose(x: Array, y: Array) -> Array:
+        if y.shape[:1] != mask.shape:
+            return y
+        return jnp.where(mask.reshape(mask.shape + (1,) * (y.ndim - 1)), x, y)
+
+    return jax.tree.map(choose, a, b)
+
+
+def _push(past: State, newest: State) -> State:
+    return jax.tree.map(lambda old, new: jnp.concatenate([new[:, None], old[:, :-1]], axis=1), past, newest)
+
+
+def _between(key: PRNGKeyArray, n: int, bounds: Float[Array, "2"]) -> Float[Array, " n"]:
+    return bounds[0] + (bounds[1] - bounds[0]) * jax.random.uniform(key, (n,), jnp.asarray(bounds).dtype)
+
+
+def _perturbed(key: PRNGKeyArray, n: int, nominal: Vehicle, widths: dict[str, Any]) -> dict[str, Array]:
+    """Each named parameter times a uniform factor in 1 +- its width, entry by entry."""
+    plant = {}
+    for i, (name, width) in enumerate(sorted(widths.items())):
+        value = jnp.asarray(getattr(nominal, name))
+        factor = jax.random.uniform(jax.random.fold_in(key, i), (n, *value.shape), value.dtype, -1.0, 1.0)
+        plant[name] = value * (1 + width * factor)
+    return plant
+
+
+def _wrap(angle: Array) -> Array:
+    """Into [-pi, pi]."""
+    return jnp.arctan2(jnp.sin(angle), jnp.cos(angle))
+
+
+def _check(config: EnvConfig, task: TaskConfig) -> None:
+    """Check the numbers of a configuration.
+
+    Raises:
+        ValueError: naming the field, the value and what is accepted.
+    """
+    names = [f.name for f in quantities()]
+    for name, width in config.randomize.items():
+        if name not in names:
+            raise ValueError(unknown("vehicle parameter", name, names))
+        if not 0 <= width < 1:
+            raise ValueError(f"env.randomize.{name} is {width}; accepted: at least 0 and below 1")
+    for field, bounds in (("action_latency", config.action_latency), ("observation_latency", config.observation_latency)):
+        if bounds is not None and not (0 <= bounds[0] <= bounds[1] <= 1):
+            raise ValueError(f"env.{field} is {bounds}; accepted: two rising numbers of seconds in [0, 1]")
+    if config.past_actions is not None and config.past_actions < 0:
+        raise ValueError(f"env.past_actions is {config.past_actions}; accepted: 0 or more")
+    if not (math.isfinite(config.wind) and config.wind >= 0):
+        raise ValueError(f"env.wind is {config.wind}; accepted: 0 or more, m/s")
+    if not (math.isfinite(task.episode_s) and task.episode_s > 0):
+        raise ValueError(f"task.episode_s is {task.episode_s}; accepted: a positive number of seconds")

@@ -1,0 +1,87 @@
+"""Episodes of a policy from given seeds, without new starts: what training watches and `eval` reports."""
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
+
+from e2efly.env import Env, EnvState, Step
+from e2efly.physics import State
+
+Act = Callable[[Float[Array, "n o"]], Float[Array, "n 4"]]
+"""A policy: actions from observations."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Episodes:
+    """How each of n episodes went."""
+
+    success: Bool[Array, " n"]
+    duration: Float[Array, " n"]
+    """Until success, failure or time-out, s."""
+    final_error: Float[Array, " n"]
+    """The task's error at its end, m."""
+    mean_error: Float[Array, " n"]
+    """Mean error over the episode after `settle`, m."""
+    top_speed: Float[Array, " n"]
+    """m/s."""
+    top_rate: Float[Array, " n"]
+    """Largest body rate, rad/s."""
+    roughness: Float[Array, " n"]
+    """Mean length of the change of the action between two steps (its range is [-1, 1] an axis)."""
+    reward: Float[Array, " n"]
+    """Sum over the episode."""
+    crashed: Bool[Array, " n"]
+    """Ended for ill before time was out."""
+
+
+def run_episodes(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int, settle: float = 0.0) -> Episodes:
+    """Fly `n` episodes of at most `steps` control steps; each stands still once it has ended."""
+    state, observation = env.reset(key, n)
+    zero, no = jnp.zeros(n), jnp.zeros(n, bool)
+    first = (state, observation, no, Episodes(no, zero, zero, zero, zero, zero, zero, zero, no), zero)
+
+    def step(carry: tuple, _: None) -> tuple[tuple, None]:
+        state, observation, over, e, counted = carry
+        action = act(observation)
+        reached, out = env.advance(state, action)
+        live = 1.0 - over
+        counts = live * (reached.time > settle)
+        speed = jnp.linalg.norm(reached.vehicle.velocity, axis=-1)
+        turn = jnp.linalg.norm(reached.vehicle.body_rate, axis=-1)
+        change = jnp.linalg.norm(jnp.clip(action, -1, 1) - jnp.clip(state.actions[:, 0], -1, 1), axis=-1)
+        e = Episodes(
+            success=e.success | (out.success & ~over),
+            duration=e.duration + live * env.control_period,
+            final_error=jnp.where(over, e.final_error, out.error),
+            mean_error=e.mean_error + counts * out.error,
+            top_speed=jnp.maximum(e.top_speed, live * speed),
+            top_rate=jnp.maximum(e.top_rate, live * turn),
+            roughness=e.roughness + live * change,
+            reward=e.reward + live * out.reward,
+            crashed=e.crashed | (out.terminated & ~out.success & ~over),
+        )
+        return (reached, out.final_observation, over | out.done, e, counted + counts), None
+
+    (_, _, _, e, counted), _ = jax.lax.scan(step, first, None, length=steps)
+    flown = jnp.maximum(e.duration / env.control_period, 1.0)
+    return dataclasses.replace(
+        e, mean_error=e.mean_error / jnp.maximum(counted, 1.0), roughness=e.roughness / flown
+    )
+
+
+def trace(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int) -> tuple[State, Float[Array, "t n 4"], Step]:
+    """The states, actions and outcomes of `n` episodes, each leaf (steps, n, ...), without new starts."""
+    state, observation = env.reset(key, n)
+
+    def step(carry: tuple[EnvState, Array], _: None) -> tuple[tuple[EnvState, Array], tuple[State, Array, Step]]:
+        state, observation = carry
+        action = act(observation)
+        reached, out = env.advance(state, action)
+        return (reached, out.final_observation), (reached.vehicle, action, out)
+
+    return jax.lax.scan(step, (state, observation), None, length=steps)[1]

@@ -1,0 +1,1 @@
+"""Learning: networks, algorithms (one a file), checkpoints and the runner."""

@@ -1,0 +1,117 @@
+"""Back-propagation through time: gradient ascent on the return, through physics, latency and policy.
+
+Each update rolls a window of the deterministic policy and follows the exact gradient of its discounted reward. The
+state carries over to the next window, detached; a new start inside a window cuts the gradient by itself, as it does
+not depend on what came before.
+"""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+from jaxtyping import Array, Float, PRNGKeyArray
+
+from e2efly.config import BPTTConfig, NetworkConfig
+from e2efly.env import Env, EnvState
+from e2efly.learn.networks import Features, Layers, init_policy, policy
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Parameters:
+    """What BPTT learns."""
+
+    policy: Layers
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class TrainState:
+    """Everything that an update changes: what a checkpoint holds."""
+
+    parameters: Parameters
+    optimizer: Any
+    env: EnvState
+    observation: Float[Array, "n o"]
+    key: PRNGKeyArray
+
+
+@dataclass(frozen=True)
+class BPTT:
+    """The algorithm on one environment's shapes; its numbers come in with `config` at every call."""
+
+    features: Features
+    network: NetworkConfig
+    optimizer: optax.GradientTransformation
+
+    def init(self, env: Env, config: BPTTConfig, seed: int, start: tuple[EnvState, Array]) -> TrainState:
+        """The first state: the network by NumPy, environments as started."""
+        del config
+        rng = np.random.default_rng(seed)
+        hover = np.asarray(env.hover_action())
+        parameters = Parameters(init_policy(rng, self.features.size, self.network.hidden, hover))
+        return TrainState(parameters, self.optimizer.init(parameters), *start, jax.random.key(seed))
+
+    def update(
+        self, env: Env, config: BPTTConfig, state: TrainState, progress: Float[Array, ""]
+    ) -> tuple[TrainState, dict[str, Array]]:
+        """One window and one gradient step.
+
+        Args:
+            env: the environment.
+            config: numbers of the algorithm.
+            state: where the last window ended.
+            progress: share of the run that is done, in [0, 1]: sets the learning rate.
+
+        Returns:
+            The new state and the metrics of this update.
+        """
+
+        def loss(parameters: Parameters) -> tuple[Array, Any]:
+            return self._window(env, config, parameters, state)
+
+        grads, (env_state, observation, metrics) = jax.grad(loss, has_aux=True)(state.parameters)
+        rate = config.learning_rate * (config.learning_rate_end / config.learning_rate) ** progress
+        updates, optimizer = self.optimizer.update(grads, state.optimizer, state.parameters)
+        parameters = jax.tree.map(lambda p, u: p - rate * u, state.parameters, updates)
+        metrics["loss/gradient_norm"] = optax.global_norm(grads)
+        return dataclasses.replace(
+            state, parameters=parameters, optimizer=optimizer, env=env_state, observation=observation
+        ), metrics
+
+    def _window(self, env: Env, config: BPTTConfig, parameters: Parameters, state: TrainState) -> tuple[Array, Any]:
+        keep = jnp.exp(-config.gradient_decay * env.control_period)
+
+        @jax.checkpoint  # recomputing a step is faster than storing it, and far smaller
+        def step(carry: tuple[EnvState, Array, Array], _: None) -> tuple[Any, Any]:
+            env_state, observation, discount = carry
+            action = policy(parameters.policy, self.features(observation), self.network.activation)
+            env_state, out = env.step(env_state, action)
+            env_state = dataclasses.replace(env_state, vehicle=_damped(env_state.vehicle, keep))
+            gathered = (
+                jnp.mean(out.reward),
+                jnp.sum(out.done),
+                jnp.sum(out.success),
+                {name: jnp.mean(x) for name, x in out.terms.items()},
+            )
+            return (env_state, out.observation, discount * config.gamma), (discount * jnp.mean(out.reward), gathered)
+
+        first = (state.env, state.observation, jnp.float32(1.0))
+        (env_state, observation, _), (gain, gathered) = jax.lax.scan(step, first, None, length=config.horizon)
+        reward, done, success, terms = gathered
+        metrics = {
+            "reward": jnp.mean(reward),
+            "episodes": jnp.sum(done),
+            "train_success": jnp.sum(success) / jnp.maximum(jnp.sum(done), 1),
+            **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()},
+        }
+        return -jnp.sum(gain) / config.horizon, (env_state, observation, metrics)
+
+
+def _damped(tree: Any, keep: Array) -> Any:
+    """The same values; their gradient scaled by `keep`."""
+    return jax.tree.map(lambda x: keep * x + jax.lax.stop_gradient((1 - keep) * x), tree)

@@ -1,0 +1,201 @@
+"""Proximal policy optimisation (Schulman et al. 2017) on the environment, one update a call.
+
+The policy is a tanh network with Gaussian noise of learned, state-independent size; actions are clipped to [-1, 1]
+by the environment's action map. Time-outs bootstrap with the value of the observation before the new start.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+from jaxtyping import Array, Float, PRNGKeyArray
+
+from e2efly.config import NetworkConfig, PPOConfig
+from e2efly.env import Env, EnvState
+from e2efly.learn.networks import Features, Layers, init_mlp, init_policy, mlp, policy
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Parameters:
+    """What PPO learns."""
+
+    policy: Layers
+    log_std: Float[Array, "4"]
+    critic: Layers
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class TrainState:
+    """Everything that an update changes: what a checkpoint holds."""
+
+    parameters: Parameters
+    optimizer: Any
+    env: EnvState
+    observation: Float[Array, "n o"]
+    key: PRNGKeyArray
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Samples:
+    """What a rollout gathers, each leaf (steps, n, ...) or flat."""
+
+    features: Float[Array, "*t f"]
+    action: Float[Array, "*t 4"]
+    log_prob: Float[Array, "*t"]
+    advantage: Float[Array, "*t"]
+    value_target: Float[Array, "*t"]
+
+
+def gae(
+    reward: Float[Array, "t n"],
+    value: Float[Array, "t n"],
+    next_value: Float[Array, "t n"],
+    terminated: Float[Array, "t n"],
+    done: Float[Array, "t n"],
+    gamma: float | Array,
+    lam: float | Array,
+) -> Float[Array, "t n"]:
+    """Generalised advantage estimate (Schulman et al. 2016).
+
+    Args:
+        reward: of each step.
+        value: of the observation acted on.
+        next_value: of the observation reached, before any new start.
+        terminated: the step ended the episode for good: nothing follows.
+        done: the step ended the episode, also by time-out: the sum stops, the bootstrap stays.
+        gamma: discount.
+        lam: lambda.
+    """
+    delta = reward + gamma * (1.0 - terminated) * next_value - value
+
+    def backward(carry: Array, x: tuple[Array, Array]) -> tuple[Array, Array]:
+        step_delta, step_done = x
+        carry = step_delta + gamma * lam * (1.0 - step_done) * carry
+        return carry, carry
+
+    return jax.lax.scan(backward, jnp.zeros_like(delta[0]), (delta, done), reverse=True)[1]
+
+
+def log_prob(action: Float[Array, "*t 4"], mean: Float[Array, "*t 4"], log_std: Float[Array, "4"]) -> Float[Array, "*t"]:
+    """Log density of a diagonal Gaussian."""
+    z = (action - mean) * jnp.exp(-log_std)
+    return -jnp.sum(0.5 * z**2 + log_std + 0.5 * jnp.log(2 * jnp.pi), axis=-1)
+
+
+@dataclass(frozen=True)
+class PPO:
+    """The algorithm on one environment's shapes; its numbers come in with `config` at every call."""
+
+    features: Features
+    network: NetworkConfig
+    optimizer: optax.GradientTransformation
+
+    def init(self, env: Env, config: PPOConfig, seed: int, start: tuple[EnvState, Array]) -> TrainState:
+        """The first state: networks by NumPy, environments as started."""
+        rng = np.random.default_rng(seed)
+        hover = np.asarray(env.hover_action())
+        parameters = Parameters(
+            init_policy(rng, self.features.size, self.network.hidden, hover),
+            np.full(4, config.log_std, np.float32),
+            init_mlp(rng, (self.features.size, *self.network.hidden, 1), 1.0),
+        )
+        return TrainState(parameters, self.optimizer.init(parameters), *start, jax.random.key(seed))
+
+    def update(
+        self, env: Env, config: PPOConfig, state: TrainState, progress: Float[Array, ""]
+    ) -> tuple[TrainState, dict[str, Array]]:
+        """A rollout of every environment, then epochs of minibatches over it.
+
+        Args:
+            env: the environment.
+            config: numbers of the algorithm.
+            state: where the last update ended.
+            progress: share of the run that is done, in [0, 1]: sets the learning rate.
+
+        Returns:
+            The new state and the metrics of this update.
+        """
+        key, rollout_key, epoch_key = jax.random.split(state.key, 3)
+        samples, env_state, observation, metrics = self._rollout(env, config, state, rollout_key)
+        flat = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), samples)
+        size = config.envs * config.horizon
+        rate = config.learning_rate * (config.learning_rate_end / config.learning_rate) ** progress
+
+        def minibatch(carry: tuple[Parameters, Any], index: Array) -> tuple[tuple[Parameters, Any], dict[str, Array]]:
+            parameters, optimizer = carry
+            batch = jax.tree.map(lambda x: x[index], flat)
+            grads, losses = jax.grad(self._loss, has_aux=True)(parameters, config, batch)
+            updates, optimizer = self.optimizer.update(grads, optimizer, parameters)
+            parameters = jax.tree.map(lambda p, u: p - rate * u, parameters, updates)
+            return (parameters, optimizer), {**losses, "gradient_norm": optax.global_norm(grads)}
+
+        def epoch(carry: tuple[Parameters, Any], epoch_key: PRNGKeyArray) -> tuple[Any, dict[str, Array]]:
+            order = jax.random.permutation(epoch_key, size).reshape(-1, config.minibatch)
+            return jax.lax.scan(minibatch, carry, order)
+
+        (parameters, optimizer), losses = jax.lax.scan(
+            epoch, (state.parameters, state.optimizer), jax.random.split(epoch_key, config.epochs)
+        )
+        metrics |= {f"loss/{name}": jnp.mean(x) for name, x in losses.items()}
+        metrics["std"] = jnp.mean(jnp.exp(parameters.log_std))
+        return TrainState(parameters, optimizer, env_state, observation, key), metrics
+
+    def _rollout(
+        self, env: Env, config: PPOConfig, state: TrainState, key: PRNGKeyArray
+    ) -> tuple[Samples, EnvState, Array, dict[str, Array]]:
+        parameters = state.parameters
+        activation = self.network.activation
+        noise = jax.random.normal(key, (config.horizon, config.envs, 4))
+
+        def step(carry: tuple[EnvState, Array], z: Array) -> tuple[tuple[EnvState, Array], Any]:
+            env_state, observation = carry
+            features = self.features(observation)
+            mean = policy(parameters.policy, features, activation)
+            action = mean + jnp.exp(parameters.log_std) * z
+            env_state, out = env.step(env_state, action)
+            gathered = (
+                features,
+                action,
+                self.features(out.final_observation),
+                out.reward,
+                out.terminated.astype(jnp.float32),
+                out.done.astype(jnp.float32),
+                out.success.astype(jnp.float32),
+                {name: jnp.mean(x) for name, x in out.terms.items()},
+            )
+            return (env_state, out.observation), gathered
+
+        (env_state, observation), gathered = jax.lax.scan(step, (state.env, state.observation), noise)
+        features, action, final_features, reward, terminated, done, success, terms = gathered
+        value = mlp(parameters.critic, features, activation)[..., 0]
+        next_value = mlp(parameters.critic, final_features, activation)[..., 0]
+        advantage = gae(reward, value, next_value, terminated, done, config.gamma, config.gae_lambda)
+        density = -jnp.sum(0.5 * noise**2 + parameters.log_std + 0.5 * jnp.log(2 * jnp.pi), axis=-1)
+        samples = Samples(features, action, density, advantage, advantage + value)
+        ended = jnp.maximum(jnp.sum(done), 1.0)
+        metrics = {
+            "reward": jnp.mean(reward),
+            "episodes": jnp.sum(done),
+            "train_success": jnp.sum(success) / ended,
+            **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()},
+        }
+        return samples, env_state, observation, metrics
+
+    def _loss(self, parameters: Parameters, config: PPOConfig, batch: Samples) -> tuple[Array, dict[str, Array]]:
+        activation = self.network.activation
+        mean = policy(parameters.policy, batch.features, activation)
+        ratio = jnp.exp(log_prob(batch.action, mean, parameters.log_std) - batch.log_prob)
+        advantage = (batch.advantage - jnp.mean(batch.advantage)) / (jnp.std(batch.advantage) + 1e-8)
+        clipped = jnp.clip(ratio, 1 - config.clip, 1 + config.clip)
+        policy_loss = -jnp.mean(jnp.minimum(ratio * advantage, clipped * advantage))
+        value = mlp(parameters.critic, batch.features, activation)[..., 0]
+        value_loss = 0.5 * jnp.mean((value - batch.value_target) ** 2)
+        entropy = jnp.sum(parameters.log_std)
+        total = policy_loss + config.value_weight * value_loss - config.entropy_weight * entropy
+        return total, {"policy": policy_loss, "value": value_loss, "ratio": jnp.mean(ratio)}

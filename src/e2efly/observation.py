@@ -1,0 +1,33 @@
+"""What a policy sees, field by field: the words of the contract. Imports no JAX."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Field:
+    """A part of the observation vector."""
+
+    name: str
+    """What it is."""
+    size: int
+    """How many numbers."""
+    frame: str
+    """`world` (ENU), `body` (FLU), `world_body` (a turn from body to world) or `none`."""
+    unit: str
+    """Unit of each number."""
+    scale: float
+    """The number, in that unit, that the network sees as 1."""
+    description: str
+    """How to compute it."""
+
+
+ATTITUDE = Field("attitude", 4, "world_body", "1", 1.0, "unit quaternion wxyz, body to world")
+VELOCITY = Field("velocity", 3, "world", "m/s", 2.0, "velocity of the centre of mass")
+BODY_RATE = Field("body_rate", 3, "body", "rad/s", 4.0, "angular velocity about body x, y, z")
+GYROSCOPE = Field("gyroscope", 3, "body", "rad/s", 4.0, "measured angular velocity")
+ACCELEROMETER = Field("accelerometer", 3, "body", "m/s^2", 10.0, "measured specific force (level at rest: 0, 0, 9.81)")
+
+
+def past_actions(count: int) -> Field:
+    """The policy's last outputs."""
+    return Field("past_actions", 4 * count, "none", "1", 1.0, "the policy's last outputs in [-1, 1], newest first")

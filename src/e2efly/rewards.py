@@ -1,0 +1,287 @@
+"""The paper's reward manual: one pure function a term, batched over leading axes.
+
+Every term is unweighted and signed so that its weight is positive: the reward of a step is the sum of weight times
+term. A term asks for what it reads by the names of its arguments; `reward` finds them among the signals of the step
+and the parameters of the configuration. Terms are tagged: `differentiable`, `partly` (differentiable between jumps)
+or `sparse` (an event; first-order methods drop its gradient, which is zero anyway).
+
+The equation names are those of the E2E-Fly paper, section Reward Design. Where the paper contradicts itself the
+docstring says what we do; docs/rewards.md has the table.
+"""
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from e2efly.physics.components import safe_sqrt
+from e2efly.vehicles.names import unknown
+
+Scalar = Float[Array, "*n"]
+Vector = Float[Array, "*n 3"]
+
+
+def norm(v: Float[Array, "*n k"]) -> Scalar:
+    """Euclidean length over the last axis; gradient 0 at zero."""
+    return safe_sqrt(jnp.sum(v * v, axis=-1))
+
+
+def prog1(offset: Vector, previous_offset: Vector) -> Scalar:
+    """Distance to the goal gained in this step, m (Eq. prog1; signed, where the paper's norm also pays for losing)."""
+    return norm(previous_offset) - norm(offset)
+
+
+def prog2(offset: Vector) -> Scalar:
+    """Minus the distance to the goal, m (Eq. prog2)."""
+    return -norm(offset)
+
+
+def progxy(offset: Vector) -> Scalar:
+    """Minus the horizontal distance to the goal, m (Eq. prog3)."""
+    return -norm(offset[..., :2])
+
+
+def progx(offset: Vector) -> Scalar:
+    """Minus the distance to the goal along world x, m (Eq. prog4)."""
+    return -jnp.abs(offset[..., 0])
+
+
+def progy(offset: Vector) -> Scalar:
+    """Minus the distance to the goal along world y, m (Eq. prog5)."""
+    return -jnp.abs(offset[..., 1])
+
+
+def progz(offset: Vector) -> Scalar:
+    """Minus the distance to the goal along world z, m (Eq. prog6)."""
+    return -jnp.abs(offset[..., 2])
+
+
+def act1(action: Float[Array, "*n 4"]) -> Scalar:
+    """Minus the length of the action (Eq. act1, with the sign it has in act3)."""
+    return -norm(action)
+
+
+def act2(action: Float[Array, "*n 4"], previous_action: Float[Array, "*n 4"]) -> Scalar:
+    """Minus the length of the change of the action (Eq. act2, with the sign it has in act3)."""
+    return -norm(action - previous_action)
+
+
+def act3(
+    action: Float[Array, "*n 4"],
+    previous_action: Float[Array, "*n 4"],
+    act3_size: float | Array = 0.025,
+    act3_change: float | Array = 0.002,
+) -> Scalar:
+    """Both: -(lambda7 |u| + lambda8 |u - u'|), with the paper's racing values as defaults (Eq. act3)."""
+    return act3_size * act1(action) + act3_change * act2(action, previous_action)
+
+
+def ori1(yaw_error: Scalar) -> Scalar:
+    """exp(-|yaw error|), rad (Eq. ori1; of the absolute angle, or one side would pay)."""
+    return jnp.exp(-jnp.abs(yaw_error))
+
+
+def ori2(quaternion: Float[Array, "*n 4"], desired_quaternion: Float[Array, "*n 4"]) -> Scalar:
+    """Minus the distance of the quaternion to the desired one (Eq. ori2), of q and -q the nearer: both are one turn."""
+    inner = jnp.sum(quaternion * desired_quaternion, axis=-1, keepdims=True)
+    return -norm(quaternion - jnp.where(inner < 0, -1.0, 1.0) * desired_quaternion)
+
+
+def ori3(pixel: Float[Array, "*n 2"], pixel_velocity: Float[Array, "*n 2"]) -> Scalar:
+    """exp(-(u^2 + v^2 + u'^2 + v'^2)): keep the target still in the middle of the image (Eq. ori3)."""
+    return jnp.exp(-jnp.sum(pixel**2, axis=-1) - jnp.sum(pixel_velocity**2, axis=-1))
+
+
+def ori4(roll_error: Scalar, approaching: Bool[Array, "*n"], ori4_limit: float | Array = 2.0) -> Scalar:
+    """-min(tan|roll error|, lambda12) while approaching a gap, else 0 (Eq. ori4). The limit holds from a right angle on."""
+    angle = jnp.abs(roll_error)
+    bounded = jnp.minimum(angle, jnp.arctan(ori4_limit))
+    return jnp.where(approaching, -jnp.tan(bounded), 0.0)
+
+
+def v1(velocity: Vector) -> Scalar:
+    """Minus the speed, m/s (Eq. linearv1)."""
+    return -norm(velocity)
+
+
+def v2(velocity: Vector, desired_speed: Scalar | float = 1.0) -> Scalar:
+    """-(speed - v_d) (Eq. linearv2, as written: it pays for being slow without bound)."""
+    return -(norm(velocity) - desired_speed)
+
+
+def v3(velocity: Vector, desired_speed: Scalar | float = 1.0) -> Scalar:
+    """-(exp(speed - v_d) + 1) (Eq. linearv3, as written: the constant stays)."""
+    return -(jnp.exp(norm(velocity) - desired_speed) + 1.0)
+
+
+def descent_speed(
+    height: Scalar, vz_slope: float | Array = 1.0, vz_min: float | Array = 0.2, vz_max: float | Array = 1.0
+) -> Scalar:
+    """Wanted speed of descent at a height: clamp(alpha height, min, max), m/s (Eq. linearvz)."""
+    return jnp.clip(vz_slope * height, vz_min, vz_max)
+
+
+def vz(
+    velocity: Vector,
+    height: Scalar,
+    vz_slope: float | Array = 1.0,
+    vz_min: float | Array = 0.2,
+    vz_max: float | Array = 1.0,
+) -> Scalar:
+    """1 / (1 + |v_h + v_z|): 1 at the wanted speed of descent (Eq. linearv4)."""
+    return 1.0 / (1.0 + jnp.abs(descent_speed(height, vz_slope, vz_min, vz_max) + velocity[..., 2]))
+
+
+def anglev(body_rate: Vector) -> Scalar:
+    """Minus the body rate, rad/s (Eq. anglev)."""
+    return -norm(body_rate)
+
+
+def avoid1(clearance: Scalar, avoid1_offset: float | Array = 0.1) -> Scalar:
+    """-1 / (d + b) (Eq. avoid1; negative, where the paper's sign pays for being near)."""
+    return -1.0 / (jnp.maximum(clearance, 0.0) + avoid1_offset)
+
+
+def avoid2(
+    clearance: Scalar,
+    approach_speed: Scalar,
+    avoid2_radius: float | Array = 0.12,
+    avoid2_barrier: float | Array = 0.1,
+    avoid2_steepness: float | Array = 32.0,
+) -> Scalar:
+    """-|v_c| (max(1 - (d - r), 0)^2 + lambda19 softplus(-lambda20 (d - r))), v_c >= 0 only while approaching.
+
+    Eq. avoid2, with the softplus falling with distance (the paper's grows) and inside the scaling by the approach
+    speed, as its text says. Steepness 32 is DiffPhysDrone's.
+    """
+    gap = clearance - avoid2_radius
+    near = jnp.maximum(1.0 - gap, 0.0) ** 2 + avoid2_barrier * jax.nn.softplus(-avoid2_steepness * gap)
+    return -jnp.maximum(approach_speed, 0.0) * near
+
+
+def goal(arrived: Bool[Array, "*n"]) -> Scalar:
+    """1 in the step that arrives at a goal (Eq. goal)."""
+    return arrived.astype(jnp.float32)
+
+
+def crash(crashed: Bool[Array, "*n"]) -> Scalar:
+    """-1 in the step that crashes (Eq. collision)."""
+    return -crashed.astype(jnp.float32)
+
+
+def near(offset: Vector, near_steepness: float | Array = 8.0) -> Scalar:
+    """exp(-d) + exp(-k d) / 2: steep near the goal and flat far away. Ours, for PPO; not in the paper."""
+    d = norm(offset)
+    return jnp.exp(-d) + 0.5 * jnp.exp(-near_steepness * d)
+
+
+def anglev_sq(body_rate: Vector) -> Scalar:
+    """Minus the body rate squared, (rad/s)^2: no corner at zero. Ours."""
+    return -jnp.sum(body_rate**2, axis=-1)
+
+
+def act2_sq(action: Float[Array, "*n 4"], previous_action: Float[Array, "*n 4"]) -> Scalar:
+    """Minus the squared change of the action: no corner at zero. Ours."""
+    return -jnp.sum((action - previous_action) ** 2, axis=-1)
+
+
+def descent(
+    velocity: Vector,
+    height: Scalar,
+    offset: Vector,
+    vz_slope: float | Array = 1.0,
+    vz_min: float | Array = 0.2,
+    vz_max: float | Array = 1.0,
+    descent_cone: float | Array = 0.3,
+) -> Scalar:
+    """-|v_h s + v_z|, m/s: the wanted descent of `vz`, slowed by s = 1 / (1 + (d_xy / cone)^2) until centred. Ours."""
+    centred = 1.0 / (1.0 + jnp.sum(offset[..., :2] ** 2, axis=-1) / descent_cone**2)
+    return -jnp.abs(descent_speed(height, vz_slope, vz_min, vz_max) * centred + velocity[..., 2])
+
+
+def upright(quaternion: Float[Array, "*n 4"]) -> Scalar:
+    """-(1 - cos tilt): level is 0, upside down -2; heading free. Ours."""
+    return -2.0 * (quaternion[..., 1] ** 2 + quaternion[..., 2] ** 2)
+
+
+Kind = Literal["differentiable", "partly", "sparse"]
+
+
+@dataclass(frozen=True)
+class Term:
+    """A reward term: its function, and how far it can be differentiated."""
+
+    function: Callable[..., Array]
+    kind: Kind
+
+    @property
+    def inputs(self) -> list[str]:
+        """Signals that it must be given."""
+        parameters = inspect.signature(self.function).parameters.values()
+        return [p.name for p in parameters if p.default is inspect.Parameter.empty]
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Constants that a configuration may set, with their defaults."""
+        parameters = inspect.signature(self.function).parameters.values()
+        return {p.name: p.default for p in parameters if p.default is not inspect.Parameter.empty}
+
+
+_KINDS: dict[Kind, tuple[Callable[..., Array], ...]] = {
+    "differentiable": (
+        prog1, prog2, progxy, progx, progy, progz, act1, act2, act3, ori1, ori3, v1, v2, v3, anglev, near,
+        anglev_sq, act2_sq, upright,
+    ),
+    "partly": (ori2, ori4, vz, avoid1, avoid2, descent),
+    "sparse": (goal, crash),
+}  # fmt: skip
+TERMS: dict[str, Term] = {
+    function.__name__: Term(function, kind) for kind, functions in _KINDS.items() for function in functions
+}
+"""Every term by name."""
+
+PARAMETERS: frozenset[str] = frozenset(name for term in TERMS.values() for name in term.parameters)
+"""Constants of all terms."""
+
+
+def check(weights: Mapping[str, float], parameters: Mapping[str, float]) -> None:
+    """Check the names of a reward's terms and parameters.
+
+    Raises:
+        ValueError: naming the unknown name, the nearest one and all there are.
+    """
+    for name in weights:
+        if name not in TERMS:
+            raise ValueError(unknown("reward term", name, TERMS))
+    for name in parameters:
+        if name not in PARAMETERS:
+            raise ValueError(unknown("reward parameter", name, PARAMETERS))
+
+
+def reward(
+    weights: Mapping[str, float | Array], parameters: Mapping[str, float | Array], signals: Mapping[str, Array]
+) -> tuple[Scalar, dict[str, Scalar]]:
+    """The weighted sum of the terms, and each weighted term.
+
+    Args:
+        weights: a weight a term; an array leaf, so that changing it does not recompile.
+        parameters: constants of the terms that differ from their defaults.
+        signals: what the step offers to the terms, by name.
+
+    Raises:
+        ValueError: when a term needs a signal that the task does not have.
+    """
+    terms = {}
+    for name, weight in weights.items():
+        term = TERMS[name]
+        if missing := [i for i in term.inputs if i not in signals]:
+            raise ValueError(f"reward term {name!r} needs {', '.join(missing)}, which this task does not have")
+        given = {**parameters, **signals}
+        constants = {p: given[p] for p in term.parameters if p in given}
+        value = term.function(**{i: signals[i] for i in term.inputs}, **constants)
+        terms[name] = weight * (jax.lax.stop_gradient(value) if term.kind == "sparse" else value)
+    return sum(terms.values()), terms

@@ -1,0 +1,1 @@
+"""What the vehicle measures: noise of the state, IMU, age of measurements."""

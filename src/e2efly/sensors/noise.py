@@ -1,0 +1,28 @@
+"""White noise on the observed state."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import PRNGKeyArray
+
+from e2efly.config import NoiseConfig
+from e2efly.physics import State
+from e2efly.physics.components import stack
+from e2efly.physics.rotation import multiply, normalize
+
+jax.tree_util.register_dataclass(NoiseConfig)
+
+
+def add_noise(noise: NoiseConfig, key: PRNGKeyArray, state: State) -> State:
+    """The state as measured: Gaussian noise on position, velocity and body rate; a small random turn on the attitude."""
+    draw = jax.random.normal(key, (*state.position.shape[:-1], 12), state.position.dtype)
+    half_turn = noise.attitude * draw[..., 6:9] / 2
+    turn = stack(jnp.ones_like(half_turn[..., 0]), *(half_turn[..., i] for i in range(3)))
+    return dataclasses.replace(
+        state,
+        position=state.position + noise.position * draw[..., 0:3],
+        velocity=state.velocity + noise.velocity * draw[..., 3:6],
+        quaternion=normalize(multiply(state.quaternion, turn)),
+        body_rate=state.body_rate + noise.body_rate * draw[..., 9:12],
+    )

@@ -1,0 +1,73 @@
+"""Hovering: fly to a point from anywhere near and stay there."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
+
+from e2efly.config import HoverConfig
+from e2efly.observation import Field
+from e2efly.physics import State
+from e2efly.physics.rotation import from_euler
+from e2efly.tasks.task import Outcome, Shape, at_rest, touches_ground, uniform
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Hover:
+    """The task's memory is how long the vehicle has been within the radius, s."""
+
+    config: HoverConfig
+    shape: Shape
+    control_period: float | Array
+
+    name = "hover"
+    fields = (Field("position_error", 3, "world", "m", 1.0, "target position minus vehicle position"),)
+
+    @property
+    def episode_s(self) -> float | Array:
+        """Time limit, s."""
+        return self.config.episode_s
+
+    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Float[Array, " n"]]:
+        """Uniform about the target: position, velocity, roll, pitch, any yaw, body rates."""
+        c, u = self.config, uniform(key, n, 12)
+        state = at_rest(jnp.asarray(c.target) + c.position * u[:, :3])
+        quaternion = from_euler(c.tilt * u[:, 6], c.tilt * u[:, 7], jnp.pi * u[:, 8])
+        return dataclasses.replace(
+            state, velocity=c.velocity * u[:, 3:6], quaternion=quaternion, body_rate=c.body_rate * u[:, 9:12]
+        ), jnp.zeros(n)
+
+    def goal(self, memory: Float[Array, " n"], time: Float[Array, " n"]) -> Float[Array, "n 3"]:
+        """The target."""
+        del time
+        return jnp.broadcast_to(jnp.asarray(self.config.target), (*memory.shape, 3))
+
+    def targets(self, memory: Float[Array, " n"], time: Float[Array, " n"]) -> Float[Array, "n 1 3"]:
+        """The target."""
+        return self.goal(memory, time)[:, None]
+
+    def desired_yaw(self, memory: Float[Array, " n"], state: State) -> Float[Array, " n"]:
+        """Along world x."""
+        del state
+        return jnp.zeros_like(memory)
+
+    def advance(
+        self,
+        memory: Float[Array, " n"],
+        before: State,
+        after: State,
+        time: Float[Array, " n"],
+        timed_out: Bool[Array, " n"],
+    ) -> tuple[Float[Array, " n"], Outcome]:
+        """Success: within the radius for the last `hold_s` of the episode, never outside the fence or on the ground."""
+        del before
+        c = self.config
+        error = jnp.linalg.norm(after.position - self.goal(memory, time), axis=-1)
+        held = jnp.where(error < c.radius, memory + self.control_period, 0.0)
+        crashed = (error > c.fence) | touches_ground(self.shape, after)
+        arrived = (held > 0) & (memory == 0)
+        success = timed_out & ~crashed & (held >= c.hold_s - 1e-4)
+        return held, Outcome(crashed, success, arrived, crashed, error)

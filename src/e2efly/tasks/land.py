@@ -1,0 +1,82 @@
+"""Landing: touch down gently on a point of the ground."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
+
+from e2efly.config import LandConfig
+from e2efly.observation import Field
+from e2efly.physics import State
+from e2efly.physics.rotation import cos_tilt, from_euler
+from e2efly.tasks.task import Outcome, Shape, at_rest, touches_ground, uniform
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Land:
+    """The pad lies at the world's origin. The task's memory is empty: an array of shape (n, 0)."""
+
+    config: LandConfig
+    shape: Shape
+
+    name = "land"
+    fields = (
+        Field("position_error", 3, "world", "m", 1.0, "where the centre of mass is after landing, minus where it is"),
+    )
+
+    @property
+    def episode_s(self) -> float | Array:
+        """Time limit, s."""
+        return self.config.episode_s
+
+    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Float[Array, "n 0"]]:
+        """Level, any heading, over and beside the pad."""
+        c, u = self.config, uniform(key, n, 7)
+        low, high = c.height
+        height = self.shape.feet_height + (low + high) / 2 + (high - low) / 2 * u[:, 2]
+        state = at_rest(jnp.stack([c.sideways * u[:, 0], c.sideways * u[:, 1], height], axis=-1))
+        zero = jnp.zeros(n)
+        quaternion = from_euler(zero, zero, jnp.pi * u[:, 6])
+        return dataclasses.replace(state, velocity=c.velocity * u[:, 3:6], quaternion=quaternion), jnp.zeros((n, 0))
+
+    def goal(self, memory: Float[Array, "n 0"], time: Float[Array, " n"]) -> Float[Array, "n 3"]:
+        """The centre of mass of a vehicle that stands on the pad."""
+        del memory
+        zero = jnp.zeros_like(time)
+        return jnp.stack([zero, zero, zero + self.shape.feet_height], axis=-1)
+
+    def targets(self, memory: Float[Array, "n 0"], time: Float[Array, " n"]) -> Float[Array, "n 1 3"]:
+        """The same."""
+        return self.goal(memory, time)[:, None]
+
+    def desired_yaw(self, memory: Float[Array, "n 0"], state: State) -> Float[Array, " n"]:
+        """Along world x."""
+        del memory
+        return jnp.zeros_like(state.position[:, 0])
+
+    def advance(
+        self,
+        memory: Float[Array, "n 0"],
+        before: State,
+        after: State,
+        time: Float[Array, " n"],
+        timed_out: Bool[Array, " n"],
+    ) -> tuple[Float[Array, "n 0"], Outcome]:
+        """The episode ends at the first touch; success: near the centre, slow, upright. Judged at the step's end."""
+        del before, timed_out
+        c = self.config
+        offset = after.position - self.goal(memory, time)
+        sideways = jnp.linalg.norm(offset[:, :2], axis=-1)
+        touched = touches_ground(self.shape, after)
+        success = (
+            touched
+            & (sideways < c.radius)
+            & (jnp.abs(offset[:, 2]) < c.height_error)
+            & (jnp.linalg.norm(after.velocity, axis=-1) < c.speed)
+            & (cos_tilt(after.quaternion) > jnp.cos(c.tilt))
+        )
+        lost = (sideways > c.fence) | (offset[:, 2] > c.fence)
+        return memory, Outcome(touched | lost, success, success, (touched & ~success) | lost, sideways)

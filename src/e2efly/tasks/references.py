@@ -1,0 +1,164 @@
+"""References to follow: every kind becomes one quintic spline, so that all of them share one compiled program.
+
+A spline has uniform knots with position, velocity and acceleration (quintic Hermite pieces, twice continuously
+differentiable). A circle of the tracking task differs from its spline by less than 0.01 mm, a 3 m/s lemniscate by
+less than 0.1 mm.
+"""
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, PRNGKeyArray
+
+KNOT_PERIOD = 0.5
+"""Seconds between knots."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Spline:
+    """Knots a vehicle: [:, :, 0] position, m; 1 velocity, m/s; 2 acceleration, m/s^2."""
+
+    knots: Float[Array, "n m 3 3"]
+
+    def position(self, time: Float[Array, "n k"]) -> Float[Array, "n k 3"]:
+        """Positions at the given times, s; held at the ends."""
+        last = self.knots.shape[1] - 1
+        u = jnp.clip(time / KNOT_PERIOD, 0.0, last)
+        index = jnp.minimum(u.astype(jnp.int32), last - 1)
+        s = (u - index)[..., None]
+        rows = jnp.arange(self.knots.shape[0])[:, None]
+        a, b = self.knots[rows, index], self.knots[rows, index + 1]
+        h = KNOT_PERIOD
+        p0, v0, a0 = a[..., 0, :], a[..., 1, :] * h, a[..., 2, :] * (h * h / 2)
+        p1, v1, a1 = b[..., 0, :], b[..., 1, :] * h, b[..., 2, :] * (h * h / 2)
+        d = p1 - p0
+        c3 = 10 * d - 6 * v0 - 4 * v1 - 3 * a0 + a1
+        c4 = -15 * d + 8 * v0 + 7 * v1 + 3 * a0 - 2 * a1
+        c5 = 6 * d - 3 * v0 - 3 * v1 - a0 + a1
+        return p0 + s * (v0 + s * (a0 + s * (c3 + s * (c4 + s * c5))))
+
+
+def knot_count(duration: float) -> int:
+    """Knots that cover `duration` seconds."""
+    return math.ceil(duration / KNOT_PERIOD) + 1
+
+
+def circle(centre: Array, radius: float | Array, rate: float | Array, phase: Float[Array, " n"], m: int) -> Spline:
+    """A level circle: radius in m, angular rate in rad/s, phase in rad."""
+    angle = rate * KNOT_PERIOD * jnp.arange(m) + phase[:, None]
+    c, s, zero = jnp.cos(angle), jnp.sin(angle), jnp.zeros_like(angle)
+    p = jnp.asarray(centre) + radius * jnp.stack([c, s, zero], axis=-1)
+    v = radius * rate * jnp.stack([-s, c, zero], axis=-1)
+    a = radius * rate**2 * jnp.stack([-c, -s, zero], axis=-1)
+    return Spline(jnp.stack([p, v, a], axis=-2))
+
+
+def lemniscate(
+    centre: Array, half_length: float | Array, speed: float | Array, phase: Float[Array, " n"], m: int
+) -> Spline:
+    """Gerono's level figure of eight, x = A sin, y = A sin cos: half length A in m, top speed (at the middle) in m/s."""
+    rate = speed / (half_length * jnp.sqrt(2.0))
+    angle = rate * KNOT_PERIOD * jnp.arange(m) + phase[:, None]
+    zero = jnp.zeros_like(angle)
+    s, c, s2, c2 = jnp.sin(angle), jnp.cos(angle), jnp.sin(2 * angle), jnp.cos(2 * angle)
+    p = jnp.asarray(centre) + half_length * jnp.stack([s, s2 / 2, zero], axis=-1)
+    v = half_length * rate * jnp.stack([c, c2, zero], axis=-1)
+    a = half_length * rate**2 * jnp.stack([-s, -2 * s2, zero], axis=-1)
+    return Spline(jnp.stack([p, v, a], axis=-2))
+
+
+def polynomial(
+    key: PRNGKeyArray, centre: Array, reach: float | Array, speed: float | Array, n: int, m: int, every: int = 4
+) -> Spline:
+    """Random and smooth: minimum-jerk-like pieces of `every` knot periods between random points of a box.
+
+    The way points lie uniformly within `reach` of the centre, an axis. Their velocities are the mean slope to their
+    neighbours, the average speed of each vehicle's path being uniform between 0 and `speed`, m/s.
+    """
+    points_key, speed_key = jax.random.split(key)
+    count = math.ceil((m - 1) / every) + 1
+    points = reach * jax.random.uniform(points_key, (n, count + 2, 3), minval=-1.0, maxval=1.0)
+    period = every * KNOT_PERIOD
+    slope = jnp.diff(points, axis=1) / period
+    # shrink about the centre so that no piece is faster, on average, than the speed drawn for this vehicle
+    drawn = speed * jax.random.uniform(speed_key, (n, 1, 1))
+    shrink = jnp.minimum(1.0, drawn / jnp.max(jnp.linalg.norm(slope, axis=-1), axis=1)[:, None, None])
+    points, slope = points * shrink, slope * shrink
+    velocity = (slope[:, 1:] + slope[:, :-1]) / 2
+    coarse = jnp.stack([points[:, 1:-1], velocity, jnp.zeros_like(velocity)], axis=-2)
+    return Spline(_refine(coarse, period, every, m).at[:, :, 0].add(jnp.asarray(centre)))
+
+
+def _refine(coarse: Float[Array, "n c 3 3"], period: float, every: int, m: int) -> Float[Array, "n m 3 3"]:
+    """Quintic pieces over `every` knot periods, sampled with their derivatives at each knot: the same curve."""
+    s = np.arange(m) / every
+    index = np.minimum(s.astype(int), coarse.shape[1] - 2)
+    basis = np.stack([_basis(order, s - index) / period**order for order in range(3)])  # (order, 6, m)
+    scale = np.array([1.0, period, period**2])
+    ends = jnp.concatenate([coarse[:, index], coarse[:, index + 1]], axis=2) * np.tile(scale, 2)[:, None]
+    return jnp.einsum("oem,nmed->nmod", jnp.asarray(basis, coarse.dtype), ends)
+
+
+def _basis(order: int, s: np.ndarray) -> np.ndarray:
+    """The `order`-th derivative of the six quintic Hermite basis functions (p0, v0, a0, p1, v1, a1) at s, (6, m)."""
+    coefficients = np.array(
+        [
+            [-6, 15, -10, 0, 0, 1],
+            [-3, 8, -6, 0, 1, 0],
+            [-0.5, 1.5, -1.5, 0.5, 0, 0],
+            [6, -15, 10, 0, 0, 0],
+            [-3, 7, -4, 0, 0, 0],
+            [0.5, -1, 0.5, 0, 0, 0],
+        ]
+    )
+    return np.stack([np.polyval(np.polyder(np.poly1d(row), order), s) for row in coefficients])
+
+
+def read_csv(path: str | Path) -> np.ndarray:
+    """Read a reference: columns t, x, y, z with a header line, seconds and metres, t rising from any value.
+
+    Returns:
+        (rows, 4), t from zero.
+
+    Raises:
+        ValueError: naming the file, the line and what is accepted.
+    """
+    accepted = "accepted: a header 't,x,y,z', then at least 3 rows of finite numbers, t rising (s, m)"
+    try:
+        with Path(path).open(newline="", encoding="utf-8") as file:
+            lines = list(csv.reader(file))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"reference {str(path)!r} cannot be read: {error}") from None
+    if not lines or [cell.strip().lower() for cell in lines[0]] != ["t", "x", "y", "z"]:
+        raise ValueError(f"reference {path}, line 1: {lines[0] if lines else 'empty'}; {accepted}")
+    rows = []
+    for number, cells in enumerate(lines[1:], start=2):
+        try:
+            row = [float(cell) for cell in cells]
+        except ValueError:
+            row = []
+        if len(row) != 4 or not all(map(math.isfinite, row)) or (rows and row[0] <= rows[-1][0]):
+            raise ValueError(f"reference {path}, line {number}: {cells}; {accepted}")
+        rows.append(row)
+    if len(rows) < 3:
+        raise ValueError(f"reference {path}: {len(rows)} rows; {accepted}")
+    table = np.array(rows)
+    table[:, 0] -= table[0, 0]
+    return table
+
+
+def through_points(table: np.ndarray, m: int) -> np.ndarray:
+    """Knots (m, 3, 3) of the natural cubic spline through the rows t, x, y, z; held after the last row."""
+    from scipy.interpolate import CubicSpline  # only a user's own reference needs it
+
+    spline = CubicSpline(table[:, 0], table[:, 1:], bc_type="natural")
+    t = np.arange(m) * KNOT_PERIOD
+    inside = t <= table[-1, 0]
+    t = np.minimum(t, table[-1, 0])
+    return np.stack([spline(t), *(spline(t, order) * inside[:, None] for order in (1, 2))], axis=1)

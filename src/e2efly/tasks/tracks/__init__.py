@@ -1,0 +1,95 @@
+"""Race tracks as data files, and their loader."""
+
+import math
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from e2efly.vehicles.names import unknown
+
+_HERE = Path(__file__).parent
+_ACCEPTED = "accepted: closed (true or false), start {position [x, y, z], yaw}, gates [{position, yaw, opening [w, h]}]"
+
+
+@dataclass(frozen=True)
+class RaceTrack:
+    """A race track, world ENU, m and rad."""
+
+    name: str
+    closed: bool
+    """Whether the first gate follows the last."""
+    start: np.ndarray
+    """(3,) where a race begins."""
+    start_yaw: float
+    """Heading there."""
+    position: np.ndarray
+    """(gates, 3) centres of the openings."""
+    yaw: np.ndarray
+    """(gates,) the direction in which a gate is flown through, about world z."""
+    opening: np.ndarray
+    """(gates, 2) inner width and height."""
+
+
+def track_names() -> list[str]:
+    """The tracks that the package ships."""
+    return sorted(path.stem for path in _HERE.glob("*.toml"))
+
+
+def load_track(name_or_path: str) -> RaceTrack:
+    """Load a shipped track by name, or any by the path of its .toml file.
+
+    Raises:
+        ValueError: naming the file, the key, the value and what is accepted.
+    """
+    path = Path(name_or_path) if name_or_path.endswith(".toml") else _HERE / f"{name_or_path}.toml"
+    if not path.is_file():
+        raise ValueError(unknown("track", name_or_path, track_names()) + ", or the path of a .toml file")
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not a TOML file: {error}") from None
+    _keys(path, "the file", table, {"closed", "start", "gates"})
+    if not isinstance(table["closed"], bool):
+        raise ValueError(f"{path}: closed is {table['closed']!r}; accepted: true or false")
+    gates = table["gates"]
+    if not isinstance(gates, list) or len(gates) < 2:
+        raise ValueError(f"{path}: gates is {gates!r}; accepted: a list of at least 2")
+    _keys(path, "start", table["start"], {"position", "yaw"})
+    for i, gate in enumerate(gates):
+        _keys(path, f"gates[{i}]", gate, {"position", "yaw", "opening"})
+    opening = np.stack([_numbers(path, f"gates[{i}].opening", g["opening"], (2,)) for i, g in enumerate(gates)])
+    position = np.stack([_numbers(path, f"gates[{i}].position", g["position"], (3,)) for i, g in enumerate(gates)])
+    for i, (p, o) in enumerate(zip(position, opening, strict=True)):
+        if np.any(o <= 0.3):
+            raise ValueError(f"{path}: gates[{i}].opening is {o.tolist()}; accepted: more than 0.3 m")
+        if p[2] - o[1] / 2 < 0:
+            raise ValueError(f"{path}: gates[{i}].position z is {p[2]} m; accepted: an opening above the ground")
+    return RaceTrack(
+        name=path.stem,
+        closed=table["closed"],
+        start=_numbers(path, "start.position", table["start"]["position"], (3,)),
+        start_yaw=math.radians(float(_numbers(path, "start.yaw", table["start"]["yaw"], ()))),
+        position=position,
+        yaw=np.radians([float(_numbers(path, f"gates[{i}].yaw", g["yaw"], ())) for i, g in enumerate(gates)]),
+        opening=opening,
+    )
+
+
+def _keys(path: Path, where: str, table: Any, wanted: set[str]) -> None:
+    if not isinstance(table, dict) or set(table) != wanted:
+        found = sorted(table) if isinstance(table, dict) else table
+        raise ValueError(f"{path}: {where} has {found}; {_ACCEPTED}")
+
+
+def _numbers(path: Path, where: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    try:
+        array = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        array = np.full((), np.nan)
+    if array.shape != shape or not np.all(np.isfinite(array)):
+        expected = "a finite number" if shape == () else f"{shape[0]} finite numbers"
+        raise ValueError(f"{path}: {where} is {value!r}; accepted: {expected}")
+    return array
