@@ -30,6 +30,11 @@ from e2efly.vehicles import Vehicle, load_vehicle, unknown
 from e2efly.vehicles.vehicle import GRAVITY, quantities
 
 
+def random_key(seed: int) -> PRNGKeyArray:
+    """The key of a seed. XLA's own generator: it compiles in a seventh of the time of JAX's default."""
+    return jax.random.key(seed, impl="rbg")
+
+
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class EnvState:

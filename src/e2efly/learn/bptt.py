@@ -16,7 +16,8 @@ import optax
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import BPTTConfig, NetworkConfig
-from e2efly.env import Env, EnvState
+from e2efly.env import Env, EnvState, random_key
+from e2efly.learn.algorithm import TrainState, adam, annealed
 from e2efly.learn.networks import Features, Layers, init_policy, policy
 
 
@@ -28,33 +29,19 @@ class Parameters:
     policy: Layers
 
 
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class TrainState:
-    """Everything that an update changes: what a checkpoint holds."""
-
-    parameters: Parameters
-    optimizer: Any
-    env: EnvState
-    observation: Float[Array, "n o"]
-    key: PRNGKeyArray
-
-
 @dataclass(frozen=True)
 class BPTT:
     """The algorithm on one environment's shapes; its numbers come in with `config` at every call."""
 
     features: Features
     network: NetworkConfig
-    optimizer: optax.GradientTransformation
 
     def init(self, env: Env, config: BPTTConfig, seed: int, start: tuple[EnvState, Array]) -> TrainState:
         """The first state: the network by NumPy, environments as started."""
-        del config
         rng = np.random.default_rng(seed)
         hover = np.asarray(env.hover_action())
         parameters = Parameters(init_policy(rng, self.features.size, self.network.hidden, hover))
-        return TrainState(parameters, self.optimizer.init(parameters), *start, jax.random.key(seed))
+        return TrainState(parameters, adam(config.max_grad_norm).init(parameters), *start, random_key(seed))
 
     def update(
         self, env: Env, config: BPTTConfig, state: TrainState, progress: Float[Array, ""]
@@ -75,8 +62,8 @@ class BPTT:
             return self._window(env, config, parameters, state)
 
         grads, (env_state, observation, metrics) = jax.grad(loss, has_aux=True)(state.parameters)
-        rate = config.learning_rate * (config.learning_rate_end / config.learning_rate) ** progress
-        updates, optimizer = self.optimizer.update(grads, state.optimizer, state.parameters)
+        rate = annealed(config, progress)
+        updates, optimizer = adam(config.max_grad_norm).update(grads, state.optimizer, state.parameters)
         parameters = jax.tree.map(lambda p, u: p - rate * u, state.parameters, updates)
         metrics["loss/gradient_norm"] = optax.global_norm(grads)
         return dataclasses.replace(

@@ -14,7 +14,8 @@ import optax
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import NetworkConfig, PPOConfig
-from e2efly.env import Env, EnvState
+from e2efly.env import Env, EnvState, random_key
+from e2efly.learn.algorithm import TrainState, adam, annealed
 from e2efly.learn.networks import Features, Layers, init_mlp, init_policy, mlp, policy
 
 
@@ -26,18 +27,6 @@ class Parameters:
     policy: Layers
     log_std: Float[Array, "4"]
     critic: Layers
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class TrainState:
-    """Everything that an update changes: what a checkpoint holds."""
-
-    parameters: Parameters
-    optimizer: Any
-    env: EnvState
-    observation: Float[Array, "n o"]
-    key: PRNGKeyArray
 
 
 @jax.tree_util.register_dataclass
@@ -94,7 +83,6 @@ class PPO:
 
     features: Features
     network: NetworkConfig
-    optimizer: optax.GradientTransformation
 
     def init(self, env: Env, config: PPOConfig, seed: int, start: tuple[EnvState, Array]) -> TrainState:
         """The first state: networks by NumPy, environments as started."""
@@ -105,7 +93,7 @@ class PPO:
             np.full(4, config.log_std, np.float32),
             init_mlp(rng, (self.features.size, *self.network.hidden, 1), 1.0),
         )
-        return TrainState(parameters, self.optimizer.init(parameters), *start, jax.random.key(seed))
+        return TrainState(parameters, adam(config.max_grad_norm).init(parameters), *start, random_key(seed))
 
     def update(
         self, env: Env, config: PPOConfig, state: TrainState, progress: Float[Array, ""]
@@ -123,24 +111,25 @@ class PPO:
         """
         key, rollout_key, epoch_key = jax.random.split(state.key, 3)
         samples, env_state, observation, metrics = self._rollout(env, config, state, rollout_key)
-        flat = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), samples)
         size = config.envs * config.horizon
-        rate = config.learning_rate * (config.learning_rate_end / config.learning_rate) ** progress
+        # one sort of random bits: sorting is slow on a CPU, so that both epochs share the order
+        order = jnp.argsort(jax.random.bits(epoch_key, (size,)))
+        flat = jax.tree.map(lambda x: x.reshape(size, *x.shape[2:])[order], samples)
+        batches = jax.tree.map(lambda x: x.reshape(-1, config.minibatch, *x.shape[1:]), flat)
+        rate = annealed(config, progress)
 
-        def minibatch(carry: tuple[Parameters, Any], index: Array) -> tuple[tuple[Parameters, Any], dict[str, Array]]:
+        def minibatch(carry: tuple[Parameters, Any], batch: Samples) -> tuple[tuple[Parameters, Any], dict[str, Array]]:
             parameters, optimizer = carry
-            batch = jax.tree.map(lambda x: x[index], flat)
             grads, losses = jax.grad(self._loss, has_aux=True)(parameters, config, batch)
-            updates, optimizer = self.optimizer.update(grads, optimizer, parameters)
+            updates, optimizer = adam(config.max_grad_norm).update(grads, optimizer, parameters)
             parameters = jax.tree.map(lambda p, u: p - rate * u, parameters, updates)
             return (parameters, optimizer), {**losses, "gradient_norm": optax.global_norm(grads)}
 
-        def epoch(carry: tuple[Parameters, Any], epoch_key: PRNGKeyArray) -> tuple[Any, dict[str, Array]]:
-            order = jax.random.permutation(epoch_key, size).reshape(-1, config.minibatch)
-            return jax.lax.scan(minibatch, carry, order)
+        def epoch(carry: tuple[Parameters, Any], _: None) -> tuple[Any, dict[str, Array]]:
+            return jax.lax.scan(minibatch, carry, batches)
 
         (parameters, optimizer), losses = jax.lax.scan(
-            epoch, (state.parameters, state.optimizer), jax.random.split(epoch_key, config.epochs)
+            epoch, (state.parameters, state.optimizer), None, length=config.epochs
         )
         metrics |= {f"loss/{name}": jnp.mean(x) for name, x in losses.items()}
         metrics["std"] = jnp.mean(jnp.exp(parameters.log_std))

@@ -80,7 +80,8 @@ class Race:
         track = load_track(config.track)
         if config.laps > 1 and not track.closed:
             raise ValueError(f"laps is {config.laps}; accepted: 0 or 1, as track {track.name!r} is not closed")
-        return Race(config, shape, Gates.of(track), track.closed)
+        numbers = dataclasses.replace(config, track="")  # resolved here: tracks share a compiled program
+        return Race(numbers, shape, Gates.of(track), track.closed)
 
     @property
     def episode_s(self) -> float | Array:

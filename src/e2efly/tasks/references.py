@@ -49,28 +49,41 @@ def knot_count(duration: float) -> int:
     return math.ceil(duration / KNOT_PERIOD) + 1
 
 
-def circle(centre: Array, radius: float | Array, rate: float | Array, phase: Float[Array, " n"], m: int) -> Spline:
-    """A level circle: radius in m, angular rate in rad/s, phase in rad."""
-    angle = rate * KNOT_PERIOD * jnp.arange(m) + phase[:, None]
-    c, s, zero = jnp.cos(angle), jnp.sin(angle), jnp.zeros_like(angle)
-    p = jnp.asarray(centre) + radius * jnp.stack([c, s, zero], axis=-1)
-    v = radius * rate * jnp.stack([-s, c, zero], axis=-1)
-    a = radius * rate**2 * jnp.stack([-c, -s, zero], axis=-1)
-    return Spline(jnp.stack([p, v, a], axis=-2))
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Lissajous:
+    """A level curve x = X sin(w t + p + d), y = Y sin(k (w t + p)): a circle or a figure of eight, by its numbers."""
 
+    half_x: float | Array
+    """X, m."""
+    half_y: float | Array
+    """Y, m."""
+    ratio: float | Array
+    """k: turns of y for one of x."""
+    shift: float | Array
+    """d, rad."""
+    rate: float | Array
+    """w, rad/s."""
 
-def lemniscate(
-    centre: Array, half_length: float | Array, speed: float | Array, phase: Float[Array, " n"], m: int
-) -> Spline:
-    """Gerono's level figure of eight, x = A sin, y = A sin cos: half length A in m, top speed (at the middle) in m/s."""
-    rate = speed / (half_length * jnp.sqrt(2.0))
-    angle = rate * KNOT_PERIOD * jnp.arange(m) + phase[:, None]
-    zero = jnp.zeros_like(angle)
-    s, c, s2, c2 = jnp.sin(angle), jnp.cos(angle), jnp.sin(2 * angle), jnp.cos(2 * angle)
-    p = jnp.asarray(centre) + half_length * jnp.stack([s, s2 / 2, zero], axis=-1)
-    v = half_length * rate * jnp.stack([c, c2, zero], axis=-1)
-    a = half_length * rate**2 * jnp.stack([-s, -2 * s2, zero], axis=-1)
-    return Spline(jnp.stack([p, v, a], axis=-2))
+    @staticmethod
+    def circle(radius: float, rate: float) -> "Lissajous":
+        """Radius in m, angular rate in rad/s, counter-clockwise."""
+        return Lissajous(radius, radius, 1.0, math.pi / 2, rate)
+
+    @staticmethod
+    def lemniscate(half_length: float, speed: float) -> "Lissajous":
+        """Gerono's figure of eight, x = A sin, y = A sin cos: A in m, top speed (in the middle) in m/s."""
+        return Lissajous(half_length, half_length / 2, 2.0, 0.0, speed / (half_length * math.sqrt(2.0)))
+
+    def spline(self, centre: Array, phase: Float[Array, " n"], m: int) -> Spline:
+        """The curve about `centre` from each phase p, rad, as `m` knots."""
+        angle = self.rate * KNOT_PERIOD * jnp.arange(m) + phase[:, None]
+        x, y = angle + self.shift, self.ratio * angle
+        wx, wy, zero = self.rate, self.ratio * self.rate, jnp.zeros_like(angle)
+        p = jnp.stack([self.half_x * jnp.sin(x), self.half_y * jnp.sin(y), zero], axis=-1)
+        v = jnp.stack([wx * self.half_x * jnp.cos(x), wy * self.half_y * jnp.cos(y), zero], axis=-1)
+        a = -jnp.stack([wx**2 * self.half_x * jnp.sin(x), wy**2 * self.half_y * jnp.sin(y), zero], axis=-1)
+        return Spline(jnp.stack([p + jnp.asarray(centre), v, a], axis=-2))
 
 
 def polynomial(

@@ -14,7 +14,7 @@ from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.tasks import references
-from e2efly.tasks.references import Spline
+from e2efly.tasks.references import Lissajous, Spline
 from e2efly.tasks.task import Outcome, Shape, at_rest, into_ball, touches_ground, uniform
 from e2efly.vehicles.names import unknown
 
@@ -37,7 +37,7 @@ class Memory:
 
 
 @partial(
-    jax.tree_util.register_dataclass, data_fields=["config", "shape", "csv_knots"], meta_fields=["knots"]
+    jax.tree_util.register_dataclass, data_fields=["config", "shape", "curve"], meta_fields=["knots"]
 )
 @dataclass(frozen=True)
 class Track:
@@ -46,7 +46,8 @@ class Track:
     config: TrackConfig
     shape: Shape
     knots: int
-    csv_knots: np.ndarray | None
+    curve: Lissajous | np.ndarray | None
+    """What to follow: a curve, the knots of the user's file, or None: random polynomials."""
 
     name = "track"
     fields = (
@@ -63,8 +64,9 @@ class Track:
         Raises:
             ValueError: for an unknown kind or a broken file.
         """
+        numbers = dataclasses.replace(config, reference="")  # resolved here: references share a compiled program
         kinds = ("polynomial", "circle", "lemniscate")
-        table = None
+        m = references.knot_count(config.episode_s + POINTS * SPACING)
         if config.reference not in kinds:
             if not config.reference.endswith(".csv"):
                 raise ValueError(unknown("reference", config.reference, kinds) + ", or the path of a .csv file")
@@ -74,9 +76,12 @@ class Track:
                     f"reference {config.reference}: lowest z is {table[:, 3].min()} m; accepted: above "
                     f"{shape.feet_height} m, the height of the centre of mass over the feet"
                 )
-        m = references.knot_count(config.episode_s + POINTS * SPACING)
-        knots = None if table is None else references.through_points(table, m).astype(np.float32)
-        return Track(config, shape, m, knots)
+            return Track(numbers, shape, m, references.through_points(table, m).astype(np.float32))
+        curves = {
+            "circle": Lissajous.circle(config.radius, config.circle_rate),
+            "lemniscate": Lissajous.lemniscate(config.radius, config.lemniscate_speed),
+        }
+        return Track(numbers, shape, m, curves.get(config.reference))
 
     @property
     def episode_s(self) -> float | Array:
@@ -86,14 +91,11 @@ class Track:
     def reference(self, key: PRNGKeyArray, n: int) -> Spline:
         """Draw a reference a vehicle."""
         c = self.config
-        if self.csv_knots is not None:
-            return Spline(jnp.broadcast_to(jnp.asarray(self.csv_knots), (n, *self.csv_knots.shape)))
-        if c.reference == "polynomial":
+        if self.curve is None:
             return references.polynomial(key, c.centre, c.polynomial_reach, c.polynomial_speed, n, self.knots)
-        phase = jnp.pi * uniform(key, n, 1)[:, 0]
-        if c.reference == "circle":
-            return references.circle(c.centre, c.radius, c.circle_rate, phase, self.knots)
-        return references.lemniscate(c.centre, c.radius, c.lemniscate_speed, phase, self.knots)
+        if isinstance(self.curve, Lissajous):
+            return self.curve.spline(c.centre, jnp.pi * uniform(key, n, 1)[:, 0], self.knots)
+        return Spline(jnp.broadcast_to(jnp.asarray(self.curve), (n, *self.curve.shape)))
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Memory]:
         """Level, any heading, near the reference's first point, with a velocity of its own."""

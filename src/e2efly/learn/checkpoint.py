@@ -1,0 +1,105 @@
+"""Checkpoints: one safetensors file, written atomically, checked when read. No pickle."""
+
+import json
+import os
+import zlib
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
+
+FORMAT = 1
+"""Version of the layout of a checkpoint."""
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Write a file so that at any moment it is whole: the old one or the new one.
+
+    Raises:
+        OSError: naming the path, when the folder cannot be written or is full.
+    """
+    part = path.with_name(path.name + ".part")
+    try:
+        with part.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise OSError(f"cannot write {path}: {error.strerror}") from error
+
+
+def save_checkpoint(path: Path, tree: Any, about: dict[str, Any]) -> None:
+    """Write the leaves of a tree, and what `about` says of them, as JSON."""
+    arrays = _arrays(tree)
+    header = {**about, "format": FORMAT, "crc32": _checksum(arrays)}
+    write_atomically(path, save(arrays, {"about": json.dumps(header)}))
+
+
+def read_about(path: Path) -> dict[str, Any]:
+    """What a checkpoint says of itself.
+
+    Raises:
+        ValueError: when the file is missing, truncated or of another format.
+    """
+    try:
+        with safe_open(path, "numpy") as file:
+            about = json.loads((file.metadata() or {}).get("about", "{}"))
+    except (SafetensorError, OSError, ValueError) as error:
+        raise ValueError(f"checkpoint {path} cannot be read (truncated or damaged?): {error}") from None
+    if about.get("format") != FORMAT:
+        raise ValueError(f"checkpoint {path}: format is {about.get('format')!r}; accepted: {FORMAT}")
+    return about
+
+
+def load_checkpoint(path: Path, like: Any) -> Any:
+    """Read a tree of the structure, shapes and types of `like`.
+
+    Raises:
+        ValueError: when the file is missing, truncated, damaged, or of another structure.
+    """
+    about = read_about(path)
+    try:
+        with safe_open(path, "numpy") as file:
+            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (not a dict)
+    except (SafetensorError, OSError) as error:
+        raise ValueError(f"checkpoint {path} cannot be read (truncated or damaged?): {error}") from None
+    if _checksum(arrays) != about["crc32"]:
+        raise ValueError(f"checkpoint {path}: its checksum is wrong; the file is damaged")
+    leaves, structure = jax.tree_util.tree_flatten_with_path(like)
+    found = []
+    for where, leaf in leaves:
+        name = jax.tree_util.keystr(where)
+        key = _is_key(leaf)
+        wanted = jax.random.key_data(leaf) if key else leaf
+        array = arrays.pop(name, None)
+        if array is None or array.shape != wanted.shape or array.dtype != wanted.dtype:
+            has = "is missing" if array is None else f"is {array.dtype}{list(array.shape)}"
+            raise ValueError(f"checkpoint {path}: {name} {has}; accepted: {wanted.dtype}{list(wanted.shape)}")
+        found.append(jax.random.wrap_key_data(array, impl=jax.random.key_impl(leaf)) if key else array)
+    if arrays:
+        raise ValueError(f"checkpoint {path}: {', '.join(sorted(arrays))} belong to no part of this run")
+    return jax.tree_util.tree_unflatten(structure, found)
+
+
+def _is_key(leaf: Any) -> bool:
+    return hasattr(leaf, "dtype") and jax.dtypes.issubdtype(leaf.dtype, jax.dtypes.prng_key)
+
+
+def _arrays(tree: Any) -> dict[str, np.ndarray]:
+    leaves = jax.tree_util.tree_flatten_with_path(tree)[0]
+    return {
+        jax.tree_util.keystr(where): np.ascontiguousarray(jax.random.key_data(leaf) if _is_key(leaf) else leaf)
+        for where, leaf in leaves
+    }
+
+
+def _checksum(arrays: dict[str, np.ndarray]) -> int:
+    total = 0
+    for name in sorted(arrays):
+        total = zlib.crc32(np.ascontiguousarray(arrays[name]), zlib.crc32(name.encode(), total))
+    return total
