@@ -94,7 +94,7 @@ class Step:
 @partial(
     jax.tree_util.register_dataclass,
     data_fields=[
-        "physics", "task", "weights", "parameters", "center", "half", "latency_range", "observation_latency_range",
+        "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range", "observation_latency_range",
         "randomize", "wind", "noise", "imu",
     ],
     meta_fields=["queue", "seen_actions", "past"],
@@ -111,6 +111,8 @@ class Env:
     """Command at action 0, of the nominal vehicle."""
     half: Float[Array, "4"]
     """Half of the command's range."""
+    hover: Float[Array, "4"]
+    """The action that hovers a level vehicle, where the command mode has one; else the middle of the range."""
     latency_range: Float[Array, "2"]
     observation_latency_range: Float[Array, "2"]
     randomize: dict[str, Any]
@@ -153,6 +155,7 @@ class Env:
             parameters=dict(reward.parameters),
             center=((low + high) / 2).astype(dtype),
             half=((high - low) / 2).astype(dtype),
+            hover=((_hover_command(config.command_mode, vehicle) - low) / (high - low) * 2 - 1).astype(dtype),
             latency_range=np.asarray(late, dtype),
             observation_latency_range=np.asarray(config.observation_latency, dtype),
             randomize=dict(config.randomize),
@@ -286,7 +289,7 @@ class Env:
             vehicle=vehicle,
             memory=memory,
             time=jnp.zeros(n, dtype),
-            actions=jnp.broadcast_to(self.hover_action(), (n, self.queue, 4)).astype(dtype),
+            actions=jnp.broadcast_to(self.hover, (n, self.queue, 4)).astype(dtype),
             action_latency=_between(action_key, n, self.latency_range),
             plant=_perturbed(plant_key, n, nominal, self.randomize),
             wind=None if self.wind is None else self.wind * into_ball(uniform(wind_key, n, 3)),
@@ -296,16 +299,6 @@ class Env:
             key=key,
             tick=tick,
         )
-
-    def hover_action(self) -> Float[Array, "4"]:
-        """The action that hovers a level vehicle, where the command mode has one; else the middle of the range."""
-        mass = self.physics.nominal.mass
-        hover = {
-            "ctbr": (GRAVITY, 0.0, 0.0, 0.0),
-            "attitude": (GRAVITY, 0.0, 0.0, 0.0),
-            "rotor_thrust": (mass * GRAVITY / 4,) * 4,
-        }.get(self.physics.command_mode, (0.0,) * 4)
-        return (jnp.stack([jnp.asarray(x) for x in hover]) - self.center) / self.half
 
     def _observe(self, state: EnvState) -> Float[Array, "n o"]:
         seen = state.vehicle
@@ -349,6 +342,12 @@ def _perturbed(key: PRNGKeyArray, n: int, nominal: Vehicle, widths: dict[str, An
         factor = jax.random.uniform(jax.random.fold_in(key, i), (n, *value.shape), value.dtype, -1.0, 1.0)
         plant[name] = value * (1 + width * factor)
     return plant
+
+
+def _hover_command(mode: str, vehicle: Vehicle) -> np.ndarray:
+    each = vehicle.mass * GRAVITY / 4
+    level = {"ctbr": (GRAVITY, 0, 0, 0), "attitude": (GRAVITY, 0, 0, 0), "rotor_thrust": (each,) * 4}
+    return np.asarray(level.get(mode, (0, 0, 0, 0)), np.float64)
 
 
 def _wrap(angle: Array) -> Array:

@@ -37,8 +37,8 @@ class TrainState:
 class Algorithm(Protocol):
     """A learning algorithm on the shapes of one environment."""
 
-    def init(self, env: Env, config: Any, seed: int, start: tuple[EnvState, Array]) -> TrainState:
-        """The first state, from environments as started."""
+    def init(self, env: Env, config: Any, seed: int) -> Any:
+        """Fresh parameters, made by NumPy: nothing to compile."""
         ...
 
     def update(
@@ -54,6 +54,12 @@ def adam(max_grad_norm: float | Array) -> optax.GradientTransformation:
     Works on all parameters as one vector: a dozen small arrays take longer to compile than the rest of an update.
     """
     return optax.flatten(optax.chain(optax.clip_by_global_norm(max_grad_norm), optax.scale_by_adam()))
+
+
+def begin(env: Env, config: AlgorithmConfig, parameters: Any, key: PRNGKeyArray) -> TrainState:
+    """The first state of a run: environments as started, the optimiser at rest."""
+    env_state, observation = env.reset(jax.random.fold_in(key, 0), config.envs)
+    return TrainState(parameters, adam(config.max_grad_norm).init(parameters), env_state, observation, key)
 
 
 def annealed(config: AlgorithmConfig, progress: Float[Array, ""]) -> Float[Array, ""]:

@@ -16,7 +16,7 @@ import optax
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import BPTTConfig, NetworkConfig
-from e2efly.env import Env, EnvState, random_key
+from e2efly.env import Env, EnvState
 from e2efly.learn.algorithm import TrainState, adam, annealed
 from e2efly.learn.networks import Features, Layers, init_policy, policy
 
@@ -36,12 +36,11 @@ class BPTT:
     features: Features
     network: NetworkConfig
 
-    def init(self, env: Env, config: BPTTConfig, seed: int, start: tuple[EnvState, Array]) -> TrainState:
-        """The first state: the network by NumPy, environments as started."""
+    def init(self, env: Env, config: BPTTConfig, seed: int) -> Parameters:
+        """A fresh network, made by NumPy."""
+        del config
         rng = np.random.default_rng(seed)
-        hover = np.asarray(env.hover_action())
-        parameters = Parameters(init_policy(rng, self.features.size, self.network.hidden, hover))
-        return TrainState(parameters, adam(config.max_grad_norm).init(parameters), *start, random_key(seed))
+        return Parameters(init_policy(rng, self.features.size, self.network.hidden, np.asarray(env.hover)))
 
     def update(
         self, env: Env, config: BPTTConfig, state: TrainState, progress: Float[Array, ""]

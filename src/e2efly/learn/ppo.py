@@ -14,7 +14,7 @@ import optax
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import NetworkConfig, PPOConfig
-from e2efly.env import Env, EnvState, random_key
+from e2efly.env import Env, EnvState
 from e2efly.learn.algorithm import TrainState, adam, annealed
 from e2efly.learn.networks import Features, Layers, init_mlp, init_policy, mlp, policy
 
@@ -84,16 +84,14 @@ class PPO:
     features: Features
     network: NetworkConfig
 
-    def init(self, env: Env, config: PPOConfig, seed: int, start: tuple[EnvState, Array]) -> TrainState:
-        """The first state: networks by NumPy, environments as started."""
+    def init(self, env: Env, config: PPOConfig, seed: int) -> Parameters:
+        """Fresh networks, made by NumPy."""
         rng = np.random.default_rng(seed)
-        hover = np.asarray(env.hover_action())
-        parameters = Parameters(
-            init_policy(rng, self.features.size, self.network.hidden, hover),
+        return Parameters(
+            init_policy(rng, self.features.size, self.network.hidden, np.asarray(env.hover)),
             np.full(4, config.log_std, np.float32),
             init_mlp(rng, (self.features.size, *self.network.hidden, 1), 1.0),
         )
-        return TrainState(parameters, adam(config.max_grad_norm).init(parameters), *start, random_key(seed))
 
     def update(
         self, env: Env, config: PPOConfig, state: TrainState, progress: Float[Array, ""]

@@ -1,0 +1,209 @@
+"""Load `policy.onnx` and act with it. Imports no JAX and no simulator, so that it starts fast on a companion computer.
+
+The file is refused when it does not agree with its own contract, or with what the caller is about to fly.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import onnxruntime as ort
+
+from e2efly.deploy.contract import ACTION_LIMITS, ACTION_SIZE, METADATA_KEY, Contract
+from e2efly.vehicles import Vehicle
+
+INPUT, OUTPUT = "observation", "action"
+"""Names of the graph's only input and output."""
+UNIT_TOLERANCE = 0.01
+"""How far the length of the attitude quaternion may be from 1."""
+
+
+@dataclass(frozen=True)
+class Policy:
+    """A checked policy, on one thread. Make it with `load_policy`."""
+
+    contract: Contract
+    """What it sees and commands."""
+    session: ort.InferenceSession
+    """The loaded graph."""
+
+    def act(self, observation: np.ndarray) -> np.ndarray:
+        """The actions of observations.
+
+        Args:
+            observation: shape (o,) or (n, o), laid out as `contract.observation` says, in its units and frames.
+
+        Returns:
+            Float32 in [-1, 1], shape (4,) or (n, 4).
+
+        Raises:
+            ValueError: naming the observation field, for a wrong shape, a non-finite number or an attitude that is no
+                unit quaternion; for an observation so large that the network overflows.
+        """
+        x = np.asarray(observation)
+        self._check(x)
+        batch = np.ascontiguousarray(x if x.ndim == 2 else x[None], np.float32)
+        action = self.session.run([OUTPUT], {INPUT: batch})[0]
+        good = np.abs(action) <= ACTION_LIMITS[1]  # false for NaN
+        if not good.all():
+            row = int(np.argmin(good.all(-1)))
+            raise ValueError(
+                f"action is {action[row].tolist()} for the observation {batch[row].tolist()}; accepted: numbers in "
+                "[-1, 1]; the observation is far outside of what flies, or the policy file is damaged"
+            )
+        return action if x.ndim == 2 else action[0]
+
+    def command(self, action: np.ndarray) -> np.ndarray:
+        """The commands of actions, shape (4,) or (n, 4), in `contract.action.units`; actions are clipped to [-1, 1].
+
+        Raises:
+            ValueError: for a wrong shape or a non-finite number.
+        """
+        a = np.asarray(action, np.float64)
+        if a.ndim not in (1, 2) or a.shape[-1] != ACTION_SIZE:
+            raise ValueError(f"action has shape {a.shape}; accepted: ({ACTION_SIZE},) or (n, {ACTION_SIZE})")
+        if not np.isfinite(a).all():
+            raise ValueError(f"action is {a.tolist()}; accepted: finite numbers")
+        low, high = np.array(self.contract.action.low), np.array(self.contract.action.high)
+        return low + (np.clip(a, *ACTION_LIMITS) + 1) / 2 * (high - low)
+
+    def _check(self(self, x: np.ndarray) -> None:
+        """Refuse what the network must not see; quick when all is well, as it runs at every control step."""
+        if x.ndim not in (1, 2) or x.shape[-1] != self.contract.observation_size or x.dtype.kind not in "fiu":
+            raise ValueError(_wrong_shape(self.contract, x))
+        good = np.abs(x) <= np.finfo(np.float32).max  # false for NaN, infinity and what float32 cannot hold
+        if not good.all():
+            name = next(name for name, part in self._parts.items() if not good[..., part].all())
+            raise _refusal(name, x, good[..., self._parts[name]].all(-1), "finite numbers")
+        name = next(field.name for field in self.contract.observation if field.frame == "world_body")
+        square = np.square(x[..., self._parts[name]], dtype=np.float64).sum(-1)
+        unit = np.abs(square - 1) <= 2 * UNIT_TOLERANCE
+        if not unit.all():
+            raise _refusal(name, x, unit, "a unit quaternion wxyz, body to world")
+
+
+def load_policy(
+    path: str | Path,
+    *,
+    task: str | None = None,
+    vehicle: Vehicle | None = None,
+    control_rate_hz: float | None = None,
+    command_mode: str | None = None,
+) -> Policy:
+    """Load a policy and check it against its contract and against what it is going to fly.
+
+    Args:
+        path: the `policy.onnx`.
+        task: name of the task that will be flown.
+        vehicle: the vehicle that will fly, as loaded.
+        control_rate_hz: how often the policy will be asked, Hz.
+        command_mode: what the flight controller will be sent.
+
+    Raises:
+        ValueError: naming the file and the field, what it is, what was wanted, and what to do. What is left out is
+            not compared.
+    """
+    where = str(path)
+    session = _session(where)
+    stored = session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
+    if stored is None:
+        raise ValueError(
+            f"{where}: metadata key {METADATA_KEY!r} is missing; accepted: an ONNX file with its contract, as "
+            "`e2efly export` writes it"
+        )
+    try:
+        contract = Contract.from_json(stored)
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from None
+    _check_graph(where, session, contract)
+    _check_use(where, contract, task, vehicle, control_rate_hz, command_mode)
+    policy = Policy(contract, session)
+    try:  # also warms the session up
+        policy.act(level_and_still(contract))
+    except Exception as error:  # ONNX Runtime's errors share no other base
+        raise ValueError(f"{where}: does not run on the observation of a level, still vehicle: {error}") from None
+    return policy
+
+
+def level_and_still(contract: Contract) -> np.ndarray:
+    """An observation, shape (o,): the level attitude, heading along world x, and zeros."""
+    parts = ([1.0, 0.0, 0.0, 0.0] if f.frame == "world_body" else [0.0] * f.size for f in contract.observation)
+    return np.concatenate([np.array(part, np.float32) for part in parts])
+
+
+def _session(where: str) -> ort.InferenceSession:
+    try:
+        content = Path(where).read_bytes()
+    except OSError as error:
+        raise ValueError(f"{where}: cannot be read: {error.strerror}; accepted: the path of a policy.onnx") from None
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    try:
+        return ort.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # ONNX Runtime's errors share no other base
+        raise ValueError(
+            f"{where}: not an ONNX file that ONNX Runtime {ort.__version__} can load (truncated or damaged? copy or "
+            f"export it again): {error}"
+        ) from None
+
+
+def _check_graph(where: str, session: ort.InferenceSession, contract: Contract) -> None:
+    """One float32 input and one float32 output, of the names and sizes of the contract, with a free batch axis."""
+    sides = (
+        ("input", session.get_inputs(), INPUT, contract.observation_size),
+        ("output", session.get_outputs(), OUTPUT, ACTION_SIZE),
+    )
+    for side, nodes, name, size in sides:
+        has = [(node.name, node.type, node.shape) for node in nodes]
+        good = len(nodes) == 1 and nodes[0].name == name and nodes[0].type == "tensor(float)"
+        shape = nodes[0].shape if nodes else []
+        if not good or len(shape) != 2 or isinstance(shape[0], int) or shape[1] != size:
+            raise ValueError(
+                f"{where}: {side} of the graph is {has}; its contract says [({name!r}, 'tensor(float)', "
+                f"['n', {size}])]; export the policy again"
+            )
+
+
+def _check_use(
+    where: str,
+    contract: Contract,
+    task: str | None,
+    vehicle: Vehicle | None,
+    control_rate_hz: float | None,
+    command_mode: str | None,
+) -> None:
+    """What the policy was trained for against what it is going to fly."""
+    if task is not None and task != contract.task:
+        raise _mismatch(where, "task", contract.task, task, "load a policy that was trained for this task")
+    if vehicle is not None and vehicle.name != contract.vehicle:
+        remedy = "load a policy that was trained for this vehicle, or name the vehicle that it was trained for"
+        raise _mismatch(where, "vehicle", contract.vehicle, vehicle.name, remedy)
+    if vehicle is not None and vehicle.hash != contract.vehicle_hash:
+        remedy = f"the parameters of {vehicle.name!r} have changed since: restore its file, or train the policy again"
+        raise _mismatch(where, "vehicle_hash", contract.vehicle_hash, vehicle.hash, remedy)
+    if control_rate_hz is not None and not abs(control_rate_hz - contract.control_rate_hz) <= 1e-6 * control_rate_hz:
+        remedy = "run it at the rate that it was trained at"
+        raise _mismatch(where, "control_rate_hz", contract.control_rate_hz, control_rate_hz, remedy)
+    if command_mode is not None and command_mode != contract.action.mode:
+        remedy = "choose the command mode that it was trained with"
+        raise _mismatch(where, "action.mode", contract.action.mode, command_mode, remedy)
+
+
+def _mismatch(where: str, field: str, has: object, wanted: object, remedy: str) -> ValueError:
+    return ValueError(f"{where}: {field} of the policy is {has!r}, wanted: {wanted!r}; {remedy}")
+
+
+def _wrong_shape(contract: Contract, x: np.ndarray) -> str:
+    """What is wrong with the shape, and the field at which a vector of this length breaks off."""
+    size = contract.observation_size
+    layout = ", ".join(f"{field.name} {field.size}" for field in contract.observation)
+    accepted = f"float32 of shape ({size},) or (n, {size}): {layout}"
+    text = f"observation has shape {x.shape} and type {x.dtype}; accepted: {accepted}"
+    count = x.shape[-1] if x.ndim else 0
+    if count > size:
+        return f"{text}; {count - size} too many after field {contract.observation[-1].name!r}"
+    ends = np.cumsum([field.size for field in contract.observation])
+    if count < size:
+        return f"{text}; it breaks off in field {contract.observation[int(np.argmax(ends > count))].name!r}"
+    return text
