@@ -26,6 +26,8 @@ class NoiseConfig:
 class ImuConfig:
     """A consumer IMU. White noise as density, bias as a random walk."""
 
+    observed: bool = False
+    """Whether gyroscope and accelerometer join the observation (sets shapes)."""
     gyro_noise: float = 8.7e-5
     """Gyroscope white noise, rad/s/sqrt(Hz)."""
     gyro_bias: float = 2.23e-5
@@ -66,8 +68,8 @@ class EnvConfig:
     """Largest wind speed, m/s: constant in an episode, uniform in a ball."""
     noise: NoiseConfig = NoiseConfig()
     """Noise of the observed state."""
-    imu: ImuConfig | None = None
-    """When given, gyroscope and accelerometer join the observation (sets shapes)."""
+    imu: ImuConfig = ImuConfig()
+    """The IMU."""
     position_range: float = 5.0
     """Reach of the position command mode, m an axis about the origin."""
 

@@ -161,7 +161,7 @@ class Env:
             randomize=dict(config.randomize),
             wind=config.wind or None,
             noise=config.noise if noisy else None,
-            imu=config.imu,
+            imu=config.imu if config.imu.observed else None,
             queue=max(frames + 1, seen, 2),
             seen_actions=seen,
             past=latency.frames(config.observation_latency[1], period) + 1 if config.observation_latency[1] else 0,

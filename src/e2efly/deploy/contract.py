@@ -7,6 +7,8 @@ import dataclasses
 import json
 import math
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
 from typing import Any
 
 from e2efly.observation import Field
@@ -84,10 +86,21 @@ class Contract:
     hover_action: tuple[float, ...]
     """The past actions that it is shown before it has acted; it hovers, where the command mode has a hover."""
 
-    @property
+    @cached_property
     def observation_size(self) -> int:
         """Numbers of the observation."""
         return sum(field.size for field in self.observation)
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Where each field lies in the observation, by name, in order."""
+        ends = list(accumulate(field.size for field in self.observation))
+        return {f.name: slice(end - f.size, end) for f, end in zip(self.observation, ends, strict=True)}
+
+    @cached_property
+    def attitude(self) -> str:
+        """Name of the field that is the attitude."""
+        return next(field.name for field in self.observation if field.frame == "world_body")
 
     def to_json(self) -> str:
         """The contract as JSON.

@@ -67,19 +67,20 @@ class Policy:
         low, high = np.array(self.contract.action.low), np.array(self.contract.action.high)
         return low + (np.clip(a, *ACTION_LIMITS) + 1) / 2 * (high - low)
 
-    def _check(self(self, x: np.ndarray) -> None:
+    def _check(self, x: np.ndarray) -> None:
         """Refuse what the network must not see; quick when all is well, as it runs at every control step."""
+        slices = self.contract.slices
         if x.ndim not in (1, 2) or x.shape[-1] != self.contract.observation_size or x.dtype.kind not in "fiu":
             raise ValueError(_wrong_shape(self.contract, x))
         good = np.abs(x) <= np.finfo(np.float32).max  # false for NaN, infinity and what float32 cannot hold
         if not good.all():
-            name = next(name for name, part in self._parts.items() if not good[..., part].all())
-            raise _refusal(name, x, good[..., self._parts[name]].all(-1), "finite numbers")
-        name = next(field.name for field in self.contract.observation if field.frame == "world_body")
-        square = np.square(x[..., self._parts[name]], dtype=np.float64).sum(-1)
+            name = next(name for name, part in slices.items() if not good[..., part].all())
+            raise _refusal(name, x[..., slices[name]], good[..., slices[name]].all(-1), "finite numbers")
+        attitude = x[..., slices[self.contract.attitude]]
+        square = np.square(attitude, dtype=np.float64).sum(-1)
         unit = np.abs(square - 1) <= 2 * UNIT_TOLERANCE
         if not unit.all():
-            raise _refusal(name, x, unit, "a unit quaternion wxyz, body to world")
+            raise _refusal(self.contract.attitude, attitude, unit, "a unit quaternion wxyz, body to world")
 
 
 def load_policy(
@@ -119,16 +120,17 @@ def load_policy(
     _check_use(where, contract, task, vehicle, control_rate_hz, command_mode)
     policy = Policy(contract, session)
     try:  # also warms the session up
-        policy.act(level_and_still(contract))
+        policy.act(_level_and_still(contract))
     except Exception as error:  # ONNX Runtime's errors share no other base
         raise ValueError(f"{where}: does not run on the observation of a level, still vehicle: {error}") from None
     return policy
 
 
-def level_and_still(contract: Contract) -> np.ndarray:
+def _level_and_still(contract: Contract) -> np.ndarray:
     """An observation, shape (o,): the level attitude, heading along world x, and zeros."""
-    parts = ([1.0, 0.0, 0.0, 0.0] if f.frame == "world_body" else [0.0] * f.size for f in contract.observation)
-    return np.concatenate([np.array(part, np.float32) for part in parts])
+    observation = np.zeros(contract.observation_size, np.float32)
+    observation[contract.slices[contract.attitude].start] = 1.0
+    return observation
 
 
 def _session(where: str) -> ort.InferenceSession:
@@ -194,6 +196,13 @@ def _mismatch(where: str, field: str, has: object, wanted: object, remedy: str) 
     return ValueError(f"{where}: {field} of the policy is {has!r}, wanted: {wanted!r}; {remedy}")
 
 
+def _refusal(name: str, part: np.ndarray, good: np.ndarray, accepted: str) -> ValueError:
+    """Names the field, and the first row of a batch that is not good."""
+    row = int(np.argmin(good))
+    where = "observation" if part.ndim == 1 else f"observation[{row}]"
+    return ValueError(f"{where}: field {name!r} is {np.atleast_2d(part)[row].tolist()}; accepted: {accepted}")
+
+
 def _wrong_shape(contract: Contract, x: np.ndarray) -> str:
     """What is wrong with the shape, and the field at which a vector of this length breaks off."""
     size = contract.observation_size
@@ -203,7 +212,6 @@ def _wrong_shape(contract: Contract, x: np.ndarray) -> str:
     count = x.shape[-1] if x.ndim else 0
     if count > size:
         return f"{text}; {count - size} too many after field {contract.observation[-1].name!r}"
-    ends = np.cumsum([field.size for field in contract.observation])
     if count < size:
-        return f"{text}; it breaks off in field {contract.observation[int(np.argmax(ends > count))].name!r}"
+        return f"{text}; it breaks off in field {next(n for n, s in contract.slices.items() if s.stop > count)!r}"
     return text

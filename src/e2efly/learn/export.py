@@ -57,7 +57,7 @@ def contract_of(env: Env, config: EnvConfig) -> Contract:
         vehicle=vehicle.name,
         vehicle_hash=vehicle.hash,
         control_rate_hz=float(rate),
-        latency_s=latency[0] if latency[0] == latency[1] else sum(latency) / 2,
+        latency_s=sum(latency) / 2,
         latency_range_s=latency,
         observation_latency_range_s=_decimals(env.observation_latency_range),
         observation=env.fields,
@@ -80,6 +80,7 @@ def export_policy(path: Path, layers: Layers, features: Features, activation: st
         ValueError: naming what does not fit together: layers, features, activation or contract.
         OSError: when the file cannot be written.
     """
+    about = contract.to_json()
     if contract.observation != features.fields:
         raise ValueError(
             f"contract.observation is {contract.observation}; accepted: the fields of the features, {features.fields}"
@@ -109,7 +110,7 @@ def export_policy(path: Path, layers: Layers, features: Features, activation: st
         producer_name="e2efly",
         producer_version=contract.e2efly_version,
     )
-    helper.set_model_props(model, {METADATA_KEY: contract.to_json()})
+    helper.set_model_props(model, {METADATA_KEY: about})
     onnx.checker.check_model(model, full_check=True)
     write_atomically(Path(path), model.SerializeToString())
 
@@ -156,10 +157,11 @@ def _feature_nodes(features: Features) -> tuple[list[onnx.NodeProto], dict[str, 
     attitude = next(where[0] for field, where in columns if field.frame == "world_body")
     vectors = [i for field, where in columns if field.frame == "world" for i in where]
     rest = [i for field, where in columns if field.frame in ("body", "none") for i in where]
-    # turned vectors, up and the rest lie side by side in `parts`; `order` puts them into the order of the fields
-    place = {i: p for p, i in enumerate([*vectors, attitude, attitude + 1, attitude + 2, attitude + 3, *rest])}
-    order = [place[i] - (i in rest) for field, where in columns for i in where[: 3 if _up(field) else None]]
-    scale = [1.0 if _up(field) else field.scale for field, where in columns for _ in where[: 3 if _up(field) else None]]
+    # turned vectors, up and the rest lie side by side in `parts`; `order` puts them into the order of the fields,
+    # up, of three numbers and no scale, in the place of the attitude's first three
+    place = {column: p for p, column in enumerate([*vectors, *range(attitude, attitude + 3), *rest])}
+    order = [place[i] for _, where in columns for i in where if i in place]
+    scale = [1.0 if f.frame == "world_body" else f.scale for f, where in columns for i in where if i in place]
 
     table = np.zeros((len(_PAIRS), 9), np.float32)
     for entry, terms in enumerate(_R_WORLD_BODY):
@@ -178,7 +180,8 @@ def _feature_nodes(features: Features) -> tuple[list[onnx.NodeProto], dict[str, 
         "flat_shape": [0, len(vectors)],
     }
     constants = {name: np.array(value, np.int64) for name, value in constants.items()}
-    constants |= {"table": table, "identity": np.eye(3, dtype=np.float32).reshape(9), "scale": np.float32(scale)}
+    floats = {"table": table, "identity": np.eye(3).reshape(9), "scale": scale}
+    constants |= {name: np.array(value, np.float32) for name, value in floats.items()}
 
     def gather(data: str, index: str, output: str) -> onnx.NodeProto:
         return helper.make_node("Gather", [data, index], [output], axis=1)
@@ -203,11 +206,6 @@ def _feature_nodes(features: Features) -> tuple[list[onnx.NodeProto], dict[str, 
     return nodes, constants
 
 
-def _up(field: Field) -> bool:
-    """Whether the field is the attitude, whose four numbers become three."""
-    return field.frame == "world_body"
-
-
 def _check(layers: list[tuple[np.ndarray, np.ndarray]], features: Features, activation: str) -> None:
     if activation not in _OPERATORS:
         raise ValueError(f"activation is {activation!r}; accepted: {', '.join(_OPERATORS)}")
@@ -216,10 +214,11 @@ def _check(layers: list[tuple[np.ndarray, np.ndarray]], features: Features, acti
         outputs = 4 if i == len(layers) - 1 else bias.size
         if weight.shape != (size, outputs) or bias.shape != (outputs,):
             raise ValueError(
-                f"layers[{i}] has shapes {weight.shape} and {bias.shape}; accepted: ({size}, {outputs}) and ({outputs},)"
+                f"layers[{i}] has shapes {weight.shape} and {bias.shape}; accepted: "
+                f"({size}, {outputs}) and ({outputs},)"
             )
         if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
-            raise ValueError(f"layers[{i}] is not finite; accepted: finite weights and biases (did the training diverge?)")
+            raise ValueError(f"layers[{i}] is not finite; accepted: finite numbers (did the training diverge?)")
         size = outputs
     if not layers:
         raise ValueError("layers is empty; accepted: at least one layer")
@@ -227,9 +226,9 @@ def _check(layers: list[tuple[np.ndarray, np.ndarray]], features: Features, acti
 
 def _same(name: str, has: Any, wanted: Any) -> None:
     """Equal, up to the rounding of the environment's type."""
-    same = has == wanted if isinstance(has, str) else np.allclose(has, wanted, rtol=1e-6, atol=1e-12)
+    same = has == wanted if isinstance(wanted, str) else np.allclose(has, wanted, rtol=1e-6, atol=0.0)
     if not same:
-        raise ValueError(f"{name} of the environment is {has}; accepted: {wanted}, as its configuration and vehicle say")
+        raise ValueError(f"{name} of the environment is {has}; its configuration and vehicle say {wanted}")
 
 
 def _decimals(values: Any) -> tuple[float, ...]:

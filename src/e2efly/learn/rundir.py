@@ -14,7 +14,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from e2efly import config as configs
 from e2efly.config import TrainConfig
 from e2efly.learn.checkpoint import write_atomically
 from e2efly.presets import algorithm_name, preset, task_name
@@ -169,8 +168,6 @@ def _read(like: Any, content: Any, where: str) -> Any:
 
 def _value(like: Any, name: str, value: Any, where: str) -> Any:
     default = getattr(like, name)
-    if name == "imu" and value is not None:
-        default = configs.ImuConfig()
     if dataclasses.is_dataclass(default):
         return _read(default, value, f"{where}: {name}")
     return tuple(value) if isinstance(value, list) else value

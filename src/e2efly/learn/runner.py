@@ -5,7 +5,6 @@ on nothing else, so that a run that was killed and resumed ends bit for bit like
 """
 
 import dataclasses
-import json
 import math
 import signal
 import threading
@@ -14,7 +13,6 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -224,8 +222,7 @@ def train(
     key = random_key(config.seed)
     progress, best = Progress(), parameters.policy
     if resume and run.checkpoint.exists():
-        like = {"state": jax.eval_shape(partial(begin, setup.env, config.algo), parameters, key), "best": best}
-        loaded = load_checkpoint(run.checkpoint, like)
+        loaded = load_checkpoint(run.checkpoint, _checkpoint_like(setup, parameters))
         state, best = jax.device_put(loaded["state"]), loaded["best"]
         progress = Progress(**{f.name: read_about(run.checkpoint)[f.name] for f in dataclasses.fields(Progress)})
     else:
@@ -391,6 +388,20 @@ def _interruptible() -> Iterator[threading.Event]:
         signal.signal(signal.SIGINT, old)
 
 
-def summary_text(summary: dict[str, Any]) -> str:
-    """The summary as JSON text."""
-    return json.dumps(summary, indent=2)
+def load_policy_layers(setup: Setup, run: RunDirectory, which: str) -> Layers:
+    """The `best` or the `last` policy of a run's checkpoint.
+
+    Raises:
+        ValueError: when there is no whole checkpoint.
+    """
+    parameters = setup.algorithm.init(setup.env, setup.config.algo, setup.config.seed)
+    loaded = load_checkpoint(run.checkpoint, _checkpoint_like(setup, parameters))
+    return loaded["best"] if which == "best" else loaded["state"].parameters.policy
+
+
+def _checkpoint_like(setup: Setup, parameters: Any) -> dict[str, Any]:
+    """Shapes and types of what a checkpoint holds."""
+    state = jax.eval_shape(
+        lambda env, p, key: begin(env, setup.config.algo, p, key), setup.env, parameters, random_key(0)
+    )
+    return {"state": state, "best": parameters.policy}

@@ -11,7 +11,9 @@ from e2efly.physics import State
 from e2efly.physics.rotation import unrotate
 from e2efly.vehicles.vehicle import GRAVITY
 
-jax.tree_util.register_dataclass(ImuConfig)
+jax.tree_util.register_dataclass(
+    ImuConfig, data_fields=[f for f in ImuConfig.__annotations__ if f != "observed"], meta_fields=["observed"]
+)
 
 
 @jax.tree_util.register_dataclass

@@ -1,0 +1,5 @@
+"""`python -m e2efly`."""
+
+from e2efly.cli import main
+
+main()

@@ -1,0 +1,218 @@
+"""The command line: `e2efly train | eval | export | bench | list`. Imports no JAX before a command runs."""
+
+import dataclasses
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, NoReturn
+
+import tyro
+from rich.console import Console
+
+from e2efly import __version__, presets
+from e2efly.config import EnvConfig, NetworkConfig, RewardConfig
+from e2efly.vehicles import unknown
+
+_ABOUT = f"""e2efly {__version__}: train an end-to-end quadrotor policy in seconds, check it, and fly it.
+
+  e2efly train hover               learn to hover, evaluate, export policy.onnx
+  e2efly train race --algo bptt    another task, another algorithm
+  e2efly eval runs/hover-ppo-0     fly a policy from 1000 unseen starts, draw plots
+  e2efly export RUN                write policy.onnx from a checkpoint again
+  e2efly bench                     how fast this machine simulates and learns
+  e2efly list                      tasks, algorithms, vehicles, tracks, reward terms
+
+`e2efly COMMAND --help` lists every option of a command."""
+
+
+@dataclass(frozen=True)
+class Eval:
+    """Fly a policy from unseen starts and report how it did."""
+
+    policy: tyro.conf.Positional[Path]
+    """A run directory, or a policy.onnx."""
+    episodes: int = 1000
+    """Starts of each criterion."""
+    json: Path | None = None
+    """Write the report, with a row for every start, to this file."""
+    plots: Path | None = None
+    """Folder of the plots; RUN/plots, or the folder of the policy, when left out."""
+    seed: int = 1_000_000
+    """Seed of the starts."""
+    vehicle: str | None = None
+    """Fly another vehicle than the contract's: a name or a .toml file. The policy is not changed."""
+    device: Literal["cpu", "gpu"] | None = None
+    """Where to compute."""
+
+
+@dataclass(frozen=True)
+class Export:
+    """Write policy.onnx from the checkpoint of a run."""
+
+    run: tyro.conf.Positional[Path]
+    """A run directory."""
+    out: Path | None = None
+    """The file to write; RUN/policy.onnx when left out."""
+    which: Literal["best", "last"] = "best"
+    """The best policy by evaluation, or the last."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Measure this machine: physics sub-steps/s, environment steps/s, training steps/s."""
+
+    json: Path | None = None
+    """Write the figures to this file."""
+    device: Literal["cpu", "gpu"] | None = None
+    """Where to compute."""
+
+
+@dataclass(frozen=True)
+class List:
+    """What there is: tasks, algorithms, presets, vehicles, tracks, references, command modes, reward terms."""
+
+
+def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
+    """The options of `train` for a task, algorithm and preset: a dataclass and its defaults.
+
+    Raises:
+        ValueError: for an unknown name.
+    """
+    config = presets.preset(task, algo, preset)
+    options = dataclasses.make_dataclass(
+        "Train",
+        [
+            ("task_name", tyro.conf.Positional[Annotated[str, tyro.conf.arg(metavar="TASK", help=_tasks())]]),
+            ("algo_name", Annotated[str, tyro.conf.arg(name="algo", metavar="ALGO", help=f"Algorithm: {_join(presets.ALGORITHMS)}.")]),
+            ("preset", Annotated[str, tyro.conf.arg(help=f"Where the defaults come from: {_join(presets.PRESETS)}.")]),
+            ("vehicle", Annotated[str, tyro.conf.arg(help="A shipped vehicle, or the path of a .toml file.")]),
+            ("seed", Annotated[int, tyro.conf.arg(help="Seed of everything random.")]),
+            ("out", Annotated[Path | None, tyro.conf.arg(help="Run directory; runs/TASK-ALGO-SEED when left out.")]),
+            ("resume", Annotated[bool, tyro.conf.arg(help="Go on with the unfinished run in --out.")]),
+            ("device", Annotated[Literal["cpu", "gpu"] | None, tyro.conf.arg(help="Where to compute.")]),
+            ("plots", Annotated[bool, tyro.conf.arg(help="Evaluate and draw plots at the end.")]),
+            ("steps", Annotated[int, tyro.conf.arg(help="Environment steps of the whole run.")]),
+            ("chunk", Annotated[int, tyro.conf.arg(help="Updates between two evaluations (sets shapes).")]),
+            ("eval_episodes", Annotated[int, tyro.conf.arg(help="Starts of an evaluation while training (sets shapes).")]),
+            ("stop_at", Annotated[float | None, tyro.conf.arg(help="Stop once the success on 1000 starts is at least this.")]),
+            ("env", EnvConfig),
+            ("task", Annotated[type(config.task), tyro.conf.arg(name="task")]),
+            ("algo", Annotated[type(config.algo), tyro.conf.arg(name="algo")]),
+            ("network", NetworkConfig),
+            ("reward", RewardConfig),
+        ],
+        frozen=True,
+    )  # fmt: skip
+    options.__doc__ = f"Train a policy ({task}, {algo}). The defaults below are those of the preset {preset!r}."
+    top = {name: getattr(config, name) for name in ("seed", "steps", "chunk", "eval_episodes", "stop_at")}
+    parts = {name: getattr(config, name) for name in ("env", "task", "algo", "network", "reward")}
+    defaults = options(
+        task_name=tyro.MISSING, algo_name=algo, preset=preset, vehicle=config.env.vehicle, out=None, resume=False,
+        device=None, plots=True, **top, **parts,
+    )  # fmt: skip
+    return options, defaults
+
+
+def train_config(options: Any) -> Any:
+    """The `TrainConfig` of parsed options."""
+    config = presets.preset(options.task_name, options.algo_name, options.preset)
+    shared = {f.name: getattr(options, f.name) for f in dataclasses.fields(config)}
+    if options.vehicle != config.env.vehicle:
+        shared["env"] = dataclasses.replace(options.env, vehicle=options.vehicle)
+    return dataclasses.replace(config, **shared)
+
+
+def main() -> NoReturn:
+    """Run the command line and exit: 0 when it did what was asked, 2 for bad input, 130 after Ctrl-C."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command; returns the exit status."""
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(_ABOUT)
+        return 0
+    if arguments[0] in ("-V", "--version"):
+        print(__version__)
+        return 0
+    try:
+        return _command(arguments[0])(arguments[1:])
+    except (ValueError, OSError, FloatingPointError) as error:
+        console.print("[bold red]error:[/]", end=" ")
+        console.print(str(error), markup=False)
+        return 2
+    except KeyboardInterrupt:
+        console.print("interrupted")
+        return 130
+
+
+def _command(name: str) -> Callable[[list[str]], int]:
+    commands = {"train": _train, "eval": _eval, "export": _export, "bench": _bench, "list": _list}
+    if name not in commands:
+        raise ValueError(unknown("command", name, commands))
+    return commands[name]
+
+
+def _train(arguments: list[str]) -> int:
+    task = next((a for a in arguments[:1] if not a.startswith("-")), "hover")
+    options, defaults = train_options(task, _peek(arguments, "--algo", "ppo"), _peek(arguments, "--preset", "ours"))
+    if arguments[:1] != [task] and not {"-h", "--help"} & set(arguments):
+        raise ValueError(f"train needs a task first: {_join(presets.TASKS)}")
+    parsed = tyro.cli(options, default=defaults, args=arguments, prog="e2efly train", config=(tyro.conf.AvoidSubcommands,))
+    config = train_config(parsed)
+    out = parsed.out or Path("runs") / f"{task}-{parsed.algo_name}-{config.seed}"
+    from e2efly.commands.train import train_command
+
+    return train_command(config, out, resume=parsed.resume, device=parsed.device, plots=parsed.plots)
+
+
+def _eval(arguments: list[str]) -> int:
+    options = tyro.cli(Eval, args=arguments, prog="e2efly eval")
+    from e2efly.commands.evaluate import eval_command
+
+    return eval_command(options.policy, options.episodes, options.json, options.plots, options.seed, options.vehicle, options.device)
+
+
+def _export(arguments: list[str]) -> int:
+    options = tyro.cli(Export, args=arguments, prog="e2efly export")
+    from e2efly.commands.export import export_command
+
+    return export_command(options.run, options.out, options.which)
+
+
+def _bench(arguments: list[str]) -> int:
+    options = tyro.cli(Bench, args=arguments, prog="e2efly bench")
+    from e2efly.commands.bench import bench_command
+
+    return bench_command(options.json, options.device)
+
+
+def _list(arguments: list[str]) -> int:
+    tyro.cli(List, args=arguments, prog="e2efly list")
+    from e2efly.commands.catalogue import list_command
+
+    return list_command()
+
+
+def _peek(arguments: list[str], flag: str, default: str) -> str:
+    """The value of a flag, before the rest is parsed: it decides which other flags there are."""
+    for i, argument in enumerate(arguments):
+        if argument.startswith(flag + "="):
+            return argument.split("=", 1)[1]
+        if argument == flag and i + 1 < len(arguments):
+            return arguments[i + 1]
+    return default
+
+
+def _tasks() -> str:
+    return f"What to learn: {_join(presets.TASKS)}."
+
+
+def _join(names: Any) -> str:
+    return ", ".join(names)
+
+
+if __name__ == "__main__":
+    main()

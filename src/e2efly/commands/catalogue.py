@@ -1,0 +1,38 @@
+"""`e2efly list`."""
+
+from rich.console import Console
+from rich.table import Table
+
+from e2efly import presets
+from e2efly.device import prepare
+from e2efly.tasks.tracks import track_names
+from e2efly.vehicles import load_vehicle, vehicle_names
+
+
+def list_command() -> int:
+    """Print what there is."""
+    prepare("cpu")
+    from e2efly.physics import COMMAND_MODES, INTEGRATORS
+    from e2efly.rewards import TERMS
+
+    console = Console(highlight=False)
+    for kind, names in (
+        ("tasks", presets.TASKS),
+        ("algorithms", presets.ALGORITHMS),
+        ("presets", presets.PRESETS),
+        ("race tracks", track_names()),
+        ("references", ["polynomial", "circle", "lemniscate", "FILE.csv"]),
+        ("command modes", COMMAND_MODES),
+        ("integrators", INTEGRATORS),
+    ):
+        console.print(f"[bold]{kind}[/]: {', '.join(names)}")
+    vehicles = Table("vehicle", "mass, kg", "thrust/weight", "latency, s", "hash", box=None, header_style="bold")
+    for name in vehicle_names():
+        v = load_vehicle(name)
+        vehicles.add_row(name, f"{v.mass:g}", f"{v.thrust_to_weight:.2f}", f"{v.latency:g}", v.hash)
+    console.print(vehicles)
+    terms = Table("reward term", "gradient", "what it is (unweighted)", box=None, header_style="bold")
+    for name, term in TERMS.items():
+        terms.add_row(name, term.kind, (term.function.__doc__ or "").split("\n")[0])
+    console.print(terms)
+    return 0

@@ -1,0 +1,215 @@
+"""`e2efly eval`."""
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from e2efly import presets
+from e2efly.config import EnvConfig, RewardConfig, TaskConfig
+from e2efly.deploy.policy import Policy, load_policy
+from e2efly.device import prepare
+from e2efly.learn.checkpoint import write_atomically
+from e2efly.learn.rundir import RunDirectory
+from e2efly.vehicles import load_vehicle
+
+BATCH = 250
+"""Starts that are flown at once."""
+
+
+def eval_command(
+    path: Path,
+    episodes: int,
+    report: Path | None,
+    plots: Path | None,
+    seed: int,
+    vehicle: str | None,
+    device: str | None,
+    quiet: bool = False,
+) -> int:
+    """Fly the ONNX file itself from unseen starts; print a table, write the report and the plots."""
+    if episodes <= 0:
+        raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
+    prepare(device)
+    run = RunDirectory(path) if path.is_dir() else None
+    policy = load_policy(run.policy if run else path)
+    if run:
+        config = run.config()
+        task, env_config = config.task, config.env
+    else:
+        task, env_config = _from_contract(policy)
+    if vehicle is not None:
+        env_config = dataclasses.replace(env_config, vehicle=vehicle)
+    flown = fly_suites(policy, task, env_config, episodes, seed)
+    console = Console(highlight=False, quiet=quiet)
+    console.print(_table(flown, episodes))
+    if report:
+        write_atomically(report, (json.dumps(_report(policy, path, env_config, flown, seed), indent=1) + "\n").encode())
+        console.print(f"Report: {report}")
+    folder = plots or (run.plots if run else path.parent / "plots")
+    _draw(policy, task, env_config, flown, seed, folder, run)
+    console.print(f"Plots: {folder}")
+    return 0
+
+
+def _from_contract(policy: Policy) -> tuple[TaskConfig, EnvConfig]:
+    """Task and environment as the contract of a lone policy.onnx says."""
+    c = policy.contract
+    vehicle = load_vehicle(c.vehicle)
+    if vehicle.hash != c.vehicle_hash:
+        raise ValueError(
+            f"vehicle_hash is {c.vehicle_hash} in the contract, but vehicle {c.vehicle!r} is {vehicle.hash}: it was "
+            "trained on other parameters; accepted: the vehicle's file with --vehicle FILE.toml, or a policy of its own"
+        )
+    counts = {f.name: f.size for f in c.observation}
+    config = EnvConfig(
+        vehicle=c.vehicle,
+        command_mode=c.action.mode,
+        control_rate=c.control_rate_hz,
+        action_latency=tuple(c.latency_range_s),
+        observation_latency=tuple(c.observation_latency_range_s),
+        past_actions=counts.get("past_actions", 0) // 4,
+    )
+    return presets.preset(c.task, "ppo").task, config
+
+
+def fly_suites(policy: Policy, task: TaskConfig, env_config: EnvConfig, episodes: int, seed: int) -> dict[str, Any]:
+    """Fly `episodes` starts of every criterion of a task; `Episodes` of NumPy arrays by the criterion's name."""
+    import jax
+
+    from e2efly.env import Env, random_key
+    from e2efly.evaluate import run_episodes
+
+    flown = {}
+    program = jax.jit(
+        lambda env, key, steps, settle: run_episodes(env, callback(policy), key, BATCH, steps, settle),
+        static_argnums=2,
+    )
+    for name, suite in presets.suites(task).items():
+        env = Env.of(suite, RewardConfig({"prog2": 1.0}), env_config)
+        check_observation(policy, env)
+        steps, settle = episode_steps(suite, env), float(getattr(suite, "settle_s", 0.0))
+        keys = [jax.random.fold_in(random_key(seed), i) for i in range(-(-episodes // BATCH))]
+        parts = [jax.tree.map(np.asarray, program(env, key, steps, settle)) for key in keys]
+        flown[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
+    return flown
+
+
+def callback(policy: Policy) -> Any:
+    """The ONNX file as a function inside compiled programs."""
+    import jax
+    import jax.numpy as jnp
+
+    def act(observation: Any) -> Any:
+        shape = jax.ShapeDtypeStruct((observation.shape[0], 4), jnp.float32)
+        return jax.pure_callback(lambda o: policy.act(np.asarray(o)), shape, observation)
+
+    return act
+
+
+def episode_steps(task: TaskConfig, env: Any) -> int:
+    """Control steps of the longest episode."""
+    return int(np.ceil(float(task.episode_s) / env.control_period - 1e-6))
+
+
+def check_observation(policy: Policy, env: Any) -> None:
+    """Refuse a policy whose observation is not the environment's.
+
+    Raises:
+        ValueError: naming the field, and what either side has.
+    """
+    wanted = [(f.name, f.size, f.frame, f.unit) for f in policy.contract.observation]
+    offered = [(f.name, f.size, f.frame, f.unit) for f in env.fields]
+    if wanted != offered:
+        odd = [f for f in wanted if f not in offered] + [f for f in offered if f not in wanted]
+        raise ValueError(f"observation: the policy wants {wanted}, the environment gives {offered}; they differ in {odd}")
+
+
+def _table(flown: dict[str, Any], episodes: int) -> Table:
+    from e2efly.evaluate import wilson
+
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for heading in (
+        "criterion", f"success of {episodes}", "95 % interval", "final error", "mean error", "time", "top speed",
+        "roughness",
+    ):  # fmt: skip
+        table.add_column(heading)
+    for name, e in flown.items():
+        ok = np.asarray(e.success)
+        low, high = wilson(int(ok.sum()), len(ok))
+        table.add_row(
+            name,
+            f"{ok.mean():.2%}",
+            f"{low:.2%} to {high:.2%}",
+            f"{100 * e.final_error.mean():.2f} cm",
+            f"{100 * e.mean_error.mean():.2f} cm",
+            f"{e.duration[ok].mean():.2f} s" if ok.any() else "none",
+            f"{e.top_speed.max():.1f} m/s",
+            f"{e.roughness.mean():.3f}",
+        )
+    return table
+
+
+def _report(policy: Policy, path: Path, env_config: EnvConfig, flown: dict[str, Any], seed: int) -> dict[str, Any]:
+    """The report of `--json`: a summary and a row for every start, by criterion."""
+    from e2efly.evaluate import wilson
+
+    def criterion(e: Any) -> dict[str, Any]:
+        ok = np.asarray(e.success)
+        names = [f.name for f in dataclasses.fields(e)]
+        columns = {name: np.asarray(getattr(e, name)) for name in names}
+        return {
+            "episodes": len(ok),
+            "success": float(ok.mean()),
+            "success_interval_95": wilson(int(ok.sum()), len(ok)),
+            "mean": {name: float(column.mean()) for name, column in columns.items()},
+            "median": {name: float(np.median(column)) for name, column in columns.items() if column.dtype != bool},
+            "mean_duration_of_success_s": float(columns["duration"][ok].mean()) if ok.any() else None,
+            "starts": [
+                {name: (bool if c.dtype == bool else float)(c[i]) for name, c in columns.items()} for i in range(len(ok))
+            ],
+        }
+
+    return {
+        "policy": str(path),
+        "task": policy.contract.task,
+        "vehicle": env_config.vehicle,
+        "seed": seed,
+        "units": {
+            "duration": "s", "final_error": "m", "mean_error": "m", "top_speed": "m/s", "top_rate": "rad/s",
+            "roughness": "mean |change of action| a step, action in [-1, 1]",
+        },
+        "criteria": {name: criterion(e) for name, e in flown.items()},
+    }  # fmt: skip
+
+
+def _draw(
+    policy: Policy,
+    task: TaskConfig,
+    env_config: EnvConfig,
+    flown: dict[str, Any],
+    seed: int,
+    folder: Path,
+    run: RunDirectory | None,
+) -> None:
+    from e2efly.env import Env, random_key
+    from e2efly.view import plots
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"cannot make the folder of the plots {folder}: {error.strerror}") from error
+    title = f"{policy.contract.task} on {policy.contract.vehicle}"
+    for name, suite in presets.suites(task).items():
+        env = Env.of(suite, RewardConfig({"prog2": 1.0}), env_config)
+        flights = plots.fly(env, callback(policy), random_key(seed), 12, episode_steps(suite, env))
+        tag = f"{title}: {name}" if len(flown) > 1 else title
+        plots.plot_flights(env.task, flights, folder / f"flights_{name}.png", tag)
+        plots.plot_time(flights, 0, folder / f"time_{name}.png", tag)
+    plots.plot_errors(flown, folder / "errors.png", title)
+    if run and (rows := run.rows()):
+        plots.plot_learning(rows, folder / "learning.png", title)

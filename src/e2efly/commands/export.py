@@ -1,0 +1,25 @@
+"""`e2efly export`."""
+
+from pathlib import Path
+
+from rich.console import Console
+
+from e2efly.device import prepare
+
+
+def export_command(run_path: Path, out: Path | None, which: str) -> int:
+    """Write policy.onnx from the checkpoint of a run."""
+    prepare("cpu")
+    from e2efly.learn.export import contract_of, export_policy
+    from e2efly.learn.rundir import RunDirectory
+    from e2efly.learn.runner import Setup, load_policy_layers
+
+    run = RunDirectory(run_path)
+    setup = Setup.of(run.config())
+    layers = load_policy_layers(setup, run, which)
+    path = out or run.policy
+    export_policy(
+        path, layers, setup.features, setup.config.network.activation, contract_of(setup.env, setup.config)
+    )
+    Console(highlight=False).print(f"Wrote the {which} policy of {run_path} to {path}")
+    return 0

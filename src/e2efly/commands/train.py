@@ -1,0 +1,61 @@
+"""`e2efly train`."""
+
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from e2efly.commands.progress import TerminalProgress
+from e2efly.config import TrainConfig
+from e2efly.device import prepare
+from e2efly.presets import algorithm_name, task_name
+
+
+def train_command(config: TrainConfig, out: Path, resume: bool, device: str | None, plots: bool) -> int:
+    """Train, ship the best policy, evaluate it and draw plots; exit status 0, or 130 when the user stopped it."""
+    prepare(device)
+    from e2efly.learn.runner import train
+
+    console = Console(highlight=False)
+    task, algo = task_name(config.task), algorithm_name(config.algo)
+    with TerminalProgress(console, f"{task} by {algo}") as progress:
+        summary = train(config, out, progress, resume)
+    _report(console, summary, out)
+    if summary["stopped_by_user"]:
+        console.print(f"Stopped. Go on with: e2efly train {task} --algo {algo} --out {out} --resume")
+        return 130
+    if plots:
+        from e2efly.commands.evaluate import eval_command
+
+        eval_command(out, 1000, None, None, 1_000_000, None, None, quiet=True)
+        console.print(f"Plots: {out / 'plots'}")
+    console.print(f"Policy: {out / 'policy.onnx'} (its contract is inside; `e2efly eval {out}` flies it again)")
+    return 0
+
+
+def _report(console: Console, summary: dict[str, Any], out: Path) -> None:
+    del out
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for heading in ("criterion", "policy", "success", "final error", "mean error", "time of a success", "top speed"):
+        table.add_column(heading)
+    for which in ("shipped", "last"):
+        for name, d in summary[which].items():
+            if name == "update":
+                continue
+            table.add_row(
+                name,
+                f"{which} (update {summary[which]['update']})",
+                f"{d['success']:.1%}",
+                f"{100 * d['final_error_m']:.1f} cm",
+                f"{100 * d['mean_error_m']:.1f} cm",
+                f"{d['seconds_of_success']:.2f} s",
+                f"{d['top_speed_m_s']:.1f} m/s",
+            )
+    seconds = summary["seconds_trained_from_process_start"]
+    console.print(
+        f"\nLearned to {summary['task']} by {summary['algorithm'].upper()} in {seconds:.1f} s from the start of the "
+        f"process ({summary['env_steps'] / 1e6:.2f} M environment steps). "
+        f"Flown from {summary['episodes']} starts that it never saw:"
+    )
+    console.print(table)
