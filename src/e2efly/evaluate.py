@@ -1,6 +1,7 @@
 """Episodes of a policy from given seeds, without new starts: what training watches and `eval` reports."""
 
 import dataclasses
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -74,14 +75,27 @@ def run_episodes(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int, sett
     )
 
 
-def trace(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int) -> tuple[State, Float[Array, "t n 4"], Step]:
-    """The states, actions and outcomes of `n` episodes, each leaf (steps, n, ...), without new starts."""
+def trace(
+    env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int
+) -> tuple[State, Float[Array, "t n 4"], Float[Array, "t n 3"], Step]:
+    """States, actions, goals and outcomes of `n` episodes, each leaf (steps, n, ...), without new starts."""
     state, observation = env.reset(key, n)
 
-    def step(carry: tuple[EnvState, Array], _: None) -> tuple[tuple[EnvState, Array], tuple[State, Array, Step]]:
+    def step(carry: tuple[EnvState, Array], _: None) -> tuple[tuple[EnvState, Array], tuple]:
         state, observation = carry
         action = act(observation)
         reached, out = env.advance(state, action)
-        return (reached, out.final_observation), (reached.vehicle, action, out)
+        goal = env.task.goal(state.memory, reached.time)
+        return (reached, out.final_observation), (reached.vehicle, action, goal, out)
 
     return jax.lax.scan(step, (state, observation), None, length=steps)[1]
+
+
+def wilson(successes: int, n: int, z: float = 1.96) -> tuple[float, float]:
+    """Wilson's score interval of a success rate (E. B. Wilson 1927); z 1.96 is 95 %."""
+    if n == 0:
+        return 0.0, 1.0
+    p, scale = successes / n, 1 + z**2 / n
+    middle = (p + z**2 / (2 * n)) / scale
+    half = z * math.sqrt(p * (1 - p) / n + z**2 / (4 * n**2)) / scale
+    return max(0.0, middle - half), min(1.0, middle + half)

@@ -47,9 +47,7 @@ def test_every_shipped_vehicle_loads() -> None:
         assert load_vehicle(name).name == name
 
 
-@pytest.mark.parametrize(
-    ("name", "rotor_speed", "thrust_to_weight"), [("vis_r", 2117, 2.78), ("vis_h", 1677, 4.44)]
-)
+@pytest.mark.parametrize(("name", "rotor_speed", "thrust_to_weight"), [("vis_r", 2117, 2.78), ("vis_h", 1677, 4.44)])
 def test_the_papers_checks(name: str, rotor_speed: float, thrust_to_weight: float) -> None:
     vehicle = load_vehicle(name)
     assert vehicle.hover_rotor_speed == pytest.approx(rotor_speed, abs=0.5)
@@ -103,7 +101,6 @@ def test_thrust_is_never_negative() -> None:
 
 @pytest.mark.parametrize("name", ["VIS-R", "vis_r", "Vis-r"])
 def test_a_name_may_be_written_as_in_the_paper(name: str) -> None:
-    assert load_vehicle(name) == load_vehicle(name)
     assert load_vehicle(name).name == "vis_r"
 
 
@@ -139,7 +136,7 @@ BROKEN: dict[str, tuple[Callable[[dict], Any], tuple[str, ...]]] = {
     "wrong unit": (lambda t: t["mass"].update(unit="g"), ("mass.unit is 'g'", "accepted: 'kg'")),
     "wrong shape": (lambda t: t["inertia"].update(value=[1e-3, 1e-3]), ("inertia.value", "[0.001, 0.001]", "(3,)")),
     "ragged": (
-        lambda t: t["rotor_position"].update(value=[[1.0], [1.0, 2.0]]), ("rotor_position.value", "[1.0], [1.0", "(4, 2)")
+        lambda t: t["rotor_position"].update(value=[[1.0], [1.0, 2.0]]), ("rotor_position.value", "[[1.0], ", "(4, 2)")
     ),
     "list for a number": (lambda t: t["mass"].update(value=[0.75]), ("mass.value is [0.75]", "a number")),
     "text for a number": (lambda t: t["mass"].update(value="heavy"), ("mass.value is 'heavy'", "a number")),

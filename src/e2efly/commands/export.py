@@ -19,7 +19,7 @@ def export_command(run_path: Path, out: Path | None, which: str) -> int:
     layers = load_policy_layers(setup, run, which)
     path = out or run.policy
     export_policy(
-        path, layers, setup.features, setup.config.network.activation, contract_of(setup.env, setup.config)
+        path, layers, setup.features, setup.config.network.activation, contract_of(setup.env, setup.config.env)
     )
     Console(highlight=False).print(f"Wrote the {which} policy of {run_path} to {path}")
     return 0

@@ -16,7 +16,7 @@ import optax
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import BPTTConfig, NetworkConfig
-from e2efly.env import Env, EnvState
+from e2efly.env import Env, EnvState, Step
 from e2efly.learn.algorithm import TrainState, adam, annealed
 from e2efly.learn.networks import Features, Layers, init_policy, policy
 
@@ -73,10 +73,13 @@ class BPTT:
         keep = jnp.exp(-config.gradient_decay * env.control_period)
 
         @jax.checkpoint  # recomputing a step is faster than storing it, and far smaller
+        def fly(parameters: Parameters, env_state: EnvState, observation: Array) -> tuple[EnvState, Step]:
+            action = policy(parameters.policy, self.features(observation), self.network.activation)
+            return env.advance(env_state, action)
+
         def step(carry: tuple[EnvState, Array, Array], _: None) -> tuple[Any, Any]:
             env_state, observation, discount = carry
-            action = policy(parameters.policy, self.features(observation), self.network.activation)
-            env_state, out = env.step(env_state, action)
+            env_state, out = env.restart(*fly(parameters, env_state, observation))
             env_state = dataclasses.replace(env_state, vehicle=_damped(env_state.vehicle, keep))
             gathered = (
                 jnp.mean(out.reward),

@@ -62,7 +62,7 @@ def contract_of(env: Env, config: EnvConfig) -> Contract:
         observation_latency_range_s=_decimals(env.observation_latency_range),
         observation=env.fields,
         action=Action(mode.name, mode.fields, mode.units, *limits),
-        hover_action=_decimals(env.hover_action()),
+        hover_action=_decimals(env.hover),
     )
 
 

@@ -293,7 +293,7 @@ def _finish(
     config = setup.config
     by_best = judge(setup, programs.evaluate, best, REPORTED, REPORT_EPISODES)
     by_last = judge(setup, programs.evaluate, state.parameters.policy, REPORTED, REPORT_EPISODES)
-    export_policy(run.policy, best, setup.features, config.network.activation, contract_of(setup.env, config))
+    export_policy(run.policy, best, setup.features, config.network.activation, contract_of(setup.env, config.env))
     summary = {
         "task": presets.task_name(config.task),
         "algorithm": presets.algorithm_name(config.algo),

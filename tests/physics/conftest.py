@@ -1,0 +1,65 @@
+"""What the physics tests share: one compiled flight, and random states."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from e2efly.physics import Physics, State, step
+from e2efly.vehicles import Vehicle, load_vehicle
+
+Fly = Callable[..., State]
+
+
+@pytest.fixture(scope="session")
+def vis_r() -> Vehicle:
+    return load_vehicle("vis_r")
+
+
+@pytest.fixture(scope="session")
+def vacuum(vis_r: Vehicle) -> Vehicle:
+    """VIS-R without drag."""
+    return dataclasses.replace(vis_r, drag_linear=np.zeros(3), drag_quadratic=np.zeros(3))
+
+
+@pytest.fixture(scope="session")
+def stone(vacuum: Vehicle) -> Vehicle:
+    """VIS-R whose rotors do not push, without drag."""
+    return dataclasses.replace(vacuum, thrust_map=np.array([1e-9, 0.0, -1.0]))
+
+
+@pytest.fixture(scope="session")
+def fly() -> Fly:
+    """(physics, plant, state, commands (t, ..., 4), wind) -> the states after each control step, (t, ...)."""
+
+    @jax.jit
+    def run(physics: Physics, plant: Vehicle, state: State, commands: jax.Array, wind: Any = None) -> State:
+        def one(state: State, command: jax.Array) -> tuple[State, State]:
+            state = step(physics, plant, state, command, wind=wind)
+            return state, state
+
+        return jax.lax.scan(one, state, commands)[1]
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def random_state(vis_r: Vehicle) -> Callable[..., State]:
+    """(seed, shape) -> states in fast and tumbling flight, in the current default precision."""
+
+    def draw(seed: int, shape: tuple[int, ...] = ()) -> State:
+        rng = np.random.default_rng(seed)
+        q = rng.normal(size=(*shape, 4))
+        return State(
+            position=jnp.asarray(rng.normal(size=(*shape, 3))),
+            velocity=jnp.asarray(4 * rng.normal(size=(*shape, 3))),
+            quaternion=jnp.asarray(q / np.linalg.norm(q, axis=-1, keepdims=True)),
+            body_rate=jnp.asarray(2 * rng.normal(size=(*shape, 3))),
+            rotor_speed=jnp.asarray(vis_r.hover_rotor_speed * rng.uniform(0.7, 1.3, (*shape, 4))),
+        )
+
+    return draw
