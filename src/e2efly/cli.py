@@ -160,7 +160,9 @@ def _train(arguments: list[str]) -> int:
     options, defaults = train_options(task, _peek(arguments, "--algo", "ppo"), _peek(arguments, "--preset", "ours"))
     if arguments[:1] != [task] and not {"-h", "--help"} & set(arguments):
         raise ValueError(f"train needs a task first: {_join(presets.TASKS)}")
-    parsed = tyro.cli(options, default=defaults, args=arguments, prog="e2efly train", config=(tyro.conf.AvoidSubcommands,))
+    parsed = tyro.cli(
+        options, default=defaults, args=arguments, prog="e2efly train", config=(tyro.conf.AvoidSubcommands,)
+    )
     config = train_config(parsed)
     out = parsed.out or Path("runs") / f"{task}-{parsed.algo_name}-{config.seed}"
     from e2efly.commands.train import train_command
@@ -172,7 +174,9 @@ def _eval(arguments: list[str]) -> int:
     options = tyro.cli(Eval, args=arguments, prog="e2efly eval")
     from e2efly.commands.evaluate import eval_command
 
-    return eval_command(options.policy, options.episodes, options.json, options.plots, options.seed, options.vehicle, options.device)
+    return eval_command(
+        options.policy, options.episodes, options.json, options.plots, options.seed, options.vehicle, options.device
+    )
 
 
 def _export(arguments: list[str]) -> int:

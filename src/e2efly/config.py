@@ -57,7 +57,7 @@ class EnvConfig:
     largest_step: float = 0.005
     """Largest physics sub-step, s (sets shapes)."""
     action_latency: tuple[float, float] | None = None
-    """Seconds from observation to command, uniform an episode; the vehicle's own when left out (its top sets shapes)."""
+    """Seconds from observation to command, uniform an episode; the vehicle's own when left out (top sets shapes)."""
     observation_latency: tuple[float, float] = (0.0, 0.0)
     """Age of the observed state, s, uniform an episode (its top sets shapes)."""
     past_actions: int | None = None

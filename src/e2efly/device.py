@@ -33,7 +33,7 @@ def prepare(device: str | None = None) -> None:
     except RuntimeError as error:
         reason = str(error).splitlines()[0]
         raise ValueError(
-            f"--device {device} is not to be had: {reason} (for NVIDIA GPUs: pip install 'e2efly[cuda]'; or --device cpu)"
+            f"--device {device} is not to be had: {reason} (NVIDIA GPUs: pip install 'e2efly[cuda]')"
         ) from None
     if device and found != device:
         raise ValueError(f"--device {device} is not to be had: JAX computes on {found}")

@@ -29,6 +29,9 @@ from e2efly.tasks.task import into_ball, uniform
 from e2efly.vehicles import Vehicle, load_vehicle, unknown
 from e2efly.vehicles.vehicle import GRAVITY, quantities
 
+DEFAULT = EnvConfig()
+"""The VIS-R, nothing random but the starts."""
+
 
 def random_key(seed: int) -> PRNGKeyArray:
     """The key of a seed. XLA's own generator: it compiles in a seventh of the time of JAX's default."""
@@ -94,8 +97,8 @@ class Step:
 @partial(
     jax.tree_util.register_dataclass,
     data_fields=[
-        "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range", "observation_latency_range",
-        "randomize", "wind", "noise", "imu",
+        "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range",
+        "observation_latency_range", "randomize", "wind", "noise", "imu",
     ],
     meta_fields=["queue", "seen_actions", "past"],
 )  # fmt: skip
@@ -113,8 +116,8 @@ class Env:
     """Half of the command's range."""
     hover: Float[Array, "4"]
     """The action that hovers a level vehicle, where the command mode has one; else the middle of the range."""
-    latency_range: Float[Array, "2"]
-    observation_latency_range: Float[Array, "2"]
+    latency_range: Float[Array | np.ndarray, "2"]
+    observation_latency_range: Float[Array | np.ndarray, "2"]
     randomize: dict[str, Any]
     """Relative half-width of each randomised vehicle parameter."""
     wind: Any
@@ -129,7 +132,7 @@ class Env:
     """States that are kept for late observations; 0: none."""
 
     @staticmethod
-    def of(task: TaskConfig, reward: RewardConfig, config: EnvConfig = EnvConfig(), dtype: type = np.float32) -> "Env":
+    def of(task: TaskConfig, reward: RewardConfig, config: EnvConfig = DEFAULT, dtype: type = np.float32) -> "Env":
         """Build the environment of a configuration.
 
         Raises:
@@ -228,9 +231,7 @@ class Env:
         tick = state.tick + 1
         inertial = state.imu
         if self.imu is not None and inertial is not None:
-            inertial = imu.measure(
-                self.imu, jax.random.fold_in(state.key, 2 * tick), inertial, before, after, period
-            )
+            inertial = imu.measure(self.imu, jax.random.fold_in(state.key, 2 * tick), inertial, before, after, period)
         reached = EnvState(
             vehicle=after,
             memory=memory,
@@ -330,7 +331,7 @@ def _push(past: State, newest: State) -> State:
     return jax.tree.map(lambda old, new: jnp.concatenate([new[:, None], old[:, :-1]], axis=1), past, newest)
 
 
-def _between(key: PRNGKeyArray, n: int, bounds: Float[Array, "2"]) -> Float[Array, " n"]:
+def _between(key: PRNGKeyArray, n: int, bounds: Float[Array | np.ndarray, "2"]) -> Float[Array, " n"]:
     return bounds[0] + (bounds[1] - bounds[0]) * jax.random.uniform(key, (n,), jnp.asarray(bounds).dtype)
 
 
@@ -367,7 +368,10 @@ def _check(config: EnvConfig, task: TaskConfig) -> None:
             raise ValueError(unknown("vehicle parameter", name, names))
         if not 0 <= width < 1:
             raise ValueError(f"env.randomize.{name} is {width}; accepted: at least 0 and below 1")
-    for field, bounds in (("action_latency", config.action_latency), ("observation_latency", config.observation_latency)):
+    for field, bounds in (
+        ("action_latency", config.action_latency),
+        ("observation_latency", config.observation_latency),
+    ):
         if bounds is not None and not (0 <= bounds[0] <= bounds[1] <= 1):
             raise ValueError(f"env.{field} is {bounds}; accepted: two rising numbers of seconds in [0, 1]")
     if config.past_actions is not None and config.past_actions < 0:

@@ -70,9 +70,7 @@ def run_episodes(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int, sett
 
     (_, _, _, e, counted), _ = jax.lax.scan(step, first, None, length=steps)
     flown = jnp.maximum(e.duration / env.control_period, 1.0)
-    return dataclasses.replace(
-        e, mean_error=e.mean_error / jnp.maximum(counted, 1.0), roughness=e.roughness / flown
-    )
+    return dataclasses.replace(e, mean_error=e.mean_error / jnp.maximum(counted, 1.0), roughness=e.roughness / flown)
 
 
 def trace(

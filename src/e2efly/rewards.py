@@ -97,7 +97,7 @@ def ori3(pixel: Float[Array, "*n 2"], pixel_velocity: Float[Array, "*n 2"]) -> S
 
 
 def ori4(roll_error: Scalar, approaching: Bool[Array, "*n"], ori4_limit: float | Array = 2.0) -> Scalar:
-    """-min(tan|roll error|, lambda12) while approaching a gap, else 0 (Eq. ori4). The limit holds from a right angle on."""
+    """-min(tan|roll error|, lambda12) while approaching a gap, else 0 (Eq. ori4); the limit holds past a right angle."""
     angle = jnp.abs(roll_error)
     bounded = jnp.minimum(angle, jnp.arctan(ori4_limit))
     return jnp.where(approaching, -jnp.tan(bounded), 0.0)
@@ -284,4 +284,4 @@ def reward(
         constants = {p: given[p] for p in term.parameters if p in given}
         value = term.function(**{i: signals[i] for i in term.inputs}, **constants)
         terms[name] = weight * (jax.lax.stop_gradient(value) if term.kind == "sparse" else value)
-    return sum(terms.values()), terms
+    return jnp.sum(jnp.stack(list(terms.values())), axis=0), terms

@@ -70,8 +70,8 @@ def _from_contract(policy: Policy) -> tuple[TaskConfig, EnvConfig]:
         vehicle=c.vehicle,
         command_mode=c.action.mode,
         control_rate=c.control_rate_hz,
-        action_latency=tuple(c.latency_range_s),
-        observation_latency=tuple(c.observation_latency_range_s),
+        action_latency=(c.latency_range_s[0], c.latency_range_s[1]),
+        observation_latency=(c.observation_latency_range_s[0], c.observation_latency_range_s[1]),
         past_actions=counts.get("past_actions", 0) // 4,
     )
     return presets.preset(c.task, "ppo").task, config
@@ -126,7 +126,9 @@ def check_observation(policy: Policy, env: Any) -> None:
     offered = [(f.name, f.size, f.frame, f.unit) for f in env.fields]
     if wanted != offered:
         odd = [f for f in wanted if f not in offered] + [f for f in offered if f not in wanted]
-        raise ValueError(f"observation: the policy wants {wanted}, the environment gives {offered}; they differ in {odd}")
+        raise ValueError(
+            f"observation: the policy wants {wanted}, the environment gives {offered}; they differ in {odd}"
+        )
 
 
 def _table(flown: dict[str, Any], episodes: int) -> Table:
@@ -170,7 +172,8 @@ def _report(policy: Policy, path: Path, env_config: EnvConfig, flown: dict[str, 
             "median": {name: float(np.median(column)) for name, column in columns.items() if column.dtype != bool},
             "mean_duration_of_success_s": float(columns["duration"][ok].mean()) if ok.any() else None,
             "starts": [
-                {name: (bool if c.dtype == bool else float)(c[i]) for name, c in columns.items()} for i in range(len(ok))
+                {name: (bool if c.dtype == bool else float)(c[i]) for name, c in columns.items()}
+                for i in range(len(ok))
             ],
         }
 

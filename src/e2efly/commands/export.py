@@ -18,8 +18,6 @@ def export_command(run_path: Path, out: Path | None, which: str) -> int:
     setup = Setup.of(run.config())
     layers = load_policy_layers(setup, run, which)
     path = out or run.policy
-    export_policy(
-        path, layers, setup.features, setup.config.network.activation, contract_of(setup.env, setup.config.env)
-    )
+    export_policy(path, layers, setup.features, setup.config.network.activation, contract_of(setup.env, setup.config))
     Console(highlight=False).print(f"Wrote the {which} policy of {run_path} to {path}")
     return 0

@@ -16,6 +16,9 @@ INPUT, OUTPUT = "observation", "action"
 """Names of the graph's only input and output."""
 UNIT_TOLERANCE = 0.01
 """How far the length of the attitude quaternion may be from 1."""
+ROUNDING = 1e-6
+"""How far beyond 1 an action may lie: ONNX Runtime's tanh reaches 1.0000001."""
+_LARGEST = np.finfo(np.float32).max
 
 
 @dataclass(frozen=True)
@@ -44,13 +47,14 @@ class Policy:
         self._check(x)
         batch = np.ascontiguousarray(x if x.ndim == 2 else x[None], np.float32)
         action = self.session.run([OUTPUT], {INPUT: batch})[0]
-        good = np.abs(action) <= ACTION_LIMITS[1]  # false for NaN
+        good = np.abs(action) <= 1 + ROUNDING  # false for NaN
         if not good.all():
             row = int(np.argmin(good.all(-1)))
             raise ValueError(
                 f"action is {action[row].tolist()} for the observation {batch[row].tolist()}; accepted: numbers in "
                 "[-1, 1]; the observation is far outside of what flies, or the policy file is damaged"
             )
+        action = np.minimum(np.maximum(action, -1), 1)
         return action if x.ndim == 2 else action[0]
 
     def command(self, action: np.ndarray) -> np.ndarray:
@@ -72,7 +76,7 @@ class Policy:
         slices = self.contract.slices
         if x.ndim not in (1, 2) or x.shape[-1] != self.contract.observation_size or x.dtype.kind not in "fiu":
             raise ValueError(_wrong_shape(self.contract, x))
-        good = np.abs(x) <= np.finfo(np.float32).max  # false for NaN, infinity and what float32 cannot hold
+        good = np.abs(x) <= _LARGEST  # false for NaN, infinity and what float32 cannot hold
         if not good.all():
             name = next(name for name, part in slices.items() if not good[..., part].all())
             raise _refusal(name, x[..., slices[name]], good[..., slices[name]].all(-1), "finite numbers")

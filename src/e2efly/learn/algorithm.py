@@ -1,7 +1,6 @@
 """What every algorithm is to the runner, and what they share."""
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Protocol
 
 import jax

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Array, Float
 
 from e2efly.config import BPTTConfig, NetworkConfig
 from e2efly.env import Env, EnvState, Step
@@ -62,7 +62,7 @@ class BPTT:
 
         grads, (env_state, observation, metrics) = jax.grad(loss, has_aux=True)(state.parameters)
         rate = annealed(config, progress)
-        updates, optimizer = adam(config.max_grad_norm).update(grads, state.optimizer, state.parameters)
+        updates, optimizer = adam(config.max_grad_norm).update(grads, state.optimizer)
         parameters = jax.tree.map(lambda p, u: p - rate * u, state.parameters, updates)
         metrics["loss/gradient_norm"] = optax.global_norm(grads)
         return dataclasses.replace(

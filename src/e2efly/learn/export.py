@@ -9,7 +9,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from e2efly.config import EnvConfig
+from e2efly.config import TrainConfig
 from e2efly.deploy.contract import CONTRACT_VERSION, METADATA_KEY, Action, Contract
 from e2efly.deploy.policy import INPUT, OUTPUT, load_policy
 from e2efly.env import Env
@@ -28,20 +28,20 @@ _R_WORLD_BODY = ("-yy-zz", "+xy-wz", "+xz+wy", "+xy+wz", "-xx-zz", "+yz-wx", "+x
 """Row by row, half of R_world_body less the identity, as sums of products of quaternion entries."""
 
 
-def contract_of(env: Env, config: EnvConfig) -> Contract:
+def contract_of(env: Env, config: TrainConfig) -> Contract:
     """The contract of a policy of this environment.
 
     Args:
         env: the environment that the policy was trained in.
-        config: what it was built from; gives the exact numbers of which `env` holds float32.
+        config: the run's; its `env` is what `env` was built from, and has the exact numbers.
 
     Raises:
-        ValueError: when `env` was not built from `config` and the vehicle as it is now, naming the field.
+        ValueError: when `env` was not built from `config.env` and the vehicle as it is now, naming the field.
     """
-    vehicle, physics = load_vehicle(config.vehicle), env.physics
-    mode = COMMAND_MODES[config.command_mode]
-    rate = vehicle.control_rate if config.control_rate is None else config.control_rate
-    low, high = command_limits(mode, vehicle, config.position_range)
+    about, physics = config.env, env.physics
+    vehicle, mode = load_vehicle(about.vehicle), COMMAND_MODES[about.command_mode]
+    rate = vehicle.control_rate if about.control_rate is None else about.control_rate
+    low, high = command_limits(mode, vehicle, about.position_range)
     _same("command_mode", physics.command_mode, mode.name)
     _same("control_period", physics.control_period, 1 / rate)
     for name in (field.name for field in quantities()):

@@ -5,6 +5,7 @@ The features are part of the policy and of its exported graph: the observation s
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import jax
 import jax.numpy as jnp
@@ -14,7 +15,7 @@ from jaxtyping import Array, Float
 from e2efly.observation import Field
 from e2efly.physics.rotation import unrotate
 
-Layers = list[tuple[Array, Array]]
+Layers = list[tuple[Array | np.ndarray, Array | np.ndarray]]
 """Weights (inputs, outputs) and biases of each layer."""
 
 ACTIVATIONS = {"relu": jax.nn.relu, "tanh": jnp.tanh, "elu": jax.nn.elu}
@@ -57,7 +58,7 @@ class Features:
 def init_mlp(rng: np.random.Generator, sizes: tuple[int, ...], last_gain: float) -> Layers:
     """Orthogonal layers (gain sqrt 2, the last one `last_gain`) and zero biases, in NumPy: nothing to compile."""
     layers = []
-    for i, (n, m) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
+    for i, (n, m) in enumerate(pairwise(sizes)):
         gain = last_gain if i == len(sizes) - 2 else math.sqrt(2)
         q, r = np.linalg.qr(rng.standard_normal((max(n, m), min(n, m))))
         q = q * np.sign(np.diag(r))

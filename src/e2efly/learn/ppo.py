@@ -25,7 +25,7 @@ class Parameters:
     """What PPO learns."""
 
     policy: Layers
-    log_std: Float[Array, "4"]
+    log_std: Float[Array | np.ndarray, "4"]
     critic: Layers
 
 
@@ -71,7 +71,9 @@ def gae(
     return jax.lax.scan(backward, jnp.zeros_like(delta[0]), (delta, done), reverse=True)[1]
 
 
-def log_prob(action: Float[Array, "*t 4"], mean: Float[Array, "*t 4"], log_std: Float[Array, "4"]) -> Float[Array, "*t"]:
+def log_prob(
+    action: Float[Array, "*t 4"], mean: Float[Array, "*t 4"], log_std: Float[Array, "4"]
+) -> Float[Array, "*t"]:
     """Log density of a diagonal Gaussian."""
     z = (action - mean) * jnp.exp(-log_std)
     return -jnp.sum(0.5 * z**2 + log_std + 0.5 * jnp.log(2 * jnp.pi), axis=-1)
@@ -119,7 +121,7 @@ class PPO:
         def minibatch(carry: tuple[Parameters, Any], batch: Samples) -> tuple[tuple[Parameters, Any], dict[str, Array]]:
             parameters, optimizer = carry
             grads, losses = jax.grad(self._loss, has_aux=True)(parameters, config, batch)
-            updates, optimizer = adam(config.max_grad_norm).update(grads, optimizer, parameters)
+            updates, optimizer = adam(config.max_grad_norm).update(grads, optimizer)
             parameters = jax.tree.map(lambda p, u: p - rate * u, parameters, updates)
             return (parameters, optimizer), {**losses, "gradient_norm": optax.global_norm(grads)}
 

@@ -1,6 +1,6 @@
 """The run directory: everything needed to reproduce a run and to fly its policy.
 
-    config.json  versions.json  metrics.csv  events/  checkpoint.safetensors  plots/  policy.onnx  summary.json
+config.json  versions.json  metrics.csv  events/  checkpoint.safetensors  plots/  policy.onnx  summary.json
 """
 
 import csv
@@ -100,7 +100,9 @@ class RunDirectory:
         if not self.metrics.is_file():
             return []
         with self.metrics.open(newline="", encoding="utf-8") as file:
-            return [{k: float(v) for k, v in row.items() if v} for row in csv.DictReader(file) if None not in row.values()]
+            return [
+                {k: float(v) for k, v in row.items() if v} for row in csv.DictReader(file) if None not in row.values()
+            ]
 
     def append(self, rows: list[dict[str, float]]) -> None:
         """Append metrics."""

@@ -187,13 +187,11 @@ class Progress:
     """Seconds from process start and environment steps at the first evaluation at `stop_at`; empty before."""
 
 
-class NonFinite(FloatingPointError):
+class NonFiniteError(FloatingPointError):
     """A loss or reward term was not finite."""
 
 
-def train(
-    config: TrainConfig, out: Path, reporter: Reporter, resume: bool = False
-) -> dict[str, Any]:
+def train(config: TrainConfig, out: Path, reporter: Reporter, resume: bool = False) -> dict[str, Any]:
     """Train a policy into a run directory.
 
     Args:
@@ -208,7 +206,7 @@ def train(
     Raises:
         ValueError: for a configuration, folder or checkpoint that cannot be used.
         OSError: when the folder cannot be written.
-        NonFinite: naming the term and the update; the last good checkpoint is kept.
+        NonFiniteError: naming the term and the update; the last good checkpoint is kept.
     """
     run = RunDirectory(out)
     setup = Setup.of(config)
@@ -293,7 +291,7 @@ def _finish(
     config = setup.config
     by_best = judge(setup, programs.evaluate, best, REPORTED, REPORT_EPISODES)
     by_last = judge(setup, programs.evaluate, state.parameters.policy, REPORTED, REPORT_EPISODES)
-    export_policy(run.policy, best, setup.features, config.network.activation, contract_of(setup.env, config.env))
+    export_policy(run.policy, best, setup.features, config.network.activation, contract_of(setup.env, config))
     summary = {
         "task": presets.task_name(config.task),
         "algorithm": presets.algorithm_name(config.algo),
@@ -349,7 +347,7 @@ def _check_finite(metrics: dict[str, np.ndarray], update: int) -> None:
     for i in range(len(next(iter(metrics.values())))):
         for name in sorted(metrics, key=lambda n: (not n.startswith("reward/"), n)):
             if not np.isfinite(metrics[name][i]):
-                raise NonFinite(
+                raise NonFiniteError(
                     f"{name} became {metrics[name][i]} in update {update + i + 1}; the checkpoint of update {update} "
                     "is kept (lower algo.learning-rate or algo.max-grad-norm, or look at that term)"
                 )
@@ -363,7 +361,11 @@ def _check_resume(run: RunDirectory, config: TrainConfig) -> None:
     if different := list(differences(run.config(), config)):
         raise ValueError(f"{run.path} was started with another configuration: {'; '.join(different)}")
     started, now = run.read_json("versions.json"), versions()
-    changed = [f"{name} {started.get(name)} and {now[name]}" for name in ("e2efly", "jax", "jaxlib") if started.get(name) != now[name]]
+    changed = [
+        f"{name} {started.get(name)} and {now[name]}"
+        for name in ("e2efly", "jax", "jaxlib")
+        if started.get(name) != now[name]
+    ]
     if changed:
         raise ValueError(f"{run.path} was started with another version: {', '.join(changed)}")
 

@@ -39,10 +39,8 @@ def rotor_wrench(vehicle: Vehicle, thrust: Rotors) -> tuple[Array, Vec3]:
     x, y = (split4(vehicle.rotor_position[..., i]) for i in range(2))
     spin = split4(vehicle.rotor_spin)
     collective = thrust[0] + thrust[1] + thrust[2] + thrust[3]
-    roll = sum(y[i] * thrust[i] for i in range(4))
-    pitch = -sum(x[i] * thrust[i] for i in range(4))
-    yaw = vehicle.torque_ratio * sum(spin[i] * thrust[i] for i in range(4))
-    return collective, Vec3(roll, pitch, yaw)
+    roll, pitch, yaw = _weighted(y, thrust), -_weighted(x, thrust), _weighted(spin, thrust)
+    return collective, Vec3(roll, pitch, vehicle.torque_ratio * yaw)
 
 
 def drag(vehicle: Vehicle, air_velocity: Vec3) -> Vec3:
@@ -80,3 +78,7 @@ def derivative(vehicle: Vehicle, parts: Parts, wind: Vec3 | None) -> Parts:
         body_rate=angular_acceleration(vehicle, parts.body_rate, torque),
         rotor_speed=(zero, zero, zero, zero),
     )
+
+
+def _weighted(a: Rotors, b: Rotors) -> Array:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]

@@ -83,7 +83,7 @@ def _accelerate(vehicle: Vehicle, mixer: Mixer, parts: Parts, wanted: Vec3, yaw:
 
 
 def _attitude(vehicle: Vehicle, mixer: Mixer, parts: Parts, thrust: Array, wanted: Quat) -> Rotors:
-    """Tilt-prioritised attitude law (Brescianini and D'Andrea, Tilt-prioritized quadrocopter attitude control, 2018)."""
+    """Tilt-prioritised law (Brescianini and D'Andrea, Tilt-prioritized quadrocopter attitude control, 2018)."""
     e = parts.attitude.conjugate().compose(wanted)
     n = jnp.sqrt(e.w**2 + e.z**2 + 1e-12)
     sign = jnp.where(e.w >= 0, 1.0, -1.0)

@@ -15,7 +15,7 @@ from e2efly.vehicles.vehicle import Vehicle, allocation_matrix
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Mixer:
-    """The inverse of the rotor geometry and the thrust limits, of the vehicle that the flight controller believes in."""
+    """The inverse of the rotor geometry, and the thrust limits, of the nominal vehicle."""
 
     matrix: np.ndarray | Array
     """(4, 4): rotor thrusts, N, from [collective, N; roll, pitch, yaw torque, N*m]."""

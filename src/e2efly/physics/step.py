@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from e2efly.physics.components import Vec3
-from e2efly.physics.control import COMMAND_MODES
+from e2efly.physics.control import COMMAND_MODES, Command
 from e2efly.physics.integrate import INTEGRATORS
 from e2efly.physics.mixer import Mixer
 from e2efly.physics.state import Parts, State, split4
@@ -99,11 +99,16 @@ def step(
 
     def substep(parts: Parts, index: Array) -> tuple[Parts, None]:
         acting = after
-        if before is not None:
+        if before is not None and switch_time is not None:
             done = jnp.clip((index + 1) - switch_time / dt, 0.0, 1.0).astype(command.dtype)
-            acting = tuple(b + (a - b) * done for a, b in zip(after, before, strict=True))
+            acting = _blend(before, after, done)
         rotor_command = law(physics.nominal, physics.mixer, parts, acting)
         return integrate(vehicle, parts, rotor_command, air, dt), None
 
     parts, _ = jax.lax.scan(substep, Parts.of(state), jnp.arange(physics.substeps))
     return parts.join()
+
+
+def _blend(before: Command, after: Command, share: Array) -> Command:
+    a, b, c, d = (x + (y - x) * share for x, y in zip(before, after, strict=True))
+    return a, b, c, d

@@ -15,7 +15,7 @@ jax.tree_util.register_dataclass(NoiseConfig)
 
 
 def add_noise(noise: NoiseConfig, key: PRNGKeyArray, state: State) -> State:
-    """The state as measured: Gaussian noise on position, velocity and body rate; a small random turn on the attitude."""
+    """The state as measured: Gaussian position, velocity and body rate; a small random turn of the attitude."""
     draw = jax.random.normal(key, (*state.position.shape[:-1], 12), state.position.dtype)
     half_turn = noise.attitude * draw[..., 6:9] / 2
     turn = stack(jnp.ones_like(half_turn[..., 0]), *(half_turn[..., i] for i in range(3)))

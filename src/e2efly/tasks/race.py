@@ -32,13 +32,13 @@ LOWEST_START = 0.3
 class Gates:
     """The gates of a track as arrays."""
 
-    start: Float[Array, "3"]
+    start: Float[Array | np.ndarray, "3"]
     start_yaw: float | Array
-    position: Float[Array, "g+1 3"]
+    position: Float[Array | np.ndarray, "g+1 3"]
     """Centres; the last row is what the policy is shown behind the last gate."""
-    cos: Float[Array, " g"]
-    sin: Float[Array, " g"]
-    half: Float[Array, "g 2"]
+    cos: Float[Array | np.ndarray, " g"]
+    sin: Float[Array | np.ndarray, " g"]
+    half: Float[Array | np.ndarray, "g 2"]
     """Half of the opening's width and height, m."""
 
     @staticmethod
@@ -47,14 +47,15 @@ class Gates:
         cos, sin = np.cos(track.yaw), np.sin(track.yaw)
         straight_on = track.position[-1] + 3.0 * np.array([cos[-1], sin[-1], 0.0])
         position = np.vstack([track.position, track.position[0] if track.closed else straight_on])
-        arrays = (track.start, np.float64(track.start_yaw), position, cos, sin, track.opening / 2)
-        return Gates(*(a.astype(np.float32) for a in arrays))
+        start, opening = track.start.astype(np.float32), track.opening.astype(np.float32)
+        p, c, s = (x.astype(np.float32) for x in (position, cos, sin))
+        return Gates(start, track.start_yaw, p, c, s, opening / 2)
 
     def local(self, point: Float[Array, "n 3"]) -> tuple[Array, Array, Array]:
         """Coordinates in every gate's frame, each (n, g)."""
         d = point[:, None] - self.position[:-1]
-        x, y = d[..., 0], d[..., 1]
-        return self.cos * x + self.sin * y, self.cos * y - self.sin * x, d[..., 2]
+        x, y, cos, sin = d[..., 0], d[..., 1], jnp.asarray(self.cos), jnp.asarray(self.sin)
+        return cos * x + sin * y, cos * y - sin * x, d[..., 2]
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "gates"], meta_fields=["closed"])
@@ -96,7 +97,7 @@ class Race:
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Int[Array, " n"]]:
         """At rest and level in a ball about the start, heading as the track says."""
         u = uniform(key, n, 3)
-        position = self.gates.start + self.config.position * into_ball(u)
+        position = jnp.asarray(self.gates.start) + self.config.position * into_ball(u)
         lowest = self.shape.feet_height + LOWEST_START
         position = position.at[:, 2].max(lowest)
         zero = jnp.zeros(n)

@@ -15,6 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
+Point = Array | tuple[float, float, float]
+"""A point, m."""
 KNOT_PERIOD = 0.5
 """Seconds between knots."""
 
@@ -75,7 +77,7 @@ class Lissajous:
         """Gerono's figure of eight, x = A sin, y = A sin cos: A in m, top speed (in the middle) in m/s."""
         return Lissajous(half_length, half_length / 2, 2.0, 0.0, speed / (half_length * math.sqrt(2.0)))
 
-    def spline(self, centre: Array, phase: Float[Array, " n"], m: int) -> Spline:
+    def spline(self, centre: Point, phase: Float[Array, " n"], m: int) -> Spline:
         """The curve about `centre` from each phase p, rad, as `m` knots."""
         angle = self.rate * KNOT_PERIOD * jnp.arange(m) + phase[:, None]
         x, y = angle + self.shift, self.ratio * angle
@@ -87,7 +89,7 @@ class Lissajous:
 
 
 def polynomial(
-    key: PRNGKeyArray, centre: Array, reach: float | Array, speed: float | Array, n: int, m: int, every: int = 4
+    key: PRNGKeyArray, centre: Point, reach: float | Array, speed: float | Array, n: int, m: int, every: int = 4
 ) -> Spline:
     """Random and smooth: minimum-jerk-like pieces of `every` knot periods between random points of a box.
 

@@ -62,6 +62,11 @@ class Task(Protocol):
         ...
 
     @property
+    def shape(self) -> Shape:
+        """What of the vehicle can touch things."""
+        ...
+
+    @property
     def fields(self) -> tuple[Field, ...]:
         """The task's own observation fields: positions relative to the vehicle, world, m."""
         ...

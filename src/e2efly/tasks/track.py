@@ -36,9 +36,7 @@ class Memory:
     """Counted steps."""
 
 
-@partial(
-    jax.tree_util.register_dataclass, data_fields=["config", "shape", "curve"], meta_fields=["knots"]
-)
+@partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "curve"], meta_fields=["knots"])
 @dataclass(frozen=True)
 class Track:
     """Follow a reference; make it with `Track.of`."""

@@ -9,6 +9,7 @@ import matplotlib
 import numpy as np
 from jaxtyping import PRNGKeyArray
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
@@ -22,7 +23,9 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#00
 """Okabe and Ito's palette, safe for colour-blind readers."""
 SPEED = "viridis"
 
-matplotlib.rcParams.update({"axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.alpha": 0.25})
+matplotlib.rcParams.update(
+    {"axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.alpha": 0.25}
+)
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,9 @@ def plot_learning(rows: list[dict[str, float]], path: Path, title: str) -> None:
     ):
         x = [row[key] * scale for row in seen]
         for name, color in zip(names, COLORS, strict=False):
-            axes[0, column].plot(x, [100 * row[name] for row in seen], "o-", ms=3, color=color, label=name.split("/")[1])
+            axes[0, column].plot(
+                x, [100 * row[name] for row in seen], "o-", ms=3, color=color, label=name.split("/")[1]
+            )
         axes[1, column].plot(x, [row["reward"] for row in seen], "o-", ms=3, color=COLORS[2], label="reward")
         axes[1, column].set_xlabel(label)
         for axis in axes[:, column]:
@@ -101,7 +106,9 @@ def plot_flights(task: Task, flights: Flights, path: Path, title: str) -> None:
     """Trajectories coloured by speed, in space and from above, with what the task flies to."""
     figure = Figure(figsize=(12, 5.6), layout="constrained")
     space, top = figure.add_subplot(1, 2, 1, projection="3d"), figure.add_subplot(1, 2, 2)
-    top_speed = max(1.0, max(np.linalg.norm(flights.velocity[:k, i], axis=-1).max() for i, k in enumerate(flights.length)))
+    top_speed = max(
+        1.0, max(np.linalg.norm(flights.velocity[:k, i], axis=-1).max() for i, k in enumerate(flights.length))
+    )
     norm = Normalize(0, top_speed)
     for i, k in enumerate(flights.length):
         p, v = flights.position[:k, i], np.linalg.norm(flights.velocity[:k, i], axis=-1)
@@ -122,7 +129,7 @@ def plot_flights(task: Task, flights: Flights, path: Path, title: str) -> None:
     space.set(xlabel="x, m", ylabel="y, m", zlabel="z, m")
     top.set(xlabel="x, m", ylabel="y, m", aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     top.legend(frameon=False, loc="upper right")
-    mappable = matplotlib.cm.ScalarMappable(norm, SPEED)
+    mappable = ScalarMappable(norm, SPEED)
     figure.colorbar(mappable, ax=top, label="speed, m/s", shrink=0.8)
     figure.suptitle(f"{title}: {flights.success.sum()} of {len(flights.success)} flights drawn succeeded")
     figure.savefig(path, dpi=110)
@@ -134,7 +141,10 @@ def _scenery(task: Task, flights: Flights, space: Any, top: Axes) -> None:
         g = task.gates
         for i, (c, cos, sin, half) in enumerate(zip(g.position[:-1], g.cos, g.sin, g.half, strict=True)):
             left = np.array([-sin, cos, 0.0])
-            corners = [c + a * half[0] * left + b * half[1] * np.array([0, 0, 1.0]) for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1), (1, 1))]
+            corners = [
+                c + a * half[0] * left + b * half[1] * np.array([0, 0, 1.0])
+                for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1), (1, 1))
+            ]
             corners = np.array(corners)
             space.plot(*corners.T, color=COLORS[1], lw=2)
             top.plot(*corners[:, :2].T, color=COLORS[1], lw=3, label="gate" if i == 0 else None)

@@ -1,0 +1,49 @@
+# Everything runs from a virtual environment of its own, made on first use.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+TEST_READY := $(VENV)/.test-ready
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+
+.PHONY: demo test lint bench docs clean
+
+demo: $(READY)
+	@rm -rf runs/demo
+	@$(BIN)/e2efly train hover --out runs/demo
+	@echo
+	@echo "What this did: trained a hover policy for the VIS-R quadrotor from nothing, on the plain CPU, kept the best one,"
+	@echo "flew it from 1000 starts that it never saw, and wrote plots and policy.onnx, the file that flies."
+	@echo "What to look at:   runs/demo/plots/*.png   runs/demo/summary.json   tensorboard --logdir runs/demo/events"
+	@echo "What to try next:  $(BIN)/e2efly train race            (fly a lap through four gates)"
+	@echo "                   $(BIN)/e2efly train land --algo bptt (exact gradients through the physics)"
+	@echo "                   $(BIN)/e2efly list                   (tasks, vehicles, tracks, reward terms)"
+
+test: $(TEST_READY) lint
+	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+lint: $(TEST_READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+	$(BIN)/basedpyright
+
+bench: $(TEST_READY)
+	$(BIN)/python benchmarks/run_all.py
+
+docs: $(READY)
+	$(BIN)/python docs/figures.py
+
+clean:
+	rm -rf $(VENV) runs build dist src/*.egg-info
+
+$(READY): pyproject.toml constraints.txt
+	@echo "setting up $(VENV) (once)"
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "e2efly needs Python 3.11 or newer; set PYTHON=/path/to/python3.11")'
+	@$(PYTHON) -m venv $(VENV)
+	@$(INSTALL) -e .
+	@touch $@
+
+$(TEST_READY): $(READY)
+	@$(INSTALL) -e '.[test]'
+	@touch $@

@@ -1,0 +1,39 @@
+"""`e2efly bench`: what this machine does in a few seconds. The published figures are made by benchmarks/."""
+
+import json
+import os
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from e2efly.device import prepare
+from e2efly.learn.checkpoint import write_atomically
+
+
+def bench_command(report: Path | None, device: str | None) -> int:
+    """Measure and print; exit status 0."""
+    prepare(device)
+    console = Console(highlight=False)
+    figures = measure()
+    table = Table("what", "per second", box=None, header_style="bold")
+    for name, value in figures.items():
+        table.add_row(name, f"{value / 1e6:.2f} M" if value >= 1e6 else f"{value / 1e3:.0f} k")
+    console.print(table)
+    if report:
+        write_atomically(
+            report, (json.dumps({"cores": os.cpu_count(), "per_second": figures}, indent=1) + "\n").encode()
+        )
+    return 0
+
+
+def measure() -> dict[str, float]:
+    """Steps a second by what is counted: the best of several runs after compilation."""
+    from e2efly.learn.benchmark import environment_steps, physics_substeps, training_steps
+
+    return {
+        "physics sub-steps, 1024 vehicles": physics_substeps(1024),
+        "environment steps, 1024 environments, hover": environment_steps("hover", 1024),
+        "PPO training steps, hover preset": training_steps("hover", "ppo"),
+        "BPTT training steps, hover preset": training_steps("hover", "bptt"),
+    }

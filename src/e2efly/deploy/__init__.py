@@ -1,0 +1,1 @@
+"""Onboard: load a policy, check its contract, run it. Imports no JAX and no simulator."""
