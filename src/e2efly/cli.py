@@ -80,30 +80,28 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
         ValueError: for an unknown name.
     """
     config = presets.preset(task, algo, preset)
-    options = dataclasses.make_dataclass(
-        "Train",
-        [
-            ("task_name", tyro.conf.Positional[Annotated[str, tyro.conf.arg(metavar="TASK", help=_tasks())]]),
-            ("algo_name", Annotated[str, tyro.conf.arg(name="algo", metavar="ALGO", help=f"Algorithm: {_join(presets.ALGORITHMS)}.")]),
-            ("preset", Annotated[str, tyro.conf.arg(help=f"Where the defaults come from: {_join(presets.PRESETS)}.")]),
-            ("vehicle", Annotated[str, tyro.conf.arg(help="A shipped vehicle, or the path of a .toml file.")]),
-            ("seed", Annotated[int, tyro.conf.arg(help="Seed of everything random.")]),
-            ("out", Annotated[Path | None, tyro.conf.arg(help="Run directory; runs/TASK-ALGO-SEED when left out.")]),
-            ("resume", Annotated[bool, tyro.conf.arg(help="Go on with the unfinished run in --out.")]),
-            ("device", Annotated[Literal["cpu", "gpu"] | None, tyro.conf.arg(help="Where to compute.")]),
-            ("plots", Annotated[bool, tyro.conf.arg(help="Evaluate and draw plots at the end.")]),
-            ("steps", Annotated[int, tyro.conf.arg(help="Environment steps of the whole run.")]),
-            ("chunk", Annotated[int, tyro.conf.arg(help="Updates between two evaluations (sets shapes).")]),
-            ("eval_episodes", Annotated[int, tyro.conf.arg(help="Starts of an evaluation while training (sets shapes).")]),
-            ("stop_at", Annotated[float | None, tyro.conf.arg(help="Stop once the success on 1000 starts is at least this.")]),
-            ("env", EnvConfig),
-            ("task", Annotated[type(config.task), tyro.conf.arg(name="task")]),
-            ("algo", Annotated[type(config.algo), tyro.conf.arg(name="algo")]),
-            ("network", NetworkConfig),
-            ("reward", RewardConfig),
-        ],
-        frozen=True,
-    )  # fmt: skip
+    arg = tyro.conf.arg
+    every = [
+        ("task_name", tyro.conf.Positional[Annotated[str, arg(metavar="TASK", help=_tasks())]]),
+        ("algo_name", Annotated[str, arg(name="algo", help=f"Algorithm: {_join(presets.ALGORITHMS)}.")]),
+        ("preset", Annotated[str, arg(help=f"Where the defaults come from: {_join(presets.PRESETS)}.")]),
+        ("vehicle", Annotated[str, arg(help="A shipped vehicle, or the path of a .toml file.")]),
+        ("seed", Annotated[int, arg(help="Seed of everything random.")]),
+        ("out", Annotated[Path | None, arg(help="Run directory; runs/TASK-ALGO-SEED when left out.")]),
+        ("resume", Annotated[bool, arg(help="Go on with the unfinished run in --out.")]),
+        ("device", Annotated[Literal["cpu", "gpu"] | None, arg(help="Where to compute.")]),
+        ("plots", Annotated[bool, arg(help="Evaluate and draw plots at the end.")]),
+        ("steps", Annotated[int, arg(help="Environment steps of the whole run.")]),
+        ("chunk", Annotated[int, arg(help="Updates between two evaluations (sets shapes).")]),
+        ("eval_episodes", Annotated[int, arg(help="Starts of an evaluation while training (sets shapes).")]),
+        ("stop_at", Annotated[float | None, arg(help="Stop once the success on 1000 starts is at least this.")]),
+        ("env", EnvConfig),
+        ("task", Annotated[type(config.task), arg(name="task")]),
+        ("algo", Annotated[type(config.algo), arg(name="algo")]),
+        ("network", NetworkConfig),
+        ("reward", RewardConfig),
+    ]
+    options = dataclasses.make_dataclass("Train", every, frozen=True)
     options.__doc__ = f"Train a policy ({task}, {algo}). The defaults below are those of the preset {preset!r}."
     top = {name: getattr(config, name) for name in ("seed", "steps", "chunk", "eval_episodes", "stop_at")}
     parts = {name: getattr(config, name) for name in ("env", "task", "algo", "network", "reward")}

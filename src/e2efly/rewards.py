@@ -97,7 +97,7 @@ def ori3(pixel: Float[Array, "*n 2"], pixel_velocity: Float[Array, "*n 2"]) -> S
 
 
 def ori4(roll_error: Scalar, approaching: Bool[Array, "*n"], ori4_limit: float | Array = 2.0) -> Scalar:
-    """-min(tan|roll error|, lambda12) while approaching a gap, else 0 (Eq. ori4); the limit holds past a right angle."""
+    """-min(tan|roll error|, lambda12) while approaching a gap, else 0 (Eq. ori4); limited past a right angle too."""
     angle = jnp.abs(roll_error)
     bounded = jnp.minimum(angle, jnp.arctan(ori4_limit))
     return jnp.where(approaching, -jnp.tan(bounded), 0.0)

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jax
@@ -9,7 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.physics import Physics, State, step
+from e2efly.physics import INTEGRATORS, Physics, State, step
+from e2efly.physics.components import Vec3
+from e2efly.physics.state import Parts, split4
 from e2efly.vehicles import Vehicle, load_vehicle
 
 Fly = Callable[..., State]
@@ -43,6 +46,31 @@ def fly() -> Fly:
             return state, state
 
         return jax.lax.scan(one, state, commands)[1]
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def fly_open_loop() -> Fly:
+    """(integrator, plant, state (n, ...), rotor speed commands (t, n, 4), wind, period of a command, substeps) -> (t, n).
+
+    The numbers of sub-steps and seconds are traced: one program an integrator and batch.
+    """
+
+    @partial(jax.jit, static_argnums=0)
+    def run(
+        integrator: str, plant: Vehicle, state: State, commands: jax.Array, wind: Any, period: Any, substeps: Any
+    ) -> State:
+        air, dt = Vec3.of(wind), period / substeps
+
+        def one(parts: Parts, command: jax.Array) -> tuple[Parts, State]:
+            def substep(_: jax.Array, parts: Parts) -> Parts:
+                return INTEGRATORS[integrator](plant, parts, split4(command), air, dt)
+
+            parts = jax.lax.fori_loop(0, substeps, substep, parts)
+            return parts, parts.join()
+
+        return jax.lax.scan(one, Parts.of(state), commands)[1]
 
     return run
 

@@ -3,9 +3,11 @@
 import dataclasses
 from collections.abc import Callable
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from e2efly.physics import State, body
 from e2efly.physics.components import Quat, Vec3
@@ -78,11 +80,9 @@ def test_hover_is_an_equilibrium(name: str) -> None:
 
 
 def test_acceleration_by_hand(vis_r: Vehicle, random_state: Callable[..., State]) -> None:
-    from scipy.spatial.transform import Rotation
-
     state, wind, collective = random_state(5, (20,)), draws(6, 3, 3.0, 20), np.linspace(0, 20, 20)
-    R = Rotation.from_quat(np.asarray(state.quaternion), scalar_first=True)
-    v = R.inv().apply(state.velocity - wind)
+    R = Rotation.from_quat(np.array(state.quaternion), scalar_first=True)
+    v = R.inv().apply(np.array(state.velocity) - wind)
     force = -(vis_r.drag_linear * v + vis_r.drag_quadratic * v * np.abs(v)) + collective[:, None] * [0, 0, 1]
     expected = R.apply(force) / vis_r.mass - [0, 0, GRAVITY]
     actual = body.acceleration(
@@ -92,8 +92,6 @@ def test_acceleration_by_hand(vis_r: Vehicle, random_state: Callable[..., State]
 
 
 def test_a_vehicle_is_a_pytree_of_its_numbers(vis_r: Vehicle) -> None:
-    import jax
-
     doubled = jax.tree.map(lambda x: 2 * x, vis_r)
     assert (doubled.name, doubled.mass) == ("vis_r", 1.5)
     assert len(jax.tree.leaves(vis_r)) == len(dataclasses.fields(vis_r)) - 1

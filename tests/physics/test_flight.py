@@ -17,7 +17,9 @@ from e2efly.vehicles.vehicle import GRAVITY
 pytestmark = pytest.mark.usefixtures("x64")
 
 
-def physics_of(vehicle: Vehicle, mode: str = "rotor_thrust", integrator: str = "rk4", **options: float) -> Physics:
+def physics_of(
+    vehicle: Vehicle, mode: str = "rotor_thrust", integrator: str = "semi_implicit", **options: float
+) -> Physics:
     return Physics.of(vehicle, mode, integrator, dtype=np.float64, **options)
 
 
@@ -30,7 +32,7 @@ def at_rest(vehicle: Vehicle) -> State:
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-@pytest.mark.parametrize("name", ["vis_r", "crazyflie"])
+@pytest.mark.parametrize("name", ["vis_r", "vis_h"])
 def test_hover_stays(name: str, integrator: str, fly: Callable[..., State]) -> None:
     vehicle = load_vehicle(name)
     end = fly(physics_of(vehicle, integrator=integrator), vehicle, at_rest(vehicle), hover_thrusts(vehicle, 60))
@@ -55,7 +57,7 @@ def test_a_free_body_keeps_angular_momentum_and_energy(
     vis_r: Vehicle, stone: Vehicle, random_state: Callable[..., State], fly: Callable[..., State]
 ) -> None:
     state = dataclasses.replace(random_state(0, (8,)), body_rate=random_state(1, (8,)).body_rate * 2)
-    path = fly(physics_of(vis_r, largest_step=0.002), stone, state, hover_thrusts(vis_r, 60)[:, None])
+    path = fly(physics_of(vis_r, integrator="rk4", largest_step=0.002), stone, state, hover_thrusts(vis_r, 60)[:, None])
 
     def conserved(s: State) -> tuple[jax.Array, jax.Array, jax.Array]:
         momentum = stone.inertia * s.body_rate
@@ -70,41 +72,33 @@ def test_a_free_body_keeps_angular_momentum_and_energy(
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-@pytest.mark.parametrize("largest_step", [0.1, 0.005, 0.002])
 def test_motor_lag_is_exact_for_any_substep(
-    largest_step: float, integrator: str, vis_r: Vehicle, fly: Callable[..., State]
+    integrator: str, vis_r: Vehicle, random_state: Callable[..., State], fly_open_loop: Callable[..., State]
 ) -> None:
-    physics = physics_of(vis_r, integrator=integrator, largest_step=largest_step)
-    command = jnp.asarray([0.5, 1.0, 3.0, 5.0])
-    path = fly(physics, vis_r, at_rest(vis_r), jnp.broadcast_to(command, (5, 4)))
+    state, still = random_state(4, (6,)), jnp.zeros((6, 3))
+    wanted = jnp.asarray(np.random.default_rng(5).uniform(300, 3500, (6, 4)))
+    t = 0.02 * jnp.arange(1, 61)[:, None, None]
+    expected = wanted + (state.rotor_speed - wanted) * jnp.exp(-t / vis_r.motor_time_constant)
+    for substeps in (1, 3, 10):
+        plant = jax.tree.map(lambda x: jnp.broadcast_to(x, (6, *np.shape(x))), vis_r)
+        commands = jnp.broadcast_to(wanted, (60, 6, 4))
+        path = fly_open_loop(integrator, plant, state, commands, still, 0.02, substeps)
+        np.testing.assert_allclose(path.rotor_speed, expected, rtol=1e-12)
+
+
+def test_motor_lag_in_a_control_step(vis_r: Vehicle, fly: Callable[..., State]) -> None:
+    physics, command = physics_of(vis_r), jnp.asarray([0.5, 1.0, 3.0, 5.0])
+    path = fly(physics, vis_r, at_rest(vis_r), jnp.broadcast_to(command, (60, 4)))
     k2, k1, k0 = vis_r.thrust_map
     wanted = (-k1 + np.sqrt(k1**2 + 4 * k2 * (np.asarray(command) - k0))) / (2 * k2)
-    t = physics.control_period * np.arange(1, 6)[:, None]
+    t = np.arange(1, 61)[:, None] / 30
     expected = wanted + (vis_r.hover_rotor_speed - wanted) * np.exp(-t / vis_r.motor_time_constant)
     np.testing.assert_allclose(path.rotor_speed, expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("integrator", "order"), [("euler", 1), ("semi_implicit", 1), ("rk4", 4)])
-def test_order_of_the_integrator(integrator: str, order: int, vis_r: Vehicle, fly: Callable[..., State]) -> None:
-    state = dataclasses.replace(
-        at_rest(vis_r), velocity=jnp.asarray([6.0, 4.0, 5.0]), body_rate=jnp.asarray([2.0, -1.0, 1.5])
-    )
-    commands = jnp.asarray([[2.2, 1.7, 1.9, 2.4]] * 2)
-
-    def end(name: str, substeps: int) -> np.ndarray:
-        physics = physics_of(vis_r, integrator=name, control_rate=10.0, largest_step=0.1 / substeps)
-        assert physics.substeps == substeps
-        last = jax.tree.map(lambda x: np.asarray(x[-1]), fly(physics, vis_r, state, commands))
-        return np.concatenate([last.position, last.velocity, last.quaternion, last.body_rate])
-
-    exact = end("rk4", 400)
-    coarse, fine = (np.abs(end(integrator, n) - exact).max() for n in (10, 20))
-    assert np.log2(coarse / fine) == pytest.approx(order, abs=0.15)
-
-
 def test_terminal_velocity(vis_r: Vehicle, stone: Vehicle, fly: Callable[..., State]) -> None:
     plant = dataclasses.replace(stone, drag_linear=vis_r.drag_linear, drag_quadratic=vis_r.drag_quadratic)
-    physics = physics_of(vis_r, largest_step=1 / 30)
+    physics = physics_of(vis_r, integrator="rk4", largest_step=1 / 30)
     k1, k2 = vis_r.drag_linear[2], vis_r.drag_quadratic[2]
     falling = fly(physics, plant, at_rest(vis_r), hover_thrusts(vis_r, 1200))
     expected = (-k1 + np.sqrt(k1**2 + 4 * k2 * vis_r.mass * GRAVITY)) / (2 * k2)
@@ -123,7 +117,7 @@ def test_wind_is_a_moving_frame(
     physics, state, wind = physics_of(vis_r, "ctbr", integrator), random_state(2), jnp.asarray([3.0, -2.0, 1.0])
     commands = jnp.asarray(np.random.default_rng(3).normal([9.81, 0, 0, 0], [2, 1, 1, 1], (30, 4)))
     windy = fly(physics, vis_r, state, commands, wind)
-    still = fly(physics, vis_r, dataclasses.replace(state, velocity=state.velocity - wind), commands)
+    still = fly(physics, vis_r, dataclasses.replace(state, velocity=state.velocity - wind), commands, 0 * wind)
     carried = wind * (jnp.arange(1, 31) / 30)[:, None]
     np.testing.assert_allclose(windy.position, still.position + carried, atol=1e-11)
     np.testing.assert_allclose(windy.velocity, still.velocity + wind, atol=1e-11)
@@ -205,4 +199,4 @@ def test_a_weaker_battery_sinks(vis_r: Vehicle, fly: Callable[..., State]) -> No
     np.testing.assert_allclose(path.rotor_speed, vis_r.hover_rotor_speed, rtol=1e-9)
     thrust = rotor_thrust(weak, split4(path.rotor_speed))[0][-1]
     assert float(thrust) == pytest.approx(0.9 * vis_r.mass * GRAVITY / 4, rel=1e-9)
-    assert float(path.velocity[-1, 2]) == pytest.approx(-0.1 * GRAVITY, rel=0.02)
+    assert float(path.velocity[-1, 2]) == pytest.approx(-0.1 * GRAVITY / 2, rel=0.01)

@@ -23,7 +23,7 @@ def vectors(seed: int, n: int = 50) -> jax.Array:
 
 
 def scipy_rotation(q: jax.Array) -> Rotation:
-    return Rotation.from_quat(np.asarray(q), scalar_first=True)
+    return Rotation.from_quat(np.array(q), scalar_first=True)
 
 
 def close(a: jax.Array, b: object, atol: float = 1e-12) -> None:
@@ -43,7 +43,7 @@ def test_group_axioms() -> None:
 
 def test_product_is_the_product_of_rotations() -> None:
     a, b, v = quaternions(3), quaternions(4), vectors(5)
-    close(rotation.rotate(rotation.multiply(a, b), v), (scipy_rotation(a) * scipy_rotation(b)).apply(v))
+    close(rotation.rotate(rotation.multiply(a, b), v), (scipy_rotation(a) * scipy_rotation(b)).apply(np.array(v)))
     close(rotation.rotate(rotation.multiply(a, b), v), rotation.rotate(a, rotation.rotate(b, v)))
 
 
@@ -99,15 +99,9 @@ def test_derivative_is_the_body_rates() -> None:
 
 def test_yaw_has_a_finite_gradient_where_it_is_not_defined() -> None:
     up = rotation.from_euler(jnp.asarray(0.0), jnp.asarray(-jnp.pi / 2), jnp.asarray(0.0))
-    for q in (
-        up,
-        jnp.asarray(IDENTITY),
-        jnp.asarray([0.0, 1, 0, 0]),
-        jnp.asarray([0.0, 0, 1, 0]),
-        jnp.asarray([0.0, 0, 0, 1]),
-    ):
-        assert np.all(np.isfinite(jax.grad(rotation.yaw)(q)))
-    close(jax.grad(rotation.yaw)(jnp.asarray(IDENTITY)), [0, 0, 0, 2])
+    gradient = jax.jit(jax.vmap(jax.grad(rotation.yaw)))(jnp.vstack([jnp.eye(4), up, -up]))
+    assert np.all(np.isfinite(gradient))
+    close(gradient[0], [0, 0, 0, 2])
 
 
 def test_leading_axes() -> None:

@@ -46,7 +46,7 @@ class Policy:
         x = np.asarray(observation)
         self._check(x)
         batch = np.ascontiguousarray(x if x.ndim == 2 else x[None], np.float32)
-        action = self.session.run([OUTPUT], {INPUT: batch})[0]
+        action = np.asarray(self.session.run([OUTPUT], {INPUT: batch})[0])
         good = np.abs(action) <= 1 + ROUNDING  # false for NaN
         if not good.all():
             row = int(np.argmin(good.all(-1)))
@@ -82,7 +82,7 @@ class Policy:
             raise _refusal(name, x[..., slices[name]], good[..., slices[name]].all(-1), "finite numbers")
         attitude = x[..., slices[self.contract.attitude]]
         square = np.square(attitude, dtype=np.float64).sum(-1)
-        unit = np.abs(square - 1) <= 2 * UNIT_TOLERANCE
+        unit = np.asarray(np.abs(square - 1) <= 2 * UNIT_TOLERANCE)
         if not unit.all():
             raise _refusal(self.contract.attitude, attitude, unit, "a unit quaternion wxyz, body to world")
 

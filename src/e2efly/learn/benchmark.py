@@ -36,7 +36,7 @@ def physics_substeps(vehicles: int, calls: int = 200) -> float:
 
 
 def environment_steps(task: str, envs: int, steps: int = 200, env_config: EnvConfig | None = None) -> float:
-    """Environment steps/s with random actions: latency, physics, reward terms, observation, new starts, randomisation."""
+    """Environment steps/s with random actions, everything included: latency, reward, new starts, randomisation."""
     config = presets.preset(task, "ppo")
     env_config = env_config or dataclasses.replace(config.env, randomize={"mass": 0.1, "motor_time_constant": 0.1})
     env = Env.of(config.task, config.reward, env_config)

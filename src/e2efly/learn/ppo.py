@@ -72,7 +72,7 @@ def gae(
 
 
 def log_prob(
-    action: Float[Array, "*t 4"], mean: Float[Array, "*t 4"], log_std: Float[Array, "4"]
+    action: Float[Array, "*t 4"], mean: Float[Array, "*t 4"], log_std: Float[Array | np.ndarray, "4"]
 ) -> Float[Array, "*t"]:
     """Log density of a diagonal Gaussian."""
     z = (action - mean) * jnp.exp(-log_std)

@@ -1,0 +1,112 @@
+"""The command line as its user meets it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from e2efly.cli import run
+
+
+def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """The error text of a call that must end with status 2."""
+    try:
+        status = run(arguments)
+    except SystemExit as end:  # the parser's own way out
+        status = end.code
+    assert status == 2
+    captured = capsys.readouterr()
+    return " ".join((captured.err + captured.out).split())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["trian"], "unknown command 'trian'; did you mean 'train'?"),
+        (["train", "hoover"], "unknown task 'hoover'; did you mean 'hover'? (there are: hover, land, race, track)"),
+        (["train"], "train needs a task first: hover, land, track, race"),
+        (["train", "hover", "--algo", "bppt"], "unknown algorithm 'bppt'; did you mean 'bptt'?"),
+        (["train", "hover", "--preset", "papr"], "unknown preset 'papr'; did you mean 'paper'?"),
+        (["train", "hover", "--vehicle", "vis_x"], "unknown vehicle 'vis_x'; did you mean 'vis_r'?"),
+        (["train", "hover", "--algo.gama", "0.9"], "--algo.gamma"),
+        (["train", "race", "--task.track", "s_shape"], "unknown track 's_shape'; did you mean 's_shaped'?"),
+        (["train", "track", "--task.reference", "cirle"], "unknown reference 'cirle'; did you mean 'circle'?"),
+        (["train", "hover", "--env.command-mode", "ctrb"], "unknown command mode 'ctrb'; did you mean 'ctbr'?"),
+        (["train", "hover", "--reward.weights", "prog9", "1"], "unknown reward term 'prog9'"),
+        (["train", "hover", "--steps", "-1"], "steps is -1; accepted: more than 0"),
+        (["train", "hover", "--algo.envs", "0"], "algo.envs is 0; accepted: more than 0"),
+        (["train", "hover", "--algo.minibatch", "1000"], "algo.minibatch is 1000; accepted: a divisor"),
+        (["train", "hover", "--env.randomize", "mas", "0.1"], "unknown vehicle parameter 'mas'; did you mean 'mass'?"),
+        (["train", "hover", "--device", "gpu"], "--device gpu is not to be had"),
+        (["eval", "nowhere.onnx"], "nowhere.onnx"),
+        (["eval", "nowhere.onnx", "--episodes", "0"], "--episodes is 0; accepted: more than 0"),
+        (["export", "nowhere"], "nowhere holds no run"),
+    ],
+)
+def test_bad_input_is_named_with_what_exists(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    if arguments[0] == "train" and len(arguments) > 1:
+        arguments = [*arguments, "--out", str(tmp_path / "run")]
+    assert said in error_of(arguments, capsys)
+
+
+def test_a_folder_that_cannot_be_made_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    assert "cannot make --out" in error_of(["train", "hover", "--out", str(tmp_path / "file/run")], capsys)
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["train", "--help"], ["train", "race", "--algo", "bptt", "--help"],
+                                       ["eval", "--help"], ["bench", "--help"], ["--version"]])  # fmt: skip
+def test_help_imports_no_jax(arguments: list[str]) -> None:
+    code = (
+        "import sys; from e2efly.cli import run\n"
+        f"try: run({arguments!r})\nexcept SystemExit: pass\n"
+        "sys.exit('jax' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
+    assert done.returncode == 0
+    assert b"e2efly" in done.stdout or b"0." in done.stdout
+
+
+def test_every_option_of_train_has_help() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "e2efly", "train", "race", "--help"], capture_output=True, check=True, text=True
+    )
+    for flag in ("TASK", "--algo ", "--vehicle", "--seed", "--out", "--resume", "--algo.gamma", "--task.laps",
+                 "--env.noise.position", "--env.imu.observed", "--reward.weights", "--network.hidden"):  # fmt: skip
+        assert flag in done.stdout
+
+
+def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["list"]) == 0
+    out = capsys.readouterr().out
+    for name in ("hover", "bptt", "vis_r", "crazyflie", "circle_3d", "avoid2", "sparse", "position"):
+        assert name in out
+
+
+def test_train_eval_export_and_plots_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "run"
+    flags = ["--steps", "2048", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16", "--algo.horizon", "16",
+             "--algo.minibatch", "128", "--task.episode-s", "1"]  # fmt: skip
+    assert run(["train", "hover", "--out", str(folder), *flags]) == 0
+    for name in ("config.json", "versions.json", "metrics.csv", "summary.json", "policy.onnx", "checkpoint.safetensors",
+                 "plots/learning.png", "plots/errors.png", "plots/flights_hover.png", "plots/time_hover.png"):  # fmt: skip
+        assert (folder / name).stat().st_size > 0
+    assert list((folder / "events").iterdir())
+    report = tmp_path / "report.json"
+    assert run(["eval", str(folder), "--episodes", "30", "--json", str(report)]) == 0
+    content = json.loads(report.read_text())
+    assert len(content["criteria"]["hover"]["starts"]) == 30
+    assert 0 <= content["criteria"]["hover"]["success_interval_95"][1] <= 1
+    before = (folder / "policy.onnx").read_bytes()
+    assert run(["export", str(folder)]) == 0
+    assert (folder / "policy.onnx").read_bytes() == before
+    (folder / "policy.onnx").write_bytes(before[:100])
+    assert "policy.onnx" in error_of(["eval", str(folder)], capsys)
+    assert "already holds a run" in error_of(["train", "hover", "--out", str(folder)], capsys)
+    assert "seed: 0 and 3" in error_of(
+        ["train", "hover", "--out", str(folder), *flags, "--seed", "3", "--resume"], capsys
+    )

@@ -1,0 +1,75 @@
+"""Environments so small that the right answer is known, behind the interface that the algorithms use."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from e2efly.env import Step
+from e2efly.observation import ATTITUDE, Field
+from e2efly.physics import State
+
+FIELDS = (Field("position_error", 3, "world", "m", 1.0, "constant"), ATTITUDE)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class ProbeState:
+    """The last action is kept as the rotor speed."""
+
+    vehicle: State
+    count: Array
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Pays -|x - target|^2, where x is the last action (delay 0) or the one before (delay 1), plus a constant."""
+
+    target: tuple[float, float, float, float] = (0.3, -0.5, 0.0, 0.6)
+    delay: int = 0
+    constant: float = 0.0
+    weight: float = 1.0
+    length: int = 4
+    ends_for_good: bool = True
+
+    fields = FIELDS
+    control_period = 1.0
+    hover = np.zeros(4, np.float32)
+
+    def reset(self, n: int) -> tuple[ProbeState, Array]:
+        zero = jnp.zeros((n, 3))
+        level = jnp.tile(jnp.array([1.0, 0, 0, 0]), (n, 1))
+        return ProbeState(State(zero, zero, level, zero, jnp.zeros((n, 4))), jnp.zeros(n)), self._observe(n)
+
+    def _observe(self, n: int) -> Array:
+        return jnp.tile(jnp.array([1.0, 0.5, -0.5, 1.0, 0, 0, 0]), (n, 1))
+
+    def advance(self, state: ProbeState, action: Array) -> tuple[ProbeState, Step]:
+        acted = state.vehicle.rotor_speed if self.delay else action
+        error = jnp.linalg.norm(acted - jnp.array(self.target), axis=-1)
+        count = state.count + 1
+        over = count >= self.length
+        n = action.shape[0]
+        reached = ProbeState(dataclasses.replace(state.vehicle, rotor_speed=action), count)
+        no = jnp.zeros(n, bool)
+        observation = self._observe(n)
+        out = Step(
+            observation=observation,
+            final_observation=observation,
+            reward=self.constant - self.weight * error**2,
+            terms={},
+            terminated=over if self.ends_for_good else no,
+            truncated=no if self.ends_for_good else over,
+            success=over,
+            error=error,
+        )
+        return reached, out
+
+    def restart(self, state: ProbeState, out: Step) -> tuple[ProbeState, Step]:
+        return dataclasses.replace(state, count=jnp.where(out.done, 0.0, state.count)), out
+
+    def step(self, state: ProbeState, action: Array) -> tuple[ProbeState, Step]:
+        return self.restart(*self.advance(state, action))

@@ -1,0 +1,108 @@
+"""PPO and BPTT on probe problems with known answers; GAE by hand."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from e2efly.config import AlgorithmConfig, BPTTConfig, NetworkConfig, PPOConfig
+from e2efly.env import random_key
+from e2efly.learn.algorithm import TrainState, adam, annealed
+from e2efly.learn.bptt import BPTT
+from e2efly.learn.networks import Features, mlp, policy
+from e2efly.learn.ppo import PPO, gae
+from tests.learn.probe import Probe
+
+NETWORK = NetworkConfig((16,), "tanh")
+PPO_CONFIG = PPOConfig(envs=64, horizon=16, minibatch=256, epochs=4, learning_rate=1e-2, learning_rate_end=1e-3)
+BPTT_CONFIG = BPTTConfig(envs=4, horizon=8, learning_rate=2e-2, learning_rate_end=1e-3, max_grad_norm=10.0)
+
+
+def learn(probe: Probe, config: AlgorithmConfig, updates: int) -> tuple[Any, TrainState, dict[str, jax.Array]]:
+    features = Features(probe.fields)
+    algorithm = PPO(features, NETWORK) if isinstance(config, PPOConfig) else BPTT(features, NETWORK)
+    parameters = jax.tree.map(jnp.asarray, algorithm.init(probe, config, 0))  # type: ignore[arg-type]
+    env_state, observation = probe.reset(config.envs)
+    state = TrainState(
+        parameters,
+        adam(config.max_grad_norm).init(parameters),
+        env_state,
+        observation,
+        random_key(0),  # type: ignore[arg-type]
+    )
+
+    @jax.jit
+    def run(state: TrainState) -> tuple[TrainState, dict[str, jax.Array]]:
+        def update(state: TrainState, i: jax.Array) -> tuple[TrainState, dict[str, jax.Array]]:
+            return algorithm.update(probe, config, state, i / updates)  # type: ignore[arg-type]
+
+        return jax.lax.scan(update, state, jnp.arange(updates))
+
+    return algorithm, *run(state)
+
+
+def learned_action(state: TrainState) -> np.ndarray:
+    features = Features(Probe.fields)
+    return np.asarray(policy(state.parameters.policy, features(state.observation[:1]), NETWORK.activation)[0])
+
+
+def learned_value(state: TrainState) -> float:
+    features = Features(Probe.fields)
+    return float(mlp(state.parameters.critic, features(state.observation[:1]), NETWORK.activation)[0, 0])
+
+
+@pytest.mark.parametrize("delay", [0, 1])
+def test_bptt_finds_the_action_that_pays_best(delay: int) -> None:
+    probe = Probe(delay=delay, length=1000)
+    _, state, _ = learn(probe, BPTT_CONFIG, 300)
+    np.testing.assert_allclose(learned_action(state), probe.target, atol=0.01)
+
+
+@pytest.mark.parametrize("delay", [0, 1])
+def test_ppo_finds_the_action_that_pays_best(delay: int) -> None:
+    probe = Probe(delay=delay, length=1000, ends_for_good=False)
+    _, state, _ = learn(probe, dataclasses.replace(PPO_CONFIG, gamma=0.9), 150)
+    np.testing.assert_allclose(learned_action(state), probe.target, atol=0.08)
+
+
+def test_a_time_out_keeps_the_value_of_what_would_follow() -> None:
+    # reward 1 a step, gamma 1/2: 1 + 1/2 + 1/4 + ... = 2 although every episode is cut after one step
+    probe = Probe(constant=1.0, weight=0.0, length=1, ends_for_good=False)
+    _, state, _ = learn(probe, dataclasses.replace(PPO_CONFIG, gamma=0.5), 100)
+    assert learned_value(state) == pytest.approx(2.0, abs=0.05)
+
+
+def test_nothing_follows_a_termination() -> None:
+    probe = Probe(constant=1.0, weight=0.0, length=1, ends_for_good=True)
+    _, state, _ = learn(probe, dataclasses.replace(PPO_CONFIG, gamma=0.5), 100)
+    assert learned_value(state) == pytest.approx(1.0, abs=0.05)
+
+
+def test_gae_by_hand() -> None:
+    # gamma 1/2, lambda 1/2; a termination after the second step, a time-out after the fourth
+    reward = jnp.array([1.0, 2.0, 3.0, 4.0])[:, None]
+    value = jnp.array([10.0, 20.0, 30.0, 40.0])[:, None]
+    next_value = jnp.array([20.0, 99.0, 40.0, 50.0])[:, None]
+    terminated = jnp.array([0.0, 1.0, 0.0, 0.0])[:, None]
+    done = jnp.array([0.0, 1.0, 0.0, 1.0])[:, None]
+    got = gae(reward, value, next_value, terminated, done, 0.5, 0.5)[:, 0]
+    d0, d1, d2, d3 = 1 + 10 - 10, 2 - 20, 3 + 20 - 30, 4 + 25 - 40
+    np.testing.assert_allclose(got, [d0 + d1 / 4, d1, d2 + d3 / 4, d3])
+
+
+def test_gradient_decay_changes_the_gradient_and_not_the_flight() -> None:
+    probe = Probe(delay=1, length=1000)
+    _, exact, exact_metrics = learn(probe, BPTT_CONFIG, 1)
+    _, damped, damped_metrics = learn(probe, dataclasses.replace(BPTT_CONFIG, gradient_decay=2.0), 1)
+    np.testing.assert_array_equal(exact_metrics["reward"], damped_metrics["reward"])
+    assert damped_metrics["loss/gradient_norm"][0] < 0.5 * exact_metrics["loss/gradient_norm"][0]
+    del exact, damped
+
+
+def test_learning_rate_falls_exponentially() -> None:
+    config = PPOConfig(learning_rate=1e-2, learning_rate_end=1e-4)
+    rates = [float(annealed(config, jnp.float32(p))) for p in (0.0, 0.5, 1.0)]
+    np.testing.assert_allclose(rates, [1e-2, 1e-3, 1e-4], rtol=1e-5)

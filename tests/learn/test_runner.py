@@ -1,0 +1,169 @@
+"""Runs: real trainings that reach a stated success, resume bit for bit, stop when they must."""
+
+import dataclasses
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from safetensors.numpy import load_file
+
+from e2efly import presets
+from e2efly.config import TrainConfig
+from e2efly.learn.rundir import RunDirectory, from_json, to_json
+from e2efly.learn.runner import NonFiniteError, train
+
+SMALL = ["--steps", "6144", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16", "--algo.horizon", "16",
+         "--algo.minibatch", "128", "--network.hidden", "8", "--task.episode-s", "1", "--no-plots"]  # fmt: skip
+
+
+class Silent:
+    """A reporter that keeps what it was told."""
+
+    def __init__(self) -> None:
+        self.seen: list[tuple[int, float]] = []
+
+    def compiling(self) -> None:
+        pass
+
+    def progress(self, steps: int, total: int, rate: float, success: float, best: float) -> None:
+        del total, rate, best
+        self.seen.append((steps, success))
+
+
+def small(task: str = "hover", algo: str = "ppo", **changes: Any) -> TrainConfig:
+    config = presets.preset(task, algo)
+    sizes: dict[str, Any] = {"envs": 16, "horizon": 16}
+    if algo == "ppo":
+        sizes["minibatch"] = 128
+    return dataclasses.replace(
+        config, algo=dataclasses.replace(config.algo, **sizes), steps=1024, chunk=2, eval_episodes=20, **changes
+    )
+
+
+@pytest.mark.parametrize(
+    ("task", "algo", "steps", "success"),
+    [("hover", "ppo", 700_000, 0.98), ("land", "bptt", 700_000, 0.95), ("race", "ppo", 1_200_000, 0.9),
+     ("track", "bptt", 900_000, 0.9)],
+)  # fmt: skip
+def test_a_short_training_learns(task: str, algo: str, steps: int, success: float, tmp_path: Path) -> None:
+    config = dataclasses.replace(presets.preset(task, algo), steps=steps)
+    summary = train(config, tmp_path / "run", Silent())
+    reached = [value["success"] for name, value in summary["shipped"].items() if name != "update"]
+    assert min(reached) >= success, summary
+
+
+def cli(*arguments: str, cwd: Path) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "e2efly", *arguments]
+    return subprocess.Popen(command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+
+
+def wait_for_update(run: Path, process: subprocess.Popen[bytes], updates: int) -> None:
+    """Wait until the metrics hold `updates` rows."""
+    metrics = run / "metrics.csv"
+    while process.poll() is None:
+        if metrics.exists() and metrics.read_text().count("\n") > updates:
+            return
+        time.sleep(0.005)
+    raise AssertionError(process.stdout.read().decode() if process.stdout else "ended early")
+
+
+@pytest.mark.parametrize("algo", ["ppo", "bptt"])
+def test_a_killed_run_ends_bit_for_bit_like_one_that_was_not(algo: str, tmp_path: Path) -> None:
+    small_flags = [f for i, f in enumerate(SMALL) if algo == "ppo" or i not in (10, 11)]
+    flags = ["train", "hover", "--algo", algo, *small_flags]
+    whole = cli(*flags, "--out", "whole", cwd=tmp_path)
+    assert whole.wait() == 0, whole.stdout.read() if whole.stdout else ""
+    for round_, updates in enumerate((4, 12)):
+        process = cli(*flags, "--out", "cut", *(["--resume"] if round_ else []), cwd=tmp_path)
+        wait_for_update(tmp_path / "cut", process, updates)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    resumed = cli(*flags, "--out", "cut", "--resume", cwd=tmp_path)
+    assert resumed.wait() == 0, resumed.stdout.read() if resumed.stdout else ""
+    a, b = (load_file(tmp_path / run / "checkpoint.safetensors") for run in ("whole", "cut"))
+    assert a.keys() == b.keys()
+    for name in a:
+        np.testing.assert_array_equal(a[name], b[name], err_msg=name)
+    assert (tmp_path / "whole/policy.onnx").read_bytes() == (tmp_path / "cut/policy.onnx").read_bytes()
+    rows_a, rows_b = (RunDirectory(tmp_path / run).rows() for run in ("whole", "cut"))
+    timeless = [
+        [{k: v for k, v in row.items() if k not in ("seconds", "rate")} for row in rows] for rows in (rows_a, rows_b)
+    ]
+    assert timeless[0] == timeless[1]
+
+
+def test_ctrl_c_saves_and_stops(tmp_path: Path) -> None:
+    flags = ["train", "hover", *SMALL, "--steps", "100000000", "--out", "run"]
+    process = cli(*flags, cwd=tmp_path)
+    wait_for_update(tmp_path / "run", process, 4)
+    os.kill(process.pid, signal.SIGINT)
+    assert process.wait() == 130
+    output = process.stdout.read().decode() if process.stdout else ""
+    assert "--resume" in output
+    summary = json.loads((tmp_path / "run/summary.json").read_text())
+    assert summary["stopped_by_user"]
+    assert not summary["finished"]
+    assert (tmp_path / "run/policy.onnx").exists()
+
+
+def test_a_loss_that_is_not_finite_stops_the_run_and_keeps_the_checkpoint(tmp_path: Path) -> None:
+    config = small("hover", "bptt")
+    config = dataclasses.replace(
+        config, algo=dataclasses.replace(config.algo, learning_rate=1e30, learning_rate_end=1e30)
+    )
+    with pytest.raises(NonFiniteError, match=r"(reward|loss).* became (nan|-?inf) in update \d+"):
+        train(dataclasses.replace(config, steps=100_000), tmp_path / "run", Silent())
+
+
+def test_resume_refuses_another_configuration_and_names_it(tmp_path: Path) -> None:
+    config = small()
+    RunDirectory(tmp_path / "run").create(config)
+    other = dataclasses.replace(config, seed=5, algo=dataclasses.replace(config.algo, gamma=0.9))
+    with pytest.raises(ValueError, match=r"algo.gamma: 0.98 and 0.9; seed: 0 and 5"):
+        train(other, tmp_path / "run", Silent(), resume=True)
+
+
+def test_resume_refuses_another_version(tmp_path: Path) -> None:
+    config = small()
+    run = RunDirectory(tmp_path / "run")
+    run.create(config)
+    run.write_json("versions.json", {**run.read_json("versions.json"), "jaxlib": "0.0.1"})
+    with pytest.raises(ValueError, match="another version: jaxlib 0.0.1"):
+        train(config, tmp_path / "run", Silent(), resume=True)
+
+
+def test_a_run_is_not_overwritten(tmp_path: Path) -> None:
+    RunDirectory(tmp_path / "run").create(small())
+    with pytest.raises(ValueError, match="already holds a run"):
+        RunDirectory(tmp_path / "run").create(small())
+
+
+@pytest.mark.parametrize("task", list(presets.TASKS))
+@pytest.mark.parametrize("algo", list(presets.ALGORITHMS))
+@pytest.mark.parametrize("name", list(presets.PRESETS))
+def test_every_preset_is_complete_and_survives_json(task: str, algo: str, name: str) -> None:
+    config = presets.preset(task, algo, name)
+    presets.check(config)
+    assert from_json(json.loads(json.dumps(to_json(config))), "config.json") == config
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"steps": 0}, "steps is 0; accepted: more than 0"),
+        ({"steps": -5}, "steps is -5"),
+        ({"eval_episodes": 0}, "eval_episodes is 0"),
+        ({"seed": -1}, "seed is -1"),
+        ({"stop_at": 2.0}, "stop_at is 2.0"),
+    ],
+)
+def test_bad_numbers_are_named(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        presets.check(dataclasses.replace(presets.preset("hover", "ppo"), **change))
