@@ -102,9 +102,11 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
         ("reward", RewardConfig),
     ]
     options = dataclasses.make_dataclass("Train", every, frozen=True)
-    options.__doc__ = f"Train a policy ({task}, {algo}). The defaults below are those of the preset {preset!r}."
+    weights = ", ".join(f"{name} {weight:g}" for name, weight in config.reward.weights.items())
+    options.__doc__ = f"Train a policy ({task}, {algo}). The defaults below are those of the preset {preset!r}; its reward is {weights}."
     top = {name: getattr(config, name) for name in ("seed", "steps", "chunk", "eval_episodes", "stop_at")}
-    parts = {name: getattr(config, name) for name in ("env", "task", "algo", "network", "reward")}
+    parts = {name: getattr(config, name) for name in ("env", "task", "algo", "network")}
+    parts["reward"] = RewardConfig()  # changes to the preset's; a filled dictionary would take no new names
     defaults = options(
         task_name=tyro.MISSING, algo_name=algo, preset=preset, vehicle=config.env.vehicle, out=None, resume=False,
         device=None, plots=True, **top, **parts,
@@ -116,6 +118,11 @@ def train_config(options: Any) -> Any:
     """The `TrainConfig` of parsed options."""
     config = presets.preset(options.task_name, options.algo_name, options.preset)
     shared = {f.name: getattr(options, f.name) for f in dataclasses.fields(config)}
+    changes = options.reward
+    shared["reward"] = RewardConfig(
+        {name: w for name, w in {**config.reward.weights, **changes.weights}.items() if w != 0},
+        {**config.reward.parameters, **changes.parameters},
+    )
     if options.vehicle != config.env.vehicle:
         shared["env"] = dataclasses.replace(options.env, vehicle=options.vehicle)
     return dataclasses.replace(config, **shared)

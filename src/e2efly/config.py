@@ -178,7 +178,7 @@ class RewardConfig:
     """The reward: a weighted sum of the manual's terms."""
 
     weights: dict[str, float] = field(default_factory=dict)
-    """Weight of each term by name; see `e2efly list`."""
+    """Weight of each term by name; see `e2efly list`. On the command line: changes to the preset's, 0 drops a term."""
     parameters: dict[str, float] = field(default_factory=dict)
     """Constants of the terms that differ from their defaults."""
 
@@ -268,7 +268,7 @@ class TrainConfig:
     """Environment steps of the whole run."""
     chunk: int = 10
     """Updates between two evaluations (sets shapes)."""
-    eval_episodes: int = 256
+    eval_episodes: int = 250
     """Starts of an evaluation while training (sets shapes)."""
     stop_at: float | None = None
     """Stop once the success on 1000 starts is at least this; left out: use all steps."""

@@ -76,24 +76,34 @@ def run_episodes(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int, sett
 def trace(
     env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int
 ) -> tuple[State, Float[Array, "t n 4"], Float[Array, "t n 3"], Step]:
-    """States, actions, goals and outcomes of `n` episodes, each leaf (steps, n, ...), without new starts."""
+    """`n` episodes step by step, without new starts.
+
+    Returns:
+        Of every control step, each leaf (steps, n, ...): the state reached, the command in physical units, where to be
+        then, and the outcome. An episode goes on after its end: `Step.done` tells where that was.
+    """
     state, observation = env.reset(key, n)
 
-    def step(carry: tuple[EnvState, Array], _: None) -> tuple[tuple[EnvState, Array], tuple]:
+    def step(carry: tuple[EnvState, Array], _: None) -> tuple[tuple[EnvState, Array], tuple[State, Array, Array, Step]]:
         state, observation = carry
         action = act(observation)
         reached, out = env.advance(state, action)
-        goal = env.task.goal(state.memory, reached.time)
-        return (reached, out.final_observation), (reached.vehicle, action, goal, out)
+        goal = env.task.goal(reached.memory, reached.time)
+        return (reached, out.final_observation), (reached.vehicle, env.command(action), goal, out)
 
     return jax.lax.scan(step, (state, observation), None, length=steps)[1]
 
 
 def wilson(successes: int, n: int, z: float = 1.96) -> tuple[float, float]:
-    """Wilson's score interval of a success rate (E. B. Wilson 1927); z 1.96 is 95 %."""
+    """Wilson's score interval of a success rate; with z = 1.96 it holds the true rate in 95 % of cases.
+
+    Raises:
+        ValueError: when the counts are no counts of successes among trials.
+    """
+    if not 0 <= successes <= n:
+        raise ValueError(f"{successes} successes of {n}; accepted: from 0 to the number of trials")
     if n == 0:
         return 0.0, 1.0
-    p, scale = successes / n, 1 + z**2 / n
-    middle = (p + z**2 / (2 * n)) / scale
-    half = z * math.sqrt(p * (1 - p) / n + z**2 / (4 * n**2)) / scale
-    return max(0.0, middle - half), min(1.0, middle + half)
+    centre = (successes + z**2 / 2) / (n + z**2)
+    half = z / (n + z**2) * math.sqrt(successes * (n - successes) / n + z**2 / 4)
+    return max(centre - half, 0.0), min(centre + half, 1.0)

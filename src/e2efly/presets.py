@@ -49,21 +49,38 @@ _PAPER_PPO_EXTRA: dict[str, dict[str, float]] = {
 def _hover(algo: str) -> TrainConfig:
     if algo == "ppo":
         weights = {"near": 1.0, "v1": 0.02, "anglev_sq": 0.002, "act2_sq": 0.02}
-        return TrainConfig(HoverConfig(), PPOConfig(), RewardConfig(weights), steps=2_000_000)
+        return TrainConfig(HoverConfig(), PPOConfig(), RewardConfig(weights), steps=2_500_000)
     weights = {"prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02}
     return TrainConfig(HoverConfig(), BPTTConfig(), RewardConfig(weights), steps=1_000_000)
 
 
 def _land(algo: str) -> TrainConfig:
-    return TrainConfig(LandConfig(), ALGORITHMS[algo], RewardConfig({}), steps=2_000_000)
+    if algo == "ppo":
+        weights = {
+            "prog1": 4.0, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02, "goal": 10.0, "crash": 10.0,
+        }  # fmt: skip
+        settings: AlgorithmConfig = PPOConfig(learning_rate=5e-3, learning_rate_end=5e-4)
+        return TrainConfig(LandConfig(), settings, RewardConfig(weights), steps=2_000_000)
+    weights = {"progxy": 1.0, "descent": 1.0, "upright": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02}
+    return TrainConfig(LandConfig(), BPTTConfig(), RewardConfig(weights), steps=1_000_000)
 
 
 def _track(algo: str) -> TrainConfig:
-    return TrainConfig(TrackConfig(), ALGORITHMS[algo], RewardConfig({}), steps=2_000_000)
+    if algo == "ppo":
+        weights = {"near": 1.0, "anglev_sq": 0.002, "act2_sq": 0.02}
+        return TrainConfig(TrackConfig(), PPOConfig(), RewardConfig(weights), steps=2_000_000)
+    weights = {"prog2": 1.0, "anglev_sq": 0.01, "act2_sq": 0.02}
+    return TrainConfig(TrackConfig(), BPTTConfig(), RewardConfig(weights), steps=1_000_000)
 
 
 def _race(algo: str) -> TrainConfig:
-    return TrainConfig(RaceConfig(laps=0), ALGORITHMS[algo], RewardConfig({}), steps=2_000_000)
+    if algo == "ppo":
+        weights = {"prog1": 1.0, "anglev_sq": 0.0005, "act2_sq": 0.005, "goal": 1.0, "crash": 1.0}
+        settings: AlgorithmConfig = PPOConfig(gamma=0.97, learning_rate=5e-3, learning_rate_end=5e-4)
+        return TrainConfig(RaceConfig(laps=0), settings, RewardConfig(weights), steps=3_000_000)
+    weights = {"prog1": 1.0, "near": 0.1, "anglev_sq": 0.0005, "act2_sq": 0.005}
+    settings = BPTTConfig(learning_rate=8e-3, gradient_decay=1.0)
+    return TrainConfig(RaceConfig(laps=0), settings, RewardConfig(weights), steps=2_500_000)
 
 
 _OURS: dict[str, Callable[[str], TrainConfig]] = {"hover": _hover, "land": _land, "track": _track, "race": _race}

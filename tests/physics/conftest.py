@@ -52,7 +52,7 @@ def fly() -> Fly:
 
 @pytest.fixture(scope="session")
 def fly_open_loop() -> Fly:
-    """(integrator, plant, state (n, ...), rotor speed commands (t, n, 4), wind, period of a command, substeps) -> (t, n).
+    """(integrator, plant, state (n, ...), rotor speed commands (t, n, 4), wind, seconds a command, substeps) -> (t, n).
 
     The numbers of sub-steps and seconds are traced: one program an integrator and batch.
     """

@@ -79,7 +79,7 @@ class Policy:
         good = np.abs(x) <= _LARGEST  # false for NaN, infinity and what float32 cannot hold
         if not good.all():
             name = next(name for name, part in slices.items() if not good[..., part].all())
-            raise _refusal(name, x[..., slices[name]], good[..., slices[name]].all(-1), "finite numbers")
+            raise _refusal(name, x[..., slices[name]], np.all(good[..., slices[name]], -1), "finite numbers")
         attitude = x[..., slices[self.contract.attitude]]
         square = np.square(attitude, dtype=np.float64).sum(-1)
         unit = np.asarray(np.abs(square - 1) <= 2 * UNIT_TOLERANCE)
@@ -110,7 +110,10 @@ def load_policy(
     """
     where = str(path)
     session = _session(where)
-    stored = session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
+    try:
+        stored = session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{where}: its metadata is no text (damaged? copy or export it again): {error}") from None
     if stored is None:
         raise ValueError(
             f"{where}: metadata key {METADATA_KEY!r} is missing; accepted: an ONNX file with its contract, as "

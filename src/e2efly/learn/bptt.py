@@ -64,7 +64,7 @@ class BPTT:
         rate = annealed(config, progress)
         updates, optimizer = adam(config.max_grad_norm).update(grads, state.optimizer)
         parameters = jax.tree.map(lambda p, u: p - rate * u, state.parameters, updates)
-        metrics["loss/gradient_norm"] = optax.global_norm(grads)
+        metrics["loss/gradient_norm"] = optax.tree.norm(grads)
         return dataclasses.replace(
             state, parameters=parameters, optimizer=optimizer, env=env_state, observation=observation
         ), metrics

@@ -94,7 +94,7 @@ def _is_key(leaf: Any) -> bool:
 def _arrays(tree: Any) -> dict[str, np.ndarray]:
     leaves = jax.tree_util.tree_flatten_with_path(tree)[0]
     return {
-        jax.tree_util.keystr(where): np.ascontiguousarray(jax.random.key_data(leaf) if _is_key(leaf) else leaf)
+        jax.tree_util.keystr(where): np.asarray(jax.random.key_data(leaf) if _is_key(leaf) else leaf, order="C")
         for where, leaf in leaves
     }
 

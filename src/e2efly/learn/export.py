@@ -1,6 +1,5 @@
 """Export a policy: features, network and squashing as one ONNX graph that carries its contract."""
 
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +8,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
+from e2efly import __version__
 from e2efly.config import TrainConfig
 from e2efly.deploy.contract import CONTRACT_VERSION, METADATA_KEY, Action, Contract
 from e2efly.deploy.policy import INPUT, OUTPUT, load_policy
@@ -52,7 +52,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
     limits = (tuple(map(float, low)), tuple(map(float, high)))
     return Contract(
         contract_version=CONTRACT_VERSION,
-        e2efly_version=_version(),
+        e2efly_version=__version__,
         task=env.task.name,
         vehicle=vehicle.name,
         vehicle_hash=vehicle.hash,
@@ -132,7 +132,7 @@ def parity(
         The difference of actions, whose range is [-1, 1].
     """
     observation = random_observations(np.random.default_rng(seed), features.fields, count)
-    wanted = jax.jit(lambda x: policy(layers, features(x), activation))(observation)
+    wanted = jax.jit(lambda layers, x: policy(layers, features(x), activation))(layers, observation)
     return float(np.max(np.abs(load_policy(path).act(observation) - np.asarray(wanted))))
 
 
@@ -234,10 +234,3 @@ def _same(name: str, has: Any, wanted: Any) -> None:
 def _decimals(values: Any) -> tuple[float, ...]:
     """The shortest decimal numbers that round to these, so that 0.03 in float32 reads 0.03."""
     return tuple(float(str(value)) for value in np.asarray(values))
-
-
-def _version() -> str:
-    try:
-        return metadata.version("e2efly")
-    except metadata.PackageNotFoundError:  # run from its source
-        return "not installed"

@@ -123,7 +123,7 @@ class PPO:
             grads, losses = jax.grad(self._loss, has_aux=True)(parameters, config, batch)
             updates, optimizer = adam(config.max_grad_norm).update(grads, optimizer)
             parameters = jax.tree.map(lambda p, u: p - rate * u, parameters, updates)
-            return (parameters, optimizer), {**losses, "gradient_norm": optax.global_norm(grads)}
+            return (parameters, optimizer), {**losses, "gradient_norm": optax.tree.norm(grads)}
 
         def epoch(carry: tuple[Parameters, Any], _: None) -> tuple[Any, dict[str, Array]]:
             return jax.lax.scan(minibatch, carry, batches)

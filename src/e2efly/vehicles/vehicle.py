@@ -226,7 +226,8 @@ def check(vehicle: Vehicle, where: str = "vehicle") -> None:
             "accepted: more than 1.05, and less than 1 at idle)"
         )
     allocation = allocation_matrix(vehicle)
-    if vehicle.torque_ratio == 0 or np.linalg.cond(allocation / np.abs(allocation).max(1, keepdims=True)) > 1e3:
+    largest = np.abs(allocation).max(1, keepdims=True)
+    if np.any(largest == 0) or np.linalg.cond(allocation / largest) > 1e3:
         raise ValueError(
             f"{where}: rotor_position.value {vehicle.rotor_position.tolist()}, rotor_spin and torque_ratio "
             f"({vehicle.torque_ratio} m) leave an axis without control; accepted: rotors that give independent "

@@ -1,1 +1,1 @@
-"""Pictures of runs and flights."""
+"""Looking at runs and flights: plots."""

@@ -1,219 +1,272 @@
-"""Plots of runs and flights as PNG files, by matplotlib's object interface: no window, no global state."""
+"""Plots of runs and flights: each function takes data and writes one PNG file, 1200 pixels wide."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jax
-import matplotlib
 import numpy as np
-from jaxtyping import PRNGKeyArray
+from jaxtyping import Float
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection
-from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d.art3d import Line3DCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
-from e2efly.env import Env
-from e2efly.evaluate import Act, Episodes, trace, wilson
-from e2efly.tasks import Race, Task, Track
+from e2efly.config import HoverConfig, LandConfig, TaskConfig, TrackConfig
+from e2efly.evaluate import Episodes, wilson
+from e2efly.physics.control import COMMAND_MODES
+from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.view.flights import Flights, fly
+from e2efly.view.space import plot_flights
+from e2efly.view.style import BLUE, CYCLE, GREEN, GREY, INK, PURPLE, VERMILLION, figure, say
 
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
-"""Okabe and Ito's palette, safe for colour-blind readers."""
-SPEED = "viridis"
+Rows = list[dict[str, float]]
 
-matplotlib.rcParams.update(
-    {"axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.alpha": 0.25}
+__all__ = ["Flights", "fly", "limits", "plot_errors", "plot_flights", "plot_learning", "plot_time"]
+
+
+def plot_learning(rows: Rows, path: str | Path, title: str, best_update: int | None = None) -> None:
+    """Draw the learning curves of a run.
+
+    Args:
+        rows: of metrics.csv, as `RunDirectory.rows` reads them: an update each, some with an evaluation.
+        path: the PNG file.
+        title: of the figure.
+        best_update: the update whose policy was shipped, marked in every panel; None: no mark.
+    """
+    evaluated = [row for row in rows if "seconds" in row]
+    best = next((row for row in evaluated if row["update"] == best_update), None)
+    note = [] if best is None else [f"dashed: update {best['update']:.0f}, whose policy was shipped"]
+    with figure(path, title, 8.8, note) as fig:
+        grid = fig.add_gridspec(3, 2, height_ratios=[1.0, 1.0, 1.2])
+        clocks = (("seconds", 1.0, "time since process start, compilation included (s)"), ("steps", 1e-6, _STEPS))
+        for column, (clock, scale, label) in enumerate(clocks):
+            above = fig.add_subplot(grid[0, column])
+            below = fig.add_subplot(grid[1, column], sharex=above)
+            _success(above, evaluated, clock, scale)
+            above.set_ylabel("success of evaluation (%)")
+            above.tick_params(labelbottom=False)
+            _curve(below, rows, clock, scale, "reward", INK)
+            below.set_ylabel("mean training reward\nof a step")
+            below.set_xlabel(label)
+            for ax in (above, below):
+                _mark(ax, best, clock, scale)
+            above.set_xlim(left=0.0)
+        terms = fig.add_subplot(grid[2, :])
+        _terms(terms, rows)
+        _mark(terms, best, "steps", 1e-6)
+
+
+_STEPS = "environment steps (million)"
+
+
+def _curve(ax: Axes, rows: Rows, x: str, scale: float, y: str, color: str, **style: Any) -> None:
+    """One column over another, of the rows that have both; with dots where there are few."""
+    points = np.array([(scale * row[x], row[y]) for row in rows if x in row and y in row]).reshape(-1, 2)
+    if len(points) == 0:
+        say(ax, "nothing measured yet")
+        return
+    ax.plot(*points.T, color=color, marker="o" if len(points) < 40 else "", markersize=3.5, **style)
+
+
+def _success(ax: Axes, rows: Rows, x: str, scale: float) -> None:
+    keys = list(dict.fromkeys(k for row in rows for k in row if k.startswith("eval/") and k.endswith("/success")))
+    percent = [{**row, **{key: 100 * row[key] for key in keys if key in row}} for row in rows]
+    for key, color in zip(keys, CYCLE, strict=False):
+        _curve(ax, percent, x, scale, key, color, label=key.split("/")[1])
+    if keys:
+        ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(keys), borderpad=0.1)
+    else:
+        say(ax, "no evaluation yet")
+    ax.set_ylim(-4, 104)
+    ax.set_yticks([0, 25, 50, 75, 100])
+
+
+def _mark(ax: Axes, best: dict[str, float] | None, x: str, scale: float) -> None:
+    if best is not None:
+        ax.axvline(scale * best[x], color=GREY, linewidth=1.2, linestyle=(0, (4, 3)), zorder=1.5)
+
+
+def _terms(ax: Axes, rows: Rows) -> None:
+    """The weighted terms of the reward, on an axis that is linear about zero and logarithmic beyond."""
+    keys = list(dict.fromkeys(key for row in rows for key in row if key.startswith("reward/")))
+    ax.set_xlabel(_STEPS)
+    ax.set_ylabel("mean weighted term\nof a step")
+    if not keys:
+        say(ax, "no reward terms yet")
+        return
+    size = {key: max(abs(row[key]) for row in rows if key in row) for key in keys}
+    keys.sort(key=lambda key: -size[key])
+    for i, key in enumerate(keys):
+        dashes = ("-", (0, (5, 2)), (0, (1, 1.5)))[i // len(CYCLE) % 3]
+        color = CYCLE[i % len(CYCLE)]
+        _curve(ax, rows, "steps", 1e-6, key, color, label=key.removeprefix("reward/"), linestyle=dashes)
+    if (largest := max(size.values())) > 0:
+        ax.set_yscale("symlog", linthresh=10.0 ** np.floor(np.log10(largest) - 2), linscale=0.6)
+    ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
+    ax.set_xlim(left=0.0)
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def plot_time(flights: Flights, index: int, path: str | Path, title: str) -> None:
+    """Draw one episode over time: position and velocity, attitude, command, body rates and rotor speeds.
+
+    Args:
+        flights: the episodes.
+        index: which of them.
+        path: the PNG file.
+        title: of the figure.
+    """
+    steps, mode = int(flights.length[index]), COMMAND_MODES[flights.command_mode]
+    time, command = flights.time[:steps], flights.command[:steps, index]
+    asked = time - (flights.time[0] if len(flights.time) else 0.0)
+    end = f"{time[-1]:.2f} s" if steps else "0 s"
+    note = f"episode {index}, {'success' if flights.success[index] else 'no success'} after {end}"
+    with figure(path, title, 9.6, [note]) as fig:
+        axes = fig.subplots(4, 2, sharex=True).ravel()
+        place, speed, attitude, thrust, roll, pitch, yaw, rotor = axes
+        colors = (BLUE, VERMILLION, GREEN)
+        for i, (name, color) in enumerate(zip("xyz", colors, strict=True)):
+            place.plot(time, flights.position[:steps, index, i], color=color, label=name)
+            place.plot(time, flights.goal[:steps, index, i], color=color, linewidth=1.1, linestyle=(0, (4, 2)))
+            speed.plot(time, flights.velocity[:steps, index, i], color=color, label=name)
+        place.plot([], [], color=GREY, linewidth=1.1, linestyle=(0, (4, 2)), label="goal")
+        attitude.plot(time, np.degrees(flights.tilt[:steps, index]), color=BLUE, label="tilt")
+        attitude.plot(*_unwound(time, np.degrees(flights.yaw[:steps, index])), color=VERMILLION, label="yaw")
+        for i, (ax, color) in enumerate(zip((roll, pitch, yaw), colors, strict=True)):
+            name = ("roll", "pitch", "yaw")[i]
+            if f"{name}_rate" in mode.fields:
+                wanted = command[:, mode.fields.index(f"{name}_rate")]
+                ax.plot(asked, wanted, color=GREY, linewidth=1.0, drawstyle="steps-post", label="commanded")
+            ax.plot(time, flights.body_rate[:steps, index, i], color=color, label="measured")
+            ax.set_ylabel(f"{name} rate (rad/s)")
+        _command(thrust, asked, command, flights.command_mode)
+        for i, name in enumerate(("rear right", "front right", "rear left", "front left")):
+            color = (BLUE, VERMILLION, GREEN, PURPLE)[i]
+            rotor.plot(time, flights.rotor_speed[:steps, index, i], color=color, linewidth=1.2, label=name)
+        for ax, label in ((place, "position (m)"), (speed, "velocity (m/s)"), (attitude, "angle (deg)")):
+            ax.set_ylabel(label)
+        rotor.set_ylabel("rotor speed (rad/s)")
+        for ax in axes:
+            ax.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=4, borderpad=0.1, handlelength=1.6)
+            ax.set_xlim(0.0, max(float(time[-1]) if steps else 0.0, 0.1))
+            ax.margins(y=0.08)
+        for ax in axes[-2:]:
+            ax.set_xlabel("time (s)")
+
+
+def _command(ax: Axes, time: Float[np.ndarray, " t"], command: Float[np.ndarray, "t 4"], name: str) -> None:
+    """The collective thrust against gravity, where the mode has one; else all four numbers of the command."""
+    mode = COMMAND_MODES[name]
+    if mode.fields[0] == "collective_thrust":
+        ax.axhline(1.0, color=GREY, linewidth=1.1, linestyle=(0, (4, 2)), label="hover: 1 g")
+        ax.plot(time, command[:, 0] / GRAVITY, color=BLUE, drawstyle="steps-post", label="commanded")
+        ax.set_ylabel("thrust / mass (g)")
+        return
+    for i, (field, color) in enumerate(zip(mode.fields, CYCLE, strict=False)):
+        ax.plot(time, command[:, i], color=color, drawstyle="steps-post", label=field.replace("_", " "))
+    ax.set_ylabel(f"command ({', '.join(dict.fromkeys(mode.units))})")
+
+
+def _unwound(time: np.ndarray, degrees: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """An angle over time with gaps where it jumps from one end of its range to the other."""
+    jumps = np.flatnonzero(np.abs(np.diff(degrees)) > 180) + 1
+    return np.insert(time, jumps, np.nan), np.insert(degrees, jumps, np.nan)
+
+
+def limits(suites: Mapping[str, TaskConfig]) -> dict[str, dict[str, float]]:
+    """The largest error, m, with which an episode still succeeds, by criterion and by field of `Episodes`."""
+    found: dict[str, dict[str, float]] = {}
+    for name, config in suites.items():
+        if isinstance(config, TrackConfig):
+            found[name] = {"mean_error": float(config.mean_error)}
+        elif isinstance(config, HoverConfig | LandConfig):
+            found[name] = {"final_error": float(config.radius)}
+    return found
+
+
+_PANELS = (
+    ("final_error", "error at the end (m)"),
+    ("mean_error", "mean error (m)"),
+    ("duration", "duration (s)"),
+    ("top_speed", "top speed (m/s)"),
+    ("top_rate", "top body rate (rad/s)"),
+    ("roughness", "mean change of the action a step"),
 )
 
 
-@dataclass(frozen=True)
-class Flights:
-    """States and commands of n flights at t control steps, NumPy."""
+def plot_errors(
+    episodes: Mapping[str, Episodes],
+    path: str | Path,
+    title: str,
+    limits: Mapping[str, Mapping[str, float]] | None = None,
+) -> None:
+    """Draw how errors, durations, speeds and roughness are distributed over many episodes.
 
-    time: np.ndarray
-    """(t,) s."""
-    position: np.ndarray
-    """(t, n, 3) world, m."""
-    velocity: np.ndarray
-    """(t, n, 3) world, m/s."""
-    quaternion: np.ndarray
-    """(t, n, 4) wxyz, body to world."""
-    body_rate: np.ndarray
-    """(t, n, 3) body, rad/s."""
-    rotor_speed: np.ndarray
-    """(t, n, 4) rad/s."""
-    command: np.ndarray
-    """(t, n, 4) in the units of the command mode."""
-    goal: np.ndarray
-    """(t, n, 3) where to be, world, m."""
-    length: np.ndarray
-    """(n,) steps until the episode ended."""
-    success: np.ndarray
-    """(n,) whether it met the criterion."""
-
-
-def fly(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int) -> Flights:
-    """Fly `n` episodes of at most `steps` control steps and keep everything."""
-    states, actions, goals, out = jax.tree.map(
-        np.asarray, jax.jit(lambda env, key: trace(env, act, key, n, steps))(env, key)
-    )
-    done = out.terminated | out.truncated
-    length = np.where(done.any(0), done.argmax(0) + 1, steps)
-    low, half = np.asarray(env.center) - np.asarray(env.half), np.asarray(env.half)
-    return Flights(
-        time=env.control_period * np.arange(1, steps + 1),
-        position=states.position,
-        velocity=states.velocity,
-        quaternion=states.quaternion,
-        body_rate=states.body_rate,
-        rotor_speed=states.rotor_speed,
-        command=low + (np.clip(actions, -1, 1) + 1) * half,
-        goal=goals,
-        length=length,
-        success=np.array([bool(out.success[k - 1, i]) for i, k in enumerate(length)]),
-    )
+    Args:
+        episodes: by criterion.
+        path: the PNG file.
+        title: of the figure, to which the success of each criterion and its 95 % interval (Wilson) are added.
+        limits: by criterion and field of `Episodes`: drawn as vertical lines; see `limits`.
+    """
+    notes = [_rate(name, np.asarray(e.success)) for name, e in episodes.items()]
+    colors = dict(zip(episodes, CYCLE * len(episodes), strict=False))
+    with figure(path, title, 6.6, notes) as fig:
+        for ax, (field, label) in zip(fig.subplots(2, 3, sharey=True).ravel(), _PANELS, strict=True):
+            values = {name: _finite(getattr(e, field), field) for name, e in episodes.items()}
+            lines = {name: limit[field] for name, limit in (limits or {}).items() if field in limit and name in colors}
+            _distributions(ax, values, lines, colors)
+            ax.set_xlabel(label)
+            if ax.get_subplotspec().is_first_col():
+                ax.set_ylabel("episodes at or below (%)")
+        handles = [Line2D([], [], color=color, label=name) for name, color in colors.items()]
+        handles.append(Patch(facecolor=GREY, alpha=0.3, label="histogram (scaled to its peak)"))
+        if limits:
+            handles.append(Line2D([], [], color=INK, linewidth=1.2, linestyle=(0, (4, 2)), label="limit of success"))
+        fig.legend(handles=handles, loc="outside lower center", ncols=len(handles))
 
 
-def plot_learning(rows: list[dict[str, float]], path: Path, title: str) -> None:
-    """Learning curves against seconds from the start of the process and against environment steps."""
-    figure = Figure(figsize=(12, 7), layout="constrained")
-    axes = figure.subplots(2, 2, sharey="row")
-    seen = [row for row in rows if "seconds" in row]
-    names = [key for key in (seen[0] if seen else {}) if key.endswith("/success")]
-    for column, (key, label, scale) in enumerate(
-        (("seconds", "time from process start, s", 1.0), ("steps", "environment steps, millions", 1e-6))
-    ):
-        x = [row[key] * scale for row in seen]
-        for name, color in zip(names, COLORS, strict=False):
-            axes[0, column].plot(
-                x, [100 * row[name] for row in seen], "o-", ms=3, color=color, label=name.split("/")[1]
-            )
-        axes[1, column].plot(x, [row["reward"] for row in seen], "o-", ms=3, color=COLORS[2], label="reward")
-        axes[1, column].set_xlabel(label)
-        for axis in axes[:, column]:
-            axis.set_xlim(left=0)
-    axes[0, 0].set(ylabel="success, %", ylim=(-3, 103))
-    axes[1, 0].set_ylabel("mean reward a step")
-    if names:
-        axes[0, 0].legend(frameon=False)
-    figure.suptitle(f"{title}: learning")
-    figure.savefig(path, dpi=110)
+def _rate(name: str, success: np.ndarray) -> str:
+    k, n = int(success.sum()), len(success)
+    low, high = wilson(k, n)
+    rate = f"{100 * k / n:.1f} %" if n else "none"
+    return f"{name}: {rate} of {n} episodes succeed (95 % interval {100 * low:.1f} to {100 * high:.1f} %)"
 
 
-def plot_flights(task: Task, flights: Flights, path: Path, title: str) -> None:
-    """Trajectories coloured by speed, in space and from above, with what the task flies to."""
-    figure = Figure(figsize=(12, 5.6), layout="constrained")
-    space, top = figure.add_subplot(1, 2, 1, projection="3d"), figure.add_subplot(1, 2, 2)
-    top_speed = max(
-        1.0, max(np.linalg.norm(flights.velocity[:k, i], axis=-1).max() for i, k in enumerate(flights.length))
-    )
-    norm = Normalize(0, top_speed)
-    for i, k in enumerate(flights.length):
-        p, v = flights.position[:k, i], np.linalg.norm(flights.velocity[:k, i], axis=-1)
-        if k > 1:
-            pieces = np.stack([p[:-1], p[1:]], axis=1)
-            space.add_collection3d(Line3DCollection(list(pieces), array=v[1:], cmap=SPEED, norm=norm, lw=1.4))
-            top.add_collection(LineCollection(list(pieces[..., :2]), array=v[1:], cmap=SPEED, norm=norm, lw=1.4))
-        space.scatter(*p[0], color=COLORS[7], s=10)
-        top.scatter(*p[0, :2], color=COLORS[7], s=12, label="start" if i == 0 else None, zorder=3)
-        if not flights.success[i]:
-            top.scatter(*p[-1, :2], color=COLORS[1], marker="x", s=40, zorder=4)
-    _scenery(task, flights, space, top)
-    points = np.concatenate([flights.position[:k, i] for i, k in enumerate(flights.length)])
-    low, high = points.min(0) - 0.3, points.max(0) + 0.3
-    low[2] = min(low[2], 0.0)
-    space.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    space.set_box_aspect(high - low)
-    space.set(xlabel="x, m", ylabel="y, m", zlabel="z, m")
-    top.set(xlabel="x, m", ylabel="y, m", aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    top.legend(frameon=False, loc="upper right")
-    mappable = ScalarMappable(norm, SPEED)
-    figure.colorbar(mappable, ax=top, label="speed, m/s", shrink=0.8)
-    figure.suptitle(f"{title}: {flights.success.sum()} of {len(flights.success)} flights drawn succeeded")
-    figure.savefig(path, dpi=110)
+def _finite(values: Any, field: str) -> np.ndarray:
+    """Sorted finite values; a mean error of exactly zero belongs to an episode that ended before errors counted."""
+    array = np.sort(np.asarray(values, np.float64))
+    array = array[np.isfinite(array)]
+    return array[array > 0] if field == "mean_error" else array
 
 
-def _scenery(task: Task, flights: Flights, space: Any, top: Axes) -> None:
-    """Gates, reference, or target."""
-    if isinstance(task, Race):
-        g = task.gates
-        for i, (c, cos, sin, half) in enumerate(zip(g.position[:-1], g.cos, g.sin, g.half, strict=True)):
-            left = np.array([-sin, cos, 0.0])
-            corners = [
-                c + a * half[0] * left + b * half[1] * np.array([0, 0, 1.0])
-                for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1), (1, 1))
-            ]
-            corners = np.array(corners)
-            space.plot(*corners.T, color=COLORS[1], lw=2)
-            top.plot(*corners[:, :2].T, color=COLORS[1], lw=3, label="gate" if i == 0 else None)
-            top.annotate(str(i + 1), c[:2] + 0.3, color=COLORS[1])
+def _distributions(
+    ax: Axes, values: Mapping[str, np.ndarray], lines: Mapping[str, float], colors: Mapping[str, str]
+) -> None:
+    """Empirical distribution functions over pale histograms; a logarithmic axis for more than a decade of values."""
+    ax.set_ylim(0, 104)
+    ax.set_yticks([0, 25, 50, 75, 100])
+    whole = np.concatenate([np.zeros(0), *values.values()])
+    if len(whole) == 0:
+        say(ax, "no episodes")
         return
-    for i, k in enumerate(flights.length):
-        goal, label = flights.goal[:k, i], "target" if i == 0 else None
-        if isinstance(task, Track):
-            space.plot(*goal.T, color=COLORS[7], lw=0.6, ls="--")
-            top.plot(*goal[:, :2].T, color=COLORS[7], lw=0.8, ls="--", label="reference" if i == 0 else None)
-        elif i == 0:
-            space.scatter(*goal[0], color=COLORS[1], s=40)
-            top.scatter(*goal[0, :2], color=COLORS[1], s=40, label=label, zorder=5)
-
-
-def plot_time(flights: Flights, index: int, path: Path, title: str) -> None:
-    """One flight over time: states, and the commands beside the response."""
-    k = int(flights.length[index])
-    t = flights.time[:k]
-    q = flights.quaternion[:k, index]
-    w, x, y, z = q.T
-    tilt = np.degrees(np.arccos(np.clip(1 - 2 * (x * x + y * y), -1, 1)))
-    heading = np.degrees(np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))))
-    figure = Figure(figsize=(12, 9), layout="constrained")
-    axes = figure.subplots(3, 2, sharex=True).ravel()
-    for i, name in enumerate("xyz"):
-        axes[0].plot(t, flights.position[:k, index, i], color=COLORS[i], label=name)
-        axes[0].plot(t, flights.goal[:k, index, i], color=COLORS[i], ls=":", lw=1)
-        axes[1].plot(t, flights.velocity[:k, index, i], color=COLORS[i], label=name)
-        axes[3].plot(t, flights.body_rate[:k, index, i], color=COLORS[i], label=("roll", "pitch", "yaw")[i])
-        axes[3].step(t, flights.command[:k, index, i + 1], color=COLORS[i], ls=":", lw=1, where="pre")
-    axes[2].plot(t, tilt, color=COLORS[0], label="tilt")
-    axes[2].plot(t, heading, color=COLORS[1], label="heading")
-    axes[4].step(t, flights.command[:k, index, 0] / 9.81, color=COLORS[0], where="pre")
-    for i, name in enumerate(("rear right", "front right", "rear left", "front left")):
-        axes[5].plot(t, flights.rotor_speed[:k, index, i], color=COLORS[i], label=name)
-    labels = (
-        "position (dotted: goal), m", "velocity, m/s", "angle, deg", "body rate (dotted: command), rad/s",
-        "first command / 9.81 (ctbr: thrust in g)", "rotor speed, rad/s",
-    )  # fmt: skip
-    for axis, label in zip(axes, labels, strict=True):
-        axis.set_ylabel(label)
-        if axis.get_legend_handles_labels()[0]:
-            axis.legend(frameon=False, ncols=4, fontsize=8, loc="best")
-    for axis in axes[-2:]:
-        axis.set_xlabel("time, s")
-    figure.suptitle(f"{title}: one flight")
-    figure.savefig(path, dpi=110)
-
-
-def plot_errors(episodes: dict[str, Episodes], path: Path, title: str) -> None:
-    """Distributions over all starts of the final error, the mean error, the duration and the top speed."""
-    figure = Figure(figsize=(12, 7), layout="constrained")
-    axes = figure.subplots(2, 2).ravel()
-    columns = (("final_error", "final error, m", True), ("mean_error", "mean error, m", True),
-               ("duration", "duration, s", False), ("top_speed", "top speed, m/s", False))  # fmt: skip
-    notes = []
-    for (name, e), color in zip(episodes.items(), COLORS, strict=False):
-        ok = np.asarray(e.success)
-        low, high = wilson(int(ok.sum()), len(ok))
-        notes.append(f"{name} {ok.mean():.1%} ({low:.1%} to {high:.1%})")
-        for axis, (column, label, logarithmic) in zip(axes, columns, strict=True):
-            values = np.sort(np.asarray(getattr(e, column), np.float64))
-            if logarithmic:
-                values = np.maximum(values, 1e-5)
-                axis.set_xscale("log")
-            axis.plot(values, 100 * np.arange(1, len(values) + 1) / len(values), color=color, label=name)
-            axis.set(xlabel=label, ylabel="starts at or below, %", ylim=(0, 101))
-    if episodes:
-        axes[0].legend(frameon=False)
-    figure.suptitle(f"{title}: success {', '.join(notes)}")
-    figure.savefig(path, dpi=110)
+    edge = np.array([whole.min(), whole.max(), *lines.values()])
+    low, high = float(edge.min()), float(edge.max())
+    if low > 0 and high > 10 * low:
+        ax.set_xscale("log")
+        low, high = low / 1.25, high * 1.25
+        bins = np.geomspace(low, high, 41)
+    else:
+        margin = 0.04 * (high - low) or max(0.05 * abs(high), 1e-3)
+        low, high = low - margin, high + margin
+        bins = np.linspace(low, high, 41)
+    ax.set_xlim(low, high)
+    for name, column in values.items():
+        if len(column) == 0:
+            continue
+        counts, _ = np.histogram(column, bins)
+        if counts.max():
+            ax.stairs(60 * counts / counts.max(), bins, fill=True, color=colors[name], alpha=0.25)
+        share = 100 * np.arange(1, len(column) + 1) / len(column)
+        ends = np.concatenate([[low], column, [high]]), np.concatenate([[0.0], share, [100.0]])
+        ax.plot(*ends, color=colors[name], drawstyle="steps-post")
+    for name, x in lines.items():
+        ax.axvline(x, color=colors[name] if len(values) > 1 else INK, linewidth=1.2, linestyle=(0, (4, 2)))

@@ -1,0 +1,83 @@
+"""Flights of a policy as NumPy arrays: what the plots draw."""
+
+from dataclasses import dataclass
+
+import jax
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+
+from e2efly.env import Env
+from e2efly.evaluate import Act, trace
+
+
+@dataclass(frozen=True)
+class Flights:
+    """`n` episodes over `t` control steps. Row k is what step k reached; rows from `length` on lie after the end."""
+
+    time: Float[np.ndarray, " t"]
+    """Since the start of the episode, s: the end of each step, so that the first is one control period."""
+    position: Float[np.ndarray, "t n 3"]
+    """Centre of mass, world, m."""
+    velocity: Float[np.ndarray, "t n 3"]
+    """World, m/s."""
+    quaternion: Float[np.ndarray, "t n 4"]
+    """Unit quaternion wxyz, body to world."""
+    body_rate: Float[np.ndarray, "t n 3"]
+    """Body, rad/s."""
+    rotor_speed: Float[np.ndarray, "t n 4"]
+    """Rear right, front right, rear left, front left, rad/s."""
+    command: Float[np.ndarray, "t n 4"]
+    """What the policy asked for at the start of the step, in the units of the command mode; it acts a latency later."""
+    goal: Float[np.ndarray, "t n 3"]
+    """Where to be at `time`, world, m."""
+    length: Int[np.ndarray, " n"]
+    """Steps until the episode ended."""
+    success: Bool[np.ndarray, " n"]
+    """Whether it ended well."""
+    command_mode: str = "ctbr"
+    """A name of `e2efly.physics.COMMAND_MODES`: what `command` is."""
+
+    @property
+    def speed(self) -> Float[np.ndarray, "t n"]:
+        """m/s."""
+        return np.linalg.norm(self.velocity, axis=-1)
+
+    @property
+    def tilt(self) -> Float[np.ndarray, "t n"]:
+        """Angle between the body's z axis and up, rad."""
+        x, y = self.quaternion[..., 1], self.quaternion[..., 2]
+        return 2 * np.arcsin(np.clip(np.hypot(x, y), 0.0, 1.0))
+
+    @property
+    def yaw(self) -> Float[np.ndarray, "t n"]:
+        """Heading of the body's x axis, rad in [-pi, pi]."""
+        w, x, y, z = np.moveaxis(self.quaternion, -1, 0)
+        return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def fly(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int) -> Flights:
+    """Fly `n` episodes of at most `steps` control steps.
+
+    Args:
+        env: the environment.
+        act: the policy, as a function that JAX can compile.
+        key: decides the starts and all noise.
+        n: episodes, side by side.
+        steps: control steps; an episode that is longer is cut.
+    """
+
+    @jax.jit
+    def program(env: Env, key: PRNGKeyArray) -> tuple[Array, ...]:
+        state, command, goal, out = trace(env, act, key, n, steps)
+        s = (state.position, state.velocity, state.quaternion, state.body_rate, state.rotor_speed)
+        return *s, command, goal, out.done, out.success
+
+    *arrays, done, success = (np.asarray(x) for x in program(env, key))
+    length = np.where(done.any(axis=0), done.argmax(axis=0) + 1, steps)
+    return Flights(
+        env.control_period * np.arange(1, steps + 1),
+        *arrays,
+        length=length,
+        success=success[length - 1, np.arange(n)],
+        command_mode=env.physics.command_mode,
+    )

@@ -1,0 +1,217 @@
+"""Flights in space: in 3D and from above."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import Bbox
+from mpl_toolkits.mplot3d import proj3d
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from mpl_toolkits.mplot3d.axes3d import Axes3D
+
+from e2efly.view.flights import Flights
+from e2efly.view.scene import Face, Line, Mark, Thing, scene
+from e2efly.view.style import GREY, INK, PALE, VERMILLION, figure
+
+SPEED = LinearSegmentedColormap.from_list("speed", colormaps["viridis"](np.linspace(0.0, 0.92, 256)))
+"""Viridis without its pale end, which white paper swallows."""
+
+Corner = Float[np.ndarray, "3"]
+
+_MARK: dict[str, Any] = {
+    "color": INK,
+    "markersize": 12,
+    "markeredgecolor": "white",
+    "markeredgewidth": 0.8,
+    "linestyle": "",
+}
+_TEXT: dict[str, Any] = {
+    "color": INK, "ha": "center", "va": "center", "weight": "bold", "zorder": 6,
+    "path_effects": [withStroke(linewidth=3, foreground="white")],
+}  # fmt: skip
+_START: dict[str, Any] = {
+    "marker": "o", "markersize": 5, "markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 1.2,
+    "linestyle": "",
+}  # fmt: skip
+_FAILURE: dict[str, Any] = {
+    "marker": "X", "markersize": 8, "markerfacecolor": VERMILLION, "markeredgecolor": "white", "linestyle": "",
+}  # fmt: skip
+
+
+def plot_flights(task: Any, flights: Flights, path: str | Path, title: str) -> None:
+    """Draw episodes in space, in 3D and from above, coloured by speed, with what the task has there.
+
+    Args:
+        task: the environment's task.
+        flights: the episodes.
+        path: the PNG file.
+        title: of the figure.
+    """
+    things = scene(task, flights)
+    tracks = [flights.position[:k, i] for i, k in enumerate(flights.length)]
+    low, high = _bounds(tracks, things)
+    fastest = max((float(flights.speed[:k, i].max()) for i, k in enumerate(flights.length) if k), default=0.0)
+    norm = Normalize(0.0, max(fastest, 0.1))
+    with figure(path, title, 4.8 if _is_flat(high - low) else 5.8, free=True) as fig:
+        solid = fig.add_axes((0.01, 0.10, 0.55, 0.83), projection="3d", computed_zorder=False)
+        assert isinstance(solid, Axes3D)
+        _solid(solid, flights, things, low, high, norm)
+        _fit(fig, solid, low, high, Bbox.from_extents(0.012, 0.09, 0.55, 0.91))
+        plan = fig.add_axes((0.63, 0.21, 0.275, 0.65))
+        _plan(plan, flights, things, low, high, norm)
+        bar_axes = fig.add_axes((0.928, 0.21, 0.014, 0.65))
+        bar = fig.colorbar(ScalarMappable(norm, SPEED), cax=bar_axes)
+        bar.set_label("speed (m/s)")
+        bar_axes.grid(False)
+        bar.outline.set_visible(False)
+        fig.legend(handles=_legend(flights, things), loc="lower center", bbox_to_anchor=(0.5, 0.0), ncols=6)
+
+
+def _fit(fig: Figure, ax: Axes3D, low: Corner, high: Corner, room: Bbox) -> None:
+    """Zoom and shift 3D axes so that their box and labels fill `room`, in parts of the figure."""
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    zoom = 1.0
+
+    def measured() -> Bbox:
+        fig.draw_without_rendering()
+        x, y, _ = proj3d.proj_transform(*corners.T, ax.get_proj())
+        boxes = [axis.get_tightbbox() for axis in (ax.xaxis, ax.yaxis, ax.zaxis)]
+        flat = Bbox.null()
+        flat.update_from_data_xy(ax.transData.transform(np.stack([x, y], axis=-1)))
+        return Bbox.union([flat, *(box for box in boxes if box)]).transformed(fig.transFigure.inverted())
+
+    for _ in range(2):
+        box = measured()
+        zoom *= min(room.width / box.width, room.height / box.height)
+        ax.set_box_aspect(high - low, zoom=zoom)
+    box, at = measured(), ax.get_position(original=True)
+    shift = ((room.x0 + room.x1 - box.x0 - box.x1) / 2, (room.y0 + room.y1 - box.y0 - box.y1) / 2)
+    ax.set_position((at.x0 + shift[0], at.y0 + shift[1], at.width, at.height))
+
+
+def _bounds(tracks: list[np.ndarray], things: list[Thing]) -> tuple[Corner, Corner]:
+    """Corners of a box about all that is drawn, ground included, at least 0.6 m wide with a margin."""
+    points = [np.zeros((1, 3)) + [[*tracks[0][0, :2], 0.0]]] if tracks and len(tracks[0]) else [np.zeros((1, 3))]
+    points += tracks
+    points += [np.atleast_2d(thing.point if isinstance(thing, Mark) else thing.points) for thing in things]
+    whole = np.concatenate(points)
+    whole = whole[np.isfinite(whole).all(axis=1)]
+    low, high = whole.min(axis=0), whole.max(axis=0)
+    middle, half = (low + high) / 2, np.maximum((high - low) / 2 * 1.04, [0.6, 0.6, 0.0])
+    return np.array([*(middle - half)[:2], min(low[2], 0.0)]), np.array([*(middle + half)[:2], max(high[2], 0.6)])
+
+
+def _is_flat(size: Corner) -> bool:
+    return bool(size[2] < 0.4 * size[:2].max())
+
+
+def _segments(points: np.ndarray) -> np.ndarray:
+    """(m, d) points as (m - 1, 2, d) pairs."""
+    return np.stack([points[:-1], points[1:]], axis=1)
+
+
+def _paths(flights: Flights) -> tuple[np.ndarray, np.ndarray]:
+    """The segments (s, 2, 3) of all flights until their ends, and the speed on each."""
+    segments = [_segments(flights.position[:k, i]) for i, k in enumerate(flights.length)]
+    speeds = [(flights.speed[: max(k - 1, 0), i] + flights.speed[1:k, i]) / 2 for i, k in enumerate(flights.length)]
+    return np.concatenate([np.zeros((0, 2, 3)), *segments]), np.concatenate([np.zeros(0), *speeds])
+
+
+def _ends(flights: Flights) -> tuple[np.ndarray, np.ndarray]:
+    """Where the flights begin, (n, 3), and where those that failed end."""
+    kept = np.flatnonzero(flights.length > 0)
+    last = flights.position[flights.length[kept] - 1, kept]
+    return flights.position[0, kept], last[~flights.success[kept].astype(bool)]
+
+
+def _solid(ax: Axes3D, flights: Flights, things: list[Thing], low: Corner, high: Corner, norm: Normalize) -> None:
+    (x0, y0, z0), (x1, y1, _) = low, high
+    ground = np.array([[x0, y0, 0], [x1, y0, 0], [x1, y1, 0], [x0, y1, 0]])
+    ax.add_collection3d(Poly3DCollection([ground], facecolors="#EFEFEC", edgecolors="none", zorder=0))
+    segments, speeds = _paths(flights)
+    shadow = segments * [1, 1, 0]
+    ax.add_collection3d(Line3DCollection(shadow, colors=PALE, linewidths=1.0, zorder=1))
+    for thing in things:
+        if isinstance(thing, Line):
+            ax.plot(*thing.points.T, color=thing.color, linewidth=thing.width, zorder=2, solid_capstyle="butt")
+        elif isinstance(thing, Face):
+            ax.add_collection3d(Poly3DCollection([thing.points], facecolors=thing.color, edgecolors="none", zorder=2))
+        elif thing.text:
+            ax.text(*thing.point, thing.text, **_TEXT)
+        else:
+            ax.plot(*thing.point[:, None], marker=thing.marker, **_MARK, zorder=5)
+    lines = Line3DCollection(segments, array=speeds, cmap=SPEED, norm=norm, linewidths=1.5, zorder=3)
+    lines.set_capstyle("round")
+    ax.add_collection3d(lines)
+    starts, failures = _ends(flights)
+    ax.plot(*starts.T, **_START, zorder=4)
+    ax.plot(*failures.T, **_FAILURE, zorder=7)
+    ax.set_xlim(x0, x1)
+    ax.set_ylim(y0, y1)
+    ax.set_zlim(z0, high[2])
+    ax.set_box_aspect(high - low)
+    ax.set_proj_type("persp", focal_length=1.4)
+    flat = _is_flat(high - low)
+    ax.view_init(elev=34 if flat else 24, azim=-58)
+    for axis, label, few in ((ax.xaxis, "x (m)", 6), (ax.yaxis, "y (m)", 6), (ax.zaxis, "z (m)", 3 if flat else 6)):
+        axis.set_label_text(label)
+        axis.set_major_locator(MaxNLocator(few, steps=[1, 2, 5, 10]))
+        axis.set_pane_color((1, 1, 1, 0))
+        axis.line.set_color(GREY)
+        axis.labelpad = 0
+    ax.tick_params(pad=1)
+
+
+def _plan(ax: Axes, flights: Flights, things: list[Thing], low: Corner, high: Corner, norm: Normalize) -> None:
+    ax.set_title("From above")
+    for thing in things:
+        if isinstance(thing, Line):
+            ax.plot(*thing.points.T[:2], color=thing.color, linewidth=thing.width, zorder=2, solid_capstyle="butt")
+        elif isinstance(thing, Face):
+            ax.add_patch(Polygon(thing.points[:, :2], facecolor=thing.color, edgecolor=thing.color, linewidth=2.5))
+        elif thing.text:
+            ax.text(*thing.point[:2], thing.text, **_TEXT)
+        else:
+            ax.plot(*thing.point[:2, None], marker=thing.marker, **_MARK, zorder=5)
+    segments, speeds = _paths(flights)
+    lines = LineCollection(list(segments[..., :2]), array=speeds, cmap=SPEED, norm=norm, linewidths=1.4, zorder=3)
+    lines.set_capstyle("round")
+    ax.add_collection(lines)
+    starts, failures = _ends(flights)
+    ax.plot(*starts.T[:2], **_START, zorder=4)
+    ax.plot(*failures.T[:2], **_FAILURE, zorder=7)
+    ax.set_xlim(low[0], high[0])
+    ax.set_ylim(low[1], high[1])
+    ax.set_aspect("equal", adjustable="box")
+    ax.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+    ax.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))
+    ax.set_xlabel("x (m)")
+    ax.set_ylabel("y (m)")
+
+
+def _legend(flights: Flights, things: list[Thing]) -> list[Line2D | Patch]:
+    handles: list[Line2D | Patch] = [Line2D([], [], label="start", **_START)]
+    for thing in things:
+        if not thing.label:
+            continue
+        if isinstance(thing, Line):
+            handles.append(Line2D([], [], color=thing.color, linewidth=thing.width, label=thing.label))
+        elif isinstance(thing, Face):
+            handles.append(Patch(facecolor=thing.color, label=thing.label))
+        else:
+            handles.append(Line2D([], [], marker=thing.marker, label=thing.label, **_MARK))
+    failed = len(_ends(flights)[1])
+    if failed:
+        handles.append(Line2D([], [], label=f"failed here ({failed} of {len(flights.length)})", **_FAILURE))
+    return [*handles, Line2D([], [], color=PALE, label="shadow on the ground")]

@@ -1,0 +1,60 @@
+"""How all plots look. Drawn by Matplotlib's objects, without pyplot: no global state, no window."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
+CYCLE = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY)
+"""Okabe and Ito's palette: told apart with every kind of colour vision."""
+INK, GREY, PALE, HALO = "#222222", "#767676", "#D0D0D0", "#F5CE85"
+
+WIDTH, DPI = 10.0, 120
+"""Inches and dots an inch: 1200 pixels."""
+
+_STYLE: dict[str, Any] = {
+    "font.family": "DejaVu Sans", "font.size": 10, "axes.titlesize": 11, "axes.labelsize": 10, "figure.titlesize": 13,
+    "legend.fontsize": 9, "xtick.labelsize": 9, "ytick.labelsize": 9,
+    "text.color": INK, "axes.labelcolor": INK, "axes.edgecolor": GREY, "xtick.color": GREY, "ytick.color": GREY,
+    "xtick.labelcolor": INK, "ytick.labelcolor": INK,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "axes.axisbelow": True,
+    "axes.titlelocation": "left", "axes.facecolor": "white", "figure.facecolor": "white", "savefig.facecolor": "white",
+    "grid.color": "#E6E6E6", "grid.linewidth": 0.8, "lines.linewidth": 1.6, "lines.solid_capstyle": "round",
+    "legend.frameon": False, "axes.formatter.useoffset": False, "axes.unicode_minus": True,
+}  # fmt: skip
+
+
+@contextmanager
+def figure(
+    path: str | Path, title: str, height: float, notes: Sequence[str] = (), free: bool = False
+) -> Iterator[Figure]:
+    """A figure, written to `path` as PNG when the block ends well.
+
+    Args:
+        path: the PNG file.
+        title: in bold.
+        height: inches.
+        notes: lines under the title.
+        free: whether the block places its axes itself.
+    """
+    with rc_context(_STYLE):
+        fig = Figure(figsize=(WIDTH, height), dpi=DPI, layout="none" if free else "constrained")
+        FigureCanvasAgg(fig)
+        top = 1 - 0.12 / height
+        room = "\n".join([title, *("" for _ in notes)])  # the empty lines keep the axes off the notes
+        fig.suptitle(room, x=0.012, y=top, ha="left", va="top", weight="bold")
+        below = top - 1.6 * _STYLE["figure.titlesize"] / 72 / height
+        fig.text(0.012, below, "\n".join(notes), ha="left", va="top", linespacing=1.5)
+        yield fig
+        fig.savefig(path, format="png")
+
+
+def say(ax: Axes, text: str) -> None:
+    """A word in the middle of axes that have nothing to show."""
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=GREY)

@@ -1,0 +1,154 @@
+"""Exact gradients of a control step against central differences, in every command mode, and where they could break."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.flatten_util import ravel_pytree
+
+from e2efly.physics import COMMAND_MODES, INTEGRATORS, Physics, State, rotation, step
+from e2efly.vehicles import Vehicle
+
+pytestmark = pytest.mark.usefixtures("x64")
+
+PLANT = (
+    "mass", "inertia", "rotor_position", "thrust_map", "torque_ratio", "motor_time_constant",
+    "drag_linear", "drag_quadratic",
+)  # fmt: skip
+KRAD = 1000.0
+HOVER = {"rotor_thrust": [0.75 * 9.81 / 4] * 4, "ctbr": [9.81, 0, 0, 0], "attitude": [9.81, 0, 0, 0]}
+COMMANDS = {
+    "rotor_thrust": [1.9, 1.7, 2.0, 1.8],
+    "ctbr": [11.0, 1.0, -2.0, 0.7],
+    "attitude": [10.0, 0.3, -0.2, 0.5],
+    "acceleration": [1.0, -2.0, 0.5, 0.6],
+    "velocity": [1.0, 0.5, -0.3, -0.4],
+    "position": [0.5, 0.4, -0.2, 0.3],
+}
+EXTREME = {
+    "rotor_thrust": [9.0, -1.0, 9.0, 8.0],
+    "ctbr": [80.0, 9.0, -20.0, 3.0],
+    "attitude": [70.0, 1.5, -1.5, 2.0],
+    "acceleration": [50.0, -60.0, 40.0, 0.6],
+    "velocity": [30.0, 20.0, 25.0, -0.4],
+    "position": [40.0, 50.0, -60.0, 0.3],
+}
+
+
+def inputs(mode: str, q: Any, command: list[float], speed: float = 1.0, switch: float = 0.3) -> dict[str, Any]:
+    """Everything that a step depends on, each of order one: rotors in krad/s, vehicle parameters over their own."""
+    rest = speed == 0.0
+    return {
+        "position": jnp.asarray([0.1, -0.2, 0.3]) * speed,
+        "velocity": jnp.asarray([0.5, -0.3, 0.2]) * speed,
+        "quaternion": jnp.asarray(q, float),
+        "body_rate": jnp.asarray([0.3, -0.5, 0.2]) * speed,
+        "rotor_speed": jnp.asarray([2.117] * 4 if rest else [2.0, 2.1, 2.2, 2.05]),
+        "command": jnp.asarray(command),
+        "previous": jnp.asarray(command) + (0.0 if rest else jnp.asarray([0.2, -0.1, 0.15, -0.1])),
+        "switch": jnp.asarray(switch),
+        "wind": jnp.asarray([0.4, -0.6, 0.2]) * speed,
+        "plant": {name: jnp.ones(SHAPES[name]) for name in PLANT},
+    }
+
+
+SHAPES = {"inertia": 3, "rotor_position": (4, 2), "thrust_map": 3, "drag_linear": 3, "drag_quadratic": 3} | {
+    name: () for name in ("mass", "torque_ratio", "motor_time_constant")
+}
+
+
+def stepper(vehicle: Vehicle, physics: Physics, structure: Callable) -> Callable[[jax.Array], jax.Array]:
+    """One control step as a function of a flat vector."""
+
+    def run(x: jax.Array) -> jax.Array:
+        i = structure(x)
+        plant = dataclasses.replace(vehicle, **{name: getattr(vehicle, name) * i["plant"][name] for name in PLANT})
+        state = State(i["position"], i["velocity"], i["quaternion"], i["body_rate"], KRAD * i["rotor_speed"])
+        end = step(
+            physics, plant, state, i["command"],
+            previous=i["previous"], switch_time=i["switch"] * physics.control_period, wind=i["wind"],
+        )  # fmt: skip
+        return jnp.concatenate([end.position, end.velocity, end.quaternion, end.body_rate, end.rotor_speed / KRAD])
+
+    return run
+
+
+GENERIC = rotation.from_euler(*map(np.asarray, (0.2, -0.1, 0.4)))
+
+
+@pytest.mark.parametrize("mode", COMMAND_MODES)
+def test_gradients_of_a_step(mode: str, vis_r: Vehicle, jacobians: Callable) -> None:
+    """With respect to state, both commands, the switch, wind and plant. At rest and level too: no formula breaks."""
+    hover = HOVER.get(mode, [0.0] * 4)
+    aligned = 0.0 if mode != "position" else 1e-3  # so that a tilt of zero is not at the corner of |q|
+    points = {
+        "generic": inputs(mode, GENERIC, COMMANDS[mode]),
+        "late switch": inputs(mode, GENERIC, COMMANDS[mode], switch=0.8),
+        "tumbling": inputs(mode, [0.5, -0.5, 0.6, np.sqrt(0.14)], COMMANDS[mode], speed=5.0),
+        "saturated": inputs(mode, GENERIC, EXTREME[mode]),
+        "level and still": inputs(mode, [1, 0, 0, 0], hover, speed=0.0),
+    }
+    del aligned
+    physics = Physics.of(vis_r, mode, control_rate=100.0, dtype=np.float64)
+    assert physics.substeps == 2
+    _, structure = ravel_pytree(points["generic"])
+    exact, numeric = jacobians(
+        stepper(vis_r, physics, structure), jnp.stack([ravel_pytree(p)[0] for p in points.values()])
+    )
+    names = _names(points["generic"])
+    for i, point in enumerate(points):
+        scale = 1 + np.abs(numeric[i])
+        wrong = np.argwhere(np.abs(exact[i] - numeric[i]) > 1e-6 * scale)
+        assert not len(wrong), [(point, int(o), names[p], exact[i, o, p], numeric[i, o, p]) for o, p in wrong[:5]]
+    for name in ("velocity", "command", "previous", "switch", "wind", "mass", "thrust_map", "drag_linear"):
+        column = [i for i, n in enumerate(names) if n.startswith(name)]
+        assert np.max(np.abs(exact[0][:, column])) > 1e-8, name  # each of them matters
+
+
+def _names(tree: dict[str, Any]) -> list[str]:
+    """What each entry of the flat vector is."""
+    leaves = jax.tree_util.tree_leaves_with_path(tree)
+    return [f"{path[-1].key}[{i}]" for path, leaf in leaves for i in range(leaf.size)]
+
+
+@pytest.mark.parametrize("mode", COMMAND_MODES)
+def test_gradients_are_finite_where_the_map_has_corners(mode: str, vis_r: Vehicle) -> None:
+    hover = HOVER.get(mode, [0.0] * 4)
+    half_turns = np.eye(4)[1:]
+    points = [inputs(mode, q, hover, speed=v, switch=s) for q in half_turns for v in (0.0, 1.0) for s in (0.0, 0.5)]
+    points.append(inputs(mode, [1, 0, 0, 0], hover, speed=0.0, switch=1.0))
+    points.append(inputs(mode, [1, 0, 0, 0], EXTREME[mode], speed=0.0, switch=0.0))
+    points.append(inputs(mode, [1, 0, 0, 0], (-np.asarray(EXTREME[mode])).tolist(), speed=0.0))
+    points.append({**points[0], "rotor_speed": jnp.zeros(4)})
+    physics = Physics.of(vis_r, mode, control_rate=100.0, dtype=np.float64)
+    flat = jnp.stack([ravel_pytree(p)[0] for p in points])
+    _, structure = ravel_pytree(points[0])
+    exact = jax.jit(jax.vmap(jax.jacrev(stepper(vis_r, physics, structure))))(flat)
+    assert np.all(np.isfinite(exact))
+
+
+@pytest.mark.parametrize("integrator", [i for i in INTEGRATORS if i != "semi_implicit"])
+def test_gradients_of_the_other_integrators(integrator: str, vis_r: Vehicle, jacobians: Callable) -> None:
+    physics = Physics.of(vis_r, "ctbr", integrator, control_rate=100.0, dtype=np.float64)
+    point = inputs("ctbr", GENERIC, COMMANDS["ctbr"])
+    flat, structure = ravel_pytree(point)
+    exact, numeric = jacobians(stepper(vis_r, physics, structure), flat[None])
+    np.testing.assert_allclose(exact, numeric, rtol=1e-6, atol=1e-7)
+
+
+def test_single_precision_gradients_are_finite_at_hover(vis_r: Vehicle) -> None:
+    with jax.enable_x64(False):
+        for mode in ("position", "attitude"):
+            physics = Physics.of(vis_r, mode, control_rate=100.0)
+            state = State.hovering(vis_r, jnp.zeros(3))
+
+            def loss(state: State, command: jax.Array, physics: Physics = physics) -> jax.Array:
+                end = step(physics, physics.nominal, state, command)
+                return jnp.sum(end.position) + jnp.sum(end.quaternion) + jnp.sum(end.body_rate)
+
+            gradient = jax.jit(jax.grad(loss, (0, 1)))(state, jnp.asarray(HOVER.get(mode, [0.0] * 4)))
+            assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(gradient))
