@@ -57,7 +57,8 @@ def _hover(algo: str) -> TrainConfig:
 def _land(algo: str) -> TrainConfig:
     if algo == "ppo":
         weights = {
-            "prog1": 4.0, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02, "goal": 10.0, "crash": 10.0,
+            "prog1": 4.0, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02,
+            "goal": 10.0, "crash": 10.0,
         }  # fmt: skip
         settings: AlgorithmConfig = PPOConfig(learning_rate=5e-3, learning_rate_end=5e-4)
         return TrainConfig(LandConfig(), settings, RewardConfig(weights), steps=2_000_000)

@@ -12,6 +12,8 @@ import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
+from e2efly.env import GENERATOR
+
 FORMAT = 1
 """Version of the layout of a checkpoint."""
 
@@ -76,12 +78,12 @@ def load_checkpoint(path: Path, like: Any) -> Any:
     for where, leaf in leaves:
         name = jax.tree_util.keystr(where)
         key = _is_key(leaf)
-        wanted = jax.random.key_data(leaf) if key else leaf
+        wanted = jax.eval_shape(jax.random.key_data, leaf) if key else leaf
         array = arrays.pop(name, None)
         if array is None or array.shape != wanted.shape or array.dtype != wanted.dtype:
             has = "is missing" if array is None else f"is {array.dtype}{list(array.shape)}"
             raise ValueError(f"checkpoint {path}: {name} {has}; accepted: {wanted.dtype}{list(wanted.shape)}")
-        found.append(jax.random.wrap_key_data(array, impl=jax.random.key_impl(leaf)) if key else array)
+        found.append(jax.random.wrap_key_data(array, impl=GENERATOR) if key else array)
     if arrays:
         raise ValueError(f"checkpoint {path}: {', '.join(sorted(arrays))} belong to no part of this run")
     return jax.tree_util.tree_unflatten(structure, found)

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from e2efly.config import HoverConfig, LandConfig, TaskConfig, TrackConfig
 from e2efly.evaluate import Episodes, wilson
@@ -19,6 +20,9 @@ from e2efly.view.space import plot_flights
 from e2efly.view.style import BLUE, CYCLE, GREEN, GREY, INK, PURPLE, VERMILLION, figure, say
 
 Rows = list[dict[str, float]]
+
+_STEPS = "environment steps (million)"
+_DASHED: dict[str, Any] = {"linewidth": 1.2, "linestyle": (0, (4, 2))}
 
 __all__ = ["Flights", "fly", "limits", "plot_errors", "plot_flights", "plot_learning", "plot_time"]
 
@@ -38,9 +42,11 @@ def plot_learning(rows: Rows, path: str | Path, title: str, best_update: int | N
     with figure(path, title, 8.8, note) as fig:
         grid = fig.add_gridspec(3, 2, height_ratios=[1.0, 1.0, 1.2])
         clocks = (("seconds", 1.0, "time since process start, compilation included (s)"), ("steps", 1e-6, _STEPS))
+        first = None
         for column, (clock, scale, label) in enumerate(clocks):
             above = fig.add_subplot(grid[0, column])
-            below = fig.add_subplot(grid[1, column], sharex=above)
+            below = fig.add_subplot(grid[1, column], sharex=above, sharey=first)
+            first = first or below
             _success(above, evaluated, clock, scale)
             above.set_ylabel("success of evaluation (%)")
             above.tick_params(labelbottom=False)
@@ -55,7 +61,6 @@ def plot_learning(rows: Rows, path: str | Path, title: str, best_update: int | N
         _mark(terms, best, "steps", 1e-6)
 
 
-_STEPS = "environment steps (million)"
 
 
 def _curve(ax: Axes, rows: Rows, x: str, scale: float, y: str, color: str, **style: Any) -> None:
@@ -82,7 +87,7 @@ def _success(ax: Axes, rows: Rows, x: str, scale: float) -> None:
 
 def _mark(ax: Axes, best: dict[str, float] | None, x: str, scale: float) -> None:
     if best is not None:
-        ax.axvline(scale * best[x], color=GREY, linewidth=1.2, linestyle=(0, (4, 3)), zorder=1.5)
+        ax.axvline(scale * best[x], color=GREY, zorder=1.5, **_DASHED)
 
 
 def _terms(ax: Axes, rows: Rows) -> None:
@@ -103,7 +108,7 @@ def _terms(ax: Axes, rows: Rows) -> None:
         ax.set_yscale("symlog", linthresh=10.0 ** np.floor(np.log10(largest) - 2), linscale=0.6)
     ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
     ax.set_xlim(left=0.0)
-    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=8, borderpad=0.1)
 
 
 def plot_time(flights: Flights, index: int, path: str | Path, title: str) -> None:
@@ -119,16 +124,17 @@ def plot_time(flights: Flights, index: int, path: str | Path, title: str) -> Non
     time, command = flights.time[:steps], flights.command[:steps, index]
     asked = time - (flights.time[0] if len(flights.time) else 0.0)
     end = f"{time[-1]:.2f} s" if steps else "0 s"
-    note = f"episode {index}, {'success' if flights.success[index] else 'no success'} after {end}"
+    ending = f"episode {index}: {'success' if flights.success[index] else 'no success'}, {end}"
+    note = f"{ending}; commands are drawn when the policy gives them, its latency before they act"
     with figure(path, title, 9.6, [note]) as fig:
         axes = fig.subplots(4, 2, sharex=True).ravel()
         place, speed, attitude, thrust, roll, pitch, yaw, rotor = axes
         colors = (BLUE, VERMILLION, GREEN)
         for i, (name, color) in enumerate(zip("xyz", colors, strict=True)):
             place.plot(time, flights.position[:steps, index, i], color=color, label=name)
-            place.plot(time, flights.goal[:steps, index, i], color=color, linewidth=1.1, linestyle=(0, (4, 2)))
+            place.plot(time, flights.goal[:steps, index, i], color=color, drawstyle="steps-post", **_DASHED)
             speed.plot(time, flights.velocity[:steps, index, i], color=color, label=name)
-        place.plot([], [], color=GREY, linewidth=1.1, linestyle=(0, (4, 2)), label="goal")
+        place.plot([], [], color=GREY, label="goal", **_DASHED)
         attitude.plot(time, np.degrees(flights.tilt[:steps, index]), color=BLUE, label="tilt")
         attitude.plot(*_unwound(time, np.degrees(flights.yaw[:steps, index])), color=VERMILLION, label="yaw")
         for i, (ax, color) in enumerate(zip((roll, pitch, yaw), colors, strict=True)):
@@ -136,7 +142,7 @@ def plot_time(flights: Flights, index: int, path: str | Path, title: str) -> Non
             if f"{name}_rate" in mode.fields:
                 wanted = command[:, mode.fields.index(f"{name}_rate")]
                 ax.plot(asked, wanted, color=GREY, linewidth=1.0, drawstyle="steps-post", label="commanded")
-            ax.plot(time, flights.body_rate[:steps, index, i], color=color, label="measured")
+            ax.plot(time, flights.body_rate[:steps, index, i], color=color, label="actual")
             ax.set_ylabel(f"{name} rate (rad/s)")
         _command(thrust, asked, command, flights.command_mode)
         for i, name in enumerate(("rear right", "front right", "rear left", "front left")):
@@ -149,6 +155,7 @@ def plot_time(flights: Flights, index: int, path: str | Path, title: str) -> Non
             ax.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=4, borderpad=0.1, handlelength=1.6)
             ax.set_xlim(0.0, max(float(time[-1]) if steps else 0.0, 0.1))
             ax.margins(y=0.08)
+        attitude.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 1.5, 3, 4.5, 9, 10]))
         for ax in axes[-2:]:
             ax.set_xlabel("time (s)")
 
@@ -157,7 +164,7 @@ def _command(ax: Axes, time: Float[np.ndarray, " t"], command: Float[np.ndarray,
     """The collective thrust against gravity, where the mode has one; else all four numbers of the command."""
     mode = COMMAND_MODES[name]
     if mode.fields[0] == "collective_thrust":
-        ax.axhline(1.0, color=GREY, linewidth=1.1, linestyle=(0, (4, 2)), label="hover: 1 g")
+        ax.axhline(1.0, color=GREY, label="hover: 1 g", **_DASHED)
         ax.plot(time, command[:, 0] / GRAVITY, color=BLUE, drawstyle="steps-post", label="commanded")
         ax.set_ylabel("thrust / mass (g)")
         return
@@ -184,8 +191,8 @@ def limits(suites: Mapping[str, TaskConfig]) -> dict[str, dict[str, float]]:
 
 
 _PANELS = (
-    ("final_error", "error at the end (m)"),
-    ("mean_error", "mean error (m)"),
+    ("final_error", "distance to the goal at the end (m)"),
+    ("mean_error", "mean distance to the goal (m)"),
     ("duration", "duration (s)"),
     ("top_speed", "top speed (m/s)"),
     ("top_rate", "top body rate (rad/s)"),
@@ -213,14 +220,14 @@ def plot_errors(
         for ax, (field, label) in zip(fig.subplots(2, 3, sharey=True).ravel(), _PANELS, strict=True):
             values = {name: _finite(getattr(e, field), field) for name, e in episodes.items()}
             lines = {name: limit[field] for name, limit in (limits or {}).items() if field in limit and name in colors}
-            _distributions(ax, values, lines, colors)
+            _distributions(ax, values, lines, colors, field.endswith("error"))
             ax.set_xlabel(label)
             if ax.get_subplotspec().is_first_col():
                 ax.set_ylabel("episodes at or below (%)")
         handles = [Line2D([], [], color=color, label=name) for name, color in colors.items()]
         handles.append(Patch(facecolor=GREY, alpha=0.3, label="histogram (scaled to its peak)"))
         if limits:
-            handles.append(Line2D([], [], color=INK, linewidth=1.2, linestyle=(0, (4, 2)), label="limit of success"))
+            handles.append(Line2D([], [], color=INK, label="limit of success", **_DASHED))
         fig.legend(handles=handles, loc="outside lower center", ncols=len(handles))
 
 
@@ -239,9 +246,13 @@ def _finite(values: Any, field: str) -> np.ndarray:
 
 
 def _distributions(
-    ax: Axes, values: Mapping[str, np.ndarray], lines: Mapping[str, float], colors: Mapping[str, str]
+    ax: Axes,
+    values: Mapping[str, np.ndarray],
+    lines: Mapping[str, float],
+    colors: Mapping[str, str],
+    logarithmic: bool,
 ) -> None:
-    """Empirical distribution functions over pale histograms; a logarithmic axis for more than a decade of values."""
+    """Empirical distribution functions over pale histograms; where allowed and of use, on a logarithmic axis."""
     ax.set_ylim(0, 104)
     ax.set_yticks([0, 25, 50, 75, 100])
     whole = np.concatenate([np.zeros(0), *values.values()])
@@ -250,13 +261,17 @@ def _distributions(
         return
     edge = np.array([whole.min(), whole.max(), *lines.values()])
     low, high = float(edge.min()), float(edge.max())
-    if low > 0 and high > 10 * low:
+    if logarithmic and low > 0 and high > 10 * low:
         ax.set_xscale("log")
         low, high = low / 1.25, high * 1.25
+        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 100 * low else (1.0,)))
+        ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+        ax.xaxis.set_minor_formatter(NullFormatter())
         bins = np.geomspace(low, high, 41)
     else:
         margin = 0.04 * (high - low) or max(0.05 * abs(high), 1e-3)
         low, high = low - margin, high + margin
+        ax.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
         bins = np.linspace(low, high, 41)
     ax.set_xlim(low, high)
     for name, column in values.items():
@@ -269,4 +284,4 @@ def _distributions(
         ends = np.concatenate([[low], column, [high]]), np.concatenate([[0.0], share, [100.0]])
         ax.plot(*ends, color=colors[name], drawstyle="steps-post")
     for name, x in lines.items():
-        ax.axvline(x, color=colors[name] if len(values) > 1 else INK, linewidth=1.2, linestyle=(0, (4, 2)))
+        ax.axvline(x, color=colors[name] if len(values) > 1 else INK, **_DASHED)

@@ -19,7 +19,7 @@ WIDTH, DPI = 10.0, 120
 """Inches and dots an inch: 1200 pixels."""
 
 _STYLE: dict[str, Any] = {
-    "font.family": "DejaVu Sans", "font.size": 10, "axes.titlesize": 11, "axes.labelsize": 10, "figure.titlesize": 13,
+    "font.family": "DejaVu Sans", "font.size": 10, "axes.titlesize": 11, "axes.labelsize": 10,
     "legend.fontsize": 9, "xtick.labelsize": 9, "ytick.labelsize": 9,
     "text.color": INK, "axes.labelcolor": INK, "axes.edgecolor": GREY, "xtick.color": GREY, "ytick.color": GREY,
     "xtick.labelcolor": INK, "ytick.labelcolor": INK,
@@ -44,13 +44,14 @@ def figure(
         free: whether the block places its axes itself.
     """
     with rc_context(_STYLE):
-        fig = Figure(figsize=(WIDTH, height), dpi=DPI, layout="none" if free else "constrained")
+        fig = Figure(figsize=(WIDTH, height), dpi=DPI)
         FigureCanvasAgg(fig)
-        top = 1 - 0.12 / height
-        room = "\n".join([title, *("" for _ in notes)])  # the empty lines keep the axes off the notes
-        fig.suptitle(room, x=0.012, y=top, ha="left", va="top", weight="bold")
-        below = top - 1.6 * _STYLE["figure.titlesize"] / 72 / height
-        fig.text(0.012, below, "\n".join(notes), ha="left", va="top", linespacing=1.5)
+        lines = 0.42 + 0.21 * len(notes)  # inches over the axes
+        fig.text(0.012, 1 - 0.12 / height, title, va="top", weight="bold", size=13)
+        fig.text(0.012, 1 - 0.40 / height, "\n".join(notes), va="top", linespacing=1.45)
+        if not free:
+            rect = (0.004, 0.0, 0.988, 1 - lines / height)
+            fig.set_layout_engine("constrained", rect=rect, w_pad=0.06, h_pad=0.06)
         yield fig
         fig.savefig(path, format="png")
 
