@@ -118,9 +118,11 @@ class RunDirectory:
 
     def forget_after(self, update: int) -> None:
         """Drop metrics of updates that a resumed run will do again."""
-        kept = [row for row in self.rows() if row["update"] <= update]
-        self.metrics.unlink(missing_ok=True)
-        self.append(kept)
+        if not self.metrics.exists():
+            return
+        header, *lines = self.metrics.read_text(encoding="utf-8").splitlines(keepends=True)
+        whole = [line for line in lines if line.endswith("\n") and int(line.split(",", 1)[0]) <= update]
+        write_atomically(self.metrics, "".join([header, *whole]).encode())
 
 
 def versions() -> dict[str, str]:

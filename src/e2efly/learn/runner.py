@@ -237,7 +237,7 @@ def _loop(
     from tensorboardX import SummaryWriter
 
     config, task = setup.config, presets.task_name(setup.config.task)
-    before = progress.seconds - since_process_start()
+    before = progress.seconds  # of earlier processes of this run
     with SummaryWriter(str(run.events), purge_step=progress.update) as events, _interruptible() as stop:
         while progress.update < setup.updates and not stop.is_set():
             began = time.perf_counter()

@@ -61,8 +61,6 @@ def plot_learning(rows: Rows, path: str | Path, title: str, best_update: int | N
         _mark(terms, best, "steps", 1e-6)
 
 
-
-
 def _curve(ax: Axes, rows: Rows, x: str, scale: float, y: str, color: str, **style: Any) -> None:
     """One column over another, of the rows that have both; with dots where there are few."""
     points = np.array([(scale * row[x], row[y]) for row in rows if x in row and y in row]).reshape(-1, 2)
