@@ -1,6 +1,8 @@
-"""Time since the process began: what a user waits for includes imports."""
+"""What a run takes of the machine: time since the process began, imports included, and memory."""
 
 import os
+import resource
+import sys
 import time
 
 _IMPORTED = time.time()
@@ -16,3 +18,9 @@ def since_process_start() -> float:
         return uptime - ticks / os.sysconf("SC_CLK_TCK")
     except (OSError, ValueError, IndexError):
         return time.time() - _IMPORTED
+
+
+def peak_memory() -> float:
+    """Largest resident memory of this process so far, bytes."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return float(peak if sys.platform == "darwin" else 1024 * peak)

@@ -26,7 +26,7 @@ from e2efly.env import Env, random_key
 from e2efly.evaluate import Episodes, run_episodes
 from e2efly.learn.algorithm import Algorithm, TrainState, begin, make_algorithm
 from e2efly.learn.checkpoint import load_checkpoint, read_about, save_checkpoint
-from e2efly.learn.clock import since_process_start
+from e2efly.learn.clock import peak_memory, since_process_start
 from e2efly.learn.networks import Features, Layers, policy
 from e2efly.learn.rundir import RunDirectory, differences, versions
 
@@ -302,6 +302,7 @@ def _finish(
         "env_steps": progress.update * setup.steps_per_update,
         "seconds_trained_from_process_start": round(trained, 3),
         "reached_criterion": progress.reached,
+        "peak_memory_gb": round(peak_memory() / 1e9, 3),
         "shipped": {"update": progress.best_update, **{n: digest(e) for n, e in by_best.items()}},
         "last": {"update": progress.update, **{n: digest(e) for n, e in by_last.items()}},
         "episodes": REPORT_EPISODES,

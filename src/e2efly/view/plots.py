@@ -222,7 +222,7 @@ def plot_errors(
             ax.set_xlabel(label)
             if ax.get_subplotspec().is_first_col():
                 ax.set_ylabel("episodes at or below (%)")
-        handles = [Line2D([], [], color=color, label=name) for name, color in colors.items()]
+        handles: list[Line2D | Patch] = [Line2D([], [], color=color, label=name) for name, color in colors.items()]
         handles.append(Patch(facecolor=GREY, alpha=0.3, label="histogram (scaled to its peak)"))
         if limits:
             handles.append(Line2D([], [], color=INK, label="limit of success", **_DASHED))

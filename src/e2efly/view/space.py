@@ -18,7 +18,6 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
 from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
-from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from e2efly.view.flights import Flights
 from e2efly.view.scene import Face, Line, Mark, Thing, scene
@@ -28,6 +27,8 @@ SPEED = LinearSegmentedColormap.from_list("speed", colormaps["viridis"](np.linsp
 """Viridis without its pale end, which white paper swallows."""
 
 Corner = Float[np.ndarray, "3"]
+Solid = Any
+"""An `Axes3D`: Matplotlib ships no types for it."""
 
 _MARK: dict[str, Any] = {
     "color": INK,
@@ -61,11 +62,11 @@ def plot_flights(task: Any, flights: Flights, path: str | Path, title: str) -> N
     things = scene(task, flights)
     tracks = [flights.position[:k, i] for i, k in enumerate(flights.length)]
     low, high = _bounds(tracks, things)
-    fastest = max((float(flights.speed[:k, i].max()) for i, k in enumerate(flights.length) if k), default=0.0)
+    speeds = _paths(flights)[1]
+    fastest = speeds[np.isfinite(speeds)].max(initial=0.0)
     norm = Normalize(0.0, max(fastest, 0.1))
     with figure(path, title, 4.8 if _is_flat(high - low) else 5.8, free=True) as fig:
-        solid = fig.add_axes((0.01, 0.10, 0.55, 0.83), projection="3d", computed_zorder=False)
-        assert isinstance(solid, Axes3D)
+        solid: Solid = fig.add_axes((0.01, 0.10, 0.55, 0.83), projection="3d", computed_zorder=False)
         _solid(solid, flights, things, low, high, norm)
         _fit(fig, solid, low, high, Bbox.from_extents(0.012, 0.09, 0.55, 0.91))
         plan = fig.add_axes((0.63, 0.21, 0.275, 0.65))
@@ -78,14 +79,14 @@ def plot_flights(task: Any, flights: Flights, path: str | Path, title: str) -> N
         fig.legend(handles=_legend(flights, things), loc="lower center", bbox_to_anchor=(0.5, 0.0), ncols=6)
 
 
-def _fit(fig: Figure, ax: Axes3D, low: Corner, high: Corner, room: Bbox) -> None:
+def _fit(fig: Figure, ax: Solid, low: Corner, high: Corner, room: Bbox) -> None:
     """Zoom and shift 3D axes so that their box and labels fill `room`, in parts of the figure."""
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     zoom = 1.0
 
     def measured() -> Bbox:
         fig.draw_without_rendering()
-        x, y, _ = proj3d.proj_transform(*corners.T, ax.get_proj())
+        x, y, _ = proj3d.proj_transform(corners[:, 0], corners[:, 1], corners[:, 2], ax.get_proj())
         boxes = [axis.get_tightbbox() for axis in (ax.xaxis, ax.yaxis, ax.zaxis)]
         flat = Bbox.null()
         flat.update_from_data_xy(ax.transData.transform(np.stack([x, y], axis=-1)))
@@ -102,18 +103,17 @@ def _fit(fig: Figure, ax: Axes3D, low: Corner, high: Corner, room: Bbox) -> None
 
 def _bounds(tracks: list[np.ndarray], things: list[Thing]) -> tuple[Corner, Corner]:
     """Corners of a box about all that is drawn, ground included, at least 0.6 m wide with a margin."""
-    points = [np.zeros((1, 3)) + [[*tracks[0][0, :2], 0.0]]] if tracks and len(tracks[0]) else [np.zeros((1, 3))]
-    points += tracks
-    points += [np.atleast_2d(thing.point if isinstance(thing, Mark) else thing.points) for thing in things]
-    whole = np.concatenate(points)
+    points = [np.atleast_2d(thing.point if isinstance(thing, Mark) else thing.points) for thing in things]
+    whole = np.concatenate([*tracks, *points]) if tracks or points else np.zeros((1, 3))
     whole = whole[np.isfinite(whole).all(axis=1)]
+    whole = whole if len(whole) else np.zeros((1, 3))
     low, high = whole.min(axis=0), whole.max(axis=0)
     middle, half = (low + high) / 2, np.maximum((high - low) / 2 * 1.04, [0.6, 0.6, 0.0])
     return np.array([*(middle - half)[:2], min(low[2], 0.0)]), np.array([*(middle + half)[:2], max(high[2], 0.6)])
 
 
 def _is_flat(size: Corner) -> bool:
-    return bool(size[2] < 0.4 * size[:2].max())
+    return bool(size[2] < 0.4 * np.max(size[:2]))
 
 
 def _segments(points: np.ndarray) -> np.ndarray:
@@ -129,19 +129,19 @@ def _paths(flights: Flights) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _ends(flights: Flights) -> tuple[np.ndarray, np.ndarray]:
-    """Where the flights begin, (n, 3), and where those that failed end."""
+    """Where the flights begin, (n, 3), and where those without success end."""
     kept = np.flatnonzero(flights.length > 0)
     last = flights.position[flights.length[kept] - 1, kept]
     return flights.position[0, kept], last[~flights.success[kept].astype(bool)]
 
 
-def _solid(ax: Axes3D, flights: Flights, things: list[Thing], low: Corner, high: Corner, norm: Normalize) -> None:
+def _solid(ax: Solid, flights: Flights, things: list[Thing], low: Corner, high: Corner, norm: Normalize) -> None:
     (x0, y0, z0), (x1, y1, _) = low, high
     ground = np.array([[x0, y0, 0], [x1, y0, 0], [x1, y1, 0], [x0, y1, 0]])
     ax.add_collection3d(Poly3DCollection([ground], facecolors="#EFEFEC", edgecolors="none", zorder=0))
     segments, speeds = _paths(flights)
     shadow = segments * [1, 1, 0]
-    ax.add_collection3d(Line3DCollection(shadow, colors=PALE, linewidths=1.0, zorder=1))
+    ax.add_collection3d(Line3DCollection(shadow, colors=PALE, linewidths=1.0, zorder=1), autolim=False)
     for thing in things:
         if isinstance(thing, Line):
             ax.plot(*thing.points.T, color=thing.color, linewidth=thing.width, zorder=2, solid_capstyle="butt")
@@ -153,7 +153,7 @@ def _solid(ax: Axes3D, flights: Flights, things: list[Thing], low: Corner, high:
             ax.plot(*thing.point[:, None], marker=thing.marker, **_MARK, zorder=5)
     lines = Line3DCollection(segments, array=speeds, cmap=SPEED, norm=norm, linewidths=1.5, zorder=3)
     lines.set_capstyle("round")
-    ax.add_collection3d(lines)
+    ax.add_collection3d(lines, autolim=False)
     starts, failures = _ends(flights)
     ax.plot(*starts.T, **_START, zorder=4)
     ax.plot(*failures.T, **_FAILURE, zorder=7)
@@ -181,7 +181,7 @@ def _plan(ax: Axes, flights: Flights, things: list[Thing], low: Corner, high: Co
         elif isinstance(thing, Face):
             ax.add_patch(Polygon(thing.points[:, :2], facecolor=thing.color, edgecolor=thing.color, linewidth=2.5))
         elif thing.text:
-            ax.text(*thing.point[:2], thing.text, **_TEXT)
+            ax.text(thing.point[0], thing.point[1], thing.text, **_TEXT)
         else:
             ax.plot(*thing.point[:2, None], marker=thing.marker, **_MARK, zorder=5)
     segments, speeds = _paths(flights)
@@ -213,5 +213,5 @@ def _legend(flights: Flights, things: list[Thing]) -> list[Line2D | Patch]:
             handles.append(Line2D([], [], marker=thing.marker, label=thing.label, **_MARK))
     failed = len(_ends(flights)[1])
     if failed:
-        handles.append(Line2D([], [], label=f"failed here ({failed} of {len(flights.length)})", **_FAILURE))
+        handles.append(Line2D([], [], label=f"no success ({failed} of {len(flights.length)})", **_FAILURE))
     return [*handles, Line2D([], [], color=PALE, label="shadow on the ground")]

@@ -18,7 +18,7 @@ INK, GREY, PALE, HALO = "#222222", "#767676", "#D0D0D0", "#F5CE85"
 WIDTH, DPI = 10.0, 120
 """Inches and dots an inch: 1200 pixels."""
 
-_STYLE: dict[str, Any] = {
+_STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans", "font.size": 10, "axes.titlesize": 11, "axes.labelsize": 10,
     "legend.fontsize": 9, "xtick.labelsize": 9, "ytick.labelsize": 9,
     "text.color": INK, "axes.labelcolor": INK, "axes.edgecolor": GREY, "xtick.color": GREY, "ytick.color": GREY,

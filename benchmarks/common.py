@@ -1,0 +1,57 @@
+"""What the benchmark scripts share: the machine, JSON files, markdown tables."""
+
+import argparse
+import json
+import os
+import platform
+import statistics
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+RESULTS = Path(__file__).parent / "results"
+"""Where the published figures are kept."""
+
+
+def machine() -> dict[str, Any]:
+    """What the figures were measured on."""
+    model = platform.processor()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        names = [line.split(":", 1)[1].strip() for line in cpuinfo.read_text().splitlines() if "model name" in line]
+        model = names[0] if names else model
+    packages = {name: metadata.version(name) for name in ("e2efly", "jax", "jaxlib", "numpy")}
+    return {"cpu": model, "cores": os.cpu_count(), "python": platform.python_version(), **packages}
+
+
+def arguments(about: str, **extra: Any) -> argparse.Namespace:
+    """The command line of a benchmark: `--json FILE` and what else it names."""
+    parser = argparse.ArgumentParser(description=about)
+    parser.add_argument("--json", type=Path, default=None, help="where to write the figures")
+    for name, default in extra.items():
+        flag = "--" + name.replace("_", "-")
+        many = isinstance(default, list)
+        kind = type(default[0]) if many else type(default) if default is not None else str
+        parser.add_argument(flag, type=kind, nargs="*" if many else None, default=default)
+    return parser.parse_args()
+
+
+def write(name: str, path: Path | None, content: dict[str, Any]) -> None:
+    """Write figures with the machine and the day."""
+    path = path or RESULTS / f"{name}.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    day = datetime.now(UTC).strftime("%Y-%m-%d")
+    path.write_text(json.dumps({"machine": machine(), "date": day, **content}, indent=1) + "\n")
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """A markdown table."""
+    heads = list(rows[0])
+    lines = ["| " + " | ".join(heads) + " |", "| " + " | ".join("---" for _ in heads) + " |"]
+    return "\n".join(lines + ["| " + " | ".join(str(row[h]) for h in heads) + " |" for row in rows])
+
+
+def median(values: list[float]) -> float:
+    """The median; NaN of nothing."""
+    return statistics.median(values) if values else float("nan")

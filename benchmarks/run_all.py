@@ -1,0 +1,9 @@
+"""Every benchmark, one after the other (about an hour on two cores); figures go to benchmarks/results."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+for name in ("rates", "time_to_criterion", "success"):
+    print(f"== {name}", flush=True)
+    subprocess.run([sys.executable, str(Path(__file__).parent / f"{name}.py")], check=True)
