@@ -145,9 +145,10 @@ def test_scene_of_tracking_ends_with_each_flight() -> None:
 
 def test_tilt_and_yaw_by_hand() -> None:
     half = np.sqrt(0.5)
-    turned = np.array([[1, 0, 0, 0], [half, 0, 0, half], [half, half, 0, 0], [0, 1, 0, 0]])[:, None]
-    f = dataclasses.replace(flights(), quaternion=turned)
-    np.testing.assert_allclose(np.degrees(f.tilt[:, 0]), [0, 0, 90, 180], atol=1e-6)
+    turned = np.array([[1, 0, 0, 0], [half, 0, 0, half], [half, half, 0, 0], [0, 1, 0, 0]])
+    f = flights(1)
+    f.quaternion[:4, 0] = turned
+    np.testing.assert_allclose(np.degrees(f.tilt[:4, 0]), [0, 0, 90, 180], atol=1e-6)
     np.testing.assert_allclose(np.degrees(f.yaw[:3, 0]), [0, 90, 0], atol=1e-6)
 
 

@@ -33,6 +33,8 @@ from e2efly.learn.rundir import RunDirectory, differences, versions
 WATCHED, REPORTED = 1, 2
 """Streams of starts: those that training watches, and the unseen ones of the report."""
 REPORT_EPISODES = 1000
+FAST_COMPILE: dict[str, bool | str | int] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
+"""XLA options for programs that run for seconds only."""
 
 
 class Reporter(Protocol):
@@ -116,16 +118,19 @@ class Programs:
         def start(env: Env, parameters: Any, key: jax.Array) -> TrainState:
             return begin(env, config.algo, parameters, key)
 
+        options = FAST_COMPILE if config.fast_compile and jax.default_backend() == "cpu" else {}
+
         def train_programs() -> Any:
             state = jax.eval_shape(start, env, parameters, key)
-            return jax.jit(chunk, donate_argnums=2).lower(env, config.algo, state, 0, setup.updates).compile()
+            program = jax.jit(chunk, donate_argnums=2)
+            return program.lower(env, config.algo, state, 0, setup.updates).compile(compiler_options=options)
 
         def other_programs() -> tuple[Any, Any]:
             act = evaluation(setup)
             judge = next(iter(setup.judges.values()))
             return (
-                jax.jit(start).lower(env, parameters, key).compile(),
-                act.lower(judge, parameters.policy, key).compile(),
+                jax.jit(start).lower(env, parameters, key).compile(compiler_options=options),
+                act.lower(judge, parameters.policy, key).compile(compiler_options=options),
             )
 
         with ThreadPoolExecutor(2) as pool:
