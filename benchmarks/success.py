@@ -1,6 +1,6 @@
 """Success over 1000 unseen starts of the shipped policy of the full presets, for every task, algorithm and seed.
 
-    python benchmarks/success.py [--tasks hover ...] [--algos ppo bptt] [--seeds 5] [--json FILE]
+python benchmarks/success.py [--tasks hover ...] [--algos ppo bptt] [--seeds 5] [--json FILE]
 """
 
 import json

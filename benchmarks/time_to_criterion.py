@@ -56,7 +56,10 @@ def main() -> None:
                 steps.append(first["steps"])
                 memory.append(first["peak_memory_gb"])
                 every.append({"task": task, "algo": algo, "seed": seed, "cold": first, "warm": second})
-                print(f"{algo} {task} seed {seed}: cold {first['seconds']:.2f} s, warm {second['seconds']:.2f} s", flush=True)
+                print(
+                    f"{algo} {task} seed {seed}: cold {first['seconds']:.2f} s, warm {second['seconds']:.2f} s",
+                    flush=True,
+                )
             rows.append(
                 {
                     "algorithm": algo,

@@ -26,9 +26,8 @@ class Print:
 
 
 steps = int(sys.argv[1]) if len(sys.argv) > 1 else 500_000
-config = dataclasses.replace(
-    preset("hover", "bptt"), reward=RewardConfig({"prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.05}), steps=steps
-)  # fmt: skip
+reward = RewardConfig({"prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.05})
+config = dataclasses.replace(preset("hover", "bptt"), reward=reward, steps=steps)
 with tempfile.TemporaryDirectory() as folder:
     summary = train(config, Path(folder) / "run", Print())
     policy = load_policy(Path(folder) / "run" / "policy.onnx", task="hover")
@@ -36,4 +35,6 @@ observation = np.zeros(policy.contract.observation_size, np.float32)
 observation[policy.contract.slices["attitude"]] = (1, 0, 0, 0)
 action = policy.act(observation)
 print(f"success on unseen starts: {summary['shipped']['hover']['success']:.1%}")
-print("at the target it commands", dict(zip(policy.contract.action.fields, policy.command(action).round(2), strict=True)))
+print(
+    "at the target it commands", dict(zip(policy.contract.action.fields, policy.command(action).round(2), strict=True))
+)

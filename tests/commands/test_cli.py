@@ -92,8 +92,8 @@ def test_train_eval_export_and_plots_end_to_end(tmp_path: Path, capsys: pytest.C
     flags = ["--steps", "2048", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16", "--algo.horizon", "16",
              "--algo.minibatch", "128", "--task.episode-s", "1"]  # fmt: skip
     assert run(["train", "hover", "--out", str(folder), *flags]) == 0
-    for name in ("config.json", "versions.json", "metrics.csv", "summary.json", "policy.onnx", "checkpoint.safetensors",
-                 "plots/learning.png", "plots/errors.png", "plots/flights_hover.png", "plots/time_hover.png"):  # fmt: skip
+    files = ("config.json", "versions.json", "metrics.csv", "summary.json", "policy.onnx", "checkpoint.safetensors")
+    for name in (*files, *(f"plots/{plot}.png" for plot in ("learning", "errors", "flights_hover", "time_hover"))):
         assert (folder / name).stat().st_size > 0
     assert list((folder / "events").iterdir())
     report = tmp_path / "report.json"

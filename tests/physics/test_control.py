@@ -51,7 +51,7 @@ def test_body_rates_and_collective_thrust(answer: Callable[..., State], vacuum: 
     path = answer("ctbr", *asked.tolist())
     within = np.clip(asked[:, 1:], -vacuum.body_rate_max, vacuum.body_rate_max)
     np.testing.assert_allclose(path.body_rate[30, 0], within[0], atol=2e-3)  # after 1 s
-    np.testing.assert_allclose(path.body_rate[-1], within, atol=1e-2 * np.abs(within))
+    np.testing.assert_allclose(path.body_rate[-1], within, rtol=1e-2)
     collective = sum(rotor_thrust(vacuum, split4(path.rotor_speed[-1]))) / vacuum.mass
     np.testing.assert_allclose(collective, asked[:, 0], rtol=1e-2)
 
@@ -93,7 +93,7 @@ def test_position(answer: Callable[..., State], vis_r: Vehicle) -> None:
 
 def test_cascade_keeps_its_limits(answer: Callable[..., State], vacuum: Vehicle) -> None:
     path = answer("position", (100.0, 0.0, 0.0, 0.0), (0.0, -100.0, -100.0, 0.0))
-    assert np.all(np.abs(path.velocity) < vacuum.speed_max + 0.05)
+    assert np.all(np.abs(path.velocity) < vacuum.speed_max + 0.1)
     np.testing.assert_allclose(path.velocity[-1], [[5, 0, 0], [0, -5, -2]], atol=1e-3)
     path = answer("acceleration", (100.0, 0.0, 0.0, 0.0), (100.0, 100.0, -100.0, 0.0))
     tilt = np.arccos(np.asarray(rotation.cos_tilt(path.quaternion)))

@@ -10,15 +10,23 @@ import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
 
-from e2efly.physics import COMMAND_MODES, INTEGRATORS, Physics, State, rotation, step
+from e2efly.physics import COMMAND_MODES, Physics, State, rotation, step
 from e2efly.vehicles import Vehicle
+from tests.gradients import central, reverse
 
 pytestmark = pytest.mark.usefixtures("x64")
 
-PLANT = (
-    "mass", "inertia", "rotor_position", "thrust_map", "torque_ratio", "motor_time_constant",
-    "drag_linear", "drag_quadratic",
-)  # fmt: skip
+SHAPES = {
+    "mass": (),
+    "inertia": (3,),
+    "rotor_position": (4, 2),
+    "thrust_map": (3,),
+    "torque_ratio": (),
+    "motor_time_constant": (),
+    "drag_linear": (3,),
+    "drag_quadratic": (3,),
+}
+"""The vehicle's parameters that move the plant."""
 KRAD = 1000.0
 HOVER = {"rotor_thrust": [0.75 * 9.81 / 4] * 4, "ctbr": [9.81, 0, 0, 0], "attitude": [9.81, 0, 0, 0]}
 COMMANDS = {
@@ -52,27 +60,36 @@ def inputs(mode: str, q: Any, command: list[float], speed: float = 1.0, switch: 
         "previous": jnp.asarray(command) + (0.0 if rest else jnp.asarray([0.2, -0.1, 0.15, -0.1])),
         "switch": jnp.asarray(switch),
         "wind": jnp.asarray([0.4, -0.6, 0.2]) * speed,
-        "plant": {name: jnp.ones(SHAPES[name]) for name in PLANT},
+        "plant": {name: jnp.ones(shape) for name, shape in SHAPES.items()},
     }
 
 
-SHAPES = {"inertia": 3, "rotor_position": (4, 2), "thrust_map": 3, "drag_linear": 3, "drag_quadratic": 3} | {
-    name: () for name in ("mass", "torque_ratio", "motor_time_constant")
-}
+def flat(points: list[dict[str, Any]]) -> jax.Array:
+    """(points, entries)."""
+    return jnp.stack([ravel_pytree(p)[0] for p in points])
 
 
-def stepper(vehicle: Vehicle, physics: Physics, structure: Callable) -> Callable[[jax.Array], jax.Array]:
-    """One control step as a function of a flat vector."""
+def names(point: dict[str, Any]) -> list[str]:
+    """What each entry of the flat vector is."""
+    leaves = jax.tree_util.tree_leaves_with_path(point)
+    return [f"{path[-1].key}[{i}]" for path, leaf in leaves for i in range(leaf.size)]
+
+
+def stepper(vehicle: Vehicle, mode: str, integrator: str = "semi_implicit") -> Callable[[jax.Array], jax.Array]:
+    """Two sub-steps as a function of flat rows."""
+    physics = Physics.of(vehicle, mode, integrator, control_rate=100.0, dtype=np.float64)
+    assert physics.substeps == 2
+    structure = ravel_pytree(inputs(mode, GENERIC, COMMANDS[mode]))[1]
 
     def run(x: jax.Array) -> jax.Array:
-        i = structure(x)
-        plant = dataclasses.replace(vehicle, **{name: getattr(vehicle, name) * i["plant"][name] for name in PLANT})
+        i = jax.vmap(structure)(x)
+        plant = dataclasses.replace(vehicle, **{name: getattr(vehicle, name) * i["plant"][name] for name in SHAPES})
         state = State(i["position"], i["velocity"], i["quaternion"], i["body_rate"], KRAD * i["rotor_speed"])
         end = step(
             physics, plant, state, i["command"],
             previous=i["previous"], switch_time=i["switch"] * physics.control_period, wind=i["wind"],
         )  # fmt: skip
-        return jnp.concatenate([end.position, end.velocity, end.quaternion, end.body_rate, end.rotor_speed / KRAD])
+        return jnp.concatenate([end.position, end.velocity, end.quaternion, end.body_rate, end.rotor_speed / KRAD], -1)
 
     return run
 
@@ -81,38 +98,25 @@ GENERIC = rotation.from_euler(*map(np.asarray, (0.2, -0.1, 0.4)))
 
 
 @pytest.mark.parametrize("mode", COMMAND_MODES)
-def test_gradients_of_a_step(mode: str, vis_r: Vehicle, jacobians: Callable) -> None:
+def test_gradients_of_a_step(mode: str, vis_r: Vehicle) -> None:
     """With respect to state, both commands, the switch, wind and plant. At rest and level too: no formula breaks."""
-    hover = HOVER.get(mode, [0.0] * 4)
-    aligned = 0.0 if mode != "position" else 1e-3  # so that a tilt of zero is not at the corner of |q|
     points = {
         "generic": inputs(mode, GENERIC, COMMANDS[mode]),
         "late switch": inputs(mode, GENERIC, COMMANDS[mode], switch=0.8),
         "tumbling": inputs(mode, [0.5, -0.5, 0.6, np.sqrt(0.14)], COMMANDS[mode], speed=5.0),
         "saturated": inputs(mode, GENERIC, EXTREME[mode]),
-        "level and still": inputs(mode, [1, 0, 0, 0], hover, speed=0.0),
+        "level and still": inputs(mode, [1, 0, 0, 0], HOVER.get(mode, [0.0] * 4), speed=0.0),
     }
-    del aligned
-    physics = Physics.of(vis_r, mode, control_rate=100.0, dtype=np.float64)
-    assert physics.substeps == 2
-    _, structure = ravel_pytree(points["generic"])
-    exact, numeric = jacobians(
-        stepper(vis_r, physics, structure), jnp.stack([ravel_pytree(p)[0] for p in points.values()])
-    )
-    names = _names(points["generic"])
+    entries = names(points["generic"])
+    with jax.disable_jit():  # compiled gradients: see below
+        run, rows = stepper(vis_r, mode), flat(list(points.values()))
+        exact, numeric = reverse(run, rows, 17), central(run, rows)
     for i, point in enumerate(points):
-        scale = 1 + np.abs(numeric[i])
-        wrong = np.argwhere(np.abs(exact[i] - numeric[i]) > 1e-6 * scale)
-        assert not len(wrong), [(point, int(o), names[p], exact[i, o, p], numeric[i, o, p]) for o, p in wrong[:5]]
+        wrong = np.argwhere(np.abs(exact[i] - numeric[i]) > 1e-6 * (1 + np.abs(numeric[i])))
+        assert not len(wrong), [(point, int(o), entries[p], exact[i, o, p], numeric[i, o, p]) for o, p in wrong[:5]]
     for name in ("velocity", "command", "previous", "switch", "wind", "mass", "thrust_map", "drag_linear"):
-        column = [i for i, n in enumerate(names) if n.startswith(name)]
+        column = [i for i, entry in enumerate(entries) if entry.startswith(name)]
         assert np.max(np.abs(exact[0][:, column])) > 1e-8, name  # each of them matters
-
-
-def _names(tree: dict[str, Any]) -> list[str]:
-    """What each entry of the flat vector is."""
-    leaves = jax.tree_util.tree_leaves_with_path(tree)
-    return [f"{path[-1].key}[{i}]" for path, leaf in leaves for i in range(leaf.size)]
 
 
 @pytest.mark.parametrize("mode", COMMAND_MODES)
@@ -124,25 +128,31 @@ def test_gradients_are_finite_where_the_map_has_corners(mode: str, vis_r: Vehicl
     points.append(inputs(mode, [1, 0, 0, 0], EXTREME[mode], speed=0.0, switch=0.0))
     points.append(inputs(mode, [1, 0, 0, 0], (-np.asarray(EXTREME[mode])).tolist(), speed=0.0))
     points.append({**points[0], "rotor_speed": jnp.zeros(4)})
-    physics = Physics.of(vis_r, mode, control_rate=100.0, dtype=np.float64)
-    flat = jnp.stack([ravel_pytree(p)[0] for p in points])
-    _, structure = ravel_pytree(points[0])
-    exact = jax.jit(jax.vmap(jax.jacrev(stepper(vis_r, physics, structure))))(flat)
+    with jax.disable_jit():
+        exact = reverse(stepper(vis_r, mode), flat(points), 17)
+    assert exact.shape[:2] == (16, 17)
     assert np.all(np.isfinite(exact))
 
 
-@pytest.mark.parametrize("integrator", [i for i in INTEGRATORS if i != "semi_implicit"])
-def test_gradients_of_the_other_integrators(integrator: str, vis_r: Vehicle, jacobians: Callable) -> None:
-    physics = Physics.of(vis_r, "ctbr", integrator, control_rate=100.0, dtype=np.float64)
-    point = inputs("ctbr", GENERIC, COMMANDS["ctbr"])
-    flat, structure = ravel_pytree(point)
-    exact, numeric = jacobians(stepper(vis_r, physics, structure), flat[None])
+@pytest.mark.parametrize("integrator", ["euler", "rk4"])
+def test_gradients_of_the_other_integrators(integrator: str, vis_r: Vehicle) -> None:
+    with jax.disable_jit():
+        run, rows = stepper(vis_r, "ctbr", integrator), flat([inputs("ctbr", GENERIC, COMMANDS["ctbr"])])
+        exact, numeric = reverse(run, rows, 17), central(run, rows)
     np.testing.assert_allclose(exact, numeric, rtol=1e-6, atol=1e-7)
 
 
+def test_compiled_gradients_are_the_same(vis_r: Vehicle) -> None:
+    run, points = stepper(vis_r, "ctbr"), flat([inputs("ctbr", GENERIC, COMMANDS["ctbr"])])
+    with jax.disable_jit():
+        plain = reverse(run, points, 17)
+    compiled = jax.jit(lambda x: reverse(run, x, 17))(points)
+    np.testing.assert_allclose(compiled, plain, rtol=1e-9, atol=1e-12)
+
+
 def test_single_precision_gradients_are_finite_at_hover(vis_r: Vehicle) -> None:
-    with jax.enable_x64(False):
-        for mode in ("position", "attitude"):
+    with jax.enable_x64(False), jax.disable_jit():
+        for mode in COMMAND_MODES:
             physics = Physics.of(vis_r, mode, control_rate=100.0)
             state = State.hovering(vis_r, jnp.zeros(3))
 
@@ -150,5 +160,6 @@ def test_single_precision_gradients_are_finite_at_hover(vis_r: Vehicle) -> None:
                 end = step(physics, physics.nominal, state, command)
                 return jnp.sum(end.position) + jnp.sum(end.quaternion) + jnp.sum(end.body_rate)
 
-            gradient = jax.jit(jax.grad(loss, (0, 1)))(state, jnp.asarray(HOVER.get(mode, [0.0] * 4)))
+            gradient = jax.grad(loss, (0, 1))(state, jnp.asarray(HOVER.get(mode, [0.0] * 4)))
+            assert all(leaf.dtype == jnp.float32 for leaf in jax.tree.leaves(gradient))
             assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(gradient))

@@ -213,6 +213,7 @@ def _draw(
         tag = f"{title}: {name}" if len(flown) > 1 else title
         plots.plot_flights(env.task, flights, folder / f"flights_{name}.png", tag)
         plots.plot_time(flights, 0, folder / f"time_{name}.png", tag)
-    plots.plot_errors(flown, folder / "errors.png", title)
+    plots.plot_errors(flown, folder / "errors.png", title, plots.limits(presets.suites(task)))
     if run and (rows := run.rows()):
-        plots.plot_learning(rows, folder / "learning.png", title)
+        shipped = run.read_json("summary.json")["shipped"]["update"] if (run.path / "summary.json").exists() else None
+        plots.plot_learning(rows, folder / "learning.png", title, best_update=shipped)

@@ -33,7 +33,7 @@ from e2efly.learn.rundir import RunDirectory, differences, versions
 WATCHED, REPORTED = 1, 2
 """Streams of starts: those that training watches, and the unseen ones of the report."""
 REPORT_EPISODES = 1000
-FAST_COMPILE: dict[str, bool | str | int] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
+FAST_COMPILE: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
 """XLA options for programs that run for seconds only."""
 
 
@@ -118,7 +118,7 @@ class Programs:
         def start(env: Env, parameters: Any, key: jax.Array) -> TrainState:
             return begin(env, config.algo, parameters, key)
 
-        options = FAST_COMPILE if config.fast_compile and jax.default_backend() == "cpu" else {}
+        options: dict[str, Any] = FAST_COMPILE if config.fast_compile and jax.default_backend() == "cpu" else {}
 
         def train_programs() -> Any:
             state = jax.eval_shape(start, env, parameters, key)

@@ -35,9 +35,9 @@ class Vehicle:
 
     name: str = field(metadata={"static": True})
     """The name of the vehicle: its file's stem."""
-    mass: Any = _quantity("kg", above=0)
+    mass: Any = _quantity("kg", above=0.0)
     """Mass."""
-    inertia: Any = _quantity("kg*m^2", (3,), above=0)
+    inertia: Any = _quantity("kg*m^2", (3,), above=0.0)
     """Principal moments of inertia about the body axes."""
     rotor_position: Any = _quantity("m", (4, 2))
     """Rotor positions in the body's x-y plane."""
@@ -45,43 +45,43 @@ class Vehicle:
     """Sign of each rotor's reaction torque about body z."""
     thrust_map: Any = _quantity("N*s^2/rad^2, N*s/rad, N", (3,))
     """Thrust of a rotor = k2 W^2 + k1 W + k0 at rotor speed W, never below zero: [k2, k1, k0]."""
-    torque_ratio: Any = _quantity("m", at_least=0)
+    torque_ratio: Any = _quantity("m", at_least=0.0)
     """Reaction torque of a rotor over its thrust."""
-    rotor_thrust_max: Any = _quantity("N", above=0)
+    rotor_thrust_max: Any = _quantity("N", above=0.0)
     """Largest thrust of one rotor; the tighter of this and `rotor_speed_max` binds."""
-    rotor_speed_max: Any = _quantity("rad/s", above=0)
+    rotor_speed_max: Any = _quantity("rad/s", above=0.0)
     """Largest rotor speed."""
-    rotor_speed_min: Any = _quantity("rad/s", at_least=0)
+    rotor_speed_min: Any = _quantity("rad/s", at_least=0.0)
     """Idle rotor speed."""
-    motor_time_constant: Any = _quantity("s", above=0)
+    motor_time_constant: Any = _quantity("s", above=0.0)
     """Time constant of the first-order motor lag."""
-    drag_linear: Any = _quantity("N*s/m", (3,), at_least=0)
+    drag_linear: Any = _quantity("N*s/m", (3,), at_least=0.0)
     """Drag an axis of the body over air-relative speed."""
-    drag_quadratic: Any = _quantity("N*s^2/m^2", (3,), at_least=0)
+    drag_quadratic: Any = _quantity("N*s^2/m^2", (3,), at_least=0.0)
     """Drag an axis of the body over air-relative speed squared, signed."""
-    body_rate_max: Any = _quantity("rad/s", (3,), above=0)
+    body_rate_max: Any = _quantity("rad/s", (3,), above=0.0)
     """Largest body rates that are commanded."""
-    rate_gain: Any = _quantity("1/s", (3,), above=0)
+    rate_gain: Any = _quantity("1/s", (3,), above=0.0)
     """Angular acceleration commanded per body-rate error."""
-    attitude_gain: Any = _quantity("1/s", (2,), above=0)
+    attitude_gain: Any = _quantity("1/s", (2,), above=0.0)
     """Body rate commanded per attitude error: [tilt, yaw]."""
-    velocity_gain: Any = _quantity("1/s", (3,), above=0)
+    velocity_gain: Any = _quantity("1/s", (3,), above=0.0)
     """Acceleration commanded per velocity error, world axes."""
-    position_gain: Any = _quantity("1/s", (3,), above=0)
+    position_gain: Any = _quantity("1/s", (3,), above=0.0)
     """Velocity commanded per position error, world axes."""
-    tilt_max: Any = _quantity("rad", above=0)
+    tilt_max: Any = _quantity("rad", above=0.0)
     """Largest tilt that the controllers command; below pi/2."""
-    acceleration_max: Any = _quantity("m/s^2", (3,), above=0)
+    acceleration_max: Any = _quantity("m/s^2", (3,), above=0.0)
     """Largest acceleration commanded, world axes."""
-    speed_max: Any = _quantity("m/s", (3,), above=0)
+    speed_max: Any = _quantity("m/s", (3,), above=0.0)
     """Largest velocity commanded, world axes."""
-    control_rate: Any = _quantity("Hz", above=0)
+    control_rate: Any = _quantity("Hz", above=0.0)
     """Rate at which the policy is asked."""
-    latency: Any = _quantity("s", at_least=0)
+    latency: Any = _quantity("s", at_least=0.0)
     """Time from the policy's observation to its command reaching the rate loop."""
-    feet_height: Any = _quantity("m", above=0)
+    feet_height: Any = _quantity("m", above=0.0)
     """Height of the centre of mass over the feet."""
-    radius: Any = _quantity("m", above=0)
+    radius: Any = _quantity("m", above=0.0)
     """Radius of the sphere that holds the vehicle, for collisions."""
 
     @property

@@ -1,0 +1,218 @@
+"""What each task judges, by hand-made flights; references and tracks."""
+
+import dataclasses
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from e2efly.config import HoverConfig, LandConfig, RaceConfig, TrackConfig
+from e2efly.env import random_key
+from e2efly.physics.rotation import from_euler
+from e2efly.tasks import Hover, Land, Race, Shape, Track
+from e2efly.tasks.references import Lissajous, Spline, polynomial, read_csv, through_points
+from e2efly.tasks.task import Outcome, at_rest
+from e2efly.tasks.tracks import load_track, track_names
+
+SHAPE = Shape(0.05, 0.12)
+LATER, NOW = jnp.zeros(1, bool), jnp.ones(1, bool)
+
+
+def move(race: Race, memory: int, start: list[float], end: list[float]) -> tuple[int, Outcome]:
+    a, b = (at_rest(jnp.array([p])) for p in (start, end))
+    memory_after, out = race.advance(jnp.array([memory]), a, b, jnp.zeros(1), LATER)
+    return int(memory_after[0]), out
+
+
+def test_a_gate_is_passed_forward_through_its_opening() -> None:
+    race = Race.of(RaceConfig(), SHAPE)  # gate 1 at (4, 4, 1), flown through along x
+    after, out = move(race, 0, [3.9, 4.2, 1.1], [4.1, 4.2, 1.1])
+    assert (after, bool(out.arrived[0]), bool(out.terminated[0])) == (1, True, False)
+
+
+@pytest.mark.parametrize("y", [4.5, 6.0, -3.0])
+def test_crossing_the_plane_outside_the_opening_fails(y: float) -> None:
+    race = Race.of(RaceConfig(), SHAPE)
+    after, out = move(race, 0, [3.9, y, 1.1], [4.1, y, 1.1])
+    assert (after, bool(out.crashed[0]), bool(out.success[0])) == (0, True, False)
+
+
+def test_the_sphere_and_not_only_its_centre_must_fit() -> None:
+    race = Race.of(RaceConfig(), SHAPE)
+    assert not move(race, 0, [3.9, 4.37, 1.0], [4.1, 4.37, 1.0])[1].crashed[0]
+    assert move(race, 0, [3.9, 4.39, 1.0], [4.1, 4.39, 1.0])[1].crashed[0]
+
+
+def test_crossing_backward_neither_passes_nor_fails() -> None:
+    race = Race.of(RaceConfig(), SHAPE)
+    after, out = move(race, 0, [4.1, 6.0, 1.1], [3.9, 6.0, 1.1])
+    assert (after, bool(out.terminated[0])) == (0, False)
+
+
+def test_the_frame_of_any_gate_can_be_struck() -> None:
+    race = Race.of(RaceConfig(), SHAPE)
+    assert move(race, 2, [4.1, 4.55, 1.0], [3.9, 4.55, 1.0])[1].crashed[0]
+
+
+def test_gates_count_in_order_and_a_lap_ends_the_race() -> None:
+    race = Race.of(RaceConfig(), SHAPE)
+    assert move(race, 1, [3.9, 4.0, 1.0], [4.1, 4.0, 1.0])[0] == 1  # gate 1 again: gate 2 is next
+    track = load_track("four_gates")
+    c, yaw = track.position[3], track.yaw[3]
+    forward = 0.1 * np.array([np.cos(yaw), np.sin(yaw), 0])
+    after, out = move(race, 3, list(c - forward), list(c + forward))
+    assert (after, bool(out.success[0]), bool(out.terminated[0])) == (4, True, True)
+    endless = Race.of(RaceConfig(laps=0), SHAPE)
+    assert not move(endless, 3, list(c - forward), list(c + forward))[1].terminated[0]
+
+
+def test_the_ground_is_there() -> None:
+    race = Race.of(RaceConfig(), SHAPE)
+    assert move(race, 0, [0, 0, 0.1], [0, 0, 0.05])[1].crashed[0]
+
+
+@pytest.mark.parametrize("name", track_names())
+def test_shipped_tracks_meet_each_gate_from_behind(name: str) -> None:
+    track = load_track(name)
+    points = np.vstack([track.start, track.position])
+    for before, gate, yaw in zip(points, track.position, track.yaw, strict=False):
+        assert np.dot(gate - before, [np.cos(yaw), np.sin(yaw), 0]) > 0.5
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("closed = true", "closed = 1", "closed is 1; accepted: true or false"),
+        ("opening = [1.0, 1.0] },\n]", "opening = [0.2, 1.0] },\n]", r"gates\[3\].opening is \[0.2, 1.0\]"),
+        ("[4.0, 4.0, 1.0]", "[4.0, nan, 1.0]", r"gates\[0\].position is"),
+        ("[4.0, 4.0, 1.0]", "[4.0, 4.0, 0.2]", "an opening above the ground"),
+        ("yaw = 45.0", "yow = 45.0", "start has"),
+        ("closed = true", "closed =", "not a TOML file"),
+    ],
+)
+def test_broken_tracks_are_named(old: str, new: str, message: str, tmp_path: Path) -> None:
+    import e2efly.tasks.tracks as tracks
+
+    text = (Path(tracks.__file__).parent / "four_gates.toml").read_text()
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    assert load_track(str(path)).name == "mine"
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(ValueError, match=message):
+        load_track(str(path))
+
+
+def land(position: list[float], velocity: list[float], tilt: float) -> Outcome:
+    task = Land(LandConfig(), SHAPE)
+    state = dataclasses.replace(
+        at_rest(jnp.array([position])),
+        velocity=jnp.array([velocity]),
+        quaternion=from_euler(jnp.array([tilt]), jnp.zeros(1), jnp.zeros(1)),
+    )
+    return task.advance(jnp.zeros((1, 0)), state, state, jnp.zeros(1), LATER)[1]
+
+
+@pytest.mark.parametrize(
+    ("position", "velocity", "tilt", "ended", "success"),
+    [
+        ([0.05, 0.05, 0.04], [0.1, 0, -0.3], 0.1, True, True),
+        ([0.08, 0.08, 0.04], [0.1, 0, -0.3], 0.1, True, False),  # 0.113 m off
+        ([0.05, 0.05, 0.04], [0.4, 0, -0.4], 0.1, True, False),  # 0.57 m/s
+        ([0.05, 0.05, 0.04], [0.1, 0, -0.3], 0.3, True, False),  # 17 degrees
+        ([0.05, 0.05, -0.01], [0.1, 0, -0.3], 0.1, True, False),  # 6 cm under
+        ([0.05, 0.05, 0.06], [0.1, 0, -0.3], 0.1, False, False),  # not there yet
+        ([7.0, 0.0, 1.0], [0.0, 0, 0], 0.0, True, False),  # lost
+    ],
+)
+def test_a_touch_is_judged(
+    position: list[float], velocity: list[float], tilt: float, ended: bool, success: bool
+) -> None:
+    out = land(position, velocity, tilt)
+    assert (bool(out.terminated[0]), bool(out.success[0])) == (ended, success)
+
+
+def test_hovering_counts_the_last_second_only() -> None:
+    task = Hover(HoverConfig(), SHAPE, 1 / 30)
+    there, away = (at_rest(jnp.array([[0.0, 0.0, z]])) for z in (3.05, 3.2))
+    memory = jnp.zeros(1)
+    for _ in range(29):
+        memory, out = task.advance(memory, there, there, jnp.zeros(1), LATER)
+    assert not task.advance(memory, away, away, jnp.zeros(1), NOW)[1].success[0]
+    _, out = task.advance(memory, there, there, jnp.zeros(1), NOW)
+    assert out.success[0]
+    assert not task.advance(memory - 1 / 30, there, there, jnp.zeros(1), NOW)[1].success[0]
+    far = at_rest(jnp.array([[0.0, 6.1, 3.0]]))
+    assert task.advance(memory, far, far, jnp.zeros(1), LATER)[1].terminated[0]
+
+
+def test_tracking_is_judged_by_the_mean_error_after_it_settled() -> None:
+    task = Track.of(TrackConfig(reference="circle", mean_error=0.08), SHAPE)
+    _, memory = task.start(random_key(0), 1)
+    for time, off in ((1.0, 2.0), (3.0, 0.05), (4.0, 0.10)):
+        t = jnp.array([time])
+        state = at_rest(task.goal(memory, t) + jnp.array([0.0, 0.0, off]))
+        memory, _ = task.advance(memory, state, state, t, LATER)
+    t = jnp.array([5.0])
+    for off, success in ((0.06, True), (0.2, False)):
+        state = at_rest(task.goal(memory, t) + jnp.array([0.0, 0.0, off]))
+        assert bool(task.advance(memory, state, state, t, NOW)[1].success[0]) == success
+
+
+@pytest.mark.parametrize(
+    ("curve", "bound"), [(Lissajous.circle(2.0, 0.2 * np.pi), 1e-5), (Lissajous.lemniscate(2.0, 3.0), 1e-4)]
+)
+def test_splines_are_the_curves(curve: Lissajous, bound: float) -> None:
+    phase = jnp.array([0.3])
+    t = jnp.linspace(0, 9.9, 500)[None]
+    spline = curve.spline((0.0, 0.0, 3.0), phase, 23)
+    angle = curve.rate * t[0] + phase
+    x, y = curve.half_x * jnp.sin(angle + curve.shift), curve.half_y * jnp.sin(curve.ratio * angle)
+    error = np.linalg.norm(np.asarray(spline.position(t)[0, :, :2]) - np.stack([x, y], -1), axis=-1)
+    assert error.max() < bound
+
+
+def test_the_lemniscate_reaches_its_speed() -> None:
+    t = jnp.linspace(0, 8, 8001)[None]
+    p = np.asarray(Lissajous.lemniscate(2.0, 3.0).spline((0.0, 0.0, 3.0), jnp.zeros(1), 23).position(t)[0], np.float64)
+    assert np.linalg.norm(np.diff(p, axis=0), axis=-1).max() / 0.001 == pytest.approx(3.0, rel=0.02)
+
+
+def test_random_polynomials_are_smooth_and_stay_in_their_box() -> None:
+    spline = polynomial(random_key(0), (0.0, 0.0, 3.0), 2.0, 2.5, 50, 23)
+    t = jnp.broadcast_to(jnp.linspace(0, 10.9, 2000), (50, 2000))
+    p = np.asarray(spline.position(t)) - np.array([0, 0, 3.0])
+    assert np.abs(p).max() < 3.0
+    velocity = np.diff(p, axis=1) / (10.9 / 1999)
+    assert 2.0 < np.linalg.norm(velocity, axis=-1).max() < 6.0
+    acceleration = np.diff(velocity, axis=1) / (10.9 / 1999)
+    assert np.abs(acceleration).max() < 20  # no jumps of the velocity
+
+
+def test_a_users_reference_goes_through_its_points(tmp_path: Path) -> None:
+    path = tmp_path / "mine.csv"
+    t = np.arange(0, 12, 0.5)
+    path.write_text("t,x,y,z\n" + "\n".join(f"{a + 3},{np.sin(a)},{np.cos(a)},2" for a in t))
+    spline = Spline(jnp.asarray(through_points(read_csv(path), 23))[None])
+    np.testing.assert_allclose(spline.position(jnp.array([[2.5]]))[0, 0], [np.sin(2.5), np.cos(2.5), 2], atol=1e-5)
+    assert Track.of(TrackConfig(reference=str(path)), SHAPE).curve is not None
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "line 1: empty"),
+        ("time,x,y,z\n", "line 1"),
+        ("t,x,y,z\n0,0,0,1\n1,0,0,1\n", "2 rows"),
+        ("t,x,y,z\n0,0,0,1\n0,0,0,1\n2,0,0,1\n", "line 3"),
+        ("t,x,y,z\n0,0,0,1\n1,nan,0,1\n2,0,0,1\n", "line 3"),
+        ("t,x,y,z\n0,0,0,1\n1,0,1\n2,0,0,1\n", "line 3"),
+        ("t,x,y,z\n0,0,0,0\n1,0,0,1\n2,0,0,1\n", "lowest z is 0.0 m"),
+    ],
+)
+def test_broken_references_are_named(text: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.csv"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=message):
+        Track.of(TrackConfig(reference=str(path)), SHAPE)
