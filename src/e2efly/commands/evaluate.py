@@ -139,7 +139,7 @@ def _table(flown: dict[str, Any], episodes: int) -> Table:
         "criterion", f"success of {episodes}", "95 % interval", "final error", "mean error", "time", "top speed",
         "roughness",
     ):  # fmt: skip
-        table.add_column(heading)
+        table.add_column(heading, no_wrap=True)
     for name, e in flown.items():
         ok = np.asarray(e.success)
         low, high = wilson(int(ok.sum()), len(ok))

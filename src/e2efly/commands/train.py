@@ -21,7 +21,7 @@ def train_command(config: TrainConfig, out: Path, resume: bool, device: str | No
     task, algo = task_name(config.task), algorithm_name(config.algo)
     with TerminalProgress(console, f"{task} by {algo}") as progress:
         summary = train(config, out, progress, resume)
-    _report(console, summary, out)
+    _report(console, summary)
     if summary["stopped_by_user"]:
         console.print(f"Stopped. Go on with: e2efly train {task} --algo {algo} --out {out} --resume")
         return 130
@@ -34,18 +34,16 @@ def train_command(config: TrainConfig, out: Path, resume: bool, device: str | No
     return 0
 
 
-def _report(console: Console, summary: dict[str, Any], out: Path) -> None:
-    del out
+def _report(console: Console, summary: dict[str, Any]) -> None:
     table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in ("criterion", "policy", "success", "final error", "mean error", "time of a success", "top speed"):
-        table.add_column(heading)
+    for heading in ("policy", "success", "final error", "mean error", "time", "top speed"):
+        table.add_column(heading, no_wrap=True)
     for which in ("shipped", "last"):
         for name, d in summary[which].items():
             if name == "update":
                 continue
             table.add_row(
-                name,
-                f"{which} (update {summary[which]['update']})",
+                f"{name}, {which} (update {summary[which]['update']})",
                 f"{d['success']:.1%}",
                 f"{100 * d['final_error_m']:.1f} cm",
                 f"{100 * d['mean_error_m']:.1f} cm",
