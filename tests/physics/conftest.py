@@ -14,6 +14,8 @@ from e2efly.physics import INTEGRATORS, Physics, State, step
 from e2efly.physics.components import Vec3
 from e2efly.physics.state import Parts, split4
 from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles.vehicle import quantities
+from tests.compiling import jit
 
 Fly = Callable[..., State]
 
@@ -37,17 +39,40 @@ def stone(vacuum: Vehicle) -> Vehicle:
 
 @pytest.fixture(scope="session")
 def fly() -> Fly:
-    """(physics, plant, state, commands (t, ..., 4), wind) -> the states after each control step, (t, ...)."""
+    """(physics, plant, state, commands (t, [n,] 4), wind) -> the states after each control step, (t, [n,] ...).
 
-    @jax.jit
-    def run(physics: Physics, plant: Vehicle, state: State, commands: jax.Array, wind: Any = None) -> State:
+    Flights are filled up to 4 vehicles and a multiple of 300 steps, so that most tests share one program a mode.
+    """
+
+    @jit
+    def run(physics: Physics, plant: Vehicle, state: State, commands: jax.Array, wind: jax.Array) -> State:
         def one(state: State, command: jax.Array) -> tuple[State, State]:
             state = step(physics, plant, state, command, wind=wind)
             return state, state
 
         return jax.lax.scan(one, state, commands)[1]
 
-    return run
+    def filled(physics: Physics, plant: Vehicle, state: State, commands: Any, wind: Any = None) -> State:
+        t, n = len(commands), 1 if state.position.ndim == 1 else len(state.position)
+        rows, last = np.minimum(np.arange(4), n - 1), -t % 300
+
+        def fill(x: Any, ndim: int) -> jax.Array:
+            x = jnp.asarray(x)
+            return jnp.broadcast_to(x, (n, *x.shape))[rows] if x.ndim == ndim else x[rows]
+
+        shapes = {f.name: len(f.metadata["shape"]) for f in quantities()}
+        plants = {name: fill(getattr(plant, name), ndim) for name, ndim in shapes.items()}
+        commands = jnp.broadcast_to(jnp.asarray(commands).reshape(t, -1, 4), (t, n, 4))[:, rows]
+        path = run(
+            dataclasses.replace(physics, nominal=dataclasses.replace(physics.nominal, name="nominal")),
+            Vehicle("plant", **plants),
+            jax.tree.map(lambda x: fill(x, 1), state),
+            jnp.concatenate([commands, jnp.broadcast_to(commands[-1], (last, 4, 4))]),
+            fill(jnp.zeros(3) if wind is None else wind, 1),
+        )
+        return jax.tree.map(lambda x: x[:t, 0] if state.position.ndim == 1 else x[:t, :n], path)
+
+    return filled
 
 
 @pytest.fixture(scope="session")
@@ -57,7 +82,7 @@ def fly_open_loop() -> Fly:
     The numbers of sub-steps and seconds are traced: one program an integrator and batch.
     """
 
-    @partial(jax.jit, static_argnums=0)
+    @partial(jit, static_argnums=0)
     def run(
         integrator: str, plant: Vehicle, state: State, commands: jax.Array, wind: Any, period: Any, substeps: Any
     ) -> State:

@@ -12,6 +12,7 @@ from jax.flatten_util import ravel_pytree
 
 from e2efly.physics import COMMAND_MODES, Physics, State, rotation, step
 from e2efly.vehicles import Vehicle
+from tests.compiling import jit
 from tests.gradients import central, reverse
 
 pytestmark = pytest.mark.usefixtures("x64")
@@ -97,20 +98,40 @@ def stepper(vehicle: Vehicle, mode: str, integrator: str = "semi_implicit") -> C
 GENERIC = rotation.from_euler(*map(np.asarray, (0.2, -0.1, 0.4)))
 
 
-@pytest.mark.parametrize("mode", COMMAND_MODES)
-def test_gradients_of_a_step(mode: str, vis_r: Vehicle) -> None:
-    """With respect to state, both commands, the switch, wind and plant. At rest and level too: no formula breaks."""
-    points = {
+def smooth(mode: str) -> dict[str, dict[str, Any]]:
+    """Points about which the step is smooth."""
+    return {
         "generic": inputs(mode, GENERIC, COMMANDS[mode]),
         "late switch": inputs(mode, GENERIC, COMMANDS[mode], switch=0.8),
         "tumbling": inputs(mode, [0.5, -0.5, 0.6, np.sqrt(0.14)], COMMANDS[mode], speed=5.0),
         "saturated": inputs(mode, GENERIC, EXTREME[mode]),
         "level and still": inputs(mode, [1, 0, 0, 0], HOVER.get(mode, [0.0] * 4), speed=0.0),
     }
-    entries = names(points["generic"])
+
+
+def corners(mode: str) -> list[dict[str, Any]]:
+    """Half turns, zero speed, standing rotors, limits, the switch at either end."""
+    hover, half_turns, level = HOVER.get(mode, [0.0] * 4), np.eye(4)[1:], [1, 0, 0, 0]
+    points = [inputs(mode, q, hover, speed=v, switch=s) for q in half_turns for v, s in ((0.0, 0.0), (1.0, 0.5))]
+    points.append(inputs(mode, level, hover, speed=0.0, switch=1.0))
+    points.append(inputs(mode, level, EXTREME[mode], speed=0.0, switch=0.0))
+    points.append(inputs(mode, level, (-np.asarray(EXTREME[mode])).tolist(), speed=0.0))
+    points.append({**points[0], "rotor_speed": jnp.zeros(4)})
+    return points
+
+
+@pytest.mark.parametrize(
+    ("mode", "integrator"), [(mode, "semi_implicit") for mode in COMMAND_MODES] + [("ctbr", "euler"), ("ctbr", "rk4")]
+)
+def test_gradients_of_a_step(mode: str, integrator: str, vis_r: Vehicle) -> None:
+    """With respect to state, both commands, the switch, wind and plant: exact where smooth, finite everywhere."""
+    points, run = smooth(mode), stepper(vis_r, mode, integrator)
+    rows = flat(list(points.values()))
     with jax.disable_jit():  # compiled gradients: see below
-        run, rows = stepper(vis_r, mode), flat(list(points.values()))
-        exact, numeric = reverse(run, rows, 17), central(run, rows)
+        exact = np.asarray(reverse(run, jnp.concatenate([rows, flat(corners(mode))]), 17))
+        numeric = np.asarray(central(run, rows))
+    assert np.all(np.isfinite(exact))
+    entries = names(points["generic"])
     for i, point in enumerate(points):
         wrong = np.argwhere(np.abs(exact[i] - numeric[i]) > 1e-6 * (1 + np.abs(numeric[i])))
         assert not len(wrong), [(point, int(o), entries[p], exact[i, o, p], numeric[i, o, p]) for o, p in wrong[:5]]
@@ -119,47 +140,23 @@ def test_gradients_of_a_step(mode: str, vis_r: Vehicle) -> None:
         assert np.max(np.abs(exact[0][:, column])) > 1e-8, name  # each of them matters
 
 
-@pytest.mark.parametrize("mode", COMMAND_MODES)
-def test_gradients_are_finite_where_the_map_has_corners(mode: str, vis_r: Vehicle) -> None:
-    hover = HOVER.get(mode, [0.0] * 4)
-    half_turns = np.eye(4)[1:]
-    points = [inputs(mode, q, hover, speed=v, switch=s) for q in half_turns for v in (0.0, 1.0) for s in (0.0, 0.5)]
-    points.append(inputs(mode, [1, 0, 0, 0], hover, speed=0.0, switch=1.0))
-    points.append(inputs(mode, [1, 0, 0, 0], EXTREME[mode], speed=0.0, switch=0.0))
-    points.append(inputs(mode, [1, 0, 0, 0], (-np.asarray(EXTREME[mode])).tolist(), speed=0.0))
-    points.append({**points[0], "rotor_speed": jnp.zeros(4)})
-    with jax.disable_jit():
-        exact = reverse(stepper(vis_r, mode), flat(points), 17)
-    assert exact.shape[:2] == (16, 17)
-    assert np.all(np.isfinite(exact))
-
-
-@pytest.mark.parametrize("integrator", ["euler", "rk4"])
-def test_gradients_of_the_other_integrators(integrator: str, vis_r: Vehicle) -> None:
-    with jax.disable_jit():
-        run, rows = stepper(vis_r, "ctbr", integrator), flat([inputs("ctbr", GENERIC, COMMANDS["ctbr"])])
-        exact, numeric = reverse(run, rows, 17), central(run, rows)
-    np.testing.assert_allclose(exact, numeric, rtol=1e-6, atol=1e-7)
-
-
 def test_compiled_gradients_are_the_same(vis_r: Vehicle) -> None:
-    run, points = stepper(vis_r, "ctbr"), flat([inputs("ctbr", GENERIC, COMMANDS["ctbr"])])
+    run, points = stepper(vis_r, "rotor_thrust"), flat([*smooth("rotor_thrust").values(), *corners("rotor_thrust")])
     with jax.disable_jit():
         plain = reverse(run, points, 17)
-    compiled = jax.jit(lambda x: reverse(run, x, 17))(points)
-    np.testing.assert_allclose(compiled, plain, rtol=1e-9, atol=1e-12)
+    compiled = jit(lambda x: reverse(run, x, 17))(points)
+    np.testing.assert_allclose(compiled, plain, rtol=1e-9, atol=1e-9)
 
 
 def test_single_precision_gradients_are_finite_at_hover(vis_r: Vehicle) -> None:
-    with jax.enable_x64(False), jax.disable_jit():
-        for mode in COMMAND_MODES:
-            physics = Physics.of(vis_r, mode, control_rate=100.0)
-            state = State.hovering(vis_r, jnp.zeros(3))
+    """Of the whole cascade, where its errors are zero."""
+    with jax.enable_x64(False):
+        physics = Physics.of(vis_r, "position", control_rate=200.0)
 
-            def loss(state: State, command: jax.Array, physics: Physics = physics) -> jax.Array:
-                end = step(physics, physics.nominal, state, command)
-                return jnp.sum(end.position) + jnp.sum(end.quaternion) + jnp.sum(end.body_rate)
+        def loss(state: State, command: jax.Array) -> jax.Array:
+            end = step(physics, physics.nominal, state, command)
+            return jnp.sum(end.position) + jnp.sum(end.quaternion) + jnp.sum(end.rotor_speed)
 
-            gradient = jax.grad(loss, (0, 1))(state, jnp.asarray(HOVER.get(mode, [0.0] * 4)))
-            assert all(leaf.dtype == jnp.float32 for leaf in jax.tree.leaves(gradient))
-            assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(gradient))
+        gradient = jit(jax.grad(loss, (0, 1)))(State.hovering(vis_r, jnp.zeros(3)), jnp.zeros(4))
+        assert all(leaf.dtype == jnp.float32 for leaf in jax.tree.leaves(gradient))
+        assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(gradient))

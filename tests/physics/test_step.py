@@ -10,13 +10,14 @@ import pytest
 
 from e2efly.physics import COMMAND_MODES, INTEGRATORS, Physics, State, step
 from e2efly.vehicles import Vehicle
+from tests.compiling import jit
 
 N = 6
 
 
 @pytest.fixture(scope="module")
 def flown() -> Callable[..., State]:
-    return jax.jit(step)
+    return jit(step)
 
 
 @pytest.fixture
@@ -68,7 +69,7 @@ def test_leading_axes_of_any_rank(
     alone = flown(physics, vis_r, row(state, 4), commands[4])
     assert alone.quaternion.shape == (4,)
     close(alone, row(whole, 4), 1e-12)
-    mapped = jax.jit(jax.vmap(lambda s, c: step(physics, vis_r, s, c)))(state, commands)
+    mapped = jit(jax.vmap(lambda s, c: step(physics, vis_r, s, c)))(state, commands)
     close(mapped, whole, 1e-12)
 
 
@@ -76,13 +77,13 @@ def test_leading_axes_of_any_rank(
 def test_compiled_or_not(
     vis_r: Vehicle, commands: np.ndarray, random_state: Callable[..., State], flown: Callable
 ) -> None:
-    physics, state = Physics.of(vis_r, largest_step=0.02, dtype=np.float64), random_state(2, (N,))
+    physics, state = Physics.of(vis_r, largest_step=0.04, dtype=np.float64), random_state(2, (N,))
     with jax.disable_jit():
         plain = step(physics, vis_r, state, jnp.asarray(commands))
     close(flown(physics, vis_r, state, commands), plain, 1e-12)
 
 
-@pytest.mark.parametrize("mode", COMMAND_MODES)
+@pytest.mark.parametrize("mode", ["rotor_thrust", "ctbr", "position"])
 def test_single_precision_is_near_double(
     mode: str, vis_r: Vehicle, random_state: Callable[..., State], flown: Callable
 ) -> None:

@@ -175,7 +175,7 @@ def _read(where: str, f: dataclasses.Field, entry: Any) -> Any:
         raise ValueError(f"{where}: {key}.value is {entry['value']!r}; accepted: {expected}")
     value = value.astype(np.float64)
     at_least, above = f.metadata["at_least"], f.metadata["above"]
-    accepted = f">= {at_least}" if at_least is not None else f"> {above}" if above is not None else "finite"
+    accepted = f">= {at_least:g}" if at_least is not None else f"> {above:g}" if above is not None else "finite"
     good = np.isfinite(value)
     if at_least is not None:
         good &= value >= at_least
