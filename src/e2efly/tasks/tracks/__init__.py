@@ -86,7 +86,7 @@ def _keys(path: Path, where: str, table: Any, wanted: set[str]) -> None:
 
 def _numbers(path: Path, where: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     try:
-        array = np.asarray(value, np.float64)
+        array = np.full((), np.nan) if np.asarray(value).dtype == bool else np.asarray(value, np.float64)
     except (TypeError, ValueError):
         array = np.full((), np.nan)
     if array.shape != shape or not np.all(np.isfinite(array)):
