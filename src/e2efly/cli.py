@@ -94,6 +94,7 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
         ("steps", Annotated[int, arg(help="Environment steps of the whole run.")]),
         ("chunk", Annotated[int, arg(help="Updates between two evaluations (sets shapes).")]),
         ("eval_episodes", Annotated[int, arg(help="Starts of an evaluation while training (sets shapes).")]),
+        ("devices", Annotated[int | None, arg(help="Devices (CPU: cores) to share the environments among.")]),
         ("fast_compile", Annotated[bool, arg(help="On a CPU: compile in half the time, run up to a tenth slower.")]),
         ("stop_at", Annotated[float | None, arg(help="Stop once the success on 1000 starts is at least this.")]),
         ("env", EnvConfig),
@@ -106,7 +107,7 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
     weights = ", ".join(f"{name} {weight:g}" for name, weight in config.reward.weights.items())
     options.__doc__ = f"Train a policy ({task}, {algo}). The defaults are the preset {preset!r}'s; reward: {weights}."
     top = {
-        name: getattr(config, name) for name in ("seed", "steps", "chunk", "eval_episodes", "fast_compile", "stop_at")
+        name: getattr(config, name) for name in ("seed", "steps", "chunk", "eval_episodes", "devices", "fast_compile", "stop_at")
     }
     parts = {name: getattr(config, name) for name in ("env", "task", "algo", "network")}
     parts["reward"] = RewardConfig()  # changes to the preset's; a filled dictionary would take no new names

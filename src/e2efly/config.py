@@ -270,6 +270,8 @@ class TrainConfig:
     """Updates between two evaluations (sets shapes)."""
     eval_episodes: int = 250
     """Starts of an evaluation while training (sets shapes)."""
+    devices: int | None = None
+    """Devices (CPU: cores) that share the environments; left out: all there are, 32 environments or more on each."""
     fast_compile: bool = True
     """On a CPU: compile in half the time, run up to a tenth slower; right for runs of seconds."""
     stop_at: float | None = None

@@ -40,9 +40,23 @@ class Episodes:
     """Ended for ill before time was out."""
 
 
-def run_episodes(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int, settle: float = 0.0) -> Episodes:
-    """Fly `n` episodes of at most `steps` control steps; each stands still once it has ended."""
-    state, observation = env.reset(key, n)
+def run_episodes(
+    env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int, settle: float = 0.0, part: tuple[Array | int, int] = (0, 1)
+) -> Episodes:
+    """Fly episodes of at most `steps` control steps; each stands still once it has ended.
+
+    Args:
+        env: the environment.
+        act: the policy.
+        key: decides the starts.
+        n: how many.
+        steps: control steps of the longest.
+        settle: seconds before the mean error counts.
+        part: which of how many equal parts of the episodes to fly. All parts together, in order, are the `n` episodes
+            of the one part (0, 1), whatever their number; where it does not divide `n`, the last ends with repetitions.
+    """
+    state, observation = _part(*env.reset(key, n), part)
+    n = observation.shape[0]
     zero, no = jnp.zeros(n), jnp.zeros(n, bool)
     first = (state, observation, no, Episodes(no, zero, zero, zero, zero, zero, zero, zero, no), zero)
 
@@ -71,6 +85,17 @@ def run_episodes(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int, sett
     (_, _, _, e, counted), _ = jax.lax.scan(step, first, None, length=steps)
     flown = jnp.maximum(e.duration / env.control_period, 1.0)
     return dataclasses.replace(e, mean_error=e.mean_error / jnp.maximum(counted, 1.0), roughness=e.roughness / flown)
+
+
+def _part(state: EnvState, observation: Array, part: tuple[Array | int, int]) -> tuple[EnvState, Array]:
+    index, count = part
+    if count == 1:
+        return state, observation
+    n = observation.shape[0]
+    size = math.ceil(n / count)
+    rows = (index * size + jnp.arange(size)) % n
+    state = jax.tree.map(lambda x: x[rows] if x.shape[:1] == (n,) else x, state)
+    return dataclasses.replace(state, key=jax.random.fold_in(state.key, index)), observation[rows]
 
 
 def trace(

@@ -115,6 +115,18 @@ def test_recovers_from_any_attitude(mode: str, fly: Callable[..., State], vis_r:
     assert np.min(rotation.cos_tilt(path.quaternion[-1])) > 0.9
 
 
+@pytest.mark.parametrize("mode", ["attitude", "position"])
+def test_both_signs_of_a_quaternion_are_one_attitude(mode: str, fly: Callable[..., State], vis_r: Vehicle) -> None:
+    """Also when both differ from the command's sign: the vehicle takes the shorter turn."""
+    q = rotation.from_euler(jnp.asarray([0.4, -0.2]), jnp.asarray([-0.3, 0.1]), jnp.asarray([1.5, -2.5]))
+    state = State.hovering(vis_r, jnp.zeros((TURNS, 3)))
+    state = dataclasses.replace(state, quaternion=jnp.concatenate([q, -q]))
+    hover = jnp.asarray([GRAVITY if mode == "attitude" else 0.0, 0, 0, 0])
+    path = fly(Physics.of(vis_r, mode, dtype=np.float64), vis_r, state, jnp.broadcast_to(hover, (90, TURNS, 4)))
+    np.testing.assert_allclose(path.position[:, 2:], path.position[:, :2], atol=1e-12)
+    np.testing.assert_allclose(path.quaternion[:, 2:], -path.quaternion[:, :2], atol=1e-12)
+
+
 def test_command_limits_of_the_paper(vis_r: Vehicle) -> None:
     top = 4 * 5.12 / 0.75
     expected = {

@@ -4,11 +4,14 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import jax
+import jax.numpy as jnp
 import optax
+from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import AlgorithmConfig, BPTTConfig, NetworkConfig, PPOConfig
 from e2efly.env import Env, EnvState
+from e2efly.learn.devices import AXIS
 from e2efly.learn.networks import Features
 
 for _config in (PPOConfig, BPTTConfig):
@@ -23,7 +26,7 @@ for _config in (PPOConfig, BPTTConfig):
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class TrainState:
-    """Everything that an update changes: what a checkpoint holds."""
+    """Everything that an update changes on one device: what a checkpoint holds of each."""
 
     parameters: Any
     """What is learned: a dataclass with at least `policy`."""
@@ -43,22 +46,48 @@ class Algorithm(Protocol):
     def update(
         self, env: Env, config: Any, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[TrainState, dict[str, Array]]:
-        """One update at `progress` in [0, 1] of the run: the new state, and scalar metrics."""
+        """One update at `progress` in [0, 1] of the run: the new state, and scalar metrics.
+
+        Runs on each device, on its own environments, inside `e2efly.learn.devices.on_each`.
+        """
         ...
 
 
 def adam(max_grad_norm: float | Array) -> optax.GradientTransformation:
-    """Adam's direction (the learning rate is applied by the algorithm) of the norm-clipped gradient.
-
-    Works on all parameters as one vector: a dozen small arrays take longer to compile than the rest of an update.
-    """
-    return optax.flatten(optax.chain(optax.clip_by_global_norm(max_grad_norm), optax.scale_by_adam()))
+    """Adam's direction of the norm-clipped gradient."""
+    return optax.chain(optax.clip_by_global_norm(max_grad_norm), optax.scale_by_adam())
 
 
 def begin(env: Env, config: AlgorithmConfig, parameters: Any, key: PRNGKeyArray) -> TrainState:
-    """The first state of a run: environments as started, the optimiser at rest."""
-    env_state, observation = env.reset(jax.random.fold_in(key, 0), config.envs)
-    return TrainState(parameters, adam(config.max_grad_norm).init(parameters), env_state, observation, key)
+    """A device's first state of a run: its environments as started, the optimiser at rest."""
+    key = jax.random.fold_in(key, jax.lax.axis_index(AXIS))
+    env_state, observation = env.reset(jax.random.fold_in(key, 0), config.envs // jax.lax.axis_size(AXIS))
+    optimizer = adam(config.max_grad_norm).init(ravel_pytree(parameters)[0])
+    return TrainState(parameters, optimizer, env_state, observation, key)
+
+
+def descend(
+    config: AlgorithmConfig, rate: Float[Array, ""], parameters: Any, optimizer: Any, gradient: Any
+) -> tuple[Any, Any, Float[Array, ""]]:
+    """A step of Adam against the mean gradient of all devices.
+
+    Works on all parameters as one vector: a dozen small arrays take longer to compile, to add up over the devices and
+    to step than the rest of an update.
+
+    Returns:
+        The new parameters, the new state of the optimiser, and the gradient's norm.
+    """
+    flat, shaped = ravel_pytree(gradient)
+    flat = jax.lax.pmean(flat, AXIS)
+    direction, optimizer = adam(config.max_grad_norm).update(flat, optimizer)
+    parameters = jax.tree.map(lambda p, d: p - rate * d, parameters, shaped(direction))
+    return parameters, optimizer, jnp.linalg.norm(flat)
+
+
+def episode_metrics(done: Array, success: Array) -> dict[str, Array]:
+    """How many episodes ended on all devices, and the share of them that met the criterion."""
+    episodes, successes = jax.lax.psum((jnp.sum(done), jnp.sum(success)), AXIS)
+    return {"episodes": episodes, "train_success": successes / jnp.maximum(episodes, 1)}
 
 
 def annealed(config: AlgorithmConfig, progress: Float[Array, ""]) -> Float[Array, ""]:

@@ -7,17 +7,17 @@ not depend on what came before.
 
 import dataclasses
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optax
 from jaxtyping import Array, Float
 
 from e2efly.config import BPTTConfig, NetworkConfig
 from e2efly.env import Env, EnvState, Step
-from e2efly.learn.algorithm import TrainState, adam, annealed
+from e2efly.learn.algorithm import TrainState, annealed, descend, episode_metrics
 from e2efly.learn.networks import Features, Layers, init_policy, policy
 
 
@@ -62,9 +62,8 @@ class BPTT:
 
         grads, (env_state, observation, metrics) = jax.grad(loss, has_aux=True)(state.parameters)
         rate = annealed(config, progress)
-        updates, optimizer = adam(config.max_grad_norm).update(grads, state.optimizer)
-        parameters = jax.tree.map(lambda p, u: p - rate * u, state.parameters, updates)
-        metrics["loss/gradient_norm"] = optax.tree.norm(grads)
+        parameters, optimizer, norm = descend(config, rate, state.parameters, state.optimizer, grads)
+        metrics["loss/gradient_norm"] = norm
         return dataclasses.replace(
             state, parameters=parameters, optimizer=optimizer, env=env_state, observation=observation
         ), metrics
@@ -72,7 +71,8 @@ class BPTT:
     def _window(self, env: Env, config: BPTTConfig, parameters: Parameters, state: TrainState) -> tuple[Array, Any]:
         keep = jnp.exp(-config.gradient_decay * env.control_period)
 
-        @jax.checkpoint  # recomputing a step is faster than storing it, and far smaller
+        # recomputing a step is faster than storing it, and far smaller, but for the products of matrices
+        @partial(jax.checkpoint, policy=jax.checkpoint_policies.dots_saveable)
         def fly(parameters: Parameters, env_state: EnvState, observation: Array) -> tuple[EnvState, Step]:
             action = policy(parameters.policy, self.features(observation), self.network.activation)
             return env.advance(env_state, action)
@@ -94,8 +94,7 @@ class BPTT:
         reward, done, success, terms = gathered
         metrics = {
             "reward": jnp.mean(reward),
-            "episodes": jnp.sum(done),
-            "train_success": jnp.sum(success) / jnp.maximum(jnp.sum(done), 1),
+            **episode_metrics(done, success),
             **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()},
         }
         return -jnp.sum(gain) / config.horizon, (env_state, observation, metrics)

@@ -10,12 +10,11 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optax
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import NetworkConfig, PPOConfig
 from e2efly.env import Env, EnvState
-from e2efly.learn.algorithm import TrainState, adam, annealed
+from e2efly.learn.algorithm import TrainState, annealed, descend, episode_metrics
 from e2efly.learn.networks import Features, Layers, init_mlp, init_policy, mlp, policy
 
 
@@ -111,19 +110,18 @@ class PPO:
         """
         key, rollout_key, epoch_key = jax.random.split(state.key, 3)
         samples, env_state, observation, metrics = self._rollout(env, config, state, rollout_key)
-        size = config.envs * config.horizon
+        size, batches_an_epoch = samples.advantage.size, config.envs * config.horizon // config.minibatch
         # one sort of random bits: sorting is slow on a CPU, so that both epochs share the order
         order = jnp.argsort(jax.random.bits(epoch_key, (size,)))
         flat = jax.tree.map(lambda x: x.reshape(size, *x.shape[2:])[order], samples)
-        batches = jax.tree.map(lambda x: x.reshape(-1, config.minibatch, *x.shape[1:]), flat)
+        batches = jax.tree.map(lambda x: x.reshape(batches_an_epoch, -1, *x.shape[1:]), flat)
         rate = annealed(config, progress)
 
         def minibatch(carry: tuple[Parameters, Any], batch: Samples) -> tuple[tuple[Parameters, Any], dict[str, Array]]:
             parameters, optimizer = carry
             grads, losses = jax.grad(self._loss, has_aux=True)(parameters, config, batch)
-            updates, optimizer = adam(config.max_grad_norm).update(grads, optimizer)
-            parameters = jax.tree.map(lambda p, u: p - rate * u, parameters, updates)
-            return (parameters, optimizer), {**losses, "gradient_norm": optax.tree.norm(grads)}
+            parameters, optimizer, norm = descend(config, rate, parameters, optimizer, grads)
+            return (parameters, optimizer), {**losses, "gradient_norm": norm}
 
         def epoch(carry: tuple[Parameters, Any], _: None) -> tuple[Any, dict[str, Array]]:
             return jax.lax.scan(minibatch, carry, batches)
@@ -140,7 +138,7 @@ class PPO:
     ) -> tuple[Samples, EnvState, Array, dict[str, Array]]:
         parameters = state.parameters
         activation = self.network.activation
-        noise = jax.random.normal(key, (config.horizon, config.envs, 4))
+        noise = jax.random.normal(key, (config.horizon, *state.observation.shape[:1], 4))
 
         def step(carry: tuple[EnvState, Array], z: Array) -> tuple[tuple[EnvState, Array], Any]:
             env_state, observation = carry
@@ -167,11 +165,9 @@ class PPO:
         advantage = gae(reward, value, next_value, terminated, done, config.gamma, config.gae_lambda)
         density = -jnp.sum(0.5 * noise**2 + parameters.log_std + 0.5 * jnp.log(2 * jnp.pi), axis=-1)
         samples = Samples(features, action, density, advantage, advantage + value)
-        ended = jnp.maximum(jnp.sum(done), 1.0)
         metrics = {
             "reward": jnp.mean(reward),
-            "episodes": jnp.sum(done),
-            "train_success": jnp.sum(success) / ended,
+            **episode_metrics(done, success),
             **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()},
         }
         return samples, env_state, observation, metrics

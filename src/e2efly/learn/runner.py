@@ -26,6 +26,7 @@ from e2efly.env import Env, random_key
 from e2efly.evaluate import Episodes, run_episodes
 from e2efly.learn.algorithm import Algorithm, TrainState, begin, make_algorithm
 from e2efly.learn.checkpoint import load_checkpoint, read_about, save_checkpoint
+from e2efly.learn.devices import AXIS, OWN, SAME, on_each, own, placed, share, stacked
 from e2efly.learn.clock import peak_memory, since_process_start
 from e2efly.learn.networks import Features, Layers, policy
 from e2efly.learn.rundir import RunDirectory, differences, versions
@@ -61,6 +62,8 @@ class Setup:
     features: Features
     updates: int
     """Updates of the whole run."""
+    devices: int
+    """Devices that share the environments."""
 
     @staticmethod
     def of(config: TrainConfig) -> "Setup":
@@ -75,7 +78,9 @@ class Setup:
         algorithm = make_algorithm(config.algo, env, config.network)
         per_update = config.algo.envs * config.algo.horizon
         chunks = math.ceil(config.steps / (per_update * config.chunk))
-        return Setup(config, env, judges, algorithm, Features(env.fields), chunks * config.chunk)
+        devices = share(config.algo.envs, getattr(config.algo, "minibatch", None), config.devices)
+        config = dataclasses.replace(config, devices=devices)
+        return Setup(config, env, judges, algorithm, Features(env.fields), chunks * config.chunk, devices)
 
     @property
     def steps_per_update(self) -> int:
@@ -113,24 +118,21 @@ class Programs:
             def update(state: TrainState, index: jax.Array) -> tuple[TrainState, dict[str, jax.Array]]:
                 return setup.algorithm.update(env, algo, state, index / updates)
 
-            return jax.lax.scan(update, state, first + jnp.arange(config.chunk))
-
-        def start(env: Env, parameters: Any, key: jax.Array) -> TrainState:
-            return begin(env, config.algo, parameters, key)
+            state, metrics = jax.lax.scan(update, own(state), first + jnp.arange(config.chunk))
+            return stacked(state), jax.lax.pmean(metrics, AXIS)
 
         options: dict[str, Any] = FAST_COMPILE if config.fast_compile and jax.default_backend() == "cpu" else {}
 
         def train_programs() -> Any:
-            state = jax.eval_shape(start, env, parameters, key)
-            program = jax.jit(chunk, donate_argnums=2)
+            state = jax.eval_shape(start_program(setup), env, parameters, key)
+            program = on_each(chunk, setup.devices, (SAME, SAME, OWN, SAME, SAME), (OWN, SAME), donate=(2,))
             return program.lower(env, config.algo, state, 0, setup.updates).compile(compiler_options=options)
 
         def other_programs() -> tuple[Any, Any]:
-            act = evaluation(setup)
             judge = next(iter(setup.judges.values()))
             return (
-                jax.jit(start).lower(env, parameters, key).compile(compiler_options=options),
-                act.lower(judge, parameters.policy, key).compile(compiler_options=options),
+                start_program(setup).lower(env, parameters, key).compile(compiler_options=options),
+                evaluation(setup).lower(judge, parameters.policy, key).compile(compiler_options=options),
             )
 
         with ThreadPoolExecutor(2) as pool:
@@ -138,28 +140,44 @@ class Programs:
             return Programs(other.result()[0], training.result(), other.result()[1])
 
 
+def start_program(setup: Setup) -> Any:
+    """The program (environment, parameters, key) -> the first `TrainState` of each device."""
+
+    def start(env: Env, parameters: Any, key: jax.Array) -> TrainState:
+        return stacked(begin(env, setup.config.algo, parameters, key))
+
+    return on_each(start, setup.devices, (SAME, SAME, SAME), OWN)
+
+
 def evaluation(setup: Setup) -> Any:
-    """The program (environment, policy layers, key) -> `Episodes` of `eval_episodes` starts."""
-    activation, features = setup.config.network.activation, setup.features
+    """The program (environment, policy layers, key) -> `Episodes` of `eval_episodes` starts, or a few repeated more."""
+    config, features = setup.config, setup.features
 
     def evaluate(env: Env, layers: Layers, key: jax.Array) -> Episodes:
-        act = lambda observation: policy(layers, features(observation), activation)  # noqa: E731
-        return run_episodes(env, act, key, setup.config.eval_episodes, setup.episode_steps, setup.settle)
+        act = lambda observation: policy(layers, features(observation), config.network.activation)  # noqa: E731
+        part = jax.lax.axis_index(AXIS), setup.devices
+        return run_episodes(env, act, key, config.eval_episodes, setup.episode_steps, setup.settle, part)
 
-    return jax.jit(evaluate)
+    return on_each(evaluate, setup.devices, (SAME, SAME, SAME), OWN)
 
 
 def judge(
     setup: Setup, evaluate: Any, layers: Layers, stream: int, episodes: int, seed: int = 0
 ) -> dict[str, Episodes]:
     """Fly at least `episodes` starts of a stream for every criterion; NumPy arrays."""
-    rounds = math.ceil(episodes / setup.config.eval_episodes)
+    once = setup.config.eval_episodes
     flown = {}
     for name, env in setup.judges.items():
-        keys = [jax.random.fold_in(jax.random.fold_in(random_key(seed), stream), i) for i in range(rounds)]
-        parts = [jax.tree.map(np.asarray, evaluate(env, layers, key)) for key in keys]
+        stream_key = jax.random.fold_in(random_key(seed), stream)
+        keys = [jax.random.fold_in(stream_key, i) for i in range(math.ceil(episodes / once))]
+        parts = [jax.tree.map(lambda x: np.asarray(x)[:once], evaluate(env, layers, key)) for key in keys]
         flown[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
     return flown
+
+
+def policy_of(state: TrainState) -> Layers:
+    """The policy on the host: every device has the same."""
+    return jax.tree.map(lambda x: np.asarray(x)[0], state.parameters.policy)
 
 
 def success(flown: dict[str, Episodes]) -> float:
@@ -216,9 +234,9 @@ def train(config: TrainConfig, out: Path, reporter: Reporter, resume: bool = Fal
     run = RunDirectory(out)
     setup = Setup.of(config)
     if resume:
-        _check_resume(run, config)
+        _check_resume(run, setup.config)
     else:
-        run.create(config)
+        run.create(setup.config)
     parameters = setup.algorithm.init(setup.env, config.algo, config.seed)
     reporter.compiling()
     programs = Programs.compile(setup, parameters)
@@ -226,7 +244,7 @@ def train(config: TrainConfig, out: Path, reporter: Reporter, resume: bool = Fal
     progress, best = Progress(), parameters.policy
     if resume and run.checkpoint.exists():
         loaded = load_checkpoint(run.checkpoint, _checkpoint_like(setup, parameters))
-        state, best = jax.device_put(loaded["state"]), loaded["best"]
+        state, best = placed(loaded["state"], setup.devices), loaded["best"]
         progress = Progress(**{f.name: read_about(run.checkpoint)[f.name] for f in dataclasses.fields(Progress)})
     else:
         state = programs.begin(setup.env, parameters, key)
@@ -250,10 +268,11 @@ def _loop(
             metrics = {name: np.asarray(x, np.float64) for name, x in metrics.items()}
             _check_finite(metrics, progress.update)
             rate = config.chunk * setup.steps_per_update / (time.perf_counter() - began)
-            flown = judge(setup, programs.evaluate, state.parameters.policy, WATCHED, config.eval_episodes)
+            layers = policy_of(state)
+            flown = judge(setup, programs.evaluate, layers, WATCHED, config.eval_episodes)
             reached, last, now = progress.reached, success(flown), score(task, flown)
             if config.stop_at and not reached and last >= config.stop_at:
-                confirmed = judge(setup, programs.evaluate, state.parameters.policy, REPORTED, REPORT_EPISODES)
+                confirmed = judge(setup, programs.evaluate, layers, REPORTED, REPORT_EPISODES)
                 if success(confirmed) >= config.stop_at:
                     steps = (progress.update + config.chunk) * setup.steps_per_update
                     reached = {"seconds": before + since_process_start(), "steps": steps}
@@ -268,7 +287,7 @@ def _loop(
                 reached=reached,
             )
             if better:
-                best = jax.tree.map(np.asarray, state.parameters.policy)
+                best = layers
             rows = _rows(setup, metrics, progress, rate, flown)
             run.append(rows)
             for name, value in rows[-1].items():
@@ -295,7 +314,7 @@ def _finish(
     trained = progress.seconds
     config = setup.config
     by_best = judge(setup, programs.evaluate, best, REPORTED, REPORT_EPISODES)
-    by_last = judge(setup, programs.evaluate, state.parameters.policy, REPORTED, REPORT_EPISODES)
+    by_last = judge(setup, programs.evaluate, policy_of(state), REPORTED, REPORT_EPISODES)
     export_policy(run.policy, best, setup.features, config.network.activation, contract_of(setup.env, config))
     summary = {
         "task": presets.task_name(config.task),
@@ -404,12 +423,10 @@ def load_policy_layers(setup: Setup, run: RunDirectory, which: str) -> Layers:
     """
     parameters = setup.algorithm.init(setup.env, setup.config.algo, setup.config.seed)
     loaded = load_checkpoint(run.checkpoint, _checkpoint_like(setup, parameters))
-    return loaded["best"] if which == "best" else loaded["state"].parameters.policy
+    return loaded["best"] if which == "best" else policy_of(loaded["state"])
 
 
 def _checkpoint_like(setup: Setup, parameters: Any) -> dict[str, Any]:
     """Shapes and types of what a checkpoint holds."""
-    state = jax.eval_shape(
-        lambda env, p, key: begin(env, setup.config.algo, p, key), setup.env, parameters, random_key(0)
-    )
+    state = jax.eval_shape(start_program(setup), setup.env, parameters, random_key(0))
     return {"state": state, "best": parameters.policy}

@@ -1,0 +1,80 @@
+"""The environments of a run, shared out among the devices: one program, each device on its part.
+
+Within a program made by `on_each` every device has environments, random numbers and a replica of the parameters of its
+own; gradients and metrics are averaged over the axis `AXIS`. The cores of a CPU count as devices: two threads that each
+step their own vehicles take half the time, while two that share every small array operation take longer than one.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+from jax.sharding import AxisType, Mesh, NamedSharding, PartitionSpec
+
+AXIS = "devices"
+"""Name of the axis over which a program may take means and sums."""
+SAME, OWN = PartitionSpec(), PartitionSpec(AXIS)
+"""A value that every device has, and one whose leading axis is shared out."""
+LEAST = 32
+"""Environments that a device should have at least."""
+
+
+def share(envs: int, minibatch: int | None, asked: int | None) -> int:
+    """How many devices to share `envs` environments among: as many as divide the work, each with `LEAST` or more.
+
+    Args:
+        envs: environments of the run.
+        minibatch: samples of a gradient step, where there are minibatches.
+        asked: what the user wants; None: as many as there are.
+
+    Raises:
+        ValueError: when so many are not to be had or do not divide the work.
+    """
+
+    def divides(count: int) -> bool:
+        return envs % count == 0 and (minibatch or 0) % count == 0
+
+    found = len(jax.devices())
+    if asked is None:
+        most = max(1, min(found, envs // LEAST))
+        return next(count for count in range(most, 0, -1) if divides(count))
+    if not 1 <= asked <= found:
+        raise ValueError(f"devices is {asked}; accepted: 1 to {found}, which JAX has here")
+    if not divides(asked):
+        raise ValueError(f"devices is {asked}; accepted: a divisor of algo.envs ({envs}) and of algo.minibatch")
+    return asked
+
+
+def mesh(count: int) -> Mesh:
+    """The first `count` devices."""
+    return jax.make_mesh((count,), (AXIS,), axis_types=(AxisType.Auto,), devices=jax.devices()[:count])
+
+
+def on_each(function: Callable, count: int, takes: Any, returns: Any, donate: tuple[int, ...] = ()) -> Any:
+    """`function`, compiled to run on each of `count` devices.
+
+    Args:
+        function: of the device's own parts; it may use collectives over `AXIS`.
+        count: devices.
+        takes: `SAME` or `OWN` for each argument (a tree of them for the parts of one).
+        returns: the same for the result.
+        donate: arguments whose memory the result may take.
+    """
+    place = lambda specs: jax.tree.map(lambda s: NamedSharding(mesh(count), s), specs)  # noqa: E731
+    mapped = jax.shard_map(function, mesh=mesh(count), in_specs=takes, out_specs=returns, check_vma=False)
+    return jax.jit(mapped, in_shardings=place(takes), out_shardings=place(returns), donate_argnums=donate)
+
+
+def placed(tree: Any, count: int) -> Any:
+    """A tree from the host, with the leading axis of every leaf shared out."""
+    return jax.device_put(tree, NamedSharding(mesh(count), OWN))
+
+
+def own(tree: Any) -> Any:
+    """The device's part of a tree whose leaves have one entry a device."""
+    return jax.tree.map(lambda x: x[0], tree)
+
+
+def stacked(tree: Any) -> Any:
+    """The device's part with the leading axis that `own` takes off."""
+    return jax.tree.map(lambda x: x[None], tree)
