@@ -107,7 +107,8 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
     weights = ", ".join(f"{name} {weight:g}" for name, weight in config.reward.weights.items())
     options.__doc__ = f"Train a policy ({task}, {algo}). The defaults are the preset {preset!r}'s; reward: {weights}."
     top = {
-        name: getattr(config, name) for name in ("seed", "steps", "chunk", "eval_episodes", "devices", "fast_compile", "stop_at")
+        name: getattr(config, name)
+        for name in ("seed", "steps", "chunk", "eval_episodes", "devices", "fast_compile", "stop_at")
     }
     parts = {name: getattr(config, name) for name in ("env", "task", "algo", "network")}
     parts["reward"] = RewardConfig()  # changes to the preset's; a filled dictionary would take no new names

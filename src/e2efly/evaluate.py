@@ -41,7 +41,13 @@ class Episodes:
 
 
 def run_episodes(
-    env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int, settle: float = 0.0, part: tuple[Array | int, int] = (0, 1)
+    env: Env,
+    act: Act,
+    key: PRNGKeyArray,
+    n: int,
+    steps: int,
+    settle: float = 0.0,
+    part: tuple[Array | int, int] = (0, 1),
 ) -> Episodes:
     """Fly episodes of at most `steps` control steps; each stands still once it has ended.
 

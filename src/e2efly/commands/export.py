@@ -12,7 +12,8 @@ def export_command(run_path: Path, out: Path | None, which: str) -> int:
     prepare("cpu")
     from e2efly.learn.export import contract_of, export_policy
     from e2efly.learn.rundir import RunDirectory
-    from e2efly.learn.runner import Setup, load_policy_layers
+    from e2efly.learn.runner import load_policy_layers
+    from e2efly.learn.setup import Setup
 
     run = RunDirectory(run_path)
     setup = Setup.of(run.config())

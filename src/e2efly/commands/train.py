@@ -8,7 +8,7 @@ from rich.table import Table
 
 from e2efly.commands.progress import TerminalProgress
 from e2efly.config import TrainConfig
-from e2efly.device import prepare
+from e2efly.device import cache_folder, prepare
 from e2efly.presets import algorithm_name, task_name
 
 
@@ -20,7 +20,7 @@ def train_command(config: TrainConfig, out: Path, resume: bool, device: str | No
     console = Console(highlight=False)
     task, algo = task_name(config.task), algorithm_name(config.algo)
     with TerminalProgress(console, f"{task} by {algo}") as progress:
-        summary = train(config, out, progress, resume)
+        summary = train(config, out, progress, resume, traced=cache_folder() / "traced")
     _report(console, summary)
     if summary["stopped_by_user"]:
         console.print(f"Stopped. Go on with: e2efly train {task} --algo {algo} --out {out} --resume")

@@ -13,7 +13,7 @@ from e2efly import presets
 from e2efly.config import BPTTConfig, EnvConfig, NetworkConfig
 from e2efly.env import Env, random_key
 from e2efly.learn.algorithm import begin
-from e2efly.learn.runner import Setup
+from e2efly.learn.setup import Setup
 from e2efly.physics import Physics, State, step
 from e2efly.vehicles import load_vehicle
 

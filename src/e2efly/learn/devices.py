@@ -60,14 +60,20 @@ def on_each(function: Callable, count: int, takes: Any, returns: Any, donate: tu
         returns: the same for the result.
         donate: arguments whose memory the result may take.
     """
-    place = lambda specs: jax.tree.map(lambda s: NamedSharding(mesh(count), s), specs)  # noqa: E731
     mapped = jax.shard_map(function, mesh=mesh(count), in_specs=takes, out_specs=returns, check_vma=False)
-    return jax.jit(mapped, in_shardings=place(takes), out_shardings=place(returns), donate_argnums=donate)
+    return jax.jit(
+        mapped, in_shardings=shardings(takes, count), out_shardings=shardings(returns, count), donate_argnums=donate
+    )
+
+
+def shardings(places: Any, count: int) -> Any:
+    """JAX's shardings of a tree of `SAME` and `OWN`."""
+    return jax.tree.map(lambda place: NamedSharding(mesh(count), place), places)
 
 
 def placed(tree: Any, count: int) -> Any:
     """A tree from the host, with the leading axis of every leaf shared out."""
-    return jax.device_put(tree, NamedSharding(mesh(count), OWN))
+    return jax.device_put(tree, shardings(OWN, count))
 
 
 def own(tree: Any) -> Any:

@@ -10,32 +10,29 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from e2efly import presets
 from e2efly.config import TrainConfig
-from e2efly.env import Env, random_key
-from e2efly.evaluate import Episodes, run_episodes
-from e2efly.learn.algorithm import Algorithm, TrainState, begin, make_algorithm
+from e2efly.env import random_key
+from e2efly.evaluate import Episodes
+from e2efly.learn.algorithm import TrainState
 from e2efly.learn.checkpoint import load_checkpoint, read_about, save_checkpoint
-from e2efly.learn.devices import AXIS, OWN, SAME, on_each, own, placed, share, stacked
 from e2efly.learn.clock import peak_memory, since_process_start
-from e2efly.learn.networks import Features, Layers, policy
+from e2efly.learn.devices import placed
+from e2efly.learn.judge import REPORTED, WATCHED, digest, judge, score, success
+from e2efly.learn.networks import Layers
+from e2efly.learn.programs import Programs, start_program
 from e2efly.learn.rundir import RunDirectory, differences, versions
+from e2efly.learn.setup import Setup
 
-WATCHED, REPORTED = 1, 2
-"""Streams of starts: those that training watches, and the unseen ones of the report."""
 REPORT_EPISODES = 1000
-FAST_COMPILE: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
-"""XLA options for programs that run for seconds only."""
 
 
 class Reporter(Protocol):
@@ -48,152 +45,6 @@ class Reporter(Protocol):
     def progress(self, steps: int, total: int, rate: float, success: float, best: float) -> None:
         """Environment steps done, of how many, steps/s, success of the last and of the best evaluation."""
         ...
-
-
-@dataclass(frozen=True)
-class Setup:
-    """What a configuration comes to, before anything is compiled."""
-
-    config: TrainConfig
-    env: Env
-    judges: dict[str, Env]
-    """The environments of the evaluation, by the name of their criterion."""
-    algorithm: Algorithm
-    features: Features
-    updates: int
-    """Updates of the whole run."""
-    devices: int
-    """Devices that share the environments."""
-
-    @staticmethod
-    def of(config: TrainConfig) -> "Setup":
-        """Build and check everything that a configuration names.
-
-        Raises:
-            ValueError: naming the field, the value and what is accepted.
-        """
-        presets.check(config)
-        env = Env.of(config.task, config.reward, config.env)
-        judges = {name: Env.of(t, config.reward, config.env) for name, t in presets.suites(config.task).items()}
-        algorithm = make_algorithm(config.algo, env, config.network)
-        per_update = config.algo.envs * config.algo.horizon
-        chunks = math.ceil(config.steps / (per_update * config.chunk))
-        devices = share(config.algo.envs, getattr(config.algo, "minibatch", None), config.devices)
-        config = dataclasses.replace(config, devices=devices)
-        return Setup(config, env, judges, algorithm, Features(env.fields), chunks * config.chunk, devices)
-
-    @property
-    def steps_per_update(self) -> int:
-        """Environment steps of one update."""
-        return self.config.algo.envs * self.config.algo.horizon
-
-    @property
-    def episode_steps(self) -> int:
-        """Control steps of the longest episode."""
-        return math.ceil(float(self.config.task.episode_s) / self.env.control_period - 1e-6)
-
-    @property
-    def settle(self) -> float:
-        """Seconds after which the mean error counts."""
-        return float(getattr(self.config.task, "settle_s", 0.0))
-
-
-@dataclass(frozen=True)
-class Programs:
-    """The compiled programs of a run."""
-
-    begin: Any
-    chunk: Any
-    evaluate: Any
-
-    @staticmethod
-    def compile(setup: Setup, parameters: Any) -> "Programs":
-        """Compile the training and the evaluation side by side, on two threads."""
-        config, env = setup.config, setup.env
-        key = random_key(config.seed)
-
-        def chunk(
-            env: Env, algo: Any, state: TrainState, first: jax.Array, updates: jax.Array
-        ) -> tuple[TrainState, dict[str, jax.Array]]:
-            def update(state: TrainState, index: jax.Array) -> tuple[TrainState, dict[str, jax.Array]]:
-                return setup.algorithm.update(env, algo, state, index / updates)
-
-            state, metrics = jax.lax.scan(update, own(state), first + jnp.arange(config.chunk))
-            return stacked(state), jax.lax.pmean(metrics, AXIS)
-
-        options: dict[str, Any] = FAST_COMPILE if config.fast_compile and jax.default_backend() == "cpu" else {}
-
-        def train_programs() -> Any:
-            state = jax.eval_shape(start_program(setup), env, parameters, key)
-            program = on_each(chunk, setup.devices, (SAME, SAME, OWN, SAME, SAME), (OWN, SAME), donate=(2,))
-            return program.lower(env, config.algo, state, 0, setup.updates).compile(compiler_options=options)
-
-        def other_programs() -> tuple[Any, Any]:
-            judge = next(iter(setup.judges.values()))
-            return (
-                start_program(setup).lower(env, parameters, key).compile(compiler_options=options),
-                evaluation(setup).lower(judge, parameters.policy, key).compile(compiler_options=options),
-            )
-
-        with ThreadPoolExecutor(2) as pool:
-            training, other = pool.submit(train_programs), pool.submit(other_programs)
-            return Programs(other.result()[0], training.result(), other.result()[1])
-
-
-def start_program(setup: Setup) -> Any:
-    """The program (environment, parameters, key) -> the first `TrainState` of each device."""
-
-    def start(env: Env, parameters: Any, key: jax.Array) -> TrainState:
-        return stacked(begin(env, setup.config.algo, parameters, key))
-
-    return on_each(start, setup.devices, (SAME, SAME, SAME), OWN)
-
-
-def evaluation(setup: Setup) -> Any:
-    """The program (environment, policy layers, key) -> `Episodes` of `eval_episodes` starts, or a few repeated more."""
-    config, features = setup.config, setup.features
-
-    def evaluate(env: Env, layers: Layers, key: jax.Array) -> Episodes:
-        act = lambda observation: policy(layers, features(observation), config.network.activation)  # noqa: E731
-        part = jax.lax.axis_index(AXIS), setup.devices
-        return run_episodes(env, act, key, config.eval_episodes, setup.episode_steps, setup.settle, part)
-
-    return on_each(evaluate, setup.devices, (SAME, SAME, SAME), OWN)
-
-
-def judge(
-    setup: Setup, evaluate: Any, layers: Layers, stream: int, episodes: int, seed: int = 0
-) -> dict[str, Episodes]:
-    """Fly at least `episodes` starts of a stream for every criterion; NumPy arrays."""
-    once = setup.config.eval_episodes
-    flown = {}
-    for name, env in setup.judges.items():
-        stream_key = jax.random.fold_in(random_key(seed), stream)
-        keys = [jax.random.fold_in(stream_key, i) for i in range(math.ceil(episodes / once))]
-        parts = [jax.tree.map(lambda x: np.asarray(x)[:once], evaluate(env, layers, key)) for key in keys]
-        flown[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
-    return flown
-
-
-def policy_of(state: TrainState) -> Layers:
-    """The policy on the host: every device has the same."""
-    return jax.tree.map(lambda x: np.asarray(x)[0], state.parameters.policy)
-
-
-def success(flown: dict[str, Episodes]) -> float:
-    """The success rate of the worst criterion."""
-    return min(float(np.mean(e.success)) for e in flown.values())
-
-
-def score(task: str, flown: dict[str, Episodes]) -> float:
-    """What the best policy is chosen by: success first, then precision (racing: lap time)."""
-
-    def cost(e: Episodes) -> float:
-        if task == "race":
-            return float(np.mean(e.duration)) / 10
-        return float(np.mean(e.mean_error if task == "track" else e.final_error))
-
-    return min(float(np.mean(e.success)) - 0.1 * min(cost(e), 1.0) for e in flown.values())
 
 
 @dataclass(frozen=True)
@@ -214,7 +65,9 @@ class NonFiniteError(FloatingPointError):
     """A loss or reward term was not finite."""
 
 
-def train(config: TrainConfig, out: Path, reporter: Reporter, resume: bool = False) -> dict[str, Any]:
+def train(
+    config: TrainConfig, out: Path, reporter: Reporter, resume: bool = False, traced: Path | None = None
+) -> dict[str, Any]:
     """Train a policy into a run directory.
 
     Args:
@@ -222,6 +75,7 @@ def train(config: TrainConfig, out: Path, reporter: Reporter, resume: bool = Fal
         out: the run directory: new, or with `resume` an unfinished one.
         reporter: shows the progress.
         resume: go on from the checkpoint.
+        traced: a folder for traced programs, see `Programs.compile`.
 
     Returns:
         The summary that is also in summary.json.
@@ -239,7 +93,7 @@ def train(config: TrainConfig, out: Path, reporter: Reporter, resume: bool = Fal
         run.create(setup.config)
     parameters = setup.algorithm.init(setup.env, config.algo, config.seed)
     reporter.compiling()
-    programs = Programs.compile(setup, parameters)
+    programs = Programs.compile(setup, parameters, traced)
     key = random_key(config.seed)
     progress, best = Progress(), parameters.policy
     if resume and run.checkpoint.exists():
@@ -336,17 +190,9 @@ def _finish(
     return summary
 
 
-def digest(e: Episodes) -> dict[str, float]:
-    """Means over episodes, and over the successful ones for the time."""
-    ok = np.asarray(e.success)
-    return {
-        "success": round(float(np.mean(ok)), 4),
-        "final_error_m": round(float(np.mean(e.final_error)), 5),
-        "mean_error_m": round(float(np.mean(e.mean_error)), 5),
-        "seconds_of_success": round(float(np.mean(e.duration[ok])), 4) if ok.any() else math.nan,
-        "top_speed_m_s": round(float(np.max(e.top_speed)), 3),
-        "roughness": round(float(np.mean(e.roughness)), 5),
-    }
+def policy_of(state: TrainState) -> Layers:
+    """The policy on the host: every device has the same."""
+    return jax.tree.map(lambda x: np.asarray(x)[0], state.parameters.policy)
 
 
 def _rows(

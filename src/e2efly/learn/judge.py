@@ -1,0 +1,58 @@
+"""How good a policy is: episodes of every criterion, and what to make of them."""
+
+import math
+from typing import Any
+
+import jax
+import numpy as np
+
+from e2efly.env import random_key
+from e2efly.evaluate import Episodes
+from e2efly.learn.networks import Layers
+from e2efly.learn.setup import Setup
+
+WATCHED, REPORTED = 1, 2
+"""Streams of starts: those that training watches, and the unseen ones of the report."""
+
+
+def judge(
+    setup: Setup, evaluate: Any, layers: Layers, stream: int, episodes: int, seed: int = 0
+) -> dict[str, Episodes]:
+    """Fly at least `episodes` starts of a stream for every criterion; NumPy arrays."""
+    once = setup.config.eval_episodes
+    flown = {}
+    for name, env in setup.judges.items():
+        stream_key = jax.random.fold_in(random_key(seed), stream)
+        keys = [jax.random.fold_in(stream_key, i) for i in range(math.ceil(episodes / once))]
+        parts = [jax.tree.map(lambda x: np.asarray(x)[:once], evaluate(env, layers, key)) for key in keys]
+        flown[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
+    return flown
+
+
+def success(flown: dict[str, Episodes]) -> float:
+    """The success rate of the worst criterion."""
+    return min(float(np.mean(e.success)) for e in flown.values())
+
+
+def score(task: str, flown: dict[str, Episodes]) -> float:
+    """What the best policy is chosen by: success first, then precision (racing: lap time)."""
+
+    def cost(e: Episodes) -> float:
+        if task == "race":
+            return float(np.mean(e.duration)) / 10
+        return float(np.mean(e.mean_error if task == "track" else e.final_error))
+
+    return min(float(np.mean(e.success)) - 0.1 * min(cost(e), 1.0) for e in flown.values())
+
+
+def digest(e: Episodes) -> dict[str, float]:
+    """Means over episodes, and over the successful ones for the time."""
+    ok = np.asarray(e.success)
+    return {
+        "success": round(float(np.mean(ok)), 4),
+        "final_error_m": round(float(np.mean(e.final_error)), 5),
+        "mean_error_m": round(float(np.mean(e.mean_error)), 5),
+        "seconds_of_success": round(float(np.mean(e.duration[ok])), 4) if ok.any() else math.nan,
+        "top_speed_m_s": round(float(np.max(e.top_speed)), 3),
+        "roughness": round(float(np.mean(e.roughness)), 5),
+    }

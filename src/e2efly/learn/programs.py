@@ -1,0 +1,168 @@
+"""The compiled programs of a run, and the cache of what was traced.
+
+XLA's results are kept by JAX's own compilation cache. Tracing Python to reach them takes as long as a training, so that
+a second cache keeps the traced programs (StableHLO, by `jax.export`). It is for processes that run this package's code
+alone: its key knows the configuration, the vehicle and the files of the package, and no code of the user's.
+"""
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import jaxlib
+import numpy as np
+from jax import export
+
+from e2efly.env import Env, random_key
+from e2efly.evaluate import Episodes, run_episodes
+from e2efly.learn.algorithm import TrainState, begin
+from e2efly.learn.checkpoint import write_atomically
+from e2efly.learn.devices import AXIS, OWN, SAME, on_each, own, shardings, stacked
+from e2efly.learn.networks import Layers, policy
+from e2efly.learn.setup import Setup
+
+FAST_COMPILE: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
+"""XLA options for programs that run for seconds only."""
+
+
+@dataclass(frozen=True)
+class Programs:
+    """The compiled programs of a run."""
+
+    begin: Callable[[Env, Any, jax.Array], TrainState]
+    """(environment, parameters, key) -> the first state of each device."""
+    chunk: Callable[[Env, Any, TrainState, int, int], tuple[TrainState, dict[str, jax.Array]]]
+    """(environment, numbers of the algorithm, state, first update, updates of the run) -> the state after
+    `config.chunk` updates, and the metrics of each. The state that goes in is gone."""
+    evaluate: Callable[[Env, Layers, jax.Array], Episodes]
+    """(environment, policy layers, key) -> `eval_episodes` episodes, or a few repeated more."""
+
+    @staticmethod
+    def compile(setup: Setup, parameters: Any, traced: Path | None = None) -> "Programs":
+        """Compile the training while the evaluation is traced and compiled.
+
+        Args:
+            setup: the run.
+            parameters: of the algorithm, as started.
+            traced: a folder where traced programs are kept and found; None: trace anew. Only for processes in which
+                nothing of the package was replaced.
+        """
+        config, env = setup.config, setup.env
+        options = FAST_COMPILE if config.fast_compile and jax.default_backend() == "cpu" else {}
+        key = random_key(config.seed)
+        started = start_program(setup).trace(env, parameters, key)
+        state = started.out_info
+        training = (env, config.algo, state, 0, setup.updates)
+        evaluating = (next(iter(setup.judges.values())), parameters.policy, key)
+        of_leaves = _of_leaves(_chunk(setup), training, lambda out: (jax.tree.leaves(out[0]), out[1]))
+        lowered = _lower(of_leaves, setup, training, (SAME, SAME, OWN, SAME, SAME), (OWN, SAME), traced, "chunk")
+        with ThreadPoolExecutor(1) as pool:
+            compiling = pool.submit(lowered.compile, compiler_options=options)
+            of_leaves = _of_leaves(_evaluate(setup), evaluating, vars)
+            lowered = _lower(of_leaves, setup, evaluating, (SAME, SAME, SAME), OWN, traced, "evaluate")
+            start = started.lower().compile(compiler_options=options)
+            evaluate, chunk = lowered.compile(compiler_options=options), compiling.result()
+        structure = jax.tree.structure(state)
+
+        def run_chunk(*args: Any) -> tuple[TrainState, dict[str, jax.Array]]:
+            leaves, metrics = chunk(*jax.tree.leaves(args))
+            return jax.tree.unflatten(structure, leaves), metrics
+
+        return Programs(start, run_chunk, lambda *args: Episodes(**evaluate(*jax.tree.leaves(args))))
+
+
+def start_program(setup: Setup) -> Any:
+    """The program (environment, parameters, key) -> the first `TrainState` of each device."""
+
+    def start(env: Env, parameters: Any, key: jax.Array) -> TrainState:
+        return stacked(begin(env, setup.config.algo, parameters, key))
+
+    return on_each(start, setup.devices, (SAME, SAME, SAME), OWN)
+
+
+def _chunk(setup: Setup) -> Callable[..., tuple[TrainState, dict[str, jax.Array]]]:
+    def chunk(
+        env: Env, algo: Any, state: TrainState, first: jax.Array, updates: jax.Array
+    ) -> tuple[TrainState, dict[str, jax.Array]]:
+        def update(state: TrainState, index: jax.Array) -> tuple[TrainState, dict[str, jax.Array]]:
+            return setup.algorithm.update(env, algo, state, index / updates)
+
+        state, metrics = jax.lax.scan(update, own(state), first + jnp.arange(setup.config.chunk))
+        return stacked(state), jax.lax.pmean(metrics, AXIS)
+
+    return chunk
+
+
+def _evaluate(setup: Setup) -> Callable[[Env, Layers, jax.Array], Episodes]:
+    config, features = setup.config, setup.features
+
+    def evaluate(env: Env, layers: Layers, key: jax.Array) -> Episodes:
+        act = lambda observation: policy(layers, features(observation), config.network.activation)  # noqa: E731
+        part = jax.lax.axis_index(AXIS), setup.devices
+        return run_episodes(env, act, key, config.eval_episodes, setup.episode_steps, setup.settle, part)
+
+    return evaluate
+
+
+def _of_leaves(function: Callable, args: tuple, result: Callable[[Any], Any]) -> Callable:
+    """`function` of the leaves of its arguments: a traced program keeps no classes."""
+    structure = jax.tree.structure(args)
+    return lambda *leaves: result(function(*jax.tree.unflatten(structure, leaves)))
+
+
+def _lower(
+    function: Callable, setup: Setup, args: tuple, takes: tuple, returns: Any, traced: Path | None, name: str
+) -> jax.stages.Lowered:
+    """Trace a program of leaves, or find it traced, for compilation."""
+    places = tuple(place for arg, place in zip(args, takes, strict=True) for _ in jax.tree.leaves(arg))
+    leaves = jax.tree.leaves(args)
+    donated = tuple(i for i, place in enumerate(places) if place == OWN)
+    program = on_each(function, setup.devices, places, returns, donated)
+    if traced is None:
+        return program.lower(*leaves)
+    file = traced / f"{name}-{_fingerprint(setup, args)}"
+    found = _read(file)
+    if found is None:
+        found = bytes(export.export(program)(*leaves).serialize())
+        traced.mkdir(parents=True, exist_ok=True)
+        write_atomically(file, hashlib.sha256(found).digest() + found)
+    call = export.deserialize(bytearray(found)).call
+    return jax.jit(call, in_shardings=shardings(places, setup.devices), donate_argnums=donated).lower(*leaves)
+
+
+def _read(file: Path) -> bytes | None:
+    """The content of a cache file; None where it is missing or damaged: it is made again."""
+    if not file.is_file():
+        return None
+    data = file.read_bytes()
+    return data[32:] if hashlib.sha256(data[32:]).digest() == data[:32] else None
+
+
+def _fingerprint(setup: Setup, args: tuple) -> str:
+    """Of everything that a traced program depends on."""
+    config = dataclasses.asdict(dataclasses.replace(setup.config, seed=0, stop_at=None))
+    shapes = [(np.shape(x), str(x.dtype) if hasattr(x, "dtype") else type(x).__name__) for x in jax.tree.leaves(args)]
+    numbers = [np.asarray(x).tolist() for x in jax.tree.leaves((setup.env, setup.judges))]
+    device = jax.devices()[0]
+    about = [config, shapes, str(jax.tree.structure(args)), numbers, device.platform, device.device_kind,
+             jax.__version__, jaxlib.__version__, _source_hash()]  # fmt: skip
+    return hashlib.sha256(json.dumps(about, default=str).encode()).hexdigest()[:32]
+
+
+@cache
+def _source_hash() -> str:
+    """Of every file of the package."""
+    package = Path(str(resources.files("e2efly")))
+    total = hashlib.sha256()
+    for file in sorted(package.rglob("*.py")):
+        total.update(str(file.relative_to(package)).encode() + file.read_bytes())
+    return total.hexdigest()

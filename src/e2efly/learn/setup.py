@@ -1,0 +1,60 @@
+"""What a configuration comes to, before anything is compiled."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+from e2efly import presets
+from e2efly.config import TrainConfig
+from e2efly.env import Env
+from e2efly.learn.algorithm import Algorithm, make_algorithm
+from e2efly.learn.devices import share
+from e2efly.learn.networks import Features
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a configuration comes to, before anything is compiled."""
+
+    config: TrainConfig
+    env: Env
+    judges: dict[str, Env]
+    """The environments of the evaluation, by the name of their criterion."""
+    algorithm: Algorithm
+    features: Features
+    updates: int
+    """Updates of the whole run."""
+    devices: int
+    """Devices that share the environments."""
+
+    @staticmethod
+    def of(config: TrainConfig) -> "Setup":
+        """Build and check everything that a configuration names.
+
+        Raises:
+            ValueError: naming the field, the value and what is accepted.
+        """
+        presets.check(config)
+        env = Env.of(config.task, config.reward, config.env)
+        judges = {name: Env.of(t, config.reward, config.env) for name, t in presets.suites(config.task).items()}
+        algorithm = make_algorithm(config.algo, env, config.network)
+        per_update = config.algo.envs * config.algo.horizon
+        chunks = math.ceil(config.steps / (per_update * config.chunk))
+        devices = share(config.algo.envs, getattr(config.algo, "minibatch", None), config.devices)
+        config = dataclasses.replace(config, devices=devices)
+        return Setup(config, env, judges, algorithm, Features(env.fields), chunks * config.chunk, devices)
+
+    @property
+    def steps_per_update(self) -> int:
+        """Environment steps of one update."""
+        return self.config.algo.envs * self.config.algo.horizon
+
+    @property
+    def episode_steps(self) -> int:
+        """Control steps of the longest episode."""
+        return math.ceil(float(self.config.task.episode_s) / self.env.control_period - 1e-6)
+
+    @property
+    def settle(self) -> float:
+        """Seconds after which the mean error counts."""
+        return float(getattr(self.config.task, "settle_s", 0.0))
