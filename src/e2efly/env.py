@@ -35,9 +35,9 @@ DEFAULT = EnvConfig()
 """The VIS-R, nothing random but the starts."""
 
 
-def random_key(seed: int) -> PRNGKeyArray:
-    """The key of a seed."""
-    return jax.random.key(seed, impl=GENERATOR)
+def random_key(*seed: int) -> PRNGKeyArray:
+    """The key of a seed, or of several numbers; made by NumPy: nothing to compile."""
+    return jax.random.wrap_key_data(np.random.SeedSequence(seed).generate_state(4), impl=GENERATOR)
 
 
 @jax.tree_util.register_dataclass

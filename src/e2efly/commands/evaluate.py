@@ -93,7 +93,7 @@ def fly_suites(policy: Policy, task: TaskConfig, env_config: EnvConfig, episodes
         env = Env.of(suite, RewardConfig({"prog2": 1.0}), env_config)
         check_observation(policy, env)
         steps, settle = episode_steps(suite, env), float(getattr(suite, "settle_s", 0.0))
-        keys = [jax.random.fold_in(random_key(seed), i) for i in range(-(-episodes // BATCH))]
+        keys = [random_key(seed, i) for i in range(-(-episodes // BATCH))]
         parts = [jax.tree.map(np.asarray, program(env, key, steps, settle)) for key in keys]
         flown[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
     return flown

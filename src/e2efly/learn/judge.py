@@ -22,8 +22,7 @@ def judge(
     once = setup.config.eval_episodes
     flown = {}
     for name, env in setup.judges.items():
-        stream_key = jax.random.fold_in(random_key(seed), stream)
-        keys = [jax.random.fold_in(stream_key, i) for i in range(math.ceil(episodes / once))]
+        keys = [random_key(seed, stream, i) for i in range(math.ceil(episodes / once))]
         parts = [jax.tree.map(lambda x: np.asarray(x)[:once], evaluate(env, layers, key)) for key in keys]
         flown[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
     return flown

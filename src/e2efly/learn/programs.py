@@ -136,7 +136,8 @@ def _lower(
         traced.mkdir(parents=True, exist_ok=True)
         write_atomically(file, hashlib.sha256(found).digest() + found)
     call = export.deserialize(bytearray(found)).call
-    return jax.jit(call, in_shardings=shardings(places, setup.devices), donate_argnums=donated).lower(*leaves)
+    inside, outside = shardings(places, setup.devices), shardings(returns, setup.devices)
+    return jax.jit(call, in_shardings=inside, out_shardings=outside, donate_argnums=donated).lower(*leaves)
 
 
 def _read(file: Path) -> bytes | None:
