@@ -197,19 +197,19 @@ class NetworkConfig:
 class PPOConfig:
     """Proximal policy optimisation (Schulman et al. 2017)."""
 
-    envs: int = 128
+    envs: int = 64
     """Environments side by side (sets shapes)."""
     horizon: int = 64
     """Steps of each environment between updates (sets shapes)."""
     epochs: int = 2
     """Passes over the samples of an update (sets shapes)."""
-    minibatch: int = 1024
+    minibatch: int = 512
     """Samples of a gradient step; divides envs * horizon (sets shapes)."""
     learning_rate: float = 3e-3
     """Adam's step at the start."""
     learning_rate_end: float = 3e-4
     """Adam's step at the end; exponential in between."""
-    gamma: float = 0.98
+    gamma: float = 0.96
     """Discount a step."""
     gae_lambda: float = 0.95
     """Lambda of the generalised advantage estimate."""
@@ -266,7 +266,7 @@ class TrainConfig:
     """Seed of everything random."""
     steps: int = 2_000_000
     """Environment steps of the whole run."""
-    chunk: int = 10
+    chunk: int = 20
     """Updates between two evaluations (sets shapes)."""
     eval_episodes: int = 250
     """Starts of an evaluation while training (sets shapes)."""

@@ -12,6 +12,7 @@ from e2efly.config import (
     BPTTConfig,
     HoverConfig,
     LandConfig,
+    NetworkConfig,
     PPOConfig,
     RaceConfig,
     RewardConfig,
@@ -51,7 +52,7 @@ def _hover(algo: str) -> TrainConfig:
         weights = {"near": 1.0, "v1": 0.02, "anglev_sq": 0.002, "act2_sq": 0.02}
         return TrainConfig(HoverConfig(), PPOConfig(), RewardConfig(weights), steps=2_500_000)
     weights = {"prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02}
-    return TrainConfig(HoverConfig(), BPTTConfig(), RewardConfig(weights), steps=1_000_000)
+    return TrainConfig(HoverConfig(), BPTTConfig(), RewardConfig(weights), steps=1_000_000, chunk=10)
 
 
 def _land(algo: str) -> TrainConfig:
@@ -63,15 +64,18 @@ def _land(algo: str) -> TrainConfig:
         settings: AlgorithmConfig = PPOConfig(learning_rate=5e-3, learning_rate_end=5e-4)
         return TrainConfig(LandConfig(), settings, RewardConfig(weights), steps=2_000_000)
     weights = {"progxy": 1.0, "descent": 1.0, "upright": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02}
-    return TrainConfig(LandConfig(), BPTTConfig(), RewardConfig(weights), steps=1_000_000)
+    return TrainConfig(LandConfig(), BPTTConfig(learning_rate=8e-3), RewardConfig(weights), steps=1_000_000, chunk=10)
 
 
 def _track(algo: str) -> TrainConfig:
     if algo == "ppo":
         weights = {"near": 1.0, "anglev_sq": 0.002, "act2_sq": 0.02}
-        return TrainConfig(TrackConfig(), PPOConfig(), RewardConfig(weights), steps=2_000_000)
+        settings: AlgorithmConfig = PPOConfig(gamma=0.95, learning_rate=5e-3)
+        network = NetworkConfig((48, 48))
+        return TrainConfig(TrackConfig(), settings, RewardConfig(weights), network=network, steps=2_000_000, chunk=15)
     weights = {"prog2": 1.0, "anglev_sq": 0.01, "act2_sq": 0.02}
-    return TrainConfig(TrackConfig(), BPTTConfig(), RewardConfig(weights), steps=1_000_000)
+    settings = BPTTConfig(horizon=32, learning_rate=8e-3)
+    return TrainConfig(TrackConfig(), settings, RewardConfig(weights), steps=1_000_000)
 
 
 def _race(algo: str) -> TrainConfig:
@@ -81,7 +85,7 @@ def _race(algo: str) -> TrainConfig:
         return TrainConfig(RaceConfig(laps=0), settings, RewardConfig(weights), steps=3_000_000)
     weights = {"prog1": 1.0, "near": 0.1, "anglev_sq": 0.0005, "act2_sq": 0.005}
     settings = BPTTConfig(learning_rate=8e-3, gradient_decay=1.0)
-    return TrainConfig(RaceConfig(laps=0), settings, RewardConfig(weights), steps=2_500_000)
+    return TrainConfig(RaceConfig(laps=0), settings, RewardConfig(weights), steps=2_500_000, chunk=10)
 
 
 _OURS: dict[str, Callable[[str], TrainConfig]] = {"hover": _hover, "land": _land, "track": _track, "race": _race}
@@ -100,7 +104,7 @@ def _paper(task: str, algo: str) -> TrainConfig:
     else:
         settings = BPTTConfig(envs=100, horizon=96, learning_rate=1e-3, learning_rate_end=1e-5)
         steps = {"hover": 10, "land": 10, "track": 20, "race": 50}[task] * 1_000_000
-    return TrainConfig(TASKS[task], settings, RewardConfig(weights), steps=steps)
+    return TrainConfig(TASKS[task], settings, RewardConfig(weights), steps=steps, chunk=10)
 
 
 PRESETS: dict[str, Callable[[str, str], TrainConfig]] = {
