@@ -2,8 +2,12 @@
 
 from collections.abc import Iterator
 
-import jax
-import pytest
+from e2efly.device import set_xla_options
+
+set_xla_options()  # as the commands do, before anything computes: two cores are two devices
+
+import jax  # noqa: E402
+import pytest  # noqa: E402
 
 
 @pytest.fixture

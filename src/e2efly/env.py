@@ -37,7 +37,7 @@ DEFAULT = EnvConfig()
 
 def random_key(*seed: int) -> PRNGKeyArray:
     """The key of a seed, or of several numbers; made by NumPy: nothing to compile."""
-    return jax.random.wrap_key_data(np.random.SeedSequence(seed).generate_state(4), impl=GENERATOR)
+    return jax.random.wrap_key_data(jnp.asarray(np.random.SeedSequence(seed).generate_state(4)), impl=GENERATOR)
 
 
 @jax.tree_util.register_dataclass

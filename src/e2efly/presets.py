@@ -85,7 +85,7 @@ def _race(algo: str) -> TrainConfig:
         return TrainConfig(RaceConfig(laps=0), settings, RewardConfig(weights), steps=3_000_000)
     weights = {"prog1": 1.0, "near": 0.1, "anglev_sq": 0.0005, "act2_sq": 0.005}
     settings = BPTTConfig(learning_rate=8e-3, gradient_decay=1.0)
-    return TrainConfig(RaceConfig(laps=0), settings, RewardConfig(weights), steps=2_500_000, chunk=10)
+    return TrainConfig(RaceConfig(laps=0), settings, RewardConfig(weights), steps=2_500_000, chunk=15)
 
 
 _OURS: dict[str, Callable[[str], TrainConfig]] = {"hover": _hover, "land": _land, "track": _track, "race": _race}

@@ -7,11 +7,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax.flatten_util import ravel_pytree
 
 from e2efly.config import AlgorithmConfig, BPTTConfig, NetworkConfig, PPOConfig
 from e2efly.env import random_key
 from e2efly.learn.algorithm import TrainState, adam, annealed
 from e2efly.learn.bptt import BPTT
+from e2efly.learn.devices import OWN, on_each, own, stacked
 from e2efly.learn.networks import Features, mlp, policy
 from e2efly.learn.ppo import PPO, gae
 from tests.learn.probe import Probe
@@ -21,27 +23,27 @@ PPO_CONFIG = PPOConfig(envs=64, horizon=16, minibatch=256, epochs=4, learning_ra
 BPTT_CONFIG = BPTTConfig(envs=4, horizon=8, learning_rate=2e-2, learning_rate_end=1e-3, max_grad_norm=10.0)
 
 
-def learn(probe: Probe, config: AlgorithmConfig, updates: int) -> tuple[Any, TrainState, dict[str, jax.Array]]:
+def learn(
+    probe: Probe, config: AlgorithmConfig, updates: int, devices: int = 2
+) -> tuple[Any, TrainState, dict[str, jax.Array]]:
     features = Features(probe.fields)
     algorithm = PPO(features, NETWORK) if isinstance(config, PPOConfig) else BPTT(features, NETWORK)
     parameters = jax.tree.map(jnp.asarray, algorithm.init(probe, config, 0))  # type: ignore[arg-type]
-    env_state, observation = probe.reset(config.envs)
-    state = TrainState(
-        parameters,
-        adam(config.max_grad_norm).init(parameters),
-        env_state,
-        observation,
-        random_key(0),  # type: ignore[arg-type]
-    )
+    optimizer = adam(config.max_grad_norm).init(ravel_pytree(parameters)[0])
+    states = [
+        TrainState(parameters, optimizer, *probe.reset(config.envs // devices), random_key(i)) for i in range(devices)
+    ]
 
-    @jax.jit
     def run(state: TrainState) -> tuple[TrainState, dict[str, jax.Array]]:
         def update(state: TrainState, i: jax.Array) -> tuple[TrainState, dict[str, jax.Array]]:
             return algorithm.update(probe, config, state, i / updates)  # type: ignore[arg-type]
 
-        return jax.lax.scan(update, state, jnp.arange(updates))
+        return stacked(jax.lax.scan(update, own(state), jnp.arange(updates)))
 
-    return algorithm, *run(state)
+    state, metrics = on_each(run, devices, (OWN,), OWN)(jax.tree.map(lambda *x: jnp.stack(x), *states))
+    for leaf in jax.tree.leaves(state.parameters):
+        np.testing.assert_array_equal(leaf[:1], leaf[-1:], err_msg="devices learn the same")
+    return algorithm, jax.tree.map(lambda x: x[0], state), jax.tree.map(lambda x: x[0], metrics)
 
 
 def learned_action(state: TrainState) -> np.ndarray:
@@ -66,6 +68,14 @@ def test_ppo_finds_the_action_that_pays_best(delay: int) -> None:
     probe = Probe(delay=delay, length=1000, ends_for_good=False)
     _, state, _ = learn(probe, dataclasses.replace(PPO_CONFIG, gamma=0.9), 150)
     np.testing.assert_allclose(learned_action(state), probe.target, atol=0.08)
+
+
+def test_the_gradient_of_bptt_is_the_mean_over_devices() -> None:
+    probe = Probe(delay=1, length=1000)
+    _, one, _ = learn(probe, BPTT_CONFIG, 20, devices=1)
+    _, two, _ = learn(probe, BPTT_CONFIG, 20, devices=2)
+    for a, b in zip(jax.tree.leaves(one.parameters), jax.tree.leaves(two.parameters), strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-5)
 
 
 def test_a_time_out_keeps_the_value_of_what_would_follow() -> None:

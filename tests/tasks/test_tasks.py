@@ -11,7 +11,7 @@ from e2efly.config import HoverConfig, LandConfig, RaceConfig, TrackConfig
 from e2efly.env import random_key
 from e2efly.physics.rotation import from_euler
 from e2efly.tasks import Hover, Land, Race, Shape, Track
-from e2efly.tasks.references import Lissajous, Spline, polynomial, read_csv, through_points
+from e2efly.tasks.references import Lissajous, polynomial, read_csv, through_points
 from e2efly.tasks.task import Outcome, at_rest
 from e2efly.tasks.tracks import load_track, track_names
 
@@ -194,7 +194,7 @@ def test_a_users_reference_goes_through_its_points(tmp_path: Path) -> None:
     path = tmp_path / "mine.csv"
     t = np.arange(0, 12, 0.5)
     path.write_text("t,x,y,z\n" + "\n".join(f"{a + 3},{np.sin(a)},{np.cos(a)},2" for a in t))
-    spline = Spline(jnp.asarray(through_points(read_csv(path), 23))[None])
+    spline = through_points(read_csv(path))
     np.testing.assert_allclose(spline.position(jnp.array([[2.5]]))[0, 0], [np.sin(2.5), np.cos(2.5), 2], atol=1e-5)
     assert Track.of(TrackConfig(reference=str(path)), SHAPE).curve is not None
 

@@ -80,7 +80,7 @@ def descend(
     flat, shaped = ravel_pytree(gradient)
     flat = jax.lax.pmean(flat, AXIS)
     direction, optimizer = adam(config.max_grad_norm).update(flat, optimizer)
-    parameters = jax.tree.map(lambda p, d: p - rate * d, parameters, shaped(direction))
+    parameters = jax.tree.map(lambda p, d: p - rate * d, parameters, shaped(jnp.asarray(direction)))
     return parameters, optimizer, jnp.linalg.norm(flat)
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from e2efly import presets
 from e2efly.config import BPTTConfig, EnvConfig, NetworkConfig
 from e2efly.env import Env, random_key
-from e2efly.learn.algorithm import begin
+from e2efly.learn.devices import AXIS, OWN, SAME, on_each, own, placed, share, stacked
+from e2efly.learn.programs import start_program
 from e2efly.learn.setup import Setup
 from e2efly.physics import Physics, State, step
 from e2efly.vehicles import load_vehicle
@@ -22,17 +23,17 @@ def physics_substeps(vehicles: int, calls: int = 200) -> float:
     """Physics sub-steps/s of VIS-R under CTBR commands: 10 sub-steps of 5 ms a call, all in one scan."""
     vehicle = load_vehicle("vis_r")
     physics = Physics.of(vehicle, control_rate=20.0)
+    devices = share(vehicles, None, None)
     state = State.hovering(vehicle, jnp.zeros((vehicles, 3), jnp.float32))
     spread = np.random.default_rng(0).normal(size=(vehicles, 4)).astype(np.float32)
-    command = jnp.asarray(0.5 * spread + np.array([9.81, 0, 0, 0], np.float32))
+    command = 0.5 * spread + np.array([9.81, 0, 0, 0], np.float32)
 
-    @jax.jit
     def run(state: State, command: jax.Array) -> State:
-        return jax.lax.scan(lambda s, _: (step(physics, physics.nominal, s, command), None), state, None, length=calls)[
-            0
-        ]
+        body = lambda s, _: (step(physics, physics.nominal, s, command), None)  # noqa: E731
+        return jax.lax.scan(body, state, None, length=calls)[0]
 
-    return best_rate(vehicles * calls * physics.substeps, lambda: jax.block_until_ready(run(state, command)))
+    program, start = on_each(run, devices, (OWN, OWN), OWN), placed((state, command), devices)
+    return best_rate(vehicles * calls * physics.substeps, lambda: jax.block_until_ready(program(*start)))
 
 
 def environment_steps(task: str, envs: int, steps: int = 200, env_config: EnvConfig | None = None) -> float:
@@ -40,18 +41,22 @@ def environment_steps(task: str, envs: int, steps: int = 200, env_config: EnvCon
     config = presets.preset(task, "ppo")
     env_config = env_config or dataclasses.replace(config.env, randomize={"mass": 0.1, "motor_time_constant": 0.1})
     env = Env.of(config.task, config.reward, env_config)
-    actions = jnp.asarray(np.random.default_rng(0).uniform(-0.5, 0.2, (16, envs, 4)).astype(np.float32))
+    devices = share(envs, None, None)
+    actions = np.random.default_rng(0).uniform(-0.5, 0.2, (envs, 16, 4)).astype(np.float32)
 
-    @jax.jit
-    def run(env: Env, state: Any) -> Any:
+    def start(env: Env, key: jax.Array) -> Any:
+        return stacked(env.reset(jax.random.fold_in(key, jax.lax.axis_index(AXIS)), envs // devices)[0])
+
+    def run(env: Env, state: Any, actions: jax.Array) -> Any:
         def body(carry: Any, i: jax.Array) -> tuple[Any, jax.Array]:
-            carry, out = env.step(carry, actions[i % 16])
+            carry, out = env.step(carry, actions[:, i % 16])
             return carry, jnp.sum(out.observation) + jnp.sum(out.reward)
 
-        return jax.lax.scan(body, state, jnp.arange(steps))
+        return stacked(jax.lax.scan(body, own(state), jnp.arange(steps)))
 
-    state, _ = jax.jit(env.reset, static_argnums=1)(random_key(0), envs)
-    return best_rate(envs * steps, lambda: jax.block_until_ready(run(env, state)))
+    state = on_each(start, devices, (SAME, SAME), OWN)(env, random_key(0))
+    program, actions = on_each(run, devices, (SAME, OWN, OWN), OWN), placed(actions, devices)
+    return best_rate(envs * steps, lambda: jax.block_until_ready(program(env, state, actions)))
 
 
 def training_steps(task: str, algo: str, wide: bool = False) -> float:
@@ -61,16 +66,16 @@ def training_steps(task: str, algo: str, wide: bool = False) -> float:
         algo_config = dataclasses.replace(config.algo, envs=100, horizon=96)
         config = dataclasses.replace(config, algo=algo_config, network=NetworkConfig((192, 96)))
     setup = Setup.of(config)
-    key = random_key(0)
     parameters = setup.algorithm.init(setup.env, config.algo, 0)
 
-    @jax.jit
     def run(env: Env, algo: Any, state: Any) -> Any:
-        return jax.lax.scan(lambda s, _: setup.algorithm.update(env, algo, s, jnp.float32(0.5)), state, None, length=5)
+        update = lambda state, _: setup.algorithm.update(env, algo, state, jnp.float32(0.5))  # noqa: E731
+        return stacked(jax.lax.scan(update, own(state), None, length=5))
 
-    state = jax.jit(lambda env, p, key: begin(env, config.algo, p, key))(setup.env, parameters, key)
+    program = on_each(run, setup.devices, (SAME, SAME, OWN), OWN)
+    state = start_program(setup)(setup.env, parameters, random_key(0))
     return best_rate(
-        5 * setup.steps_per_update, lambda: jax.block_until_ready(run(setup.env, config.algo, state)), rounds=5
+        5 * setup.steps_per_update, lambda: jax.block_until_ready(program(setup.env, config.algo, state)), rounds=15
     )
 
 

@@ -12,13 +12,12 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
+from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
-import jaxlib
 import numpy as np
 from jax import export
 
@@ -155,7 +154,7 @@ def _fingerprint(setup: Setup, args: tuple) -> str:
     numbers = [np.asarray(x).tolist() for x in jax.tree.leaves((setup.env, setup.judges))]
     device = jax.devices()[0]
     about = [config, shapes, str(jax.tree.structure(args)), numbers, device.platform, device.device_kind,
-             jax.__version__, jaxlib.__version__, _source_hash()]  # fmt: skip
+             metadata.version("jax"), metadata.version("jaxlib"), _source_hash()]  # fmt: skip
     return hashlib.sha256(json.dumps(about, default=str).encode()).hexdigest()[:32]
 
 

@@ -8,6 +8,7 @@ less than 0.1 mm.
 import csv
 import math
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import jax
@@ -18,25 +19,29 @@ from jaxtyping import Array, Float, PRNGKeyArray
 Point = Array | tuple[float, float, float]
 """A point, m."""
 KNOT_PERIOD = 0.5
-"""Seconds between knots."""
+"""Seconds between the knots of all references but a user's."""
 
 
-@jax.tree_util.register_dataclass
+@partial(jax.tree_util.register_dataclass, data_fields=["knots"], meta_fields=["period", "end"])
 @dataclass(frozen=True)
 class Spline:
     """Knots a vehicle: [:, :, 0] position, m; 1 velocity, m/s; 2 acceleration, m/s^2."""
 
-    knots: Float[Array, "n m 3 3"]
+    knots: Float[Array | np.ndarray, "n m 3 3"]
+    period: float = KNOT_PERIOD
+    """Seconds between knots."""
+    end: float = math.inf
+    """Seconds after which the position is held, where that is before the last knot."""
 
     def position(self, time: Float[Array, "n k"]) -> Float[Array, "n k 3"]:
         """Positions at the given times, s; held at the ends."""
         last = self.knots.shape[1] - 1
-        u = jnp.clip(time / KNOT_PERIOD, 0.0, last)
+        u = jnp.clip(time, 0.0, min(self.end, last * self.period)) / self.period
         index = jnp.minimum(u.astype(jnp.int32), last - 1)
         s = (u - index)[..., None]
-        rows = jnp.arange(self.knots.shape[0])[:, None]
-        a, b = self.knots[rows, index], self.knots[rows, index + 1]
-        h = KNOT_PERIOD
+        rows, knots = jnp.arange(self.knots.shape[0])[:, None], jnp.asarray(self.knots)
+        a, b = knots[rows, index], knots[rows, index + 1]
+        h = self.period
         p0, v0, a0 = a[..., 0, :], a[..., 1, :] * h, a[..., 2, :] * (h * h / 2)
         p1, v1, a1 = b[..., 0, :], b[..., 1, :] * h, b[..., 2, :] * (h * h / 2)
         d = p1 - p0
@@ -168,12 +173,15 @@ def read_csv(path: str | Path) -> np.ndarray:
     return table
 
 
-def through_points(table: np.ndarray, m: int) -> np.ndarray:
-    """Knots (m, 3, 3) of the natural cubic spline through the rows t, x, y, z; held after the last row."""
+def through_points(table: np.ndarray) -> Spline:
+    """The natural cubic spline through the rows t, x, y, z, of one vehicle; held after the last row.
+
+    Its knots are as close as the closest rows (0.02 to 0.5 s apart), so that no point is smoothed away.
+    """
     from scipy.interpolate import CubicSpline  # only a user's own reference needs it
 
     spline = CubicSpline(table[:, 0], table[:, 1:], bc_type="natural")
-    t = np.arange(m) * KNOT_PERIOD
-    inside = t <= table[-1, 0]
-    t = np.minimum(t, table[-1, 0])
-    return np.stack([spline(t), *(spline(t, order) * inside[:, None] for order in (1, 2))], axis=1)
+    end = float(table[-1, 0])
+    period = float(np.clip(np.min(np.diff(table[:, 0])), 0.02, KNOT_PERIOD))
+    t = period * np.arange(math.ceil(end / period) + 1)
+    return Spline(np.stack([spline(t, order) for order in range(3)], axis=1)[None], period, end)

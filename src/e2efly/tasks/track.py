@@ -44,8 +44,8 @@ class Track:
     config: TrackConfig
     shape: Shape
     knots: int
-    curve: Lissajous | np.ndarray | None
-    """What to follow: a curve, the knots of the user's file, or None: random polynomials."""
+    curve: Lissajous | Spline | None
+    """What to follow: a curve, the spline of the user's file, or None: random polynomials."""
 
     name = "track"
     fields = (
@@ -74,7 +74,8 @@ class Track:
                     f"reference {config.reference}: lowest z is {table[:, 3].min()} m; accepted: above "
                     f"{shape.feet_height} m, the height of the centre of mass over the feet"
                 )
-            return Track(numbers, shape, m, references.through_points(table, m).astype(np.float32))
+            path = references.through_points(table)
+            return Track(numbers, shape, m, dataclasses.replace(path, knots=path.knots.astype(np.float32)))
         curves = {
             "circle": Lissajous.circle(config.radius, config.circle_rate),
             "lemniscate": Lissajous.lemniscate(config.radius, config.lemniscate_speed),
@@ -93,7 +94,8 @@ class Track:
             return references.polynomial(key, c.centre, c.polynomial_reach, c.polynomial_speed, n, self.knots)
         if isinstance(self.curve, Lissajous):
             return self.curve.spline(c.centre, jnp.pi * uniform(key, n, 1)[:, 0], self.knots)
-        return Spline(jnp.broadcast_to(jnp.asarray(self.curve), (n, *self.curve.shape)))
+        knots = jnp.asarray(self.curve.knots)
+        return dataclasses.replace(self.curve, knots=jnp.broadcast_to(knots, (n, *knots.shape[1:])))
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Memory]:
         """Level, any heading, near the reference's first point, with a velocity of its own."""
