@@ -9,6 +9,7 @@ import numpy as np
 
 from e2efly.config import RewardConfig
 from e2efly.deploy.policy import load_policy
+from e2efly.device import prepare
 from e2efly.learn.runner import train
 from e2efly.presets import preset
 
@@ -25,6 +26,7 @@ class Print:
         print(f"{steps / 1e6:.2f} of {total / 1e6:.2f} M steps, {rate / 1e3:.0f} k/s, success {success:.0%}")
 
 
+prepare()  # XLA options, compilation cache, a device a core: before anything computes
 steps = int(sys.argv[1]) if len(sys.argv) > 1 else 500_000
 reward = RewardConfig({"prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.05})
 config = dataclasses.replace(preset("hover", "bptt"), reward=reward, steps=steps)

@@ -63,8 +63,13 @@ def acceleration(vehicle: Vehicle, attitude: Quat, velocity: Vec3, collective: A
 
 def angular_acceleration(vehicle: Vehicle, body_rate: Vec3, torque: Vec3) -> Vec3:
     """Euler's equation in the body frame, rad/s^2: J^-1 (torque - w x J w)."""
-    inertia = Vec3.of(vehicle.inertia)
-    return (torque - body_rate.cross(inertia.times(body_rate))).over(inertia)
+    return (torque - gyroscopic_torque(vehicle, body_rate)).times(Vec3.of(1 / vehicle.inertia))
+
+
+def gyroscopic_torque(vehicle: Vehicle, body_rate: Vec3) -> Vec3:
+    """W x J w of a diagonal inertia J, N*m."""
+    j, w = Vec3.of(vehicle.inertia), body_rate
+    return Vec3((j.z - j.y) * w.y * w.z, (j.x - j.z) * w.z * w.x, (j.y - j.x) * w.x * w.y)
 
 
 def derivative(vehicle: Vehicle, parts: Parts, wind: Vec3 | None) -> Parts:

@@ -48,10 +48,6 @@ class Vec3:
         """Product an axis."""
         return Vec3(self.x * other.x, self.y * other.y, self.z * other.z)
 
-    def over(self, other: "Vec3") -> "Vec3":
-        """Quotient an axis."""
-        return Vec3(self.x / other.x, self.y / other.y, self.z / other.z)
-
     def abs(self) -> "Vec3":
         """Absolute value an axis."""
         return Vec3(jnp.abs(self.x), jnp.abs(self.y), jnp.abs(self.z))

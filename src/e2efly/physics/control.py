@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from e2efly.physics.body import Rotors, rotor_speed_for
+from e2efly.physics.body import Rotors, gyroscopic_torque, rotor_speed_for
 from e2efly.physics.components import Quat, Vec3, safe_sqrt
 from e2efly.physics.mixer import Mixer
 from e2efly.physics.rotation import euler_components
@@ -95,8 +95,8 @@ def _attitude(vehicle: Vehicle, mixer: Mixer, parts: Parts, thrust: Array, wante
 def _rates(vehicle: Vehicle, mixer: Mixer, parts: Parts, thrust: Array, wanted: Vec3) -> Rotors:
     """The rate loop: torque = J K (wanted - w) + w x J w."""
     wanted = wanted.clip(Vec3.of(vehicle.body_rate_max))
-    inertia, rate = Vec3.of(vehicle.inertia), parts.body_rate
-    torque = inertia.times(Vec3.of(vehicle.rate_gain)).times(wanted - rate) + rate.cross(inertia.times(rate))
+    stiffness = Vec3.of(vehicle.inertia * vehicle.rate_gain)
+    torque = stiffness.times(wanted - parts.body_rate) + gyroscopic_torque(vehicle, parts.body_rate)
     return rotor_speed_for(vehicle, mixer.thrusts(vehicle.mass * thrust, torque))
 
 
