@@ -3,6 +3,7 @@
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 
 def cache_folder() -> Path:
@@ -28,7 +29,20 @@ def set_xla_options() -> None:
     wanted = [f"--{name}={value}" for name, value in XLA_OPTIONS.items() if name not in flags]
     os.environ["XLA_FLAGS"] = " ".join([*flags.split(), *wanted])
     if "xla_force_host_platform_device_count" not in flags:
-        os.environ.setdefault("JAX_NUM_CPU_DEVICES", str(len(os.sched_getaffinity(0))))
+        _configure("jax_num_cpu_devices", cores())
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _configure(name: str, value: Any) -> None:
+    """Set an option of JAX that the user's environment does not set; it may be imported already."""
+    import jax
+
+    if name.upper() not in os.environ and getattr(jax.config, name) != value:
+        jax.config.update(name, value)
 
 
 def prepare(device: str | None = None) -> None:
@@ -47,9 +61,9 @@ def prepare(device: str | None = None) -> None:
     if device and "jax" not in sys.modules:
         os.environ["JAX_PLATFORMS"] = {"cpu": "cpu", "gpu": "cuda"}[device]
     set_xla_options()
-    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(cache_folder() / "jax"))
-    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.05")
-    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
+    _configure("jax_compilation_cache_dir", str(cache_folder() / "jax"))
+    _configure("jax_persistent_cache_min_compile_time_secs", 0.05)
+    _configure("jax_persistent_cache_min_entry_size_bytes", -1)
     import jax
 
     try:
