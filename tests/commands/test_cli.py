@@ -99,7 +99,10 @@ def test_train_eval_export_and_plots_end_to_end(tmp_path: Path, capsys: pytest.C
     report = tmp_path / "report.json"
     assert run(["eval", str(folder), "--episodes", "30", "--json", str(report)]) == 0
     content = json.loads(report.read_text())
-    assert len(content["criteria"]["hover"]["starts"]) == 30
+    starts = content["criteria"]["hover"]["starts"]
+    assert len(starts) == 30
+    assert len({tuple(row["start"]["position"]) for row in starts}) == 30
+    assert all(abs(x) <= 2 for row in starts for x in row["start"]["velocity"])
     assert 0 <= content["criteria"]["hover"]["success_interval_95"][1] <= 1
     before = (folder / "policy.onnx").read_bytes()
     assert run(["export", str(folder)]) == 0

@@ -91,7 +91,7 @@ def timeless(rows: list[dict[str, float]]) -> list[dict[str, float]]:
 @pytest.mark.parametrize("algo", ["ppo", "bptt"])
 def test_a_killed_run_ends_bit_for_bit_like_one_that_was_not(algo: str, tmp_path: Path) -> None:
     small_flags = [f for i, f in enumerate(SMALL) if algo == "ppo" or i not in (10, 11)]
-    flags = ["train", "hover", "--algo", algo, *small_flags]
+    flags = ["train", "hover", "--algo", algo, *small_flags, "--devices", "2"]
     whole = cli(*flags, "--out", "whole", cwd=tmp_path)
     assert whole.wait() == 0, output_of(tmp_path)
     for round_, updates in enumerate((4, 12)):

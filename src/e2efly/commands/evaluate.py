@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,11 +45,13 @@ def eval_command(
         task, env_config = _from_contract(policy)
     if vehicle is not None:
         env_config = dataclasses.replace(env_config, vehicle=vehicle)
-    flown = fly_suites(policy, task, env_config, episodes, seed)
+    flown, starts = fly_suites(policy, task, env_config, episodes, seed)
     console = Console(highlight=False, quiet=quiet)
     console.print(_table(flown, episodes))
     if report:
-        write_atomically(report, (json.dumps(_report(policy, path, env_config, flown, seed), indent=1) + "\n").encode())
+        write_atomically(
+            report, (json.dumps(_report(policy, path, env_config, flown, starts, seed), indent=1) + "\n").encode()
+        )
         console.print(f"Report: {report}")
     folder = plots or (run.plots if run else path.parent / "plots")
     _draw(policy, task, env_config, flown, seed, folder, run)
@@ -77,26 +80,34 @@ def _from_contract(policy: Policy) -> tuple[TaskConfig, EnvConfig]:
     return presets.preset(c.task, "ppo").task, config
 
 
-def fly_suites(policy: Policy, task: TaskConfig, env_config: EnvConfig, episodes: int, seed: int) -> dict[str, Any]:
-    """Fly `episodes` starts of every criterion of a task; `Episodes` of NumPy arrays by the criterion's name."""
+def fly_suites(
+    policy: Policy, task: TaskConfig, env_config: EnvConfig, episodes: int, seed: int
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Fly `episodes` starts of every criterion of a task.
+
+    Returns:
+        By the criterion's name and of NumPy arrays: `Episodes`, and the `State` that each started from.
+    """
     import jax
 
     from e2efly.env import Env, random_key
     from e2efly.evaluate import run_episodes
 
-    flown = {}
-    program = jax.jit(
-        lambda env, key, steps, settle: run_episodes(env, callback(policy), key, BATCH, steps, settle),
-        static_argnums=2,
-    )
+    flown, starts = {}, {}
+
+    @partial(jax.jit, static_argnums=2)
+    def program(env: Env, key: Any, steps: int, settle: float) -> Any:
+        start = env.reset(key, BATCH)[0].vehicle
+        return run_episodes(env, callback(policy), key, BATCH, steps, settle), start
+
     for name, suite in presets.suites(task).items():
         env = Env.of(suite, RewardConfig({"prog2": 1.0}), env_config)
         check_observation(policy, env)
         steps, settle = episode_steps(suite, env), float(getattr(suite, "settle_s", 0.0))
         keys = [random_key(seed, i) for i in range(-(-episodes // BATCH))]
         parts = [jax.tree.map(np.asarray, program(env, key, steps, settle)) for key in keys]
-        flown[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
-    return flown
+        flown[name], starts[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
+    return flown, starts
 
 
 def callback(policy: Policy) -> Any:
@@ -156,11 +167,14 @@ def _table(flown: dict[str, Any], episodes: int) -> Table:
     return table
 
 
-def _report(policy: Policy, path: Path, env_config: EnvConfig, flown: dict[str, Any], seed: int) -> dict[str, Any]:
+def _report(
+    policy: Policy, path: Path, env_config: EnvConfig, flown: dict[str, Any], starts: dict[str, Any], seed: int
+) -> dict[str, Any]:
     """The report of `--json`: a summary and a row for every start, by criterion."""
     from e2efly.evaluate import wilson
 
-    def criterion(e: Any) -> dict[str, Any]:
+    def criterion(e: Any, start: Any) -> dict[str, Any]:
+        begun = {name: np.asarray(getattr(start, name)) for name in ("position", "velocity", "quaternion", "body_rate")}
         ok = np.asarray(e.success)
         names = [f.name for f in dataclasses.fields(e)]
         columns = {name: np.asarray(getattr(e, name)) for name in names}
@@ -173,6 +187,7 @@ def _report(policy: Policy, path: Path, env_config: EnvConfig, flown: dict[str, 
             "mean_duration_of_success_s": float(columns["duration"][ok].mean()) if ok.any() else None,
             "starts": [
                 {name: (bool if c.dtype == bool else float)(c[i]) for name, c in columns.items()}
+                | {"start": {name: x[i].round(6).tolist() for name, x in begun.items()}}
                 for i in range(len(ok))
             ],
         }
@@ -185,8 +200,9 @@ def _report(policy: Policy, path: Path, env_config: EnvConfig, flown: dict[str, 
         "units": {
             "duration": "s", "final_error": "m", "mean_error": "m", "top_speed": "m/s", "top_rate": "rad/s",
             "roughness": "mean |change of action| a step, action in [-1, 1]",
+            "start": "position m, velocity m/s (world), quaternion wxyz (body to world), body_rate rad/s",
         },
-        "criteria": {name: criterion(e) for name, e in flown.items()},
+        "criteria": {name: criterion(e, starts[name]) for name, e in flown.items()},
     }  # fmt: skip
 
 

@@ -7,7 +7,6 @@ not depend on what came before.
 
 import dataclasses
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import jax
@@ -16,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from e2efly.config import BPTTConfig, NetworkConfig
-from e2efly.env import Env, EnvState, Step
+from e2efly.env import Env
 from e2efly.learn.algorithm import TrainState, annealed, descend, episode_metrics
 from e2efly.learn.networks import Features, Layers, init_policy, policy
 
@@ -71,15 +70,10 @@ class BPTT:
     def _window(self, env: Env, config: BPTTConfig, parameters: Parameters, state: TrainState) -> tuple[Array, Any]:
         keep = jnp.exp(-config.gradient_decay * env.control_period)
 
-        # recomputing a step is faster than storing it, and far smaller, but for the products of matrices
-        @partial(jax.checkpoint, policy=jax.checkpoint_policies.dots_saveable)
-        def fly(parameters: Parameters, env_state: EnvState, observation: Array) -> tuple[EnvState, Step]:
-            action = policy(parameters.policy, self.features(observation), self.network.activation)
-            return env.advance(env_state, action)
-
         def step(carry: tuple[EnvState, Array, Array], _: None) -> tuple[Any, Any]:
             env_state, observation, discount = carry
-            env_state, out = env.restart(*fly(parameters, env_state, observation))
+            action = policy(parameters.policy, self.features(observation), self.network.activation)
+            env_state, out = env.step(env_state, action)
             env_state = dataclasses.replace(env_state, vehicle=_damped(env_state.vehicle, keep))
             gathered = (
                 jnp.mean(out.reward),

@@ -105,7 +105,9 @@ def step(
         rotor_command = law(physics.nominal, physics.mixer, parts, acting)
         return integrate(vehicle, parts, rotor_command, air, dt), None
 
-    parts, _ = jax.lax.scan(substep, Parts.of(state), jnp.arange(physics.substeps))
+    # a gradient computes each sub-step again from its start: faster than storing what is inside, and far smaller
+    again = jax.checkpoint(substep, prevent_cse=False)
+    parts, _ = jax.lax.scan(again, Parts.of(state), jnp.arange(physics.substeps))
     return parts.join()
 
 
