@@ -69,12 +69,12 @@ def test_what_is_observed(advance: Any) -> None:
     state, observation = reset(env)
     v = state.vehicle
     hover = np.broadcast_to(env.hover, (N, 4))
-    expected = [[0, 0, 3.0] - v.position, v.quaternion, v.velocity, v.body_rate, hover, hover]
+    expected = [np.array([0, 0, 3.0]) - v.position, v.quaternion, v.velocity, v.body_rate, hover, hover]
     np.testing.assert_allclose(observation, np.concatenate(expected, -1), rtol=1e-5, atol=1e-6)
     action = jnp.full((N, 4), 0.3)
     state, out = advance(env, state, action)
     v = state.vehicle
-    expected = [[0, 0, 3.0] - v.position, v.quaternion, v.velocity, v.body_rate, action, hover]
+    expected = [np.array([0, 0, 3.0]) - v.position, v.quaternion, v.velocity, v.body_rate, action, hover]
     np.testing.assert_allclose(out.final_observation, np.concatenate(expected, -1), rtol=1e-5, atol=1e-6)
 
 
@@ -96,8 +96,8 @@ def test_ends_of_an_episode(advance: Any, restart: Any) -> None:
     again, over = restart(env, reached, out)
     # what was reached is kept beside the new start
     np.testing.assert_array_equal(over.final_observation, out.final_observation)
-    np.testing.assert_allclose(over.final_observation[:, :3], [0, 0, 3] - reached.vehicle.position, atol=1e-5)
-    np.testing.assert_allclose(over.observation[:, :3], [0, 0, 3] - again.vehicle.position, atol=1e-5)
+    np.testing.assert_allclose(over.final_observation[:, :3], np.array([0, 0, 3]) - reached.vehicle.position, atol=1e-5)
+    np.testing.assert_allclose(over.observation[:, :3], np.array([0, 0, 3]) - again.vehicle.position, atol=1e-5)
     assert np.abs(over.final_observation[2:4, 1]).min() > 8.5
     assert np.abs(over.observation[1:4, :3]).max() <= 2.0
     for f in dataclasses.fields(Step):

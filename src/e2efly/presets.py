@@ -12,7 +12,6 @@ from e2efly.config import (
     BPTTConfig,
     HoverConfig,
     LandConfig,
-    NetworkConfig,
     PPOConfig,
     RaceConfig,
     RewardConfig,
@@ -70,9 +69,8 @@ def _land(algo: str) -> TrainConfig:
 def _track(algo: str) -> TrainConfig:
     if algo == "ppo":
         weights = {"near": 1.0, "anglev_sq": 0.002, "act2_sq": 0.02}
-        settings: AlgorithmConfig = PPOConfig(gamma=0.95, learning_rate=5e-3)
-        network = NetworkConfig((48, 48))
-        return TrainConfig(TrackConfig(), settings, RewardConfig(weights), network=network, steps=2_000_000, chunk=15)
+        settings: AlgorithmConfig = PPOConfig(horizon=48, gamma=0.95, learning_rate=5e-3)
+        return TrainConfig(TrackConfig(), settings, RewardConfig(weights), steps=2_000_000)
     weights = {"prog2": 1.0, "anglev_sq": 0.01, "act2_sq": 0.02}
     settings = BPTTConfig(horizon=32, learning_rate=8e-3)
     return TrainConfig(TrackConfig(), settings, RewardConfig(weights), steps=1_000_000)
@@ -84,7 +82,7 @@ def _race(algo: str) -> TrainConfig:
         settings: AlgorithmConfig = PPOConfig(gamma=0.97, learning_rate=5e-3, learning_rate_end=5e-4)
         return TrainConfig(RaceConfig(laps=0), settings, RewardConfig(weights), steps=3_000_000)
     weights = {"prog1": 1.0, "near": 0.1, "anglev_sq": 0.0005, "act2_sq": 0.005}
-    settings = BPTTConfig(learning_rate=8e-3, gradient_decay=1.0)
+    settings = BPTTConfig(learning_rate=8e-3, max_grad_norm=1.0, gradient_decay=1.0)
     return TrainConfig(RaceConfig(laps=0), settings, RewardConfig(weights), steps=2_500_000, chunk=15)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from e2efly.config import BPTTConfig, NetworkConfig
-from e2efly.env import Env
+from e2efly.env import Env, EnvState
 from e2efly.learn.algorithm import TrainState, annealed, descend, episode_metrics
 from e2efly.learn.networks import Features, Layers, init_policy, policy
 
