@@ -136,9 +136,8 @@ def train_config(options: Any) -> Any:
 
 def main() -> NoReturn:
     """Run the command line and exit: 0 when it did what was asked, 2 for bad input, 130 after Ctrl-C."""
-    gc.set_threshold(
-        100_000
-    )  # imports and traces make many objects and no garbage; collecting costs a third of a second
+    # importing and tracing make many objects and no garbage: looking for it costs a third of a second
+    gc.set_threshold(100_000)
     sys.exit(run(sys.argv[1:]))
 
 

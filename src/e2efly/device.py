@@ -1,4 +1,4 @@
-"""Where JAX computes, and how it compiles. Call `prepare` before anything imports JAX."""
+"""Where JAX computes, and how it compiles. Call `prepare` before anything computes with JAX."""
 
 import os
 import sys
@@ -17,7 +17,7 @@ XLA_OPTIONS = {
     # cores work on vehicles of their own (e2efly.learn.devices), not together on one small matrix
     "xla_cpu_multi_thread_eigen": "false",
 }
-"""What makes XLA fast on a CPU here: a quarter of a million training steps a second become one million."""
+"""What makes XLA fast on small batches on a CPU; docs/architecture.md says why."""
 
 
 def set_xla_options() -> None:

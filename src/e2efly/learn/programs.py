@@ -130,7 +130,7 @@ def _lower(
     places = tuple(place for arg, place in zip(args, takes, strict=True) for _ in jax.tree.leaves(arg))
     leaves = jax.tree.leaves(args)
     donated = tuple(i for i, place in enumerate(places) if place == OWN)
-    program = on_each(function, setup.devices, places, returns, donated)
+    program = on_each(function, setup.devices, places, returns, donated)  # traced only where it is needed
     if traced is None:
         return program.lower(*leaves)
     file = traced / f"{name}-{_fingerprint(setup, args)}"
@@ -165,7 +165,7 @@ def _fingerprint(setup: Setup, args: tuple) -> str:
 
 @cache
 def _source_hash() -> str:
-    """Of every file of the package."""
+    """Of every Python file of the package; its data files are in the numbers of the environments."""
     package = Path(str(resources.files("e2efly")))
     total = hashlib.sha256()
     for file in sorted(package.rglob("*.py")):
