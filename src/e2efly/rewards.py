@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from e2efly.physics.components import safe_sqrt
+from e2efly.control.vectors import safe_sqrt
 from e2efly.vehicles.names import unknown
 
 Scalar = Float[Array, "*n"]

@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from e2efly.control.vectors import Vec3
 from e2efly.physics import INTEGRATORS, Physics, State, step
-from e2efly.physics.components import Vec3
 from e2efly.physics.state import Parts, split4
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.vehicles.vehicle import quantities

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from e2efly.control.vectors import Quat, Vec3
 from e2efly.physics import State, body
-from e2efly.physics.components import Quat, Vec3
 from e2efly.physics.state import split4
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY, allocation_matrix

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from e2efly.control.vectors import Quat, Vec3
 from e2efly.physics import rotation
-from e2efly.physics.components import Quat, Vec3
 
 pytestmark = pytest.mark.usefixtures("x64")
 

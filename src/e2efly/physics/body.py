@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from e2efly.physics.components import Quat, Vec3
+from e2efly.control.vectors import Quat, Vec3
 from e2efly.physics.state import Parts, split4
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle, quantities
 

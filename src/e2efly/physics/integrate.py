@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+from e2efly.control.vectors import Vec3
 from e2efly.physics.body import Rotors, acceleration, angular_acceleration, derivative, rotor_thrust, rotor_wrench
-from e2efly.physics.components import Vec3
 from e2efly.physics.state import Parts
 from e2efly.vehicles.vehicle import Vehicle
 

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from e2efly.physics.components import Quat, Vec3, stack
+from e2efly.control.vectors import Quat, Vec3, stack
 
 Quaternion = Float[Array, "*n 4"]
 Vector = Float[Array, "*n 3"]
@@ -42,20 +42,7 @@ def to_matrix(q: Quaternion) -> Float[Array, "*n 3 3"]:
 
 def from_euler(roll: Array, pitch: Array, yaw: Array) -> Quaternion:
     """R = Rz(yaw) Ry(pitch) Rx(roll), angles in rad."""
-    return euler_components(roll, pitch, yaw).stack()
-
-
-def euler_components(roll: Array, pitch: Array, yaw: Array) -> Quat:
-    """`from_euler`, taken apart."""
-    cr, sr = jnp.cos(roll / 2), jnp.sin(roll / 2)
-    cp, sp = jnp.cos(pitch / 2), jnp.sin(pitch / 2)
-    cy, sy = jnp.cos(yaw / 2), jnp.sin(yaw / 2)
-    return Quat(
-        cy * cp * cr + sy * sp * sr,
-        cy * cp * sr - sy * sp * cr,
-        cy * sp * cr + sy * cp * sr,
-        sy * cp * cr - cy * sp * sr,
-    )
+    return Quat.of_euler(roll, pitch, yaw).stack()
 
 
 def yaw(q: Quaternion) -> Float[Array, "*n"]:

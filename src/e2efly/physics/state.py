@@ -1,13 +1,16 @@
 """The state of a vehicle."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from e2efly.physics.components import Quat, Vec3, stack
+from e2efly.control.vectors import Quat, Vec3, stack
 from e2efly.vehicles.vehicle import Vehicle
+
+for _kind in (Vec3, Quat):
+    jax.tree_util.register_dataclass(_kind, data_fields=[f.name for f in fields(_kind)], meta_fields=[])
 
 
 @jax.tree_util.register_dataclass

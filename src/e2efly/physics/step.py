@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from e2efly.physics.components import Vec3
+from e2efly.control.vectors import Vec3
 from e2efly.physics.control import COMMAND_MODES, Command
 from e2efly.physics.integrate import INTEGRATORS
 from e2efly.physics.mixer import Mixer

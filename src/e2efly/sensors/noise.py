@@ -7,8 +7,8 @@ import jax.numpy as jnp
 from jaxtyping import PRNGKeyArray
 
 from e2efly.config import NoiseConfig
+from e2efly.control.vectors import stack
 from e2efly.physics import State
-from e2efly.physics.components import stack
 from e2efly.physics.rotation import multiply, normalize
 
 jax.tree_util.register_dataclass(NoiseConfig)
