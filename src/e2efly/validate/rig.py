@@ -1,0 +1,222 @@
+"""The firmware on a test rig: its world, a pilot with a transmitter, and a pose source.
+
+With virtual time the rig is a clock: sleeping on it lets world and firmware run.
+"""
+
+import dataclasses
+import hashlib
+import shutil
+import socket
+import time
+from collections import deque
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from e2efly.deploy.odometry import Sample
+from e2efly.physics import State
+from e2efly.validate.firmware import Firmware, firmware_folder
+from e2efly.validate.sitl import FirmwareState, Sitl
+from e2efly.validate.world import World
+from e2efly.vehicles.vehicle import Vehicle
+
+STEP_S = 0.002
+"""How often the firmware's sensors are told a new state, s."""
+RC_PERIOD_S = 0.02
+"""How often the pilot's receiver speaks, s."""
+CALIBRATION_S = 6.0
+"""The firmware stands still for so long before it can be armed, s."""
+SETTINGS = (
+    "aux 0 0 0 1700 2100 0 0",  # arm: AUX1
+    "aux 1 50 1 1700 2100 0 0",  # MSP override: AUX2
+    "aux 2 1 2 1700 2100 0 0",  # angle: AUX3
+    "set msp_override_channels_mask=15",
+    "set rates_type=ACTUAL",
+    *(f"set {axis}_rc_rate=67" for axis in ("roll", "pitch", "yaw")),
+    *(f"set {axis}_srate=67" for axis in ("roll", "pitch", "yaw")),
+    *(f"set {axis}_expo=0" for axis in ("roll", "pitch", "yaw")),
+    "set rc_smoothing=OFF",
+    "set feedforward_transition=0",
+    *(f"set f_{axis}=0" for axis in ("roll", "pitch", "yaw")),  # noise of the setpoint is not to be amplified
+    "set small_angle=180",
+    "set acc_calibration=0,0,0,1",
+    "set serial_update_rate_hz=1000",
+    "set deadband=0",
+    "set yaw_deadband=0",
+)
+"""What the firmware is set to, as lines of its own command line: what docs/hardware asks of a real controller."""
+
+
+@dataclass(frozen=True)
+class Transmitter:
+    """The pilot's hands. Sticks -1 to 1."""
+
+    armed: bool = False
+    override: bool = False
+    angle: bool = False
+    mission: str = "land"
+    """land, hover or policy."""
+    roll: float = 0.0
+    pitch: float = 0.0
+    throttle: float = -1.0
+    """What the controller gets while override is off; its copy to the bridge is centred unless `lift` says other."""
+    yaw: float = 0.0
+    lift: float = 0.0
+    """The copy of the throttle stick."""
+
+    def channels(self) -> np.ndarray:
+        """The receiver's 16 channels, us: roll, pitch, throttle, yaw; arm, override, angle, mission; copies; rest."""
+        sticks = [self.roll, self.pitch, self.throttle, self.yaw]
+        switches = [1.0 if on else -1.0 for on in (self.armed, self.override, self.angle)]
+        mission = {"land": -1.0, "hover": 0.0, "policy": 1.0}[self.mission]
+        copies = [self.roll, self.pitch, self.lift, self.yaw]
+        return np.round(1500 + 500 * np.array([*sticks, *switches, mission, *copies, 0, 0, 0, 0])).astype(int)
+
+
+class Rig:
+    """One firmware in its world. Use it as a context manager; time is virtual unless `real_time`."""
+
+    def __init__(
+        self,
+        firmware: Firmware,
+        folder: Path,
+        vehicle: Vehicle,
+        *,
+        real_time: bool = False,
+        pose_rate: float = 200.0,
+        latency: float = 0.0,
+    ) -> None:
+        self.sitl = Sitl(firmware, folder, virtual_time=not real_time)
+        self.world = World(vehicle)
+        self.state: State = self.world.at_rest()
+        self.transmitter = Transmitter()
+        self.latency = latency
+        """Age of the poses when they are delivered, s."""
+        self.wind = np.zeros(3)
+        self._pose_period = 1 / pose_rate
+        self._poses: deque[Sample] = deque()
+        self._next_pose = self._next_rc = 0.0
+        self._left = 0.0
+        self._on = True
+
+    def __enter__(self) -> "Rig":
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.sitl.close()
+
+    def start(self) -> None:
+        """Start the firmware with `SETTINGS` and wait until it can be armed."""
+        prepare(self.sitl)
+        self.sitl.start()
+        self._next_pose = self._next_rc = self.now()
+        self.sleep(CALIBRATION_S)
+
+    def now(self) -> float:
+        """Seconds: the firmware's, or the machine's monotonic clock."""
+        return self.sitl.now
+
+    def sleep(self, seconds: float) -> None:
+        """Let the world and the firmware run."""
+        if not self.sitl.virtual_time:
+            end = time.monotonic() + seconds
+            while (left := end - time.monotonic()) > 0:
+                time.sleep(min(left, STEP_S))
+                self.step(STEP_S)
+            return
+        self._left += seconds
+        while self._left > STEP_S / 2:
+            self.step(STEP_S)
+            self._left -= STEP_S
+
+    def step(self, dt: float) -> None:
+        """One step of the world and, with virtual time, of the firmware."""
+        motors = self.sitl.motors() if self._on else np.zeros(4)
+        after = self.world.advance(self.state, motors, dt, self.wind)
+        if self._on:
+            self.sitl.send_state(self.world.sensed(self.state, after, dt))
+            if self.sitl.virtual_time:
+                self.sitl.advance(dt)
+        self.state = after
+        now = self.now()
+        if now >= self._next_rc:
+            self._next_rc += RC_PERIOD_S
+            self.sitl.send_rc(self.transmitter.channels())
+        if now >= self._next_pose:
+            self._next_pose += self._pose_period
+            self._poses.append(self._sample(now))
+
+    def poses(self, now: float) -> list[Sample]:
+        """The poses that have come since the last call, `latency` s old."""
+        ready = []
+        while self._poses and self._poses[0].received + self.latency <= now:
+            sample = self._poses.popleft()
+            ready.append(dataclasses.replace(sample, received=now))
+        return ready
+
+    def set(self, **changes: object) -> None:
+        """Move the pilot's sticks and switches: fields of `Transmitter`."""
+        self.transmitter = dataclasses.replace(self.transmitter, **changes)  # type: ignore[arg-type]
+
+    def reboot(self) -> None:
+        """Cut the controller's power and give it back; the motors stop meanwhile."""
+        self.sitl.stop()
+        self.sitl.start()
+
+    def _sample(self, now: float) -> Sample:
+        s = self.state
+        return Sample(now, s.position, s.quaternion, now, s.velocity, s.body_rate)  # type: ignore[arg-type]
+
+
+def prepare(sitl: Sitl, settings: tuple[str, ...] = SETTINGS) -> None:
+    """Put settings into the folder of a firmware that is not running; they are kept, as typing them takes a while."""
+    name = hashlib.sha256("\n".join(settings).encode()).hexdigest()[:12]
+    kept = firmware_folder() / f"settings-{name}.bin"
+    mine = sitl.folder / "eeprom.bin"
+    if kept.is_file():
+        shutil.copy(kept, mine)
+        return
+    mine.unlink(missing_ok=True)
+    sitl.start()
+    try:
+        _type(sitl, settings)
+    finally:
+        sitl.stop()
+    draft = kept.with_suffix(f".{sitl.base}")
+    shutil.copy(mine, draft)
+    draft.replace(kept)
+
+
+def _type(sitl: Sitl, settings: tuple[str, ...]) -> None:
+    """Type lines into the firmware's command line, then `save`, at which it ends.
+
+    Raises:
+        ValueError: when it refuses a line, with its words.
+    """
+
+    def run(seconds: float) -> None:
+        if sitl.virtual_time:
+            for _ in range(round(seconds / STEP_S)):
+                sitl.send_state(_RESTING)
+                sitl.advance(STEP_S)
+        time.sleep(0.02 if sitl.virtual_time else seconds)
+
+    run(1.0)
+    with socket.create_connection(("127.0.0.1", sitl.base + 4), timeout=5.0) as line:
+        line.setblocking(False)
+        run(0.2)
+        for text in ("#", *(f"{setting}\n" for setting in settings)):
+            line.sendall(text.encode())
+            run(0.3)
+            answer = line.recv(65536).decode(errors="replace")
+            if "#" not in answer or "ERROR" in answer.upper() or "INVALID" in answer.upper():
+                raise ValueError(f"the firmware refuses {text!r}: {answer!r}")
+        line.sendall(b"save\n")
+        end = time.monotonic() + 20
+        while sitl.alive and time.monotonic() < end:
+            run(0.1)
+
+
+_RESTING = FirmwareState(np.zeros(3), np.array([0, 0, 9.81]), np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3))

@@ -1,0 +1,204 @@
+"""A running Betaflight SITL: its process, its sockets and its clock."""
+
+import mmap
+import os
+import socket
+import struct
+import subprocess
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from e2efly.validate.firmware import Firmware
+
+MOTOR_ORDER = np.array([3, 0, 1, 2])
+"""Where motors 1 to 4 stand in the firmware's packet, which begins with the second."""
+_STATE = struct.Struct("<18d")
+_RC = struct.Struct("<d16H")
+_MOTORS = struct.Struct("<4f")
+_PORTS = 12
+"""UDP 9001 to 9004 and TCP 5761 to 5768, moved."""
+_CLOCK = struct.Struct("<4Q")
+BOOT_S = 20.0
+"""Real time that the firmware may take to open its ports, s."""
+
+
+def free_ports() -> int:
+    """The first of `_PORTS` ports in a row that are free on loopback."""
+    for _ in range(100):
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            base = probe.getsockname()[1]
+        if base + _PORTS < 65536 and all(_free(base + i) for i in range(_PORTS)):
+            return base
+    raise OSError("no free ports on the loopback interface")
+
+
+def _free(port: int) -> bool:
+    for kind in (socket.SOCK_STREAM, socket.SOCK_DGRAM):
+        with socket.socket(socket.AF_INET, kind) as probe:
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                return False
+    return True
+
+
+@dataclass(frozen=True)
+class FirmwareState:
+    """What the firmware's sensors are told, body FLU, SI units."""
+
+    body_rate: np.ndarray
+    """(3,) rad/s."""
+    specific_force: np.ndarray
+    """(3,) m/s^2; level at rest: 0, 0, 9.81."""
+    quaternion: np.ndarray
+    """(4,) wxyz, body to world ENU."""
+    velocity: np.ndarray
+    """(3,) world, m/s."""
+    position: np.ndarray
+    """(3,) world, m."""
+
+
+class Sitl:
+    """One firmware process, in a folder of its own that holds its settings.
+
+    Its time is real, or virtual: then it runs only inside `advance`. Use it as a context manager.
+    """
+
+    def __init__(self, firmware: Firmware, folder: Path, *, virtual_time: bool) -> None:
+        self.firmware, self.folder, self.virtual_time = firmware, folder, virtual_time
+        self.base = free_ports()
+        self.time = 0.0
+        """Seconds since the firmware's start (virtual), or of the monotonic clock (real)."""
+        self._process: subprocess.Popen | None = None
+        self._motors = np.zeros(4)
+        self._clock: mmap.mmap | None = None
+        folder.mkdir(parents=True, exist_ok=True)
+        self._out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._in = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._in.bind(("127.0.0.1", self.base + 1))
+        self._in.setblocking(False)
+
+    @property
+    def msp(self) -> str:
+        """Where the firmware speaks MSP, as a link's address."""
+        return f"tcp:127.0.0.1:{self.base + 4}"
+
+    def __enter__(self) -> "Sitl":
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process runs."""
+        return self._process is not None and self._process.poll() is None
+
+    def start(self) -> None:
+        """Start the process and wait for its MSP port.
+
+        Raises:
+            OSError: when it ends or does not listen within `BOOT_S`.
+        """
+        environment = {**os.environ, "LD_PRELOAD": str(self.firmware.shim), "E2EFLY_SITL_BASE": str(self.base)}
+        if self.virtual_time:
+            path = self.folder / "clock"
+            path.write_bytes(bytes(4096))
+            with path.open("r+b") as file:
+                self._clock = mmap.mmap(file.fileno(), 4096)
+            environment["E2EFLY_SITL_CLOCK"] = str(path)
+            self.time = 0.0
+        output = self.folder / "output.txt"
+        with output.open("wb") as log:
+            self._process = subprocess.Popen(
+                [str(self.firmware.program), "127.0.0.1"],
+                cwd=self.folder,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+            )
+        end = time.monotonic() + BOOT_S
+        while b"bind port" not in (text := output.read_bytes()):  # looking by a connection would take its only place
+            if not self.alive or time.monotonic() > end:
+                raise OSError(
+                    f"the Betaflight SITL in {self.folder} does not start:\n{text[-500:].decode(errors='replace')}"
+                )
+            if self.virtual_time:
+                self.advance(0.01)
+            else:
+                time.sleep(0.02)
+
+    def stop(self) -> None:
+        """Kill the process, as a cut battery would."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+
+    def close(self) -> None:
+        """Stop it and free its sockets."""
+        self.stop()
+        self._out.close()
+        self._in.close()
+        if self._clock is not None:
+            self._clock.close()
+            self._clock = None
+
+    def send_state(self, state: FirmwareState) -> None:
+        """Hand the sensors a new state; with virtual time, return once the firmware has taken it in."""
+        packet = _STATE.pack(
+            self.now,
+            # the firmware turns signs itself: it expects rates of a z-down y-right body, and the pull, not the push
+            *(state.body_rate * (1, -1, -1)),
+            *(-state.specific_force),
+            *state.quaternion,
+            *state.velocity,
+            *state.position,
+            101325.0 - 12.0 * state.position[2],
+        )
+        seen = self._shared()[3] if self.virtual_time else 0
+        self._out.sendto(packet, ("127.0.0.1", self.base + 2))
+        if self.virtual_time:
+            end = time.monotonic() + 1.0
+            while self._shared()[3] == seen and self.alive and time.monotonic() < end:
+                time.sleep(0)
+
+    def send_rc(self, channels: np.ndarray) -> None:
+        """What the pilot's receiver says: 16 channels in us."""
+        self._out.sendto(_RC.pack(self.now, *np.asarray(channels, int)), ("127.0.0.1", self.base + 3))
+
+    @property
+    def now(self) -> float:
+        """The firmware's time, s."""
+        return self.time if self.virtual_time else time.monotonic()
+
+    def advance(self, dt: float) -> None:
+        """Let the firmware run for `dt` s of its virtual time."""
+        assert self._clock is not None
+        self.time += dt
+        horizon = round(self.time * 1e9)
+        struct.pack_into("<Q", self._clock, 0, horizon)
+        while self.alive:
+            if self._shared()[2] > horizon:
+                break
+            time.sleep(0)
+
+    def motors(self) -> np.ndarray:
+        """(4,) the newest motor outputs, 0 to 1: rear right, front right, rear left, front left."""
+        while True:
+            try:
+                packet = self._in.recv(64)
+            except BlockingIOError:
+                return self._motors
+            if len(packet) == _MOTORS.size:
+                self._motors = np.array(_MOTORS.unpack(packet))[MOTOR_ORDER]
+
+    def _shared(self) -> tuple[int, int, int, int]:
+        assert self._clock is not None
+        return _CLOCK.unpack_from(self._clock, 0)  # type: ignore[return-value]

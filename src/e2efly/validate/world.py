@@ -1,0 +1,93 @@
+"""The world of a flight controller under test: our rigid body, the ground, and an IMU.
+
+The firmware's motor outputs turn the rotors; the body's motion is what its sensors are told.
+"""
+
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from e2efly.control.vectors import Quat, Vec3
+from e2efly.physics import State
+from e2efly.physics.integrate import rk4
+from e2efly.physics.state import Parts
+from e2efly.validate.sitl import FirmwareState
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+STEP_S = 0.001
+"""Length of a step of the rigid body, s."""
+
+
+@dataclass(frozen=True)
+class World:
+    """The rigid body of a vehicle over flat ground; pure: `advance` returns what comes next."""
+
+    vehicle: Vehicle
+    """The plant; loaded."""
+
+    @property
+    def full_speed(self) -> float:
+        """Rotor speed at full motor output, rad/s: where the tighter of the vehicle's two limits binds."""
+        k2, k1, k0 = self.vehicle.thrust_map
+        top = self.vehicle.thrust_range[1]
+        return float((-k1 + np.sqrt(k1**2 + 4 * k2 * (top - k0))) / (2 * k2))
+
+    def at_rest(self, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> State:
+        """On the ground, rotors still."""
+        zero = np.zeros(3)
+        position = np.array([x, y, self.vehicle.feet_height])
+        return State(position, zero, np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), zero, np.zeros(4))
+
+    def advance(self, state: State, motors: np.ndarray, dt: float, wind: np.ndarray | None = None) -> State:
+        """The state after `dt` s under constant motor outputs.
+
+        Args:
+            state: NumPy leaves.
+            motors: (4,) in [0, 1], Betaflight's order; rotor speed is proportional to it.
+            dt: a whole number of `STEP_S`.
+            wind: (3,) world, m/s.
+        """
+        steps = max(round(dt / STEP_S), 1)
+        air = np.zeros(3) if wind is None else wind
+        after = _advance(self.vehicle, state, np.asarray(motors) * self.full_speed, air, steps)
+        return State(*(np.asarray(x, np.float64) for x in jax.tree.leaves(after)))
+
+    def sensed(self, before: State, after: State, dt: float) -> FirmwareState:
+        """What gyroscope and accelerometer say after a step of `dt` s."""
+        felt = (after.velocity - before.velocity) / dt + np.array([0, 0, GRAVITY])
+        attitude = Quat(*after.quaternion)
+        force = attitude.unrotate(Vec3(*felt))
+        return FirmwareState(after.body_rate, np.array([force.x, force.y, force.z]), after.quaternion, after.velocity,
+                             after.position)  # fmt: skip
+
+
+@partial(jax.jit, static_argnums=4)
+def _advance(vehicle: Vehicle, state: State, rotor_command: jax.Array, wind: jax.Array, steps: int) -> State:
+    air, command = Vec3.of(wind), tuple(rotor_command)
+
+    def step(parts: Parts, _: None) -> tuple[Parts, None]:
+        free = rk4(vehicle, parts, command, air, STEP_S)  # type: ignore[arg-type]
+        return _stand(vehicle, free), None
+
+    return jax.lax.scan(step, Parts.of(state), None, length=steps)[0].join()
+
+
+def _stand(vehicle: Vehicle, free: Parts) -> Parts:
+    """Hold what touches the ground: it does not sink, slide or turn, and stands upright on its feet."""
+    down = free.position.z <= vehicle.feet_height
+    keep = jnp.where(down, 0.0, 1.0)
+    q = free.attitude
+    upright = Quat(q.w, q.x * keep, q.y * keep, q.z).normalized()
+    return Parts(
+        position=Vec3(free.position.x, free.position.y, jnp.maximum(free.position.z, vehicle.feet_height)),
+        velocity=Vec3(
+            free.velocity.x * keep, free.velocity.y * keep,
+            jnp.where(down, jnp.maximum(free.velocity.z, 0.0), free.velocity.z),
+        ),
+        attitude=upright,
+        body_rate=free.body_rate * keep,
+        rotor_speed=free.rotor_speed,
+    )  # fmt: skip
