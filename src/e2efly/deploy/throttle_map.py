@@ -20,7 +20,7 @@ SCALE_RANGE = (0.5, 2.0)
 GAIN_RANGE = (0.0, 4.0)
 """Bounds of its relative change over the relative change of voltage: 2 where rotor speed follows the voltage."""
 FORGETTING = 0.998
-"""Weight of the past an update."""
+"""Weight of the past every hundredth of a second."""
 SCALE_RATE = 0.25
 """Largest change of the factor that is used, 1/s: it never jumps."""
 LOWEST_FORCE = 0.3 * GRAVITY
@@ -107,9 +107,10 @@ def update(m: ThrottleMap, throttle: float, force: float, voltage: float | None,
     row = np.array([nominal, nominal * change]) / GRAVITY
     error = force / GRAVITY - row @ theta
     covariance = np.array(m.covariance)
-    gain = covariance @ row / (FORGETTING + row @ covariance @ row)
+    forgetting = FORGETTING ** (100 * dt)
+    gain = covariance @ row / (forgetting + row @ covariance @ row)
     theta = theta + gain * error
-    covariance = (covariance - np.outer(gain, row @ covariance)) / FORGETTING + _DRIFT
+    covariance = (covariance - np.outer(gain, row @ covariance)) / forgetting + _DRIFT
     covariance = np.clip(covariance, -_LARGEST.max(), _LARGEST.max())
     covariance[[0, 1], [0, 1]] = np.minimum(np.diag(covariance), np.diag(_LARGEST))
     learned = float(np.clip(theta[0], *SCALE_RANGE))

@@ -27,6 +27,8 @@ RC_PERIOD_S = 0.02
 """How often the pilot's receiver speaks, s."""
 CALIBRATION_S = 6.0
 """The firmware stands still for so long before it can be armed, s."""
+POSE_NOISE = (0.0005, 0.01, 0.02, 0.001)
+"""Of position, m; velocity, m/s; body rate, rad/s; attitude, rad: a motion capture system's, standard deviations."""
 SETTINGS = (
     "aux 0 0 0 1700 2100 0 0",  # arm: AUX1
     "aux 1 50 1 1700 2100 0 0",  # MSP override: AUX2
@@ -39,6 +41,10 @@ SETTINGS = (
     "set rc_smoothing=OFF",
     "set feedforward_transition=0",
     *(f"set f_{axis}=0" for axis in ("roll", "pitch", "yaw")),  # noise of the setpoint is not to be amplified
+    *(f"set p_{axis}={p}" for axis, p in (("roll", 40), ("pitch", 42), ("yaw", 120))),  # tuned: 63 % of a step in
+    *(f"set i_{axis}={i}" for axis, i in (("roll", 40), ("pitch", 40), ("yaw", 20))),  # 45 ms, a fifth too far
+    *(f"set d_{axis}={d}" for axis, d in (("roll", 50), ("pitch", 55), ("yaw", 100))),
+    "set iterm_relax=RPY",
     "set small_angle=180",
     "set acc_calibration=0,0,0,1",
     "set serial_update_rate_hz=1000",
@@ -86,6 +92,7 @@ class Rig:
         real_time: bool = False,
         pose_rate: float = 200.0,
         latency: float = 0.0,
+        seed: int = 0,
     ) -> None:
         self.sitl = Sitl(firmware, folder, virtual_time=not real_time)
         self.world = World(vehicle)
@@ -99,6 +106,7 @@ class Rig:
         self._next_pose = self._next_rc = 0.0
         self._left = 0.0
         self._on = True
+        self._noise = np.random.default_rng(seed)
 
     def __enter__(self) -> "Rig":
         self.start()
@@ -166,8 +174,13 @@ class Rig:
         self.sitl.start()
 
     def _sample(self, now: float) -> Sample:
-        s = self.state
-        return Sample(now, s.position, s.quaternion, now, s.velocity, s.body_rate)  # type: ignore[arg-type]
+        s, noise = self.state, self._noise
+        position, velocity, rate = (
+            np.asarray(x) + sigma * noise.normal(size=3)
+            for x, sigma in zip((s.position, s.velocity, s.body_rate), POSE_NOISE[:3], strict=True)
+        )
+        quaternion = np.asarray(s.quaternion) + POSE_NOISE[3] / 2 * noise.normal(size=4)
+        return Sample(now, position, quaternion / np.linalg.norm(quaternion), now, velocity, rate)
 
 
 def prepare(sitl: Sitl, settings: tuple[str, ...] = SETTINGS) -> None:

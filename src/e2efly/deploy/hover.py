@@ -1,0 +1,85 @@
+"""The controllers that fly take-off, hover and landing, and turn a policy's commands into body rates."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from e2efly.control import CASCADE, Ctbr, Quat, Vec3
+from e2efly.deploy.msp.messages import Attitude
+from e2efly.deploy.odometry import Odometry
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+LEVEL_GAIN = 4.0
+"""Body rate over tilt of the blind descent, 1/s."""
+SINK_ACCELERATION, SINK_TIME = 1.0, 0.6
+"""A blind descent begins by falling so, m/s^2, for so long, s ..."""
+SINK_THRUST = 0.98
+"""... and goes on with this share of the weight: it must sink, whatever the throttle map's last error."""
+SINK_SPEED = 0.5
+"""By which the time to the ground is estimated, m/s."""
+
+
+@dataclass(frozen=True)
+class FlightMotion:
+    """Odometry taken apart, as the controllers take it."""
+
+    position: Vec3
+    velocity: Vec3
+    attitude: Quat
+
+    @staticmethod
+    def of(odometry: Odometry) -> "FlightMotion":
+        """Of an odometry."""
+        return FlightMotion(Vec3(*odometry.position), Vec3(*odometry.velocity), Quat(*odometry.quaternion))
+
+
+def flight_gains(vehicle: Vehicle, latency: float) -> Vehicle:
+    """The vehicle with gains that a latency allows.
+
+    In the simulator the attitude loop runs in the flight controller, without delay; here it is closed over the link.
+    A loop of bandwidth k behind a delay T loses k T of phase: the attitude loop keeps to half a radian of it, the
+    velocity loop to a third of the attitude loop's bandwidth, the position loop to 0.4 of the velocity loop's.
+
+    Args:
+        vehicle: as loaded.
+        latency: from the motion to the body-rate setpoint, s.
+    """
+    slowest = latency + 1 / float(np.min(vehicle.rate_gain[:2]))
+    attitude = np.minimum(vehicle.attitude_gain, 0.5 / slowest)
+    velocity = np.minimum(vehicle.velocity_gain, attitude[0] / 3)
+    position = np.minimum(vehicle.position_gain, 0.4 * velocity)
+    return dataclasses.replace(vehicle, attitude_gain=attitude, velocity_gain=velocity, position_gain=position)
+
+
+def controlled(vehicle: Vehicle, mode: str, odometry: Odometry, command: tuple[float, ...] | np.ndarray) -> Ctbr:
+    """CTBR of a command of a command mode: the simulator's own cascade."""
+    a, b, c, d = (np.float64(x) for x in command)
+    return CASCADE[mode](vehicle, FlightMotion.of(odometry), (a, b, c, d))
+
+
+def blind(attitude: Attitude | None, elapsed: float) -> Ctbr:
+    """Level by the controller's own attitude, and sink; without any attitude the rates are held at zero.
+
+    Args:
+        attitude: the flight controller's.
+        elapsed: since the descent began, s.
+    """
+    thrust = GRAVITY - SINK_ACCELERATION if elapsed < SINK_TIME else SINK_THRUST * GRAVITY
+    if attitude is None:
+        return Ctbr(thrust, Vec3(0.0, 0.0, 0.0))
+    tilt = max(math.cos(attitude.roll) * math.cos(attitude.pitch), 0.5)
+    return Ctbr(thrust / tilt, Vec3(-LEVEL_GAIN * attitude.roll, -LEVEL_GAIN * attitude.pitch, 0.0))
+
+
+def blind_time(height: float) -> float:
+    """After how long a blind descent from a height, m, has surely ended, s; the throttle is closed then."""
+    return 2.0 + max(height, 0.0) / SINK_SPEED
+
+
+def roll_pitch(quaternion: np.ndarray) -> tuple[float, float]:
+    """Roll and pitch, rad, of R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    w, x, y, z = (float(q) for q in quaternion)
+    pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
+    return math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), pitch
