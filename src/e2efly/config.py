@@ -7,6 +7,8 @@ recompile) unless the field says that it sets a shape.
 from dataclasses import dataclass, field
 from typing import Literal
 
+from e2efly.courses import defaults
+
 
 @dataclass(frozen=True)
 class NoiseConfig:
@@ -80,7 +82,7 @@ class HoverConfig:
 
     episode_s: float = 8.0
     """Length of an episode, s."""
-    target: tuple[float, float, float] = (0.0, 0.0, 3.0)
+    target: tuple[float, float, float] = defaults.TARGET
     """Where to hover, world, m."""
     position: float = 2.0
     """Start within this of the target, m an axis."""
@@ -94,7 +96,7 @@ class HoverConfig:
     """Success: within this of the target, m, ..."""
     hold_s: float = 1.0
     """... for this last part of the episode, s."""
-    fence: float = 6.0
+    fence: float = defaults.HOVER_FENCE
     """Farther than this from the target the episode fails, m."""
 
 
@@ -118,7 +120,7 @@ class LandConfig:
     """Success: speed at touch, m/s."""
     tilt: float = 0.2617993877991494
     """Success: tilt at touch, rad."""
-    fence: float = 6.0
+    fence: float = defaults.LAND_FENCE
     """Farther than this from the pad, sideways or up, the episode fails, m."""
 
 
@@ -130,7 +132,7 @@ class TrackConfig:
     """Length of an episode, s (sets shapes)."""
     reference: str = "polynomial"
     """polynomial (random, smooth), circle, lemniscate, or the path of a .csv file with columns t, x, y, z."""
-    centre: tuple[float, float, float] = (0.0, 0.0, 3.0)
+    centre: tuple[float, float, float] = defaults.CENTRE
     """Centre of the reference, world, m."""
     position: float = 1.0
     """Start within this ball about the reference, m."""
@@ -140,13 +142,13 @@ class TrackConfig:
     """The error counts after this time, s."""
     mean_error: float = 0.08
     """Success: mean distance to the reference, m."""
-    fence: float = 3.0
+    fence: float = defaults.TRACK_FENCE
     """Farther than this from the reference the episode fails, m."""
-    radius: float = 2.0
+    radius: float = defaults.RADIUS
     """Circle: radius; lemniscate: half its length, m."""
-    circle_rate: float = 0.6283185307179586
+    circle_rate: float = defaults.CIRCLE_RATE
     """Circle: angular rate, rad/s."""
-    lemniscate_speed: float = 3.0
+    lemniscate_speed: float = defaults.LEMNISCATE_SPEED
     """Lemniscate: top speed, m/s."""
     polynomial_reach: float = 2.0
     """Random polynomial: its knots lie within this of the centre, m an axis."""
@@ -160,13 +162,13 @@ class RaceConfig:
 
     episode_s: float = 12.0
     """Length of an episode, s."""
-    track: str = "four_gates"
+    track: str = defaults.TRACK
     """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file (its gate count sets shapes)."""
     position: float = 1.0
     """Start within this ball about the track's start, m."""
     laps: int = 1
     """Laps that end the episode with success; 0: fly on until time is out."""
-    fence: float = 10.0
+    fence: float = defaults.RACE_FENCE
     """Farther than this from the next gate the episode fails, m."""
 
 

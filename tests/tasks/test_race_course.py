@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from e2efly.config import HoverConfig, RaceConfig, TrackConfig
+from e2efly.courses.tracks import load_track, track_names
 from e2efly.env import random_key
 from e2efly.tasks import Outcome, Race, Shape, Track, make_task
 from e2efly.tasks.task import at_rest
-from e2efly.tasks.tracks import load_track, track_names
 
 SHAPE = Shape(0.05, 0.12)
 
@@ -102,7 +102,7 @@ BROKEN = [
 
 @pytest.mark.parametrize(("old", "new", "message"), BROKEN)
 def test_broken_tracks(old: str, new: str, message: str, tmp_path: Path) -> None:
-    import e2efly.tasks.tracks as tracks
+    import e2efly.courses.tracks as tracks
 
     text = (Path(tracks.__file__).parent / "four_gates.toml").read_text()
     assert old in text

@@ -4,9 +4,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from e2efly.courses.references import KNOT_PERIOD, Lissajous, Spline, read_csv, through_points
 from e2efly.env import random_key
-from e2efly.tasks import references
-from e2efly.tasks.references import KNOT_PERIOD, Lissajous, Spline, polynomial, through_points
+from e2efly.tasks.references import polynomial
 
 pytestmark = pytest.mark.usefixtures("x64")
 
@@ -101,4 +101,4 @@ def test_a_users_path_goes_through_points_closer_than_the_knots() -> None:
 
 def test_a_file_that_is_not_there() -> None:
     with pytest.raises(ValueError, match=r"reference 'nowhere\.csv' cannot be read"):
-        references.read_csv("nowhere.csv")
+        read_csv("nowhere.csv")

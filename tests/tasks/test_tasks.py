@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from e2efly.config import HoverConfig, LandConfig, RaceConfig, TrackConfig
+from e2efly.courses.references import Lissajous, read_csv, through_points
+from e2efly.courses.tracks import load_track, track_names
 from e2efly.env import random_key
 from e2efly.physics.rotation import from_euler
 from e2efly.tasks import Hover, Land, Race, Shape, Track
-from e2efly.tasks.references import Lissajous, polynomial, read_csv, through_points
+from e2efly.tasks.references import polynomial
 from e2efly.tasks.task import Outcome, at_rest
-from e2efly.tasks.tracks import load_track, track_names
 
 SHAPE = Shape(0.05, 0.12)
 LATER, NOW = jnp.zeros(1, bool), jnp.ones(1, bool)
@@ -92,7 +93,7 @@ def test_shipped_tracks_meet_each_gate_from_behind(name: str) -> None:
     ],
 )
 def test_broken_tracks_are_named(old: str, new: str, message: str, tmp_path: Path) -> None:
-    import e2efly.tasks.tracks as tracks
+    import e2efly.courses.tracks as tracks
 
     text = (Path(tracks.__file__).parent / "four_gates.toml").read_text()
     path = tmp_path / "mine.toml"

@@ -4,8 +4,8 @@ from rich.console import Console
 from rich.table import Table
 
 from e2efly import presets
+from e2efly.courses.tracks import track_names
 from e2efly.device import prepare
-from e2efly.tasks.tracks import track_names
 from e2efly.vehicles import load_vehicle, vehicle_names
 
 

@@ -1,9 +1,4 @@
-"""Racing: fly through gates in order, as fast as the vehicle allows.
-
-A gate's frame: x along its yaw, the direction in which it is flown through; y left; z up. A gate is passed when the
-centre of mass crosses its plane forward with the vehicle's sphere inside the opening; crossing the next gate's plane
-forward anywhere else is a failure, and so is touching the frame of any gate in either direction.
-"""
+"""Racing: fly through gates in order, as fast as the vehicle allows. What passing is: `courses/gates.py`."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -11,51 +6,20 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from e2efly.config import RaceConfig
+from e2efly.courses.gates import Gates
+from e2efly.courses.tracks import load_track
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.tasks.task import Outcome, Shape, at_rest, into_ball, touches_ground, uniform
-from e2efly.tasks.tracks import RaceTrack, load_track
 
-FRAME = 0.1
-"""Width of a gate's frame around its opening, m."""
 LOWEST_START = 0.3
 """Starts are drawn at least this high over the feet, m."""
 
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Gates:
-    """The gates of a track as arrays."""
-
-    start: Float[Array | np.ndarray, "3"]
-    start_yaw: float | Array
-    position: Float[Array | np.ndarray, "g+1 3"]
-    """Centres; the last row is what the policy is shown behind the last gate."""
-    cos: Float[Array | np.ndarray, " g"]
-    sin: Float[Array | np.ndarray, " g"]
-    half: Float[Array | np.ndarray, "g 2"]
-    """Half of the opening's width and height, m."""
-
-    @staticmethod
-    def of(track: RaceTrack) -> "Gates":
-        """The arrays of a loaded track: behind the last gate comes the first again, or a point 3 m straight on."""
-        cos, sin = np.cos(track.yaw), np.sin(track.yaw)
-        straight_on = track.position[-1] + 3.0 * np.array([cos[-1], sin[-1], 0.0])
-        position = np.vstack([track.position, track.position[0] if track.closed else straight_on])
-        start, opening = track.start.astype(np.float32), track.opening.astype(np.float32)
-        p, c, s = (x.astype(np.float32) for x in (position, cos, sin))
-        return Gates(start, track.start_yaw, p, c, s, opening / 2)
-
-    def local(self, point: Float[Array, "n 3"]) -> tuple[Array, Array, Array]:
-        """Coordinates in every gate's frame, each (n, g)."""
-        d = point[:, None] - self.position[:-1]
-        x, y, cos, sin = d[..., 0], d[..., 1], jnp.asarray(self.cos), jnp.asarray(self.sin)
-        return cos * x + sin * y, cos * y - sin * x, d[..., 2]
+jax.tree_util.register_dataclass(Gates, data_fields=list(Gates.__dataclass_fields__), meta_fields=[])
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "gates"], meta_fields=["closed"])
@@ -92,7 +56,7 @@ class Race:
     @property
     def count(self) -> int:
         """Gates of the track."""
-        return self.gates.cos.shape[0]
+        return self.gates.count
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Int[Array, " n"]]:
         """At rest and level in a ball about the start, heading as the track says."""
@@ -132,18 +96,8 @@ class Race:
     ) -> tuple[Int[Array, " n"], Outcome]:
         """Success: the last gate of the last lap passed. Crossings are judged on the straight line of the step."""
         del timed_out
-        x0, y0, z0 = self.gates.local(before.position)
-        x1, y1, z1 = self.gates.local(after.position)
-        t = x0 / jnp.where(x0 == x1, 1.0, x0 - x1)
-        y, z = jnp.abs(y0 + t * (y1 - y0)), jnp.abs(z0 + t * (z1 - z0))
-        forward, crossing = (x0 < 0) & (x1 >= 0), (x0 < 0) != (x1 < 0)
-        half, radius = self.gates.half, self.shape.radius
-        inside = (y < half[:, 0] - radius) & (z < half[:, 1] - radius)
-        outside = (y > half[:, 0] + FRAME + radius) | (z > half[:, 1] + FRAME + radius)
-        mine = (memory % self.count)[:, None] == jnp.arange(self.count)
-        passed = jnp.any(mine & forward & inside, axis=-1)
-        missed = jnp.any(mine & forward & ~inside, axis=-1)
-        struck = jnp.any(crossing & ~inside & ~outside, axis=-1)
+        index, radius = memory % self.count, self.shape.radius
+        passed, missed, struck = self.gates.judge(index, before.position, after.position, radius)
         error = jnp.linalg.norm(after.position - self.goal(memory, time), axis=-1)
         crashed = missed | struck | (error > self.config.fence) | touches_ground(self.shape, after)
         passed = passed & ~crashed

@@ -10,18 +10,13 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.config import TrackConfig
+from e2efly.courses.references import POINTS, SPACING, Lissajous, Spline, knot_count, read_csv, through_points
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
-from e2efly.tasks import references
-from e2efly.tasks.references import Lissajous, Spline
+from e2efly.tasks.references import polynomial
 from e2efly.tasks.task import Outcome, Shape, at_rest, into_ball, touches_ground, uniform
 from e2efly.vehicles.names import unknown
-
-POINTS = 10
-"""Reference points that the policy sees."""
-SPACING = 0.1
-"""Seconds between them; the first is the point to be at now."""
 
 
 @jax.tree_util.register_dataclass
@@ -64,17 +59,17 @@ class Track:
         """
         numbers = dataclasses.replace(config, reference="")  # resolved here: references share a compiled program
         kinds = ("polynomial", "circle", "lemniscate")
-        m = references.knot_count(config.episode_s + POINTS * SPACING)
+        m = knot_count(config.episode_s + POINTS * SPACING)
         if config.reference not in kinds:
             if not config.reference.endswith(".csv"):
                 raise ValueError(unknown("reference", config.reference, kinds) + ", or the path of a .csv file")
-            table = references.read_csv(config.reference)
+            table = read_csv(config.reference)
             if table[:, 3].min() <= shape.feet_height:
                 raise ValueError(
                     f"reference {config.reference}: lowest z is {table[:, 3].min()} m; accepted: above "
                     f"{shape.feet_height} m, the height of the centre of mass over the feet"
                 )
-            path = references.through_points(table)
+            path = through_points(table)
             return Track(numbers, shape, m, dataclasses.replace(path, knots=path.knots.astype(np.float32)))
         curves = {
             "circle": Lissajous.circle(config.radius, config.circle_rate),
@@ -91,7 +86,7 @@ class Track:
         """Draw a reference a vehicle."""
         c = self.config
         if self.curve is None:
-            return references.polynomial(key, c.centre, c.polynomial_reach, c.polynomial_speed, n, self.knots)
+            return polynomial(key, c.centre, c.polynomial_reach, c.polynomial_speed, n, self.knots)
         if isinstance(self.curve, Lissajous):
             return self.curve.spline(c.centre, jnp.pi * uniform(key, n, 1)[:, 0], self.knots)
         knots = jnp.asarray(self.curve.knots)

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from e2efly.courses.gates import FRAME
 from e2efly.tasks import Hover, Land, Race, Track
-from e2efly.tasks.race import FRAME
 from e2efly.view.flights import Flights
 from e2efly.view.style import HALO, INK, ORANGE
 

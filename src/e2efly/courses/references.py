@@ -1,0 +1,178 @@
+"""References to follow: every kind becomes one quintic spline, so that all of them share one compiled program.
+
+A spline has uniform knots with position, velocity and acceleration (quintic Hermite pieces, twice continuously
+differentiable). A circle of the tracking task differs from its spline by less than 0.01 mm, a 3 m/s lemniscate by
+less than 0.1 mm. The arithmetic is that of the arrays it is given: NumPy's or JAX's (also while it traces).
+"""
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+KNOT_PERIOD = 0.5
+"""Seconds between the knots of all references but a user's."""
+POINTS = 10
+"""Reference points that the policy sees."""
+SPACING = 0.1
+"""Seconds between them; the first is the point to be at now."""
+_POWERS = np.arange(6)
+
+
+@dataclass(frozen=True)
+class Spline:
+    """Knots a vehicle: [:, :, 0] position, m; 1 velocity, m/s; 2 acceleration, m/s^2."""
+
+    knots: Any
+    """(n, m, 3, 3), a NumPy or JAX array."""
+    period: float = KNOT_PERIOD
+    """Seconds between knots."""
+    end: float = math.inf
+    """Seconds after which the position is held, where that is before the last knot."""
+
+    @property
+    def duration(self) -> float:
+        """Seconds after which the position is held."""
+        return min(self.end, (self.knots.shape[1] - 1) * self.period)
+
+    def position(self, time: Any) -> Any:
+        """Positions (n, k, 3) at the times (n, k), s, in the arrays' own library; held at the ends."""
+        xp = time.__array_namespace__()
+        index, s = self.piece(time)
+        rows, knots = xp.arange(self.knots.shape[0])[:, None], xp.asarray(self.knots)
+        c0, c1, c2, c3, c4, c5 = _quintic(knots[rows, index], knots[rows, index + 1], self.period)
+        s = s[..., None]
+        return c0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
+
+    def piece(self, time: Any) -> tuple[Any, Any]:
+        """Index of the piece at each time, s, and how much of it is over, in [0, 1]."""
+        xp = time.__array_namespace__()
+        u = xp.clip(time, 0.0, self.duration) / self.period
+        index = xp.minimum(u.astype(xp.int32), self.knots.shape[1] - 2)
+        return index, u - index
+
+
+def _quintic(a: Any, b: Any, h: float) -> tuple[Any, ...]:
+    """Coefficients of s^0 to s^5 between knots a and b (..., 3, 3), h seconds apart, s in [0, 1]; each (..., 3)."""
+    p0, v0, a0 = a[..., 0, :], a[..., 1, :] * h, a[..., 2, :] * (h * h / 2)
+    p1, v1, a1 = b[..., 0, :], b[..., 1, :] * h, b[..., 2, :] * (h * h / 2)
+    d = p1 - p0
+    c3 = 10 * d - 6 * v0 - 4 * v1 - 3 * a0 + a1
+    c4 = -15 * d + 8 * v0 + 7 * v1 + 3 * a0 - 2 * a1
+    c5 = 6 * d - 3 * v0 - 3 * v1 - a0 + a1
+    return p0, v0, a0, c3, c4, c5
+
+
+@dataclass(frozen=True)
+class Polynomials:
+    """The spline of one vehicle in NumPy, its polynomials worked out beforehand: a fifth of the time a look."""
+
+    spline: Spline
+    coefficients: np.ndarray
+    """(m - 1, 6, 3) of s^0 to s^5 of each piece."""
+
+    @staticmethod
+    def of(spline: Spline) -> "Polynomials":
+        """Of a spline with knots (1, m, 3, 3)."""
+        (knots,) = np.asarray(spline.knots, np.float64)
+        return Polynomials(spline, np.stack(_quintic(knots[:-1], knots[1:], spline.period), axis=1))
+
+    def position(self, time: np.ndarray) -> np.ndarray:
+        """Positions (k, 3) at the times (k,), s; held at the ends."""
+        index, s = self.spline.piece(time)
+        return np.einsum("ke,kec->kc", s[:, None] ** _POWERS, self.coefficients[index])
+
+
+def knot_count(duration: float) -> int:
+    """Knots that cover `duration` seconds."""
+    return math.ceil(duration / KNOT_PERIOD) + 1
+
+
+@dataclass(frozen=True)
+class Lissajous:
+    """A level curve x = X sin(w t + p + d), y = Y sin(k (w t + p)): a circle or a figure of eight, by its numbers.
+
+    The numbers may be arrays of shape ().
+    """
+
+    half_x: Any
+    """X, m."""
+    half_y: Any
+    """Y, m."""
+    ratio: Any
+    """k: turns of y for one of x."""
+    shift: Any
+    """d, rad."""
+    rate: Any
+    """w, rad/s."""
+
+    @staticmethod
+    def circle(radius: float, rate: float) -> "Lissajous":
+        """Radius in m, angular rate in rad/s, counter-clockwise."""
+        return Lissajous(radius, radius, 1.0, math.pi / 2, rate)
+
+    @staticmethod
+    def lemniscate(half_length: float, speed: float) -> "Lissajous":
+        """Gerono's figure of eight, x = A sin, y = A sin cos: A in m, top speed (in the middle) in m/s."""
+        return Lissajous(half_length, half_length / 2, 2.0, 0.0, speed / (half_length * math.sqrt(2.0)))
+
+    def spline(self, centre: Any, phase: Any, m: int) -> Spline:
+        """The curve about `centre` (3,), m, from each phase p (n,), rad, as `m` knots in the phases' own library."""
+        xp = phase.__array_namespace__()
+        angle = self.rate * KNOT_PERIOD * xp.arange(m) + phase[:, None]
+        x, y = angle + self.shift, self.ratio * angle
+        wx, wy, zero = self.rate, self.ratio * self.rate, xp.zeros_like(angle)
+        p = xp.stack([self.half_x * xp.sin(x), self.half_y * xp.sin(y), zero], axis=-1)
+        v = xp.stack([wx * self.half_x * xp.cos(x), wy * self.half_y * xp.cos(y), zero], axis=-1)
+        a = -xp.stack([wx**2 * self.half_x * xp.sin(x), wy**2 * self.half_y * xp.sin(y), zero], axis=-1)
+        return Spline(xp.stack([p + xp.asarray(centre), v, a], axis=-2))
+
+
+def read_csv(path: str | Path) -> np.ndarray:
+    """Read a reference: columns t, x, y, z with a header line, seconds and metres, t rising from any value.
+
+    Returns:
+        (rows, 4), t from zero.
+
+    Raises:
+        ValueError: naming the file, the line and what is accepted.
+    """
+    accepted = "accepted: a header 't,x,y,z', then at least 3 rows of finite numbers, t rising (s, m)"
+    try:
+        with Path(path).open(newline="", encoding="utf-8") as file:
+            lines = list(csv.reader(file))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"reference {str(path)!r} cannot be read: {error}") from None
+    if not lines or [cell.strip().lower() for cell in lines[0]] != ["t", "x", "y", "z"]:
+        raise ValueError(f"reference {path}, line 1: {lines[0] if lines else 'empty'}; {accepted}")
+    rows = []
+    for number, cells in enumerate(lines[1:], start=2):
+        try:
+            row = [float(cell) for cell in cells]
+        except ValueError:
+            row = []
+        if len(row) != 4 or not all(map(math.isfinite, row)) or (rows and row[0] <= rows[-1][0]):
+            raise ValueError(f"reference {path}, line {number}: {cells}; {accepted}")
+        rows.append(row)
+    if len(rows) < 3:
+        raise ValueError(f"reference {path}: {len(rows)} rows; {accepted}")
+    table = np.array(rows)
+    table[:, 0] -= table[0, 0]
+    return table
+
+
+def through_points(table: np.ndarray) -> Spline:
+    """The natural cubic spline through the rows t, x, y, z, of one vehicle; held after the last row.
+
+    Its knots are as close as the closest rows (0.02 to 0.5 s apart), so that no point is smoothed away.
+    """
+    from scipy.interpolate import CubicSpline  # only a user's own reference needs it
+
+    spline = CubicSpline(table[:, 0], table[:, 1:], bc_type="natural")
+    end = float(table[-1, 0])
+    period = float(np.clip(np.min(np.diff(table[:, 0])), 0.02, KNOT_PERIOD))
+    t = period * np.arange(math.ceil(end / period) + 1)
+    return Spline(np.stack([spline(t, order) for order in range(3)], axis=1)[None], period, end)

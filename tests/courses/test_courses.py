@@ -1,0 +1,112 @@
+"""Courses: the same on NumPy and on JAX, without JAX, and placed in a room."""
+
+import dataclasses
+import os
+import subprocess
+import sys
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from e2efly.courses.gates import Gates
+from e2efly.courses.origin import Origin
+from e2efly.courses.references import Lissajous, Polynomials, Spline
+from e2efly.courses.tracks import load_track, track_names
+from e2efly.env import random_key
+from e2efly.tasks.references import polynomial
+
+CURVES = [Lissajous.circle(2.0, 0.2 * np.pi), Lissajous.lemniscate(2.0, 3.0)]
+
+
+@pytest.mark.parametrize("curve", CURVES)
+def test_a_curve_is_the_same_on_both_libraries(curve: Lissajous) -> None:
+    phase = np.array([-2.0, 0.3, 3.0], np.float32)
+    ours, theirs = (curve.spline((1.0, -1.0, 3.0), x, 23).knots for x in (phase, jnp.asarray(phase)))
+    assert (type(ours), ours.shape) == (np.ndarray, (3, 23, 3, 3))
+    assert isinstance(theirs, jax.Array)
+    np.testing.assert_allclose(ours, theirs, atol=3e-5)
+
+
+@pytest.mark.usefixtures("x64")
+def test_a_spline_is_the_same_on_both_libraries() -> None:
+    """Between the knots, on them, before the first and behind the end, also while JAX traces."""
+    random = polynomial(random_key(0), (0.0, 0.0, 3.0), 2.0, 2.5, 4, 23)
+    spline = Spline(np.asarray(random.knots), end=9.7)
+    time = np.stack([np.linspace(-1, 12, 300), np.arange(300) * 0.5, np.full(300, 9.7), np.full(300, 0.0)])
+    ours, theirs = spline.position(time), jax.jit(lambda s, t: s.position(t))(spline, jnp.asarray(time))
+    assert (type(ours), ours.shape) == (np.ndarray, (4, 300, 3))
+    np.testing.assert_allclose(ours, theirs, atol=1e-12)
+    np.testing.assert_array_equal(ours[0, 0], spline.knots[0, 0, 0])
+    assert spline.duration == 9.7
+    np.testing.assert_array_equal(ours[2, 0], spline.position(np.full((4, 1), 50.0))[2, 0])
+
+
+def test_polynomials_worked_out_beforehand_are_the_spline() -> None:
+    random, time = polynomial(random_key(1), (0.0, 0.0, 3.0), 2.0, 2.5, 1, 23), np.linspace(-1, 12, 333)
+    spline = Spline(np.asarray(random.knots, np.float64), end=9.7)
+    path = Polynomials.of(spline).position(time)
+    assert path.shape == (333, 3)
+    np.testing.assert_allclose(path, spline.position(time[None])[0], atol=1e-12)
+
+
+@pytest.mark.usefixtures("x64")
+@pytest.mark.parametrize("name", track_names())
+def test_gates_are_judged_alike_on_both_libraries(name: str) -> None:
+    """Steps of any length about the gates, with passes, misses and blows among them."""
+    rng = np.random.default_rng(0)
+    track = load_track(name)
+    gates = Gates.of(track)
+    n = 4000
+    index = rng.integers(0, gates.count, n)
+    middle = track.position[index] + rng.uniform(-0.8, 0.8, (n, 3))
+    step = rng.normal(0.0, 0.5, (n, 3))
+    ours = gates.judge(index, middle - step, middle + step, 0.12)
+    theirs = jax.jit(lambda g, *args: g.judge(*args))(gates, index, middle - step, middle + step, 0.12)
+    for a, b in zip(ours, theirs, strict=True):
+        assert isinstance(a, np.ndarray)
+        assert 50 < a.sum() < n - 50
+        np.testing.assert_array_equal(a, b)
+
+
+def test_an_origin_turns_then_moves() -> None:
+    origin = Origin((10.0, 20.0, 1.0), np.pi / 2)
+    np.testing.assert_allclose(origin.points((1.0, 2.0, 3.0)), [8.0, 21.0, 4.0], atol=1e-12)
+    np.testing.assert_allclose(origin.vectors(np.array([[1.0, 0.0, 0.0]])), [[0.0, 1.0, 0.0]], atol=1e-12)
+
+
+@pytest.mark.parametrize("curve", CURVES)
+def test_a_placed_spline_is_the_placed_path(curve: Lissajous) -> None:
+    origin, time = Origin((1.0, -2.0, 0.5), 0.7), np.linspace(0, 11, 100)[None]
+    spline = curve.spline((0.0, 0.0, 3.0), np.zeros(1), 23)
+    placed = origin.spline(spline)
+    np.testing.assert_allclose(placed.position(time), origin.points(spline.position(time)), atol=1e-12)
+    assert not np.allclose(placed.position(time), spline.position(time))
+
+
+@pytest.mark.parametrize("name", track_names())
+def test_a_placed_track_is_flown_by_the_placed_flight(name: str) -> None:
+    origin, track, rng = Origin((3.0, -1.0, 0.2), -2.0), load_track(name), np.random.default_rng(1)
+    n, count = 500, len(track.position)
+    index = rng.integers(0, count, n)
+    middle = track.position[index] + rng.uniform(-0.8, 0.8, (n, 3))
+    step = rng.normal(0.0, 0.5, (n, 3))
+    here = Gates.of(track).judge(index, middle - step, middle + step, 0.12)
+    a, b = origin.points(middle - step), origin.points(middle + step)
+    there = Gates.of(origin.track(track)).judge(index, a, b, 0.12)
+    np.testing.assert_array_equal(here, there)
+    placed = origin.track(track)
+    assert dataclasses.replace(placed, start=0, position=0, yaw=0, start_yaw=0.0) == dataclasses.replace(
+        track, start=0, position=0, yaw=0, start_yaw=0.0
+    )
+    assert placed.start_yaw == pytest.approx(track.start_yaw - 2.0)
+
+
+def test_courses_need_no_jax() -> None:
+    code = "import sys; from e2efly.courses import defaults, gates, origin, references, tracks; print(*sys.modules)"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    out = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    loaded = out.stdout.split()
+    assert {name.split(".")[1] for name in loaded if name.startswith("e2efly.")} == {"courses", "vehicles"}
+    assert not {"jax", "jaxlib", "jaxtyping", "scipy"} & set(loaded)
