@@ -11,8 +11,31 @@ set_xla_options()  # as the commands do, before anything computes
 import jax  # noqa: E402
 import pytest  # noqa: E402
 
+PARTS = ("ros1", "ros2", "mocap", "sitl")
+"""What may be missing on a laptop: tests in files whose names end so need it, and fail without it."""
+WITHOUT = tuple(filter(None, os.environ.get("E2EFLY_WITHOUT", "").split(",")))
+"""Parts whose tests are left out by the environment's word, which the summary repeats."""
+
 
 @pytest.fixture
 def x64() -> Iterator[None]:
     with jax.enable_x64(True):
         yield
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    del config
+    if wrong := set(WITHOUT) - set(PARTS):
+        raise pytest.UsageError(f"E2EFLY_WITHOUT names {', '.join(sorted(wrong))}; accepted: {', '.join(PARTS)}")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    out = [item for item in items if item.path.stem.endswith(tuple(f"_{part}" for part in WITHOUT))]
+    if out:
+        config.hook.pytest_deselected(items=out)
+        items[:] = [item for item in items if item not in out]
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    if WITHOUT:
+        terminalreporter.write_line(f"WITHOUT the tests of: {', '.join(WITHOUT)} (E2EFLY_WITHOUT)", yellow=True)

@@ -1,0 +1,28 @@
+"""Motion capture systems, by the package `motioncapture`."""
+
+import sys
+
+from e2efly.deploy.pose.relay import RelaySource, open_relay
+
+SYSTEMS = ("vrpn", "optitrack", "vicon", "qualisys", "nokov", "fzmotion", "mock")
+"""Systems that `motioncapture` may be built for; it says itself which ones it is."""
+ADVICE = (
+    "install the package motioncapture (pip install motioncapture), and check that the system streams to this machine"
+)
+"""What to do when it does not open."""
+
+
+def open_mocap(system: str, host: str, body: str) -> RelaySource:
+    """Follow one rigid body.
+
+    Args:
+        system: one of `SYSTEMS`.
+        host: address of the machine that streams.
+        body: name of the rigid body there.
+
+    Raises:
+        ValueError: for an unknown system, a package that is not installed, a system that does not answer.
+    """
+    if system not in SYSTEMS:
+        raise ValueError(f"pose source mocap: type is {system!r}; accepted: {', '.join(SYSTEMS)}")
+    return open_relay(f"mocap:{system}:{host}:{body}", [sys.executable], ADVICE, "mocap", system, host, body)

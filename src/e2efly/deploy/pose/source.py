@@ -1,0 +1,159 @@
+"""Where poses come from: one small interface, and its choice by a line of text."""
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from typing import Protocol
+
+from e2efly.deploy.odometry import Sample
+
+FORMS = {
+    "udp": "udp:PORT or udp:HOST:PORT, with HOST an address of this machine; without it 127.0.0.1",
+    "tcp": "tcp:HOST:PORT",
+    "mocap": "mocap:TYPE:HOST:RIGID_BODY",
+    "ros1": "ros1:/topic",
+    "ros2": "ros2:/topic",
+}
+"""The sources that `open_source` knows, and how each is written."""
+LARGEST_BATCH = 64
+"""Most samples that one `read` returns: of a flood the newest are kept, so that the control loop stays in time."""
+
+
+class PoseSource(Protocol):
+    """Delivers samples as they come. Nothing here blocks or raises once it is open."""
+
+    @property
+    def refused(self) -> int:
+        """Messages that were malformed or too many."""
+        ...
+
+    @property
+    def problem(self) -> str | None:
+        """What was wrong last; None: nothing so far."""
+        ...
+
+    def read(self, now: float) -> list[Sample]:
+        """What arrived since the last call, oldest first.
+
+        Args:
+            now: this machine's monotonic clock, s; what `Sample.received` is counted on.
+        """
+        ...
+
+    def close(self) -> None:
+        """Let go of everything; may be called twice."""
+        ...
+
+    def describe(self) -> str:
+        """What this is, for people and logs."""
+        ...
+
+
+class PlantSource:
+    """A plant in the same process, as a pose source."""
+
+    def __init__(self, state: Callable[[float], Iterable[Sample]], name: str = "plant") -> None:
+        """Wrap a plant.
+
+        Args:
+            state: takes the local time, s, and gives the samples since its last call, oldest first.
+            name: what to call it.
+        """
+        self.refused = 0
+        self.problem: str | None = None
+        self._state, self._name = state, name
+
+    def read(self, now: float) -> list[Sample]:
+        """What the plant has produced since the last call; an exception of it is counted and kept as the problem."""
+        try:
+            return list(self._state(now))
+        except Exception as error:  # a plant that fails is a source that falls silent, never a crash of the loop
+            self.refused, self.problem = self.refused + 1, f"{self._name}: {type(error).__name__}: {error}"
+            return []
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+    def describe(self) -> str:
+        """Its name."""
+        return self._name
+
+
+class Inbox:
+    """Messages as they came, parsed when read: the part that all sources of bytes share."""
+
+    def __init__(self, parse: Callable[[bytes, float], Sample]) -> None:
+        """Start empty; `parse` takes a message and its time of arrival, and raises ValueError for a malformed one."""
+        self.refused = 0
+        self.problem: str | None = None
+        self._parse = parse
+        self._messages: deque[tuple[bytes, float]] = deque()
+
+    def put(self, message: bytes, received: float) -> None:
+        """Keep a message; of too many the oldest go."""
+        self._messages.append((message, received))
+        if len(self._messages) > LARGEST_BATCH:
+            self._messages.popleft()
+            self.refuse(f"more than {LARGEST_BATCH} messages at once; the oldest were dropped")
+
+    def refuse(self, problem: str) -> None:
+        """Count a message that is no sample."""
+        self.refused, self.problem = self.refused + 1, problem
+
+    def take(self) -> list[Sample]:
+        """The samples of all messages, oldest first."""
+        samples = []
+        while self._messages:
+            message, received = self._messages.popleft()
+            try:
+                samples.append(self._parse(message, received))
+            except ValueError as error:
+                self.refuse(str(error))
+        return samples
+
+
+def open_source(text: str) -> PoseSource:
+    """Open a pose source that is written as in `FORMS`.
+
+    Raises:
+        ValueError: naming the text and what is accepted; for a port that is taken or a host without an address; for a
+            package that is not installed or a peer that does not answer, with what to do.
+    """
+    kind, _, rest = text.partition(":")
+    if kind == "udp":
+        from e2efly.deploy.pose.json_source import UdpSource
+
+        host, _, port = rest.rpartition(":")
+        return UdpSource(host or "127.0.0.1", _port(text, port))
+    if kind == "tcp":
+        from e2efly.deploy.pose.json_source import TcpSource
+
+        host, _, port = rest.rpartition(":")
+        return TcpSource(_part(text, host), _port(text, port))
+    if kind == "mocap":
+        from e2efly.deploy.pose.mocap import open_mocap
+
+        system, _, rest = rest.partition(":")
+        host, _, body = rest.partition(":")
+        return open_mocap(_part(text, system), _part(text, host), _part(text, body))
+    if kind in ("ros1", "ros2"):
+        from e2efly.deploy.pose.ros import open_ros
+
+        return open_ros(int(kind[-1]), _part(text, rest))
+    raise _refusal(text)
+
+
+def _part(text: str, part: str) -> str:
+    if not part.strip():
+        raise _refusal(text)
+    return part
+
+
+def _port(text: str, part: str) -> int:
+    if not (part.isascii() and part.isdigit() and 1 <= int(part) <= 65535):
+        raise _refusal(text)
+    return int(part)
+
+
+def _refusal(text: str) -> ValueError:
+    form = FORMS.get(text.partition(":")[0])
+    return ValueError(f"pose source is {text!r}; accepted: {form or '; '.join(FORMS.values())}")

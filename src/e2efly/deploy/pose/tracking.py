@@ -1,0 +1,245 @@
+"""From samples of a pose source to odometry that can be flown by, or to the reason why not. Pure.
+
+One sample in, one `Odometry` or one reason out. Nothing that is refused changes the motion: after a refusal the last
+good odometry stays the last good one and grows older, and `age` is what the flight is judged by.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from e2efly.deploy.odometry import Odometry, Sample
+from e2efly.deploy.pose.checks import Checks
+from e2efly.deploy.pose.clock import ClockMap, follow_clock, start_clock
+from e2efly.deploy.pose.slope import Slope, follow_slope, settled, slope, start_slope
+
+LARGEST = 1e6
+"""Numbers beyond this are nonsense, and their squares may overflow."""
+LARGEST_STAMP = 1e11
+"""Stamps beyond this, s, are too coarse: a float is then known to 15 microseconds."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """What is remembered of the samples so far; `Track()` before the first, and to start anew after a lasting fault."""
+
+    clock: ClockMap | None = None
+    """Map of the source's clock; None before the first stamp."""
+    odometry: Odometry | None = None
+    """The last that was handed out, what `age` counts from."""
+    pose: tuple[float, np.ndarray, np.ndarray] | None = None
+    """Time, s, position (3,), m, and quaternion (4,) of the last good sample."""
+    velocity: Slope | None = None
+    """Fit of the position, m."""
+    body_rate: Slope | None = None
+    """Fit of `angle`."""
+    angle: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    """(3,) sum of the small rotations about the body's axes so far, rad."""
+    same_since: float = 0.0
+    """Time since which the pose repeats bit for bit, s."""
+    same_pose: bytes = b""
+    """Bits of the last pose as it came."""
+    suspect: tuple[np.ndarray, np.ndarray] | None = None
+    """Position (3,) and quaternion (4,) that were jumped to last."""
+    suspect_count: int = 0
+    """Successive samples there."""
+    fault: str | None = None
+    """Reason of a fault that only a new `Track()` ends."""
+
+
+def age(track: Track, now: float) -> float:
+    """How old the last odometry is, s; infinite before the first. `now` is on the local monotonic clock, s."""
+    return now - track.odometry.time if track.odometry is not None else math.inf
+
+
+def track(checks: Checks, track: Track, sample: Sample) -> tuple[Track, Odometry | None, str | None]:
+    """Check one sample and estimate what it does not say.
+
+    Args:
+        checks: what it must satisfy.
+        track: what is remembered of the samples before.
+        sample: the sample; samples must come in the order in which they were received.
+
+    Returns:
+        What to remember; the odometry, or None; why there is none, or None. A reason starts with a key of `REASONS` and
+        a colon, and names the value and what is accepted. Neither odometry nor reason: a sample out of order that is
+        ignored.
+    """
+    if (reason := _content(checks, sample)) is not None:
+        return track, None, reason
+    clock, time, reason = _time(checks, track, sample)
+    track = replace(track, clock=clock)
+    if reason is not None:
+        ignored = reason.startswith("order") and checks.out_of_order == "ignore"
+        return track, None, None if ignored else reason
+    track, reason = _frozen(checks, track, sample, time)
+    if reason is not None or track.fault is not None:
+        return track, None, reason or track.fault
+    quaternion = np.asarray(sample.quaternion, np.float64)
+    quaternion = quaternion / math.sqrt(float(quaternion @ quaternion))
+    if track.pose is not None and float(quaternion @ track.pose[2]) < 0:
+        quaternion = -quaternion  # q and -q are one attitude: stay on the side of the last one
+    position = np.array(sample.position, np.float64)
+    track, reason = _jump(checks, track, time, position, quaternion)
+    if reason is not None:
+        return track, None, reason
+    return _motion(checks, track, sample, time, position, quaternion)
+
+
+def _content(checks: Checks, sample: Sample) -> str | None:
+    """Refusal of what the sample says by itself."""
+    arrays = (
+        ("position", sample.position, 3),
+        ("quaternion", sample.quaternion, 4),
+        ("velocity", sample.velocity, 3),
+        ("body_rate", sample.body_rate, 3),
+    )
+    for name, value, size in arrays:
+        if value is None:
+            continue
+        if not isinstance(value, np.ndarray) or value.shape != (size,) or value.dtype.kind not in "fiu":
+            return f"malformed: {name} is {value!r}; accepted: an array of {size} numbers"
+        if not (np.abs(value) <= LARGEST).all():  # false for NaN, too
+            return f"not_finite: {name} is {value.tolist()}; accepted: finite numbers up to {LARGEST:g}"
+    if sample.stamp is not None and not abs(sample.stamp) <= LARGEST_STAMP:
+        return f"not_finite: stamp is {sample.stamp!r}; accepted: a finite number of seconds up to {LARGEST_STAMP:g}"
+    if checks.frame and sample.frame != checks.frame:
+        return f"frame: frame is {sample.frame!r}; accepted: {checks.frame!r}"
+    length = math.sqrt(float(np.square(sample.quaternion, dtype=np.float64).sum()))
+    if not abs(length - 1) <= checks.quaternion_tolerance:
+        tolerance = checks.quaternion_tolerance
+        return f"quaternion: its length is {length:.4g}; accepted: 1 within {tolerance:g}, wxyz, body to world"
+    for name, value, limit in (
+        ("velocity", sample.velocity, checks.jump_speed),
+        ("body_rate", sample.body_rate, checks.jump_rate),
+    ):
+        if value is not None and float(np.abs(value).max()) > limit:
+            return f"speed: {name} is {value.tolist()}; accepted: at most {limit:g} an axis"
+    return None
+
+
+def _time(checks: Checks, track: Track, sample: Sample) -> tuple[ClockMap | None, float, str | None]:
+    """The map of the clock, the time of the sample on the local clock, s, and why it is refused."""
+    clock, last = track.clock, track.pose[0] if track.pose is not None else -math.inf
+    time = sample.received - checks.latency
+    if sample.stamp is None:
+        return (
+            clock,
+            time,
+            None if time > last else f"order: received {last - time:.4g} s before the last; accepted: later",
+        )
+    if clock is None:
+        return start_clock(sample.received, sample.stamp), time, None
+    step = sample.stamp - clock.stamp
+    if -checks.clock_jump <= step <= 0:
+        return clock, time, f"order: its stamp is {abs(step):.4g} s before the last; accepted: later"
+    followed, mapped = follow_clock(clock, sample.received, sample.stamp)
+    ahead = clock.offset - (sample.received - sample.stamp)  # by the old map it comes from the future
+    if step < 0 or ahead > checks.clock_jump:
+        jump = step if step < 0 else ahead
+        text = f"clock: the source's clock jumped by {jump:+.4g} s; accepted: steps below {checks.clock_jump:g} s"
+        return start_clock(sample.received, sample.stamp), time, text
+    time, delay = mapped - checks.latency, sample.received - mapped
+    if delay > checks.max_age:
+        return followed, time, f"late: {delay:.4g} s later than the quickest; accepted: at most {checks.max_age:g} s"
+    if time <= last:  # the map has just moved back by more than the interval
+        return followed, time, f"order: true {last - time:.4g} s before the last; accepted: later"
+    return followed, time, None
+
+
+def _frozen(checks: Checks, track: Track, sample: Sample, time: float) -> tuple[Track, str | None]:
+    bits = sample.position.tobytes() + sample.quaternion.tobytes()
+    if bits != track.same_pose:
+        return replace(track, same_pose=bits, same_since=time), None
+    still = time - track.same_since
+    if still <= checks.frozen_after:
+        return track, None
+    return track, f"frozen: the same pose for {still:.4g} s; accepted: at most {checks.frozen_after:g} s"
+
+
+def _jump(
+    checks: Checks, track: Track, time: float, position: np.ndarray, quaternion: np.ndarray
+) -> tuple[Track, str | None]:
+    """Refuse what the vehicle cannot have flown to; a jump that lasts becomes a fault."""
+    if track.pose is None:
+        return track, None
+    last_time, *last = track.pose
+    interval = min(time - last_time, checks.gap)
+    reach = checks.jump_position + checks.jump_speed * interval
+    turn = checks.jump_attitude + checks.jump_rate * interval
+
+    def distance(pose: tuple[np.ndarray, ...] | list[np.ndarray]) -> float:
+        step, angle = np.linalg.norm(position - pose[0]), np.linalg.norm(rotation_between(pose[1], quaternion))
+        return max(float(step) / reach, float(angle) / turn)
+
+    from_track = distance(last)
+    # The allowance grows with time: without this, a lasting jump would pass by itself after some samples.
+    with_suspect = track.suspect is not None and distance(track.suspect) < from_track
+    if from_track <= 1 and not with_suspect:
+        return replace(track, suspect=None, suspect_count=0), None
+    count = track.suspect_count + 1 if with_suspect else 1
+    step, angle = np.linalg.norm(position - last[0]), np.linalg.norm(rotation_between(last[1], quaternion))
+    reason = (
+        f"jump: by {step:.4g} m and {angle:.4g} rad within {interval:.4g} s; accepted: at most {reach:.4g} m and "
+        f"{turn:.4g} rad"
+    )
+    lasting = (
+        f"{reason}; seen {count} times, a fault until the track starts anew" if count >= checks.jump_count else None
+    )
+    track = replace(track, suspect=(position, quaternion), suspect_count=count, fault=lasting)
+    return track, lasting or reason
+
+
+def _motion(
+    checks: Checks, track: Track, sample: Sample, time: float, position: np.ndarray, quaternion: np.ndarray
+) -> tuple[Track, Odometry | None, str | None]:
+    """Odometry of a good sample: velocities as the source gives them, or else estimated."""
+    velocity_rate, body_rate_rate = (2 * math.pi * f for f in (checks.velocity_cutoff, checks.rate_cutoff))
+    shift, turn = track.velocity, track.body_rate
+    if track.pose is None or shift is None or turn is None or time - track.pose[0] > checks.gap:
+        shift, turn = start_slope(time, position), start_slope(time, np.zeros(3))
+        angle = np.zeros(3)
+    else:
+        # The angles turned add up to a quantity whose derivative is the body rate, and noise does not add up in them.
+        angle = track.angle + rotation_between(track.pose[2], quaternion)
+        shift = follow_slope(shift, velocity_rate, time, position)
+        turn = follow_slope(turn, body_rate_rate, time, angle)
+    track = replace(track, pose=(time, position, quaternion), velocity=shift, body_rate=turn, angle=angle)
+    for name, given, fit, rate in (
+        ("velocity", sample.velocity, shift, velocity_rate),
+        ("body_rate", sample.body_rate, turn, body_rate_rate),
+    ):
+        if given is None and not settled(fit, rate):
+            return track, None, f"starting: {fit.count} samples in {fit.last - fit.first:.3g} s are too few for {name}"
+    velocity = slope(shift) if sample.velocity is None else np.array(sample.velocity, np.float64)
+    if sample.velocity is not None and settled(shift, velocity_rate):
+        seen = slope(shift)
+        off = float(np.linalg.norm(velocity - seen))
+        limit = checks.velocity_mismatch + 0.3 * float(max(np.linalg.norm(velocity), np.linalg.norm(seen)))
+        if off > limit:
+            text = f"velocity: {velocity.tolist()} m/s is {off:.3g} from how the position changes"
+            return track, None, f"{text}, {seen.round(3).tolist()}; accepted: at most {limit:.3g}, in the world's axes"
+    body_rate = slope(turn) if sample.body_rate is None else np.array(sample.body_rate, np.float64)
+    odometry = Odometry(time, position, velocity, quaternion, body_rate)
+    return replace(track, odometry=odometry), odometry, None
+
+
+def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(3,) the rotation vector from attitude `a` to `b`, both (4,) unit wxyz, in the axes of the body, rad.
+
+    The logarithm of conj(a) b, the shorter way round.
+    """
+    w = float(a @ b)
+    (aw, ax, ay, az), (bw, bx, by, bz) = a.tolist(), b.tolist()  # floats: many times faster than arrays of three
+    vector = np.array(
+        [
+            aw * bx - bw * ax - ay * bz + az * by,
+            aw * by - bw * ay - az * bx + ax * bz,
+            aw * bz - bw * az - ax * by + ay * bx,
+        ]
+    )
+    sine = math.sqrt(float(vector @ vector))
+    if w < 0:
+        w, vector = -w, -vector
+    return vector * (2.0 if sine < 1e-12 else 2 * math.atan2(sine, w) / sine)

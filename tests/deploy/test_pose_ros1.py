@@ -1,0 +1,160 @@
+"""Topics of ROS 1: a real roscore, a real rospy publisher in a process of its own."""
+
+import shutil
+import socket
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from e2efly.deploy.odometry import Sample
+from e2efly.deploy.pose.relay import SYSTEM_PYTHON, RelaySource
+from e2efly.deploy.pose.source import PoseSource, open_source
+
+PACKAGES = "apt-get install python3-roslaunch python3-rosmaster python3-rospy python3-nav-msgs python3-geometry-msgs"
+PUBLISHER = """
+import math, rospy
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from std_msgs.msg import String
+rospy.init_node("publisher", disable_signals=True)
+topics = {"/odometry": Odometry, "/pose": PoseStamped, "/estimate": PoseWithCovarianceStamped, "/text": String}
+publishers = {topic: rospy.Publisher(topic, kind, queue_size=1) for topic, kind in topics.items()}
+while True:
+    for topic, kind in topics.items():
+        message = kind()
+        if kind is not String:
+            message.header.frame_id = "map"
+            message.header.stamp = rospy.Time(1700000000, 500000000)
+            pose = message.pose if kind is PoseStamped else message.pose.pose
+            pose.position.x, pose.position.y, pose.position.z = 1.0, 2.0, 3.0
+            pose.orientation.w = pose.orientation.z = math.sqrt(0.5)  # a quarter turn to the left
+        if kind is Odometry:
+            message.twist.twist.linear.x = 0.5  # forward
+            message.twist.twist.angular.y = 0.25
+        publishers[topic].publish(message)
+    rospy.sleep(0.02)
+"""
+
+
+@pytest.fixture(scope="module")
+def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """A ROS master on a free port, and a publisher."""
+    roscore = shutil.which("roscore")
+    if roscore is None or not Path(SYSTEM_PYTHON).exists():
+        pytest.fail(f"needs ROS 1: {PACKAGES}; or E2EFLY_WITHOUT=ros1 to go without these tests")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    folder = tmp_path_factory.mktemp("ros1")
+    settings = {
+        "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
+        "ROS_IP": "127.0.0.1",
+        "ROS_HOME": str(folder),
+        "ROS_LOG_DIR": str(folder),
+    }
+    started: list[subprocess.Popen] = []
+    with pytest.MonkeyPatch.context() as patch, (folder / "output").open("w") as output:
+        for key, value in settings.items():
+            patch.setenv(key, value)
+
+        def start(*command: str) -> None:
+            started.append(subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True))
+
+        try:
+            start(roscore, "-p", str(port))
+            wait_for(lambda: answers(port), "roscore", folder / "output")
+            start(SYSTEM_PYTHON, "-c", PUBLISHER)
+            yield
+        finally:
+            for process in reversed(started):
+                process.terminate()
+                process.wait(10)
+
+
+def answers(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
+def wait_for(ready: Callable[[], bool], what: str, output: Path) -> None:
+    deadline = time.monotonic() + 20
+    while not ready():
+        assert time.monotonic() < deadline, f"{what} did not start: {output.read_text()}"
+        time.sleep(0.05)
+
+
+def first(source: PoseSource) -> Sample:
+    """The first sample that comes."""
+    deadline = time.monotonic() + 20
+    while time.monotonic() < deadline:
+        if samples := source.read(time.monotonic()):
+            return samples[0]
+        time.sleep(0.01)
+    raise AssertionError(f"{source.describe()} delivered nothing: {source.problem}")
+
+
+@pytest.mark.parametrize("topic", ["/odometry", "/pose", "/estimate"])
+def test_a_topic_is_read_whatever_its_type(ros: None, topic: str) -> None:
+    source = open_source(f"ros1:{topic}")
+    try:
+        sample = first(source)
+        assert 0 <= time.monotonic() - sample.received < 5
+    finally:
+        source.close()
+    half = np.sqrt(0.5)
+    np.testing.assert_array_equal(sample.position, [1, 2, 3])
+    np.testing.assert_allclose(sample.quaternion, [half, 0, 0, half], atol=1e-12)
+    assert sample.stamp == 1700000000.5
+    assert sample.frame == "map"
+    if topic == "/odometry":  # forward of a body that looks along world y
+        assert sample.velocity is not None
+        np.testing.assert_allclose(sample.velocity, [0, 0.5, 0], atol=1e-12)
+        np.testing.assert_array_equal(sample.body_rate, [0, 0.25, 0])
+    else:
+        assert sample.velocity is None
+        assert sample.body_rate is None
+
+
+def test_a_topic_of_another_type_is_named(ros: None) -> None:
+    source = open_source("ros1:/text")
+    try:
+        deadline = time.monotonic() + 20
+        while source.problem is None and time.monotonic() < deadline:
+            assert source.read(time.monotonic()) == []
+            time.sleep(0.01)
+        assert source.problem is not None
+        assert "std_msgs/String" in source.problem
+        assert "nav_msgs/Odometry" in source.problem
+        assert source.refused >= 1
+    finally:
+        source.close()
+
+
+def test_closing_ends_the_process(ros: None) -> None:
+    source = open_source("ros1:/pose")
+    assert isinstance(source, RelaySource)
+    assert source.describe().startswith("ros1:/pose (rospy of ")
+    source.close()
+    assert source._process.returncode == 0
+    assert source.read(time.monotonic()) == []
+
+
+def test_without_a_master_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    monkeypatch.setenv("E2EFLY_ROS_PYTHON", SYSTEM_PYTHON)
+    with pytest.raises(ValueError, match=r"no ROS master answers .*127\.0\.0\.1:1.*start roscore"):
+        open_source("ros1:/odometry")
+
+
+def test_an_interpreter_without_ros_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    bare = tmp_path / "python"
+    bare.write_text(f'#!/bin/sh\nexec {SYSTEM_PYTHON} -S "$@"\n')
+    bare.chmod(0o755)
+    monkeypatch.setenv("E2EFLY_ROS_PYTHON", str(bare))
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    with pytest.raises(ValueError, match=r"No module named 'rospy'.*python3-rospy.*E2EFLY_ROS_PYTHON"):
+        open_source("ros1:/odometry")
