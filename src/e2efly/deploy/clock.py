@@ -26,3 +26,7 @@ class MonotonicClock:
     def sleep(self, seconds: float) -> None:
         """Sleep."""
         time.sleep(max(seconds, 0.0))
+
+
+MONOTONIC = MonotonicClock()
+"""The clock of real flights."""

@@ -1,0 +1,175 @@
+"""MSP frames to bytes and back: version 1 with jumbo payloads, and version 2 ("native", `$X`). Pure, no transport.
+
+Layouts, little endian, after the `$`:
+- version 1: `M`, direction, length u8, code u8, payload, XOR of everything from the length on. A length of 255 is the
+  mark of a jumbo frame, whose real length, u16, follows the code.
+- version 2: `X`, direction, flags u8, code u16, length u16, payload, CRC-8/DVB-S2 of everything from the flags on.
+"""
+
+import struct
+from dataclasses import dataclass, field
+from itertools import accumulate
+from operator import xor
+
+REQUEST, REPLY, ERROR = "<", ">", "!"
+"""Directions: to the controller, from it, and from it when it does not know or refuses the code."""
+MAX_PAYLOAD = 1024
+"""Longest payload that a decoder waits for, bytes, unless told: a corrupt length delays what follows by no more."""
+_JUMBO = 255
+_SHORTEST = 6
+_DIRECTIONS = {ord(mark): mark for mark in (REQUEST, REPLY, ERROR)}
+_START, _V1, _V2 = b"$MX"
+
+
+def _crc_of(byte: int) -> int:
+    for _ in range(8):
+        byte = (byte << 1) ^ 0x1D5 if byte & 0x80 else byte << 1
+    return byte
+
+
+_CRC = bytes(_crc_of(byte) for byte in range(256))
+"""CRC-8/DVB-S2 (polynomial 0xD5, from 0, not reflected) of one byte."""
+_PERIOD = 93
+"""Zero bytes after which every CRC state is back where it was."""
+_SHIFTS = tuple(accumulate(range(_PERIOD - 1), lambda table, _: table.translate(_CRC), initial=bytes(range(256))))
+"""`_SHIFTS[n][c]`: the CRC state c after n zero bytes. By it the CRC of any stretch follows from two running CRCs."""
+
+
+def _crc_step(state: int, byte: int) -> int:
+    return _CRC[state ^ byte]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One MSP message."""
+
+    code: int
+    """What it is about: 0 to 254 in version 1, to 65535 in version 2."""
+    payload: bytes = b""
+    """Its content."""
+    direction: str = REQUEST
+    """`REQUEST`, `REPLY` or `ERROR`."""
+    version: int = 1
+    """1 or 2."""
+    flags: int = 0
+    """Flags byte of version 2; 0 in version 1."""
+
+
+def encode(frame: Frame) -> bytes:
+    """The bytes of a frame.
+
+    Raises:
+        ValueError: naming the field, for what the version cannot carry.
+    """
+    if frame.version not in (1, 2):
+        raise ValueError(f"MSP frame: version is {frame.version!r}; accepted: 1 or 2")
+    if frame.direction not in _DIRECTIONS.values():
+        raise ValueError(f"MSP frame: direction is {frame.direction!r}; accepted: '<', '>' or '!'")
+    codes, flags = ((254, 0), (65535, 255))[frame.version - 1]
+    for name, value, most in (("code", frame.code, codes), ("flags", frame.flags, flags)):
+        if not 0 <= value <= most:
+            raise ValueError(f"MSP frame: {name} is {value!r}; accepted: 0 to {most} in version {frame.version}")
+    size = len(frame.payload)
+    if size > 65535:
+        raise ValueError(f"MSP frame: payload has {size} bytes; accepted: up to 65535")
+    mark = frame.direction.encode()
+    if frame.version == 2:
+        body = struct.pack("<BHH", frame.flags, frame.code, size) + frame.payload
+        return b"$X" + mark + body + bytes([list(accumulate(body, _crc_step, initial=0))[-1]])
+    jumbo = struct.pack("<H", size) if size >= _JUMBO else b""
+    body = bytes([min(size, _JUMBO), frame.code]) + jumbo + frame.payload
+    return b"$M" + mark + body + bytes([list(accumulate(body, xor))[-1]])
+
+
+@dataclass
+class Decoder:
+    """Finds the frames in a stream of bytes, whatever else is in it.
+
+    A start that turns out to be false costs its first byte only: the search goes on at the next one, so that garbage,
+    a flipped bit or a corrupt length hides no good frame that follows. Every start is judged in constant time (running
+    checksums are kept of the stream), so time is linear in the bytes, whatever they are. Never raises.
+    """
+
+    max_payload: int = MAX_PAYLOAD
+    """Longest payload that is believed, bytes."""
+    bad_checksums: int = 0
+    """Frames whose checksum was wrong, so far."""
+    skipped: int = 0
+    """Bytes that were no part of a good frame, so far."""
+    _bytes: bytearray = field(default_factory=bytearray, repr=False)
+    _xor: list[int] = field(default_factory=lambda: [0], repr=False)
+    _crc: list[int] = field(default_factory=lambda: [0], repr=False)
+
+    @property
+    def pending(self) -> int:
+        """Bytes held back as the beginning of a frame; never more than `max_payload` and a header."""
+        return len(self._bytes)
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """The frames that these bytes complete, in order."""
+        self._bytes += data
+        self._xor += list(accumulate(data, xor, initial=self._xor[-1]))[1:]
+        self._crc += list(accumulate(data, _crc_step, initial=self._crc[-1]))[1:]
+        return self._scan(waiting=True)
+
+    def flush(self) -> list[Frame]:
+        """Give up the frame that is incomplete, as when the line has been silent; the good ones inside it, if any."""
+        return self._scan(waiting=False)
+
+    def _scan(self, waiting: bool) -> list[Frame]:
+        frames: list[Frame] = []
+        at, end = 0, len(self._bytes)
+        while True:
+            start = self._bytes.find(_START, at)
+            start = end if start < 0 else start
+            self.skipped += start - at
+            at = start
+            if at == end:
+                break
+            found = self._judge(at)
+            if isinstance(found, tuple):
+                frame, at = found
+                frames.append(frame)
+            elif found and waiting:
+                break
+            else:
+                self.skipped += 1
+                at += 1
+        del self._bytes[:at], self._xor[:at], self._crc[:at]
+        return frames
+
+    def _judge(self, at: int) -> tuple[Frame, int] | bool:
+        """The frame that starts here and where it ends; or whether more bytes may make one."""
+        data, size = self._bytes, len(self._bytes) - at
+        if (size > 1 and data[at + 1] not in (_V1, _V2)) or (size > 2 and data[at + 2] not in _DIRECTIONS):
+            return False
+        if size < _SHORTEST:
+            return True
+        body, version, flags = at + 3, 1, 0
+        if data[at + 1] == _V2:
+            if size < 9:
+                return True
+            version = 2
+            flags, code, length = struct.unpack_from("<BHH", data, body)
+            start = body + 5
+        else:
+            length, code = data[body], data[body + 1]
+            start = body + 2
+            if length == _JUMBO:
+                if size < _SHORTEST + 2:
+                    return True
+                (length,) = struct.unpack_from("<H", data, start)
+                start += 2
+        if length > self.max_payload:
+            return False
+        end = start + length
+        if end >= len(data):
+            return True
+        if version == 1:
+            checksum = self._xor[end] ^ self._xor[body]
+        else:
+            checksum = self._crc[end] ^ _SHIFTS[(end - body) % _PERIOD][self._crc[body]]
+        if checksum != data[end]:
+            self.bad_checksums += 1
+            return False
+        return Frame(code, bytes(data[start:end]), _DIRECTIONS[data[at + 2]], version, flags), end + 1

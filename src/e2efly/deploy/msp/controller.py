@@ -1,0 +1,110 @@
+"""What a flight controller is and how it is set: read once, before flight, into one frozen dataclass."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from e2efly.deploy.clock import MONOTONIC, Clock
+from e2efly.deploy.msp import messages, settings
+from e2efly.deploy.msp.client import Client, ask
+from e2efly.deploy.msp.names import BOXES
+from e2efly.deploy.rates import RateProfile
+from e2efly.deploy.throttle_curve import ThrottleCurve
+
+VARIANT = "BTFL"
+"""The firmware that is known: Betaflight."""
+API_RANGE = ((1, 44), (1, 47))
+"""The first and last MSP versions that are known: Betaflight 4.3 to 4.6."""
+
+
+@dataclass(frozen=True)
+class ControllerInfo:
+    """A flight controller and its settings."""
+
+    variant: str
+    """`BTFL`."""
+    version: tuple[int, int, int]
+    """Of the firmware."""
+    api: tuple[int, int]
+    """MSP version."""
+    built: str
+    """Day and time of the build, and its revision."""
+    craft: str
+    """Name of the craft; may be empty."""
+    features: frozenset[str]
+    """Features that are on."""
+    rate_profile: int
+    """Which rate profile is active, from 0."""
+    rates: RateProfile
+    """The active rate profile."""
+    throttle: ThrottleCurve
+    """The active throttle curve."""
+    rx: settings.RxConfig
+    """How channels are read."""
+    rx_map: settings.RxMap
+    """Which channel is for what."""
+    deadband: settings.RcDeadband
+    """Deadbands of the sticks."""
+    failsafe: settings.FailsafeConfig
+    """What it does when the receiver falls silent."""
+    modes: tuple[settings.ModeRange, ...]
+    """Which switches make which modes active."""
+    box_ids: tuple[int, ...]
+    """Permanent ids of the modes that it knows, in the order of the bits of `StatusEx.boxes`."""
+    motor: settings.MotorConfig
+    """Motor outputs."""
+    advanced: settings.AdvancedConfig
+    """Loop and motor protocol."""
+    mixer: settings.MixerConfig
+    """Kind of vehicle."""
+    alignment: settings.BoardAlignment
+    """How it is turned in the airframe."""
+
+    def ranges(self, mode: str) -> tuple[settings.ModeRange, ...]:
+        """The switch ranges that make a mode of `BOXES` active, by name."""
+        return tuple(entry for entry in self.modes if BOXES.get(entry.box) == mode)
+
+
+def identify(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -> ControllerInfo:
+    """Read everything from a controller, waiting for it; not for flight.
+
+    Raises:
+        ValueError: for firmware that is not known, or settings that cannot be read.
+        TimeoutError: when an answer is missing after `timeout_s` seconds.
+    """
+
+    def get(kind: Any) -> Any:
+        return ask(client, kind.CODE, timeout_s, clock=clock)
+
+    variant = get(messages.FcVariant).variant
+    if variant != VARIANT:
+        raise ValueError(f"controller: the firmware is {variant!r}; accepted: {VARIANT!r} (Betaflight)")
+    api = get(messages.ApiVersion).version
+    version = get(messages.FcVersion).version
+    if not API_RANGE[0] <= api <= API_RANGE[1]:
+        first, last = (".".join(map(str, end)) for end in API_RANGE)
+        raise ValueError(
+            f"controller: it speaks MSP {api[0]}.{api[1]} (firmware {'.'.join(map(str, version))}); accepted: MSP "
+            f"{first} to {last} (Betaflight 4.3 to 4.6): what other versions mean by their numbers is not known"
+        )
+    build, tuning, rx = get(messages.BuildInfo), get(settings.RcTuning), get(settings.RxConfig)
+    return ControllerInfo(
+        variant=variant,
+        version=version,
+        api=api,
+        built=f"{build.built} {build.revision}",
+        craft=get(messages.Name).name,
+        features=get(settings.FeatureConfig).features,
+        rate_profile=get(messages.StatusEx).rate_profile,
+        rates=tuning.rates,
+        throttle=replace(tuning.throttle, min_check=rx.min_check),
+        rx=rx,
+        rx_map=get(settings.RxMap),
+        deadband=get(settings.RcDeadband),
+        failsafe=get(settings.FailsafeConfig),
+        modes=get(settings.ModeRanges).ranges,
+        box_ids=get(settings.BoxIds).ids,
+        motor=get(settings.MotorConfig),
+        advanced=get(settings.AdvancedConfig),
+        mixer=get(settings.MixerConfig),
+        alignment=get(settings.BoardAlignment),
+    )

@@ -1,0 +1,313 @@
+"""The client: requests that time out, a schedule that never floods, and identification of a recorded controller."""
+
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from e2efly.deploy.msp import messages, settings
+from e2efly.deploy.msp.client import MAX_BACKLOG, MAX_IN_FLIGHT, SCHEDULE, TIMEOUT, Client, ask
+from e2efly.deploy.msp.codec import ERROR, REPLY, Decoder, Frame, encode
+from e2efly.deploy.msp.controller import identify
+from e2efly.deploy.msp.link import open_link
+from tests.deploy.msp_golden import REPLIES, payload
+
+STICKS = messages.set_raw_rc([1500] * 8)
+
+
+class Wire:
+    """A link whose other end the test holds."""
+
+    def __init__(self) -> None:
+        self.alive, self.reason, self.connections, self.inbox = True, "", 1, b""
+        self.decoder, self.sent = Decoder(), []
+
+    def poll(self, now: float) -> None: ...
+
+    def close(self) -> None: ...
+
+    def send(self, data: bytes) -> None:
+        self.sent += self.decoder.feed(data)
+
+    def receive(self) -> bytes:
+        data, self.inbox = self.inbox, b""
+        return data
+
+    def answer(self, limit: int | None = None) -> None:
+        """Answer the oldest requests as the recorded firmware did."""
+        count = len(self.sent) if limit is None else limit
+        for frame in self.sent[:count]:
+            data = payload(REPLIES[1][frame.code]) if frame.code in REPLIES[1] else b""
+            self.inbox += encode(Frame(frame.code, data, REPLY, frame.version))
+        del self.sent[:count]
+
+
+def test_a_reply_is_kept_with_its_time_and_latency() -> None:
+    wire = Wire()
+    client = Client(wire)
+    client.poll(0.0)
+    assert client.request(108, 1.0)
+    assert not client.request(108, 1.1)  # one at a time
+    assert len(wire.sent) == 1
+    wire.answer()
+    client.poll(1.2)
+    assert client.latest[108].message == messages.Attitude(0.0, 0.0, 0.0)
+    assert (client.latest[108].time, client.latest[108].latency) == (1.2, pytest.approx(0.2))
+    assert client.message(108, 1.3, 0.2) is not None
+    assert client.message(108, 1.5, 0.2) is None
+    assert client.request(108, 1.3)
+
+
+def test_a_request_without_answer_is_given_up_and_can_be_asked_again() -> None:
+    client = Client(Wire())
+    client.poll(0.0)
+    client.request(108, 0.0)
+    client.poll(TIMEOUT)
+    assert client.timeouts == 0
+    client.poll(TIMEOUT + 0.01)
+    assert client.timeouts == 1
+    assert client.request(108, TIMEOUT + 0.02)
+
+
+def test_a_false_start_does_not_hold_back_a_good_reply_beyond_the_time_out() -> None:
+    wire = Wire()
+    client = Client(wire)
+    client.poll(0.0)
+    client.request(108, 0.0)
+    wire.answer()
+    wire.inbox = b"$M>\xff\x01\xff\x03" + wire.inbox
+    client.poll(0.01)
+    assert 108 not in client.latest
+    client.poll(TIMEOUT + 0.01)
+    assert 108 in client.latest
+
+
+def test_refused_and_unreadable_answers_are_said() -> None:
+    wire = Wire()
+    client = Client(wire)
+    client.poll(0.0)
+    wire.inbox = encode(Frame(108, b"", ERROR)) + encode(Frame(150, b"\0", REPLY)) + encode(Frame(7, b"x", REPLY))
+    client.poll(0.1)
+    assert "does not know or refuses" in client.errors[108]
+    assert "STATUS_EX" in client.errors[150]
+    assert client.latest[7].message == b"x"
+    assert set(client.latest) == {7}
+    wire.inbox = REPLIES[1][108]
+    client.poll(0.2)
+    assert 108 not in client.errors
+
+
+def run(client: Client, wire: Wire, seconds: float, each: Callable[[], None], rate: float = 500.0) -> dict[int, int]:
+    """Poll for a while; how often each code was asked for."""
+    counts: dict[int, int] = {}
+    for i in range(int(seconds * rate)):
+        before = len(wire.sent)
+        client.poll(i / rate)
+        for frame in wire.sent[before:]:
+            counts[frame.code] = counts.get(frame.code, 0) + 1
+        each()
+    return counts
+
+
+def test_schedule_keeps_its_rates() -> None:
+    wire = Wire()
+    client = Client(wire, SCHEDULE)
+    counts = run(client, wire, 4.0, wire.answer)
+    for code, rate in SCHEDULE.items():
+        assert counts[code] == pytest.approx(4 * rate, rel=0.05, abs=1)
+
+
+def test_schedule_never_floods_a_controller_that_does_not_answer() -> None:
+    wire = Wire()
+    client = Client(wire, SCHEDULE)
+    run(client, wire, TIMEOUT * 0.9, lambda: None)
+    assert 0 < len(wire.sent) <= MAX_IN_FLIGHT // 64
+
+
+def test_schedule_shares_a_slow_controller_fairly() -> None:
+    wire, ticks = Wire(), iter(range(10**9))
+    client = Client(wire, SCHEDULE)
+    counts = run(client, wire, 20.0, lambda: wire.answer(1) if next(ticks) % 10 == 0 else None)  # 50 answers a second
+    assert sum(counts.values()) == pytest.approx(1000, rel=0.05)
+    for code in (105, 108, 102, 104):
+        assert 0.15 < counts[code] / 1000 < 0.3
+    assert counts[150] > 50 and counts[130] > 4
+
+
+def test_a_message_longer_than_the_limit_is_asked_for_all_the_same() -> None:
+    wire = Wire()
+    client = Client(wire, {116: 10.0})
+
+    def answer() -> None:
+        for frame in wire.sent:
+            wire.inbox += encode(Frame(frame.code, bytes(500), REPLY))
+        wire.sent.clear()
+
+    assert run(client, wire, 1.0, answer)[116] >= 9
+
+
+def test_sticks_go_first_and_their_replies_are_eaten() -> None:
+    wire = Wire()
+    client = Client(wire, SCHEDULE)
+    client.poll(0.0)
+    wire.answer()
+    client.poll(0.001)
+    for i in range(MAX_BACKLOG + 1):
+        assert client.set_raw_rc(STICKS, 0.002 + i * 1e-3)
+    assert client.backlog == MAX_BACKLOG + 1
+    wire.sent.clear()
+    client.poll(0.1)
+    assert wire.sent == []  # telemetry waits for a controller that is behind
+    wire.inbox = encode(Frame(200, b"", REPLY)) * (MAX_BACKLOG + 1)
+    client.poll(0.11)
+    assert client.backlog == 0
+    assert wire.sent
+    assert 200 not in client.latest
+
+
+def test_lost_answers_to_sticks_do_not_stop_telemetry_for_good() -> None:
+    wire = Wire()
+    client = Client(wire, SCHEDULE)
+    client.poll(0.0)
+    for _ in range(9):
+        client.set_raw_rc(STICKS, 0.0)
+    client.poll(TIMEOUT + 0.1)
+    assert client.backlog == 0
+    assert client.timeouts >= 9
+
+
+def test_a_new_connection_starts_anew() -> None:
+    wire = Wire()
+    client = Client(wire)
+    client.poll(0.0)
+    client.request(108, 0.0)
+    wire.answer()
+    client.poll(0.1)
+    client.request(105, 0.1)
+    client.set_raw_rc(STICKS, 0.1)
+    wire.inbox = b"$M>\x40"
+    client.poll(0.2)
+    wire.connections += 1
+    client.poll(0.3)
+    assert client.latest == {} and client.backlog == 0 and client.decoder.pending == 0
+    assert client.request(105, 0.3)
+
+
+def test_a_dead_link_sends_nothing_and_says_so() -> None:
+    wire = Wire()
+    wire.alive = False
+    client = Client(wire, SCHEDULE)
+    client.poll(0.0)
+    assert not client.request(108, 0.0)
+    assert not client.set_raw_rc(STICKS, 0.0)
+    assert wire.sent == []
+
+
+def test_an_echo_of_requests_is_no_reply() -> None:
+    wire = Wire()
+    client = Client(wire)
+    client.poll(0.0)
+    client.request(10, 0.0)
+    wire.inbox = encode(Frame(10))
+    client.poll(0.1)
+    assert client.latest == {}
+
+
+def recorded(code: int) -> bytes:
+    return REPLIES[1].get(code, encode(Frame(code, b"", ERROR)))
+
+
+@contextmanager
+def controller(reply: Callable[[int], bytes]) -> Iterator[Client]:
+    """A client connected by TCP to a peer that answers as `reply` says, one connection after the other."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        listener.settimeout(10.0)
+
+        def serve() -> None:
+            while True:
+                try:
+                    peer = listener.accept()[0]
+                    with peer:
+                        decoder = Decoder()
+                        while data := peer.recv(4096):
+                            for frame in decoder.feed(data):
+                                answer = reply(frame.code)
+                                if answer == b"drop":
+                                    raise ConnectionError
+                                peer.sendall(answer)
+                except ConnectionError:
+                    continue
+                except OSError:
+                    return
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        link = open_link(f"tcp:127.0.0.1:{listener.getsockname()[1]}")
+        try:
+            yield Client(link)
+        finally:
+            link.close()
+            listener.shutdown(socket.SHUT_RDWR)
+            thread.join()
+
+
+def test_identify_the_recorded_controller() -> None:
+    with controller(recorded) as client:
+        info = identify(client, 10.0)
+    assert (info.variant, info.api, info.version, info.craft) == ("BTFL", (1, 47), (4, 6, 0), "golden one")
+    assert info.rates.rates_type == "ACTUAL"
+    assert info.throttle.min_check == info.rx.min_check == 1040
+    assert info.rx_map.letters == "TAER1234"
+    assert info.ranges("ARM") == (settings.ModeRange(0, 0, 1700, 2100),)
+    assert info.ranges("MSP OVERRIDE") == ()
+    assert info.failsafe.delay == pytest.approx(1.2)
+
+
+@pytest.mark.parametrize(
+    ("code", "data", "words"),
+    [
+        (2, b"INAV", "the firmware is 'INAV'; accepted: 'BTFL'"),
+        (1, b"\0\1\x2b", r"MSP 1\.43 .*accepted: MSP 1\.44 to 1\.47"),
+        (1, b"\0\1\x30", r"MSP 1\.48 .*accepted: MSP 1\.44 to 1\.47"),
+        (1, b"\0\2\x2d", r"MSP 2\.45 "),
+        (64, b"\0\0\0\0\0\0\0\0", "RX_MAP"),
+        (111, b"\0", "RC_TUNING"),
+    ],
+)
+def test_what_is_not_known_is_refused(code: int, data: bytes, words: str) -> None:
+    strange = encode(Frame(code, data, REPLY))
+    with (
+        controller(lambda asked: strange if asked == code else recorded(asked)) as client,
+        pytest.raises(ValueError, match=words),
+    ):
+        identify(client, 10.0)
+
+
+def test_identify_over_a_line_that_garbles_halves_and_drops() -> None:
+    seen: dict[int, int] = {}
+
+    def reply(code: int) -> bytes:
+        seen[code] = seen.get(code, 0) + 1
+        whole = recorded(code)
+        if seen[code] > 1:
+            return whole
+        if code == 44:
+            return b"drop"
+        return {0: b"\xff$M>$X" + whole, 1: whole[:-2], 2: whole}[code % 3]
+
+    with controller(reply) as client:
+        assert identify(client, 20.0).craft == "golden one"
+        assert client.link.connections == 2
+
+
+def test_ask_says_why_there_is_no_answer() -> None:
+    with controller(lambda code: b"") as client, pytest.raises(TimeoutError, match=r"Name \(10\).*nothing that is MSP"):
+        ask(client, 10, 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        target = f"tcp:127.0.0.1:{listener.getsockname()[1]}"
+    with pytest.raises(TimeoutError, match="refused"):
+        ask(Client(open_link(target)), 10, 0.2)
+    with controller(recorded) as client, pytest.raises(ValueError, match="MSP 99: the controller does not know"):
+        ask(client, 99, 10.0)

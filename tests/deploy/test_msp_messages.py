@@ -1,0 +1,134 @@
+"""MSP messages: what the real firmware's replies mean, and refusals."""
+
+import math
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from e2efly.deploy.msp import messages, settings
+from e2efly.deploy.msp.client import MESSAGES
+from e2efly.deploy.msp.names import BOXES, arming_disabled, bits
+from tests.deploy.msp_golden import GOLDEN, REPLIES, payload
+
+
+def golden(kind: type) -> object:
+    return kind.parse(payload(REPLIES[1][kind.CODE]))
+
+
+def test_identity_as_recorded() -> None:
+    assert golden(messages.FcVariant) == messages.FcVariant("BTFL")
+    assert golden(messages.ApiVersion) == messages.ApiVersion((1, 47))
+    assert golden(messages.FcVersion) == messages.FcVersion((4, 6, 0))
+    assert golden(messages.Name) == messages.Name("golden one")
+
+
+def test_settings_as_they_were_made() -> None:
+    rx = golden(settings.RxConfig)
+    assert (rx.min_check, rx.mid, rx.max_check, rx.pulse_range) == (1040, 1500, 1900, (885, 2115))
+    assert rx.smoothing
+    assert golden(settings.RxMap).letters == "TAER1234"
+    assert golden(settings.FailsafeConfig).delay == pytest.approx(1.2)
+    assert golden(settings.ModeRanges).ranges == (
+        settings.ModeRange(0, 0, 1700, 2100),
+        settings.ModeRange(28, 1, 900, 2100),
+    )
+    tuning = golden(settings.RcTuning)
+    assert tuning.rates == settings.RateProfile("ACTUAL", (7, 7, 7), (67, 67, 67), (0, 0, 0))
+    assert (tuning.throttle.mid, tuning.throttle.expo, tuning.throttle.hover) == (50, 0, 50)
+    assert golden(settings.MixerConfig) == settings.MixerConfig(3, False)
+    assert golden(settings.MotorConfig) == settings.MotorConfig(None, 2000, 1000, 4)
+    assert golden(settings.AdvancedConfig) == settings.AdvancedConfig(1, "PWM", 0.055)
+    assert "RX_MSP" in golden(settings.FeatureConfig).features
+    assert {BOXES[box] for box in golden(settings.BoxIds).ids} >= {"ARM", "ANGLE", "FAILSAFE"}
+
+
+def test_state_as_recorded() -> None:
+    status = golden(messages.StatusEx)
+    assert status.sensors == {"ACC", "BARO", "GYRO"}
+    assert 5e-5 < status.cycle_time < 1e-2
+    assert status.active(golden(settings.BoxIds).ids) == frozenset()
+    assert golden(messages.Rc).channels[:5] == (1500, 1500, 1500, 1000, 1000)
+    assert golden(messages.Motor).throttle == (0.0, 0.0, 0.0, 0.0)
+    assert golden(messages.RawImu) == messages.RawImu((0, 0, 256), (0.0, 0.0, 0.0))
+
+
+def test_body_rates_are_flu_as_the_firmware_senses_them() -> None:
+    imu = messages.RawImu.parse(payload(GOLDEN["turning"]["imu"]))
+    assert imu.body_rate == pytest.approx(GOLDEN["turning"]["body_rate"], rel=2e-3)
+
+
+def test_attitude_and_acceleration_are_flu_as_the_firmware_senses_them() -> None:
+    tilted = GOLDEN["tilted"]
+    attitude = messages.Attitude.parse(payload(tilted["attitude"]))
+    assert (attitude.roll, attitude.pitch) == pytest.approx((tilted["roll"], tilted["pitch"]), abs=2e-3)
+    assert attitude.yaw == pytest.approx(0.5, abs=0.01)
+    roll, pitch = tilted["roll"], tilted["pitch"]
+    up = (-math.sin(pitch), math.cos(pitch) * math.sin(roll), math.cos(pitch) * math.cos(roll))
+    force = messages.RawImu.parse(payload(tilted["imu"])).acceleration
+    assert [count / 256 for count in force] == pytest.approx(up, abs=0.01)
+
+
+@pytest.mark.parametrize(("heading", "yaw"), [(0, 0.0), (90, -math.pi / 2), (180, math.pi), (350, math.radians(10))])
+def test_yaw_is_positive_to_the_left(heading: int, yaw: float) -> None:
+    assert messages.Attitude.parse(struct.pack("<3h", 0, 0, heading)).yaw == pytest.approx(yaw)
+
+
+def test_status_with_modes_beyond_32_and_the_older_last_flag() -> None:
+    head = struct.pack("<HHHIBHBB", 250, 0, 33, 1 << 1, 0, 37, 4, 2)
+    status = messages.StatusEx.parse(head + b"\x02\x05\x80" + struct.pack("<BIB", 26, 1 << 25 | 1 << 7, 1))
+    assert status.boxes == 1 << 1 | 0x8005 << 32
+    assert status.active([9] * 32 + [50, 27, 3]) == {9, 50, 3}
+    assert status.arming_disabled == ("THROTTLE", "ARM_SWITCH")
+    assert (status.cpu_load, status.rate_profile, status.reboot_required) == (0.37, 2, True)
+
+
+def test_arming_flags_of_newer_firmware() -> None:
+    assert arming_disabled(1 << 28 | 1 << 25, 29) == ("FLIP_SWITCH", "ARM_SWITCH")
+    assert arming_disabled(1 << 29 | 1 << 30, 31) == ("BIT29", "ARM_SWITCH")
+    assert bits(1 << 14 | 1 << 31, {14: "RX_MSP"}) == {"RX_MSP", "BIT31"}
+
+
+def test_battery_units() -> None:
+    battery = messages.BatteryState.parse(struct.pack("<BHBHhBH", 4, 1500, 158, 321, -250, 1, 1583))
+    assert battery == messages.BatteryState(4, 1500, 321, -2.5, 15.83, "WARNING")
+    analog = messages.Analog.parse(struct.pack("<BHHhH", 158, 321, 1023, 1234, 1583))
+    assert analog == messages.Analog(15.83, 12.34, 321, 1.0)
+
+
+def test_rates_of_firmware_older_than_the_hover_throttle() -> None:
+    tuning = settings.RcTuning.parse(payload(REPLIES[1][111])[:23])
+    assert tuning.throttle.hover is None
+
+
+@pytest.mark.parametrize("code", [code for code in MESSAGES if code not in (10, 34, 119)])
+def test_a_short_payload_is_refused_by_name_and_a_longer_one_accepted(code: int) -> None:
+    kind, data = MESSAGES[code], payload(REPLIES[1][code])
+    with pytest.raises(ValueError, match=r"MSP [A-Z_]+: the payload has \d+ bytes; accepted: \d+ or more"):
+        kind.parse(data[:1])
+    if code != 105:
+        assert kind.parse(data + b"\0\0\0") == kind.parse(data)
+
+
+@given(st.sampled_from(list(MESSAGES.values())), st.binary(max_size=200))
+def test_any_payload_parses_or_is_refused(kind: type, data: bytes) -> None:
+    try:
+        kind.parse(data)
+    except ValueError as error:
+        assert len(str(error)) > 10
+
+
+def test_a_map_that_is_no_permutation_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"RX_MAP: the map is \[0, 0"):
+        settings.RxMap.parse(bytes([0, 0, 1, 2, 3, 4, 5, 6]))
+
+
+def test_set_raw_rc() -> None:
+    assert messages.set_raw_rc([1000, 1500, 1501, 2000]).payload == struct.pack("<4H", 1000, 1500, 1501, 2000)
+    for channels, words in [([1500] * 3, "3 channels"), ([1500] * 19, "19 channels")]:
+        with pytest.raises(ValueError, match=words):
+            messages.set_raw_rc(channels)
+    for value in (885, 2115, 0, math.nan, 1500.5):
+        with pytest.raises(ValueError, match="channel 2 is"):
+            messages.set_raw_rc([1500, value, 1500, 1500])
