@@ -297,19 +297,24 @@ class Bridge:
         x, y, z = target.position
         on_ground = self.flight.mode is Mode.TAKEOFF and self.height < LIFTED
         if self.flight.mode is Mode.TAKEOFF:
-            behind = self.settings.takeoff_speed - float(odometry.velocity[2])
-            below = z - float(odometry.position[2]) > 0.02
-            change = TRIM_GAIN * behind * dt if below else -self._trim * dt / TRIM_FADE
+            behind = target.climb - float(odometry.velocity[2])
+            change = TRIM_GAIN * behind * dt if self.height < LIFTED else -self._trim * dt / TRIM_FADE
             self._trim = min(max(self._trim + change, TRIM[0]), TRIM[1])
         else:
             self._trim *= math.exp(-dt / TRIM_FADE)
         if on_ground:  # no tilt before the feet are free
             x, y = float(odometry.position[0]), float(odometry.position[1])
-        wanted = controlled(self.gentle, "position", odometry, (x, y, z, target.yaw))
+        wanted = controlled(self.gentle, "velocity", odometry, self._approach((x, y, z), target, odometry))
         if on_ground:
             zero = np.float64(0.0)
             return Ctbr(wanted.thrust + self._trim, Vec3(zero, zero, zero))
         return Ctbr(wanted.thrust + self._trim, wanted.rate)
+
+    def _approach(self, point: tuple[float, float, float], target: Target, odometry: Odometry) -> tuple[float, ...]:
+        """The velocity towards a point, and with it where it moves, world, m/s; and the yaw, rad."""
+        v = self.gentle
+        wanted = v.position_gain * (np.array(point) - odometry.position) + np.array([0.0, 0.0, target.climb])
+        return (*np.clip(wanted, -v.speed_max, v.speed_max).tolist(), target.yaw)
 
     def _send(self, now: float, wanted: tuple[str, Ctbr | None]) -> Sent:
         source, command = wanted

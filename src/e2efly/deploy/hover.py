@@ -48,7 +48,8 @@ def flight_gains(vehicle: Vehicle, latency: float) -> Vehicle:
     """
     slowest = latency + 1 / float(np.min(vehicle.rate_gain[:2]))
     attitude = np.minimum(vehicle.attitude_gain, 0.5 / slowest)
-    velocity = np.minimum(vehicle.velocity_gain, attitude[0] / 3)
+    # up and down there is no attitude loop in between, only the motors, as slow as the rate loop
+    velocity = np.minimum(vehicle.velocity_gain, [attitude[0] / 3, attitude[0] / 3, 0.5 / slowest])
     position = np.minimum(vehicle.position_gain, 0.4 * velocity)
     return dataclasses.replace(vehicle, attitude_gain=attitude, velocity_gain=velocity, position_gain=position)
 

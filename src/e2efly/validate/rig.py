@@ -15,10 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from e2efly.deploy.odometry import Sample
-from e2efly.physics import State
 from e2efly.validate.firmware import Firmware, firmware_folder
 from e2efly.validate.sitl import FirmwareState, Sitl
-from e2efly.validate.world import World
+from e2efly.validate.world import Body, World
 from e2efly.vehicles.vehicle import Vehicle
 
 STEP_S = 0.002
@@ -96,7 +95,7 @@ class Rig:
     ) -> None:
         self.sitl = Sitl(firmware, folder, virtual_time=not real_time)
         self.world = World(vehicle)
-        self.state: State = self.world.at_rest()
+        self.state: Body = self.world.at_rest()
         self.transmitter = Transmitter()
         self.latency = latency
         """Age of the poses when they are delivered, s."""

@@ -4,7 +4,9 @@ The firmware's motor outputs turn the rotors; the body's motion is what its sens
 """
 
 from dataclasses import dataclass
+from dataclasses import fields as fields_of
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +24,17 @@ STEP_S = 0.001
 
 
 @dataclass(frozen=True)
+class Body:
+    """The rigid body's state: the fields of `physics.State`, NumPy, one vehicle."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    quaternion: np.ndarray
+    body_rate: np.ndarray
+    rotor_speed: np.ndarray
+
+
+@dataclass(frozen=True)
 class World:
     """The rigid body of a vehicle over flat ground; pure: `advance` returns what comes next."""
 
@@ -35,27 +48,28 @@ class World:
         top = self.vehicle.thrust_range[1]
         return float((-k1 + np.sqrt(k1**2 + 4 * k2 * (top - k0))) / (2 * k2))
 
-    def at_rest(self, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> State:
+    def at_rest(self, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Body:
         """On the ground, rotors still."""
         zero = np.zeros(3)
         position = np.array([x, y, self.vehicle.feet_height])
-        return State(position, zero, np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), zero, np.zeros(4))
+        return Body(position, zero, np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), zero, np.zeros(4))
 
-    def advance(self, state: State, motors: np.ndarray, dt: float, wind: np.ndarray | None = None) -> State:
+    def advance(self, state: Body, motors: np.ndarray, dt: float, wind: np.ndarray | None = None) -> Body:
         """The state after `dt` s under constant motor outputs.
 
         Args:
-            state: NumPy leaves.
+            state: before.
             motors: (4,) in [0, 1], Betaflight's order; rotor speed is proportional to it.
             dt: a whole number of `STEP_S`.
             wind: (3,) world, m/s.
         """
         steps = max(round(dt / STEP_S), 1)
         air = np.zeros(3) if wind is None else wind
-        after = _advance(self.vehicle, state, np.asarray(motors) * self.full_speed, air, steps)
-        return State(*(np.asarray(x, np.float64) for x in jax.tree.leaves(after)))
+        before = State(*(getattr(state, f.name) for f in fields_of(Body)))
+        after = _advance(self.vehicle, before, np.asarray(motors) * self.full_speed, air, steps)
+        return Body(*(np.asarray(x, np.float64) for x in jax.tree.leaves(after)))
 
-    def sensed(self, before: State, after: State, dt: float) -> FirmwareState:
+    def sensed(self, before: Body, after: Body, dt: float) -> FirmwareState:
         """What gyroscope and accelerometer say after a step of `dt` s."""
         felt = (after.velocity - before.velocity) / dt + np.array([0, 0, GRAVITY])
         attitude = Quat(*after.quaternion)
@@ -65,7 +79,7 @@ class World:
 
 
 @partial(jax.jit, static_argnums=4)
-def _advance(vehicle: Vehicle, state: State, rotor_command: jax.Array, wind: jax.Array, steps: int) -> State:
+def _advance(vehicle: Vehicle, state: State, rotor_command: Any, wind: Any, steps: int) -> State:
     air, command = Vec3.of(wind), tuple(rotor_command)
 
     def step(parts: Parts, _: None) -> tuple[Parts, None]:
