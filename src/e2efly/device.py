@@ -45,6 +45,16 @@ def _configure(name: str, value: Any) -> None:
         jax.config.update(name, value)
 
 
+def compute_at_once() -> None:
+    """Compute in the thread that asks, where JAX has not begun to compute yet.
+
+    Right for one tiny program that is called again and again: handing it to another thread takes longer than it does.
+    """
+    import jax
+
+    jax.config.update("jax_cpu_enable_async_dispatch", False)
+
+
 def prepare(device: str | None = None) -> None:
     """Choose the device, set `XLA_OPTIONS` and turn on the persistent compilation cache.
 

@@ -42,7 +42,7 @@ def eval_command(
         config = run.config()
         task, env_config = config.task, config.env
     else:
-        task, env_config = _from_contract(policy)
+        task, env_config = config_from_contract(policy)
     if vehicle is not None:
         env_config = dataclasses.replace(env_config, vehicle=vehicle)
     flown, starts = fly_suites(policy, task, env_config, episodes, seed)
@@ -59,7 +59,7 @@ def eval_command(
     return 0
 
 
-def _from_contract(policy: Policy) -> tuple[TaskConfig, EnvConfig]:
+def config_from_contract(policy: Policy) -> tuple[TaskConfig, EnvConfig]:
     """Task and environment as the contract of a lone policy.onnx says."""
     c = policy.contract
     vehicle = load_vehicle(c.vehicle)

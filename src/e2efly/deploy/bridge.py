@@ -15,7 +15,7 @@ from e2efly.deploy.hover import blind, blind_time, controlled, flight_gains, rol
 from e2efly.deploy.msp.client import Client
 from e2efly.deploy.msp.controller import ControllerInfo
 from e2efly.deploy.msp.messages import Attitude, BatteryState, Motor, RawImu, Rc, StatusEx, set_raw_rc
-from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.odometry import Odometry, Sample
 from e2efly.deploy.policy_worker import PolicyWorker
 from e2efly.deploy.pose.checks import Checks
 from e2efly.deploy.pose.source import PoseSource
@@ -31,6 +31,12 @@ ARM, FAILSAFE, OVERRIDE = 0, 27, 50
 """Permanent ids of Betaflight's modes."""
 CLOSED = 1000
 """The throttle channel that lets the controller arm, us."""
+PROBE = (20, 40, 60)
+"""How far off centre roll, pitch and yaw are sent before arming, to see where each goes, us."""
+OUTLIERS_S = 0.03
+"""Poses are refused for so long before the odometry counts as lost, s: an outlier or two end no flight."""
+BEHIND = 12
+"""Stick frames without an answer from which on the link is too slow to fly by: a tenth of a second."""
 THRUST_DELAY = (0.015, 0.075)
 """How long before a measured force its throttle was sent, s: the link, the rate loop and the motors' lag."""
 TRIM = (-3.0, 5.0)
@@ -98,10 +104,15 @@ class Bridge:
         self.map = throttle_map or ThrottleMap.of(vehicle)
         self.odometry: Odometry | None = None
         self.inputs = Inputs()
-        self.sent = Sent("closed", None, 0.0, self._closed())
         self.ticks = 0
+        self.land_now = False
+        """The operator asks for a landing, as the pilot does by the mission switch."""
+        self.channels_seen = False
+        """The controller has been seen to take every stick where it was sent; see `_probe`."""
+        self.sent = Sent("closed", None, 0.0, self._closed())
         self._track = Track()
         self._pose_problem: str | None = None
+        self._good_pose = -math.inf
         self._history = ThrottleHistory()
         self._trim = 0.0
         self._gravity_counts = 0.0
@@ -109,7 +120,8 @@ class Bridge:
         self._seen: dict[int, float] = {}
         self._missed: deque[float] = deque()
         self._last = 0.0
-        self._mode = Mode.INIT
+        self._stale: str | None = None
+        self._override_since = 0.0
 
     def tick(self, now: float, lateness: float = 0.0, slack: float = 0.004) -> Sent:
         """One control step at `now` s, which began `lateness` s after its time; a policy due within `slack` s acts."""
@@ -126,6 +138,18 @@ class Bridge:
         self._record(now, fresh)
         return self.sent
 
+    def look(self, now: float) -> list[Sample]:
+        """Take in poses and the controller's answers, decide and send nothing; returns the poses."""
+        self.client.poll(now)
+        poses = self._read_poses(now)
+        self._learn(now, self._read_controller(now))
+        return poses
+
+    def adopt(self, info: ControllerInfo, sticks: Sticks, settings_problems: tuple[str, ...]) -> None:
+        """The controller's settings were read again."""
+        self.info, self.sticks, self.settings_problems = info, sticks, settings_problems
+        self.channels_seen = False
+
     @property
     def flying(self) -> bool:
         """Whether the vehicle may be in the air by this bridge's doing."""
@@ -141,20 +165,24 @@ class Bridge:
         battery = self.client.message(BatteryState.CODE, now, 3.0)
         return battery.voltage / battery.cells if battery is not None and battery.cells and battery.voltage else None
 
-    def _read_poses(self, now: float) -> None:
+    def _read_poses(self, now: float) -> list[Sample]:
         if self.flight.mode in (Mode.INIT, Mode.DONE) and self._track.fault:
             self._track = Track()  # it may have been carried elsewhere
-        for sample in self.source.read(now):
+        samples = self.source.read(now)
+        for sample in samples:
             self._track, odometry, problem = track(self.checks, self._track, sample)
             self._pose_problem = problem
             if odometry is not None:
-                self.odometry = odometry
+                self.odometry, self._good_pose = odometry, now
+        if self._pose_problem and not self._track.fault and now - self._good_pose < OUTLIERS_S:
+            self._pose_problem = None
         old = age(self._track, now)
         if self._pose_problem is None and not old <= self.checks.max_age:
             said = self.source.problem
             self._stale = f"the newest is {old:.2f} s old" + (f" ({said})" if said else "")
         else:
             self._stale = None
+        return samples
 
     def _read_controller(self, now: float) -> dict[int, Any]:
         """The messages that came since the last step, by code; and all of them as inputs of the state machine."""
@@ -172,6 +200,8 @@ class Bridge:
         if status is None:
             link = self.client.link
             problem = link.reason if not link.alive else f"no answer within {patience:g} s"
+        elif self.client.backlog > BEHIND:
+            problem = f"it is behind by {self.client.backlog} stick frames (set serial_update_rate_hz=1000)"
         good = self._pose_problem is None and self._stale is None
         self.inputs = Inputs(
             odometry=self.odometry,
@@ -181,7 +211,7 @@ class Bridge:
             override=OVERRIDE in active,
             pilot=self._pilot(channels) if channels is not None and FAILSAFE not in active else None,
             voltage=self.voltage(now),
-            settings_problems=self.settings_problems,
+            settings_problems=self.settings_problems + self._probe(channels, now),
             attitude_error=self._attitude_error(attitude),
             missed_deadlines=len(self._missed),
         )
@@ -197,8 +227,26 @@ class Bridge:
             return 0.0 if channel is None else max(-1.0, min(1.0, (pulse(channel) - 1500) / 500))
 
         at = pulse(c.mission)
-        mission = Mission.LAND if at < 1300 else Mission.POLICY if at > 1700 else Mission.HOVER
+        mission = Mission.LAND if at < 1300 or self.land_now else Mission.POLICY if at > 1700 else Mission.HOVER
         return Pilot(mission, stick(c.roll), stick(c.pitch), stick(c.throttle), stick(c.yaw))
+
+    def _probe(self, channels: Rc | None, now: float) -> tuple[str, ...]:
+        """Until it is armed, the sticks are sent apart by `PROBE`: does the controller take each for what it is?"""
+        if not self.inputs.override or self.channels_seen:
+            if not self.inputs.override and self.flight.mode is Mode.INIT:
+                self.channels_seen = False
+            self._override_since = now
+            return ()
+        mid = self.sticks.centre
+        sent = [mid + offset for offset in PROBE] + [CLOSED]
+        got = list(channels.channels[:4]) if channels is not None else None
+        self.channels_seen = got is not None and all(abs(a - b) <= 1 for a, b in zip(sent, got, strict=True))
+        if self.channels_seen or now - self._override_since < 0.5:
+            return ()
+        return (
+            f"roll, pitch, yaw, throttle were sent as {sent} us and taken as {got}; needed: the same "
+            "(msp_override_channels_mask 15, rxrange as it comes; switch override on before arming)",
+        )
 
     def _attitude_error(self, attitude: Attitude | None) -> float | None:
         if attitude is None or self.odometry is None:
@@ -322,7 +370,7 @@ class Bridge:
             sent = Sent(source, None, 0.0, self._closed())
         else:
             throttle = self.map.throttle(float(command.thrust), self.inputs.voltage)
-            stick = self.sticks.channels_of(min(throttle, self.sticks.throttle.largest), _rates(command), ())
+            stick = self.sticks.channels_of(min(throttle, self.sticks.throttle.largest), rates_of(command), ())
             sent = Sent(source, command, throttle, stick.channels, stick.saturated)
         self._history.add(now, sent.throttle)
         self.client.set_raw_rc(set_raw_rc(sent.channels), now)
@@ -330,7 +378,8 @@ class Bridge:
 
     def _closed(self) -> tuple[int, ...]:
         mid = self.sticks.centre
-        return self.sticks.arrange((mid, mid, mid, CLOSED), ())
+        apart = (0, 0, 0) if self.inputs.armed or self.channels_seen else PROBE
+        return self.sticks.arrange((*(mid + offset for offset in apart), CLOSED), ())
 
     def _record(self, now: float, fresh: dict[int, Any]) -> None:
         log, sent = self.log, self.sent
@@ -347,7 +396,7 @@ class Bridge:
         log.record("command", now, {
             "source": f"{self.flight.mode}: {sent.source}",
             "collective_thrust": None if command is None else float(command.thrust),
-            "body_rate": None if command is None else _rates(command),
+            "body_rate": None if command is None else rates_of(command),
             "setpoint": setpoint, "yaw": yaw,
         })  # fmt: skip
         log.record("sticks", now, {
@@ -376,7 +425,8 @@ class Bridge:
         return None, None
 
 
-def _rates(command: Ctbr) -> list[float]:
+def rates_of(command: Ctbr) -> list[float]:
+    """The body rates of a command, rad/s."""
     return [float(rate) for rate in (command.rate.x, command.rate.y, command.rate.z)]
 
 

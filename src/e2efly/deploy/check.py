@@ -59,7 +59,8 @@ def examine(
         *_channels(info, settings),
     ]
     for axis, band in (("deadband", info.deadband.deadband), ("yaw_deadband", info.deadband.yaw_deadband)):
-        rows.append(Row(axis, f"{band} us", f"at most {LARGEST_DEADBAND} us", band <= LARGEST_DEADBAND, f"set {axis}=0"))
+        small = band <= LARGEST_DEADBAND
+        rows.append(Row(axis, f"{band} us", f"at most {LARGEST_DEADBAND} us", small, f"set {axis}=0"))
     quad = info.mixer.mixer == QUADX
     rows.append(Row("mixer", "QUADX" if quad else f"number {info.mixer.mixer}", "QUADX", quad, "mixer QUADX"))
     rows.append(Row("feature 3D", _on("3D" in info.features), "off", "3D" not in info.features, "feature -3D"))
@@ -115,8 +116,8 @@ def _modes(info: ControllerInfo) -> list[Row]:
         rows.append(Row(f"switch of {mode}", where, "a switch of the pilot's", bool(ranges), hint))
     known = next(number for number, name in BOXES.items() if name == "MSP OVERRIDE") in info.box_ids
     rows.append(
-        Row("msp_override_channels_mask", "set" if known else "0", "15: roll, pitch, throttle, yaw (tried before arming)",
-            known, "set msp_override_channels_mask=15")
+        Row("msp_override_channels_mask", "set" if known else "0", "15: the four sticks (tried before arming)", known,
+            "set msp_override_channels_mask=15")
     )  # fmt: skip
     return rows
 

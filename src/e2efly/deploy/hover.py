@@ -13,11 +13,15 @@ from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 LEVEL_GAIN = 4.0
 """Body rate over tilt of the blind descent, 1/s."""
-SINK_ACCELERATION, SINK_TIME = 1.0, 0.6
-"""A blind descent begins by falling so, m/s^2, for so long, s ..."""
+LEVEL_RATE = 3.0
+"""Largest body rate of it, rad/s."""
+SINK_SPEED, SINK_ACCELERATION = 0.6, 3.0
+"""A blind descent first goes to this speed, m/s, by this acceleration, m/s^2 ..."""
+SINK_TIME = SINK_SPEED / SINK_ACCELERATION
+"""... which takes so long from rest, s ..."""
 SINK_THRUST = 0.98
 """... and goes on with this share of the weight: it must sink, whatever the throttle map's last error."""
-SINK_SPEED = 0.5
+SLOWEST_SINK = 0.5
 """By which the time to the ground is estimated, m/s."""
 
 
@@ -60,23 +64,37 @@ def controlled(vehicle: Vehicle, mode: str, odometry: Odometry, command: tuple[f
     return CASCADE[mode](vehicle, FlightMotion.of(odometry), (a, b, c, d))
 
 
-def blind(attitude: Attitude | None, elapsed: float) -> Ctbr:
+def blind(attitude: Attitude | None, elapsed: float, climb: float = 0.0) -> Ctbr:
     """Level by the controller's own attitude, and sink; without any attitude the rates are held at zero.
 
     Args:
         attitude: the flight controller's.
         elapsed: since the descent began, s.
+        climb: vertical speed when it began, m/s: a climb is ended and a fall is caught first.
     """
-    thrust = GRAVITY - SINK_ACCELERATION if elapsed < SINK_TIME else SINK_THRUST * GRAVITY
+    thrust = SINK_THRUST * GRAVITY
+    if elapsed < sink_time(climb):
+        thrust = GRAVITY - math.copysign(SINK_ACCELERATION, climb + SINK_SPEED)
     if attitude is None:
         return Ctbr(thrust, Vec3(0.0, 0.0, 0.0))
     tilt = max(math.cos(attitude.roll) * math.cos(attitude.pitch), 0.5)
-    return Ctbr(thrust / tilt, Vec3(-LEVEL_GAIN * attitude.roll, -LEVEL_GAIN * attitude.pitch, 0.0))
+    return Ctbr(thrust / tilt, Vec3(_levelling(attitude.roll), _levelling(attitude.pitch), 0.0))
 
 
-def blind_time(height: float) -> float:
+def _levelling(angle: float) -> float:
+    return max(-LEVEL_RATE, min(LEVEL_RATE, -LEVEL_GAIN * angle))
+
+
+def sink_time(climb: float = 0.0) -> float:
+    """How long a blind descent that begins with a vertical speed, m/s, takes to reach its own, s."""
+    return abs(climb + SINK_SPEED) / SINK_ACCELERATION
+
+
+def blind_time(height: float, climb: float = 0.0) -> float:
     """After how long a blind descent from a height, m, has surely ended, s; the throttle is closed then."""
-    return 2.0 + max(height, 0.0) / SINK_SPEED
+    up = max(climb, 0.0)
+    top = max(height, 0.0) + up**2 / (2 * SINK_ACCELERATION)
+    return 2.0 + up / SINK_ACCELERATION + top / SLOWEST_SINK
 
 
 def roll_pitch(quaternion: np.ndarray) -> tuple[float, float]:

@@ -1,8 +1,11 @@
 """Ask the policy in a thread of its own, so that a slow or stuck policy never holds up the control loop."""
 
+import threading
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from concurrent.futures import TimeoutError as Late
+from queue import SimpleQueue
+from typing import Any
 
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.runtime import Decision, Imu, Runtime, RuntimeState, act, begin, due, outside
@@ -20,8 +23,10 @@ class PolicyWorker:
         """The last one: it is flown until the next is due."""
         self.problem: str | None = None
         """Why the policy failed in this flight."""
-        self._pool = ThreadPoolExecutor(1, "policy")
+        self._questions: SimpleQueue[tuple[Future, tuple[Any, ...]] | None] = SimpleQueue()
         self._running: Future | None = None
+        # a daemon: not even a policy that never answers keeps the program from ending
+        threading.Thread(target=self._answer, name="policy", daemon=True).start()
 
     @property
     def done(self) -> bool:
@@ -30,7 +35,7 @@ class PolicyWorker:
 
     def readiness(self, odometry: Odometry, now: float) -> str | None:
         """Why it must not take over now; None: it may."""
-        if self._running is not None and not self._running.done():
+        if self._busy:
             return "it is still busy with an earlier question"
         return "; ".join(outside(self.runtime, odometry, now)) or None
 
@@ -48,19 +53,36 @@ class PolicyWorker:
         state = self.state
         if state is None or now + slack < due(self.runtime, state):
             return False
+        if self._busy:
+            self.problem = "late: it is still busy with an earlier question"
+            return False
         started = time.perf_counter()
+        self._running = Future()
+        self._questions.put((self._running, (self.runtime, state, odometry, now, imu)))
         try:
-            self._running = self._pool.submit(act, self.runtime, state, odometry, now, imu)
-            self.state, self.decision = self._running.result(self.timeout)
+            state, self.decision = self._running.result(self.timeout)
         except Late:
             self.problem = f"late: no answer within {1e3 * (time.perf_counter() - started):.0f} ms"
         except Exception as error:  # whatever a policy does, the vehicle goes on flying
             self.problem = str(error) or type(error).__name__
         else:
-            self.problem = self.runtime.goal.failed(self.state.goal) or None
+            self.state = state
+            self.problem = self.runtime.goal.failed(state.goal) or None
             return True
         return False
 
     def close(self) -> None:
         """End the thread, once the policy lets it."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        self._questions.put(None)
+
+    @property
+    def _busy(self) -> bool:
+        return self._running is not None and not self._running.done()
+
+    def _answer(self) -> None:
+        while (question := self._questions.get()) is not None:
+            future, asked = question
+            try:
+                future.set_result(act(*asked))
+            except Exception as error:  # told to whoever waits for it
+                future.set_exception(error)

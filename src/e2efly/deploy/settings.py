@@ -82,6 +82,10 @@ class FlightSettings:
     """The pilot's channels."""
 
 
+SMALLEST = 0.5
+"""The fence is at least so long, wide and high, m."""
+CHANNELS = (5, 18)
+"""First and last channel that a switch or a copy of a stick can be on: 1 to 4 are the sticks."""
 _POSITIVE = (
     "takeoff_height", "takeoff_speed", "land_speed", "reposition_speed", "odometry_timeout", "link_timeout",
     "policy_timeout", "missed_deadlines", "lateness", "battery_low", "stick_deadband", "still_speed", "land_settle",
@@ -96,30 +100,57 @@ def check(settings: FlightSettings) -> None:
         ValueError: naming the field, the value and what is accepted.
     """
     for name in _POSITIVE:
-        value = getattr(settings, name)
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} is {value}; accepted: a positive number")
-    fence = settings.fence
-    for axis, low, high in zip("xyz", fence.low, fence.high, strict=True):
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise ValueError(f"fence.low and fence.high are {low} and {high} in {axis}; accepted: low below high")
-    for name in ("speed", "tilt", "braking", "reaction"):
-        value = getattr(fence, name)
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"fence.{name} is {value}; accepted: a positive number")
-    height = settings.ground_height + settings.takeoff_height
-    if not fence.low[2] < height < fence.high[2]:
+        _positive(name, getattr(settings, name))
+    if type(settings.missed_deadlines) is not int:
+        raise ValueError(f"missed_deadlines is {settings.missed_deadlines!r}; accepted: a whole number, 1 or more")
+    if settings.stick_deadband >= 1:
+        raise ValueError(f"stick_deadband is {settings.stick_deadband}; accepted: less than 1, the whole stick")
+    if not _number(settings.ground_height):
+        raise ValueError(f"ground_height is {settings.ground_height!r}; accepted: a finite number")
+    _check_fence(settings.fence)
+    low, high = settings.fence.low[2], settings.fence.high[2]
+    if not low < settings.ground_height + settings.takeoff_height < high:
         raise ValueError(
             f"takeoff_height is {settings.takeoff_height} m over {settings.ground_height} m; accepted: inside the "
-            f"fence, {fence.low[2]} to {fence.high[2]} m"
+            f"fence, {low} to {high} m"
         )
+    _check_channels(settings.channels)
+
+
+def _check_fence(fence: Fence) -> None:
+    for name in ("low", "high"):
+        point = getattr(fence, name)
+        if not (isinstance(point, tuple) and len(point) == 3 and all(map(_number, point))):
+            raise ValueError(f"fence.{name} is {point!r}; accepted: x, y and z, m")
+    for axis, low, high in zip("xyz", fence.low, fence.high, strict=True):
+        if high - low < SMALLEST:
+            said = f"fence.low and fence.high are {low} and {high} in {axis}"
+            raise ValueError(f"{said}; accepted: low at least {SMALLEST} m below high")
+    for name in ("speed", "tilt", "braking", "reaction"):
+        _positive(f"fence.{name}", getattr(fence, name))
+
+
+def _check_channels(channels: PilotChannels) -> None:
+    first, last = CHANNELS
     named = {
         name: channel
         for name in ("mission", "roll", "pitch", "throttle", "yaw")
-        if (channel := getattr(settings.channels, name)) is not None
+        if (channel := getattr(channels, name)) is not None or name == "mission"
     }
     for name, channel in named.items():
-        if not 5 <= channel <= 18:
-            raise ValueError(f"channels.{name} is {channel}; accepted: 5 to 18, or None (1 to 4 are the sticks)")
+        if type(channel) is not int or not first <= channel <= last:
+            none = "" if name == "mission" else ", or None"
+            raise ValueError(
+                f"channels.{name} is {channel!r}; accepted: {first} to {last}{none} (1 to 4 are the sticks)"
+            )
     if len(set(named.values())) != len(named):
         raise ValueError(f"channels are {named}; accepted: each another")
+
+
+def _number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _positive(name: str, value: float) -> None:
+    if not (_number(value) and value > 0):
+        raise ValueError(f"{name} is {value!r}; accepted: a positive number")

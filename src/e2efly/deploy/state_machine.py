@@ -84,7 +84,7 @@ def _common(flight: Flight, inputs: Inputs) -> Flight | None:
     if not inputs.armed:
         return None if flight.mode in (Mode.INIT, Mode.DONE) else _to(flight, Mode.DONE, Reason.DISARMED)
     if not inputs.override and (flight.mode in AIRBORNE or _left_the_ground(flight, inputs.seen)):
-        return _to(flight, Mode.PILOT, Reason.OVERRIDE_OFF)
+        return _to(flight, Mode.PILOT, Reason.OVERRIDE_OFF, target=_here(inputs))
     return None
 
 
@@ -188,7 +188,18 @@ def _must_land(settings: FlightSettings, inputs: Inputs) -> tuple[str, ...]:
 def _land(settings: FlightSettings, flight: Flight, inputs: Inputs, *reasons: str) -> Flight:
     if inputs.seen is None:
         return _to(flight, Mode.LAND, *reasons, blind=True)
-    return _to(flight, Mode.LAND, *reasons, target=stopping(settings.fence, inputs.seen))
+    return _to(flight, Mode.LAND, *reasons, target=_down_from(settings, inputs.seen))
+
+
+def _down_from(settings: FlightSettings, odometry: Odometry) -> Target:
+    """Where it can stop, but no higher than it is: what has nearly landed must not rise to the fence's floor."""
+    target = stopping(settings.fence, odometry)
+    x, y, z = target.position
+    return dataclasses.replace(target, position=(x, y, min(z, float(odometry.position[2]))))
+
+
+def _here(inputs: Inputs) -> Target | None:
+    return None if inputs.seen is None else here(inputs.seen)
 
 
 def _take_off(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
@@ -263,7 +274,7 @@ def _landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float
     if odometry is None:
         return _sinking(settings, flight, inputs)
     if flight.target is None:
-        return dataclasses.replace(flight, blind=False, target=stopping(settings.fence, odometry))
+        return dataclasses.replace(flight, blind=False, target=_down_from(settings, odometry))
     x, y, z = flight.target.position
     height = float(odometry.position[2])
     sink = settings.land_speed if float(np.linalg.norm(odometry.velocity[:2])) < SLOW else 0.0  # first it stops
@@ -295,7 +306,7 @@ def _with_pilot(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: fl
     del dt
     odometry = inputs.seen
     if not inputs.override or inputs.link_problem:
-        return dataclasses.replace(flight, target=None if odometry is None else here(odometry))
+        return dataclasses.replace(flight, target=_here(inputs))
     if odometry is None:
         return _land(settings, flight, inputs, Reason.OVERRIDE_ON, inputs.blindness)
     still = float(np.linalg.norm(odometry.velocity)) < settings.still_speed

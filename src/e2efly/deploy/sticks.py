@@ -59,15 +59,17 @@ class Sticks:
         if len(values) != 4 or not all(map(isfinite, values)):
             raise ValueError(f"stick command: throttle and body rate are {values!r}; accepted: four finite numbers")
         saturated = ["throttle"] if not 0 <= throttle <= self.throttle.largest else []
-        pulses = [self.centre] * 3 + [self.throttle.channel_for(throttle)]
+        pulses = [self.pulse(axis, rate) for axis, rate in enumerate(body_rate)]
         for axis, rate in enumerate(body_rate):
-            stick = rate_to_stick(self.rates, axis, rate) * _SIGNS[axis]
-            wanted = stick_to_channel(stick, self.centre, self.deadband[axis])
-            pulses[axis] = min(max(wanted, CHANNELS[0]), CHANNELS[1])
-            reached = self._rate(axis, pulses[axis]) if pulses[axis] != wanted else rate
-            if abs(rate) > self.rates.max_rate[axis] or abs(reached) < abs(rate):
+            at_end = pulses[axis] in CHANNELS and abs(self._rate(axis, pulses[axis])) < abs(rate)
+            if abs(rate) > self.rates.max_rate[axis] or at_end:
                 saturated.append(AXES[axis])
-        return StickCommand(self.arrange(pulses, aux), tuple(saturated))
+        return StickCommand(self.arrange((*pulses, self.throttle.channel_for(throttle)), aux), tuple(saturated))
+
+    def pulse(self, axis: int, rate: float) -> int:
+        """The pulse of an axis (0 to 2), µs, that commands a body rate, FLU, rad/s; cut at `CHANNELS`."""
+        stick = rate_to_stick(self.rates, axis, rate) * _SIGNS[axis]
+        return min(max(stick_to_channel(stick, self.centre, self.deadband[axis]), CHANNELS[0]), CHANNELS[1])
 
     def arrange(self, pulses: Sequence[int], aux: Sequence[int]) -> tuple[int, ...]:
         """Pulses for roll, pitch, yaw, throttle and AUX1, AUX2, ... in the receiver's order, µs.

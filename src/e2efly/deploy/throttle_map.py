@@ -1,15 +1,18 @@
 """From thrust to throttle: a map that learns in flight.
 
 The vehicle file gives its shape: rotor speed rises linearly with the throttle from idle to full, thrust by the
-vehicle's thrust map. What is learned is a factor on it, and how that falls with the battery's voltage, by recursive
-least squares with forgetting on the specific force along body z that was measured some 40 ms after each throttle
-(as in px4ctrl, which learns the one factor of a straight line).
+vehicle's thrust map. What is learned is a factor on it, and how that falls with the battery's voltage, from the
+specific force along body z that was measured some 40 ms after each throttle (as in px4ctrl, which learns the one factor
+of a straight line by recursive least squares with forgetting). Forgetting would lose the voltage's part, which shows
+over minutes only: here both wander at random, each at its own pace, and a Kalman filter follows them.
 """
 
 import dataclasses
+import json
 import math
 from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,23 +22,31 @@ SCALE_RANGE = (0.5, 2.0)
 """Bounds of the learned factor."""
 GAIN_RANGE = (0.0, 4.0)
 """Bounds of its relative change over the relative change of voltage: 2 where rotor speed follows the voltage."""
-FORGETTING = 0.998
-"""Weight of the past every hundredth of a second."""
-SCALE_RATE = 0.25
-"""Largest change of the factor that is used, 1/s: it never jumps."""
+SCALE_RATE, GAIN_RATE = 0.25, 0.5
+"""Largest changes of factor and voltage gain that are used, 1/s: they never jump."""
 LOWEST_FORCE = 0.3 * GRAVITY
 """Measurements below are not learned from: drag and noise outweigh thrust."""
-_DRIFT = np.diag([1e-6, 1e-8])
-"""Added to the covariance an update: keeps it alive."""
-_LARGEST = np.diag([0.05, 0.5])
-"""Bound and start of the covariance: how far off the vehicle file may be (factor: 20 % rms; voltage gain: 0.7)."""
+BELIEVED = (0.25, 4.0)
+"""Measured over nominal force, between which a measurement is learned from."""
+VOLTAGE_BELIEVED = (0.6, 1.4)
+"""Voltage over that at which the factor holds, between which it is believed."""
+NOISE = 0.1
+"""Of the accelerometer and of what the map leaves out, standard deviation, gravities."""
+WANDER = np.diag([4e-6, 1e-5])
+"""Variance that factor and voltage gain gain a second: the factor is followed within 7 s, the gain within minutes."""
+START = ((0.05, 0.0), (0.0, 0.5))
+"""First covariance, and its bound: how far off the vehicle file may be (factor: 20 % rms; voltage gain: 0.7)."""
+_FIELDS = ("vehicle_hash", "voltage", "scale", "gain", "updates", "residual")
 
 
 @dataclass(frozen=True)
 class ThrottleMap:
     """Throttle (0: idle, 1: full) against specific force along body z, m/s^2. Make it with `ThrottleMap.of`."""
 
+    vehicle_hash: str
+    """Of the vehicle that it is a map of."""
     mass: float
+    """kg."""
     thrust_map: tuple[float, float, float]
     """Thrust of a rotor over its speed: k2, k1, k0."""
     speed: tuple[float, float]
@@ -44,10 +55,14 @@ class ThrottleMap:
     """Volts a cell at which the factor holds."""
     scale: float = 1.0
     """The factor in use: it follows `learned` slowly."""
+    gain: float = 2.0
+    """The voltage gain in use: it follows `learned` slowly."""
     learned: tuple[float, float] = (1.0, 2.0)
-    """The factor at `voltage`, and its voltage gain, as the least squares have them."""
-    covariance: tuple[tuple[float, float], tuple[float, float]] = ((0.05, 0.0), (0.0, 0.5))
+    """The factor at `voltage`, and its voltage gain, as the filter has them."""
+    covariance: tuple[tuple[float, float], tuple[float, float]] = START
     """Of `learned`."""
+    last_voltage: float | None = None
+    """The last that was believed, V a cell; None: none yet."""
     updates: int = 0
     """Measurements learned from."""
     residual: float = 0.0
@@ -59,7 +74,8 @@ class ThrottleMap:
         k2, k1, k0 = (float(k) for k in vehicle.thrust_map)
         top = vehicle.thrust_range[1]
         full = (-k1 + math.sqrt(k1**2 + 4 * k2 * (top - k0))) / (2 * k2)
-        return ThrottleMap(float(vehicle.mass), (k2, k1, k0), (float(vehicle.rotor_speed_min), full), voltage)
+        idle = float(vehicle.rotor_speed_min)
+        return ThrottleMap(vehicle.hash, float(vehicle.mass), (k2, k1, k0), (idle, full), voltage)
 
     def nominal(self, throttle: float) -> float:
         """Specific force, m/s^2, of a throttle by the vehicle file alone."""
@@ -69,7 +85,7 @@ class ThrottleMap:
         return 4 * max((k2 * speed + k1) * speed + k0, 0.0) / self.mass
 
     def force(self, throttle: float, voltage: float | None = None) -> float:
-        """Specific force, m/s^2, of a throttle, as learned; voltage of a cell, None: unknown."""
+        """Specific force, m/s^2, of a throttle, as learned; voltage of a cell, None: the last that was known."""
         return self.nominal(throttle) * self._factor(voltage)
 
     def throttle(self, force: float, voltage: float | None = None) -> float:
@@ -81,11 +97,18 @@ class ThrottleMap:
         speed = (-k1 + math.sqrt(max(inside, 0.0))) / (2 * k2)
         return min(max((speed - idle) / (full - idle), 0.0), 1.0)
 
+    def change(self, voltage: float | None) -> float:
+        """Relative change of the voltage; one that cannot be counts as the last that could."""
+        believed = voltage if _believed(self, voltage) else self.last_voltage
+        return 0.0 if believed is None else believed / self.voltage - 1
+
     def _factor(self, voltage: float | None) -> float:
-        if voltage is None:
-            return self.scale
-        factor = self.scale * (1 + self.learned[1] * (voltage - self.voltage) / self.voltage)
+        factor = self.scale * (1 + self.gain * self.change(voltage))
         return min(max(factor, SCALE_RANGE[0] / 2), SCALE_RANGE[1] * 2)
+
+
+def _believed(m: ThrottleMap, voltage: float | None) -> bool:
+    return voltage is not None and VOLTAGE_BELIEVED[0] < voltage / m.voltage < VOLTAGE_BELIEVED[1]
 
 
 def update(m: ThrottleMap, throttle: float, force: float, voltage: float | None, dt: float) -> ThrottleMap:
@@ -95,34 +118,77 @@ def update(m: ThrottleMap, throttle: float, force: float, voltage: float | None,
         m: the map.
         throttle: sent one delay before the measurement.
         force: measured along body z.
-        voltage: of a cell, V; None: unknown, and the voltage gain is not learned.
-        dt: since the last update, s: bounds the change of the factor in use.
+        voltage: of a cell, V; None: unknown, the last known one is taken.
+        dt: since the last update, s.
     """
     nominal = m.nominal(throttle)
-    if not math.isfinite(force) or force < LOWEST_FORCE or nominal < LOWEST_FORCE or force > 10 * nominal:
+    believed = force >= LOWEST_FORCE <= nominal and BELIEVED[0] * nominal < force < BELIEVED[1] * nominal
+    if not (believed and 0 < dt < math.inf):  # true for NaN
         return m
-    change = 0.0 if voltage is None else (voltage - m.voltage) / m.voltage
-    # force = scale * nominal + scale * gain * nominal * change: linear in (scale, scale * gain)
-    theta = np.array([m.learned[0], m.learned[0] * m.learned[1]])
-    row = np.array([nominal, nominal * change]) / GRAVITY
-    error = force / GRAVITY - row @ theta
-    covariance = np.array(m.covariance)
-    forgetting = FORGETTING ** (100 * dt)
-    gain = covariance @ row / (forgetting + row @ covariance @ row)
-    theta = theta + gain * error
-    covariance = (covariance - np.outer(gain, row @ covariance)) / forgetting + _DRIFT
-    covariance = np.clip(covariance, -_LARGEST.max(), _LARGEST.max())
-    covariance[[0, 1], [0, 1]] = np.minimum(np.diag(covariance), np.diag(_LARGEST))
-    learned = float(np.clip(theta[0], *SCALE_RANGE))
-    slope = float(np.clip(theta[1] / learned, *GAIN_RANGE)) if voltage is not None else m.learned[1]
-    reach = SCALE_RATE * dt
-    scale = m.scale + min(max(learned - m.scale, -reach), reach)
-    rest = 0.99 * m.residual**2 + 0.01 * (error * GRAVITY) ** 2
-    (a, b), (c, d) = covariance.tolist()
+    dt = min(dt, 0.1)
+    change, (scale, gain) = m.change(voltage), m.learned
+    row = np.array([1 + gain * change, scale * change]) * (nominal / GRAVITY)
+    error = (force - scale * nominal * (1 + gain * change)) / GRAVITY
+    covariance = np.array(m.covariance) + WANDER * dt
+    k = covariance @ row / (NOISE**2 + row @ covariance @ row)
+    covariance = covariance - np.outer(k, row @ covariance)
+    shrink = np.sqrt(np.minimum(np.diag(START) / np.diag(covariance), 1.0))
+    (a, b), (c, d) = (covariance * np.outer(shrink, shrink)).tolist()
+    scale = min(max(scale + float(k[0]) * error, SCALE_RANGE[0]), SCALE_RANGE[1])
+    gain = min(max(gain + float(k[1]) * error, GAIN_RANGE[0]), GAIN_RANGE[1])
     return dataclasses.replace(
-        m, scale=scale, learned=(learned, slope), covariance=((a, b), (c, d)), updates=m.updates + 1,
-        residual=math.sqrt(rest),
-    )  # fmt: skip
+        m,
+        scale=_towards(m.scale, scale, SCALE_RATE * dt),
+        gain=_towards(m.gain, gain, GAIN_RATE * dt),
+        learned=(scale, gain),
+        covariance=((a, b), (c, d)),
+        last_voltage=voltage if _believed(m, voltage) else m.last_voltage,
+        updates=m.updates + 1,
+        residual=math.sqrt(0.99 * m.residual**2 + 0.01 * (error * GRAVITY) ** 2),
+    )
+
+
+def _towards(value: float, goal: float, reach: float) -> float:
+    return value + min(max(goal - value, -reach), reach)
+
+
+def as_json(m: ThrottleMap) -> str:
+    """What was learned, to be saved with the flight and offered to the next."""
+    values = (m.vehicle_hash, m.voltage, *m.learned, m.updates, m.residual)
+    return json.dumps(dict(zip(_FIELDS, values, strict=True)), indent=2)
+
+
+def from_json(text: str, vehicle: Vehicle) -> ThrottleMap:
+    """The map of a vehicle with what an earlier flight learned, which this flight goes on from.
+
+    Raises:
+        ValueError: naming the field, the value and what is accepted; for the map of another vehicle.
+    """
+    try:
+        values = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"throttle map: not JSON: {error}") from None
+    if not isinstance(values, dict) or set(values) != set(_FIELDS):
+        found = ", ".join(map(str, values)) if isinstance(values, dict) else type(values).__name__
+        raise ValueError(f"throttle map: it has {found}; accepted: an object with {', '.join(_FIELDS)}")
+    if values["vehicle_hash"] != vehicle.hash:
+        raise _refusal("vehicle_hash", values["vehicle_hash"], f"{vehicle.hash!r}, that of {vehicle.name!r}")
+    ranges = {"voltage": (2.0, 5.0), "scale": SCALE_RANGE, "gain": GAIN_RANGE, "residual": (0.0, 100.0)}
+    numbers = {}
+    for name, (low, high) in ranges.items():
+        value = values[name]
+        if type(value) not in (int, float) or not low <= value <= high:
+            raise _refusal(name, value, f"{low:g} to {high:g}")
+        numbers[name] = float(value)
+    if type(values["updates"]) is not int or values["updates"] < 0:
+        raise _refusal("updates", values["updates"], "a whole number, 0 or more")
+    learned = numbers["scale"], numbers["gain"]
+    fresh = ThrottleMap.of(vehicle, numbers.pop("voltage"))
+    return dataclasses.replace(fresh, **numbers, learned=learned, updates=values["updates"])
+
+
+def _refusal(name: str, value: Any, accepted: str) -> ValueError:
+    return ValueError(f"throttle map: {name} is {value!r}; accepted: {accepted}")
 
 
 class ThrottleHistory:

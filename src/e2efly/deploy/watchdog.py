@@ -3,12 +3,13 @@
 Under MSP override, Betaflight goes on with the last sticks it was sent, for ever. So the link belongs to this small
 process. It hands bytes through; when the bridge is gone, or silent for `TIMEOUT_S` in flight, it takes over for good:
 level by the controller's own attitude, a gentle descent by the throttle that the bridge had learned, then the throttle
-closed. It imports neither NumPy nor ONNX Runtime.
+closed. It imports neither NumPy nor ONNX Runtime, and ends only with the bridge: no signal but SIGKILL stops it.
 """
 
 import json
 import os
 import select
+import signal
 import socket
 import subprocess
 import sys
@@ -16,27 +17,37 @@ import time
 from bisect import bisect_right
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from itertools import chain, pairwise
 
 from e2efly.deploy.msp.codec import REPLY, Decoder, Frame, encode
 from e2efly.deploy.msp.link import Link, open_link
-from e2efly.deploy.msp.messages import Attitude, set_raw_rc
+from e2efly.deploy.msp.messages import CHANNEL_RANGE, MAX_CHANNELS, Attitude, set_raw_rc
 
 TIMEOUT_S = 0.1
 """Silence of the bridge in flight after which this process takes over, s."""
 PERIOD_S = 0.01
 """Between two frames of a take-over, s."""
+STALL_S = 0.05
+"""A round of this process counts for no longer: if the whole machine stood still, the bridge may speak first, s."""
+STALE_S = 0.2
+"""A controller's attitude older than this is not levelled by, s."""
 LEVEL_GAIN = 4.0
 """Body rate over tilt, 1/s."""
 LEVEL_RATE = 3.0
 """Largest body rate of levelling, rad/s."""
 BYTES, PLAN, STATUS, TAKEN = b"B", b"P", b"S", b"T"
 """First byte of a packet: bytes of the link; bridge's plan; state of the link; this process has taken over."""
-_PACKET = 1 << 16
+_PACKET = 1 << 17
+"""Longest packet: what a link hands over at a time, and more."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What to do without the bridge, in pulses, so that nothing need be known of controller or vehicle."""
+    """What to do without the bridge, in pulses, so that nothing need be known of controller or vehicle.
+
+    Raises:
+        ValueError: naming the field, for what could not be flown by.
+    """
 
     flying: bool
     """Whether silence is to be answered at all."""
@@ -50,6 +61,22 @@ class Plan:
     """(s since the take-over, us), rising in time: the descent; the last holds."""
     channels: tuple[int, ...]
     """A frame to begin from, us."""
+
+    def __post_init__(self) -> None:
+        n, count = len(self.rates), len(self.channels)
+        times = [at for at, _ in self.throttle]
+        given = [*self.channels, *(pulse for _, pulse in self.throttle), *chain(*self.pulses)]
+        low, high = CHANNEL_RANGE
+        good = {
+            "rates": n >= 2 and all(a < b for a, b in pairwise(self.rates)),
+            "pulses": len(self.pulses) == 3 and all(len(row) == n for row in self.pulses),
+            "places": len(set(self.places)) == 4 and all(0 <= place < count for place in self.places),
+            "throttle": bool(times) and all(a < b for a, b in pairwise(times)) and 0 <= times[0] <= times[-1] < 1000,
+            "channels": 4 <= count <= MAX_CHANNELS and all(type(p) is int and low <= p <= high for p in given),
+        }
+        for name, fine in good.items():
+            if not fine:
+                raise ValueError(f"plan: {name} is {getattr(self, name)}; accepted: as documented, {low} to {high} us")
 
 
 def descent(plan: Plan, elapsed: float, attitude: Attitude | None) -> list[int]:
@@ -79,9 +106,14 @@ def _interpolate(xs: tuple[float, ...], ys: tuple[int, ...], x: float) -> float:
 
 
 class WatchedLink:
-    """The bridge's end: a `Link` through the watchdog process."""
+    """The bridge's end: a `Link` through the watchdog process.
+
+    Raises:
+        ValueError: for a target that names no link.
+    """
 
     def __init__(self, target: str) -> None:
+        open_link(target)  # refuse a bad one here; it opens nothing before it is polled
         self.connections, self.reason = 0, "not polled yet"
         self.taken_over = ""
         """Why the watchdog has taken over; empty: it has not."""
@@ -116,15 +148,15 @@ class WatchedLink:
             except OSError as error:
                 packet, self.reason = b"", str(error)
             if not packet:
-                self._link_alive, self.reason = False, "the watchdog process has ended"
+                self._link_alive = False
+                self.reason = self.taken_over or "the watchdog process has ended"
+                self._process.poll()
                 return
             kind, content = packet[:1], packet[1:]
             if kind == BYTES:
                 self._received += content
             elif kind == STATUS:
-                status = json.loads(content)
-                self._link_alive, self.reason = status["alive"], status["reason"]
-                self.connections = status["connections"]
+                self._link_alive, self.reason, self.connections = json.loads(content)
             elif kind == TAKEN:
                 self.taken_over = self.reason = f"the watchdog has taken over: {content.decode()}"
 
@@ -144,14 +176,11 @@ class WatchedLink:
         self._hand(PLAN + json.dumps(asdict(plan)).encode())
 
     def close(self) -> None:
-        """End the watchdog; on the ground only, as it takes this for the end of the bridge otherwise."""
+        """End the watchdog on the ground; in the air it takes this for the end of the bridge, and lands."""
         self._socket.close()
-        try:
-            self._process.wait(2.0)
-        except subprocess.TimeoutExpired:
-            if not self._process.poll():
-                return  # it is landing the vehicle
         self._link_alive = False
+        with suppress(subprocess.TimeoutExpired):  # it is landing the vehicle
+            self._process.wait(2.0)
 
     def _hand(self, packet: bytes) -> None:
         try:
@@ -161,72 +190,82 @@ class WatchedLink:
 
 
 def serve(bridge: socket.socket, link: Link) -> str:
-    """Hand bytes through until the bridge ends on the ground, or take over and land; returns what happened."""
+    """Hand bytes through until the bridge ends on the ground, or take over and land; returns why, or nothing."""
     plan: Plan | None = None
-    heard = time.monotonic()
+    status: tuple[bool, str, int] | None = None
+    silence, before = 0.0, time.monotonic()
     bridge.setblocking(False)
-    status = ""
     while True:
-        select.select([bridge], [], [], 0.0005)
+        select.select([bridge], [], [], 0.001)
         now = time.monotonic()
+        silence, before = silence + min(now - before, STALL_S), now
         link.poll(now)
-        gone = False
-        while True:
-            try:
-                packet = bridge.recv(_PACKET)
-            except BlockingIOError:
-                break
-            except OSError:
-                packet = b""
-            if not packet:
-                gone = True
-                break
-            heard = now
-            if packet[:1] == PLAN:
-                plan = _plan(packet[1:])
-            else:
+        packets, gone = _packets(bridge)
+        for packet in packets:
+            silence = 0.0
+            if packet[:1] == BYTES:
                 link.send(packet[1:])
+            else:
+                plan = _plan(packet[1:]) or plan
         flying = plan is not None and plan.flying
         if gone and not flying:
             link.close()
-            return "the bridge has ended"
-        if flying and plan is not None and (gone or now - heard > TIMEOUT_S):
-            why = "the bridge has ended" if gone else f"the bridge was silent for {now - heard:.2f} s"
+            return ""
+        if plan is not None and flying and (gone or silence > TIMEOUT_S):
+            why = "the bridge has ended" if gone else f"the bridge was silent for {silence:.2f} s"
             _hand(bridge, TAKEN + why.encode())
-            print(f"watchdog: {why}: landing", file=sys.stderr, flush=True)
             land(link, plan)
-            return why
+            return f"{why}: landed"
         if data := link.receive():
             _hand(bridge, BYTES + data)
-        said = json.dumps({"alive": link.alive, "reason": link.reason, "connections": link.connections})
-        if said != status and _hand(bridge, STATUS + said.encode()):
+        said = link.alive, link.reason, link.connections
+        if said != status and _hand(bridge, STATUS + json.dumps(said).encode()):
             status = said
+
+
+def _packets(bridge: socket.socket) -> tuple[list[bytes], bool]:
+    """The packets that have come, and whether the bridge has ended."""
+    packets = []
+    while True:
+        try:
+            packet = bridge.recv(_PACKET)
+        except BlockingIOError:
+            return packets, False
+        except OSError:
+            packet = b""
+        if not packet:
+            return packets, True
+        packets.append(packet)
 
 
 def land(link: Link, plan: Plan) -> None:
     """Level, descend, close the throttle, and keep it closed for a while."""
-    decoder, attitude = Decoder(), None
+    decoder, attitude, heard = Decoder(), None, 0.0
     began = time.monotonic()
     end = plan.throttle[-1][0] + 10.0
     while (elapsed := time.monotonic() - began) < end:
         link.poll(time.monotonic())
         for frame in decoder.feed(link.receive()):
             if frame.direction == REPLY and frame.code == Attitude.CODE:
-                try:
-                    attitude = Attitude.parse(frame.payload)
-                except ValueError:
-                    attitude = None
+                with suppress(ValueError):  # one that cannot be read is not heard
+                    attitude, heard = Attitude.parse(frame.payload), elapsed
+        if elapsed - heard > STALE_S:
+            attitude = None
         link.send(encode(set_raw_rc(descent(plan, elapsed, attitude))) + encode(Frame(Attitude.CODE)))
         time.sleep(PERIOD_S)
     link.close()
 
 
-def _plan(content: bytes) -> Plan:
-    x = json.loads(content)
-    roll, pitch, yaw = (tuple(pulses) for pulses in x["pulses"])
-    a, b, c, d = x["places"]
-    steps = tuple((at, pulse) for at, pulse in x["throttle"])
-    return Plan(x["flying"], tuple(x["rates"]), (roll, pitch, yaw), (a, b, c, d), steps, tuple(x["channels"]))
+def _plan(content: bytes) -> Plan | None:
+    """The plan in a packet; None for what is none: a plan that cannot be read must not end this process."""
+    try:
+        x = json.loads(content)
+        roll, pitch, yaw = (tuple(pulses) for pulses in x["pulses"])
+        a, b, c, d = x["places"]
+        steps = tuple((at, pulse) for at, pulse in x["throttle"])
+        return Plan(x["flying"], tuple(x["rates"]), (roll, pitch, yaw), (a, b, c, d), steps, tuple(x["channels"]))
+    except (ValueError, TypeError, KeyError):
+        return None
 
 
 def _hand(bridge: socket.socket, packet: bytes) -> bool:
@@ -240,10 +279,14 @@ def _hand(bridge: socket.socket, packet: bytes) -> bool:
 def main() -> None:
     """Serve the bridge at the other end of a socket whose descriptor is given, over the link that is named."""
     descriptor, target = sys.argv[1:]
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     with suppress(OSError):  # where it is not allowed to, it is light enough
         os.nice(-10)
     with socket.socket(fileno=int(descriptor)) as bridge:
-        serve(bridge, open_link(target))
+        said = serve(bridge, open_link(target))
+    with suppress(OSError):  # perhaps nobody reads it: not before the vehicle has landed
+        sys.stderr.write(f"watchdog: {said}\n" if said else "")
 
 
 if __name__ == "__main__":

@@ -114,7 +114,17 @@ def _mujoco(vehicle: Vehicle, contract: Contract) -> Plant:
     return MujocoPlant(vehicle, contract.action.mode)
 
 
-PLANTS: dict[str, PlantKind] = {"simulator": PlantKind(_simulator), "mujoco": PlantKind(_mujoco)}
+def _betaflight(vehicle: Vehicle, contract: Contract) -> Plant:
+    from e2efly.validate import betaflight_plant
+
+    return betaflight_plant.make(vehicle, contract)
+
+
+PLANTS: dict[str, PlantKind] = {
+    "simulator": PlantKind(_simulator),
+    "mujoco": PlantKind(_mujoco),
+    "betaflight": PlantKind(_betaflight, parallel=False, latency=0.004),
+}
 """Plants by name; to add one is to add a line."""
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from e2efly.deploy.odometry import Sample
+from e2efly.device import compute_at_once
 from e2efly.validate.firmware import Firmware, firmware_folder
 from e2efly.validate.sitl import FirmwareState, Sitl
 from e2efly.validate.world import Body, World
@@ -22,6 +23,8 @@ from e2efly.vehicles.vehicle import Vehicle
 
 STEP_S = 0.002
 """How often the firmware's sensors are told a new state, s."""
+LONGEST_LAG_S = 0.2
+"""In real time the world makes up for being late by so much, s; what is more is lost."""
 RC_PERIOD_S = 0.02
 """How often the pilot's receiver speaks, s."""
 CALIBRATION_S = 6.0
@@ -93,6 +96,7 @@ class Rig:
         latency: float = 0.0,
         seed: int = 0,
     ) -> None:
+        compute_at_once()
         self.sitl = Sitl(firmware, folder, virtual_time=not real_time)
         self.world = World(vehicle)
         self.state: Body = self.world.at_rest()
@@ -100,10 +104,13 @@ class Rig:
         self.latency = latency
         """Age of the poses when they are delivered, s."""
         self.wind = np.zeros(3)
+        self.held = False
+        """The body is held where it is; the rotors turn nothing."""
         self._pose_period = 1 / pose_rate
         self._poses: deque[Sample] = deque()
         self._next_pose = self._next_rc = 0.0
         self._left = 0.0
+        self._stepped = 0.0
         self._on = True
         self._noise = np.random.default_rng(seed)
 
@@ -118,7 +125,7 @@ class Rig:
         """Start the firmware with `SETTINGS` and wait until it can be armed."""
         prepare(self.sitl)
         self.sitl.start()
-        self._next_pose = self._next_rc = self.now()
+        self._next_pose = self._next_rc = self._stepped = self.now()
         self.sleep(CALIBRATION_S)
 
     def now(self) -> float:
@@ -129,25 +136,30 @@ class Rig:
         """Let the world and the firmware run."""
         if not self.sitl.virtual_time:
             end = time.monotonic() + seconds
-            while (left := end - time.monotonic()) > 0:
-                time.sleep(min(left, STEP_S))
-                self.step(STEP_S)
+            while (now := time.monotonic()) < end:
+                self._stepped = max(self._stepped, now - LONGEST_LAG_S)
+                while self._stepped + STEP_S <= now:
+                    self.step(STEP_S)
+                time.sleep(min(end - now, STEP_S))
             return
+        self.sitl.exchange()
         self._left += seconds
         while self._left > STEP_S / 2:
             self.step(STEP_S)
             self._left -= STEP_S
+        self.sitl.exchange()
 
     def step(self, dt: float) -> None:
         """One step of the world and, with virtual time, of the firmware."""
         motors = self.sitl.motors() if self._on else np.zeros(4)
-        after = self.world.advance(self.state, motors, dt, self.wind)
+        after = self.state if self.held else self.world.advance(self.state, motors, dt, self.wind)
         if self._on:
             self.sitl.send_state(self.world.sensed(self.state, after, dt))
-            if self.sitl.virtual_time:
-                self.sitl.advance(dt)
+        if self.sitl.virtual_time:
+            self.sitl.advance(dt)
         self.state = after
-        now = self.now()
+        self._stepped += dt
+        now = self.now() if self.sitl.virtual_time else self._stepped
         if now >= self._next_rc:
             self._next_rc += RC_PERIOD_S
             self.sitl.send_rc(self.transmitter.channels())
@@ -167,10 +179,14 @@ class Rig:
         """Move the pilot's sticks and switches: fields of `Transmitter`."""
         self.transmitter = dataclasses.replace(self.transmitter, **changes)  # type: ignore[arg-type]
 
-    def reboot(self) -> None:
-        """Cut the controller's power and give it back; the motors stop meanwhile."""
-        self.sitl.stop()
-        self.sitl.start()
+    def power(self, on: bool) -> None:
+        """Cut the controller's power, at which the motors stop, or give it back, at which it boots."""
+        if on and not self._on:
+            self.sitl.start()
+            self._stepped = self.now()
+        elif not on:
+            self.sitl.stop()
+        self._on = on
 
     def _sample(self, now: float) -> Sample:
         s, noise = self.state, self._noise

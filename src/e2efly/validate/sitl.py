@@ -20,7 +20,7 @@ _RC = struct.Struct("<d16H")
 _MOTORS = struct.Struct("<4f")
 _PORTS = 12
 """UDP 9001 to 9004 and TCP 5761 to 5768, moved."""
-_CLOCK = struct.Struct("<4Q")
+_CLOCK = struct.Struct("<5Q")
 BOOT_S = 20.0
 """Real time that the firmware may take to open its ports, s."""
 
@@ -72,7 +72,8 @@ class Sitl:
         self.firmware, self.folder, self.virtual_time = firmware, folder, virtual_time
         self.base = free_ports()
         self.time = 0.0
-        """Seconds since the firmware's start (virtual), or of the monotonic clock (real)."""
+        """Seconds since the firmware's first start, in virtual time; it goes on while the firmware is off."""
+        self._booted = 0.0
         self._process: subprocess.Popen | None = None
         self._motors = np.zeros(4)
         self._clock: mmap.mmap | None = None
@@ -112,7 +113,7 @@ class Sitl:
             with path.open("r+b") as file:
                 self._clock = mmap.mmap(file.fileno(), 4096)
             environment["E2EFLY_SITL_CLOCK"] = str(path)
-            self.time = 0.0
+            self._booted = self.time
         output = self.folder / "output.txt"
         with output.open("wb") as log:
             self._process = subprocess.Popen(
@@ -140,6 +141,7 @@ class Sitl:
             self._process.kill()
             self._process.wait()
             self._process = None
+        self._motors = np.zeros(4)
 
     def close(self) -> None:
         """Stop it and free its sockets."""
@@ -153,11 +155,11 @@ class Sitl:
     def send_state(self, state: FirmwareState) -> None:
         """Hand the sensors a new state; with virtual time, return once the firmware has taken it in."""
         packet = _STATE.pack(
-            self.now,
+            self.now - self._booted,
             # the firmware turns signs itself: it expects rates of a z-down y-right body, and the pull, not the push
             *(state.body_rate * (1, -1, -1)),
             *(-state.specific_force),
-            *state.quaternion,
+            *(state.quaternion * (1, 1, -1, -1)),
             *state.velocity,
             *state.position,
             101325.0 - 12.0 * state.position[2],
@@ -165,13 +167,16 @@ class Sitl:
         seen = self._shared()[3] if self.virtual_time else 0
         self._out.sendto(packet, ("127.0.0.1", self.base + 2))
         if self.virtual_time:
-            end = time.monotonic() + 1.0
-            while self._shared()[3] == seen and self.alive and time.monotonic() < end:
+            looks = 0
+            while self._shared()[3] == seen:
+                looks += 1
+                if looks % 1000 == 0 and not self.alive:
+                    return
                 time.sleep(0)
 
     def send_rc(self, channels: np.ndarray) -> None:
         """What the pilot's receiver says: 16 channels in us."""
-        self._out.sendto(_RC.pack(self.now, *np.asarray(channels, int)), ("127.0.0.1", self.base + 3))
+        self._out.sendto(_RC.pack(self.now - self._booted, *np.asarray(channels, int)), ("127.0.0.1", self.base + 3))
 
     @property
     def now(self) -> float:
@@ -179,14 +184,29 @@ class Sitl:
         return self.time if self.virtual_time else time.monotonic()
 
     def advance(self, dt: float) -> None:
-        """Let the firmware run for `dt` s of its virtual time."""
-        assert self._clock is not None
+        """Let the firmware run for `dt` s of virtual time; where it is off, time alone passes."""
         self.time += dt
-        horizon = round(self.time * 1e9)
+        if self._process is None:
+            return
+        assert self._clock is not None
+        horizon = round((self.time - self._booted) * 1e9)
         struct.pack_into("<Q", self._clock, 0, horizon)
-        while self.alive:
-            if self._shared()[2] > horizon:
-                break
+        looks = 0
+        while self._shared()[2] <= horizon:
+            looks += 1
+            if looks % 1000 == 0 and not self.alive:
+                return
+            time.sleep(0)
+
+    def exchange(self) -> None:
+        """With virtual time: wait until the firmware has read what was sent to it, and sent what it has to say."""
+        if not self.virtual_time:
+            return
+        seen, looks = self._shared()[4], 0
+        while self._shared()[4] < seen + 2:
+            looks += 1
+            if looks % 1000 == 0 and not self.alive:
+                return
             time.sleep(0)
 
     def motors(self) -> np.ndarray:
@@ -199,6 +219,6 @@ class Sitl:
             if len(packet) == _MOTORS.size:
                 self._motors = np.array(_MOTORS.unpack(packet))[MOTOR_ORDER]
 
-    def _shared(self) -> tuple[int, int, int, int]:
+    def _shared(self) -> tuple[int, int, int, int, int]:
         assert self._clock is not None
         return _CLOCK.unpack_from(self._clock, 0)  # type: ignore[return-value]

@@ -24,7 +24,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { CALL_NS = 200, SELECT_US = 300, STATE_BYTES = 144 };
+enum { CALL_NS = 200, SELECT_US = 100, STATE_BYTES = 144 };
 
 /* Shared with the simulator; all in ns or counts. */
 struct shared {
@@ -32,12 +32,13 @@ struct shared {
     _Atomic uint64_t now;     /* the firmware's time */
     _Atomic uint64_t waiting; /* the time beyond the horizon that its main thread waits for; 0 while it runs */
     _Atomic uint64_t states;  /* vehicle states that the firmware has taken in */
+    _Atomic uint64_t rounds;  /* of its network thread: after two, what was sent before has been read */
 };
 
 static struct shared *shared;
 static int base;
 static _Atomic int listening;
-static _Thread_local int took_state;
+static _Thread_local int took_state, network;
 
 static ssize_t (*next_sendto)(int, const void *, size_t, int, const struct sockaddr *, socklen_t);
 static ssize_t (*next_recvfrom)(int, void *, size_t, int, struct sockaddr *, socklen_t *);
@@ -122,6 +123,8 @@ int select(int count, fd_set *readable, fd_set *writable, fd_set *odd, struct ti
         took_state = 0;
         atomic_fetch_add(&shared->states, 1);
     }
+    if (count <= 1) network = 1;
+    if (shared && network) atomic_fetch_add(&shared->rounds, 1);
     if (count <= 1) { /* the network thread, before any port is open: it throws away one that is just being opened */
         const struct timespec pause = {0, 5000000};
         while (!atomic_load(&listening)) syscall(SYS_nanosleep, &pause, NULL);

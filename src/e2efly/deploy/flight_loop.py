@@ -1,0 +1,162 @@
+"""The control loop in real time: an absolute schedule, the watchdog's plan, the log's timing, the operator's word."""
+
+import gc
+import math
+import os
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+from e2efly.control import Ctbr
+from e2efly.deploy.bridge import CLOSED, Bridge, Log
+from e2efly.deploy.clock import MONOTONIC, Clock
+from e2efly.deploy.hover import SINK_TIME, blind, blind_time
+from e2efly.deploy.msp.controller import ControllerInfo
+from e2efly.deploy.state_machine import Mode
+from e2efly.deploy.watchdog import Plan, WatchedLink
+
+LOWEST_RATE = 100.0
+"""The loop runs at least so often, Hz."""
+PLAN_PERIOD = 0.1
+"""How often the watchdog is told what to do, s."""
+PLAN_RATES = tuple(0.5 * i for i in range(-6, 7))
+"""Body rates, rad/s, of the watchdog's tables."""
+STATUS_PERIOD = 1.0
+"""How often a line of status is told, s."""
+
+
+def loop_rate(control_rate: float) -> float:
+    """The lowest multiple of a policy's rate, Hz, that is at least `LOWEST_RATE`: it acts on the loop's own grid."""
+    return control_rate * max(math.ceil(LOWEST_RATE / control_rate - 1e-9), 1)
+
+
+@dataclass
+class Timing:
+    """How punctual the loop was."""
+
+    rounds: int = 0
+    missed: int = 0
+    """Rounds that began after the next was due."""
+    lateness: list[float] = field(default_factory=list)
+    """Of each round, s."""
+
+
+def fly(
+    bridge: Bridge,
+    rate: float,
+    *,
+    log: Log | None = None,
+    watchdog: WatchedLink | None = None,
+    say: Callable[[str], None] = print,
+    stop: Callable[[], bool] = lambda: False,
+    identify_again: Callable[[], ControllerInfo | None] | None = None,
+    clock: Clock = MONOTONIC,
+) -> Timing:
+    """Run the bridge until `stop` says so and the vehicle is on the ground.
+
+    Args:
+        bridge: what to run.
+        rate: control steps a second, Hz.
+        log: the flight's record.
+        watchdog: told what to do should this process fall silent.
+        say: takes lines for people; it must not block.
+        stop: whether to end; a vehicle in the air is landed first.
+        identify_again: reads the controller's settings anew after it was connected again, on the ground.
+        clock: the time.
+    """
+    timing, period = Timing(), 1 / rate
+    due = clock.now() + period
+    last_plan = last_status = cpu_at = due
+    cpu, told, connection = time.process_time(), "", bridge.client.link.connections
+    previous = clock.now()
+    with _no_pauses():
+        while True:
+            clock.sleep(due - clock.now())
+            now = clock.now()
+            late = max(now - due, 0.0)
+            if stop():
+                bridge.land_now = True
+                if not bridge.flying:
+                    return timing
+            if bridge.client.link.connections != connection and bridge.flight.mode in (Mode.INIT, Mode.DONE):
+                if identify_again is not None and identify_again() is not None:
+                    connection = bridge.client.link.connections
+                due = now = clock.now()
+                late = 0.0
+            bridge.tick(now, late, slack=period / 2)
+            if watchdog is not None and now - last_plan >= PLAN_PERIOD:
+                last_plan = now
+                watchdog.plan(plan_of(bridge))
+            if (line := _told(bridge)) != told:
+                told = line
+                say(line)
+            elif now - last_status >= STATUS_PERIOD:
+                last_status = now
+                say(_status(bridge))
+            done = clock.now()
+            timing.rounds += 1
+            timing.lateness.append(late)
+            missed = done > due + period
+            timing.missed += missed
+            if log is not None:
+                load = None
+                if now - cpu_at >= STATUS_PERIOD:
+                    spent = time.process_time()
+                    load, cpu, cpu_at = (spent - cpu) / (now - cpu_at), spent, now
+                log.record("timing", now, {
+                    "period_s": now - previous, "work_s": done - now, "lateness_s": late, "deadline_missed": missed,
+                    **({} if load is None else {"cpu_load": load}),
+                })  # fmt: skip
+            previous = now
+            due += period
+            if done > due:  # what was missed stays missed: no burst to catch up
+                due += math.ceil((done - due) / period) * period
+
+
+def plan_of(bridge: Bridge) -> Plan:
+    """What the watchdog is to do from here on without the bridge."""
+    sticks, voltage = bridge.sticks, bridge.inputs.voltage
+
+    def throttle(command: Ctbr) -> int:
+        share = min(bridge.map.throttle(float(command.thrust), voltage), sticks.throttle.largest)
+        return sticks.throttle.channel_for(share)
+
+    roll, pitch, yaw = (tuple(sticks.pulse(axis, rate) for rate in PLAN_RATES) for axis in range(3))
+    end = max(blind_time(bridge.height), 2 * SINK_TIME)
+    steps = ((0.0, throttle(blind(None, 0.0))), (SINK_TIME, throttle(blind(None, 2 * SINK_TIME))), (end, CLOSED))
+    a, b, c, d = sticks.channel[:4]
+    mid = sticks.centre
+    idle = sticks.arrange((mid, mid, mid, CLOSED), ())
+    return Plan(bridge.flying, PLAN_RATES, (roll, pitch, yaw), (a, b, c, d), steps, idle)
+
+
+def _told(bridge: Bridge) -> str:
+    """The mode and its reasons without their numbers, which change all the time."""
+    flight = bridge.flight
+    return f"{flight.mode.upper()}: " + "; ".join(str(reason).split(": ")[0] for reason in flight.reasons)
+
+
+def _status(bridge: Bridge) -> str:
+    o, flight = bridge.odometry, bridge.flight
+    if flight.mode is Mode.INIT:
+        return "\n".join([f"{flight.mode.upper()}:", *(f"  - {reason}" for reason in flight.reasons)])
+    where = "unknown" if o is None else f"{o.position.round(2).tolist()} m, {o.velocity.round(2).tolist()} m/s"
+    return f"{flight.mode.upper()}: {where}, throttle {bridge.sent.throttle:.2f}"
+
+
+class _no_pauses:  # noqa: N801
+    """No garbage collection in flight, real-time scheduling where it is allowed, short sleeps that are exact."""
+
+    def __enter__(self) -> None:
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        with suppress(OSError, AttributeError):  # an ordinary user's process is punctual enough on an idle core
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+
+    def __exit__(self, *_: object) -> None:
+        gc.enable()
+        gc.unfreeze()
+        with suppress(OSError, AttributeError):
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

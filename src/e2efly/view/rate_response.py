@@ -1,0 +1,138 @@
+"""The rate loop's step response from a flight: what a body rate does that is asked for.
+
+No step is flown. The impulse response h of the response y to the command x is the one of `WINDOW` s that explains y
+best, min |y - h * x|^2 + ridge |h|^2: Wiener's deconvolution in the time domain (Wiener 1949), whose normal equations
+are Toeplitz matrices of correlations. Its running sum is the step response.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_toeplitz
+from scipy.signal import correlate
+
+WINDOW = 0.5
+"""Length of the estimated response, s."""
+SETTLED = 0.3
+"""From here on the response counts as settled, s."""
+RIDGE = 1e-3
+"""Weight of the ridge, of the command's power."""
+EXCITATION = 0.1
+"""Root mean square of the command's changes within a second that an estimate needs, rad/s."""
+EXPLAINED = 0.7
+"""Share of the response's variance that the estimate must explain to be believed."""
+_GRID = (0.001, 0.02)  # s: finest and coarsest step in time
+
+
+@dataclass(frozen=True)
+class StepResponse:
+    """The response of one axis to a step of 1 rad/s, or why there is none."""
+
+    time: np.ndarray
+    """(k,) s since the step."""
+    response: np.ndarray
+    """(k,) rad/s."""
+    delay: float
+    """Until 10 % of the settled value, s; NaN where there is none."""
+    rise: float
+    """Until 63 % of the settled value, s: of a first-order lag its dead time plus its time constant."""
+    overshoot: float
+    """Largest value over the settled one, less 1; 0 for none."""
+    gain: float
+    """The settled value."""
+    excitation: float
+    """Root mean square of the command's changes within a second, rad/s."""
+    explained: float
+    """Share of the response's variance that the estimate explains."""
+    reason: str
+    """Why the numbers are not to be believed; empty where they are."""
+
+
+def step_response(
+    command_time: np.ndarray,
+    command: np.ndarray,
+    response_time: np.ndarray,
+    response: np.ndarray,
+    intervals: list[tuple[float, float]] | None = None,
+) -> StepResponse:
+    """Estimate a step response.
+
+    Args:
+        command_time: (m,) s, rising.
+        command: (m,) rad/s, each held until the next.
+        response_time: (n,) s, rising, on the same clock.
+        response: (n,) rad/s.
+        intervals: from and to, s: when the loop was closed; None: always.
+    """
+    x, y, step = _aligned(command_time, command, response_time, response, intervals or [(-np.inf, np.inf)])
+    if len(x) * step < 4 * WINDOW:
+        return _nothing(f"less than {4 * WINDOW:g} s of commands and response together", 0.0)
+    excitation = float(np.std(x - _smooth(x, round(1.0 / step))))
+    if excitation < EXCITATION:
+        return _nothing(f"not enough excitation: {excitation:.2g} rad/s rms, needed {EXCITATION:g}", excitation)
+    count = round(WINDOW / step)
+    power = _correlation(x, x, count)
+    power[0] *= 1 + RIDGE
+    impulse = np.asarray(solve_toeplitz(power, _correlation(y, x, count)))
+    rest = y - np.convolve(x, impulse)[: len(y)]
+    explained = 1 - float(np.var(rest) / max(np.var(y), 1e-12))
+    curve, time = np.cumsum(impulse), step * (np.arange(count) + 0.5)  # ones from 0 on: a step half a cell earlier
+    gain = float(np.mean(curve[time >= SETTLED]))
+    weak = f"the command explains {max(explained, 0):.0%} of the response, needed {EXPLAINED:.0%}"
+    reason = "" if explained >= EXPLAINED and gain > 0.1 else weak
+    delay, rise = (_reaches(time, curve, part * gain) for part in (0.1, 1 - np.exp(-1)))
+    overshoot = max(float(curve.max() / gain) - 1, 0.0) if gain > 0 else float("nan")
+    return StepResponse(time, curve, delay, rise, overshoot, gain, excitation, explained, reason)
+
+
+def _nothing(reason: str, excitation: float) -> StepResponse:
+    nan = float("nan")
+    return StepResponse(np.zeros(0), np.zeros(0), nan, nan, nan, nan, excitation, nan, reason)
+
+
+def _aligned(
+    t_x: np.ndarray, x: np.ndarray, t_y: np.ndarray, y: np.ndarray, intervals: list[tuple[float, float]]
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Command and response on one grid, without their means, zero outside the intervals; and its step, s."""
+    t_x, x = t_x[np.isfinite(x)], x[np.isfinite(x)]
+    t_y, y = t_y[np.isfinite(y)], y[np.isfinite(y)]
+    if len(t_x) < 2 or len(t_y) < 2:
+        return np.zeros(0), np.zeros(0), _GRID[1]
+    step = float(np.clip(np.median(np.diff(t_y)) / 4, *_GRID))
+    time = np.arange(max(t_x[0], t_y[0]), min(t_x[-1], t_y[-1]), step)
+    time = time[_within(time, intervals)]
+    area = np.concatenate([[0.0], np.cumsum(x[:-1] * np.diff(t_x))])  # of what is held: its mean about a grid point
+    held = (np.interp(time + step / 2, t_x, area) - np.interp(time - step / 2, t_x, area)) / step  # loses no time
+    seen = np.interp(time, t_y, y)
+    return (held - held.mean(), seen - seen.mean(), step) if len(time) else (held, seen, step)
+
+
+def _within(time: np.ndarray, intervals: list[tuple[float, float]]) -> np.ndarray:
+    inside = np.zeros(len(time), bool)
+    for start, end in intervals:
+        inside |= (time >= start) & (time <= end)
+    return inside
+
+
+def _correlation(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
+    """Sum over n of a[n + k] b[n] for k = 0 ... count - 1."""
+    return correlate(a, b, method="fft")[len(b) - 1 :][:count]
+
+
+def _smooth(x: np.ndarray, width: int) -> np.ndarray:
+    """Moving mean over `width` samples."""
+    total = np.cumsum(np.concatenate([[0.0], x]))
+    i = np.arange(len(x))
+    low, high = np.maximum(i - width // 2, 0), np.minimum(i + width // 2 + 1, len(x))
+    return (total[high] - total[low]) / (high - low)
+
+
+def _reaches(time: np.ndarray, curve: np.ndarray, level: float) -> float:
+    """The first time at which the curve reaches a level, between samples; NaN where it does not."""
+    above = np.flatnonzero(curve >= level)
+    if len(above) == 0 or level <= 0:
+        return float("nan")
+    i = int(above[0])
+    if i == 0:
+        return float(time[0])
+    return float(time[i - 1] + (level - curve[i - 1]) / (curve[i] - curve[i - 1]) * (time[i] - time[i - 1]))

@@ -1,0 +1,93 @@
+"""The same starts flown in two places, laid over each other."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
+
+from e2efly.physics.control import COMMAND_MODES
+from e2efly.view.flights import Flights
+from e2efly.view.scene import Face, Line, Thing, scene
+from e2efly.view.style import BLUE, GREY, INK, VERMILLION, figure
+
+_LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": BLUE, "linewidth": 2.8, "alpha": 0.5},
+    {"color": VERMILLION, "linewidth": 1.2},
+)
+"""The first place wide and pale, the second thin on top of it: where they agree, both are seen."""
+_FAILED: dict[str, Any] = {"marker": "X", "markersize": 8, "markeredgecolor": "white", "linestyle": ""}
+
+
+def plot_overlay(task: Any, flown: Mapping[str, Flights], path: str | Path, title: str) -> None:
+    """Draw all flights from above and from the side, and the first of them over time: speed, height and commands.
+
+    Args:
+        task: the environment's task.
+        flown: flights of the same starts in the same order, by the name of the place; two places.
+        path: the PNG file.
+        title: of the figure.
+
+    Raises:
+        ValueError: when there are not two places with equally many flights.
+    """
+    counts = [flights.position.shape[1] for flights in flown.values()]
+    if len(counts) != 2 or counts[0] != counts[1] or not counts[0]:
+        raise ValueError(
+            f"flights of {dict(zip(flown, counts, strict=True))}; accepted: as many of either of two places"
+        )
+    places = list(zip(flown.items(), _LOOKS, strict=True))
+    mode = COMMAND_MODES[next(iter(flown.values())).command_mode]
+    shown = f"{counts[0]} starts in space; over time the first of them"
+    with figure(path, title, 10.6, [f"{shown}; commands are drawn when the policy gives them"]) as fig:
+        grid = fig.add_gridspec(4, 2, height_ratios=[2.2, 1.0, 1.0, 1.0])
+        things = scene(task, next(iter(flown.values())))
+        for column, (name, axes, labels) in enumerate(
+            (("From above", (0, 1), ("x (m)", "y (m)")), ("From the side", (0, 2), ("x (m)", "z (m)")))
+        ):
+            ax = fig.add_subplot(grid[0, column])
+            _space(ax, places, things, axes)
+            ax.set_title(name)
+            ax.set_xlabel(labels[0])
+            ax.set_ylabel(labels[1])
+        panels = [fig.add_subplot(grid[1 + i // 2, i % 2]) for i in range(6)]
+        for (_, flights), look in places:
+            steps = int(flights.length[0])
+            time = flights.time[:steps]
+            asked = time - flights.time[0]
+            panels[0].plot(time, flights.speed[:steps, 0], **look)
+            panels[1].plot(time, flights.position[:steps, 0, 2], **look)
+            for i, ax in enumerate(panels[2:]):
+                ax.plot(asked, flights.command[:steps, 0, i], drawstyle="steps-post", **look)
+        commands = [f"{f.replace('_', ' ')}\n({unit})" for f, unit in zip(mode.fields, mode.units, strict=True)]
+        for ax, label in zip(panels, ["speed (m/s)", "height (m)", *commands], strict=True):
+            ax.set_ylabel(label)
+        for ax in panels[4:]:
+            ax.set_xlabel("time (s)")
+        handles = [Line2D([], [], label=name, **look) for (name, _), look in places]
+        handles.append(Line2D([], [], color=GREY, label="no success", **_FAILED))
+        fig.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+
+
+def _space(ax: Axes, places: list, things: list[Thing], axes: tuple[int, int]) -> None:
+    """All flights projected onto two of the world's axes, over what the task has there."""
+    columns = list(axes)
+    for thing in things:
+        if isinstance(thing, Line):
+            ax.plot(*thing.points[:, columns].T, color=thing.color, linewidth=thing.width, zorder=1.5)
+        elif isinstance(thing, Face):
+            ax.add_patch(Polygon(thing.points[:, columns], facecolor=thing.color, edgecolor=thing.color, linewidth=2.5))
+        elif thing.text:
+            x, y = thing.point[columns]
+            ax.text(x, y, thing.text, color=INK, ha="center", va="center", weight="bold")
+        else:
+            ax.plot(*thing.point[columns, None], marker=thing.marker, color=INK, markersize=11, linestyle="")
+    for (_, flights), look in places:
+        for i, length in enumerate(flights.length):
+            track = flights.position[:length, i][:, columns]
+            ax.plot(*track.T, **look)
+            if length and not flights.success[i]:
+                ax.plot(*track[-1, :, None], color=look["color"], zorder=7, **_FAILED)
+    ax.set_aspect("equal", adjustable="datalim")
