@@ -92,7 +92,7 @@ def main() -> None:
         if good_found != pieces:
             raise SystemExit(f"{name}: {pieces - good_found} good frames were lost; seed {args.seed}")
     print(common.table(rows))
-    common.write("msp_fuzz", args.json, {"rows": rows})
+    common.write("msp_fuzz", args.json, {"table": rows})
 
 
 if __name__ == "__main__":

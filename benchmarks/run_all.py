@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-for name in ("rates", "time_to_criterion", "success"):
+for name in (
+    "rates", "time_to_criterion", "success", "runtime_speed", "msp_fuzz", "sim_to_sim", "firmware_flights",
+):  # fmt: skip
     print(f"== {name}", flush=True)
     subprocess.run([sys.executable, str(Path(__file__).parent / f"{name}.py")], check=True)

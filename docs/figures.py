@@ -13,6 +13,12 @@ TITLES = {
     "rates": "Rates",
     "time_to_criterion": "Time to the criterion, from process start",
     "success": "Success over 1000 unseen starts, full presets",
+    "sim_to_sim": "The same policies in MuJoCo, 200 starts",
+    "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
+    "firmware_faults": "Faults injected into flights of the real firmware",
+    "bridge_loop": "The bridge's control loop, flying the firmware in real time",
+    "runtime_speed": "The runtime on a companion computer",
+    "msp_fuzz": "MSP codec under fuzzing",
 }
 
 

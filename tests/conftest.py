@@ -10,6 +10,10 @@ set_xla_options()  # as the commands do, before anything computes
 
 import jax  # noqa: E402
 import pytest  # noqa: E402
+from hypothesis import settings  # noqa: E402
+
+settings.register_profile("suite", deadline=None)  # how busy the machine is says nothing of the code
+settings.load_profile("suite")
 
 PARTS = ("ros1", "ros2", "mocap", "sitl")
 """What may be missing on a laptop: tests in files whose names end so need it, and fail without it."""

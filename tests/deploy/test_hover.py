@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from e2efly.control import CASCADE
@@ -92,7 +93,8 @@ def fly_blind(
     for k in range(round(seconds / dt)):
         if k % 10 == 0 and seen:  # the controller's answer, in its steps of 0.1 deg
             angles = math.atan2(R[2, 1], R[2, 2]), -math.asin(max(-1.0, min(1.0, R[2, 0])))
-            attitude = Attitude(*(math.radians(round(math.degrees(angle), 1)) for angle in angles), 0.0)
+            told = [math.radians(round(math.degrees(angle), 1)) for angle in angles]
+            attitude = Attitude(told[0], told[1], 0.0)
         if k % 5 == 0:
             command = blind(attitude, k * dt, first)
             asked.append((np.array([command.rate.x, command.rate.y, command.rate.z], float), float(command.thrust)))
@@ -151,6 +153,7 @@ def test_blind_without_an_attitude_the_rates_are_zero() -> None:
     assert first.thrust < later.thrust < GRAVITY
 
 
+@hypothesis_settings(deadline=None)
 @given(st.floats(-math.pi, math.pi), st.floats(-math.pi / 2, math.pi / 2), st.floats(0, 100), st.floats(-10, 10))
 def test_blind_it_asks_for_what_can_be_flown(roll: float, pitch: float, elapsed: float, climb: float) -> None:
     out = blind(Attitude(roll, pitch, 0.0), elapsed, climb)
@@ -159,11 +162,13 @@ def test_blind_it_asks_for_what_can_be_flown(roll: float, pitch: float, elapsed:
     assert out.rate.x * roll <= 0 and out.rate.y * pitch <= 0
 
 
+@hypothesis_settings(deadline=None)
 @given(st.floats(0, 50), st.floats(0, 50), st.floats(-5, 5))
 def test_a_higher_descent_is_given_longer(height: float, more: float, climb: float) -> None:
     assert 2.0 <= blind_time(-1.0) <= blind_time(height, climb) <= blind_time(height + more, climb)
 
 
+@hypothesis_settings(deadline=None)
 @given(st.floats(-3.1, 3.1), st.floats(-1.55, 1.55), st.floats(-3.1, 3.1))
 def test_roll_and_pitch_are_those_of_the_convention(roll: float, pitch: float, yaw: float) -> None:
     def half(angle: float) -> tuple[float, float]:
@@ -188,7 +193,8 @@ def test_hover_returns_from_a_metre_off_over_the_link() -> None:
 def _swing(vehicle: Vehicle, latency: float, lag: float) -> float:
     """How far it flies past the point that it comes to from a metre away, in the plane, m."""
     dt, x, v, tilt, rate = 0.002, -1.0, 0.0, 0.0, 0.0
-    asked, farthest = [(0.0, GRAVITY)] * round(latency / dt), 0.0
+    newest, farthest = (0.0, GRAVITY), 0.0
+    asked = [newest] * round(latency / dt)
     for k in range(round(10.0 / dt)):
         if k % 5 == 0:
             q = np.array([math.cos(tilt / 2), 0.0, math.sin(tilt / 2), 0.0])

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from e2efly.deploy.throttle_map import (
@@ -66,11 +67,13 @@ MAPS = st.builds(
 VOLTAGES = st.none() | st.floats(3.0, 4.35)
 
 
+@hypothesis_settings(deadline=None)
 @given(MAPS, st.floats(0, 1), VOLTAGES)
 def test_force_and_throttle_are_inverse(m: ThrottleMap, throttle: float, voltage: float | None) -> None:
     assert m.throttle(m.force(throttle, voltage), voltage) == pytest.approx(throttle, abs=1e-9)
 
 
+@hypothesis_settings(deadline=None)
 @given(MAPS, st.floats(-1e3, 1e3), st.floats(0, 100), VOLTAGES)
 def test_the_throttle_rises_with_the_force_and_stays_within_its_ends(
     m: ThrottleMap, force: float, more: float, voltage: float | None
@@ -91,7 +94,8 @@ def test_converges_from_30_percent_wrong_within_5_s_of_hover(scale: float) -> No
 @pytest.mark.parametrize("mismatch", [-0.015, 0.0, 0.015])
 def test_a_delay_that_is_off_by_15_ms_while_the_throttle_varies_does_little_harm(scale: float, mismatch: float) -> None:
     noise, m, history = np.random.default_rng(1), NEW, ThrottleHistory()
-    delay, lag, rotor, dt = 0.02, 0.035, NEW.throttle(GRAVITY), 0.002
+    delay, lag, dt = 0.02, 0.035, 0.002
+    throttle = rotor = NEW.throttle(GRAVITY)
     sent = [rotor] * round(delay / dt)
     for k in range(round(8.0 / dt)):
         t = k * dt
@@ -164,6 +168,7 @@ def test_no_throttle_is_not_learned_from(throttle: float) -> None:
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.floats(0, 30)
 
 
+@hypothesis_settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(0, 1), NUMBERS, st.none() | NUMBERS | st.floats(3, 4.4), NUMBERS), max_size=40))
 def test_whatever_is_measured_it_stays_finite_bounded_and_able_to_learn(
     story: list[tuple[float, float, float | None, float]],
@@ -174,7 +179,7 @@ def test_whatever_is_measured_it_stays_finite_bounded_and_able_to_learn(
         assert SCALE_RANGE[0] <= m.scale <= SCALE_RANGE[1] and GAIN_RANGE[0] <= m.gain <= GAIN_RANGE[1]
         assert 0 <= m.throttle(GRAVITY, entry[2]) <= 1
         covariance = np.array(m.covariance)
-        assert (np.linalg.eigvalsh(covariance) > 0).all() and (np.diag(covariance) <= [0.05, 0.5]).all()
+        assert (np.linalg.eigvalsh(covariance) > 0).all() and (np.diag(covariance) <= [0.05 + 1e-9, 0.5 + 1e-9]).all()
         assert math.isfinite(m.residual)
 
 

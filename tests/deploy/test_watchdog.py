@@ -14,6 +14,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import asdict
 from math import radians
 from pathlib import Path
@@ -22,7 +23,7 @@ import pytest
 
 from e2efly.deploy.msp.codec import REPLY, Decoder, Frame, encode
 from e2efly.deploy.msp.messages import SET_RAW_RC, Attitude, set_raw_rc
-from e2efly.deploy.watchdog import LEVEL_GAIN, LEVEL_RATE, STALE_S, TIMEOUT_S, Plan, WatchedLink, descent
+from e2efly.deploy.watchdog import LEVEL_GAIN, LEVEL_RATE, STALE_S, Plan, WatchedLink, descent
 
 RATES = tuple(0.5 * i for i in range(-8, 9))
 PULSES = tuple(1500 + round(100 * rate) for rate in RATES)
@@ -37,8 +38,9 @@ PLAN = Plan(
 GROUND = dataclasses.replace(PLAN, flying=False)
 STEADY = (1510, 1520, 1600, 1490, 1900, 1900, 1500, 1500)
 """What the bridge sends in flight."""
-REACTION = 0.5
-"""Within this the sticks are the watchdog's, s: the promise is TIMEOUT_S and 0.02, the rest is for a busy machine."""
+REACTION = 2.0
+"""Within this the sticks are the watchdog's, s. It waits for 1 s here, not TIMEOUT_S: a busy machine stops the bridges
+of these tests for longer than that; benchmarks/firmware_faults.py measures the promise."""
 
 
 class TestDescent:
@@ -78,6 +80,9 @@ class TestDescent:
     def test_a_plan_that_cannot_be_flown_is_refused(self, name: str, value: object) -> None:
         with pytest.raises(ValueError, match=f"plan: {name} is "):
             dataclasses.replace(PLAN, **{name: value})
+
+    def test_of_steps_of_the_throttle_at_one_time_the_last_counts(self) -> None:
+        assert descent(dataclasses.replace(PLAN, throttle=((0.0, 1300), (0.0, 1400))), 0.0, None)[2] == 1400
 
     def test_a_throttle_that_is_no_pulse_is_refused(self) -> None:
         with pytest.raises(ValueError, match="plan: channels"):
@@ -128,16 +133,14 @@ class Controller:
                 peer, decoder = self.listener.accept()[0], Decoder()
                 self.accepted += 1
                 continue
-            try:
+            data = b""
+            with suppress(OSError):  # it has gone
                 data = peer.recv(65536)
-            except OSError:
-                data = b""
+                for frame in decoder.feed(data):
+                    self._answer(peer, frame)
             if not data:
                 peer.close()
                 peer = None
-                continue
-            for frame in decoder.feed(data):
-                self._answer(peer, frame)
         if peer is not None:
             peer.close()
 
@@ -180,7 +183,7 @@ from e2efly.deploy.msp.codec import encode
 from e2efly.deploy.msp.messages import set_raw_rc
 from e2efly.deploy.watchdog import Plan, WatchedLink
 target, sticks, plan = sys.argv[1], json.loads(sys.argv[2]), Plan(**json.loads(sys.argv[3]))
-link = WatchedLink(target)
+link = WatchedLink(target, 1.0)
 print(link._process.pid, flush=True)
 while not link.taken_over:
     link.poll(0.0)
@@ -290,7 +293,7 @@ def test_a_bridge_that_hangs_in_flight_and_is_told_when_it_goes_on(
     flight.process.send_signal(signal.SIGCONT)
     assert flight.process.stdout is not None
     said = flight.process.stdout.readline()
-    assert re.match(r"False the watchdog has taken over: the bridge was silent for 0\.\d+ s", said)
+    assert re.match(r"False the watchdog has taken over: the bridge was silent for 1\.\d+ s", said)
     assert all(row != STEADY for at, row in controller.sticks if at > since + REACTION)  # and it stays out of it
 
 
@@ -317,7 +320,7 @@ def test_a_bridge_that_is_killed_on_the_ground_ends_the_watchdog_without_a_stick
 def test_a_bridge_that_hangs_on_the_ground_is_waited_for(controller: Controller, fly: Callable[..., Flying]) -> None:
     flight = fly(GROUND)
     flight.process.send_signal(signal.SIGSTOP)
-    time.sleep(3 * TIMEOUT_S)
+    time.sleep(1.5)
     flight.process.send_signal(signal.SIGCONT)
     count = controller.count()
     until(lambda: controller.count() > count + 10)
@@ -369,7 +372,7 @@ def test_a_watchdog_that_dies_is_seen_as_a_lost_link_and_leaves_nothing_behind(c
         assert link.receive() == b""
     assert "does not listen" in link.reason or "ended" in link.reason
     link.close()
-    assert set(Path("/proc/self/fd").iterdir()) == before
+    until(lambda: set(Path("/proc/self/fd").iterdir()) == before)  # the controller closes its side, too
 
 
 def test_a_watchdog_that_hangs_never_blocks_the_bridge(controller: Controller) -> None:

@@ -141,7 +141,7 @@ def fly_command(options: Fly) -> int:
         finally:
             stop.restore()
         telemetry.close()
-        path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map, body), encoding="utf-8")
+        path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map), encoding="utf-8")
         late = sorted(timing.lateness)
         p99 = 1e3 * late[int(0.99 * (len(late) - 1))] if late else 0.0
         console.print(f"{timing.rounds} control steps, late by {p99:.1f} ms (p99), {timing.missed} missed.")
@@ -227,7 +227,7 @@ def _table(rows: tuple[Row, ...]) -> Table:
 
 def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row, ...]) -> int:
     """Watch poses, receiver and attitude for a while, and say what forbids a take-off. Sends no sticks."""
-    bridge.client.schedule = dict(SCHEDULE)
+    bridge.channels_seen = True  # nothing is sent, so nothing can be seen of it
     end, poses = time.monotonic() + LOOK_S, []
     while (now := time.monotonic()) < end:
         poses += bridge.look(now)
@@ -244,7 +244,10 @@ def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row,
         if poses and poses[-1].stamp is not None:
             table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")
     pilot = bridge.inputs.pilot
-    heard = "not heard" if pilot is None else f"mission {pilot.mission}, sticks {pilot.deflection:.2f}"
+    heard = "not heard"
+    if pilot is not None:
+        sticks = ", ".join(f"{name} {getattr(pilot, name):+.2f}" for name in ("roll", "pitch", "throttle", "yaw"))
+        heard = f"mission {pilot.mission}; {sticks}"
     table.add_row("receiver", heard)
     table.add_row("battery", f"{bridge.inputs.voltage:.2f} V a cell" if bridge.inputs.voltage else "unknown")
     error = bridge.inputs.attitude_error
@@ -261,7 +264,7 @@ def _record_meta(log: Telemetry, bridge: Bridge, body: Vehicle, contract: str, r
     settings = {
         "flight": dataclasses.asdict(bridge.settings),
         "controller": {row.setting: row.value for row in rows},
-        "throttle_map": json.loads(throttle_map.as_json(bridge.map, body)),
+        "throttle_map": json.loads(throttle_map.as_json(bridge.map)),
     }
     versions = {
         "e2efly": __version__, "python": sys.version.split()[0], "machine": platform.platform(),

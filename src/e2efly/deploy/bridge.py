@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from e2efly.control import Ctbr, Vec3
-from e2efly.deploy import state_machine
+from e2efly.deploy import reckoning, state_machine
 from e2efly.deploy.goals import LandGoal
 from e2efly.deploy.hover import blind, blind_time, controlled, flight_gains, roll_pitch
 from e2efly.deploy.msp.client import Client
@@ -29,14 +29,23 @@ from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 ARM, FAILSAFE, OVERRIDE = 0, 27, 50
 """Permanent ids of Betaflight's modes."""
+MEDDLING = {1: "ANGLE", 2: "HORIZON", 3: "ALTHOLD", 6: "HEADFREE", 11: "POS HOLD", 46: "GPS RESCUE", 47: "ACRO TRAINER"}
+"""Modes in which sticks do not mean body rates, by permanent id."""
+RECEIVER_LOST = frozenset({"RXLOSS", "FAILSAFE"})
+"""Reasons against arming by which the controller tells that it does not hear the pilot."""
+VOLTAGE_SHARE = 0.4
+"""Weight of a new battery reading: a moment's sag under full throttle is no empty battery."""
 CLOSED = 1000
 """The throttle channel that lets the controller arm, us."""
 PROBE = (20, 40, 60)
 """How far off centre roll, pitch and yaw are sent before arming, to see where each goes, us."""
+AFRESH_S = 1.0
+"""After so long without a good pose, on the ground, tracking begins afresh, s."""
 OUTLIERS_S = 0.03
 """Poses are refused for so long before the odometry counts as lost, s: an outlier or two end no flight."""
-BEHIND = 12
-"""Stick frames without an answer from which on the link is too slow to fly by: a tenth of a second."""
+BEHIND = 50
+"""Stick frames without an answer, for each second of the link's time-out, with which the link is too slow to fly by:
+half of the time-out at 100 Hz."""
 THRUST_DELAY = (0.015, 0.075)
 """How long before a measured force its throttle was sent, s: the link, the rate loop and the motors' lag."""
 TRIM = (-3.0, 5.0)
@@ -113,6 +122,7 @@ class Bridge:
         self._track = Track()
         self._pose_problem: str | None = None
         self._good_pose = -math.inf
+        self._reckoned: reckoning.Reckoning | None = None
         self._history = ThrottleHistory()
         self._trim = 0.0
         self._gravity_counts = 0.0
@@ -122,6 +132,7 @@ class Bridge:
         self._last = 0.0
         self._stale: str | None = None
         self._override_since = 0.0
+        self._voltage: float | None = None
 
     def tick(self, now: float, lateness: float = 0.0, slack: float = 0.004) -> Sent:
         """One control step at `now` s, which began `lateness` s after its time; a policy due within `slack` s acts."""
@@ -160,21 +171,19 @@ class Bridge:
         """Over the place of take-off, by the last odometry, m."""
         return float(self.odometry.position[2]) - self.flight.home if self.odometry is not None else 0.0
 
-    def voltage(self, now: float) -> float | None:
-        """Of a cell, V; None: the controller does not know."""
-        battery = self.client.message(BatteryState.CODE, now, 3.0)
-        return battery.voltage / battery.cells if battery is not None and battery.cells and battery.voltage else None
-
     def _read_poses(self, now: float) -> list[Sample]:
-        if self.flight.mode in (Mode.INIT, Mode.DONE) and self._track.fault:
-            self._track = Track()  # it may have been carried elsewhere
+        long = now - self._good_pose > AFRESH_S
+        if self.flight.mode in (Mode.INIT, Mode.DONE) and (self._track.fault or (self._pose_problem and long)):
+            self._track, self._good_pose = Track(), now  # it may have been carried elsewhere, its clock set
         samples = self.source.read(now)
         for sample in samples:
             self._track, odometry, problem = track(self.checks, self._track, sample)
             self._pose_problem = problem
             if odometry is not None:
                 self.odometry, self._good_pose = odometry, now
-        if self._pose_problem and not self._track.fault and now - self._good_pose < OUTLIERS_S:
+                self._reckoned = reckoning.seen(odometry, now)
+        said_frozen = (self._pose_problem or "").startswith("frozen")  # which lasts already
+        if self._pose_problem and not self._track.fault and now - self._good_pose < OUTLIERS_S and not said_frozen:
             self._pose_problem = None
         old = age(self._track, now)
         if self._pose_problem is None and not old <= self.checks.max_age:
@@ -200,8 +209,14 @@ class Bridge:
         if status is None:
             link = self.client.link
             problem = link.reason if not link.alive else f"no answer within {patience:g} s"
-        elif self.client.backlog > BEHIND:
+        elif self.client.backlog > BEHIND * patience:
             problem = f"it is behind by {self.client.backlog} stick frames (set serial_update_rate_hz=1000)"
+        meddling = tuple(f"{MEDDLING[box]} is on: sticks are no body rates" for box in MEDDLING.keys() & active)
+        meddling = meddling if OVERRIDE in active else ()
+        heard = channels is not None and FAILSAFE not in active
+        heard = heard and not (status is not None and RECEIVER_LOST & set(status.arming_disabled))
+        if (battery := fresh.get(BatteryState.CODE)) is not None:
+            self._measure(battery.message)
         good = self._pose_problem is None and self._stale is None
         self.inputs = Inputs(
             odometry=self.odometry,
@@ -209,13 +224,22 @@ class Bridge:
             link_problem=problem,
             armed=ARM in active,
             override=OVERRIDE in active,
-            pilot=self._pilot(channels) if channels is not None and FAILSAFE not in active else None,
-            voltage=self.voltage(now),
-            settings_problems=self.settings_problems + self._probe(channels, now),
+            pilot=self._pilot(channels) if heard and channels is not None else None,
+            voltage=self._voltage if self.client.message(BatteryState.CODE, now, 3.0) is not None else None,
+            settings_problems=self.settings_problems + self._probe(channels, now) + meddling,
+            policy_problem=meddling[0] if meddling else None,
             attitude_error=self._attitude_error(attitude),
             missed_deadlines=len(self._missed),
         )
         return fresh
+
+    def _measure(self, battery: BatteryState) -> None:
+        """Smooth the voltage of a cell; None: the controller does not know it."""
+        if not (battery.cells and battery.voltage):
+            self._voltage = None
+            return
+        cell = battery.voltage / battery.cells
+        self._voltage = cell if self._voltage is None else self._voltage + VOLTAGE_SHARE * (cell - self._voltage)
 
     def _pilot(self, rc: Rc) -> Pilot | None:
         c = self.settings.channels
@@ -266,6 +290,8 @@ class Bridge:
             return
         force = counts * (GRAVITY / self._gravity_counts)
         self._imu = Imu(np.array(reply.message.body_rate), force)
+        attitude = self.client.message(Attitude.CODE, now, 0.1)
+        self._reckoned = reckoning.reckon(self._reckoned, attitude, tuple(force.tolist()), now)
         if self.flying and self.height > LIFTED and not self.flight.blind and self.inputs.armed:
             at = reply.time - reply.latency / 2
             throttle = self._history.between(at - THRUST_DELAY[1], at - THRUST_DELAY[0])
@@ -286,9 +312,9 @@ class Bridge:
         if self.flight.mode is Mode.POLICY and worker is not None and good and odometry is not None:
             self._ask(now, slack, odometry)
         elif self.flight.mode is Mode.HOVER:
-            problem = "none is loaded" if worker is None else None
+            problem = "none is loaded" if worker is None else self.inputs.policy_problem
             if worker is not None and good and odometry is not None:
-                problem = worker.readiness(odometry, now)
+                problem = problem or worker.readiness(odometry, now)
             self.inputs = dataclasses.replace(self.inputs, policy_problem=problem)
         self._step(now)
         if self.flight.mode is Mode.POLICY and worker is not None and worker.state is None:
@@ -310,7 +336,7 @@ class Bridge:
                 "step": state.steps if state is not None else 0,
             })  # fmt: skip
         self.inputs = dataclasses.replace(
-            self.inputs, policy_problem=worker.problem, policy_done=worker.done,
+            self.inputs, policy_problem=self.inputs.policy_problem or worker.problem, policy_done=worker.done,
             policy_lands=isinstance(worker.runtime.goal, LandGoal),
         )  # fmt: skip
 
@@ -336,9 +362,13 @@ class Bridge:
             return "policy", controlled(self.vehicle, decision.mode, odometry, decision.command)
         if flight.target is None or odometry is None or flight.blind:
             elapsed = now - flight.since
-            if elapsed > blind_time(self.height):
+            climb = float(odometry.velocity[2]) if odometry is not None else 0.0
+            if elapsed > blind_time(self.height, climb):
                 return "closed", None
-            return "blind", blind(self.client.message(Attitude.CODE, now, 0.5), elapsed)
+            attitude, reckoned = self.client.message(Attitude.CODE, now, 0.5), self._reckoned
+            if attitude is not None and reckoned is not None and now - reckoned.time < reckoning.LONGEST_STEP:
+                return "blind", reckoning.settle(attitude, elapsed, reckoned.velocity)
+            return "blind", blind(attitude, elapsed, climb)
         return "hover", self._hover(flight.target, odometry, dt)
 
     def _hover(self, target: Target, odometry: Odometry, dt: float) -> Ctbr:

@@ -72,6 +72,11 @@ def examine(
         Row("failsafe_procedure", info.failsafe.procedure, "DROP or AUTO-LAND", info.failsafe.procedure != "GPS-RESCUE",
             "set failsafe_procedure=AUTO-LAND")
     )  # fmt: skip
+    falls = info.failsafe.procedure == "AUTO-LAND" and info.failsafe.throttle <= info.rx.min_check
+    rows.append(
+        Row("failsafe_throttle", f"{info.failsafe.throttle} us", "with AUTO-LAND: a little under hovering, or it falls",
+            not falls, "set failsafe_throttle=... or set failsafe_procedure=DROP")
+    )  # fmt: skip
     turned = [round(degrees(angle)) for angle in info.alignment.angles]
     rows.append(Row("align_board", f"{turned} deg", "any: attitudes are compared before take-off", True))
     return tuple(rows)
@@ -113,7 +118,8 @@ def _modes(info: ControllerInfo) -> list[Row]:
     for mode, hint in (("ARM", "aux 0 0 0 1700 2100 0 0"), ("MSP OVERRIDE", "aux 1 50 1 1700 2100 0 0")):
         ranges = info.ranges(mode)
         where = ", ".join(f"AUX{r.aux + 1} {r.low} to {r.high}" for r in ranges) or "none"
-        rows.append(Row(f"switch of {mode}", where, "a switch of the pilot's", bool(ranges), hint))
+        switched = bool(ranges) and all(r.low > 1000 or r.high < 2000 for r in ranges)
+        rows.append(Row(f"switch of {mode}", where, "a switch of the pilot's, not always on", switched, hint))
     known = next(number for number, name in BOXES.items() if name == "MSP OVERRIDE") in info.box_ids
     rows.append(
         Row("msp_override_channels_mask", "set" if known else "0", "15: the four sticks (tried before arming)", known,
@@ -125,10 +131,12 @@ def _modes(info: ControllerInfo) -> list[Row]:
 def _channels(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
     """The channels that the bridge reads must not be those of the controller's own switches."""
     taken = {r.aux + 5: BOXES.get(r.box, str(r.box)) for r in info.modes}
-    mission = settings.channels.mission
+    c = settings.channels
+    used = {"mission": c.mission, "roll": c.roll, "pitch": c.pitch, "throttle": c.throttle, "yaw": c.yaw}
     return [
-        Row(f"channel {mission} (mission)", taken.get(mission, "free"), "free of the controller's own modes",
-            mission not in taken, f"fly --flight.channels.mission to another than {sorted(taken)}"),
+        Row(f"channel {channel} ({name})", taken.get(channel, "free"), "free of the controller's own modes",
+            channel not in taken, f"fly --flight.channels.{name} to another than {sorted(taken)}")
+        for name, channel in used.items() if channel is not None
     ]  # fmt: skip
 
 

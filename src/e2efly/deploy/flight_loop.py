@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from e2efly.control import Ctbr
 from e2efly.deploy.bridge import CLOSED, Bridge, Log
 from e2efly.deploy.clock import MONOTONIC, Clock
-from e2efly.deploy.hover import SINK_TIME, blind, blind_time
+from e2efly.deploy.hover import blind, blind_time, sink_time
 from e2efly.deploy.msp.controller import ControllerInfo
 from e2efly.deploy.state_machine import Mode
 from e2efly.deploy.watchdog import Plan, WatchedLink
@@ -77,7 +77,7 @@ def fly(
             late = max(now - due, 0.0)
             if stop():
                 bridge.land_now = True
-                if not bridge.flying:
+                if bridge.flight.mode in (Mode.INIT, Mode.DONE):  # not while the pilot flies: the sticks would stay
                     return timing
             if bridge.client.link.connections != connection and bridge.flight.mode in (Mode.INIT, Mode.DONE):
                 if identify_again is not None and identify_again() is not None:
@@ -123,12 +123,17 @@ def plan_of(bridge: Bridge) -> Plan:
         return sticks.throttle.channel_for(share)
 
     roll, pitch, yaw = (tuple(sticks.pulse(axis, rate) for rate in PLAN_RATES) for axis in range(3))
-    end = max(blind_time(bridge.height), 2 * SINK_TIME)
-    steps = ((0.0, throttle(blind(None, 0.0))), (SINK_TIME, throttle(blind(None, 2 * SINK_TIME))), (end, CLOSED))
+    climb = float(bridge.odometry.velocity[2]) if bridge.odometry is not None else 0.0
+    begin = sink_time(climb)
+    end = max(blind_time(bridge.height, climb), 2 * begin)
+    steps = (
+        (0.0, throttle(blind(None, 0.0, climb))), (begin, throttle(blind(None, 2 * begin + 1.0, climb))), (end, CLOSED),
+    )  # fmt: skip
     a, b, c, d = sticks.channel[:4]
     mid = sticks.centre
     idle = sticks.arrange((mid, mid, mid, CLOSED), ())
-    return Plan(bridge.flying, PLAN_RATES, (roll, pitch, yaw), (a, b, c, d), steps, idle)
+    flying = bridge.flying or bridge.flight.mode is Mode.PILOT
+    return Plan(flying, PLAN_RATES, (roll, pitch, yaw), (a, b, c, d), steps, idle)
 
 
 def _told(bridge: Bridge) -> str:
@@ -153,7 +158,7 @@ class _no_pauses:  # noqa: N801
         gc.freeze()
         gc.disable()
         with suppress(OSError, AttributeError):  # an ordinary user's process is punctual enough on an idle core
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))  # the watchdog stands above it
 
     def __exit__(self, *_: object) -> None:
         gc.enable()

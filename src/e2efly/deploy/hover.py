@@ -19,7 +19,7 @@ SINK_SPEED, SINK_ACCELERATION = 0.6, 3.0
 """A blind descent first goes to this speed, m/s, by this acceleration, m/s^2 ..."""
 SINK_TIME = SINK_SPEED / SINK_ACCELERATION
 """... which takes so long from rest, s ..."""
-SINK_THRUST = 0.98
+SINK_THRUST = 0.95
 """... and goes on with this share of the weight: it must sink, whatever the throttle map's last error."""
 SLOWEST_SINK = 0.5
 """By which the time to the ground is estimated, m/s."""

@@ -292,11 +292,11 @@ def _sinking(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
     if not flight.blind:
         return _to(flight, Mode.LAND, inputs.blindness, blind=True)
     last = inputs.odometry
-    height = float(last.position[2]) - flight.home if last is not None else math.nan
+    height, climb = (float(last.position[2]) - flight.home, float(last.velocity[2])) if last else (math.nan, math.nan)
     if not math.isfinite(height):
         height = settings.fence.high[2] - flight.home
     elapsed = flight.now - flight.since
-    if elapsed > blind_time(height):
+    if elapsed > blind_time(height, climb if math.isfinite(climb) else 0.0):
         return _to(flight, Mode.DONE, f"{Reason.LANDED}: without odometry, after {elapsed:.0f} s")
     return flight
 

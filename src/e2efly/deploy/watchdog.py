@@ -18,6 +18,7 @@ from bisect import bisect_right
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from itertools import chain, pairwise
+from math import inf
 
 from e2efly.deploy.msp.codec import REPLY, Decoder, Frame, encode
 from e2efly.deploy.msp.link import Link, open_link
@@ -71,7 +72,7 @@ class Plan:
             "rates": n >= 2 and all(a < b for a, b in pairwise(self.rates)),
             "pulses": len(self.pulses) == 3 and all(len(row) == n for row in self.pulses),
             "places": len(set(self.places)) == 4 and all(0 <= place < count for place in self.places),
-            "throttle": bool(times) and all(a < b for a, b in pairwise(times)) and 0 <= times[0] <= times[-1] < 1000,
+            "throttle": bool(times) and all(a <= b for a, b in pairwise(times)) and 0 <= times[0] <= times[-1] < inf,
             "channels": 4 <= count <= MAX_CHANNELS and all(type(p) is int and low <= p <= high for p in given),
         }
         for name, fine in good.items():
@@ -112,7 +113,13 @@ class WatchedLink:
         ValueError: for a target that names no link.
     """
 
-    def __init__(self, target: str) -> None:
+    def __init__(self, target: str, timeout: float = TIMEOUT_S) -> None:
+        """Start the process.
+
+        Args:
+            target: the link, as `open_link` takes it.
+            timeout: silence of the bridge in flight after which it takes over, s.
+        """
         open_link(target)  # refuse a bad one here; it opens nothing before it is polled
         self.connections, self.reason = 0, "not polled yet"
         self.taken_over = ""
@@ -124,7 +131,7 @@ class WatchedLink:
         mine.setblocking(False)
         with other:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "e2efly.deploy.watchdog", str(other.fileno()), target],
+                [sys.executable, "-m", "e2efly.deploy.watchdog", str(other.fileno()), target, str(timeout)],
                 pass_fds=[other.fileno()],
                 stdin=subprocess.DEVNULL,
                 start_new_session=True,  # Ctrl-C is for the bridge
@@ -189,7 +196,7 @@ class WatchedLink:
             self.reason = f"the watchdog process does not listen: {error}"
 
 
-def serve(bridge: socket.socket, link: Link) -> str:
+def serve(bridge: socket.socket, link: Link, timeout: float = TIMEOUT_S) -> str:
     """Hand bytes through until the bridge ends on the ground, or take over and land; returns why, or nothing."""
     plan: Plan | None = None
     status: tuple[bool, str, int] | None = None
@@ -211,7 +218,7 @@ def serve(bridge: socket.socket, link: Link) -> str:
         if gone and not flying:
             link.close()
             return ""
-        if plan is not None and flying and (gone or silence > TIMEOUT_S):
+        if plan is not None and flying and (gone or silence > timeout):
             why = "the bridge has ended" if gone else f"the bridge was silent for {silence:.2f} s"
             _hand(bridge, TAKEN + why.encode())
             land(link, plan)
@@ -278,13 +285,13 @@ def _hand(bridge: socket.socket, packet: bytes) -> bool:
 
 def main() -> None:
     """Serve the bridge at the other end of a socket whose descriptor is given, over the link that is named."""
-    descriptor, target = sys.argv[1:]
+    descriptor, target, timeout = sys.argv[1:]
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    with suppress(OSError):  # where it is not allowed to, it is light enough
-        os.nice(-10)
+    with suppress(OSError, AttributeError):  # where it is not allowed to, it is light enough
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(20))  # a bridge that spins must not starve it
     with socket.socket(fileno=int(descriptor)) as bridge:
-        said = serve(bridge, open_link(target))
+        said = serve(bridge, open_link(target), float(timeout))
     with suppress(OSError):  # perhaps nobody reads it: not before the vehicle has landed
         sys.stderr.write(f"watchdog: {said}\n" if said else "")
 

@@ -24,7 +24,7 @@ from e2efly.vehicles.vehicle import Vehicle
 STEP_S = 0.002
 """How often the firmware's sensors are told a new state, s."""
 LONGEST_LAG_S = 0.2
-"""In real time the world makes up for being late by so much, s; what is more is lost."""
+"""In real time, the longest by which a busy machine may hold up world and firmware and that they make up for, s."""
 RC_PERIOD_S = 0.02
 """How often the pilot's receiver speaks, s."""
 CALIBRATION_S = 6.0
@@ -36,6 +36,7 @@ SETTINGS = (
     "aux 1 50 1 1700 2100 0 0",  # MSP override: AUX2
     "aux 2 1 2 1700 2100 0 0",  # angle: AUX3
     "set msp_override_channels_mask=15",
+    "set max_aux_channels=14",  # or the copies of throttle and yaw on channels 11 and 12 are not read
     "set rates_type=ACTUAL",
     *(f"set {axis}_rc_rate=67" for axis in ("roll", "pitch", "yaw")),
     *(f"set {axis}_srate=67" for axis in ("roll", "pitch", "yaw")),
@@ -83,7 +84,10 @@ class Transmitter:
 
 
 class Rig:
-    """One firmware in its world. Use it as a context manager; time is virtual unless `real_time`."""
+    """One firmware in its world. Use it as a context manager.
+
+    Time is virtual; with `real_time` it keeps pace with the machine's clock, as for a bridge in another process.
+    """
 
     def __init__(
         self,
@@ -97,7 +101,7 @@ class Rig:
         seed: int = 0,
     ) -> None:
         compute_at_once()
-        self.sitl = Sitl(firmware, folder, virtual_time=not real_time)
+        self.sitl = Sitl(firmware, folder, virtual_time=True)
         self.world = World(vehicle)
         self.state: Body = self.world.at_rest()
         self.transmitter = Transmitter()
@@ -110,7 +114,8 @@ class Rig:
         self._poses: deque[Sample] = deque()
         self._next_pose = self._next_rc = 0.0
         self._left = 0.0
-        self._stepped = 0.0
+        self._real_time = real_time
+        self._epoch = 0.0
         self._on = True
         self._noise = np.random.default_rng(seed)
 
@@ -125,20 +130,21 @@ class Rig:
         """Start the firmware with `SETTINGS` and wait until it can be armed."""
         prepare(self.sitl)
         self.sitl.start()
-        self._next_pose = self._next_rc = self._stepped = self.now()
+        self._next_pose = self._next_rc = self.now()
+        self._epoch = time.monotonic() - self.now()
         self.sleep(CALIBRATION_S)
 
     def now(self) -> float:
-        """Seconds: the firmware's, or the machine's monotonic clock."""
+        """Seconds of the firmware's time."""
         return self.sitl.now
 
     def sleep(self, seconds: float) -> None:
         """Let the world and the firmware run."""
-        if not self.sitl.virtual_time:
+        if self._real_time:
             end = time.monotonic() + seconds
             while (now := time.monotonic()) < end:
-                self._stepped = max(self._stepped, now - LONGEST_LAG_S)
-                while self._stepped + STEP_S <= now:
+                self._epoch = max(self._epoch, now - LONGEST_LAG_S - self.now())
+                while self.now() + STEP_S <= now - self._epoch:
                     self.step(STEP_S)
                 time.sleep(min(end - now, STEP_S))
             return
@@ -150,16 +156,14 @@ class Rig:
         self.sitl.exchange()
 
     def step(self, dt: float) -> None:
-        """One step of the world and, with virtual time, of the firmware."""
+        """One step of the world and of the firmware."""
         motors = self.sitl.motors() if self._on else np.zeros(4)
         after = self.state if self.held else self.world.advance(self.state, motors, dt, self.wind)
         if self._on:
             self.sitl.send_state(self.world.sensed(self.state, after, dt))
-        if self.sitl.virtual_time:
-            self.sitl.advance(dt)
+        self.sitl.advance(dt)
         self.state = after
-        self._stepped += dt
-        now = self.now() if self.sitl.virtual_time else self._stepped
+        now = self.now()
         if now >= self._next_rc:
             self._next_rc += RC_PERIOD_S
             self.sitl.send_rc(self.transmitter.channels())
@@ -183,7 +187,7 @@ class Rig:
         """Cut the controller's power, at which the motors stop, or give it back, at which it boots."""
         if on and not self._on:
             self.sitl.start()
-            self._stepped = self.now()
+            self._epoch = time.monotonic() - self.now()
         elif not on:
             self.sitl.stop()
         self._on = on

@@ -34,7 +34,8 @@ TIMEOUT = 0.3
 MAX_IN_FLIGHT = 256
 """Bytes of scheduled replies that may be awaited at a time."""
 MAX_BACKLOG = 2
-"""Stick frames without answer from which on the schedule pauses: the controller is behind."""
+"""With more stick frames without answer the controller is behind, or answers were lost: it is asked for one message
+at a time, whose answer tells which."""
 _UNKNOWN_REPLY = 64
 """Bytes that a reply of unknown length is taken to have."""
 _OVERHEAD = 6
@@ -160,14 +161,13 @@ class Client:
                 self._take(frame, now)
 
     def _ask_due(self, now: float) -> None:
-        if self.backlog > MAX_BACKLOG:
-            return
+        behind = self.backlog > MAX_BACKLOG
         in_flight = sum(self._sizes.get(code, _UNKNOWN_REPLY) for code in self._asked)
         free = (code for code in self.schedule if code not in self._asked)
         overdue = {code: (now - self._due.setdefault(code, now)) * self.schedule[code] for code in free}
         for code in sorted((code for code in overdue if overdue[code] >= 0), key=overdue.__getitem__, reverse=True):
             size = self._sizes.get(code, _UNKNOWN_REPLY)
-            if in_flight and in_flight + size > MAX_IN_FLIGHT:
+            if in_flight and (behind or in_flight + size > MAX_IN_FLIGHT):
                 return
             self.request(code, now)
             in_flight += size

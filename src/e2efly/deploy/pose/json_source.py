@@ -132,6 +132,7 @@ class UdpSource:
 
     def read(self, now: float) -> list[Sample]:
         """Datagrams since the last call; `received` is when the kernel took them, not when they were read."""
+        del now
         for _ in range(4 * LARGEST_BATCH):  # an end even under a flood
             try:
                 message, extra, flags, _ = self._socket.recvmsg(LONGEST, 64)
@@ -143,7 +144,8 @@ class UdpSource:
             if flags & socket.MSG_TRUNC:
                 self._inbox.refuse(f"pose: a datagram of more than {LONGEST} bytes; accepted: at most {LONGEST}")
             else:
-                self._inbox.put(message, now - _waited(extra))
+                # not `now`: this process may have been held up since, and a time too early would spoil the clock map
+                self._inbox.put(message, time.monotonic() - _waited(extra))
         return self._inbox.take()
 
     def close(self) -> None:
