@@ -206,7 +206,6 @@ class Flying:
         )  # fmt: skip
         assert self.process.stdout is not None
         self.watchdog = int(self.process.stdout.readline())
-        until(lambda: controller.count() > 20)
 
     def close(self) -> None:
         for pid in (self.process.pid, self.watchdog):
@@ -221,6 +220,7 @@ def fly(controller: Controller) -> Iterator[Callable[..., Flying]]:
 
     def begin(plan: Plan = PLAN, stderr: int | None = None) -> Flying:
         flights.append(Flying(controller, plan, stderr))
+        until(lambda: controller.count() > 20)
         return flights[-1]
 
     yield begin

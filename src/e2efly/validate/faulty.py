@@ -118,7 +118,7 @@ class FaultyLink:
         return self._burst(self.garbage) + data
 
     def _burst(self, share: float) -> bytes:
-        return self._random.bytes(self._random.integers(1, GARBAGE)) if self._random.random() < share else b""
+        return self._random.bytes(int(self._random.integers(1, GARBAGE))) if self._random.random() < share else b""
 
 
 class FaultyPoses:

@@ -86,8 +86,9 @@ def changes_of(line: bytes) -> dict[str, Any]:
     """
     known = {field.name for field in fields(Transmitter)}
     content = json.loads(line)
-    if not isinstance(content, dict) or (wrong := sorted(content.keys() - known)):
-        raise ValueError(f"control: {wrong if isinstance(content, dict) else content}; accepted: {sorted(known)}")
+    wrong = sorted(content.keys() - known) if isinstance(content, dict) else [content]
+    if wrong:
+        raise ValueError(f"control: {wrong}; accepted: {sorted(known)}")
     return content
 
 
@@ -112,7 +113,7 @@ def serve(rig: Rig, poses: int, listener: socket.socket) -> None:
                 }
                 sender.sendto(json.dumps({**pose, "stamp": sample.stamp}).encode(), ("127.0.0.1", poses))
             readable, _, _ = select.select([control or listener, sys.stdin], [], [], 0)
-            if sys.stdin in readable and not sys.stdin.buffer.read1(1):
+            if sys.stdin in readable and not os.read(sys.stdin.fileno(), 1):
                 return
             if not {control, listener} & set(readable):
                 continue

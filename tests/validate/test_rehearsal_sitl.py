@@ -1,0 +1,28 @@
+"""A whole flight through the real firmware."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from e2efly.deploy.flight_log import read_log
+from e2efly.deploy.goal_options import GoalOptions, goal_for
+from e2efly.deploy.policy import load_policy
+from e2efly.deploy.telemetry import Telemetry
+from e2efly.validate import firmware
+from e2efly.validate.rehearsal import rehearse
+from e2efly.vehicles import load_vehicle
+
+
+def test_take_off_hover_policy_hover_land_by_switches_alone(policy_of: Callable[..., Path], tmp_path: Path) -> None:
+    vehicle, policy = load_vehicle("vis_r"), load_policy(policy_of("hover"))
+    goal = goal_for(policy.contract, GoalOptions(), vehicle)
+    with Telemetry(tmp_path / "flight.mcap") as log:
+        flight = rehearse(firmware.build(), policy, goal, vehicle, seed=3, log=log)
+    assert flight.modes == ("init", "takeoff", "hover", "policy", "hover", "land", "done", "init")
+    assert flight.complete
+    assert flight.hover_error < 0.10
+    assert flight.policy_error < 0.10
+    assert 0.5 < flight.top_speed < 6.0
+    read = read_log(tmp_path / "flight.mcap")
+    assert read.cut_off == ""
+    assert tuple(m["mode"] for m in read["mode"].values) == flight.modes[1:]
+    assert len(read["policy"]) > 300
