@@ -109,7 +109,7 @@ class Bridge:
         """The vehicle with the gains of take-off, hover and landing."""
         self.worker, self.log, self.settings_problems = worker, log, settings_problems
         self.checks = checks or Checks(max_age=settings.odometry_timeout)
-        self.flight = Flight()
+        self.flight = Flight(home=settings.ground_height)
         self.map = throttle_map or ThrottleMap.of(vehicle)
         self.odometry: Odometry | None = None
         self.inputs = Inputs()
@@ -243,6 +243,8 @@ class Bridge:
 
     def _pilot(self, rc: Rc) -> Pilot | None:
         c = self.settings.channels
+        if c.mission > len(rc.channels):
+            return None  # the switch is not there: nobody's will is known
 
         def pulse(channel: int) -> int:
             return rc.channels[channel - 1] if channel <= len(rc.channels) else 1500
