@@ -219,7 +219,7 @@ def test_two_at_once_have_ports_of_their_own_and_move_alike(tmp_path: Path) -> N
         assert abs(a.sitl.base - b.sitl.base) >= 12
         for rig in (a, b):
             rig.set(angle=True)
-        for changes, seconds in (({"armed": True}, 0.4), ({"throttle": 0.0, "roll": 0.2}, 0.6)):
+        for changes, seconds in (({"armed": True}, 0.4), ({"throttle": 0.4, "roll": 0.3}, 0.8)):
             for rig in (a, b):
                 rig.set(**changes)
             for _ in range(round(seconds / 0.02)):

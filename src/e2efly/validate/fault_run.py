@@ -79,7 +79,7 @@ def strike(stage: Stage, fault: Fault, log: Path) -> Outcome:
         bridge.log = None
     stage.heal()
     goes_on = fault.end is End.GOES_ON
-    allowed = math.nan if goes_on else fault.within + period
+    allowed = math.nan if goes_on else fault.within + period + (stage.policy_period if fault.asked else 0.0)
     problems = _change_problems(fault, changes, mode, reaction, allowed)
     speed, tilt = _touch(trace, stage.rig.world.vehicle.feet_height)
     problems += _world_problems(fault, trace, speed, tilt)
@@ -167,7 +167,7 @@ def _refused(stage: Stage, fault: Fault, log: Path) -> Outcome:
     """The pilot tries to take off with a controller that is not what it should be."""
     stage.ready(Mode.INIT)
     stage.close()
-    stage._parts()
+    stage.renew()
     fault.inject(stage)
     problems: list[str] = []
     changes: list[Any] = []

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from unittest import mock
 
 import numpy as np
 
@@ -57,6 +56,8 @@ class Fault:
     """Whether it has become visible to anybody: the time to react counts from there."""
     each: Callable[[Stage], None] = lambda stage: None
     """Done before every control step while it lasts."""
+    asked: bool = False
+    """The policy must be asked first: its period comes on top."""
     watch: float = 1.0
     """How long the flight is watched where nothing is to change any more, s."""
 
@@ -107,8 +108,10 @@ def _wall_clock(stage: Stage) -> None:
     def off() -> float:
         return 7200.0 * math.copysign(1.0, math.sin(10 * stage.rig.now()))
 
-    stage.undo.enter_context(mock.patch.object(time, "time", lambda: wall() + off()))
-    stage.undo.enter_context(mock.patch.object(time, "time_ns", lambda: wall_ns() + round(off() * 1e9)))
+    time.time = lambda: wall() + off()
+    time.time_ns = lambda: wall_ns() + round(off() * 1e9)
+    stage.undo.callback(setattr, time, "time", wall)
+    stage.undo.callback(setattr, time, "time_ns", wall_ns)
 
 
 def _network(fault: str) -> Callable[[Stage], None]:
@@ -199,9 +202,9 @@ FAULTS = (
     Fault("link: garbage between frames", Mode.POLICY, _link(garbage=0.5), End.GOES_ON),
     Fault("link: one frame of five halved", Mode.POLICY, _link(halved=0.2), End.GOES_ON),
     # the policy loses the vehicle to the hover controller
-    Fault("policy: NaN", Mode.POLICY, _network("nan"), End.HOVER, Reason.POLICY, 0.02),
-    Fault("policy: exception", Mode.POLICY, _network("raise"), End.HOVER, Reason.POLICY, 0.02),
-    Fault("policy: late", Mode.POLICY, _network("late"), End.HOVER, Reason.POLICY, 0.02),
+    Fault("policy: NaN", Mode.POLICY, _network("nan"), End.HOVER, Reason.POLICY, asked=True),
+    Fault("policy: exception", Mode.POLICY, _network("raise"), End.HOVER, Reason.POLICY, asked=True),
+    Fault("policy: late", Mode.POLICY, _network("late"), End.HOVER, Reason.POLICY, asked=True),
     Fault("control steps late", Mode.POLICY, _nothing, End.HOVER, Reason.DEADLINES, 0.03, each=_late_step),
     Fault("pilot: policy switch off", Mode.POLICY, _set(mission="hover"), End.HOVER, Reason.MISSION, RECEIVER_S),
     Fault("pilot: stick input", Mode.POLICY, _set(roll=0.5), End.HOVER, Reason.STICK_INPUT, RECEIVER_S),
@@ -229,4 +232,4 @@ FAULTS = (
     Fault("battery low before take-off", Mode.INIT, _rewrite(BatteryState.CODE, _low_battery), End.REFUSED,
           Reason.BATTERY_LOW),
 )  # fmt: skip
-"""All that can be done in virtual time; those that need processes are in `process_faults`."""
+"""All that can be done in virtual time; those of the bridge's process are in `process_faults`."""

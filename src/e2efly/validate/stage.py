@@ -67,10 +67,11 @@ class Stage:
         """Ends what a fault has changed elsewhere."""
         self._policy, self._goal = dataclasses.replace(policy, session=self.network), goal
         self.trace = Trace()
-        self._parts()
+        self.renew()
         self.open()
 
-    def _parts(self) -> None:
+    def renew(self) -> None:
+        """New link and pose source, without faults."""
         self.link = FaultyLink(lambda: open_link(self.rig.sitl.msp), self.random)
         self.poses = FaultyPoses(PlantSource(self.rig.poses, "rig"))
 
@@ -89,8 +90,8 @@ class Stage:
         self.patience(PATIENCE_S)
 
     def reopen(self) -> None:
-        """The same with new parts, after `close`."""
-        self._parts()
+        """The same with new link and pose source, after `close`."""
+        self.renew()
         self.open()
 
     def close(self) -> None:
@@ -103,6 +104,11 @@ class Stage:
     def mode(self) -> Mode:
         """The bridge's."""
         return self.session.bridge.flight.mode
+
+    @property
+    def policy_period(self) -> float:
+        """Between two questions to the policy, s."""
+        return 1 / self._policy.contract.control_rate_hz
 
     def patience(self, seconds: float) -> None:
         """How long the bridge waits for the policy, real time."""
