@@ -34,12 +34,12 @@ class Rig:
         )
         assert self.process.stdout is not None
         told = json.loads(self.process.stdout.readline())
-        self.msp = told["msp"]
+        self.link = told["link"]
         self.file = socket.create_connection(("127.0.0.1", told["control"])).makefile("rw")
 
-    def tell(self, **order: Any) -> dict[str, Any]:
-        """Give an order; returns the true state."""
-        self.file.write(json.dumps(order) + "\n")
+    def tell(self, **changes: Any) -> dict[str, Any]:
+        """Move the pilot's sticks and switches; returns the true state."""
+        self.file.write(json.dumps(changes) + "\n")
         self.file.flush()
         return json.loads(self.file.readline())
 
@@ -61,24 +61,24 @@ def main() -> None:
         rig, log = Rig(others, port), folder / "flight.mcap"
         began = time.monotonic()
         fly = subprocess.Popen([
-            "taskset", "-c", str(cores[0]), sys.executable, "-m", "e2efly", "fly", str(policy), "--link", rig.msp,
+            "taskset", "-c", str(cores[0]), sys.executable, "-m", "e2efly", "fly", str(policy), "--link", rig.link,
             "--pose", f"udp:{port}", "--log", str(log), "--flight.battery-unknown", "--flight.takeoff-height", "1.5",
             "--goal.target", *map(str, TARGET),
         ], stdout=subprocess.DEVNULL)  # fmt: skip
         for wait, order in ((2.0, {"override": True}), (1.0, {"armed": True}), (1.5, {"mission": "hover"})):
             time.sleep(wait)
-            rig.tell(set=order)
+            rig.tell(**order)
         time.sleep(8.0)
-        rig.tell(set={"mission": "policy"})
+        rig.tell(mission="policy")
         time.sleep(3.0)
         errors = []
         end = time.monotonic() + args.seconds
         while time.monotonic() < end:
             time.sleep(0.1)
             errors.append(float(np.linalg.norm(np.subtract(rig.tell()["position"], TARGET))))
-        rig.tell(set={"mission": "land"})
+        rig.tell(mission="land")
         time.sleep(9.0)
-        rig.tell(set={"armed": False})
+        rig.tell(armed=False)
         fly.terminate()
         fly.wait(10)
         rig.process.kill()
