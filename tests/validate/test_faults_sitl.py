@@ -70,7 +70,6 @@ def test_all_of_them_are_documented() -> None:
 def test_the_bridges_process_fails(fault: str, policy_of: Callable[..., Path], tmp_path: Path) -> None:
     """In real time: a process of its own flies, and another is the world."""
     outcome = process_faults.strike(fault, policy_of("hover"), tmp_path)
-    print(outcome)
     assert outcome.problems == ()
     assert outcome.touch_speed < 2.5
     assert outcome.touch_tilt < 0.35

@@ -138,6 +138,10 @@ class Rig:
         """Seconds of the firmware's time."""
         return self.sitl.now
 
+    def machine_time(self, moment: float) -> float:
+        """When a moment of the firmware's time, s, was on the machine's monotonic clock; with `real_time` only."""
+        return self._epoch + moment
+
     def sleep(self, seconds: float) -> None:
         """Let the world and the firmware run."""
         if self._real_time:

@@ -111,7 +111,8 @@ def serve(rig: Rig, poses: int, listener: socket.socket) -> None:
                 pose = {
                     name: getattr(sample, name).tolist() for name in ("position", "quaternion", "velocity", "body_rate")
                 }
-                sender.sendto(json.dumps({**pose, "stamp": sample.stamp}).encode(), ("127.0.0.1", poses))
+                stamp = rig.machine_time(sample.received)
+                sender.sendto(json.dumps({**pose, "stamp": stamp}).encode(), ("127.0.0.1", poses))
             readable, _, _ = select.select([control or listener, sys.stdin], [], [], 0)
             if sys.stdin in readable and not os.read(sys.stdin.fileno(), 1):
                 return
