@@ -231,12 +231,13 @@ def _take_off(rig: RigClient, bridge: _Bridge) -> None:
         rig.set(armed=True)
         if bridge.heard("ready", 3.0):
             rig.set(mission="hover")
-            if bridge.heard("TAKEOFF", 2.0):
-                break
-        rig.set(armed=False, mission="land")
+            if bridge.heard("HOVER", 10.0):
+                return
+        rig.set(mission="land")
+        _until(rig, FLIGHT_S, lambda state: state["standing"])
+        rig.set(armed=False)
         if time.monotonic() > end:
             raise RuntimeError(f"the bridge did not take off; it said: {bridge.said[-8:]}")
-    bridge.wait_for("HOVER", FLIGHT_S)
 
 
 def _until_sinking(rig: RigClient) -> float:
