@@ -17,10 +17,12 @@ from e2efly.deploy.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, 
 from e2efly.deploy.hover import blind_time
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.settings import Fence, FlightSettings
-from e2efly.deploy.state_machine import LONGEST_STEP, step
+from e2efly.deploy.state_machine import FALLEN_S, LONGEST_STEP, SLOWED_S, step
 
 SETTINGS = FlightSettings()
 DT = 0.01
+ELSEWHERE = FlightSettings(follow_distance=100.0)
+"""For what is looked at far from where the flight was."""
 START = 5000.0
 """s on the clock."""
 LAND, HOVER, POLICY = Pilot(Mission.LAND), Pilot(Mission.HOVER), Pilot(Mission.POLICY)
@@ -121,9 +123,9 @@ def kept_out(**changes: Any) -> Callable[[], Flight]:
     """A policy that is asked for with something amiss: it does not begin, and one that flies ends in a hover."""
 
     def run() -> Flight:
-        flight = flown(hovering(), having(AWAY, **changes))
+        flight = flown(hovering(), having(AWAY, **changes), settings=ELSEWHERE)
         assert flight.mode is Mode.HOVER
-        stopped = flown(policy_flying(), having(AWAY, **changes))
+        stopped = flown(policy_flying(), having(AWAY, **changes), settings=ELSEWHERE)
         assert stopped.mode is Mode.HOVER and stopped.lock
         assert set(flight.reasons) == set(stopped.reasons)
         return stopped
@@ -192,6 +194,18 @@ CASES: dict[Reason, list[Callable[[], Flight]]] = {
         lambda: flown(policy_flying(), having(AWAY, policy_done=True, policy_lands=True, odometry=at(0.1))),
     ],
     Reason.NOT_CLIMBING: [lambda: flown(taking_off(), having(pilot=HOVER), 7.6)],
+    Reason.CRASHED: [
+        *(
+            lambda begin=begin: flown(begin(), having(UP, odometry=at(0.05, roll=1.3)), FALLEN_S + 2 * DT)
+            for begin in (taking_off, hovering, landing)
+        ),
+        lambda: flown(
+            policy_flying(),
+            having(AWAY, odometry=at(0.3, roll=1.3)),
+            FALLEN_S + 2 * DT,
+            dataclasses.replace(SETTINGS, fence=dataclasses.replace(SETTINGS.fence, tilt=3.0)),
+        ),
+    ],
     Reason.DEADLINES: [kept_out(missed_deadlines=3)],
     Reason.GUARD: [
         kept_out(odometry=at(2.0, x=2.0, velocity=(4.0, 0, 0))),
@@ -343,6 +357,47 @@ def test_a_landing_begins_where_the_vehicle_can_stop_and_no_higher_than_it_is() 
     assert found.target is not None and found.target.position[2] == 0.15
 
 
+def test_a_landing_in_a_gust_does_not_wait_for_ever() -> None:
+    gust = having(UP, pilot=LAND, odometry=at(1.05, velocity=(0.8, 0, 0)))
+    waiting = flown(flown(hovering(), gust), gust, SLOWED_S - 0.1)
+    assert waiting.target is not None and waiting.target.position[2] == pytest.approx(1.05, abs=0.01)
+    sinking = flown(waiting, gust, 1.0)
+    assert sinking.target is not None and sinking.target.position[2] < 0.8
+
+
+def test_odometry_that_leads_astray_is_not_believed_again_before_the_vehicle_stands() -> None:
+    spiral = having(UP, odometry=at(1.05, x=1.6))
+    astray = flown(hovering(), spiral)
+    assert astray.mode is Mode.LAND and astray.blind and said(astray, Reason.NO_ODOMETRY)
+    assert "does not go where it is sent" in astray.reasons[0]
+    for begin in (lambda: flown(taking_off(), UP), lambda: flown(landing(), having(UP, pilot=LAND))):
+        assert flown(begin(), spiral).misled
+    assert flown(astray, UP, 0.5).blind  # not even back at its target
+    by_hand = flown(astray, having(spiral, override=False))
+    assert by_hand.mode is Mode.PILOT
+    assert flown(by_hand, spiral).blind  # handed over in the air
+    stands = flown(by_hand, having(spiral, override=False, odometry=at(x=1.6)), 0.1)
+    assert flown(stands, having(odometry=at(x=1.6))).mode is Mode.INIT
+    assert not flown(flown(astray, BLIND, blind_time(1.1) + 0.1), BLIND).misled
+
+
+def test_far_from_the_target_is_no_sign_as_long_as_it_comes_nearer() -> None:
+    fast = having(UP, odometry=at(1.05, x=-2.5, velocity=(4.0, 0, 0)))
+    flight = flown(flown(policy_flying(), having(AWAY, odometry=fast.odometry)), fast)
+    assert flight.mode is Mode.HOVER and flight.target is not None and flight.target.position[0] > -0.8
+    for x in (-2.0, -1.0, 0.0, 0.6):
+        flight = flown(flight, having(UP, odometry=at(1.05, x=x)))
+    assert flight.mode is Mode.HOVER
+
+
+def test_a_moment_on_its_side_is_no_crash() -> None:
+    flight = hovering()
+    for _ in range(10):
+        flight = flown(flight, having(UP, odometry=at(1.05, roll=1.3)), FALLEN_S - 2 * DT)
+        flight = flown(flight, having(UP, odometry=at(1.05, roll=1.3, velocity=(0, 0, -1))))
+    assert flight.mode is Mode.HOVER
+
+
 def test_odometry_lost_sinks_blind_and_found_lands_from_there() -> None:
     flight = flown(landing(), having(UP, pilot=LAND), 2.0)
     lost = flown(flight, BLIND)
@@ -441,7 +496,7 @@ def test_sticks_move_the_hover_in_the_heading_of_the_vehicle_and_no_farther_than
         np.testing.assert_allclose((*to.position, to.yaw), np.add((0.5, 0.5, 1.0, math.pi / 2), change), atol=1e-9)
     flight = hovering()
     for _ in range(100):
-        flight = flown(flight, having(UP, pilot=Pilot(Mission.HOVER, pitch=1.0, throttle=1.0)), 0.1)
+        flight = flown(flight, having(UP, pilot=Pilot(Mission.HOVER, pitch=1.0, throttle=1.0)), 0.1, ELSEWHERE)
     assert flight.target is not None
     assert flight.target.position == (SETTINGS.fence.high[0], 0.0, SETTINGS.fence.high[2])
 
@@ -586,6 +641,7 @@ def check_rules(before: Flight, flight: Flight, inputs: Inputs, inputs_before: I
     seen = inputs.odometry is not None and not inputs.odometry_problem and bool(
         np.isfinite(np.concatenate([inputs.odometry.position, inputs.odometry.velocity])).all()
     )  # fmt: skip
+    seen = seen and not flight.misled
     heard = not inputs.link_problem
     assert flight.mode is before.mode or flight.mode in EDGES[before.mode]
     assert flight.reasons or flight == Flight()

@@ -10,6 +10,7 @@ import numpy as np
 
 from e2efly.control import Ctbr, Vec3
 from e2efly.deploy import reckoning, state_machine
+from e2efly.deploy.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Pilot, Target
 from e2efly.deploy.goals import LandGoal
 from e2efly.deploy.hover import blind, blind_time, controlled, flight_gains, roll_pitch
 from e2efly.deploy.msp.client import Client
@@ -22,7 +23,6 @@ from e2efly.deploy.pose.source import PoseSource
 from e2efly.deploy.pose.tracking import Track, age, track
 from e2efly.deploy.runtime import Imu
 from e2efly.deploy.settings import FlightSettings
-from e2efly.deploy.state_machine import Flight, Inputs, Mission, Mode, Pilot, Target
 from e2efly.deploy.sticks import Sticks
 from e2efly.deploy.throttle_map import ThrottleHistory, ThrottleMap, update
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
@@ -164,7 +164,7 @@ class Bridge:
     @property
     def flying(self) -> bool:
         """Whether the vehicle may be in the air by this bridge's doing."""
-        return self.flight.mode in state_machine.AIRBORNE
+        return self.flight.mode in AIRBORNE
 
     @property
     def height(self) -> float:
@@ -368,7 +368,8 @@ class Bridge:
             if elapsed > blind_time(self.height, climb):
                 return "closed", None
             attitude, reckoned = self.client.message(Attitude.CODE, now, 0.5), self._reckoned
-            if attitude is not None and reckoned is not None and now - reckoned.time < reckoning.LONGEST_STEP:
+            known = reckoned is not None and now - reckoned.time < reckoning.LONGEST_STEP and not flight.misled
+            if attitude is not None and reckoned is not None and known:
                 return "blind", reckoning.settle(attitude, elapsed, reckoned.velocity)
             return "blind", blind(attitude, elapsed, climb)
         return "hover", self._hover(flight.target, odometry, dt)

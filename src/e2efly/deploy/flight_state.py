@@ -66,6 +66,7 @@ class Reason(StrEnum):
     POLICY = "policy"
     POLICY_DONE = "the policy's task is over"
     NOT_CLIMBING = "does not climb"
+    CRASHED = "lies on its side or its back"
     DEADLINES = "missed deadlines"
     GUARD = "would leave the fence"
     LANDED = "landed"
@@ -176,3 +177,9 @@ class Flight:
     """The mission switch must leave its policy position before the policy flies again."""
     still_since: float | None = None
     """Since when it has been still while landing, s."""
+    fallen_since: float | None = None
+    """Since when it has been still and far from level, s."""
+    nearest: float = math.inf
+    """How near the vehicle has come to the target in this mode, horizontally, m."""
+    misled: bool = False
+    """It went away from its target: until it stands, its odometry counts as lost."""

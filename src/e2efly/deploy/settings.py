@@ -76,6 +76,9 @@ class FlightSettings:
     """Still for so long, with the target well below: landed, s."""
     attitude_agreement: float = 0.2
     """Largest roll and pitch between the controller's estimate and the odometry before take-off, rad."""
+    follow_distance: float = 1.5
+    """A vehicle that flies so far away from its target, having been nearer, has odometry that is not its own: a wrong
+    heading, another vehicle's body, m."""
     fence: Fence = Fence()
     """Where policies may fly."""
     channels: PilotChannels = PilotChannels()
@@ -89,7 +92,7 @@ CHANNELS = (5, 18)
 _POSITIVE = (
     "takeoff_height", "takeoff_speed", "land_speed", "reposition_speed", "odometry_timeout", "link_timeout",
     "policy_timeout", "missed_deadlines", "lateness", "battery_low", "stick_deadband", "still_speed", "land_settle",
-    "attitude_agreement",
+    "attitude_agreement", "follow_distance",
 )  # fmt: skip
 
 

@@ -33,7 +33,13 @@ ON_GROUND = 0.25
 STANDING = 0.1
 """A still vehicle this near to the height at which it stood before stands there again, m."""
 SLOW = 0.5
-"""Horizontal speed below which a landing sinks, m/s."""
+"""Horizontal speed below which a landing sinks, m/s ..."""
+SLOWED_S = 3.0
+"""... or after so long: in a gust it may never be that slow, s."""
+MISLED = "the vehicle does not go where it is sent (wrong heading?)"
+"""Said of odometry that is not the vehicle's own."""
+FALLEN, FALLEN_SPEED, FALLEN_S = math.radians(60), 0.3, 0.5
+"""Nothing flies so far from level, so slowly, m/s, for so long, s: gravity alone would have made it faster."""
 LEAD = 0.6
 """How far the target of a landing may be under the vehicle, m: farther shows no more than that there is ground."""
 PRESSED = 0.5
@@ -51,20 +57,46 @@ def step(settings: FlightSettings, flight: Flight, inputs: Inputs, now: float) -
     """
     passed = now - flight.now if flight.now else 0.0
     dt = min(max(passed, 0.0), LONGEST_STEP)
-    jump, still = passed - dt, flight.still_since
+    jump = passed - dt
     policy = inputs.pilot is not None and inputs.pilot.mission is Mission.POLICY
     flight = dataclasses.replace(
         flight,
         now=now,
         since=flight.since + jump,
-        still_since=None if still is None else still + jump,
+        still_since=None if flight.still_since is None else flight.still_since + jump,
+        fallen_since=None if flight.fallen_since is None else flight.fallen_since + jump,
         rearm=flight.rearm and not _mission_low(inputs),
         lock=flight.lock and policy,
     )
+    flight = _watched(settings, flight, inputs)
+    if flight.misled:
+        inputs = dataclasses.replace(inputs, odometry_problem=MISLED)
     following = _common(flight, inputs) or _STEPS[flight.mode](settings, flight, inputs, dt)
     if (following.mode, following.blind) == (flight.mode, flight.blind):
         return following
-    return dataclasses.replace(following, since=now, still_since=None)
+    return dataclasses.replace(following, since=now, still_since=None, fallen_since=None, nearest=math.inf)
+
+
+def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
+    """Whether the vehicle follows the hover controller, and whether it has fallen over.
+
+    With a wrong heading the controller pushes to the wrong side, and the vehicle spirals outwards, ever faster. Nothing
+    on the ground shows it: the flight controller's own heading is not the odometry's.
+    """
+    if flight.mode in (Mode.INIT, Mode.DONE):
+        return dataclasses.replace(flight, misled=False, fallen_since=None)
+    odometry, target = inputs.seen, flight.target
+    if odometry is None:
+        return dataclasses.replace(flight, fallen_since=None)
+    fallen = tilt_of(odometry.quaternion) > FALLEN and float(np.linalg.norm(odometry.velocity)) < FALLEN_SPEED
+    fallen_since = (flight.now if flight.fallen_since is None else flight.fallen_since) if fallen else None
+    if target is None or flight.mode is Mode.PILOT:
+        misled = flight.misled and not _stands(settings, flight, odometry)
+        return dataclasses.replace(flight, fallen_since=fallen_since, misled=misled)
+    off = math.hypot(*np.subtract(target.position[:2], odometry.position[:2]).tolist())
+    nearest = min(flight.nearest, off)
+    misled = flight.misled or off > nearest + settings.follow_distance
+    return dataclasses.replace(flight, nearest=nearest, misled=misled, fallen_since=fallen_since)
 
 
 def _mission_low(inputs: Inputs) -> bool:
@@ -85,6 +117,8 @@ def _common(flight: Flight, inputs: Inputs) -> Flight | None:
         return None if flight.mode in (Mode.INIT, Mode.DONE) else _to(flight, Mode.DONE, Reason.DISARMED)
     if not inputs.override and (flight.mode in AIRBORNE or _left_the_ground(flight, inputs.seen)):
         return _to(flight, Mode.PILOT, Reason.OVERRIDE_OFF, target=_here(inputs))
+    if flight.mode in AIRBORNE and flight.fallen_since is not None and flight.now - flight.fallen_since >= FALLEN_S:
+        return _to(flight, Mode.DONE, Reason.CRASHED)
     return None
 
 
@@ -277,7 +311,8 @@ def _landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float
         return dataclasses.replace(flight, blind=False, target=_down_from(settings, odometry))
     x, y, z = flight.target.position
     height = float(odometry.position[2])
-    sink = settings.land_speed if float(np.linalg.norm(odometry.velocity[:2])) < SLOW else 0.0  # first it stops
+    stopped = float(np.linalg.norm(odometry.velocity[:2])) < SLOW or flight.now - flight.since > SLOWED_S
+    sink = settings.land_speed if stopped else 0.0
     down = max(z - sink * dt, height - LEAD)
     still = float(np.linalg.norm(odometry.velocity)) < settings.still_speed and height - down > PRESSED
     since = (flight.now if flight.still_since is None else flight.still_since) if still else None
@@ -309,10 +344,15 @@ def _with_pilot(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: fl
         return dataclasses.replace(flight, target=_here(inputs))
     if odometry is None:
         return _land(settings, flight, inputs, Reason.OVERRIDE_ON, inputs.blindness)
-    still = float(np.linalg.norm(odometry.velocity)) < settings.still_speed
-    if still and abs(float(odometry.position[2]) - flight.home) < STANDING:
+    if _stands(settings, flight, odometry):
         return _to(flight, Mode.INIT, Reason.OVERRIDE_ON, rearm=True)
     return _to(flight, Mode.HOVER, Reason.OVERRIDE_ON, target=here(odometry), lock=True)
+
+
+def _stands(settings: FlightSettings, flight: Flight, odometry: Odometry) -> bool:
+    """Whether it is still, at the height of its take-off."""
+    still = float(np.linalg.norm(odometry.velocity)) < settings.still_speed
+    return still and abs(float(odometry.position[2]) - flight.home) < STANDING
 
 
 def _done(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:

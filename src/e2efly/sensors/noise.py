@@ -18,11 +18,12 @@ def add_noise(noise: NoiseConfig, key: PRNGKeyArray, state: State) -> State:
     """The state as measured: Gaussian position, velocity and body rate; a small random turn of the attitude."""
     draw = jax.random.normal(key, (*state.position.shape[:-1], 12), state.position.dtype)
     half_turn = noise.attitude * draw[..., 6:9] / 2
-    turn = stack(jnp.ones_like(half_turn[..., 0]), *(half_turn[..., i] for i in range(3)))
+    # The turn is what is normalised, not the product: no noise then changes no bit of the attitude.
+    turn = normalize(stack(jnp.ones_like(half_turn[..., 0]), *(half_turn[..., i] for i in range(3))))
     return dataclasses.replace(
         state,
         position=state.position + noise.position * draw[..., 0:3],
         velocity=state.velocity + noise.velocity * draw[..., 3:6],
-        quaternion=normalize(multiply(state.quaternion, turn)),
+        quaternion=multiply(state.quaternion, turn),
         body_rate=state.body_rate + noise.body_rate * draw[..., 9:12],
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from e2efly.deploy.flight_log import read_log
-from e2efly.deploy.state_machine import Mode, Reason
+from e2efly.deploy.flight_state import Mode, Reason
 from e2efly.deploy.telemetry import Telemetry
 from e2efly.validate.faults import End, Fault
 from e2efly.validate.stage import FENCE, Stage, Trace

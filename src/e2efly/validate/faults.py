@@ -11,10 +11,10 @@ import numpy as np
 
 from e2efly.deploy.bridge import OUTLIERS_S
 from e2efly.deploy.fence import fence_problem
+from e2efly.deploy.flight_state import Mode, Reason
 from e2efly.deploy.msp.messages import BatteryState, FcVariant
 from e2efly.deploy.msp.settings import RcTuning, RxMap
 from e2efly.deploy.odometry import Odometry, Sample
-from e2efly.deploy.state_machine import Mode, Reason
 from e2efly.validate.stage import FENCE, LATENCY_S, POSE_S, SETTINGS, Stage
 
 RECEIVER_S = 0.05

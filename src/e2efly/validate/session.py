@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.bridge import Bridge, Log
+from e2efly.deploy.flight_state import Mode
 from e2efly.deploy.goals import Goal
 from e2efly.deploy.msp.client import SCHEDULE, Client
 from e2efly.deploy.msp.controller import identify
@@ -18,7 +19,6 @@ from e2efly.deploy.policy_worker import PolicyWorker
 from e2efly.deploy.pose.source import PlantSource
 from e2efly.deploy.runtime import Envelope, Runtime
 from e2efly.deploy.settings import Fence, FlightSettings
-from e2efly.deploy.state_machine import Mode
 from e2efly.deploy.sticks import sticks_of
 from e2efly.validate.rig import Rig
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from e2efly.deploy.check import examine, problems
 from e2efly.deploy.fence import tilt_of
+from e2efly.deploy.flight_state import Mode, Reason
 from e2efly.deploy.goals import Goal
 from e2efly.deploy.msp.link import open_link
 from e2efly.deploy.policy import Policy
 from e2efly.deploy.pose.source import PlantSource
 from e2efly.deploy.settings import Fence, FlightSettings
-from e2efly.deploy.state_machine import Mode, Reason
 from e2efly.validate.faulty import FaultyLink, FaultyNetwork, FaultyPoses
 from e2efly.validate.rig import Rig
 from e2efly.validate.session import Session
