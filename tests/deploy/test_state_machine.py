@@ -385,9 +385,16 @@ def test_far_from_the_target_is_no_sign_as_long_as_it_comes_nearer() -> None:
     fast = having(UP, odometry=at(1.05, x=-2.5, velocity=(4.0, 0, 0)))
     flight = flown(flown(policy_flying(), having(AWAY, odometry=fast.odometry)), fast)
     assert flight.mode is Mode.HOVER and flight.target is not None and flight.target.position[0] > -0.8
-    for x in (-2.0, -1.0, 0.0, 0.6):
-        flight = flown(flight, having(UP, odometry=at(1.05, x=x)))
+    for x in (-2.0, -1.0, 0.0, 1.5, 2.9):  # shoots past it
+        flight = flown(flight, having(UP, odometry=at(1.05, x=x, velocity=(4.0, 0, 0))))
     assert flight.mode is Mode.HOVER
+
+
+def test_the_pilots_stick_may_move_the_target_ahead_of_the_vehicle() -> None:
+    pulled = having(UP, pilot=Pilot(Mission.HOVER, pitch=1.0))
+    flight = flown(hovering(), pulled, 2.0)  # the vehicle hangs back, as in a wind
+    assert flight.mode is Mode.HOVER and flight.target is not None and flight.target.position[0] > 1.2
+    assert flown(flight, UP, 1.0).mode is Mode.HOVER
 
 
 def test_a_moment_on_its_side_is_no_crash() -> None:

@@ -180,6 +180,6 @@ class Flight:
     fallen_since: float | None = None
     """Since when it has been still and far from level, s."""
     nearest: float = math.inf
-    """How near the vehicle has come to the target in this mode, horizontally, m."""
+    """How near the vehicle has come to the target, horizontally, m; infinite until it was slow there once."""
     misled: bool = False
     """It went away from its target: until it stands, its odometry counts as lost."""

@@ -76,9 +76,9 @@ class FlightSettings:
     """Still for so long, with the target well below: landed, s."""
     attitude_agreement: float = 0.2
     """Largest roll and pitch between the controller's estimate and the odometry before take-off, rad."""
-    follow_distance: float = 1.5
-    """A vehicle that flies so far away from its target, having been nearer, has odometry that is not its own: a wrong
-    heading, another vehicle's body, m."""
+    follow_distance: float = 1.0
+    """A vehicle that flies so far away from its target, having come to rest nearer, has odometry that is not its own:
+    a wrong heading, another vehicle's body, m."""
     fence: Fence = Fence()
     """Where policies may fly."""
     channels: PilotChannels = PilotChannels()

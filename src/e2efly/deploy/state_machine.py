@@ -94,7 +94,8 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
         misled = flight.misled and not _stands(settings, flight, odometry)
         return dataclasses.replace(flight, fallen_since=fallen_since, misled=misled)
     off = math.hypot(*np.subtract(target.position[:2], odometry.position[:2]).tolist())
-    nearest = min(flight.nearest, off)
+    rests = math.isfinite(flight.nearest) or float(np.linalg.norm(odometry.velocity)) < SLOW
+    nearest = min(flight.nearest, off) if rests else math.inf
     misled = flight.misled or off > nearest + settings.follow_distance
     return dataclasses.replace(flight, nearest=nearest, misled=misled, fallen_since=fallen_since)
 
@@ -267,7 +268,9 @@ def _hover(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) 
             return _to(flight, Mode.POLICY, Reason.MISSION)
         flight = dataclasses.replace(flight, reasons=refusals)
     assert flight.target is not None
-    return dataclasses.replace(flight, target=moved(settings, flight.target, inputs.pilot, dt))
+    target = moved(settings, flight.target, inputs.pilot, dt)
+    nearest = flight.nearest if target.position[:2] == flight.target.position[:2] else math.inf
+    return dataclasses.replace(flight, target=target, nearest=nearest)
 
 
 def policy_refusals(settings: FlightSettings, flight: Flight, inputs: Inputs, odometry: Odometry) -> tuple[str, ...]:
