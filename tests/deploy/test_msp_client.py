@@ -60,6 +60,22 @@ def test_a_reply_is_kept_with_its_time_and_latency() -> None:
     assert client.request(108, 1.3)
 
 
+def test_half_a_reply_that_runs_together_with_the_next_is_not_believed_though_its_checksum_fits() -> None:
+    wire = Wire()
+    client = Client(wire)
+    client.poll(0.0)
+    first, second = encode(Frame(105, bytes(range(32)), REPLY)), encode(Frame(108, bytes(6), REPLY))
+    cut = first[:20] + second + second
+    body = cut[3 : 3 + 2 + 32]
+    check = 0
+    for byte in body:
+        check ^= byte
+    wire.inbox = cut[: 3 + 2 + 32] + bytes([check]) + second
+    client.poll(0.1)
+    assert client.run_together == 1
+    assert set(client.latest) == {108}
+
+
 def test_a_request_without_answer_is_given_up_and_can_be_asked_again() -> None:
     client = Client(Wire())
     client.poll(0.0)

@@ -237,8 +237,9 @@ def test_without_power_the_motors_stop_and_time_goes_on(tmp_path: Path) -> None:
         rig.set(override=True)
         bench.send(0.3, None)
         rig.set(armed=True)
-        bench.send(0.3, None)
-        bench.send(0.3, 0.5)
+        bench.send(0.5, None)
+        assert bench.armed
+        bench.send(0.5, 0.5)
         assert rig.state.velocity[2] > 0.1
         before = rig.now()
         rig.power(False)
@@ -249,6 +250,7 @@ def test_without_power_the_motors_stop_and_time_goes_on(tmp_path: Path) -> None:
         assert rig.now() >= before + 1.5
         rig.sleep(3.0)
         bench.client.poll(rig.now())
+        bench.client.link.close()
         again = Bench(rig)
         again.send(0.5, None)
         assert not again.armed  # a switch that was on before the boot arms nothing

@@ -445,7 +445,7 @@ class Bridge:
         if self.ticks % 50 == 0:
             c = self.client
             log.record("link", now, {
-                "timeouts": c.timeouts, "errors": c.decoder.bad_checksums + c.decoder.skipped,
+                "timeouts": c.timeouts, "errors": c.decoder.bad_checksums + c.decoder.skipped + c.run_together,
                 "reconnects": max(c.link.connections - 1, 0),
                 "round_trip": max((reply.latency for reply in c.latest.values()), default=None),
             })  # fmt: skip

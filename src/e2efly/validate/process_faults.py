@@ -93,10 +93,6 @@ class _Bridge:
     """`e2efly fly` as a process, and what it says."""
 
     def __init__(self, policy: Path, rig: RigClient, log: Path, limit: int | None) -> None:
-        def limited() -> None:
-            if limit is not None:
-                resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-
         options = ["--flight.battery-unknown", "--flight.takeoff-speed", "0.8", "--flight.land-speed", "0.6"]
         # a busy machine holds up the rig, too: not what is looked at here
         options += ["--flight.odometry-timeout", "0.6", "--flight.link-timeout", "1.5"]
@@ -105,10 +101,11 @@ class _Bridge:
             [*command, "--pose", f"udp:{rig.pose_port}", *options],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            preexec_fn=limited,
             text=True,
             env={**os.environ, "COLUMNS": "400", "PYTHONUNBUFFERED": "1"},
         )
+        if limit is not None:  # long before it has a log to write
+            resource.prlimit(self.process.pid, resource.RLIMIT_FSIZE, (limit, limit))
         self.said: list[str] = []
         self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._reader = threading.Thread(target=self._read, daemon=True)

@@ -81,9 +81,13 @@ class Stage:
         Raises:
             ValueError: for a controller that is refused outright.
         """
-        session = Session(
-            self.rig, SETTINGS, policy=self._policy, goal=self._goal, link=self.link, source=self.poses
-        )  # fmt: skip
+        try:
+            session = Session(
+                self.rig, SETTINGS, policy=self._policy, goal=self._goal, link=self.link, source=self.poses
+            )
+        except ValueError:
+            self.link.close()
+            raise
         vehicle, contract = self.rig.world.vehicle, self._policy.contract
         session.bridge.settings_problems = problems(examine(session.info, vehicle, SETTINGS, contract))
         self.session = session

@@ -39,6 +39,9 @@ at a time, whose answer tells which."""
 _UNKNOWN_REPLY = 64
 """Bytes that a reply of unknown length is taken to have."""
 _OVERHEAD = 6
+_STARTS = (b"$M>", b"$X>")
+"""Beginnings of replies. Inside a payload they tell of half a frame run together with the next one, whose checksum, of
+8 bits, happens to fit: it does once in 256."""
 
 
 class Reply(NamedTuple):
@@ -68,6 +71,8 @@ class Client:
     """Requests that got no answer in time, so far."""
     backlog: int = 0
     """Stick frames that the controller has not answered yet."""
+    run_together: int = 0
+    """Replies thrown away because another begins inside, so far."""
     decoder: Decoder = field(default_factory=Decoder)
     """Counts bad checksums and skipped bytes."""
     _asked: dict[int, float] = field(default_factory=dict)
@@ -116,6 +121,9 @@ class Client:
     def _take(self, frame: Frame, now: float) -> None:
         if frame.direction == REQUEST:
             return  # an echo, as of a line whose two wires touch
+        if any(start in frame.payload for start in _STARTS):
+            self.run_together += 1
+            return
         self._strike_off(frame.code)
         if frame.code == messages.SET_RAW_RC:
             self._rc_answered = now
