@@ -239,7 +239,7 @@ def test_without_power_the_motors_stop_and_time_goes_on(tmp_path: Path) -> None:
         rig.set(armed=True)
         bench.send(0.5, None)
         assert bench.armed
-        bench.send(0.5, 0.5)
+        bench.send(0.5, 0.7)
         assert rig.state.velocity[2] > 0.1
         before = rig.now()
         rig.power(False)

@@ -43,6 +43,9 @@ AFRESH_S = 1.0
 """After so long without a good pose, on the ground, tracking begins afresh, s."""
 OUTLIERS_S = 0.03
 """Poses are refused for so long before the odometry counts as lost, s: an outlier or two end no flight."""
+RC_PATIENCE = 1.2
+"""The pilot's channels may be so much older than the link's time-out: a lost link is to be told as one, whichever answer
+came last."""
 BEHIND = 50
 """Stick frames without an answer, for each second of the link's time-out, with which the link is too slow to fly by:
 half of the time-out at 100 Hz."""
@@ -203,7 +206,7 @@ class Bridge:
         patience = self.settings.link_timeout
         status = self.client.message(StatusEx.CODE, now, patience)
         active = status.active(self.info.box_ids) if status is not None else frozenset()
-        channels = self.client.message(Rc.CODE, now, patience)
+        channels = self.client.message(Rc.CODE, now, RC_PATIENCE * patience)
         attitude = self.client.message(Attitude.CODE, now, patience)
         problem = None
         if status is None:
