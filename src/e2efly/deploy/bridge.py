@@ -44,8 +44,8 @@ AFRESH_S = 1.0
 OUTLIERS_S = 0.03
 """Poses are refused for so long before the odometry counts as lost, s: an outlier or two end no flight."""
 RC_PATIENCE = 1.2
-"""The pilot's channels may be so much older than the link's time-out: a lost link is to be told as one, whichever answer
-came last."""
+"""The pilot's channels may be so much older than the link's time-out: a lost link is to be told as one, whichever
+answer came last."""
 BEHIND = 50
 """Stick frames without an answer, for each second of the link's time-out, with which the link is too slow to fly by:
 half of the time-out at 100 Hz."""
