@@ -2,13 +2,10 @@
 
 python benchmarks/firmware_faults.py [--times 5] [--only TEXT ...] [--policy policy.onnx] [--json FILE]
 
-`--policy` is a hover policy; left out, one is trained (some 10 s). Faults of the bridge's process fly in real time: let
-the machine be quiet. Exit status 1 when any ends otherwise than documented.
+`--policy` is a hover policy; left out, one is trained (some 10 s). Time is virtual: the figures do not depend on the
+machine. Exit status 1 when any ends otherwise than documented.
 """
 
-import math
-import os
-import subprocess
 import sys
 import tempfile
 import time
@@ -17,22 +14,16 @@ from pathlib import Path
 from typing import Any
 
 from common import arguments, table, write
+from fault_table import hover_policy, summary
 
 from e2efly.deploy.goal_options import GoalOptions, goal_for
 from e2efly.deploy.policy import load_policy
-from e2efly.validate import firmware, process_faults
+from e2efly.validate import firmware
 from e2efly.validate.fault_run import strike
 from e2efly.validate.faults import FAULTS
 from e2efly.validate.rig import Rig
 from e2efly.validate.stage import LATENCY_S, TARGET, Stage
 from e2efly.vehicles import load_vehicle
-
-
-def train(folder: Path) -> Path:
-    """A hover policy of the preset."""
-    command = [sys.executable, "-m", "e2efly", "train", "hover", "--out", str(folder), "--no-plots", "--device", "cpu"]
-    subprocess.run(command, env=os.environ, stdout=subprocess.DEVNULL, check=True)
-    return folder / "policy.onnx"
 
 
 def virtual(policy_file: Path, folder: Path, seed: int, only: list[str]) -> list[dict[str, Any]]:
@@ -61,47 +52,6 @@ def virtual(policy_file: Path, folder: Path, seed: int, only: list[str]) -> list
     return rows
 
 
-def real(policy: Path, folder: Path, seed: int, only: list[str]) -> list[dict[str, Any]]:
-    """Every fault of the bridge's process once, in real time."""
-    rows: list[dict[str, Any]] = []
-    for fault in process_faults.FAULTS:
-        if only and not any(text in f"bridge: {fault}" for text in only):
-            continue
-        try:
-            outcome = asdict(process_faults.strike(fault, policy, folder, seed))
-        except RuntimeError as error:
-            outcome = {"problems": [str(error)]}
-        rows.append({"seed": seed, **outcome, "fault": f"bridge: {fault}"})
-        print(seed, fault, outcome["problems"] or "ok", flush=True)
-    return rows
-
-
-def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One line a fault."""
-    lines = []
-    for name in dict.fromkeys(row["fault"] for row in rows):
-        mine = [row for row in rows if row["fault"] == name]
-
-        def worst(key: str, rows: list[dict[str, Any]] = mine) -> float:
-            known = [row[key] for row in rows if math.isfinite(row.get(key, math.nan))]
-            return max(known, default=math.nan)
-
-        def shown(value: float, digits: int) -> str:
-            return "" if math.isnan(value) else f"{value:.{digits}f}"
-
-        lines.append(
-            {
-                "fault": name,
-                "as documented": f"{sum(not row['problems'] for row in mine)} of {len(mine)}",
-                "time to react, s": shown(worst("reaction"), 3),
-                "allowed, s": shown(worst("allowed"), 3),
-                "touch, m/s": shown(worst("touch_speed"), 2),
-                "largest tilt, rad": shown(worst("largest_tilt"), 2),
-            }
-        )
-    return lines
-
-
 def main() -> None:
     """Fly, print a table, write JSON."""
     options = arguments(__doc__ or "", times=5, only=[""], policy=None)
@@ -110,10 +60,9 @@ def main() -> None:
     rows: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as text:
         folder = Path(text)
-        policy = Path(options.policy) if options.policy else train(folder / "hover")
+        policy = hover_policy(options.policy, folder)
         for seed in range(options.times):
             rows += virtual(policy, folder, seed, only)
-            rows += real(policy, folder, seed, only)
     lines = summary(rows)
     write("firmware_faults", options.json, {"table": lines, "faults": rows, "took_s": time.perf_counter() - began})
     print(table(lines))

@@ -63,6 +63,9 @@ class World:
             dt: a whole number of `STEP_S`.
             wind: (3,) world, m/s.
         """
+        standing = state.position[2] <= self.vehicle.feet_height and not (state.velocity.any() or state.body_rate.any())
+        if standing and not (motors.any() or state.rotor_speed.any()):
+            return state  # as it is for seconds after each boot
         steps = max(round(dt / STEP_S), 1)
         air = np.zeros(3) if wind is None else wind
         parts = (getattr(state, f.name) for f in fields_of(Body))

@@ -1,0 +1,45 @@
+"""Faults of the bridge's own process: killed, stopped, its disk full, while it flies the real firmware in real time.
+
+python benchmarks/process_faults.py [--times 5] [--policy policy.onnx] [--json FILE]
+
+Let the machine be quiet. `--policy` is a hover policy; left out, one is trained. Exit status 1 when any ends otherwise
+than documented.
+"""
+
+import sys
+import tempfile
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from common import arguments, table, write
+from fault_table import hover_policy, summary
+
+from e2efly.validate.process_faults import FAULTS, strike
+
+
+def main() -> None:
+    """Fly, print a table, write JSON."""
+    options = arguments(__doc__ or "", times=5, policy=None)
+    began = time.perf_counter()
+    rows: list[dict[str, Any]] = []
+    with tempfile.TemporaryDirectory() as text:
+        folder = Path(text)
+        policy = hover_policy(options.policy, folder)
+        for seed in range(options.times):
+            for fault in FAULTS:
+                try:
+                    outcome = asdict(strike(fault, policy, folder, seed))
+                except RuntimeError as error:
+                    outcome = {"problems": [str(error)]}
+                rows.append({"seed": seed, **outcome, "fault": f"bridge: {fault}"})
+                print(seed, fault, outcome["problems"] or "ok", flush=True)
+    lines = summary(rows)
+    write("process_faults", options.json, {"table": lines, "faults": rows, "took_s": time.perf_counter() - began})
+    print(table(lines))
+    sys.exit(any(row["problems"] for row in rows))
+
+
+if __name__ == "__main__":
+    main()
