@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from e2efly.deploy.flight_log import read_log
 from e2efly.deploy.goal_options import GoalOptions, goal_for
 from e2efly.deploy.policy import load_policy
@@ -25,4 +27,5 @@ def test_take_off_hover_policy_hover_land_by_switches_alone(policy_of: Callable[
     read = read_log(tmp_path / "flight.mcap")
     assert read.cut_off == ""
     assert tuple(m["mode"] for m in read["mode"].values) == flight.modes[1:]
-    assert len(read["policy"]) > 300
+    begins, ends = (read["mode"].stamp[i] / 1e9 for i in (2, 3))
+    assert len(read["policy"]) == pytest.approx((ends - begins) * policy.contract.control_rate_hz, abs=2)
