@@ -1,4 +1,4 @@
-"""The bridge in real time: `e2efly fly` on one core flies the real firmware on the rig, which has the other cores.
+"""The bridge in real time: `e2efly fly` on one core flies the real firmware on the rig, which uses all.
 
     python benchmarks/bridge_loop.py [--policy FILE] [--seconds 30] [--json FILE]
 
@@ -6,82 +6,42 @@ Lateness of the control steps and the policy's inference come from the flight's 
 truth. With `--seconds 600` it is the soak. Give the machine nothing else to do. Without --policy a hover is trained.
 """
 
-import json
 import os
-import socket
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from common import arguments, table, write
 
 from e2efly.deploy.flight_log import read_log
+from e2efly.validate.process_faults import BridgeProcess, RigClient, take_off
 
 TARGET = (0.0, 0.0, 2.0)
-
-
-class Rig:
-    """The rig's process and its control port."""
-
-    def __init__(self, core: str, pose_port: int) -> None:
-        command = ["taskset", "-c", core, sys.executable, "-m", "e2efly.validate.rig_process"]
-        self.process = subprocess.Popen(
-            [*command, "--pose-port", str(pose_port)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        assert self.process.stdout is not None
-        told = json.loads(self.process.stdout.readline())
-        self.link = told["link"]
-        self.file = socket.create_connection(("127.0.0.1", told["control"])).makefile("rw")
-
-    def tell(self, **changes: Any) -> dict[str, Any]:
-        """Move the pilot's sticks and switches; returns the true state."""
-        self.file.write(json.dumps(changes) + "\n")
-        self.file.flush()
-        return json.loads(self.file.readline())
 
 
 def main() -> None:
     """Fly, print the table, write the figures."""
     args = arguments(__doc__ or "", policy=None, seconds=30.0)
     cores = sorted(os.sched_getaffinity(0))
-    others = ",".join(map(str, cores[1:] or cores))
     with tempfile.TemporaryDirectory() as text:
         folder = Path(text)
         policy = Path(args.policy) if args.policy else folder / "run" / "policy.onnx"
         if not args.policy:
             train = [sys.executable, "-m", "e2efly", "train", "hover", "--out", str(policy.parent), "--no-plots"]
             subprocess.run(train, check=True, stdout=subprocess.DEVNULL)
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
-        rig, log = Rig(others, port), folder / "flight.mcap"
-        began = time.monotonic()
-        fly = subprocess.Popen([
-            "taskset", "-c", str(cores[0]), sys.executable, "-m", "e2efly", "fly", str(policy), "--link", rig.link,
-            "--pose", f"udp:{port}", "--log", str(log), "--flight.battery-unknown", "--flight.takeoff-height", "1.5",
-            "--goal.target", *map(str, TARGET),
-        ], stdout=subprocess.DEVNULL)  # fmt: skip
-        for wait, order in ((2.0, {"override": True}), (1.0, {"armed": True}), (1.5, {"mission": "hover"})):
-            time.sleep(wait)
-            rig.tell(**order)
-        time.sleep(8.0)
-        rig.tell(mission="policy")
-        time.sleep(3.0)
-        errors = []
-        end = time.monotonic() + args.seconds
-        while time.monotonic() < end:
-            time.sleep(0.1)
-            errors.append(float(np.linalg.norm(np.subtract(rig.tell()["position"], TARGET))))
-        rig.tell(mission="land")
-        time.sleep(9.0)
-        rig.tell(armed=False)
-        fly.terminate()
-        fly.wait(10)
-        rig.process.kill()
+        log, began = folder / "flight.mcap", time.monotonic()
+        with RigClient() as rig:
+            os.sched_setaffinity(0, cores[:1])
+            options = ("--flight.takeoff-height", "1.5", "--goal.target", *map(str, TARGET))
+            bridge = BridgeProcess(policy, rig, log, options=options)
+            os.sched_setaffinity(0, cores)
+            try:
+                errors = fly(rig, bridge, args.seconds)
+            finally:
+                bridge.close()
         print(f"flown for {time.monotonic() - began:.0f} s")
         content = read_log(log)
     timing, asked = content["timing"], content["policy"]
@@ -103,6 +63,24 @@ def main() -> None:
         "lateness_s": _figures(lateness), "work_s": _figures(work), "inference_s": _figures(inference),
         "not_in_log": content.cut_off,
     })  # fmt: skip
+
+
+def fly(rig: RigClient, bridge: BridgeProcess, seconds: float) -> list[float]:
+    """Take off, let the policy fly for `seconds`, land; the distances to the target, m."""
+    take_off(rig, bridge)
+    time.sleep(2.0)
+    rig.set(mission="policy")
+    bridge.wait_for("POLICY", 5.0)
+    time.sleep(3.0)
+    errors, end = [], time.monotonic() + seconds
+    while time.monotonic() < end:
+        time.sleep(0.1)
+        errors.append(float(np.linalg.norm(np.subtract(rig.set()["position"], TARGET))))
+    rig.set(mission="land")
+    bridge.wait_for("DONE", 20.0)
+    rig.set(armed=False)
+    bridge.end(10.0)
+    return errors
 
 
 def _figures(values: np.ndarray) -> list[float]:

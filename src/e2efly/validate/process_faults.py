@@ -89,16 +89,27 @@ class RigClient:
         return json.loads(self._lines.readline())
 
 
-class _Bridge:
+class BridgeProcess:
     """`e2efly fly` as a process, and what it says."""
 
-    def __init__(self, policy: Path, rig: RigClient, log: Path, limit: int | None) -> None:
-        options = ["--flight.battery-unknown", "--flight.takeoff-speed", "0.8", "--flight.land-speed", "0.6"]
+    def __init__(
+        self, policy: Path, rig: RigClient, log: Path, limit: int | None = None, options: tuple[str, ...] = ()
+    ) -> None:
+        """Start it.
+
+        Args:
+            policy: a policy.onnx.
+            rig: the world.
+            log: of the flight.
+            limit: bytes that a file may have; None: any.
+            options: more of the command's; they come last.
+        """
+        common = ["--flight.battery-unknown", "--flight.takeoff-speed", "0.8", "--flight.land-speed", "0.6"]
         # a busy machine holds up the rig, too: not what is looked at here
-        options += ["--flight.odometry-timeout", "0.6", "--flight.link-timeout", "1.5"]
+        common += ["--flight.odometry-timeout", "0.6", "--flight.link-timeout", "1.5"]
         command = [sys.executable, "-m", "e2efly", "fly", str(policy), "--link", rig.link, "--log", str(log)]
         self.process = subprocess.Popen(
-            [*command, "--pose", f"udp:{rig.pose_port}", *options],
+            [*command, "--pose", f"udp:{rig.pose_port}", *common, *options],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -170,17 +181,17 @@ def strike(fault: str, policy: Path, folder: Path, seed: int = 0) -> ProcessOutc
     log = folder / f"{fault.replace(' ', '_')}-{seed}.mcap"
     random = np.random.default_rng(seed)
     with RigClient(seed=seed) as rig:
-        bridge = _Bridge(policy, rig, log, LOG_LIMIT if fault == "disk full" else None)
+        bridge = BridgeProcess(policy, rig, log, LOG_LIMIT if fault == "disk full" else None)
         try:
             return _flight(fault, rig, bridge, log, float(random.uniform(0.5, 1.5)))
         finally:
             bridge.close()
 
 
-def _flight(fault: str, rig: RigClient, bridge: _Bridge, log: Path, moment: float) -> ProcessOutcome:
+def _flight(fault: str, rig: RigClient, bridge: BridgeProcess, log: Path, moment: float) -> ProcessOutcome:
     problems: list[str] = []
     reaction = allowed = math.nan
-    _take_off(rig, bridge)
+    take_off(rig, bridge)
     time.sleep(moment)
     if fault == "disk full":
         if not _log_stands(log):
@@ -218,7 +229,7 @@ def _flight(fault: str, rig: RigClient, bridge: _Bridge, log: Path, moment: floa
     )  # fmt: skip
 
 
-def _take_off(rig: RigClient, bridge: _Bridge) -> None:
+def take_off(rig: RigClient, bridge: BridgeProcess) -> None:
     """Hand over, arm, and hover; what a busy machine makes fail, the pilot tries again."""
     bridge.wait_for("INIT", START_S)
     rig.set(override=True)
