@@ -7,14 +7,13 @@ truth. With `--seconds 600` it is the soak. Give the machine nothing else to do.
 """
 
 import os
-import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
 from common import arguments, table, write
+from fault_table import hover_policy
 
 from e2efly.deploy.flight_log import read_log
 from e2efly.validate.process_faults import BridgeProcess, RigClient, take_off
@@ -28,10 +27,7 @@ def main() -> None:
     cores = sorted(os.sched_getaffinity(0))
     with tempfile.TemporaryDirectory() as text:
         folder = Path(text)
-        policy = Path(args.policy) if args.policy else folder / "run" / "policy.onnx"
-        if not args.policy:
-            train = [sys.executable, "-m", "e2efly", "train", "hover", "--out", str(policy.parent), "--no-plots"]
-            subprocess.run(train, check=True, stdout=subprocess.DEVNULL)
+        policy = hover_policy(args.policy, folder)
         log, began = folder / "flight.mcap", time.monotonic()
         with RigClient() as rig:
             os.sched_setaffinity(0, cores[:1])

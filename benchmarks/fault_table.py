@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from common import table, write
+
 
 def hover_policy(given: str | None, folder: Path) -> Path:
     """The policy given, or one of the hover preset, trained."""
@@ -16,6 +18,14 @@ def hover_policy(given: str | None, folder: Path) -> Path:
     command = [sys.executable, "-m", "e2efly", "train", "hover", "--out", str(run), "--no-plots", "--device", "cpu"]
     subprocess.run(command, env=os.environ, stdout=subprocess.DEVNULL, check=True)
     return run / "policy.onnx"
+
+
+def report(name: str, file: str | None, rows: list[dict[str, Any]], took: float) -> None:
+    """Write the figures, print the table, and end with status 1 when any row has problems."""
+    lines = summary(rows)
+    write(name, file, {"table": lines, "faults": rows, "took_s": took})
+    print(table(lines))
+    sys.exit(any(row["problems"] for row in rows))
 
 
 def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

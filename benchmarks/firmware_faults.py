@@ -6,15 +6,14 @@ python benchmarks/firmware_faults.py [--times 5] [--only TEXT ...] [--policy pol
 machine. Exit status 1 when any ends otherwise than documented.
 """
 
-import sys
 import tempfile
 import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from common import arguments, table, write
-from fault_table import hover_policy, summary
+from common import arguments
+from fault_table import hover_policy, report
 
 from e2efly.deploy.goal_options import GoalOptions, goal_for
 from e2efly.deploy.policy import load_policy
@@ -63,10 +62,7 @@ def main() -> None:
         policy = hover_policy(options.policy, folder)
         for seed in range(options.times):
             rows += virtual(policy, folder, seed, only)
-    lines = summary(rows)
-    write("firmware_faults", options.json, {"table": lines, "faults": rows, "took_s": time.perf_counter() - began})
-    print(table(lines))
-    sys.exit(any(row["problems"] for row in rows))
+    report("firmware_faults", options.json, rows, time.perf_counter() - began)
 
 
 if __name__ == "__main__":

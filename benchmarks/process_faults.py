@@ -6,15 +6,14 @@ Let the machine be quiet. `--policy` is a hover policy; left out, one is trained
 than documented.
 """
 
-import sys
 import tempfile
 import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from common import arguments, table, write
-from fault_table import hover_policy, summary
+from common import arguments
+from fault_table import hover_policy, report
 
 from e2efly.validate.process_faults import FAULTS, strike
 
@@ -35,10 +34,7 @@ def main() -> None:
                     outcome = {"problems": [str(error)]}
                 rows.append({"seed": seed, **outcome, "fault": f"bridge: {fault}"})
                 print(seed, fault, outcome["problems"] or "ok", flush=True)
-    lines = summary(rows)
-    write("process_faults", options.json, {"table": lines, "faults": rows, "took_s": time.perf_counter() - began})
-    print(table(lines))
-    sys.exit(any(row["problems"] for row in rows))
+    report("process_faults", options.json, rows, time.perf_counter() - began)
 
 
 if __name__ == "__main__":

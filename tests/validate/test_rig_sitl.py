@@ -43,6 +43,13 @@ class Bench:
             self.client.poll(self.rig.now())
             self.client.set_raw_rc(set_raw_rc(channels), self.rig.now())
 
+    def arm(self) -> None:
+        """Hand over, and arm."""
+        self.rig.set(override=True)
+        self.send(0.3, None)
+        self.rig.set(armed=True)
+        self.send(0.5, None)
+
     def said(self, kind: type) -> object:
         message = self.client.message(kind.CODE, self.rig.now(), 0.2)  # type: ignore[attr-defined]
         assert message is not None
@@ -68,10 +75,7 @@ def bench(standing: Bench) -> Iterator[Bench]:
     """On the ground, armed, in override, throttle closed; afterwards disarmed."""
     rig = standing.rig
     rig.state = rig.world.at_rest()
-    rig.set(override=True)
-    standing.send(0.3, None)
-    rig.set(armed=True)
-    standing.send(0.3, None)
+    standing.arm()
     yield standing
     rig.held = False
     rig.set(armed=False)
@@ -183,10 +187,7 @@ def test_under_override_the_last_sticks_are_held_though_msp_is_silent(
     monkeypatch.setattr(rig_module, "prepare", lambda sitl: prepare(sitl, chosen))
     with Rig(firmware.build(), tmp_path, VEHICLE) as rig:
         bench = Bench(rig)
-        rig.set(override=True)
-        bench.send(0.3, None)
-        rig.set(armed=True)
-        bench.send(0.3, None)
+        bench.arm()
         idle = rig.sitl.motors().mean()
         bench.send(0.5, 0.15, (0.0, 0.0, 0.3))
         sent = bench.said(Rc)
@@ -234,10 +235,7 @@ def test_two_at_once_have_ports_of_their_own_and_move_alike(tmp_path: Path) -> N
 def test_without_power_the_motors_stop_and_time_goes_on(tmp_path: Path) -> None:
     with Rig(firmware.build(), tmp_path, VEHICLE) as rig:
         bench = Bench(rig)
-        rig.set(override=True)
-        bench.send(0.3, None)
-        rig.set(armed=True)
-        bench.send(0.5, None)
+        bench.arm()
         assert bench.armed
         bench.send(0.5, 0.7)
         assert rig.state.velocity[2] > 0.1
