@@ -9,11 +9,13 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from e2efly.control import Ctbr
-from e2efly.deploy.bridge import CLOSED, Bridge, Log
+from e2efly.deploy.bridge import Bridge
 from e2efly.deploy.clock import MONOTONIC, Clock
 from e2efly.deploy.flight_state import Mode
 from e2efly.deploy.hover import blind, blind_time, sink_time
+from e2efly.deploy.instruments import CLOSED
 from e2efly.deploy.msp.controller import ControllerInfo
+from e2efly.deploy.record import Log
 from e2efly.deploy.watchdog import Plan, WatchedLink
 
 LOWEST_RATE = 100.0

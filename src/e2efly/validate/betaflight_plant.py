@@ -52,7 +52,7 @@ class BetaflightPlant:
             if not self._session.take_off(4.0):
                 raise OSError(f"the firmware does not take off: {self._bridge.flight.reasons}")
         except BaseException:
-            self._rig.sitl.close()
+            self._rig.close()
             raise
 
     @property
@@ -98,7 +98,7 @@ class BetaflightPlant:
     def close(self) -> None:
         """End the firmware."""
         self._session.close()
-        self._rig.sitl.close()
+        self._rig.close()
         self._folder.cleanup()
 
     def _frame(self, channels: tuple[int, ...], dt: float) -> None:

@@ -24,7 +24,7 @@ START_S = 60.0
 """How long a process may take to be ready on a busy machine, s."""
 FLIGHT_S = 40.0
 """How long each part of a flight may take on a busy machine, s."""
-LOG_LIMIT = 150_000
+LOG_LIMIT = 400_000
 """Bytes that a full disk takes."""
 FAULTS = ("killed", "stopped", "disk full")
 """SIGKILL, SIGSTOP and a limit of the size of files."""

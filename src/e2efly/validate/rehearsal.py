@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from e2efly.deploy.bridge import Log
 from e2efly.deploy.flight_state import Mode, Reason
 from e2efly.deploy.goals import GatesGoal, Goal, HoverGoal, LandGoal, ReferenceGoal
 from e2efly.deploy.policy import Policy
+from e2efly.deploy.record import Log
 from e2efly.validate.firmware import Firmware
 from e2efly.validate.rig import Rig
 from e2efly.validate.session import Flown, Session, rehearsal_settings

@@ -9,13 +9,14 @@ import shutil
 import socket
 import time
 from collections import deque
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from e2efly.deploy.odometry import Sample
-from e2efly.device import compute_at_once
+from e2efly.device import compute_at_once, one_core
 from e2efly.validate.firmware import Firmware, firmware_folder
 from e2efly.validate.sitl import FirmwareState, Sitl
 from e2efly.validate.world import Body, World
@@ -84,7 +85,7 @@ class Transmitter:
 
 
 class Rig:
-    """One firmware in its world. Use it as a context manager.
+    """One firmware in its world. Use it as a context manager: inside, the thread and the firmware share one core.
 
     Time is virtual; with `real_time` it keeps pace with the machine's clock, as for a bridge in another process.
     """
@@ -104,6 +105,7 @@ class Rig:
         self.sitl = Sitl(firmware, folder, virtual_time=True)
         self.world = World(vehicle)
         self.state: Body = self.world.at_rest()
+        self.world.advance(self.state, np.ones(4), STEP_S)  # compiled while it has all cores
         self.transmitter = Transmitter()
         self.latency = latency
         """Age of the poses when they are delivered, s."""
@@ -118,16 +120,28 @@ class Rig:
         self._epoch = 0.0
         self._on = True
         self._noise = np.random.default_rng(seed)
+        self._open = ExitStack()
 
     def __enter__(self) -> "Rig":
         self.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.sitl.close()
+        self.close()
 
     def start(self) -> None:
-        """Start the firmware with `SETTINGS` and wait until it can be armed."""
+        """Start the firmware with `SETTINGS` and wait until it can be armed; `close`, in the same thread, ends it."""
+        with ExitStack() as opened:
+            opened.callback(self.sitl.close)
+            opened.enter_context(one_core())
+            self._boot()
+            self._open = opened.pop_all()
+
+    def close(self) -> None:
+        """End the firmware."""
+        self._open.close()
+
+    def _boot(self) -> None:
         prepare(self.sitl)
         self.sitl.start()
         self._next_pose = self._next_rc = self.now()

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.deploy.bridge import Bridge, Log
+from e2efly.deploy.bridge import Bridge
 from e2efly.deploy.flight_state import Mode
 from e2efly.deploy.goals import Goal
 from e2efly.deploy.msp.client import SCHEDULE, Client
@@ -17,6 +17,7 @@ from e2efly.deploy.msp.link import Link, open_link
 from e2efly.deploy.policy import Policy
 from e2efly.deploy.policy_worker import PolicyWorker
 from e2efly.deploy.pose.source import PlantSource
+from e2efly.deploy.record import Log
 from e2efly.deploy.runtime import Envelope, Runtime
 from e2efly.deploy.settings import Fence, FlightSettings
 from e2efly.deploy.sticks import sticks_of

@@ -6,6 +6,7 @@ import socket
 import struct
 import subprocess
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,6 +78,7 @@ class Sitl:
         self._process: subprocess.Popen | None = None
         self._motors = np.zeros(4)
         self._clock: mmap.mmap | None = None
+        self._go = self._poke = self._done = -1
         folder.mkdir(parents=True, exist_ok=True)
         self._out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._in = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -107,12 +109,18 @@ class Sitl:
             OSError: when it ends or does not listen within `BOOT_S`.
         """
         environment = {**os.environ, "LD_PRELOAD": str(self.firmware.shim), "E2EFLY_SITL_BASE": str(self.base)}
+        theirs: tuple[int, ...] = ()
         if self.virtual_time:
             path = self.folder / "clock"
             path.write_bytes(bytes(4096))
             with path.open("r+b") as file:
                 self._clock = mmap.mmap(file.fileno(), 4096)
-            environment["E2EFLY_SITL_CLOCK"] = str(path)
+            (go, self._go), (poke, self._poke), (self._done, done) = os.pipe(), os.pipe(), os.pipe()
+            theirs = (go, poke, done)
+            environment |= {
+                "E2EFLY_SITL_CLOCK": str(path), "E2EFLY_SITL_GO": str(go), "E2EFLY_SITL_POKE": str(poke),
+                "E2EFLY_SITL_DONE": str(done),
+            }  # fmt: skip
             self._booted = self.time
         output = self.folder / "output.txt"
         with output.open("wb") as log:
@@ -123,10 +131,13 @@ class Sitl:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
+                pass_fds=theirs,
             )
-        end = time.monotonic() + BOOT_S
+        for end in theirs:
+            os.close(end)
+        latest = time.monotonic() + BOOT_S
         while b"bind port" not in (text := output.read_bytes()):  # looking by a connection would take its only place
-            if not self.alive or time.monotonic() > end:
+            if not self.alive or time.monotonic() > latest:
                 raise OSError(
                     f"the Betaflight SITL in {self.folder} does not start:\n{text[-500:].decode(errors='replace')}"
                 )
@@ -141,6 +152,10 @@ class Sitl:
             self._process.kill()
             self._process.wait()
             self._process = None
+        for end in (self._go, self._poke, self._done):
+            if end >= 0:
+                os.close(end)
+        self._go = self._poke = self._done = -1
         self._motors = np.zeros(4)
 
     def close(self) -> None:
@@ -166,13 +181,8 @@ class Sitl:
         )
         seen = self._shared()[3] if self.virtual_time else 0
         self._out.sendto(packet, ("127.0.0.1", self.base + 2))
-        if self.virtual_time:
-            looks = 0
-            while self._shared()[3] == seen:
-                looks += 1
-                if looks % 1000 == 0 and not self.alive:
-                    return
-                time.sleep(0)
+        while self.virtual_time and self._shared()[3] == seen and self._told():
+            pass
 
     def send_rc(self, channels: np.ndarray) -> None:
         """What the pilot's receiver says: 16 channels in us."""
@@ -191,23 +201,27 @@ class Sitl:
         assert self._clock is not None
         horizon = round((self.time - self._booted) * 1e9)
         struct.pack_into("<Q", self._clock, 0, horizon)
-        looks = 0
-        while self._shared()[2] <= horizon:
-            looks += 1
-            if looks % 1000 == 0 and not self.alive:
-                return
-            time.sleep(0)
+        self._write(self._go)
+        while self._shared()[2] <= horizon and self._told():
+            pass
+
+    def _write(self, pipe: int) -> None:
+        with suppress(BrokenPipeError):  # it has ended
+            os.write(pipe, b"\0")
+
+    def _told(self) -> bool:
+        """Wait until the firmware has something to tell; False: it has ended."""
+        return bool(os.read(self._done, 64))
 
     def exchange(self) -> None:
         """With virtual time: wait until the firmware has read what was sent to it, and sent what it has to say."""
-        if not self.virtual_time:
+        if not self.virtual_time or self._process is None:
             return
-        seen, looks = self._shared()[4], 0
-        while self._shared()[4] < seen + 2:
-            looks += 1
-            if looks % 1000 == 0 and not self.alive:
-                return
-            time.sleep(0)
+        for _ in range(2):  # it reads in the first round and writes in the second
+            seen = self._shared()[4]
+            self._write(self._poke)
+            while self._shared()[4] == seen and self._told():
+                pass
 
     def motors(self) -> np.ndarray:
         """(4,) the newest motor outputs, 0 to 1: rear right, front right, rear left, front left."""

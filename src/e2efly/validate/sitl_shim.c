@@ -4,6 +4,12 @@
  *                        loopback interface only, so that many run side by side and none is seen from outside.
  * E2EFLY_SITL_CLOCK=FILE makes time virtual: the firmware's clock stops at a horizon that the simulator moves on, so
  *                        that a flight does not depend on how fast or busy the machine is.
+ * E2EFLY_SITL_GO=FD      where the simulator writes a byte when it has moved the horizon.
+ * E2EFLY_SITL_POKE=FD    where it writes a byte to have the network thread come round.
+ * E2EFLY_SITL_DONE=FD    where a byte is written when the horizon is reached, when a vehicle state was taken in, and
+ *                        when the network thread has come round.
+ *
+ * Each waits for the other in read(2): one flight keeps one core busy, and an idle one none.
  */
 #define _GNU_SOURCE
 #include <arpa/inet.h>
@@ -24,7 +30,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { CALL_NS = 200, SELECT_US = 100, STATE_BYTES = 144, EAGER_LOOKS = 40 };
+enum { CALL_NS = 200, SELECT_US = 1000, STATE_BYTES = 144 };
 
 /* Shared with the simulator; all in ns or counts. */
 struct shared {
@@ -32,13 +38,13 @@ struct shared {
     _Atomic uint64_t now;     /* the firmware's time */
     _Atomic uint64_t waiting; /* the time beyond the horizon that its main thread waits for; 0 while it runs */
     _Atomic uint64_t states;  /* vehicle states that the firmware has taken in */
-    _Atomic uint64_t rounds;  /* of its network thread: after two, what was sent before has been read */
+    _Atomic uint64_t rounds;  /* of its network thread since it was poked: it has read what was sent before */
 };
 
 static struct shared *shared;
-static int base;
+static int base, go, poke, done;
 static _Atomic int listening;
-static _Thread_local int took_state, network;
+static _Thread_local int took_state, network, poked;
 
 static ssize_t (*next_sendto)(int, const void *, size_t, int, const struct sockaddr *, socklen_t);
 static ssize_t (*next_recvfrom)(int, void *, size_t, int, struct sockaddr *, socklen_t *);
@@ -63,7 +69,17 @@ __attribute__((constructor)) static void start(void)
         if (map == MAP_FAILED) _exit(97);
         shared = map;
         close(fd);
+        go = atoi(getenv("E2EFLY_SITL_GO"));
+        poke = atoi(getenv("E2EFLY_SITL_POKE"));
+        done = atoi(getenv("E2EFLY_SITL_DONE"));
     }
+}
+
+/* Tell the simulator; it is gone if that fails. */
+static void tell(void)
+{
+    while (write(done, "", 1) < 0)
+        if (errno != EINTR) _exit(98);
 }
 
 static int moved(int port)
@@ -115,39 +131,56 @@ int listen(int fd, int backlog)
     return result;
 }
 
-/* A thread that asks for more has dealt with what it got. With virtual time nobody waits long in real time. */
+/* A thread that asks for more has dealt with what it got. The network thread waits for the simulator's poke, too. */
 int select(int count, fd_set *readable, fd_set *writable, fd_set *odd, struct timeval *timeout)
 {
     struct timeval brief = {0, SELECT_US};
     if (shared && took_state) {
         took_state = 0;
         atomic_fetch_add(&shared->states, 1);
+        tell();
     }
     if (count <= 1) network = 1;
-    if (shared && network) atomic_fetch_add(&shared->rounds, 1);
+    if (poked) {
+        poked = 0;
+        atomic_fetch_add(&shared->rounds, 1);
+        tell();
+    }
     if (count <= 1) { /* the network thread, before any port is open: it throws away one that is just being opened */
         const struct timespec pause = {0, 5000000};
         while (!atomic_load(&listening)) syscall(SYS_nanosleep, &pause, NULL);
         syscall(SYS_nanosleep, &pause, NULL);
     }
-    if (shared && timeout && (timeout->tv_sec || timeout->tv_usec > SELECT_US)) timeout = &brief;
-    return next_select(count, readable, writable, odd, timeout);
+    if (!shared || !network || !readable || count <= 1) return next_select(count, readable, writable, odd, timeout);
+    if (timeout && (timeout->tv_sec || timeout->tv_usec > SELECT_US)) timeout = &brief;
+    FD_SET(poke, readable);
+    int ready = next_select(count > poke ? count : poke + 1, readable, writable, odd, timeout);
+    if (ready > 0 && FD_ISSET(poke, readable)) {
+        char byte;
+        FD_CLR(poke, readable);
+        ready--;
+        poked = read(poke, &byte, 1) == 1;
+    }
+    return ready;
 }
 
 static int main_thread(void)
 {
-    return syscall(SYS_gettid) == getpid();
+    static _Thread_local enum { UNKNOWN, YES, NO } answer; /* asked some 600 times a step of 2 ms */
+    if (answer == UNKNOWN) answer = syscall(SYS_gettid) == getpid() ? YES : NO;
+    return answer == YES;
 }
 
 /* Only the main thread moves time on: a little with each look at the clock, as looking costs time on a real one too. */
 static uint64_t advance(uint64_t by)
 {
-    const struct timespec brief = {0, 5000}, longer = {0, 200000};
-    int looks = 0;
+    char byte;
     uint64_t now = atomic_load(&shared->now) + by;
     while (now > atomic_load(&shared->horizon)) {
         atomic_store(&shared->waiting, now);
-        syscall(SYS_nanosleep, ++looks < EAGER_LOOKS ? &brief : &longer, NULL); /* an idle world costs little */
+        tell();
+        while (read(go, &byte, 1) < 0)
+            if (errno != EINTR) _exit(98);
     }
     atomic_store(&shared->waiting, 0);
     atomic_store(&shared->now, now);

@@ -21,6 +21,8 @@ from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 STEP_S = 0.001
 """Length of a step of the rigid body, s."""
+_PROGRAMS: dict[str, Any] = {}
+"""By the vehicle's hash: compiling takes a second, which the next world of the same vehicle need not wait for."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,7 @@ class World:
                 [after.position, after.velocity, after.quaternion, after.body_rate, after.rotor_speed]
             )
 
-        return jax.jit(run, static_argnums=1)
+        return _PROGRAMS.setdefault(vehicle.hash, jax.jit(run, static_argnums=1))
 
     def sensed(self, before: Body, after: Body, dt: float) -> FirmwareState:
         """What gyroscope and accelerometer say after a step of `dt` s."""

@@ -1,0 +1,177 @@
+"""What the flight controller says of itself, its pilot and its battery, read at each control step."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from e2efly.deploy.flight_state import Mission, Pilot
+from e2efly.deploy.msp.client import Client
+from e2efly.deploy.msp.controller import ControllerInfo
+from e2efly.deploy.msp.messages import Attitude, BatteryState, Rc, StatusEx
+from e2efly.deploy.settings import FlightSettings, PilotChannels
+
+ARM, FAILSAFE, OVERRIDE = 0, 27, 50
+"""Permanent ids of Betaflight's modes."""
+MEDDLING = {1: "ANGLE", 2: "HORIZON", 3: "ALTHOLD", 6: "HEADFREE", 11: "POS HOLD", 46: "GPS RESCUE", 47: "ACRO TRAINER"}
+"""Modes in which sticks do not mean body rates, by permanent id."""
+RECEIVER_LOST = frozenset({"RXLOSS", "FAILSAFE"})
+"""Reasons against arming by which the controller tells that it does not hear the pilot."""
+VOLTAGE_SHARE = 0.4
+"""Weight of a new battery reading: a moment's sag under full throttle is no empty battery."""
+RC_PATIENCE = 1.2
+"""The pilot's channels may be so much older than the link's time-out: a lost link is to be told as one, whichever
+answer came last."""
+BEHIND = 50
+"""Stick frames without an answer, for each second of the link's time-out, with which the link is too slow to fly by:
+half of the time-out at 100 Hz."""
+BATTERY_PATIENCE_S = 3.0
+"""The battery's voltage may be so old, s."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What was known of the flight controller at a control step."""
+
+    link_problem: str | None
+    """Why it is not heard."""
+    armed: bool
+    override: bool
+    """It takes its sticks from here."""
+    pilot: Pilot | None
+    """None: it does not hear the receiver."""
+    voltage: float | None
+    """Of a cell, V; None: it does not know it."""
+    meddling: tuple[str, ...]
+    """The modes in which the sticks that are sent would be no body rates, in words."""
+    channels: Rc | None
+    """The sticks that it flies by."""
+    attitude: Attitude | None
+    fresh: dict[int, Any]
+    """The replies that came since the reading before, by code."""
+
+
+@dataclass
+class Instruments:
+    """Reads one flight controller."""
+
+    client: Client
+    settings: FlightSettings
+    _seen: dict[int, float] = field(default_factory=dict)
+    _voltage: float | None = None
+
+    def read(self, now: float, info: ControllerInfo, *, land: bool) -> Reading:
+        """What the answers say that have come until `now` s.
+
+        Args:
+            now: on the client's clock, s.
+            info: of the controller: it tells which modes are on.
+            land: the operator asks for a landing, as the pilot does by the mission switch.
+        """
+        fresh = self._fresh()
+        if (battery := fresh.get(BatteryState.CODE)) is not None:
+            self._measure(battery.message)
+        patience = self.settings.link_timeout
+        status: StatusEx | None = self.client.message(StatusEx.CODE, now, patience)
+        active = status.active(info.box_ids) if status is not None else frozenset()
+        channels: Rc | None = self.client.message(Rc.CODE, now, RC_PATIENCE * patience)
+        meddling = tuple(f"{MEDDLING[box]} is on: sticks are no body rates" for box in MEDDLING.keys() & active)
+        heard = FAILSAFE not in active and not (status is not None and RECEIVER_LOST & set(status.arming_disabled))
+        battery_known = self.client.message(BatteryState.CODE, now, BATTERY_PATIENCE_S) is not None
+        return Reading(
+            link_problem=self._link_problem(status),
+            armed=ARM in active,
+            override=OVERRIDE in active,
+            pilot=pilot_of(channels, self.settings.channels, land=land) if heard and channels is not None else None,
+            voltage=self._voltage if battery_known else None,
+            meddling=meddling if OVERRIDE in active else (),
+            channels=channels,
+            attitude=self.client.message(Attitude.CODE, now, patience),
+            fresh=fresh,
+        )
+
+    def _fresh(self) -> dict[int, Any]:
+        fresh = {}
+        for code, reply in self.client.latest.items():
+            if self._seen.get(code) != reply.time:
+                self._seen[code] = reply.time
+                fresh[code] = reply
+        return fresh
+
+    def _link_problem(self, status: StatusEx | None) -> str | None:
+        patience, link = self.settings.link_timeout, self.client.link
+        if status is None:
+            return link.reason if not link.alive else f"no answer within {patience:g} s"
+        if self.client.backlog > BEHIND * patience:
+            return f"it is behind by {self.client.backlog} stick frames (set serial_update_rate_hz=1000)"
+        return None
+
+    def _measure(self, battery: BatteryState) -> None:
+        """Smooth the voltage of a cell."""
+        if not (battery.cells and battery.voltage):
+            self._voltage = None
+            return
+        cell = battery.voltage / battery.cells
+        self._voltage = cell if self._voltage is None else self._voltage + VOLTAGE_SHARE * (cell - self._voltage)
+
+
+def pilot_of(rc: Rc, places: PilotChannels, *, land: bool) -> Pilot | None:
+    """What the pilot wants; None where the mission switch is not there: nobody's will is known.
+
+    Args:
+        rc: the receiver's channels.
+        places: where the copies of the sticks and the mission switch are.
+        land: a landing is asked for, whatever the switch says.
+    """
+    if places.mission > len(rc.channels):
+        return None
+
+    def pulse(channel: int) -> int:
+        return rc.channels[channel - 1] if channel <= len(rc.channels) else 1500
+
+    def stick(channel: int | None) -> float:
+        return 0.0 if channel is None else max(-1.0, min(1.0, (pulse(channel) - 1500) / 500))
+
+    at = pulse(places.mission)
+    mission = Mission.LAND if at < 1300 or land else Mission.POLICY if at > 1700 else Mission.HOVER
+    return Pilot(mission, stick(places.roll), stick(places.pitch), stick(places.throttle), stick(places.yaw))
+
+
+PROBE = (20, 40, 60)
+"""How far off centre roll, pitch and yaw are sent before arming, to see where each goes, us."""
+CLOSED = 1000
+"""The throttle channel that lets the controller arm, us."""
+PROBE_S = 0.5
+"""So long after the override has come on the sticks must be seen where they were sent, s."""
+
+
+@dataclass
+class ChannelProbe:
+    """Until it is armed, the sticks are sent apart by `PROBE`: does the controller take each for what it is?"""
+
+    seen: bool = False
+    """It does."""
+    _since: float | None = None
+    """When they were first looked for."""
+
+    def look(self, now: float, reading: Reading, centre: int, *, grounded: bool) -> tuple[str, ...]:
+        """What is wrong with the channels, in words.
+
+        Args:
+            now: s.
+            reading: of this control step.
+            centre: of the sticks, us.
+            grounded: no flight has begun; the override going off then asks for a new look.
+        """
+        if self.seen or not reading.override:
+            self.seen = self.seen and (reading.override or not grounded)
+            self._since = None
+            return ()
+        self._since = now if self._since is None else self._since
+        sent = [centre + offset for offset in PROBE] + [CLOSED]
+        got = list(reading.channels.channels[:4]) if reading.channels is not None else None
+        self.seen = got is not None and all(abs(a - b) <= 1 for a, b in zip(sent, got, strict=True))
+        if self.seen or now - self._since < PROBE_S:
+            return ()
+        return (
+            f"roll, pitch, yaw, throttle were sent as {sent} us and taken as {got}; needed: the same "
+            "(msp_override_channels_mask 15, rxrange as it comes; switch override on before arming)",
+        )
