@@ -19,12 +19,12 @@ demo: $(READY)
 	@echo "                   $(BIN)/e2efly train land --algo bptt (exact gradients through the physics)"
 	@echo "                   $(BIN)/e2efly list                   (tasks, vehicles, tracks, reward terms)"
 
-# The tests that fly the real firmware have both cores to themselves: the firmware and its world run in step.
-SITL := $(shell find tests -name 'test_*_sitl.py')
+# What runs in real time, in several processes, has both cores to itself.
+REAL_TIME := tests/validate/test_process_faults_sitl.py
 
 test: $(TEST_READY) lint
-	$(BIN)/python -m pytest -n 2 --dist loadfile $(addprefix --ignore=,$(SITL))
-	$(BIN)/python -m pytest $(SITL)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --ignore=$(REAL_TIME)
+	$(BIN)/python -m pytest $(REAL_TIME)
 
 lint: $(TEST_READY)
 	$(BIN)/ruff check .

@@ -102,7 +102,7 @@ class Rig:
         seed: int = 0,
     ) -> None:
         compute_at_once()
-        self.sitl = Sitl(firmware, folder, virtual_time=True)
+        self.sitl = Sitl(firmware, folder)
         self.world = World(vehicle)
         self.state: Body = self.world.at_rest()
         self.world.advance(self.state, np.ones(4), STEP_S)  # compiled while it has all cores
@@ -247,11 +247,10 @@ def _type(sitl: Sitl, settings: tuple[str, ...]) -> None:
     """
 
     def run(seconds: float) -> None:
-        if sitl.virtual_time:
-            for _ in range(round(seconds / STEP_S)):
-                sitl.send_state(_RESTING)
-                sitl.advance(STEP_S)
-        time.sleep(0.02 if sitl.virtual_time else seconds)
+        for _ in range(round(seconds / STEP_S)):
+            sitl.send_state(_RESTING)
+            sitl.advance(STEP_S)
+        sitl.exchange()
 
     run(1.0)
     with socket.create_connection(("127.0.0.1", sitl.base + 4), timeout=5.0) as line:

@@ -66,14 +66,14 @@ class FirmwareState:
 class Sitl:
     """One firmware process, in a folder of its own that holds its settings.
 
-    Its time is real, or virtual: then it runs only inside `advance`. Use it as a context manager.
+    Its time is virtual: it runs only inside `advance`. Use it as a context manager.
     """
 
-    def __init__(self, firmware: Firmware, folder: Path, *, virtual_time: bool) -> None:
-        self.firmware, self.folder, self.virtual_time = firmware, folder, virtual_time
+    def __init__(self, firmware: Firmware, folder: Path) -> None:
+        self.firmware, self.folder = firmware, folder
         self.base = free_ports()
-        self.time = 0.0
-        """Seconds since the firmware's first start, in virtual time; it goes on while the firmware is off."""
+        self.now = 0.0
+        """The firmware's time: seconds since its first start; it goes on while the firmware is off."""
         self._booted = 0.0
         self._process: subprocess.Popen | None = None
         self._motors = np.zeros(4)
@@ -108,20 +108,16 @@ class Sitl:
         Raises:
             OSError: when it ends or does not listen within `BOOT_S`.
         """
-        environment = {**os.environ, "LD_PRELOAD": str(self.firmware.shim), "E2EFLY_SITL_BASE": str(self.base)}
-        theirs: tuple[int, ...] = ()
-        if self.virtual_time:
-            path = self.folder / "clock"
-            path.write_bytes(bytes(4096))
-            with path.open("r+b") as file:
-                self._clock = mmap.mmap(file.fileno(), 4096)
-            (go, self._go), (poke, self._poke), (self._done, done) = os.pipe(), os.pipe(), os.pipe()
-            theirs = (go, poke, done)
-            environment |= {
-                "E2EFLY_SITL_CLOCK": str(path), "E2EFLY_SITL_GO": str(go), "E2EFLY_SITL_POKE": str(poke),
-                "E2EFLY_SITL_DONE": str(done),
-            }  # fmt: skip
-            self._booted = self.time
+        clock = self.folder / "clock"
+        clock.write_bytes(bytes(4096))
+        with clock.open("r+b") as file:
+            self._clock = mmap.mmap(file.fileno(), 4096)
+        (go, self._go), (poke, self._poke), (self._done, done) = os.pipe(), os.pipe(), os.pipe()
+        environment = os.environ | {
+            "LD_PRELOAD": str(self.firmware.shim), "E2EFLY_SITL_BASE": str(self.base), "E2EFLY_SITL_CLOCK": str(clock),
+            "E2EFLY_SITL_GO": str(go), "E2EFLY_SITL_POKE": str(poke), "E2EFLY_SITL_DONE": str(done),
+        }  # fmt: skip
+        self._booted = self.now
         output = self.folder / "output.txt"
         with output.open("wb") as log:
             self._process = subprocess.Popen(
@@ -131,9 +127,9 @@ class Sitl:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
-                pass_fds=theirs,
+                pass_fds=(go, poke, done),
             )
-        for end in theirs:
+        for end in (go, poke, done):
             os.close(end)
         latest = time.monotonic() + BOOT_S
         while b"bind port" not in (text := output.read_bytes()):  # looking by a connection would take its only place
@@ -141,10 +137,7 @@ class Sitl:
                 raise OSError(
                     f"the Betaflight SITL in {self.folder} does not start:\n{text[-500:].decode(errors='replace')}"
                 )
-            if self.virtual_time:
-                self.advance(0.01)
-            else:
-                time.sleep(0.02)
+            self.advance(0.01)
 
     def stop(self) -> None:
         """Kill the process, as a cut battery would."""
@@ -168,7 +161,7 @@ class Sitl:
             self._clock = None
 
     def send_state(self, state: FirmwareState) -> None:
-        """Hand the sensors a new state; with virtual time, return once the firmware has taken it in."""
+        """Hand the sensors a new state, and wait until the firmware has taken it in."""
         packet = _STATE.pack(
             self.now - self._booted,
             # the firmware turns signs itself: it expects rates of a z-down y-right body, and the pull, not the push
@@ -179,27 +172,22 @@ class Sitl:
             *state.position,
             101325.0 - 12.0 * state.position[2],
         )
-        seen = self._shared()[3] if self.virtual_time else 0
+        seen = self._shared()[3]
         self._out.sendto(packet, ("127.0.0.1", self.base + 2))
-        while self.virtual_time and self._shared()[3] == seen and self._told():
+        while self._shared()[3] == seen and self._told():
             pass
 
     def send_rc(self, channels: np.ndarray) -> None:
         """What the pilot's receiver says: 16 channels in us."""
         self._out.sendto(_RC.pack(self.now - self._booted, *np.asarray(channels, int)), ("127.0.0.1", self.base + 3))
 
-    @property
-    def now(self) -> float:
-        """The firmware's time, s."""
-        return self.time if self.virtual_time else time.monotonic()
-
     def advance(self, dt: float) -> None:
-        """Let the firmware run for `dt` s of virtual time; where it is off, time alone passes."""
-        self.time += dt
+        """Let the firmware run for `dt` s of its time; where it is off, time alone passes."""
+        self.now += dt
         if self._process is None:
             return
         assert self._clock is not None
-        horizon = round((self.time - self._booted) * 1e9)
+        horizon = round((self.now - self._booted) * 1e9)
         struct.pack_into("<Q", self._clock, 0, horizon)
         self._write(self._go)
         while self._shared()[2] <= horizon and self._told():
@@ -214,8 +202,8 @@ class Sitl:
         return bool(os.read(self._done, 64))
 
     def exchange(self) -> None:
-        """With virtual time: wait until the firmware has read what was sent to it, and sent what it has to say."""
-        if not self.virtual_time or self._process is None:
+        """Wait until the firmware has read what was sent to it, and sent what it has to say."""
+        if self._process is None:
             return
         for _ in range(2):  # it reads in the first round and writes in the second
             seen = self._shared()[4]
