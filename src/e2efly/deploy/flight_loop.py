@@ -3,9 +3,10 @@
 import gc
 import math
 import os
+import sys
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 
 from e2efly.control import Ctbr
@@ -24,6 +25,10 @@ PLAN_PERIOD = 0.1
 """How often the watchdog is told what to do, s."""
 PLAN_RATES = tuple(0.5 * i for i in range(-6, 7))
 """Body rates, rad/s, of the watchdog's tables."""
+SWITCH_S = 1e-4
+"""How long another thread of the process may hold up the loop, s; 5 ms is the interpreter's own."""
+LOOP_PRIORITY, POLICY_PRIORITY = 10, 9
+"""Real-time priorities; the watchdog stands above them."""
 STATUS_PERIOD = 1.0
 """How often a line of status is told, s."""
 
@@ -72,7 +77,7 @@ def fly(
     last_plan = last_status = cpu_at = due
     cpu, told, connection = time.process_time(), "", bridge.client.link.connections
     previous = clock.now()
-    with _no_pauses():
+    with _no_pauses(bridge):
         while True:
             clock.sleep(due - clock.now())
             now = clock.now()
@@ -152,18 +157,30 @@ def _status(bridge: Bridge) -> str:
     return f"{flight.mode.upper()}: {where}, throttle {bridge.sent.throttle:.2f}"
 
 
-class _no_pauses:  # noqa: N801
-    """No garbage collection in flight, real-time scheduling where it is allowed, short sleeps that are exact."""
-
-    def __enter__(self) -> None:
-        gc.collect()
-        gc.freeze()
-        gc.disable()
-        with suppress(OSError, AttributeError):  # an ordinary user's process is punctual enough on an idle core
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))  # the watchdog stands above it
-
-    def __exit__(self, *_: object) -> None:
+@contextmanager
+def _no_pauses(bridge: Bridge) -> Iterator[None]:
+    """No garbage collection in flight, threads that give way at once, real-time scheduling where it is allowed."""
+    threads = {0: LOOP_PRIORITY}
+    if bridge.worker is not None:
+        threads[bridge.worker.native_id] = POLICY_PRIORITY
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH_S)
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    _schedule(threads)
+    try:
+        yield
+    finally:
+        _schedule(dict.fromkeys(threads))
         gc.enable()
         gc.unfreeze()
+        sys.setswitchinterval(before)
+
+
+def _schedule(threads: Mapping[int, int | None]) -> None:
+    """Real-time priorities by thread; None: as usual. An ordinary user's process is punctual enough on an idle core."""
+    for thread, priority in threads.items():
         with suppress(OSError, AttributeError):
-            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+            policy = os.SCHED_OTHER if priority is None else os.SCHED_FIFO
+            os.sched_setscheduler(thread, policy, os.sched_param(priority or 0))

@@ -26,7 +26,14 @@ class PolicyWorker:
         self._questions: SimpleQueue[tuple[Future, tuple[Any, ...]] | None] = SimpleQueue()
         self._running: Future | None = None
         # a daemon: not even a policy that never answers keeps the program from ending
-        threading.Thread(target=self._answer, name="policy", daemon=True).start()
+        self._thread = threading.Thread(target=self._answer, name="policy", daemon=True)
+        self._thread.start()
+
+    @property
+    def native_id(self) -> int:
+        """Of its thread, as the operating system knows it."""
+        assert self._thread.native_id is not None
+        return self._thread.native_id
 
     @property
     def done(self) -> bool:
