@@ -5,7 +5,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from e2efly.deploy.msp.settings import RcTuning
@@ -80,6 +80,7 @@ profiles = st.builds(
 
 @settings(max_examples=500)
 @given(profiles, st.integers(0, 2), st.floats(-1, 1))
+@example(profile("BETAFLIGHT", 241, 0, 22, 200), 0, 3.1e-225)  # Newton's step falls out of the bracket by rounding
 def test_the_inverse_is_exact(p: RateProfile, axis: int, stick: float) -> None:
     rate = stick_to_rate(p, axis, stick)
     found = rate_to_stick(p, axis, rate)

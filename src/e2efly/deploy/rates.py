@@ -128,10 +128,9 @@ class Curve:
             value, slope = self.at(x)
             low, high = (x, high) if value < rate else (low, x)
             step = x - (value - rate) / slope if slope > 0 else -1.0
-            new = step if low <= step <= high else 0.5 * (low + high)
-            if abs(new - x) < 1e-8:  # the next error is about the square of this one
-                return new
-            x = new
+            if low <= step <= high and abs(step - x) < 1e-8:  # the next error is about the square of this one
+                return step
+            x = step if low <= step <= high else 0.5 * (low + high)
         return x
 
 
