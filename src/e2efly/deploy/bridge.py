@@ -10,6 +10,7 @@ from e2efly.control import Ctbr, Vec3
 from e2efly.deploy import reckoning, state_machine
 from e2efly.deploy.flight_state import AIRBORNE, Flight, Inputs, Mode, Target
 from e2efly.deploy.goals import LandGoal
+from e2efly.deploy.heading_watch import HeadingWatch, watched
 from e2efly.deploy.hover import blind, blind_time, controlled, flight_gains, roll_pitch
 from e2efly.deploy.instruments import CLOSED, PROBE, ChannelProbe, Instruments, Reading
 from e2efly.deploy.msp.client import Client
@@ -95,6 +96,7 @@ class Bridge:
         self._track = Track()
         self._pose_problem: str | None = None
         self._good_pose = -math.inf
+        self._heading = HeadingWatch()
         self._reckoned: reckoning.Reckoning | None = None
         self._history = ThrottleHistory()
         self._trim = 0.0
@@ -152,6 +154,7 @@ class Bridge:
             if odometry is not None:
                 self.odometry, self._good_pose = odometry, now
                 self._reckoned = reckoning.seen(odometry, now)
+                self._heading = watched(self._heading, odometry) if self.height > LIFTED else HeadingWatch()
         said_frozen = (self._pose_problem or "").startswith("frozen")  # which lasts already
         if self._pose_problem and not self._track.fault and now - self._good_pose < OUTLIERS_S and not said_frozen:
             self._pose_problem = None
@@ -180,6 +183,7 @@ class Bridge:
             settings_problems=self.settings_problems + probed + reading.meddling,
             policy_problem=reading.meddling[0] if reading.meddling else None,
             attitude_error=self._attitude_error(reading.attitude),
+            heading_error=self._heading.error if good else None,
             missed_deadlines=len(self._missed),
         )
         return reading
@@ -271,9 +275,11 @@ class Bridge:
             if elapsed > blind_time(self.height, climb):
                 return "closed", None
             attitude, reckoned = self.client.message(Attitude.CODE, now, 0.5), self._reckoned
-            known = reckoned is not None and now - reckoned.time < reckoning.LONGEST_STEP and not flight.misled
+            known = reckoned is not None and now - reckoned.time < reckoning.LONGEST_STEP
+            known = known and not (flight.misled and flight.turned is None)
             if attitude is not None and reckoned is not None and known:
-                return "blind", reckoning.settle(attitude, elapsed, reckoned.velocity)
+                velocity = reckoning.turned(reckoned.velocity, flight.turned or 0.0)
+                return "blind", reckoning.settle(attitude, elapsed, velocity)
             return "blind", blind(attitude, elapsed, climb)
         return "hover", self._hover(flight.target, odometry, dt)
 

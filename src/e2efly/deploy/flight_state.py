@@ -117,6 +117,8 @@ class Inputs:
     """How the controller's settings are unlike what the policy needs."""
     attitude_error: float | None = None
     """Between the controller's roll and pitch and the odometry's, rad; None: the controller's are not heard."""
+    heading_error: float | None = None
+    """The odometry's heading minus the one that the flight shows, rad; None: it shows none now."""
     policy_problem: str | None = None
     """Why the policy must not fly, or must stop: failed, late, non-finite, outside its envelope."""
     policy_done: bool = False
@@ -181,5 +183,7 @@ class Flight:
     """Since when it has been still and far from level, s."""
     nearest: float = math.inf
     """How near the vehicle has come to the target, horizontally, m; infinite until it was slow there once."""
+    turned: float | None = None
+    """The error of the odometry's heading for which it counts as lost, rad."""
     misled: bool = False
     """It went away from its target: until it stands, its odometry counts as lost."""

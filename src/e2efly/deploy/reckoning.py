@@ -44,6 +44,12 @@ def seen(odometry: Odometry, now: float) -> Reckoning:
     return Reckoning((c * x + s * y, c * y - s * x, z), now)
 
 
+def turned(velocity: tuple[float, float, float], angle: float) -> tuple[float, float, float]:
+    """A velocity forward, left and up, seen from a heading that is turned to the right by an angle, rad."""
+    (forward, left, up), c, s = velocity, math.cos(angle), math.sin(angle)
+    return c * forward - s * left, s * forward + c * left, up
+
+
 def reckon(
     before: Reckoning | None, attitude: Attitude | None, force: tuple[float, ...], now: float
 ) -> Reckoning | None:

@@ -79,6 +79,8 @@ class FlightSettings:
     follow_distance: float = 1.0
     """A vehicle that flies so far away from its target, having come to rest nearer, has odometry that is not its own:
     a wrong heading, another vehicle's body, m."""
+    heading_agreement: float = 0.7
+    """Largest error of the odometry's heading, as the flight itself shows it, rad."""
     fence: Fence = Fence()
     """Where policies may fly."""
     channels: PilotChannels = PilotChannels()
@@ -92,7 +94,7 @@ CHANNELS = (5, 18)
 _POSITIVE = (
     "takeoff_height", "takeoff_speed", "land_speed", "reposition_speed", "odometry_timeout", "link_timeout",
     "policy_timeout", "missed_deadlines", "lateness", "battery_low", "stick_deadband", "still_speed", "land_settle",
-    "attitude_agreement", "follow_distance",
+    "attitude_agreement", "follow_distance", "heading_agreement",
 )  # fmt: skip
 
 

@@ -37,7 +37,9 @@ SLOW = 0.5
 SLOWED_S = 3.0
 """... or after so long: in a gust it may never be that slow, s."""
 MISLED = "the vehicle does not go where it is sent (wrong heading?)"
-"""Said of odometry that is not the vehicle's own."""
+"""Said of odometry that is not the vehicle's own ..."""
+TURNED = "its heading is wrong"
+"""... and of odometry whose heading is not."""
 FALLEN, FALLEN_SPEED, FALLEN_S = math.radians(60), 0.3, 0.5
 """Nothing flies so far from level, so slowly, m/s, for so long, s: gravity alone would have made it faster."""
 LEAD = 0.6
@@ -70,7 +72,8 @@ def step(settings: FlightSettings, flight: Flight, inputs: Inputs, now: float) -
     )
     flight = _watched(settings, flight, inputs)
     if flight.misled:
-        inputs = dataclasses.replace(inputs, odometry_problem=MISLED)
+        problem = MISLED if flight.turned is None else f"{TURNED} by {math.degrees(flight.turned):.0f} deg"
+        inputs = dataclasses.replace(inputs, odometry_problem=problem)
     following = _common(flight, inputs) or _STEPS[flight.mode](settings, flight, inputs, dt)
     if (following.mode, following.blind) == (flight.mode, flight.blind):
         return following
@@ -78,26 +81,31 @@ def step(settings: FlightSettings, flight: Flight, inputs: Inputs, now: float) -
 
 
 def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
-    """Whether the vehicle follows the hover controller, and whether it has fallen over.
+    """Whether the odometry is the vehicle's own, and whether the vehicle has fallen over.
 
     With a wrong heading the controller pushes to the wrong side, and the vehicle spirals outwards, ever faster. Nothing
-    on the ground shows it: the flight controller's own heading is not the odometry's.
+    on the ground shows it: the flight controller's own heading is not the odometry's. The flight shows it, and where it
+    does not, the distance from the target.
     """
     if flight.mode in (Mode.INIT, Mode.DONE):
-        return dataclasses.replace(flight, misled=False, fallen_since=None)
+        return dataclasses.replace(flight, misled=False, turned=None, fallen_since=None)
     odometry, target = inputs.seen, flight.target
     if odometry is None:
         return dataclasses.replace(flight, fallen_since=None)
     fallen = tilt_of(odometry.quaternion) > FALLEN and float(np.linalg.norm(odometry.velocity)) < FALLEN_SPEED
     fallen_since = (flight.now if flight.fallen_since is None else flight.fallen_since) if fallen else None
+    wrong = inputs.heading_error is not None and abs(inputs.heading_error) > settings.heading_agreement
+    flight = dataclasses.replace(
+        flight, fallen_since=fallen_since,
+        turned=inputs.heading_error if wrong else flight.turned if flight.misled else None,
+    )  # fmt: skip
     if target is None or flight.mode is Mode.PILOT:
-        misled = flight.misled and not _stands(settings, flight, odometry)
-        return dataclasses.replace(flight, fallen_since=fallen_since, misled=misled)
+        return dataclasses.replace(flight, misled=flight.misled and not _stands(settings, flight, odometry))
     off = math.hypot(*np.subtract(target.position[:2], odometry.position[:2]).tolist())
     rests = math.isfinite(flight.nearest) or float(np.linalg.norm(odometry.velocity)) < SLOW
     nearest = min(flight.nearest, off) if rests else math.inf
-    misled = flight.misled or off > nearest + settings.follow_distance
-    return dataclasses.replace(flight, nearest=nearest, misled=misled, fallen_since=fallen_since)
+    misled = flight.misled or wrong or off > nearest + settings.follow_distance
+    return dataclasses.replace(flight, nearest=nearest, misled=misled)
 
 
 def _mission_low(inputs: Inputs) -> bool:

@@ -9,6 +9,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from e2efly.control.vectors import Quat
 from e2efly.deploy.bridge import OUTLIERS_S
 from e2efly.deploy.fence import fence_problem
 from e2efly.deploy.flight_state import Mode, Reason
@@ -22,6 +23,8 @@ RECEIVER_S = 0.05
 its channels (20 ms)."""
 GUST, WALL = 50.0, 0.6
 """Wind of a gust, m/s, until the policy has lost the vehicle; distance of the fence, m."""
+DRIFT_RATE, ASTRAY, HEADING_S = 0.7, 0.3, 0.6
+"""How fast a heading drifts, rad/s; the speed, m/s, from which on the vehicle shows it, and how soon, s."""
 BATTERY_S = 0.55
 """The battery is asked for at 2 Hz; the question and its answer take their time."""
 
@@ -94,6 +97,23 @@ def _outlier(stage: Stage) -> None:
         return dataclasses.replace(sample, position=sample.position + 5.0)
 
     stage.poses.alter = once
+
+
+def _drift(stage: Stage) -> None:
+    """The heading turns away, to either side, until it is half a turn off."""
+    began, side = stage.rig.now(), float(stage.random.choice([-1.0, 1.0]))
+
+    def turned(sample: Sample) -> Sample:
+        angle = side * min(DRIFT_RATE * (stage.rig.now() - began), math.pi)
+        turn = Quat(math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)).compose(Quat(*sample.quaternion))
+        return dataclasses.replace(sample, quaternion=np.array([turn.w, turn.x, turn.y, turn.z]))
+
+    stage.poses.alter = turned
+
+
+def _led_astray(stage: Stage) -> bool:
+    """Nothing is to be seen of a wrong heading before the vehicle moves by it."""
+    return float(np.linalg.norm(stage.rig.state.velocity[:2])) > ASTRAY and stage.mode is Mode.HOVER
 
 
 def _source_clock(sample: Sample) -> Sample:
@@ -216,6 +236,8 @@ FAULTS = (
     Fault("poses: frozen", Mode.POLICY, _freeze, End.LANDED, Reason.NO_ODOMETRY, 0.2 + POSE_S),
     Fault("poses: jump for good", Mode.POLICY, _jump, End.LANDED, Reason.NO_ODOMETRY, OUTLIERS_S + POSE_S),
     Fault("poses: NaN", Mode.POLICY, _alter(_nan), End.LANDED, Reason.NO_ODOMETRY, OUTLIERS_S + POSE_S),
+    Fault("poses: the heading drifts away", Mode.HOVER, _drift, End.LANDED, Reason.NO_ODOMETRY, HEADING_S,
+          begins=_led_astray),
     Fault("link: nothing but garbage comes back", Mode.POLICY, _link(spoilt=1.0), End.LANDED, Reason.LINK, 0.25),
     Fault("link: half frames", Mode.POLICY, _link(halved=1.0), End.LANDED, Reason.LINK, 0.25),
     Fault("link: slow, 60 ms each way", Mode.POLICY, _link(delay=0.06), End.LANDED, Reason.LINK, 0.25),
