@@ -327,6 +327,22 @@ def test_the_envelope(runtime: Runtime) -> None:
     assert len(outside(near, still((0.0, 0.0, 2.4)), START)) == 1
 
 
+def test_a_race_begins_where_its_track_does_and_heads_as_it_says(tmp_path: Path) -> None:
+    """Training begins nowhere else: four_gates at (0, 0, 1.5), heading 45 degrees."""
+    policy = load_policy(make(tmp_path, presets.TASKS["race"], EnvConfig())[1])
+    runtime = Runtime.of(policy, goal_for(policy.contract, GoalOptions(), VEHICLE), VEHICLE)
+
+    def begins(x: float, yaw: float) -> tuple[str, ...]:
+        turned = np.array([math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)])
+        return outside(runtime, still((x, 0.0, 1.5), quaternion=turned), START)
+
+    assert begins(1.4, 0.5) == begins(-1.4, 1.1 - 2 * math.pi) == ()
+    assert begins(1.6, math.pi / 4) == ("distance is 1.6 m from the start; accepted: at most 1.5",)
+    assert begins(0.0, 0.0) == ("heading is 0.785 rad from the start's, 45 deg; accepted: at most 0.35",)
+    flying = begin(runtime, still(), START)
+    assert outside(runtime, still((3.0, 0.0, 1.5)), START, flying) == ()
+
+
 def test_flying_imports_no_jax_and_no_simulator(hovering: Path) -> None:
     code = f"""
 import sys

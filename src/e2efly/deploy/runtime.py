@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.contract import ACTION_SIZE, COMMANDS, Contract
-from e2efly.deploy.goals import Goal
+from e2efly.deploy.fence import heading
+from e2efly.deploy.goals import GatesGoal, Goal
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.policy import Policy
 from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY
@@ -50,6 +51,10 @@ class Envelope:
     """Largest tilt, rad."""
     distance: float | None = None
     """Largest distance to where the goal is, m; left out: where an episode of the training ends."""
+    start: float = 1.5
+    """Largest distance to where a race begins, m."""
+    heading: float = 0.35
+    """Largest angle between the heading and that with which a race begins, rad."""
 
 
 @dataclass(frozen=True)
@@ -319,6 +324,13 @@ def outside(runtime: Runtime, odometry: Odometry, now: float, state: RuntimeStat
             "m from the goal",
         ),
     )
+    if isinstance(goal, GatesGoal) and state is None:
+        gates = goal.gates
+        off = math.remainder(heading(odometry.quaternion) - float(gates.start_yaw), math.tau)
+        limits += (
+            ("distance", float(np.linalg.norm(odometry.position - gates.start)), envelope.start, "m from the start"),
+            ("heading", abs(off), envelope.heading, f"rad from the start's, {math.degrees(gates.start_yaw):.0f} deg"),
+        )
     return tuple(
         f"{name} is {value:.3g} {unit}; accepted: at most {limit:.3g}"
         for name, value, limit, unit in limits

@@ -17,6 +17,8 @@ from e2efly.vehicles.vehicle import Vehicle
 
 PARKED = 0.3
 """The vehicle stands within this of where the policy's course begins, m an axis."""
+ASKEW = 0.05
+"""How far a race's heading at the start is off, rad."""
 LINK_S = 0.01
 """What link and firmware take from a pose to the rate loop's setpoint on the rig, s; the poses are late by the rest."""
 WATCHED = {"hover": 8.0, "track": 12.0, "land": 15.0, "race": 40.0}
@@ -82,7 +84,7 @@ def _fly(rig: Rig, policy: Policy, goal: Goal, seed: int, log: Log | None) -> Re
     random = np.random.default_rng(seed)
     first = _begin(goal)
     x, y = first[:2] + random.uniform(-PARKED, PARKED, 2)
-    rig.state = rig.world.at_rest(x, y, random.uniform(-np.pi, np.pi) if not isinstance(goal, GatesGoal) else 0.0)
+    rig.state = rig.world.at_rest(x, y, _heading(goal, random))
     rig.sleep(0.5)
     feet = rig.world.vehicle.feet_height
     session = Session(rig, rehearsal_settings(first[2] - feet), policy=policy, goal=goal, log=log)
@@ -141,6 +143,13 @@ def _begin(goal: Goal) -> np.ndarray:
         return np.array(goal.spline.position(np.zeros((1, 1)))[0, 0], np.float64)
     assert isinstance(goal, GatesGoal)
     return np.asarray(goal.gates.start, np.float64)
+
+
+def _heading(goal: Goal, random: np.random.Generator) -> float:
+    """In which the vehicle is put down, rad: any, but that races begin as their track says."""
+    if isinstance(goal, GatesGoal):
+        return float(goal.gates.start_yaw) + random.uniform(-ASKEW, ASKEW)
+    return random.uniform(-np.pi, np.pi)
 
 
 def _first_hover(flown: Flown) -> np.ndarray:
