@@ -381,6 +381,25 @@ def test_odometry_that_leads_astray_is_not_believed_again_before_the_vehicle_sta
     assert not flown(flown(astray, BLIND, blind_time(1.1) + 0.1), BLIND).misled
 
 
+def test_a_heading_that_the_flight_shows_to_be_wrong_ends_it() -> None:
+    wrong = having(UP, heading_error=-1.6)
+    for flight in (taking_off(), hovering()):
+        astray = flown(flight, wrong)
+        assert astray.mode is Mode.LAND and astray.blind and astray.turned == -1.6
+        assert said(astray, Reason.NO_ODOMETRY) and "its heading is wrong by -92 deg" in astray.reasons[0]
+    assert flown(landing(), having(wrong, pilot=LAND)).blind
+    assert flown(hovering(), having(UP, heading_error=0.6), 1.0).mode is Mode.HOVER  # it still finds its target
+    assert flown(astray, having(UP, heading_error=-1.8)).turned == -1.8  # the newest that is known
+    later = flown(astray, UP, 0.5)
+    assert later.blind and later.turned == -1.6
+    policy = flown(policy_flying(), having(AWAY, heading_error=2.0))
+    assert policy.mode is Mode.POLICY and not policy.misled  # the fence watches it; the hover after it is told at once
+    assert flown(policy, having(UP, heading_error=2.0), 0.05).mode is Mode.LAND
+    by_hand = flown(astray, having(wrong, override=False), 0.1)
+    assert by_hand.mode is Mode.PILOT and by_hand.misled
+    assert flown(later, BLIND, blind_time(1.1) + 0.1).turned is None
+
+
 def test_far_from_the_target_is_no_sign_as_long_as_it_comes_nearer() -> None:
     fast = having(UP, odometry=at(1.05, x=-2.5, velocity=(4.0, 0, 0)))
     flight = flown(flown(policy_flying(), having(AWAY, odometry=fast.odometry)), fast)
@@ -606,6 +625,7 @@ NEWS = st.fixed_dictionaries(
         | st.builds(Pilot, st.sampled_from(Mission), *[st.sampled_from([0.0, 0.0, 0.3, -1.0])] * 4),
         "voltage": st.sampled_from([4.0, 4.0, 3.0, None, math.nan]),
         "attitude_error": st.sampled_from([0.0, 0.0, 0.5, None, math.nan]),
+        "heading_error": st.sampled_from([None, None, None, 0.2, -1.5, 3.1]),
         "policy_problem": st.sampled_from([None, None, "late"]),
         "policy_done": st.booleans(),
         "policy_lands": st.booleans(),

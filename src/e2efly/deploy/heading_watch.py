@@ -19,9 +19,9 @@ MEMORY_S = 0.7
 """Over which accelerations are compared, s."""
 PUSH = 0.3
 """With less acceleration nothing can be told, m/s^2, root mean square."""
-COHERENCE = 0.85
+COHERENCE = 0.93
 """How alike what is flown is to what is pushed, 0 to 1, for the error to be believed ..."""
-RATIO = (0.5, 2.0)
+RATIO = (0.7, 1.5)
 """... and how large, beside it."""
 LONGEST_STEP = 0.1
 """Between two odometries; after a longer pause the comparison begins anew, s."""
