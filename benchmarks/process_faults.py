@@ -30,6 +30,9 @@ def main() -> None:
             for fault in FAULTS:
                 try:
                     outcome = asdict(strike(fault, policy, folder, seed))
+                    if outcome["reaction"] > outcome["allowed"]:
+                        late = f"reacted after {outcome['reaction']:.3f} s; allowed: {outcome['allowed']:.3f}"
+                        outcome["problems"] = [*outcome["problems"], late]
                 except RuntimeError as error:
                     outcome = {"problems": [str(error)]}
                 rows.append({"seed": seed, **outcome, "fault": f"bridge: {fault}"})

@@ -125,12 +125,7 @@ class Session:
 
     def fly(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
         """Control steps for so long, or until something holds; whether it did."""
-        end = self.rig.now() + seconds
-        while self.rig.now() < end:
-            self.step()
-            if until():
-                return True
-        return False
+        return run(self.rig, self.step, seconds, until)
 
     def in_mode(self, *modes: Mode) -> Callable[[], bool]:
         """Whether the bridge is in one of these modes."""
@@ -162,6 +157,16 @@ class Session:
         if bridge.flight.target is not None:
             return np.array(bridge.flight.target.position)
         return None
+
+
+def run(rig: Rig, step: Callable[[], None], seconds: float, until: Callable[[], bool]) -> bool:
+    """Steps for so long of the rig's time, or until something holds; whether it did."""
+    end = rig.now() + seconds
+    while rig.now() < end:
+        step()
+        if until():
+            return True
+    return False
 
 
 def rehearsal_settings(height: float, reach: float = 20.0) -> FlightSettings:

@@ -17,7 +17,7 @@ from e2efly.deploy.pose.source import PlantSource
 from e2efly.deploy.settings import Fence, FlightSettings
 from e2efly.validate.faulty import FaultyLink, FaultyNetwork, FaultyPoses
 from e2efly.validate.rig import Rig
-from e2efly.validate.session import Session
+from e2efly.validate.session import Session, run
 from e2efly.vehicles.vehicle import GRAVITY
 
 FENCE = Fence(low=(-3.0, -3.0, 0.1), high=(3.0, 3.0, 3.0))
@@ -135,12 +135,7 @@ class Stage:
 
     def fly(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
         """Control steps for so long, or until something holds; whether it did."""
-        end = self.rig.now() + seconds
-        while self.rig.now() < end:
-            self.step()
-            if until():
-                return True
-        return False
+        return run(self.rig, self.step, seconds, until)
 
     def ready(self, mode: Mode) -> None:
         """Bring the flight into INIT, HOVER or POLICY, at a moment of chance.
