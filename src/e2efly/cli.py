@@ -2,6 +2,8 @@
 
 import dataclasses
 import gc
+import os
+import signal
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -187,10 +189,19 @@ def train_config(options: Any) -> Any:
 
 
 def main() -> NoReturn:
-    """Run the command line and exit: 0 when it did what was asked, 2 for bad input, 130 after Ctrl-C."""
+    """Run the command line and exit: 0 when it did what was asked, 2 for bad input, 130 after Ctrl-C.
+
+    When nobody reads its output any more it ends without a word, with 141 or, where rich prints, 1.
+    """
     # importing and tracing make many objects and no garbage: looking for it costs a third of a second
     gc.set_threshold(100_000)
-    sys.exit(run(sys.argv[1:]))
+    try:
+        status = run(sys.argv[1:])
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever reads, as `head`, has enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = 128 + signal.SIGPIPE
+    sys.exit(status)
 
 
 def run(arguments: list[str]) -> int:
@@ -204,6 +215,8 @@ def run(arguments: list[str]) -> int:
         return 0
     try:
         return _command(arguments[0])(arguments[1:])
+    except BrokenPipeError:
+        raise
     except (ValueError, OSError, FloatingPointError) as error:
         console.print("[bold red]error:[/]", end=" ")
         console.print(str(error), markup=False)

@@ -1,6 +1,7 @@
 """The command line as its user meets it."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -78,6 +79,19 @@ def test_every_option_of_train_has_help() -> None:
     for flag in ("TASK", "--algo ", "--vehicle", "--seed", "--out", "--resume", "--algo.gamma", "--task.laps",
                  "--env.noise.position", "--env.imu.observed", "--reward.weights", "--network.hidden"):  # fmt: skip
         assert flag in done.stdout
+
+
+@pytest.mark.parametrize("command", [["--help"], ["list"]])
+def test_a_reader_that_has_enough_is_no_error(command: list[str]) -> None:
+    """As `e2efly list | head -1`."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [sys.executable, "-m", "e2efly", *command], stdout=writing, stderr=subprocess.PIPE, check=False
+    )
+    os.close(writing)
+    assert done.stderr == b""
+    assert done.returncode in (1, 141)
 
 
 def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
