@@ -174,10 +174,10 @@ def test_sticks_go_first_and_their_replies_are_eaten() -> None:
         assert client.set_raw_rc(STICKS, 0.002 + i * 1e-3)
     assert client.backlog == MAX_BACKLOG + 1
     wire.sent.clear()
-    client.poll(0.1)
+    client.poll(0.07)
     assert wire.sent == []  # telemetry waits for a controller that is behind
     wire.inbox = encode(Frame(200, b"", REPLY)) * (MAX_BACKLOG + 1)
-    client.poll(0.11)
+    client.poll(0.08)
     assert client.backlog == 0
     assert wire.sent
     assert 200 not in client.latest

@@ -389,14 +389,18 @@ def test_a_heading_that_the_flight_shows_to_be_wrong_ends_it() -> None:
         assert said(astray, Reason.NO_ODOMETRY) and "its heading is wrong by -92 deg" in astray.reasons[0]
     assert flown(landing(), having(wrong, pilot=LAND)).blind
     assert flown(hovering(), having(UP, heading_error=0.6), 1.0).mode is Mode.HOVER  # it still finds its target
-    assert flown(astray, having(UP, heading_error=-1.8)).turned == -1.8  # the newest that is known
+    for newer in (-1.8, 0.05):  # the newest that is known: it is what the brake goes by
+        assert flown(astray, having(UP, heading_error=newer)).turned == newer
     later = flown(astray, UP, 0.5)
     assert later.blind and later.turned == -1.6
-    policy = flown(policy_flying(), having(AWAY, heading_error=2.0))
-    assert policy.mode is Mode.POLICY and not policy.misled  # the fence watches it; the hover after it is told at once
+    policy = flown(policy_flying(), having(AWAY, heading_error=2.0))  # the fence watches it; the hover is told at once
+    assert policy.mode is Mode.POLICY and not policy.misled and policy.turned is None
     assert flown(policy, having(UP, heading_error=2.0), 0.05).mode is Mode.LAND
     by_hand = flown(astray, having(wrong, override=False), 0.1)
     assert by_hand.mode is Mode.PILOT and by_hand.misled
+    assert flown(with_pilot(), having(wrong, override=False)).turned is None
+    lost = flown(flown(policy_flying(), having(AWAY, heading_error=2.0)), having(AWAY, odometry_problem="too old"))
+    assert lost.blind and lost.turned is None  # nothing has tripped: the brake goes by the heading as it is
     assert flown(later, BLIND, blind_time(1.1) + 0.1).turned is None
 
 

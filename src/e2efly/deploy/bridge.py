@@ -43,6 +43,8 @@ AFRESH_S = 1.0
 """After so long without a good pose, on the ground, tracking begins afresh, s."""
 OUTLIERS_S = 0.03
 """Poses are refused for so long before the odometry counts as lost, s: an outlier or two end no flight."""
+ATTITUDE_S = 0.1
+"""The controller's attitude, beside which the odometry's heading is looked at, may be so old, s."""
 THRUST_DELAY = (0.015, 0.075)
 """How long before a measured force its throttle was sent, s: the link, the rate loop and the motors' lag."""
 TRIM = (-3.0, 5.0)
@@ -153,8 +155,8 @@ class Bridge:
             self._pose_problem = problem
             if odometry is not None:
                 self.odometry, self._good_pose = odometry, now
-                self._reckoned = reckoning.seen(odometry, now)
-                self._heading = watched(self._heading, odometry) if self.height > LIFTED else HeadingWatch()
+                self._reckoned = reckoning.seen(odometry, now, self.flight.turned or 0.0)
+                self._watch_heading(odometry, now)
         said_frozen = (self._pose_problem or "").startswith("frozen")  # which lasts already
         if self._pose_problem and not self._track.fault and now - self._good_pose < OUTLIERS_S and not said_frozen:
             self._pose_problem = None
@@ -165,6 +167,11 @@ class Bridge:
         else:
             self._stale = None
         return samples
+
+    def _watch_heading(self, odometry: Odometry, now: float) -> None:
+        attitude = self.client.message(Attitude.CODE, now, ATTITUDE_S)
+        if attitude is not None:
+            self._heading = watched(self._heading, odometry, attitude) if self.height > LIFTED else HeadingWatch()
 
     def _read_controller(self, now: float) -> Reading:
         """What the controller has said, and all of it as inputs of the state machine."""
@@ -278,8 +285,7 @@ class Bridge:
             known = reckoned is not None and now - reckoned.time < reckoning.LONGEST_STEP
             known = known and not (flight.misled and flight.turned is None)
             if attitude is not None and reckoned is not None and known:
-                velocity = reckoning.turned(reckoned.velocity, flight.turned or 0.0)
-                return "blind", reckoning.settle(attitude, elapsed, velocity)
+                return "blind", reckoning.settle(attitude, elapsed, reckoned.velocity)
             return "blind", blind(attitude, elapsed, climb)
         return "hover", self._hover(flight.target, odometry, dt)
 

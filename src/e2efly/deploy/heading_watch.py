@@ -1,13 +1,18 @@
 """Whether the odometry's heading is the vehicle's own: a tilt must push it the way it is seen to go.
 
 Nothing on the ground shows a wrong heading, and a hover controller that is led by one pushes to the wrong side, ever
-harder. In the air the horizontal acceleration that goes with the tilt is compared with the one that is flown: turned
-by the heading's error they are alike. Wind and gusts, which push without a tilt, are not alike.
+harder. In the air the horizontal acceleration that goes with the flight controller's roll and pitch, turned by the
+odometry's heading, is compared with the one that the odometry flies: turned by the heading's error they are alike,
+whether the source's axes are turned or the body's. Wind and gusts, which push without a tilt, are seldom alike, and not
+for long.
 """
 
+import cmath
 import math
 from dataclasses import dataclass, replace
 
+from e2efly.deploy.fence import heading
+from e2efly.deploy.msp.messages import Attitude
 from e2efly.deploy.odometry import Odometry
 from e2efly.vehicles.vehicle import GRAVITY
 
@@ -23,6 +28,8 @@ COHERENCE = 0.93
 """How alike what is flown is to what is pushed, 0 to 1, for the error to be believed ..."""
 RATIO = (0.7, 1.5)
 """... and how large, beside it."""
+SMALL, LASTING_S = 0.35, 0.12
+"""An error above this, rad, is believed after so long only, s: a growing gust can look like one for a moment."""
 LONGEST_STEP = 0.1
 """Between two odometries; after a longer pause the comparison begins anew, s."""
 
@@ -44,9 +51,17 @@ class HeadingWatch:
     power: tuple[float, float] = (0.0, 0.0)
     """Mean squares of the push and of the flown acceleration."""
 
+    lasting: float = 0.0
+    """For how long the error has been large, s."""
+
     @property
     def error(self) -> float | None:
         """The heading seen minus the true one, rad, -pi to pi; None: it cannot be told now."""
+        error = self._error
+        return None if error is not None and abs(error) > SMALL and self.lasting < LASTING_S else error
+
+    @property
+    def _error(self) -> float | None:
         push, flown = self.power
         if push < PUSH**2:
             return None
@@ -56,17 +71,19 @@ class HeadingWatch:
         return -math.atan2(self.cross.imag, self.cross.real)
 
 
-def watched(before: HeadingWatch, odometry: Odometry) -> HeadingWatch:
+def watched(before: HeadingWatch, odometry: Odometry, attitude: Attitude) -> HeadingWatch:
     """The watch after another odometry, in flight.
 
     Args:
         before: the watch so far.
         odometry: checked.
+        attitude: the flight controller's; its roll and pitch count.
     """
-    w, x, y, z = (float(q) for q in odometry.quaternion)
     velocity = complex(*(float(v) for v in odometry.velocity[:2]))
-    up = max(1 - 2 * (x * x + y * y), 0.5)
-    push = GRAVITY / up * complex(2 * (x * z + w * y), 2 * (y * z - w * x))
+    roll, pitch = attitude.roll, attitude.pitch
+    up = max(math.cos(roll) * math.cos(pitch), 0.5)
+    leans = complex(math.cos(roll) * math.sin(pitch), -math.sin(roll))
+    push = GRAVITY / up * leans * cmath.exp(1j * heading(odometry.quaternion))
     dt = odometry.time - before.time
     if not 0 <= dt <= LONGEST_STEP:
         return HeadingWatch(time=odometry.time, velocity=velocity, push=push)
@@ -77,8 +94,11 @@ def watched(before: HeadingWatch, odometry: Odometry) -> HeadingWatch:
     a, b = (old + slow * (new - old) for old, new in zip(before.steady, (push, flown), strict=True))
     p, f = push - a, flown - b
     (pp, ff), cross = before.power, before.cross
-    return replace(
+    after = replace(
         before, time=odometry.time, velocity=smooth, push=push, steady=(a, b),
         cross=cross + kept * (f * p.conjugate() - cross),
         power=(pp + kept * (abs(p) ** 2 - pp), ff + kept * (abs(f) ** 2 - ff)),
     )  # fmt: skip
+    error = after._error
+    large = error is not None and abs(error) > SMALL
+    return replace(after, lasting=before.lasting + dt if large else 0.0)

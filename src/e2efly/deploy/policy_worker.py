@@ -1,9 +1,11 @@
 """Ask the policy in a thread of its own, so that a slow or stuck policy never holds up the control loop."""
 
+import os
 import threading
 import time
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as Late
+from contextlib import suppress
 from queue import SimpleQueue
 from typing import Any
 
@@ -70,6 +72,8 @@ class PolicyWorker:
             state, self.decision = self._running.result(self.timeout)
         except Late:
             self.problem = f"late: no answer within {1e3 * (time.perf_counter() - started):.0f} ms"
+            with suppress(OSError, AttributeError):  # should it never come back, others must run
+                os.sched_setscheduler(self.native_id, os.SCHED_OTHER, os.sched_param(0))
         except Exception as error:  # whatever a policy does, the vehicle goes on flying
             self.problem = str(error) or type(error).__name__
         else:

@@ -36,18 +36,12 @@ class Reckoning:
     """Up to when it is reckoned, s."""
 
 
-def seen(odometry: Odometry, now: float) -> Reckoning:
-    """Begin from an odometry at `now`, s."""
+def seen(odometry: Odometry, now: float, error: float = 0.0) -> Reckoning:
+    """Begin from an odometry at `now`, s, whose heading is wrong by `error`, rad."""
     x, y, z = (float(v) for v in odometry.velocity)
-    yaw = heading(odometry.quaternion)
+    yaw = heading(odometry.quaternion) - error
     c, s = math.cos(yaw), math.sin(yaw)
     return Reckoning((c * x + s * y, c * y - s * x, z), now)
-
-
-def turned(velocity: tuple[float, float, float], angle: float) -> tuple[float, float, float]:
-    """A velocity forward, left and up, seen from a heading that is turned to the right by an angle, rad."""
-    (forward, left, up), c, s = velocity, math.cos(angle), math.sin(angle)
-    return c * forward - s * left, s * forward + c * left, up
 
 
 def reckon(

@@ -94,17 +94,19 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
         return dataclasses.replace(flight, fallen_since=None)
     fallen = tilt_of(odometry.quaternion) > FALLEN and float(np.linalg.norm(odometry.velocity)) < FALLEN_SPEED
     fallen_since = (flight.now if flight.fallen_since is None else flight.fallen_since) if fallen else None
-    wrong = inputs.heading_error is not None and abs(inputs.heading_error) > settings.heading_agreement
-    flight = dataclasses.replace(
-        flight, fallen_since=fallen_since,
-        turned=inputs.heading_error if wrong else flight.turned if flight.misled else None,
-    )  # fmt: skip
+    flight = dataclasses.replace(flight, fallen_since=fallen_since)
+    error = inputs.heading_error
+    if flight.misled and flight.turned is not None and error is not None:
+        flight = dataclasses.replace(flight, turned=error)
     if target is None or flight.mode is Mode.PILOT:
-        return dataclasses.replace(flight, misled=flight.misled and not _stands(settings, flight, odometry))
+        misled = flight.misled and not _stands(settings, flight, odometry)
+        return dataclasses.replace(flight, misled=misled, turned=flight.turned if misled else None)
+    if error is not None and abs(error) > settings.heading_agreement:
+        return dataclasses.replace(flight, misled=True, turned=error)
     off = math.hypot(*np.subtract(target.position[:2], odometry.position[:2]).tolist())
     rests = math.isfinite(flight.nearest) or float(np.linalg.norm(odometry.velocity)) < SLOW
     nearest = min(flight.nearest, off) if rests else math.inf
-    misled = flight.misled or wrong or off > nearest + settings.follow_distance
+    misled = flight.misled or off > nearest + settings.follow_distance
     return dataclasses.replace(flight, nearest=nearest, misled=misled)
 
 

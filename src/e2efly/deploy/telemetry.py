@@ -12,7 +12,6 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -21,8 +20,6 @@ import numpy as np
 
 from e2efly.deploy.channels import CHANNELS, json_schema
 
-NICE = 10
-"""How far the writer stands back behind what flies, in Unix's units."""
 FLUSH_PERIOD = 0.1
 """Seconds between two chunks: the most that dies with the process, plus the time to write one."""
 SYNC_PERIOD = 1.0
@@ -134,8 +131,6 @@ class Telemetry:
 
     def _write(self) -> None:
         """The writer's thread."""
-        with suppress(OSError, AttributeError):
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICE)  # of this thread: it can wait
         try:
             log = _Mcap(self._file)
             while True:

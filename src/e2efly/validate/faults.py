@@ -11,11 +11,12 @@ import numpy as np
 
 from e2efly.control.vectors import Quat
 from e2efly.deploy.bridge import OUTLIERS_S
-from e2efly.deploy.fence import fence_problem
+from e2efly.deploy.fence import fence_problem, heading
 from e2efly.deploy.flight_state import Mode, Reason
 from e2efly.deploy.msp.messages import BatteryState, FcVariant
 from e2efly.deploy.msp.settings import RcTuning, RxMap
 from e2efly.deploy.odometry import Odometry, Sample
+from e2efly.validate.rig import STEP_S
 from e2efly.validate.stage import FENCE, LATENCY_S, POSE_S, SETTINGS, Stage
 
 RECEIVER_S = 0.05
@@ -23,7 +24,7 @@ RECEIVER_S = 0.05
 its channels (20 ms)."""
 GUST, WALL = 50.0, 0.6
 """Wind of a gust, m/s, until the policy has lost the vehicle; distance of the fence, m."""
-DRIFT_RATE, ASTRAY, HEADING_S = 0.7, 0.3, 0.6
+DRIFT_RATE, ASTRAY, HEADING_S = 0.7, 0.3, 0.8
 """How fast a heading drifts, rad/s; the speed, m/s, from which on the vehicle shows it, and how soon, s."""
 BATTERY_S = 0.55
 """The battery is asked for at 2 Hz; the question and its answer take their time."""
@@ -112,8 +113,11 @@ def _drift(stage: Stage) -> None:
 
 
 def _led_astray(stage: Stage) -> bool:
-    """Nothing is to be seen of a wrong heading before the vehicle moves by it."""
-    return float(np.linalg.norm(stage.rig.state.velocity[:2])) > ASTRAY and stage.mode is Mode.HOVER
+    """Nothing is to be seen of a wrong heading before it leads the vehicle to the wrong side, and it moves by it."""
+    odometry, true = stage.session.bridge.odometry, stage.rig.state
+    assert odometry is not None
+    error = math.remainder(heading(odometry.quaternion) - heading(true.quaternion), math.tau)
+    return abs(error) > math.pi / 2 and float(np.linalg.norm(true.velocity[:2])) > ASTRAY
 
 
 def _source_clock(sample: Sample) -> Sample:
@@ -228,7 +232,7 @@ FAULTS = (
     Fault("control steps late", Mode.POLICY, _nothing, End.HOVER, Reason.DEADLINES, 0.03, each=_late_step),
     Fault("pilot: policy switch off", Mode.POLICY, _set(mission="hover"), End.HOVER, Reason.MISSION, RECEIVER_S),
     Fault("pilot: stick input", Mode.POLICY, _set(roll=0.5), End.HOVER, Reason.STICK_INPUT, RECEIVER_S),
-    Fault("fence: a gust", Mode.POLICY, _gust, End.HOVER, None, POSE_S + LATENCY_S, begins=_past_fence,
+    Fault("fence: a gust", Mode.POLICY, _gust, End.HOVER, None, POSE_S + LATENCY_S + STEP_S, begins=_past_fence,
           each=_calm),
     Fault("pilot: override off", Mode.POLICY, _override_off, End.PILOT, Reason.OVERRIDE_OFF, RECEIVER_S + 0.05),
     # the vehicle lands

@@ -140,6 +140,7 @@ class Rig:
     def close(self) -> None:
         """End the firmware."""
         self._open.close()
+        self.sitl.close()
 
     def _boot(self) -> None:
         prepare(self.sitl)

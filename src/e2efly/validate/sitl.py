@@ -2,6 +2,7 @@
 
 import mmap
 import os
+import select
 import socket
 import struct
 import subprocess
@@ -23,7 +24,7 @@ _PORTS = 12
 """UDP 9001 to 9004 and TCP 5761 to 5768, moved."""
 _CLOCK = struct.Struct("<5Q")
 BOOT_S = 20.0
-"""Real time that the firmware may take to open its ports, s."""
+"""Real time that the firmware may take to open its ports, or to answer, s."""
 
 
 def free_ports() -> int:
@@ -119,18 +120,20 @@ class Sitl:
         }  # fmt: skip
         self._booted = self.now
         output = self.folder / "output.txt"
-        with output.open("wb") as log:
-            self._process = subprocess.Popen(
-                [str(self.firmware.program), "127.0.0.1"],
-                cwd=self.folder,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-                pass_fds=(go, poke, done),
-            )
-        for end in (go, poke, done):
-            os.close(end)
+        try:
+            with output.open("wb") as log:
+                self._process = subprocess.Popen(
+                    [str(self.firmware.program), "127.0.0.1"],
+                    cwd=self.folder,
+                    env=environment,
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=log,
+                    pass_fds=(go, poke, done),
+                )
+        finally:
+            for end in (go, poke, done):
+                os.close(end)
         latest = time.monotonic() + BOOT_S
         while b"bind port" not in (text := output.read_bytes()):  # looking by a connection would take its only place
             if not self.alive or time.monotonic() > latest:
@@ -198,7 +201,13 @@ class Sitl:
             os.write(pipe, b"\0")
 
     def _told(self) -> bool:
-        """Wait until the firmware has something to tell; False: it has ended."""
+        """Wait until the firmware has something to tell; False: it has ended.
+
+        Raises:
+            OSError: when it says nothing for `BOOT_S`.
+        """
+        if not select.select([self._done], [], [], BOOT_S)[0]:
+            raise OSError(f"the Betaflight SITL in {self.folder} hangs: it said nothing for {BOOT_S:g} s")
         return bool(os.read(self._done, 64))
 
     def exchange(self) -> None:

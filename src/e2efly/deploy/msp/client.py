@@ -30,7 +30,10 @@ SCHEDULE = {
 }  # fmt: skip
 """How often each message is asked for in flight, Hz."""
 TIMEOUT = 0.3
-"""How long a reply may take, s, before the request counts as lost and may be sent again."""
+"""How long a reply may take, s, before the request counts as lost and may be sent again ..."""
+SHORTEST_TIMEOUT, PATIENCE = 0.08, 4.0
+"""... but, once replies have come, no longer than so many times what the slowest of them took, nor shorter than this:
+on a line that loses frames the controller must not seem lost for the sake of one."""
 MAX_IN_FLIGHT = 256
 """Bytes of scheduled replies that may be awaited at a time."""
 MAX_BACKLOG = 2
@@ -155,8 +158,14 @@ class Client:
             lost += 1
         self.timeouts += lost
 
+    @property
+    def _timeout(self) -> float:
+        slowest = max((reply.latency for reply in self.latest.values()), default=TIMEOUT)
+        return min(max(PATIENCE * slowest, SHORTEST_TIMEOUT), TIMEOUT)
+
     def _expire(self, now: float) -> None:
-        late = [code for code, asked in self._asked.items() if now - asked > TIMEOUT]
+        timeout = self._timeout
+        late = [code for code, asked in self._asked.items() if now - asked > timeout]
         for code in late:
             del self._asked[code]
             self._awaited.remove(code)
