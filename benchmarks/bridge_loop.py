@@ -1,9 +1,9 @@
 """The bridge in real time: `e2efly fly` on one core flies the real firmware on the rig, which has another.
 
-    python benchmarks/bridge_loop.py [--policy FILE] [--seconds 30] [--json FILE]
+    python benchmarks/bridge_loop.py [--policy FILE] [--seconds 600] [--json FILE]
 
 Lateness of the control steps and the policy's inference come from the flight's own log; the hover error is the rig's
-truth. With `--seconds 600` it is the soak. Give the machine nothing else to do. Without --policy a hover is trained.
+truth. Ten minutes are the soak. Give the machine nothing else to do. Without --policy a hover is trained.
 """
 
 import os
@@ -24,7 +24,7 @@ TARGET = (0.0, 0.0, 2.0)
 
 def main() -> None:
     """Fly, print the table, write the figures."""
-    args = arguments(__doc__ or "", policy=None, seconds=30.0)
+    args = arguments(__doc__ or "", policy=None, seconds=600.0)
     cores = sorted(os.sched_getaffinity(0))
     with tempfile.TemporaryDirectory() as text:
         folder = Path(text)

@@ -183,6 +183,23 @@ def test_sticks_go_first_and_their_replies_are_eaten() -> None:
     assert 200 not in client.latest
 
 
+def test_where_answers_are_quick_a_lost_one_is_asked_for_again_soon() -> None:
+    """On a line that loses frames: before the link counts as lost."""
+    wire = Wire()
+    client = Client(wire, {108: 20.0})
+    client.poll(0.0)
+    wire.answer()
+    client.poll(0.01)
+    client.poll(0.06)
+    assert len(wire.sent) == 1  # its answer is lost
+    wire.sent.clear()
+    client.poll(0.06 + 0.07)
+    assert not wire.sent
+    client.poll(0.06 + 0.09)
+    assert [frame.code for frame in wire.sent] == [108]
+    assert client.timeouts == 1
+
+
 def test_lost_answers_to_sticks_do_not_stop_telemetry_for_good() -> None:
     wire = Wire()
     client = Client(wire, SCHEDULE)
