@@ -165,6 +165,12 @@ def test_a_response_that_is_not_the_command_s_is_not_believed(log: FlightLog) ->
     assert "explains" in r.reason
 
 
+def test_a_loop_that_does_not_end_at_its_command_is_not_believed(log: FlightLog) -> None:
+    commands = log["command"]
+    roll = commands.numbers("body_rate", 3)[:, 0]
+    assert "settles at 0.4" in step_response(commands.time, roll, commands.time, 0.4 * roll).reason
+
+
 def test_the_summary_says_what_was_flown(log: FlightLog) -> None:
     table = summary(log)
     assert table["duration_s"] == pytest.approx(27.99, abs=1e-3) and table["cut_off"] is None

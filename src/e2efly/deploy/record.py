@@ -94,6 +94,8 @@ def record_map(log: Log, now: float, throttle_map: ThrottleMap) -> None:
 def record_link(log: Log, now: float, client: Client) -> None:
     """Keep how well the controller is heard."""
     log.record("link", now, {
+        "requests": client.requests,
+        "replies": client.replies,
         "timeouts": client.timeouts,
         "errors": client.decoder.bad_checksums + client.decoder.skipped + client.run_together,
         "reconnects": max(client.link.connections - 1, 0),

@@ -40,7 +40,8 @@ def plot_loop(log: FlightLog, path: str | Path) -> None:
         over.set_ylabel("lateness (ms)")
         if len(timing):
             over.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderpad=0.1)
-        load.plot(timing.time, 100 * timing.numbers("cpu_load"), color=BLUE, label="companion")
+        spent = timing.numbers("cpu_load")  # told once a second
+        load.plot(timing.time[np.isfinite(spent)], 100 * spent[np.isfinite(spent)], color=BLUE, label="companion")
         load.plot(log["status"].time, 100 * log["status"].numbers("cpu_load"), color=VERMILLION, label="controller")
         load.set_ylabel("processor load (%)")
         load.set_ylim(0, max(105.0, load.get_ylim()[1]))

@@ -20,7 +20,9 @@ RIDGE = 1e-3
 EXCITATION = 0.1
 """Root mean square of the command's changes within a second that an estimate needs, rad/s."""
 EXPLAINED = 0.7
-"""Share of the response's variance that the estimate must explain to be believed."""
+"""Share of the response's variance that the estimate must explain to be believed ..."""
+SETTLES = (0.6, 1.5)
+"""... and where it must settle: a loop with an integrator ends at 1."""
 _GRID = (0.001, 0.02)  # s: finest and coarsest step in time
 
 
@@ -79,7 +81,9 @@ def step_response(
     curve, time = np.cumsum(impulse), step * (np.arange(count) + 0.5)  # ones from 0 on: a step half a cell earlier
     gain = float(np.mean(curve[time >= SETTLED]))
     weak = f"the command explains {max(explained, 0):.0%} of the response, needed {EXPLAINED:.0%}"
-    reason = "" if explained >= EXPLAINED and gain > 0.1 else weak
+    reason = "" if explained >= EXPLAINED else weak
+    if not reason and not SETTLES[0] <= gain <= SETTLES[1]:  # an integrator ends at 1
+        reason = f"settles at {gain:.2f} of the command, not at 1: too little motion, or not this loop's"
     delay, rise = (_reaches(time, curve, part * gain) for part in (0.1, 1 - np.exp(-1)))
     overshoot = max(float(curve.max() / gain) - 1, 0.0) if gain > 0 else float("nan")
     return StepResponse(time, curve, delay, rise, overshoot, gain, excitation, explained, reason)

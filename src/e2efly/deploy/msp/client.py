@@ -70,6 +70,10 @@ class Client:
     """The latest reply to each code, on this connection."""
     errors: dict[int, str] = field(default_factory=dict)
     """What was wrong with the last answer to each code, where something was."""
+    requests: int = 0
+    """Requests sent, so far; stick frames not counted."""
+    replies: int = 0
+    """Replies taken in, so far; those to stick frames not counted."""
     timeouts: int = 0
     """Requests that got no answer in time, so far."""
     backlog: int = 0
@@ -101,6 +105,7 @@ class Client:
         if code in self._asked or not self.link.alive:
             return False
         self._asked[code] = now
+        self.requests += 1
         self._awaited.append(code)
         self.link.send(encode(Frame(code, payload, version=1 if code < 255 else 2)))
         return True
@@ -131,6 +136,7 @@ class Client:
         if frame.code == messages.SET_RAW_RC:
             self._rc_answered = now
             return
+        self.replies += 1
         asked = self._asked.pop(frame.code, now)
         self._sizes[frame.code] = len(frame.payload) + _OVERHEAD
         if frame.direction == ERROR:
