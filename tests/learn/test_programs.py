@@ -29,6 +29,17 @@ def config(**changes: Any) -> TrainConfig:
     )
 
 
+def small_ppo(**changes: Any) -> TrainConfig:
+    """Of programs that are compiled soon."""
+    base = presets.preset("hover", "ppo")
+    algo = dataclasses.replace(base.algo, envs=8, horizon=4, minibatch=16, epochs=1)
+    task = dataclasses.replace(base.task, episode_s=1.0)
+    network = NetworkConfig((8,))
+    return dataclasses.replace(
+        base, algo=algo, task=task, network=network, chunk=2, eval_episodes=9, devices=2, **changes
+    )
+
+
 def run(setup: Setup, traced: Path | None) -> tuple[Any, Any]:
     parameters = setup.algorithm.init(setup.env, setup.config.algo, 0)
     programs = Programs.compile(setup, parameters, traced)
@@ -44,7 +55,7 @@ def same(a: Any, b: Any) -> bool:
 
 
 def test_a_traced_program_found_again_computes_the_same(tmp_path: Path) -> None:
-    setup = Setup.of(config())
+    setup = Setup.of(small_ppo())
     fresh = run(setup, None)
     first = run(setup, tmp_path)
     files = sorted(tmp_path.iterdir())
@@ -57,9 +68,9 @@ def test_a_traced_program_found_again_computes_the_same(tmp_path: Path) -> None:
     files[0].write_bytes(files[0].read_bytes()[:-10])  # damaged: made again
     assert same(first, run(setup, tmp_path))
     assert files[0].stat().st_mtime_ns != kept[0]
-    assert run(Setup.of(config(seed=3)), tmp_path)
+    assert run(Setup.of(small_ppo(seed=3)), tmp_path)
     assert sorted(tmp_path.iterdir()) == files  # the seed is no part of the programs
-    run(Setup.of(config(reward=dataclasses.replace(setup.config.reward, weights={"vz": 1.0}))), tmp_path)
+    run(Setup.of(small_ppo(reward=dataclasses.replace(setup.config.reward, weights={"vz": 1.0}))), tmp_path)
     assert len(list(tmp_path.iterdir())) == 4  # the reward is
 
 

@@ -146,8 +146,9 @@ class Rig:
         prepare(self.sitl)
         self.sitl.start()
         self._next_pose = self._next_rc = self.now()
+        self._run(CALIBRATION_S)  # nobody is there yet for whom it would have to be in real time
+        self._poses.clear()
         self._epoch = time.monotonic() - self.now()
-        self.sleep(CALIBRATION_S)
 
     def now(self) -> float:
         """Seconds of the firmware's time."""
@@ -166,7 +167,11 @@ class Rig:
                 while self.now() + STEP_S <= now - self._epoch:
                     self.step(STEP_S)
                 time.sleep(min(end - now, STEP_S))
-            return
+        else:
+            self._run(seconds)
+
+    def _run(self, seconds: float) -> None:
+        """Steps for so long, as fast as they go."""
         self.sitl.exchange()
         self._left += seconds
         while self._left > STEP_S / 2:
