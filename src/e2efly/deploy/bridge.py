@@ -47,6 +47,8 @@ ATTITUDE_S = 0.1
 """The controller's attitude, beside which the odometry's heading is looked at, may be so old, s."""
 THRUST_DELAY = (0.015, 0.075)
 """How long before a measured force its throttle was sent, s: the link, the rate loop and the motors' lag."""
+BLOWN = 3.0
+"""Beyond this force across the body, m/s^2, the air pushes so hard that the force along it tells little of thrust."""
 TRIM = (-3.0, 5.0)
 """Bounds of the thrust that a take-off adds while the throttle map is still wrong, m/s^2."""
 TRIM_GAIN = 3.0
@@ -215,7 +217,8 @@ class Bridge:
         self._imu = Imu(np.array(reply.message.body_rate), force)
         attitude = self.client.message(Attitude.CODE, now, 0.1)
         self._reckoned = reckoning.reckon(self._reckoned, attitude, tuple(force.tolist()), now)
-        if self.flying and self.height > LIFTED and not self.flight.blind and self.inputs.armed:
+        blown = math.hypot(force[0], force[1]) > BLOWN
+        if self.flying and self.height > LIFTED and not self.flight.blind and not blown and self.inputs.armed:
             at = reply.time - reply.latency / 2
             throttle = self._history.between(at - THRUST_DELAY[1], at - THRUST_DELAY[0])
             if throttle is not None:
