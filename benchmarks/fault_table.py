@@ -4,6 +4,9 @@ import math
 import os
 import subprocess
 import sys
+import tempfile
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +23,23 @@ def hover_policy(given: str | None, folder: Path) -> Path:
     return run / "policy.onnx"
 
 
-def report(name: str, file: str | None, rows: list[dict[str, Any]], took: float) -> None:
-    """Write the figures, print the table, and end with status 1 when any row has problems."""
+def run(name: str, options: Any, fly: Callable[[Path, Path, int], list[dict[str, Any]]]) -> None:
+    """Fly so many rounds, write the figures, print the table; exit status 1 when any row has problems.
+
+    Args:
+        name: of the benchmark.
+        options: `times`, `policy` and `json`.
+        fly: (policy, folder, seed) -> a row a fault.
+    """
+    began, rows = time.perf_counter(), []
+    with tempfile.TemporaryDirectory() as text:
+        folder = Path(text)
+        policy = hover_policy(options.policy, folder)
+        for seed in range(options.times):
+            rows += fly(policy, folder, seed)
+    took = time.perf_counter() - began
     lines = summary(rows)
-    write(name, file, {"table": lines, "faults": rows, "took_s": took})
+    write(name, options.json, {"table": lines, "faults": rows, "took_s": took})
     print(table(lines))
     sys.exit(any(row["problems"] for row in rows))
 

@@ -6,14 +6,12 @@ python benchmarks/firmware_faults.py [--times 5] [--only TEXT ...] [--policy pol
 machine. Exit status 1 when any ends otherwise than documented.
 """
 
-import tempfile
-import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from common import arguments
-from fault_table import hover_policy, report
+from fault_table import run
 
 from e2efly.deploy.goal_options import GoalOptions, goal_for
 from e2efly.deploy.policy import load_policy
@@ -55,14 +53,7 @@ def main() -> None:
     """Fly, print a table, write JSON."""
     options = arguments(__doc__ or "", times=5, only=[""], policy=None)
     only = [text for text in options.only if text]
-    began = time.perf_counter()
-    rows: list[dict[str, Any]] = []
-    with tempfile.TemporaryDirectory() as text:
-        folder = Path(text)
-        policy = hover_policy(options.policy, folder)
-        for seed in range(options.times):
-            rows += virtual(policy, folder, seed, only)
-    report("firmware_faults", options.json, rows, time.perf_counter() - began)
+    run("firmware_faults", options, lambda policy, folder, seed: virtual(policy, folder, seed, only))
 
 
 if __name__ == "__main__":

@@ -6,38 +6,35 @@ Let the machine be quiet. `--policy` is a hover policy; left out, one is trained
 than documented.
 """
 
-import tempfile
-import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from common import arguments
-from fault_table import hover_policy, report
+from fault_table import run
 
 from e2efly.validate.process_faults import FAULTS, strike
 
 
+def real(policy: Path, folder: Path, seed: int) -> list[dict[str, Any]]:
+    """Every fault once, in real time."""
+    rows: list[dict[str, Any]] = []
+    for fault in FAULTS:
+        try:
+            outcome = asdict(strike(fault, policy, folder, seed))
+            if outcome["reaction"] > outcome["allowed"]:
+                late = f"reacted after {outcome['reaction']:.3f} s; allowed: {outcome['allowed']:.3f}"
+                outcome["problems"] = [*outcome["problems"], late]
+        except RuntimeError as error:
+            outcome = {"problems": [str(error)]}
+        rows.append({"seed": seed, **outcome, "fault": f"bridge: {fault}"})
+        print(seed, fault, outcome["problems"] or "ok", flush=True)
+    return rows
+
+
 def main() -> None:
     """Fly, print a table, write JSON."""
-    options = arguments(__doc__ or "", times=5, policy=None)
-    began = time.perf_counter()
-    rows: list[dict[str, Any]] = []
-    with tempfile.TemporaryDirectory() as text:
-        folder = Path(text)
-        policy = hover_policy(options.policy, folder)
-        for seed in range(options.times):
-            for fault in FAULTS:
-                try:
-                    outcome = asdict(strike(fault, policy, folder, seed))
-                    if outcome["reaction"] > outcome["allowed"]:
-                        late = f"reacted after {outcome['reaction']:.3f} s; allowed: {outcome['allowed']:.3f}"
-                        outcome["problems"] = [*outcome["problems"], late]
-                except RuntimeError as error:
-                    outcome = {"problems": [str(error)]}
-                rows.append({"seed": seed, **outcome, "fault": f"bridge: {fault}"})
-                print(seed, fault, outcome["problems"] or "ok", flush=True)
-    report("process_faults", options.json, rows, time.perf_counter() - began)
+    run("process_faults", arguments(__doc__ or "", times=5, policy=None), real)
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@ AFRESH_S = 1.0
 OUTLIERS_S = 0.03
 """Poses are refused for so long before the odometry counts as lost, s: an outlier or two end no flight."""
 ATTITUDE_S = 0.1
-"""The controller's attitude, beside which the odometry's heading is looked at, may be so old, s."""
+"""The controller's attitude, by which heading and velocity are reckoned, may be so old, s."""
 THRUST_DELAY = (0.015, 0.075)
 """How long before a measured force its throttle was sent, s: the link, the rate loop and the motors' lag."""
 BLOWN = 3.0
@@ -215,7 +215,7 @@ class Bridge:
             return
         force = counts * (GRAVITY / self._gravity_counts)
         self._imu = Imu(np.array(reply.message.body_rate), force)
-        attitude = self.client.message(Attitude.CODE, now, 0.1)
+        attitude = self.client.message(Attitude.CODE, now, ATTITUDE_S)
         self._reckoned = reckoning.reckon(self._reckoned, attitude, tuple(force.tolist()), now)
         blown = math.hypot(force[0], force[1]) > BLOWN
         if self.flying and self.height > LIFTED and not self.flight.blind and not blown and self.inputs.armed:

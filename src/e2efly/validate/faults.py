@@ -16,7 +16,6 @@ from e2efly.deploy.flight_state import Mode, Reason
 from e2efly.deploy.msp.messages import BatteryState, FcVariant
 from e2efly.deploy.msp.settings import RcTuning, RxMap
 from e2efly.deploy.odometry import Odometry, Sample
-from e2efly.validate.rig import STEP_S
 from e2efly.validate.stage import FENCE, LATENCY_S, POSE_S, SETTINGS, Stage
 
 RECEIVER_S = 0.05
@@ -24,7 +23,7 @@ RECEIVER_S = 0.05
 its channels (20 ms)."""
 GUST, WALL = 50.0, 0.6
 """Wind of a gust, m/s, until the policy has lost the vehicle; distance of the fence, m."""
-DRIFT_RATE, ASTRAY, HEADING_S = 0.7, 0.3, 0.8
+DRIFT_RATE, ASTRAY, HEADING_S = 0.7, 0.3, 0.6
 """How fast a heading drifts, rad/s; the speed, m/s, from which on the vehicle shows it, and how soon, s."""
 BATTERY_S = 0.55
 """The battery is asked for at 2 Hz; the question and its answer take their time."""
@@ -232,7 +231,7 @@ FAULTS = (
     Fault("control steps late", Mode.POLICY, _nothing, End.HOVER, Reason.DEADLINES, 0.03, each=_late_step),
     Fault("pilot: policy switch off", Mode.POLICY, _set(mission="hover"), End.HOVER, Reason.MISSION, RECEIVER_S),
     Fault("pilot: stick input", Mode.POLICY, _set(roll=0.5), End.HOVER, Reason.STICK_INPUT, RECEIVER_S),
-    Fault("fence: a gust", Mode.POLICY, _gust, End.HOVER, None, POSE_S + LATENCY_S + STEP_S, begins=_past_fence,
+    Fault("fence: a gust", Mode.POLICY, _gust, End.HOVER, None, POSE_S + LATENCY_S, begins=_past_fence,
           each=_calm),
     Fault("pilot: override off", Mode.POLICY, _override_off, End.PILOT, Reason.OVERRIDE_OFF, RECEIVER_S + 0.05),
     # the vehicle lands

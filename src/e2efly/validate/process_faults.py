@@ -22,8 +22,8 @@ from e2efly.deploy.watchdog import TIMEOUT_S
 
 START_S = 60.0
 """How long a process may take to be ready on a busy machine, s."""
-PERIOD_S, SEEN_S = 0.01, 0.02
-"""Of the control steps; from a stick frame to motors that are seen to slow down, through link, firmware and rig: s."""
+PERIOD_S = 0.01
+"""Of the control steps, s."""
 FLIGHT_S = 40.0
 """How long each part of a flight may take on a busy machine, s."""
 LOG_LIMIT = 400_000
@@ -40,8 +40,7 @@ class ProcessOutcome:
     reaction: float
     """Until the motors were seen to do something else, s; NaN where nothing was to change."""
     allowed: float
-    """What is stated: the watchdog's time-out, a control period, and what it takes to be seen, s; NaN. On a quiet
-    machine: `problems` says nothing of it."""
+    """What is stated: the watchdog's time-out and a control period, s; NaN. `problems` says nothing of it."""
     touch_speed: float
     """Of the last touch of the ground, m/s; NaN without."""
     touch_tilt: float
@@ -205,7 +204,7 @@ def _flight(fault: str, rig: RigClient, bridge: BridgeProcess, log: Path, moment
         rig.set(armed=False)
     else:
         bridge.process.send_signal({"killed": signal.SIGKILL, "stopped": signal.SIGSTOP}[fault])
-        allowed = (TIMEOUT_S if fault == "stopped" else 0.0) + PERIOD_S + SEEN_S
+        allowed = (TIMEOUT_S if fault == "stopped" else 0.0) + PERIOD_S
         reaction = _until_sinking(rig)
         if not _until(rig, FLIGHT_S, lambda state: state["standing"]):
             problems.append("it did not land")
