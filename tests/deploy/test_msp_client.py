@@ -87,17 +87,18 @@ def test_a_request_without_answer_is_given_up_and_can_be_asked_again() -> None:
     assert client.request(108, TIMEOUT + 0.02)
 
 
-def test_a_false_start_does_not_hold_back_a_good_reply_beyond_the_time_out() -> None:
+def test_a_false_start_holds_back_no_good_reply_and_is_forgotten_after_the_time_out() -> None:
     wire = Wire()
     client = Client(wire)
     client.poll(0.0)
     client.request(108, 0.0)
-    wire.answer()
-    wire.inbox = b"$M>\xff\x01\xff\x03" + wire.inbox
+    client.request(105, 0.0)
+    wire.answer(1)
+    wire.inbox = b"$M>\xff\x01\xff\x03" + wire.inbox + b"$M>\xff\x01\xff\x03"
     client.poll(0.01)
-    assert 108 not in client.latest
+    assert 108 in client.latest and client.decoder.pending
     client.poll(TIMEOUT + 0.01)
-    assert 108 in client.latest
+    assert client.decoder.pending == 0
 
 
 def test_refused_and_unreadable_answers_are_said() -> None:
@@ -198,6 +199,46 @@ def test_where_answers_are_quick_a_lost_one_is_asked_for_again_soon() -> None:
     client.poll(0.06 + 0.09)
     assert [frame.code for frame in wire.sent] == [108]
     assert client.timeouts == 1
+
+
+def test_latency_is_of_the_request_that_was_answered_though_it_had_been_given_up() -> None:
+    """A line that turns slow: the answer comes after the request was sent again."""
+    wire = Wire()
+    client = Client(wire, {108: 20.0})
+    client.poll(0.0)
+    wire.answer()
+    client.poll(0.01)
+    assert client.latency == pytest.approx(0.01)
+    client.poll(0.06)
+    client.poll(0.16)
+    assert len(wire.sent) == 2
+    wire.answer(1)
+    client.poll(0.18)
+    assert client.latency == pytest.approx(0.12)
+    assert not client.request(108, 0.18)  # the second is still awaited
+    wire.answer()
+    client.poll(0.2)
+    assert client.latency == pytest.approx(0.04)
+
+
+def test_lost_answers_are_no_latency() -> None:
+    """The answer to a later stick frame tells that the one to the request before it is lost."""
+    wire = Wire()
+    client = Client(wire, {108: 20.0})
+    client.poll(0.0)
+    wire.answer()
+    client.poll(0.01)
+    client.set_raw_rc(STICKS, 0.05)
+    client.poll(0.06)
+    client.set_raw_rc(STICKS, 0.07)
+    del wire.sent[1]
+    wire.answer()
+    client.poll(0.08)
+    assert (client.backlog, client.timeouts) == (0, 1)
+    assert [frame.code for frame in wire.sent] == [108]  # asked for again at once
+    wire.answer()
+    client.poll(0.09)
+    assert client.latency == pytest.approx(0.01)
 
 
 def test_lost_answers_to_sticks_do_not_stop_telemetry_for_good() -> None:

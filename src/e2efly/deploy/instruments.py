@@ -20,9 +20,8 @@ VOLTAGE_SHARE = 0.4
 RC_PATIENCE = 1.2
 """The pilot's channels may be so much older than the link's time-out: a lost link is to be told as one, whichever
 answer came last."""
-BEHIND = 50
-"""Stick frames without an answer, for each second of the link's time-out, with which the link is too slow to fly by:
-half of the time-out at 100 Hz."""
+BEHIND = 0.5
+"""Share of the link's time-out. A controller that takes longer to answer is too slow to fly by."""
 BATTERY_PATIENCE_S = 3.0
 """The battery's voltage may be so old, s."""
 
@@ -100,8 +99,8 @@ class Instruments:
         patience, link = self.settings.link_timeout, self.client.link
         if status is None:
             return link.reason if not link.alive else f"no answer within {patience:g} s"
-        if self.client.backlog > BEHIND * patience:
-            return f"it is behind by {self.client.backlog} stick frames (set serial_update_rate_hz=1000)"
+        if self.client.latency > BEHIND * patience:
+            return f"it answers {1e3 * self.client.latency:.0f} ms late (set serial_update_rate_hz=1000)"
         return None
 
     def _measure(self, battery: BatteryState) -> None:

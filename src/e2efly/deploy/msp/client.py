@@ -55,7 +55,8 @@ class Reply(NamedTuple):
     time: float
     """When it came, s on the monotonic clock."""
     latency: float
-    """How long after its request, s."""
+    """How long after its request, s. Of two requests, the first of which was given up, the first: where its answer was
+    lost, the next answer to a stick frame has told so already."""
 
 
 @dataclass
@@ -77,23 +78,25 @@ class Client:
     timeouts: int = 0
     """Requests that got no answer in time, so far."""
     backlog: int = 0
-    """Stick frames that the controller has not answered yet."""
+    """Stick frames whose answers are awaited: the controller has not got to them yet, or the answers are lost."""
+    latency: float = 0.0
+    """How long the newest answer took, s; those to stick frames not counted. The controller answers in order, so that
+    stick frames reach it as late."""
     run_together: int = 0
     """Replies thrown away because another begins inside, so far."""
     decoder: Decoder = field(default_factory=Decoder)
     """Counts bad checksums and skipped bytes."""
     _asked: dict[int, float] = field(default_factory=dict)
-    _awaited: deque[int] = field(default_factory=deque)
+    _awaited: deque[tuple[int, float]] = field(default_factory=deque)
     _due: dict[int, float] = field(default_factory=dict)
     _sizes: dict[int, int] = field(default_factory=dict)
     _connection: int = 0
-    _rc_answered: float = 0.0
 
     def poll(self, now: float) -> None:
         """Read what has come and ask for what is due. `now` is in s on the monotonic clock. Never raises."""
         self.link.poll(now)
         if self.link.connections != self._connection:
-            self._forget(now)
+            self._forget()
         for frame in self.decoder.feed(self.link.receive()):
             self._take(frame, now)
         self._expire(now)
@@ -106,7 +109,7 @@ class Client:
             return False
         self._asked[code] = now
         self.requests += 1
-        self._awaited.append(code)
+        self._awaited.append((code, now))
         self.link.send(encode(Frame(code, payload, version=1 if code < 255 else 2)))
         return True
 
@@ -114,10 +117,8 @@ class Client:
         """Send a stick frame of `messages.set_raw_rc` and await nothing; whether the link is alive."""
         if not self.link.alive:
             return False
-        if not self.backlog:
-            self._rc_answered = now
         self.backlog += 1
-        self._awaited.append(messages.SET_RAW_RC)
+        self._awaited.append((messages.SET_RAW_RC, now))
         self.link.send(encode(frame))
         return self.link.alive
 
@@ -132,12 +133,11 @@ class Client:
         if any(start in frame.payload for start in _STARTS):
             self.run_together += 1
             return
-        self._strike_off(frame.code)
+        asked = self._strike_off(frame.code, now)
         if frame.code == messages.SET_RAW_RC:
-            self._rc_answered = now
             return
         self.replies += 1
-        asked = self._asked.pop(frame.code, now)
+        self.latency = now - asked
         self._sizes[frame.code] = len(frame.payload) + _OVERHEAD
         if frame.direction == ERROR:
             self.errors[frame.code] = "the controller does not know or refuses it"
@@ -151,18 +151,25 @@ class Client:
         self.errors.pop(frame.code, None)
         self.latest[frame.code] = Reply(message, now, now - asked)
 
-    def _strike_off(self, code: int) -> None:
-        """A code is answered. The controller answers in order: the answers to what was sent before it are lost."""
-        lost = 0
-        while code in self._awaited:
-            earlier = self._awaited.popleft()
-            if earlier == messages.SET_RAW_RC:
-                self.backlog -= 1
+    def _strike_off(self, code: int, now: float) -> float:
+        """A code is answered. The controller answers in order: the answers to what was sent before it are lost.
+
+        Returns:
+            When it was asked for, s; `now` where it was not.
+        """
+        if all(awaited != code for awaited, _ in self._awaited):
+            return now
+        while True:
+            earlier, asked = self._awaited.popleft()
+            self.backlog -= earlier == messages.SET_RAW_RC
+            given_up = earlier != messages.SET_RAW_RC and self._asked.get(earlier) != asked
+            if not given_up:
+                self._asked.pop(earlier, None)
             if earlier == code:
-                break
-            self._asked.pop(earlier, None)
-            lost += 1
-        self.timeouts += lost
+                return asked
+            if not given_up:
+                self.timeouts += 1
+                self._due.pop(earlier, None)  # at once again
 
     @property
     def _timeout(self) -> float:
@@ -174,11 +181,12 @@ class Client:
         late = [code for code, asked in self._asked.items() if now - asked > timeout]
         for code in late:
             del self._asked[code]
-            self._awaited.remove(code)
         self.timeouts += len(late)
-        if self.backlog and now - self._rc_answered > TIMEOUT:
-            self.backlog, self.timeouts, late = 0, self.timeouts + self.backlog, [messages.SET_RAW_RC]
-            self._awaited = deque(code for code in self._awaited if code in self._asked)
+        while self._awaited and now - self._awaited[0][1] > TIMEOUT:
+            code, _ = self._awaited.popleft()
+            if code == messages.SET_RAW_RC:
+                self.backlog, self.timeouts = self.backlog - 1, self.timeouts + 1
+                late.append(code)
         if late and self.decoder.pending:  # what is held back may be no frame at all
             for frame in self.decoder.flush():
                 self._take(frame, now)
@@ -197,7 +205,7 @@ class Client:
             period = 1 / self.schedule[code]
             self._due[code] = max(self._due[code] + period, now + 0.5 * period)
 
-    def _forget(self, now: float) -> None:
+    def _forget(self) -> None:
         """A new connection: nothing of the old one is awaited or believed."""
         self._connection = self.link.connections
         self._asked.clear()
@@ -205,7 +213,7 @@ class Client:
         self._due.clear()
         self.latest.clear()
         self.errors.clear()
-        self.backlog, self._rc_answered = 0, now
+        self.backlog, self.latency = 0, 0.0
         self.decoder = Decoder(bad_checksums=self.decoder.bad_checksums, skipped=self.decoder.skipped)
 
 

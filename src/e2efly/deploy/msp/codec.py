@@ -8,13 +8,14 @@ Layouts, little endian, after the `$`:
 
 import struct
 from dataclasses import dataclass, field
+from enum import Enum, auto
 from itertools import accumulate
 from operator import xor
 
 REQUEST, REPLY, ERROR = "<", ">", "!"
 """Directions: to the controller, from it, and from it when it does not know or refuses the code."""
 MAX_PAYLOAD = 1024
-"""Longest payload that a decoder waits for, bytes, unless told: a corrupt length delays what follows by no more."""
+"""Longest payload that a decoder waits for, bytes, unless told."""
 _JUMBO = 255
 _SHORTEST = 6
 _DIRECTIONS = {ord(mark): mark for mark in (REQUEST, REPLY, ERROR)}
@@ -81,13 +82,22 @@ def encode(frame: Frame) -> bytes:
     return b"$M" + mark + body + bytes([list(accumulate(body, xor))[-1]])
 
 
+class _Not(Enum):
+    """Why there is no frame at a place."""
+
+    ONE = auto()
+    COMPLETE = auto()
+    INTACT = auto()
+
+
 @dataclass
 class Decoder:
     """Finds the frames in a stream of bytes, whatever else is in it.
 
     A start that turns out to be false costs its first byte only: the search goes on at the next one, so that garbage,
-    a flipped bit or a corrupt length hides no good frame that follows. Every start is judged in constant time (running
-    checksums are kept of the stream), so time is linear in the bytes, whatever they are. Never raises.
+    a flipped bit or a corrupt length hides no good frame that follows. Nor does half a frame hold up what comes after
+    it: a frame that is whole is taken before one around it that is not. Every start is judged in constant time (running
+    checksums are kept of the stream). Never raises.
     """
 
     max_payload: int = MAX_PAYLOAD
@@ -130,25 +140,37 @@ class Decoder:
             if isinstance(found, tuple):
                 frame, at = found
                 frames.append(frame)
-            elif found and waiting:
-                break
+            elif found is _Not.COMPLETE and waiting:
+                inner = self._whole_after(at)
+                if inner is None:
+                    break
+                self.skipped += inner - at
+                at = inner
             else:
+                self.bad_checksums += found is _Not.INTACT
                 self.skipped += 1
                 at += 1
         del self._bytes[:at], self._xor[:at], self._crc[:at]
         return frames
 
-    def _judge(self, at: int) -> tuple[Frame, int] | bool:
-        """The frame that starts here and where it ends; or whether more bytes may make one."""
+    def _whole_after(self, at: int) -> int | None:
+        """Where the next frame begins that is whole, behind an incomplete one."""
+        while (at := self._bytes.find(_START, at + 1)) > 0:
+            if isinstance(self._judge(at), tuple):
+                return at
+        return None
+
+    def _judge(self, at: int) -> tuple[Frame, int] | _Not:
+        """The frame that starts here and where it ends."""
         data, size = self._bytes, len(self._bytes) - at
         if (size > 1 and data[at + 1] not in (_V1, _V2)) or (size > 2 and data[at + 2] not in _DIRECTIONS):
-            return False
+            return _Not.ONE
         if size < _SHORTEST:
-            return True
+            return _Not.COMPLETE
         body, version, flags = at + 3, 1, 0
         if data[at + 1] == _V2:
             if size < 9:
-                return True
+                return _Not.COMPLETE
             version = 2
             flags, code, length = struct.unpack_from("<BHH", data, body)
             start = body + 5
@@ -157,19 +179,18 @@ class Decoder:
             start = body + 2
             if length == _JUMBO:
                 if size < _SHORTEST + 2:
-                    return True
+                    return _Not.COMPLETE
                 (length,) = struct.unpack_from("<H", data, start)
                 start += 2
         if length > self.max_payload:
-            return False
+            return _Not.ONE
         end = start + length
         if end >= len(data):
-            return True
+            return _Not.COMPLETE
         if version == 1:
             checksum = self._xor[end] ^ self._xor[body]
         else:
             checksum = self._crc[end] ^ _SHIFTS[(end - body) % _PERIOD][self._crc[body]]
         if checksum != data[end]:
-            self.bad_checksums += 1
-            return False
+            return _Not.INTACT
         return Frame(code, bytes(data[start:end]), _DIRECTIONS[data[at + 2]], version, flags), end + 1
