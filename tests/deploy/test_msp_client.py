@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import pytest
 
 from e2efly.deploy.msp import messages, settings
-from e2efly.deploy.msp.client import MAX_BACKLOG, MAX_IN_FLIGHT, SCHEDULE, TIMEOUT, Client, ask
+from e2efly.deploy.msp.client import FORGOTTEN, MAX_BACKLOG, MAX_IN_FLIGHT, SCHEDULE, TIMEOUT, Client, ask
 from e2efly.deploy.msp.codec import ERROR, REPLY, Decoder, Frame, encode
 from e2efly.deploy.msp.controller import identify
 from e2efly.deploy.msp.link import open_link
@@ -235,10 +235,40 @@ def test_lost_answers_are_no_latency() -> None:
     wire.answer()
     client.poll(0.08)
     assert (client.backlog, client.timeouts) == (0, 1)
-    assert [frame.code for frame in wire.sent] == [108]  # asked for again at once
+    client.poll(0.11)
     wire.answer()
-    client.poll(0.09)
+    client.poll(0.12)
     assert client.latency == pytest.approx(0.01)
+
+
+def fly(client: Client, wire: Wire, rate: float, start: float, end: float) -> None:
+    """Stick frames at 125 Hz to a controller that answers at a rate, in its own time."""
+    credit = 0.0
+    for tick in range(round(125 * start), round(125 * end)):
+        credit = min(credit + rate / 125, len(wire.sent))
+        wire.answer(int(credit))
+        credit -= int(credit)
+        client.poll(tick / 125)
+        client.set_raw_rc(STICKS, tick / 125)
+
+
+def test_a_busy_controller_that_paused_catches_up_and_is_not_flooded() -> None:
+    """It answers 350 a second, little more than is asked of it, and not at all for a while."""
+    wire = Wire()
+    client = Client(wire, SCHEDULE)
+    fly(client, wire, 350.0, 0.0, 2.0)
+    assert client.latency < 0.03 and len(wire.sent) < 9
+    fly(client, wire, 0.0, 2.0, 2.5)
+    fly(client, wire, 350.0, 2.5, 4.5)
+    assert client.latency < 0.03 and len(wire.sent) < 9
+
+
+def test_a_controller_that_falls_behind_is_found_out() -> None:
+    wire = Wire()
+    client = Client(wire, SCHEDULE)
+    fly(client, wire, 350.0, 0.0, 1.0)
+    fly(client, wire, 110.0, 1.0, 2.5)
+    assert client.latency > 0.125
 
 
 def test_lost_answers_to_sticks_do_not_stop_telemetry_for_good() -> None:
@@ -247,7 +277,7 @@ def test_lost_answers_to_sticks_do_not_stop_telemetry_for_good() -> None:
     client.poll(0.0)
     for _ in range(9):
         client.set_raw_rc(STICKS, 0.0)
-    client.poll(TIMEOUT + 0.1)
+    client.poll(FORGOTTEN + 0.1)
     assert client.backlog == 0
     assert client.timeouts >= 9
 

@@ -22,7 +22,7 @@ from e2efly.deploy.contract import Contract
 from e2efly.deploy.goal_options import GoalOptions, goal_for
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.policy import Policy, load_policy
-from e2efly.deploy.runtime import Envelope, Imu, Runtime, RuntimeState, act, begin, check, due, outside
+from e2efly.deploy.runtime import Envelope, Imu, Runtime, RuntimeState, act, begin, check, due, observe, outside
 from e2efly.env import Env, EnvState, random_key
 from e2efly.learn.export import contract_of, export_policy
 from e2efly.learn.networks import Features, init_mlp
@@ -93,6 +93,16 @@ def compare(decision: Any, state: RuntimeState, wanted: np.ndarray, contract: Co
         np.testing.assert_allclose(decision.observation[part], wanted[part], rtol=1e-6, atol=atol, err_msg=name)
     assert decision.observation.dtype == np.float32
     assert state.missed == 0
+
+
+def test_the_two_quaternions_of_an_attitude_look_the_same(runtime: Runtime) -> None:
+    """A pose source's sign must not matter: the policy was trained with w >= 0."""
+    contract = runtime.policy.contract
+    past = np.zeros_like(begin(runtime, still(), START).past_actions)
+    turned = np.array([0.6, 0.0, 0.0, -0.8])
+    for quaternion in (turned, -turned):
+        seen = observe(runtime, np.zeros((1, 3)), past, still(quaternion=quaternion))
+        np.testing.assert_allclose(seen[contract.slices["attitude"]], turned, rtol=1e-6)
 
 
 SUITES = {

@@ -19,6 +19,7 @@ import numpy as np
 
 from e2efly.deploy.flight_log import read_log
 from e2efly.deploy.watchdog import TIMEOUT_S
+from e2efly.validate.tap import Tap
 
 START_S = 60.0
 """How long a process may take to be ready on a busy machine, s."""
@@ -28,6 +29,8 @@ FLIGHT_S = 40.0
 """How long each part of a flight may take on a busy machine, s."""
 LOG_LIMIT = 400_000
 """Bytes that a full disk takes."""
+CLOSED, SINKING = 1000, 0.97
+"""Throttle pulse at the lowest, us, and the share of hover's above it with which the vehicle begins to sink."""
 FAULTS = ("killed", "stopped", "disk full")
 """SIGKILL, SIGSTOP and a limit of the size of files."""
 
@@ -38,7 +41,7 @@ class ProcessOutcome:
 
     fault: str
     reaction: float
-    """Until the motors were seen to do something else, s; NaN where nothing was to change."""
+    """Until the watchdog's first stick frame left for the controller, s; NaN where nothing was to change."""
     allowed: float
     """What is stated: the watchdog's time-out and a control period, s; NaN. `problems` says nothing of it."""
     touch_speed: float
@@ -95,7 +98,13 @@ class BridgeProcess:
     """`e2efly fly` as a process, and what it says."""
 
     def __init__(
-        self, policy: Path, rig: RigClient, log: Path, limit: int | None = None, options: tuple[str, ...] = ()
+        self,
+        policy: Path,
+        rig: RigClient,
+        log: Path,
+        limit: int | None = None,
+        options: tuple[str, ...] = (),
+        link: str | None = None,
     ) -> None:
         """Start it.
 
@@ -103,13 +112,14 @@ class BridgeProcess:
             policy: a policy.onnx.
             rig: the world.
             log: of the flight.
+            link: to the firmware; None: straight.
             limit: bytes that a file may have; None: any.
             options: more of the command's; they come last.
         """
         common = ["--flight.battery-unknown", "--flight.takeoff-speed", "0.8", "--flight.land-speed", "0.6"]
         # a busy machine holds up the rig, too: not what is looked at here
         common += ["--flight.odometry-timeout", "0.6", "--flight.link-timeout", "1.5"]
-        command = [sys.executable, "-m", "e2efly", "fly", str(policy), "--link", rig.link, "--log", str(log)]
+        command = [sys.executable, "-m", "e2efly", "fly", str(policy), "--link", link or rig.link, "--log", str(log)]
         self.process = subprocess.Popen(
             [*command, "--pose", f"udp:{rig.pose_port}", *common, *options],
             stdout=subprocess.PIPE,
@@ -182,15 +192,15 @@ def strike(fault: str, policy: Path, folder: Path, seed: int = 0) -> ProcessOutc
     """
     log = folder / f"{fault.replace(' ', '_')}-{seed}.mcap"
     random = np.random.default_rng(seed)
-    with RigClient(seed=seed) as rig:
-        bridge = BridgeProcess(policy, rig, log, LOG_LIMIT if fault == "disk full" else None)
+    with RigClient(seed=seed) as rig, Tap(rig.link) as tap:
+        bridge = BridgeProcess(policy, rig, log, LOG_LIMIT if fault == "disk full" else None, link=tap.link)
         try:
-            return _flight(fault, rig, bridge, log, float(random.uniform(0.5, 1.5)))
+            return _flight(fault, rig, bridge, tap, log, float(random.uniform(0.5, 1.5)))
         finally:
             bridge.close()
 
 
-def _flight(fault: str, rig: RigClient, bridge: BridgeProcess, log: Path, moment: float) -> ProcessOutcome:
+def _flight(fault: str, rig: RigClient, bridge: BridgeProcess, tap: Tap, log: Path, moment: float) -> ProcessOutcome:
     problems: list[str] = []
     reaction = allowed = math.nan
     take_off(rig, bridge)
@@ -205,7 +215,7 @@ def _flight(fault: str, rig: RigClient, bridge: BridgeProcess, log: Path, moment
     else:
         bridge.process.send_signal({"killed": signal.SIGKILL, "stopped": signal.SIGSTOP}[fault])
         allowed = (TIMEOUT_S if fault == "stopped" else 0.0) + PERIOD_S
-        reaction = _until_sinking(rig)
+        reaction = _until_descent(tap)
         if not _until(rig, FLIGHT_S, lambda state: state["standing"]):
             problems.append("it did not land")
         if not _until(rig, FLIGHT_S, lambda state: max(state["motors"]) < 0.12):
@@ -250,14 +260,16 @@ def take_off(rig: RigClient, bridge: BridgeProcess) -> None:
             raise RuntimeError(f"the bridge did not take off; it said: {bridge.said[-8:]}")
 
 
-def _until_sinking(rig: RigClient) -> float:
-    """Time until the motors slow down for the descent, s; infinite where they do not within 5 s."""
+def _until_descent(tap: Tap) -> float:
+    """Time from now until a stick frame has the throttle of a descent, s; infinite where none has within 5 s."""
     began = time.monotonic()
-    hover = float(np.mean(rig.set()["motors"]))
-    while (now := time.monotonic()) < began + 5.0:
-        if float(np.mean(rig.set()["motors"])) < 0.94 * hover:
-            return now - began
-        time.sleep(0.004)
+    hover = float(np.mean([pulse for at, pulse in tap.throttle if at > began - 0.5])) - CLOSED
+    seen = len(tap.throttle)
+    while time.monotonic() < began + 5.0:
+        time.sleep(0.01)
+        sinking = (at for at, pulse in tap.throttle[seen:] if pulse - CLOSED < SINKING * hover)
+        if (at := next(sinking, None)) is not None:
+            return at - began
     return math.inf
 
 

@@ -25,15 +25,18 @@ MESSAGES: dict[int, Any] = {
 }  # fmt: skip
 """The messages that are understood, by code."""
 SCHEDULE = {
-    messages.StatusEx.CODE: 20.0, messages.Rc.CODE: 50.0, messages.Attitude.CODE: 50.0, messages.RawImu.CODE: 50.0,
-    messages.Motor.CODE: 50.0, messages.BatteryState.CODE: 2.0,
+    messages.StatusEx.CODE: 30.0, messages.Rc.CODE: 50.0, messages.Attitude.CODE: 50.0, messages.RawImu.CODE: 50.0,
+    messages.Motor.CODE: 10.0, messages.BatteryState.CODE: 2.0,
 }  # fmt: skip
-"""How often each message is asked for in flight, Hz."""
+"""How often each message is asked for in flight, Hz. Together with the stick frames they must be well below what the
+controller answers, one message at each turn of its serial task: where that is 350 a second, frames soon queue up."""
 TIMEOUT = 0.3
 """How long a reply may take, s, before the request counts as lost and may be sent again ..."""
 SHORTEST_TIMEOUT, PATIENCE = 0.08, 4.0
 """... but, once replies have come, no longer than so many times what the slowest of them took, nor shorter than this:
 on a line that loses frames the controller must not seem lost for the sake of one."""
+FORGOTTEN = 1.0
+"""After so long, s, no answer is expected any more: earlier, a late one would be taken for that to a later request."""
 MAX_IN_FLIGHT = 256
 """Bytes of scheduled replies that may be awaited at a time."""
 MAX_BACKLOG = 2
@@ -167,9 +170,7 @@ class Client:
                 self._asked.pop(earlier, None)
             if earlier == code:
                 return asked
-            if not given_up:
-                self.timeouts += 1
-                self._due.pop(earlier, None)  # at once again
+            self.timeouts += not given_up
 
     @property
     def _timeout(self) -> float:
@@ -182,7 +183,7 @@ class Client:
         for code in late:
             del self._asked[code]
         self.timeouts += len(late)
-        while self._awaited and now - self._awaited[0][1] > TIMEOUT:
+        while self._awaited and now - self._awaited[0][1] > FORGOTTEN:
             code, _ = self._awaited.popleft()
             if code == messages.SET_RAW_RC:
                 self.backlog, self.timeouts = self.backlog - 1, self.timeouts + 1
