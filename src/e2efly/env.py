@@ -21,7 +21,7 @@ from e2efly.config import EnvConfig, ImuConfig, NoiseConfig, RewardConfig, TaskC
 from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field, past_actions
 from e2efly.physics import COMMAND_MODES, Physics, State, command_limits, step
 from e2efly.physics.body import hover_rotor_speed
-from e2efly.physics.rotation import canonical, from_euler, yaw
+from e2efly.physics.rotation import from_euler, yaw
 from e2efly.sensors import imu, latency
 from e2efly.sensors.noise import add_noise
 from e2efly.tasks import Shape, Task, make_task
@@ -311,7 +311,7 @@ class Env:
             seen = add_noise(self.noise, jax.random.fold_in(state.key, 2 * state.tick + 1), seen)
         n = seen.position.shape[0]
         targets = self.task.targets(state.memory, state.time) - seen.position[:, None]
-        parts = [targets.reshape(n, -1), canonical(seen.quaternion), seen.velocity, seen.body_rate]
+        parts = [targets.reshape(n, -1), seen.quaternion, seen.velocity, seen.body_rate]
         if state.imu is not None:
             parts += [state.imu.gyroscope, state.imu.accelerometer]
         parts.append(state.actions[:, : self.seen_actions].reshape(n, -1))

@@ -21,7 +21,7 @@ class Field:
     """How to compute it."""
 
 
-ATTITUDE = Field("attitude", 4, "world_body", "1", 1.0, "unit quaternion wxyz, body to world, with w >= 0")
+ATTITUDE = Field("attitude", 4, "world_body", "1", 1.0, "unit quaternion wxyz, body to world")
 VELOCITY = Field("velocity", 3, "world", "m/s", 2.0, "velocity of the centre of mass")
 BODY_RATE = Field("body_rate", 3, "body", "rad/s", 4.0, "angular velocity about body x, y, z")
 GYROSCOPE = Field("gyroscope", 3, "body", "rad/s", 4.0, "measured angular velocity")

@@ -288,7 +288,7 @@ def observe(
     row[slices[runtime.goal.field]] = (targets - odometry.position).ravel()
     for name, part in slices.items():
         if name == ATTITUDE.name:
-            row[part] = -odometry.quaternion if odometry.quaternion[0] < 0 else odometry.quaternion
+            row[part] = odometry.quaternion
         elif name == VELOCITY.name:
             row[part] = odometry.velocity
         elif name == BODY_RATE.name:

@@ -24,11 +24,6 @@ def normalize(q: Quaternion) -> Quaternion:
     return Quat.of(q).normalized().stack()
 
 
-def canonical(q: Quaternion) -> Quaternion:
-    """Of q and -q, which are one attitude, the one with w >= 0."""
-    return jnp.where(q[..., :1] < 0, -q, q)
-
-
 def rotate(q: Quaternion, v: Vector) -> Vector:
     """Body vector to world vector."""
     return Quat.of(q).rotate(Vec3.of(v)).stack()
