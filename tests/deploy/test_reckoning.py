@@ -7,7 +7,7 @@ import pytest
 
 from e2efly.deploy.msp.messages import Attitude
 from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.reckoning import BRAKE_S, LONGEST_STEP, Reckoning, reckon, seen, settle
+from e2efly.deploy.reckoning import BRAKE_S, LONGEST_STEP, Reckoning, reckon, seen, settle, trimmed
 from e2efly.vehicles.vehicle import GRAVITY
 
 DT = 0.02
@@ -45,6 +45,29 @@ def test_it_brakes_whatever_the_error_of_the_heading_once_that_is_known(yaw: flo
         roll, pitch = roll + float(wanted.x) * DT, pitch + float(wanted.y) * DT
         assert abs(velocity) < 1.75
     assert abs(velocity) < 0.35
+
+
+@pytest.mark.parametrize("wrong", [0.75, 1.0, 1.3])
+@pytest.mark.parametrize("climb", [-1.0, 0.0, 2.0])
+def test_it_sinks_though_the_throttle_map_is_wrong(wrong: float, climb: float) -> None:
+    """The thrust that comes is another than the one that is asked for; the height is reckoned, too."""
+    level, trim, up, height = Attitude(0.0, 0.0, 0.0), 0.0, climb, 1.0
+    odometry = Odometry(
+        0.0, np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, climb]), np.array([1.0, 0, 0, 0]), np.zeros(3)
+    )
+    known: Reckoning | None = seen(odometry, 0.0)
+    top = height
+    for k in range(round(4.0 / DT)):
+        assert known is not None
+        trim = trimmed(trim, k * DT, known.velocity[2], DT)
+        thrust = wrong * float(settle(level, k * DT, known.velocity, trim).thrust)
+        height, up = height + up * DT, up + (thrust - GRAVITY) * DT
+        known, top = reckon(known, level, (0.0, 0.0, thrust), (k + 1) * DT), max(top, height)
+        assert up < max(climb, 0.0) + 0.4
+        if k * DT > 2.5:
+            assert -1.4 < up < -0.5
+    assert known is not None
+    assert known.height == pytest.approx(height, abs=1e-6) and known.top == pytest.approx(top, abs=1e-6)
 
 
 def test_after_a_pause_nothing_is_known() -> None:

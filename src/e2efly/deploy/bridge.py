@@ -47,6 +47,8 @@ ATTITUDE_S = 0.1
 """The controller's attitude, by which heading and velocity are reckoned, may be so old, s."""
 THRUST_DELAY = (0.015, 0.075)
 """How long before a measured force its throttle was sent, s: the link, the rate loop and the motors' lag."""
+HIGHER = 2.0
+"""A blind descent is believed to have begun so much higher at most than it was seen last, m."""
 BLOWN = 3.0
 """Beyond this force across the body, m/s^2, the air pushes so hard that the force along it tells little of thrust."""
 TRIM = (-3.0, 5.0)
@@ -157,7 +159,8 @@ class Bridge:
             self._pose_problem = problem
             if odometry is not None:
                 self.odometry, self._good_pose = odometry, now
-                self._reckoned = reckoning.seen(odometry, now, self.flight.turned or 0.0)
+                if self._track.same_since == odometry.time:  # or it may be frozen, and the motion has gone on
+                    self._reckoned = reckoning.seen(odometry, now, self.flight.turned or 0.0)
                 self._watch_heading(odometry, now)
         said_frozen = (self._pose_problem or "").startswith("frozen")  # which lasts already
         if self._pose_problem and not self._track.fault and now - self._good_pose < OUTLIERS_S and not said_frozen:
@@ -266,7 +269,7 @@ class Bridge:
         before = self.flight
         self.flight = state_machine.step(self.settings, before, self.inputs, now)
         if self.flight.mode is not before.mode:
-            self._trim = 0.0 if self.flight.mode is Mode.TAKEOFF else self._trim
+            self._trim = 0.0 if self.flight.mode in (Mode.TAKEOFF, Mode.LAND) else self._trim
             if self.log is not None:
                 record_mode(self.log, now, before, self.flight)
 
@@ -280,17 +283,24 @@ class Bridge:
             decision = self.worker.decision
             return "policy", controlled(self.vehicle, decision.mode, odometry, decision.command)
         if flight.target is None or odometry is None or flight.blind:
-            elapsed = now - flight.since
-            climb = float(odometry.velocity[2]) if odometry is not None else 0.0
-            if elapsed > blind_time(self.height, climb):
-                return "closed", None
-            attitude, reckoned = self.client.message(Attitude.CODE, now, 0.5), self._reckoned
-            known = reckoned is not None and now - reckoned.time < reckoning.LONGEST_STEP
-            known = known and not (flight.misled and flight.turned is None)
-            if attitude is not None and reckoned is not None and known:
-                return "blind", reckoning.settle(attitude, elapsed, reckoned.velocity)
-            return "blind", blind(attitude, elapsed, climb)
+            return self._blind(now, dt)
         return "hover", self._hover(flight.target, odometry, dt)
+
+    def _blind(self, now: float, dt: float) -> tuple[str, Ctbr | None]:
+        """The descent without odometry."""
+        flight, odometry, reckoned = self.flight, self.odometry, self._reckoned
+        elapsed, higher = now - flight.since, 0.0
+        climb = float(odometry.velocity[2]) if odometry is not None else 0.0
+        if reckoned is not None and odometry is not None:  # it went on climbing
+            higher = min(reckoned.top - float(odometry.position[2]), HIGHER)
+        if elapsed > blind_time(self.height + higher, climb):
+            return "closed", None
+        attitude = self.client.message(Attitude.CODE, now, 0.5)
+        known = reckoned is not None and now - reckoned.time < reckoning.LONGEST_STEP
+        if attitude is None or reckoned is None or not known or (flight.misled and flight.turned is None):
+            return "blind", blind(attitude, elapsed, climb)
+        self._trim = reckoning.trimmed(self._trim, elapsed, reckoned.velocity[2], dt)
+        return "blind", reckoning.settle(attitude, elapsed, reckoned.velocity, self._trim)
 
     def _hover(self, target: Target, odometry: Odometry, dt: float) -> Ctbr:
         x, y, z = target.position

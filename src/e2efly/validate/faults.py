@@ -73,13 +73,9 @@ def _alter(change: Callable[[Sample], Sample | None]) -> Callable[[Stage], None]
 
 
 def _freeze(stage: Stage) -> None:
-    kept: list[Sample] = []
-
-    def frozen(sample: Sample) -> Sample:
-        kept[:] = kept or [sample]
-        return dataclasses.replace(kept[0], received=sample.received, stamp=sample.stamp)
-
-    stage.poses.alter = frozen
+    kept = stage.poses.newest
+    assert kept is not None
+    stage.poses.alter = lambda sample: dataclasses.replace(kept, received=sample.received, stamp=sample.stamp)
 
 
 def _nan(sample: Sample) -> Sample:

@@ -127,6 +127,8 @@ class FaultyPoses:
     def __init__(self, inner: PoseSource) -> None:
         """Let all through."""
         self.alter: Callable[[Sample], Sample | None] | None = None
+        self.newest: Sample | None = None
+        """The last one that was let through as it was."""
         self._inner = inner
 
     @property
@@ -143,6 +145,7 @@ class FaultyPoses:
         """What the inner source has, altered."""
         samples = self._inner.read(now)
         if self.alter is None:
+            self.newest = samples[-1] if samples else self.newest
             return samples
         return [altered for sample in samples if self.alter and (altered := self.alter(sample)) is not None]
 
