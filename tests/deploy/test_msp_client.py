@@ -184,13 +184,19 @@ def test_sticks_go_first_and_their_replies_are_eaten() -> None:
     assert 200 not in client.latest
 
 
-def test_where_answers_are_quick_a_lost_one_is_asked_for_again_soon() -> None:
-    """On a line that loses frames: before the link counts as lost."""
+def acquainted() -> tuple[Wire, Client]:
+    """A client that asks for one code, at 20 Hz, and whose first answer took 10 ms."""
     wire = Wire()
     client = Client(wire, {108: 20.0})
     client.poll(0.0)
     wire.answer()
     client.poll(0.01)
+    return wire, client
+
+
+def test_where_answers_are_quick_a_lost_one_is_asked_for_again_soon() -> None:
+    """On a line that loses frames: before the link counts as lost."""
+    wire, client = acquainted()
     client.poll(0.06)
     assert len(wire.sent) == 1  # its answer is lost
     wire.sent.clear()
@@ -203,11 +209,7 @@ def test_where_answers_are_quick_a_lost_one_is_asked_for_again_soon() -> None:
 
 def test_latency_is_of_the_request_that_was_answered_though_it_had_been_given_up() -> None:
     """A line that turns slow: the answer comes after the request was sent again."""
-    wire = Wire()
-    client = Client(wire, {108: 20.0})
-    client.poll(0.0)
-    wire.answer()
-    client.poll(0.01)
+    wire, client = acquainted()
     assert client.latency == pytest.approx(0.01)
     client.poll(0.06)
     client.poll(0.16)
@@ -223,11 +225,7 @@ def test_latency_is_of_the_request_that_was_answered_though_it_had_been_given_up
 
 def test_lost_answers_are_no_latency() -> None:
     """The answer to a later stick frame tells that the one to the request before it is lost."""
-    wire = Wire()
-    client = Client(wire, {108: 20.0})
-    client.poll(0.0)
-    wire.answer()
-    client.poll(0.01)
+    wire, client = acquainted()
     client.set_raw_rc(STICKS, 0.05)
     client.poll(0.06)
     client.set_raw_rc(STICKS, 0.07)

@@ -112,9 +112,9 @@ class BridgeProcess:
             policy: a policy.onnx.
             rig: the world.
             log: of the flight.
-            link: to the firmware; None: straight.
             limit: bytes that a file may have; None: any.
             options: more of the command's; they come last.
+            link: to the firmware; None: straight.
         """
         common = ["--flight.battery-unknown", "--flight.takeoff-speed", "0.8", "--flight.land-speed", "0.6"]
         # a busy machine holds up the rig, too: not what is looked at here
@@ -214,7 +214,7 @@ def _flight(fault: str, rig: RigClient, bridge: BridgeProcess, tap: Tap, log: Pa
         rig.set(armed=False)
     else:
         bridge.process.send_signal({"killed": signal.SIGKILL, "stopped": signal.SIGSTOP}[fault])
-        allowed = TIMEOUT_S + PERIOD_S  # a killed one's socket closes sooner, but only when its last thread has gone
+        allowed = (TIMEOUT_S if fault == "stopped" else 0.0) + PERIOD_S
         reaction = _until_descent(tap)
         if not _until(rig, FLIGHT_S, lambda state: state["standing"]):
             problems.append("it did not land")
