@@ -20,6 +20,7 @@ from dataclasses import asdict, dataclass
 from itertools import chain, pairwise
 from math import inf
 
+from e2efly.deploy.lifeline import Lifeline, watch
 from e2efly.deploy.msp.codec import REPLY, Decoder, Frame, encode
 from e2efly.deploy.msp.link import Link, open_link
 from e2efly.deploy.msp.messages import CHANNEL_RANGE, MAX_CHANNELS, Attitude, set_raw_rc
@@ -107,7 +108,7 @@ def _interpolate(xs: tuple[float, ...], ys: tuple[int, ...], x: float) -> float:
 
 
 class WatchedLink:
-    """The bridge's end: a `Link` through the watchdog process.
+    """The bridge's end: a `Link` through the watchdog process, for the life of the thread that makes it.
 
     Raises:
         ValueError: for a target that names no link.
@@ -129,10 +130,14 @@ class WatchedLink:
         for end in (mine, other):
             end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 20)
         mine.setblocking(False)
+        self._lifeline: Lifeline | None = None
+        with suppress(OSError):  # elsewhere than on Linux the socket tells of the bridge's death, some ms later
+            self._lifeline = Lifeline()
+        given = [other.fileno(), *([self._lifeline.descriptor] if self._lifeline else [])]
         with other:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "e2efly.deploy.watchdog", str(other.fileno()), target, str(timeout)],
-                pass_fds=[other.fileno()],
+                [sys.executable, "-m", "e2efly.deploy.watchdog", target, str(timeout), *map(str, given)],
+                pass_fds=given,
                 stdin=subprocess.DEVNULL,
                 start_new_session=True,  # Ctrl-C is for the bridge
             )
@@ -185,6 +190,8 @@ class WatchedLink:
     def close(self) -> None:
         """End the watchdog on the ground; in the air it takes this for the end of the bridge, and lands."""
         self._socket.close()
+        if self._lifeline:
+            self._lifeline.close()
         self._link_alive = False
         with suppress(subprocess.TimeoutExpired):  # it is landing the vehicle
             self._process.wait(2.0)
@@ -196,18 +203,30 @@ class WatchedLink:
             self.reason = f"the watchdog process does not listen: {error}"
 
 
-def serve(bridge: socket.socket, link: Link, timeout: float = TIMEOUT_S) -> str:
-    """Hand bytes through until the bridge ends on the ground, or take over and land; returns why, or nothing."""
+def serve(bridge: socket.socket, died: socket.socket | None, link: Link, timeout: float = TIMEOUT_S) -> str:
+    """Hand bytes through until the bridge ends on the ground, or take over and land.
+
+    Args:
+        bridge: to the bridge; at its end the bridge is gone.
+        died: readable once the bridge has died, which is known before its socket closes (see `lifeline`).
+        link: to the controller.
+        timeout: silence of the bridge in flight after which it is as if gone, s.
+
+    Returns:
+        Why it has landed; empty if the bridge ended on the ground.
+    """
+    heard = [bridge] if died is None else [bridge, died]
     plan: Plan | None = None
     status: tuple[bool, str, int] | None = None
     silence, before = 0.0, time.monotonic()
     bridge.setblocking(False)
     while True:
-        select.select([bridge], [], [], 0.001)
+        ready, _, _ = select.select(heard, [], [], 0.001)
         now = time.monotonic()
         silence, before = silence + min(now - before, STALL_S), now
         link.poll(now)
         packets, gone = _packets(bridge)
+        gone = gone or died in ready
         for packet in packets:
             silence = 0.0
             if packet[:1] == BYTES:
@@ -284,14 +303,15 @@ def _hand(bridge: socket.socket, packet: bytes) -> bool:
 
 
 def main() -> None:
-    """Serve the bridge at the other end of a socket whose descriptor is given, over the link that is named."""
-    descriptor, target, timeout = sys.argv[1:]
+    """Serve the bridge over the link that is named; given are descriptors of its socket and of its lifeline, if any."""
+    target, timeout, descriptor, *lifeline = sys.argv[1:]
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     with suppress(OSError, AttributeError):  # where it is not allowed to, it is light enough
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(20))  # a bridge that spins must not starve it
     with socket.socket(fileno=int(descriptor)) as bridge:
-        said = serve(bridge, open_link(target), float(timeout))
+        died = watch(int(lifeline[0])) if lifeline else None
+        said = serve(bridge, died, open_link(target), float(timeout))
     with suppress(OSError):  # perhaps nobody reads it: not before the vehicle has landed
         sys.stderr.write(f"watchdog: {said}\n" if said else "")
 
