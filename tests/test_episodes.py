@@ -12,7 +12,6 @@ from e2efly import presets
 from e2efly.config import EnvConfig, HoverConfig, ImuConfig, NoiseConfig, RewardConfig, TaskConfig
 from e2efly.env import Env, EnvState, Step, random_key
 from e2efly.physics import COMMAND_MODES
-from tests.compiling import jit
 
 REWARD = RewardConfig({"prog2": 1.0, "anglev": 0.1})
 N = 5
@@ -20,12 +19,12 @@ N = 5
 
 @pytest.fixture(scope="module")
 def advance() -> Any:
-    return jit(Env.advance)
+    return jax.jit(Env.advance)
 
 
 @pytest.fixture(scope="module")
 def restart() -> Any:
-    return jit(Env.restart)
+    return jax.jit(Env.restart)
 
 
 def make(task: TaskConfig | None = None, reward: RewardConfig = REWARD, **config: Any) -> Env:
@@ -33,7 +32,7 @@ def make(task: TaskConfig | None = None, reward: RewardConfig = REWARD, **config
 
 
 def reset(env: Env, n: int = N, seed: int = 0) -> tuple[EnvState, jax.Array]:
-    return jit(Env.reset, static_argnums=2)(env, random_key(seed), n)
+    return jax.jit(Env.reset, static_argnums=2)(env, random_key(seed), n)
 
 
 @pytest.mark.parametrize("mode", COMMAND_MODES)
@@ -131,7 +130,7 @@ def test_an_episode_has_as_many_steps_as_its_seconds_hold(rate: float, seconds: 
         after, out = env.advance(state, jnp.broadcast_to(env.hover, (1, 4)))
         return dataclasses.replace(after, vehicle=state.vehicle), out.truncated[0]
 
-    ended = jit(lambda s: jax.lax.scan(one, s, None, round(rate * seconds) + 5)[1])(state)
+    ended = jax.jit(lambda s: jax.lax.scan(one, s, None, round(rate * seconds) + 5)[1])(state)
     assert int(np.argmax(ended)) + 1 == round(rate * seconds)
 
 
@@ -139,7 +138,7 @@ def test_numbers_of_a_configuration_do_not_recompile() -> None:
     """Built anew with other numbers, one program serves all."""
     traces = []
 
-    @jit
+    @jax.jit
     def program(env: Env, key: jax.Array) -> jax.Array:
         traces.append(1)
         state, _ = env.reset(key, 4)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -27,7 +28,6 @@ from e2efly.env import Env, EnvState, random_key
 from e2efly.learn.export import contract_of, export_policy
 from e2efly.learn.networks import Features, init_mlp
 from e2efly.vehicles import load_vehicle
-from tests.compiling import jit
 
 VEHICLE = load_vehicle("vis_r")
 START = 5000.0
@@ -121,11 +121,11 @@ def test_it_sees_in_flight_what_the_environment_shows(name: str, imu: bool, tmp_
     env, path = make(tmp_path, task, EnvConfig(imu=ImuConfig(observed=imu), action_latency=(0.03, 0.08)))
     loaded, n, steps = load_policy(path), 2, round(float(env.task.episode_s) / env.control_period)
     contract = loaded.contract
-    state, observation = jit(env.reset, static_argnums=1)(random_key(3), n)
+    state, observation = jax.jit(env.reset, static_argnums=1)(random_key(3), n)
     goals = [goal_for(contract, options_of(task, state, row), VEHICLE) for row in range(n)]
     flights = [Runtime.of(loaded, goal, VEHICLE, 30.0, imu=imu) for goal in goals]
     begun = [begin(flight, odometry(state, row), START) for row, flight in enumerate(flights)]
-    advance = jit(env.advance)
+    advance = jax.jit(env.advance)
     for k in range(steps):
         actions = []
         for row, flight in enumerate(flights):
@@ -163,7 +163,7 @@ def test_it_counts_gates_in_flight_as_the_environment_does(track: str, tmp_path:
     state, _ = env.reset(random_key(0), 1)
     state = carried(env, state, points[0])
     run = begin(flight, odometry(state, 0), START)
-    judge, observe = jit(env.task.advance), jit(env._observe)
+    judge, observe = jax.jit(env.task.advance), jax.jit(env._observe)
     outcomes, failures = [], []
     for k, point in enumerate(points):
         before, state = state, carried(env, state, point)

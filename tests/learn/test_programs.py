@@ -16,7 +16,6 @@ from e2efly.evaluate import run_episodes
 from e2efly.learn.devices import share
 from e2efly.learn.programs import Programs, evaluation_program
 from e2efly.learn.setup import Setup
-from tests.compiling import jit
 
 
 def config(**changes: Any) -> TrainConfig:
@@ -90,8 +89,8 @@ def test_an_evaluation_is_the_same_on_one_device_and_on_two() -> None:
 def test_parts_of_the_episodes_are_the_whole() -> None:
     env = Env.of(presets.TASKS["hover"], config().reward)
     act = lambda o: jnp.broadcast_to(env.hover, (o.shape[0], 4))  # noqa: E731
-    fly = jit(lambda key, index: run_episodes(env, act, key, 7, 10, part=(index, 3)))
-    whole = jit(lambda key: run_episodes(env, act, key, 7, 10))(random_key(0))
+    fly = jax.jit(lambda key, index: run_episodes(env, act, key, 7, 10, part=(index, 3)))
+    whole = jax.jit(lambda key: run_episodes(env, act, key, 7, 10))(random_key(0))
     parts = [fly(random_key(0), i) for i in range(3)]
     for name in ("final_error", "top_speed", "duration"):
         joined = np.concatenate([getattr(p, name) for p in parts])[:7]

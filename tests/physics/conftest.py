@@ -15,7 +15,6 @@ from e2efly.physics import INTEGRATORS, Physics, State, step
 from e2efly.physics.state import Parts, split4
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.vehicles.vehicle import quantities
-from tests.compiling import jit
 
 Fly = Callable[..., State]
 
@@ -44,7 +43,7 @@ def fly() -> Fly:
     Flights are filled up to 4 vehicles and a multiple of 300 steps, so that most tests share one program a mode.
     """
 
-    @jit
+    @jax.jit
     def run(physics: Physics, plant: Vehicle, state: State, commands: jax.Array, wind: jax.Array) -> State:
         def one(state: State, command: jax.Array) -> tuple[State, State]:
             state = step(physics, plant, state, command, wind=wind)
@@ -82,7 +81,7 @@ def fly_open_loop() -> Fly:
     The numbers of sub-steps and seconds are traced: one program an integrator and batch.
     """
 
-    @partial(jit, static_argnums=0)
+    @partial(jax.jit, static_argnums=0)
     def run(
         integrator: str, plant: Vehicle, state: State, commands: jax.Array, wind: Any, period: Any, substeps: Any
     ) -> State:

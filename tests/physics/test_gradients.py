@@ -12,7 +12,6 @@ from jax.flatten_util import ravel_pytree
 
 from e2efly.physics import COMMAND_MODES, Physics, State, rotation, step
 from e2efly.vehicles import Vehicle
-from tests.compiling import jit
 from tests.gradients import central, reverse
 
 pytestmark = pytest.mark.usefixtures("x64")
@@ -144,7 +143,7 @@ def test_compiled_gradients_are_the_same(vis_r: Vehicle) -> None:
     run, points = stepper(vis_r, "rotor_thrust"), flat([*smooth("rotor_thrust").values(), *corners("rotor_thrust")])
     with jax.disable_jit():
         plain = reverse(run, points, 17)
-    compiled = jit(lambda x: reverse(run, x, 17))(points)
+    compiled = jax.jit(lambda x: reverse(run, x, 17))(points)
     np.testing.assert_allclose(compiled, plain, rtol=1e-9, atol=1e-9)
 
 
@@ -157,6 +156,6 @@ def test_single_precision_gradients_are_finite_at_hover(vis_r: Vehicle) -> None:
             end = step(physics, physics.nominal, state, command)
             return jnp.sum(end.position) + jnp.sum(end.quaternion) + jnp.sum(end.rotor_speed)
 
-        gradient = jit(jax.grad(loss, (0, 1)))(State.hovering(vis_r, jnp.zeros(3)), jnp.zeros(4))
+        gradient = jax.jit(jax.grad(loss, (0, 1)))(State.hovering(vis_r, jnp.zeros(3)), jnp.zeros(4))
         assert all(leaf.dtype == jnp.float32 for leaf in jax.tree.leaves(gradient))
         assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(gradient))

@@ -10,14 +10,13 @@ import pytest
 
 from e2efly.physics import COMMAND_MODES, INTEGRATORS, Physics, State, step
 from e2efly.vehicles import Vehicle
-from tests.compiling import jit
 
 N = 6
 
 
 @pytest.fixture(scope="module")
 def flown() -> Callable[..., State]:
-    return jit(step)
+    return jax.jit(step)
 
 
 @pytest.fixture
@@ -69,7 +68,7 @@ def test_leading_axes_of_any_rank(
     alone = flown(physics, vis_r, row(state, 4), commands[4])
     assert alone.quaternion.shape == (4,)
     close(alone, row(whole, 4), 1e-12)
-    mapped = jit(jax.vmap(lambda s, c: step(physics, vis_r, s, c)))(state, commands)
+    mapped = jax.jit(jax.vmap(lambda s, c: step(physics, vis_r, s, c)))(state, commands)
     close(mapped, whole, 1e-12)
 
 

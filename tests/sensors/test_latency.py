@@ -12,7 +12,6 @@ from e2efly.env import Env, EnvState, random_key
 from e2efly.physics import State
 from e2efly.sensors.latency import acting_commands, delayed_state, frames
 from e2efly.vehicles import load_vehicle
-from tests.compiling import jit
 from tests.gradients import central, reverse
 
 PERIOD = 1 / 30
@@ -77,7 +76,7 @@ def test_rotors_answer_the_delayed_command(env: Env) -> None:
     """Each sub-step gets the time average of what acts in it; the motors lag behind that."""
     vehicle, steps = load_vehicle("vis_r"), 8
     actions = np.random.default_rng(1).uniform(-1, 1, (steps, 4)).astype(np.float32)
-    path = jit(flight)(env, start(env), jnp.broadcast_to(actions[:, None], (steps, len(FRAMES), 4)))
+    path = jax.jit(flight)(env, start(env), jnp.broadcast_to(actions[:, None], (steps, len(FRAMES), 4)))
     hover = np.full((4, 4), vehicle.mass * 9.81 / 4)
     issued = np.concatenate([hover, env.command(jnp.asarray(actions))])  # 4 periods of hovering came before
     k2, k1, k0 = vehicle.thrust_map
@@ -94,7 +93,7 @@ def test_rotors_answer_the_delayed_command(env: Env) -> None:
 
 
 def test_late_rows_do_not_move_at_first(env: Env) -> None:
-    path = jit(flight)(env, start(env), jnp.ones((8, len(FRAMES), 4)))
+    path = jax.jit(flight)(env, start(env), jnp.ones((8, len(FRAMES), 4)))
     hover = load_vehicle("vis_r").hover_rotor_speed
     moved = np.abs(np.asarray(path.rotor_speed[:, :, 0]) - hover) > 1
     np.testing.assert_array_equal(np.argmax(moved, axis=0), [0, 0, 1, 1, 2])
@@ -116,8 +115,8 @@ def test_gradient_with_respect_to_the_latency() -> None:
         return jnp.concatenate([path.position[-1], path.body_rate[-1]], axis=-1)
 
     points = jnp.asarray([[0.25], [0.5], [1.8], [2.65]])
-    exact = jit(lambda x: reverse(end, x, 6))(points)
-    numeric = jit(lambda x: central(end, x, 1e-5))(points)
+    exact = jax.jit(lambda x: reverse(end, x, 6))(points)
+    numeric = jax.jit(lambda x: central(end, x, 1e-5))(points)
     assert np.min(np.abs(numeric).max((1, 2))) > 1e-3
     np.testing.assert_allclose(exact, numeric, rtol=1e-5, atol=1e-8)
 
@@ -162,7 +161,7 @@ def test_the_policy_sees_the_delayed_state() -> None:
         state, out = env.advance(state, action)
         return state, (state.vehicle, out.final_observation)
 
-    _, (path, seen) = jit(lambda s, a: jax.lax.scan(one, s, a))(state, jnp.zeros((6, 3, 4)))
+    _, (path, seen) = jax.jit(lambda s, a: jax.lax.scan(one, s, a))(state, jnp.zeros((6, 3, 4)))
     for k in range(6):
         # 1.5 periods before the state k; the state before the first is taken to be the first
         newer, older = (path.velocity[i] if i >= 0 else first.velocity for i in (k - 1, k - 2))

@@ -24,7 +24,6 @@ from e2efly.validate.plant import RigidState
 from e2efly.validate.simulator import SimulatorPlant
 from e2efly.validate.starts import BATCH, Starts, draw_starts
 from e2efly.vehicles import load_vehicle
-from tests.compiling import jit
 
 N = 4
 SEED = 1_000_000
@@ -60,7 +59,7 @@ def test_flights_of_the_runtime_are_judged_as_episodes(
     starts = draw_starts(env, N, SEED)
     verdicts = judge(env, starts, flown(path, env, starts, float(suite.episode_s)), settle)
 
-    @partial(jit, static_argnums=2)
+    @partial(jax.jit, static_argnums=2)
     def episodes(env: Env, key: Any, steps: int) -> Episodes:
         return run_episodes(env, callback(load_policy(path)), key, EVAL_BATCH, steps, settle)
 
@@ -76,7 +75,7 @@ def test_starts_are_those_of_eval_and_do_not_depend_on_their_number() -> None:
     assert BATCH == EVAL_BATCH
     env = env_of(SUITES["circle"])
     few, many = draw_starts(env, 3, SEED), draw_starts(env, BATCH + 2, SEED)
-    state, _ = jit(lambda key: env.reset(key, BATCH))(random_key(SEED, 0))
+    state, _ = jax.jit(lambda key: env.reset(key, BATCH))(random_key(SEED, 0))
     for i in range(3):
         # to rounding: two compilations of the same draw
         np.testing.assert_allclose(few.states[i].position, np.asarray(state.vehicle.position)[i], atol=1e-6)

@@ -19,7 +19,6 @@ from e2efly.validate.plant import Delay, Plant, RigidState, plant_kind
 from e2efly.validate.simulator import SimulatorPlant
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY
-from tests.compiling import jit
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 HOVER = np.array([GRAVITY, 0.0, 0.0, 0.0])
@@ -89,7 +88,7 @@ def test_hovering_stays(make: Callable[[Vehicle], Plant], drift: float, vis_r: V
     np.testing.assert_allclose(plant.state.quaternion, LEVEL, atol=drift)
 
 
-@jit
+@jax.jit
 def fine(physics: Physics, state: State, commands: jax.Array) -> State:
     """Our physics under a command each control period."""
 
