@@ -45,6 +45,74 @@ class ImuConfig:
 
 
 @dataclass(frozen=True)
+class CameraConfig:
+    """A camera on the vehicle, or a LiDAR."""
+
+    sees: Literal["depth", "range", "label", "rgb", "normal", "instance"] = "depth"
+    """What its image shows: planar depth, distance, semantic class, colour, surface normals or instances."""
+    width: int = 64
+    """Columns (sets shapes)."""
+    height: int = 64
+    """Rows (sets shapes)."""
+    projection: Literal["pinhole", "spherical"] = "pinhole"
+    """pinhole: a camera; spherical: equal angles between columns and rows, a LiDAR."""
+    fov: tuple[float, float] = (1.518436449235301, 1.0122909661567112)
+    """Horizontal and vertical field of view, rad."""
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where it sits, body frame (forward, left, up), m."""
+    pitch: float = 0.0
+    """Downwards from straight ahead, rad."""
+    reach: tuple[float, float] = (0.0, 20.0)
+    """Depth: nearest and farthest, m; nearer is a hole, farther is the farthest."""
+    fov_spread: float = 0.0
+    """Relative half-width of the random factor on the field of view, an episode."""
+    angle_spread: float = 0.0
+    """Half-width of the random mounting angles, rad an axis, an episode."""
+    position_spread: float = 0.0
+    """Half-width of the random mounting position, m an axis, an episode."""
+
+
+@dataclass(frozen=True)
+class ForestConfig:
+    """Trees at random places of a lane along world x."""
+
+    density: float = 0.1
+    """Trees a square metre."""
+    length: float = 40.0
+    """Length of the lane from the start on, m."""
+    width: float = 16.0
+    """Its width, m."""
+    radius: tuple[float, float] = (0.1, 0.35)
+    """Of the trunks, m."""
+    height: tuple[float, float] = (4.0, 8.0)
+    """Of the trunks, m."""
+    clear: float = 2.0
+    """No tree within this of the start and of the goal, m."""
+    room: int = 64
+    """Most trees of a world (sets shapes)."""
+
+
+@dataclass(frozen=True)
+class ClutterConfig:
+    """Boxes, balls, columns and capsules at random places along a track."""
+
+    obstacles: float = 16.0
+    """How many on average; each of `room` places is taken with the same probability."""
+    sideways: float = 2.5
+    """Their centres lie within this of the straight lines from gate to gate, m an axis."""
+    size: tuple[float, float] = (0.15, 0.4)
+    """Half-lengths and radii, m."""
+    clear: float = 0.5
+    """No obstacle nearer than this to a gate's opening or to the start, m."""
+    moving: float = 0.0
+    """Share of them that swings to and fro."""
+    swing: float = 1.0
+    """Amplitude of those, m."""
+    room: int = 16
+    """Most obstacles of a world; a multiple of 4 (sets shapes)."""
+
+
+@dataclass(frozen=True)
 class EnvConfig:
     """The vehicle, its controller, and what is random about them."""
 

@@ -1,0 +1,1 @@
+"""Worlds of solids, and what cameras see of them."""

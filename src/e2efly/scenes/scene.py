@@ -1,0 +1,193 @@
+"""A batch of worlds: solids of fixed number, each there or not, and a ground. Every number is an array leaf.
+
+World n has the same room for solids as every other, and its own numbers in it: changing a world never recompiles.
+World frame: x, y level, z up, m. What is not there (`active` false) is neither seen nor struck.
+"""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from e2efly.physics.rotation import from_euler, to_matrix, unrotate
+from e2efly.scenes.shapes import FAR, SHAPES, SIZES
+
+SKY, GROUND, OBSTACLE, GATE, PAD, WALL = range(6)
+"""Semantic classes."""
+CLASSES = ("sky", "ground", "obstacle", "gate", "pad", "wall")
+"""Their names."""
+_BY_CLASS = [
+    [0.55, 0.72, 0.92],
+    [0.45, 0.47, 0.42],
+    [0.62, 0.44, 0.3],
+    [0.93, 0.45, 0.13],
+    [0.95, 0.95, 0.93],
+    [0.75] * 3,
+]
+COLOURS = np.array(_BY_CLASS, np.float32)
+"""Usual colour of each class, RGB in [0, 1]."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Solids:
+    """The solids of one kind: room for k of them in each of n worlds."""
+
+    centre: Float[Array, "n k 3"]
+    """Of the path that each follows, world, m."""
+    quaternion: Float[Array, "n k 4"]
+    """Solid's frame to world, wxyz."""
+    size: Float[Array, "n k 4"]
+    """What the entries are: `SHAPES[kind].names`."""
+    active: Bool[Array, "n k"]
+    """Whether it is there."""
+    label: Int[Array, "n k"]
+    """Its semantic class."""
+    colour: Float[Array, "n k 3"]
+    """RGB in [0, 1]."""
+    cosine: Float[Array, "n k 3"]
+    """The path: centre + cosine cos(rate t) + sine sin(rate t), world, m."""
+    sine: Float[Array, "n k 3"]
+    rate: Float[Array, "n k"]
+    """rad/s."""
+
+    @staticmethod
+    def of(
+        kind: str,
+        centre: Any,
+        size: Any,
+        *,
+        yaw: Any = 0.0,
+        active: Any = True,
+        label: int | None = None,
+        colour: Any = None,
+    ) -> "Solids":
+        """Solids that stand still.
+
+        Args:
+            kind: of `SHAPES`.
+            centre: (n, k, 3), world, m.
+            size: (n, k, up to 4) or what broadcasts to it.
+            yaw: (n, k), rad.
+            active: (n, k).
+            label: semantic class; usual for the kind when left out.
+            colour: (n, k, 3) RGB; usual for the class when left out.
+        """
+        centre = jnp.asarray(centre, jnp.float32)
+        n, k, _ = centre.shape
+        label = {"gate": GATE, "pad": PAD}.get(kind, OBSTACLE) if label is None else label
+        size = jnp.asarray(size, jnp.float32)
+        size = jnp.pad(size, [(0, 0)] * (size.ndim - 1) + [(0, SIZES - size.shape[-1])])
+        angle = jnp.broadcast_to(jnp.asarray(yaw, jnp.float32), (n, k))
+        zero = jnp.zeros((n, k, 3), jnp.float32)
+        return Solids(
+            centre=centre,
+            quaternion=from_euler(jnp.zeros_like(angle), jnp.zeros_like(angle), angle),
+            size=jnp.broadcast_to(size, (n, k, SIZES)),
+            active=jnp.broadcast_to(jnp.asarray(active, bool), (n, k)),
+            label=jnp.full((n, k), label, jnp.int32),
+            colour=jnp.broadcast_to(jnp.asarray(COLOURS[label] if colour is None else colour, jnp.float32), (n, k, 3)),
+            cosine=zero,
+            sine=zero,
+            rate=jnp.zeros((n, k), jnp.float32),
+        )
+
+    @property
+    def count(self) -> int:
+        """Room for so many in a world."""
+        return self.centre.shape[1]
+
+    def position(self, time: Float[Array, " n"]) -> Float[Array, "n k 3"]:
+        """Where they are, world, m."""
+        angle = (self.rate * time[:, None])[..., None]
+        return self.centre + self.cosine * jnp.cos(angle) + self.sine * jnp.sin(angle)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Scene:
+    """n worlds."""
+
+    ground: Float[Array, " n"]
+    """Height of the ground, m; -`FAR`: none."""
+    solids: dict[str, Solids]
+    """By kind, a name of `SHAPES`."""
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Of which there is room, in the order of instance numbers."""
+        return tuple(kind for kind in sorted(self.solids) if self.solids[kind].count)
+
+    @staticmethod
+    def of(solids: dict[str, Solids], n: int, ground: float | None = 0.0) -> "Scene":
+        """Worlds over level ground (None: over none)."""
+        return Scene(jnp.full(n, -FAR if ground is None else ground, jnp.float32), solids)
+
+    @property
+    def worlds(self) -> int:
+        """How many worlds."""
+        return self.ground.shape[0]
+
+    @property
+    def capacity(self) -> int:
+        """Room for so many solids in a world."""
+        return sum(s.count for s in self.solids.values())
+
+    def at(self, time: Float[Array, " n"]) -> "Scene":
+        """The worlds as they are at `time`, s: standing still."""
+
+        def still(s: Solids) -> Solids:
+            zero = jnp.zeros_like(s.cosine)
+            return dataclasses.replace(s, centre=s.position(time), cosine=zero, sine=zero, rate=jnp.zeros_like(s.rate))
+
+        return dataclasses.replace(self, solids={kind: still(s) for kind, s in self.solids.items()})
+
+
+def join(*solids: Solids) -> Solids:
+    """Those of one kind side by side."""
+    return jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis=1), *solids)
+
+
+def choose(mask: Bool[Array, " n"], a: Scene, b: Scene) -> Scene:
+    """World by world, `a` where the mask holds."""
+    return jax.tree.map(lambda x, y: jnp.where(mask.reshape(mask.shape + (1,) * (x.ndim - 1)), x, y), a, b)
+
+
+def first_instance(scene: Scene, kind: str) -> int:
+    """Instance number of the first solid of a kind; sky is 0, the ground 1, then kind after kind."""
+    before = scene.kinds[: scene.kinds.index(kind)]
+    return 2 + sum(scene.solids[name].count for name in before)
+
+
+def clearance(scene: Scene, position: Float[Array, "n 3"], time: Float[Array, " n"]) -> Float[Array, " n"]:
+    """Signed distance of a point of each world to what is nearest, m; negative inside. Differentiable."""
+    nearest = position[:, 2] - scene.ground
+    for kind in scene.kinds:
+        nearest = jnp.minimum(nearest, jnp.min(distances(kind, scene.solids[kind], position, time), axis=1))
+    return nearest
+
+
+def distances(
+    kind: str, solids: Solids, position: Float[Array, "n 3"], time: Float[Array, " n"]
+) -> Float[Array, "n k"]:
+    """Signed distance of a point of each world to each solid, m; `FAR` to what is not there."""  # fmt: skip
+    local = unrotate(solids.quaternion, position[:, None] - solids.position(time))
+    return jnp.where(solids.active, SHAPES[kind].distance(solids.size, local), FAR)
+
+
+def approach(
+    scene: Scene, position: Float[Array, "n 3"], velocity: Float[Array, "n 3"], time: Float[Array, " n"]
+) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
+    """Clearance, m, and how fast it shrinks, m/s: by the point's velocity and by what moves."""
+    still = jnp.ones_like(time)
+    gap, growing = jax.jvp(lambda p, t: clearance(scene, p, t), (position, time), (velocity, still))
+    return gap, -growing
+
+
+def to_world(solids: Solids) -> Float[Array, "n k 3 3"]:
+    """Rotation matrices, solid's frame to world."""
+    return to_matrix(solids.quaternion)
