@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from e2efly import rewards
 from e2efly.env import Step
 from e2efly.observation import ATTITUDE, Field
 from e2efly.physics import State
@@ -49,7 +50,7 @@ class Probe:
 
     def advance(self, state: ProbeState, action: Array) -> tuple[ProbeState, Step]:
         acted = state.vehicle.rotor_speed if self.delay else action
-        error = jnp.linalg.norm(acted - jnp.array(self.target), axis=-1)
+        error = rewards.norm(acted - jnp.array(self.target))  # with a gradient where it is zero
         count = state.count + 1
         over = count >= self.length
         n = action.shape[0]
