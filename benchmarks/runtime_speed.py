@@ -27,13 +27,13 @@ def untrained(path: Path) -> None:
     from e2efly import presets
     from e2efly.env import Env
     from e2efly.learn.export import contract_of, export_policy
-    from e2efly.learn.networks import Features, init_mlp
+    from e2efly.learn.networks import Actor, Weights, init_mlp
 
     config = presets.preset("race", "ppo")
     env = Env.of(config.task, config.reward, config.env)
-    features = Features(env.fields)
-    layers = init_mlp(np.random.default_rng(0), (features.size, *config.network.hidden, 4), 1.0)
-    export_policy(path, layers, features, config.network.activation, contract_of(env, config))
+    actor = Actor.of(env.fields, env.cameras, config.network)
+    layers = init_mlp(np.random.default_rng(0), (actor.features.size, *config.network.hidden, 4), 1.0)
+    export_policy(path, Weights((), None, layers), actor, contract_of(env, config))
 
 
 def flight(path: str, acts: int) -> dict[str, float]:

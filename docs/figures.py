@@ -11,6 +11,8 @@ DOCS = Path(__file__).parent
 RESULTS = DOCS.parent / "benchmarks" / "results"
 TITLES = {
     "rates": "Rates",
+    "mesh_rendering": "Rendering of mesh scenes",
+    "rendering": "Images of the clutter scene: ground, 4 gates, 16 obstacles, another world for each camera",
     "time_to_criterion": "Time to the criterion, from process start",
     "success": "Success over 1000 unseen starts, full presets",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
@@ -33,8 +35,33 @@ def markdown(rows: list[dict[str, str]]) -> list[str]:
     ]
 
 
+def noise() -> None:
+    """The pictures of docs/noise.md: a corridor seen by a D435i, and an IMU at rest."""
+    import numpy as np
+    from PIL import Image
+
+    from e2efly.commands.render import sized
+    from e2efly.config import ImuConfig
+    from e2efly.env import random_key
+    from e2efly.scenes.camera import PRESETS
+    from e2efly.view.images import look_around
+    from e2efly.view.noise import plot_depth_noise, plot_image_noise, plot_imu
+    from e2efly.view.places import find_place
+
+    place, camera = find_place("corridor", random_key(0)), sized(PRESETS["d435i"], 320, None, None)
+    sight = look_around(camera, place.scene, 0.0, np.array([0.5, 0.0, 1.5]), np.array([1.0, 0.0, 0.0, 0.0]))
+    plot_depth_noise(sight, random_key(1), DOCS / "noise_depth.png")
+    mask = (sight.images["label"] == 2).astype(np.float32)
+    plot_image_noise(sight, mask, random_key(2), DOCS / "noise_image.png")
+    plot_imu(ImuConfig(), random_key(3), DOCS / "noise_imu.png")
+    for path in DOCS.glob("noise_*.png"):
+        with Image.open(path) as picture:
+            small = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+        small.save(path, optimize=True)
+
+
 def main() -> None:
-    """Write docs/benchmarks.md; with `--pictures` train the racer and copy its plots."""
+    """Write docs/benchmarks.md; with `--noise` draw docs/noise.md; with `--pictures` train and draw the racer, too."""
     source = "Written by `make docs` from `benchmarks/results/*.json`; measured by the scripts in `benchmarks/`."
     lines = ["# Benchmarks", "", source, ""]
     for name, title in TITLES.items():
@@ -45,6 +72,8 @@ def main() -> None:
             about = f"`benchmarks/{name}.py`, {content['date']}, {m['cores']} cores of {m['cpu']}, JAX {m['jax']}."
             lines += [f"## {title}", "", about, "", *markdown(content["table"]), ""]
     (DOCS / "benchmarks.md").write_text("\n".join(lines))
+    if "--noise" in sys.argv or "--pictures" in sys.argv:
+        noise()
     if "--pictures" in sys.argv:
         with tempfile.TemporaryDirectory() as folder:
             run = Path(folder) / "run"

@@ -21,7 +21,7 @@ class Print:
         """Nothing flies yet."""
         print("compiling")
 
-    def progress(self, steps: int, total: int, rate: float, success: float, best: float) -> None:
+    def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
         """An evaluation was done."""
         print(f"{steps / 1e6:.2f} of {total / 1e6:.2f} M steps, {rate / 1e3:.0f} k/s, success {success:.0%}")
 
@@ -35,7 +35,7 @@ with tempfile.TemporaryDirectory() as folder:
     policy = load_policy(Path(folder) / "run" / "policy.onnx", task="hover")
 observation = np.zeros(policy.contract.observation_size, np.float32)
 observation[policy.contract.slices["attitude"]] = (1, 0, 0, 0)
-action = policy.act(observation)
+action, _ = policy.act(observation)
 print(f"success on unseen starts: {summary['shipped']['hover']['success']:.1%}")
 print(
     "at the target it commands", dict(zip(policy.contract.action.fields, policy.command(action).round(2), strict=True))

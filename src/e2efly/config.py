@@ -45,11 +45,35 @@ class ImuConfig:
 
 
 @dataclass(frozen=True)
+class ImageNoiseConfig:
+    """What a camera does to its image, in this order; docs/noise.md. None leaves a noise out.
+
+    Which noises are in sets the program; their strengths are leaves.
+    """
+
+    inverse_depth: float | None = None
+    """Depth: standard deviation of 1 / d, 1/m."""
+    d435i: bool = False
+    """Depth: disparity noise, stereo shadows and range of an Intel D435i."""
+    redwood: str | None = None
+    """Depth: the Redwood model; synthetic, or a .npy file of the measured distortion, (80, 80, 5)."""
+    speckle: float | None = None
+    """Image: standard deviation as a share of the value."""
+    poisson: float | None = None
+    """Image: levels of brightness (256) whose shot noise it has."""
+    gaussian: float | None = None
+    """Image: standard deviation; of depth, as a share of the farthest."""
+    salt_and_pepper: float | None = None
+    """Image: share of the values that become 1 or 0, half of them each; of depth, the farthest or a hole."""
+
+
+@dataclass(frozen=True)
 class CameraConfig:
     """A camera on the vehicle, or a LiDAR."""
 
-    sees: Literal["depth", "range", "label", "rgb", "normal", "instance"] = "depth"
-    """What its image shows: planar depth, distance, semantic class, colour, surface normals or instances."""
+    sees: Literal["depth", "range", "mask", "rgb", "normal", "label", "instance"] = "depth"
+    """What its image shows: planar depth, distance, where a class is, colour, surface normals, semantic class or
+    instances; a policy takes the first five (sets the program)."""
     width: int = 64
     """Columns (sets shapes)."""
     height: int = 64
@@ -57,19 +81,31 @@ class CameraConfig:
     projection: Literal["pinhole", "spherical"] = "pinhole"
     """pinhole: a camera; spherical: equal angles between columns and rows, a LiDAR."""
     fov: tuple[float, float] = (1.518436449235301, 1.0122909661567112)
-    """Horizontal and vertical field of view, rad."""
+    """Horizontal and vertical field of view, rad (sets the program)."""
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where it sits, body frame (forward, left, up), m."""
     pitch: float = 0.0
     """Downwards from straight ahead, rad."""
     reach: tuple[float, float] = (0.0, 20.0)
-    """Depth: nearest and farthest, m; nearer is a hole, farther is the farthest."""
+    """Depth: nearest and farthest, m; nearer is a hole, farther is the farthest (sets the program)."""
+    of: str = "pad"
+    """mask: the class that it is of: sky, ground, obstacle, gate, pad or wall (sets the program)."""
+    encoding: Literal["inverse", "linear"] = "inverse"
+    """How a policy takes depth d: 1 m over d, or d over the farthest; a hole is 0 (sets the program)."""
+    rate: float | None = None
+    """Images a second, a whole part of the control rate; every control step when left out (sets the program)."""
+    latency: tuple[float, float] = (0.0, 0.0)
+    """Age of an image when it is first seen, s, uniform an episode (its top sets shapes)."""
     fov_spread: float = 0.0
     """Relative half-width of the random factor on the field of view, an episode."""
     angle_spread: float = 0.0
     """Half-width of the random mounting angles, rad an axis, an episode."""
     position_spread: float = 0.0
     """Half-width of the random mounting position, m an axis, an episode."""
+    noise: ImageNoiseConfig = ImageNoiseConfig()
+    """What it does to the image."""
+    light_spread: float = 0.0
+    """Colours: relative half-width of the sun's random strength and direction, an episode."""
 
 
 @dataclass(frozen=True)
@@ -140,6 +176,8 @@ class EnvConfig:
     """Noise of the observed state."""
     imu: ImuConfig = ImuConfig()
     """The IMU."""
+    cameras: tuple[CameraConfig, ...] = ()
+    """What the policy sees besides; the task's preset has its own."""
     position_range: float = 5.0
     """Reach of the position command mode, m an axis about the origin."""
 
@@ -193,6 +231,34 @@ class LandConfig:
 
 
 @dataclass(frozen=True)
+class LandVisualConfig:
+    """Touch down gently on a pad that is only seen."""
+
+    episode_s: float = 10.0
+    """Length of an episode, s."""
+    sideways: float = 1.0
+    """Start within this of the pad's centre, m an axis."""
+    height: tuple[float, float] = (1.0, 3.0)
+    """Start height of the feet over the pad, m."""
+    velocity: float = 0.5
+    """Start velocity, m/s an axis, uniform in +-."""
+    pad_size: tuple[float, float] = (0.4, 0.6)
+    """Width of the pad, m, uniform; its shape is a disc, a square or a triangle."""
+    pad_height: float = 0.2
+    """Height of the pad over the ground, m."""
+    radius: float = 0.10
+    """Success: horizontal error at touch, m."""
+    height_error: float = 0.05
+    """Success: height error at touch, m."""
+    speed: float = 0.5
+    """Success: speed at touch, m/s."""
+    tilt: float = 0.2617993877991494
+    """Success: tilt at touch, rad."""
+    fence: float = defaults.LAND_FENCE
+    """Farther than this from the pad, sideways or up, the episode fails, m."""
+
+
+@dataclass(frozen=True)
 class TrackConfig:
     """Follow a reference that is seen one second ahead."""
 
@@ -225,6 +291,26 @@ class TrackConfig:
 
 
 @dataclass(frozen=True)
+class AvoidConfig:
+    """Fly fast through a random forest that is only seen."""
+
+    episode_s: float = 20.0
+    """Length of an episode, s."""
+    forest: ForestConfig = ForestConfig()
+    """The forest; its lane is also the fence."""
+    speed: tuple[float, float] = (3.0, 10.0)
+    """Commanded speed, m/s, uniform an episode."""
+    sideways: float = 3.0
+    """Start within this of the middle of the lane, m."""
+    altitude: float = 1.5
+    """Where to fly, m over the ground."""
+    ceiling: float = 3.0
+    """Higher than this the episode fails, m."""
+    collisions_end: bool = True
+    """Whether a collision ends the episode; training goes on, so that it learns from what comes after."""
+
+
+@dataclass(frozen=True)
 class RaceConfig:
     """Fly through gates in order."""
 
@@ -240,7 +326,113 @@ class RaceConfig:
     """Farther than this from the next gate the episode fails, m."""
 
 
-TaskConfig = HoverConfig | LandConfig | TrackConfig | RaceConfig
+@dataclass(frozen=True)
+class RaceClutterConfig:
+    """Fly through gates in order, among obstacles that are only seen."""
+
+    episode_s: float = 12.0
+    """Length of an episode, s."""
+    track: str = "s_shaped"
+    """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file (its gate count sets shapes)."""
+    clutter: ClutterConfig = ClutterConfig()
+    """The obstacles."""
+    gate_position: float = 0.3
+    """Half-width of each gate's random place about the track's, m an axis."""
+    gate_yaw: float = 0.2
+    """Half-width of each gate's random turn, rad."""
+    speed: tuple[float, float] = (4.0, 12.0)
+    """Commanded speed, m/s, uniform an episode."""
+    position: float = 0.5
+    """Start within this ball about the track's start, m."""
+    laps: int = 1
+    """Laps that end the episode with success; 0: fly on until time is out."""
+    fence: float = defaults.RACE_FENCE
+    """Farther than this from the next gate the episode fails, m."""
+    collisions_end: bool = True
+    """Whether a collision ends the episode; training goes on, so that it learns from what comes after."""
+
+
+@dataclass(frozen=True)
+class GapConfig:
+    """Fly through a narrow slit in a wall, tilted so that only a banked vehicle fits."""
+
+    episode_s: float = 6.0
+    """Length of an episode, s."""
+    distance: tuple[float, float] = (2.5, 4.0)
+    """From the start to the slit, m, uniform."""
+    sideways: float = 0.5
+    """Half-width of the slit's random place about straight ahead, m an axis."""
+    altitude: float = 2.0
+    """Height of the start, m."""
+    yaw: float = 0.3
+    """Half-width of the wall's random turn about up, rad."""
+    roll: tuple[float, float] = (0.4, 0.8)
+    """Tilt of the slit to either side, rad, uniform."""
+    opening: tuple[float, float] = (0.7, 0.18)
+    """Long and short side of the slit, m."""
+    thickness: float = 0.1
+    """Of the wall, m."""
+    approach: float = 1.5
+    """From this distance to the wall on, the vehicle counts as approaching, m."""
+    beyond: float = 2.0
+    """Success: reach the point this far behind the slit ..."""
+    radius: float = 0.5
+    """... to within this, m."""
+    fence: float = 6.0
+    """Farther than this from the next target the episode fails, m."""
+    collisions_end: bool = True
+    """Whether a collision ends the episode; training goes on, so that it learns from what comes after."""
+
+
+@dataclass(frozen=True)
+class HoverAwareConfig:
+    """Hover at a point and keep a slowly moving target in the middle of the camera's image."""
+
+    episode_s: float = 8.0
+    """Length of an episode, s."""
+    target: tuple[float, float, float] = defaults.TARGET
+    """Where to hover, world, m."""
+    position: float = 1.5
+    """Start within this of the target, m an axis."""
+    velocity: float = 0.5
+    """Start velocity, m/s an axis, uniform in +-."""
+    tilt: float = 0.2617993877991494
+    """Start roll and pitch, rad, uniform in +-; any heading."""
+    distance: tuple[float, float] = (4.0, 6.0)
+    """From where to hover to what to look at, m, uniform."""
+    elevation: float = 0.2
+    """What to look at is within this of the height of where to hover, m."""
+    turn_rate: float = 0.2
+    """It circles around where to hover at up to this, rad/s, either way."""
+    size: float = 0.2
+    """Radius of what to look at, m."""
+    fov: tuple[float, float] = (1.518436449235301, 1.0122909661567112)
+    """Of the camera: horizontal and vertical, rad."""
+    camera_position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the camera sits, body frame (forward, left, up), m."""
+    camera_pitch: float = 0.0
+    """Of the camera, downwards from straight ahead, rad."""
+    radius: float = 0.1
+    """Success: within this of the target, m, ..."""
+    centred: float = 0.25
+    """... what to look at within this share of half the image from its middle, across and down, ..."""
+    hold_s: float = 1.0
+    """... for this last part of the episode, s."""
+    fence: float = defaults.HOVER_FENCE
+    """Farther than this from the target the episode fails, m."""
+
+
+TaskConfig = (
+    HoverConfig
+    | HoverAwareConfig
+    | LandConfig
+    | LandVisualConfig
+    | TrackConfig
+    | RaceConfig
+    | RaceClutterConfig
+    | AvoidConfig
+    | GapConfig
+)
 
 
 @dataclass(frozen=True)
@@ -261,6 +453,15 @@ class NetworkConfig:
     """Units of the hidden layers (sets shapes)."""
     activation: Literal["relu", "tanh", "elu"] = "relu"
     """Activation of the hidden layers (sets the program)."""
+    pool: tuple[int, int] = (16, 16)
+    """Rows and columns that an image is averaged to; divide the camera's (sets shapes)."""
+    convolution: tuple[int, ...] = ()
+    """Channels of the convolutions that take an image in place of its averages; their stride is their size, 4 (2 where
+    4 does not divide the image), so that they are products of matrices (sets shapes)."""
+    encoder: tuple[int, ...] = (64,)
+    """Units of the layers that each image passes before it joins the rest (sets shapes)."""
+    recurrent: int = 0
+    """Units of a gated recurrent unit (GRU) before the hidden layers; 0: none (sets shapes)."""
 
 
 @dataclass(frozen=True)
@@ -319,6 +520,18 @@ AlgorithmConfig = PPOConfig | BPTTConfig
 
 
 @dataclass(frozen=True)
+class StageConfig:
+    """A stage of a curriculum: the task with a few numbers changed, until it is mastered or its time is over."""
+
+    changes: dict[str, float | tuple[float, ...]]
+    """Values of the task's fields by dotted path: {"forest.density": 0.0}; none that sets shapes or the program."""
+    success: float | None = None
+    """Promotion: success of an evaluation in this stage."""
+    steps: int | None = None
+    """Promotion at the latest after so many environment steps."""
+
+
+@dataclass(frozen=True)
 class TrainConfig:
     """Everything that decides the outcome of a run."""
 
@@ -344,5 +557,7 @@ class TrainConfig:
     """Devices (CPU: cores) that share the environments; left out: all there are, 32 environments or more on each."""
     fast_compile: bool = True
     """On a CPU: compile in half the time, run up to a tenth slower; right for runs of seconds."""
+    curriculum: tuple[StageConfig, ...] = ()
+    """Stages before the task itself."""
     stop_at: float | None = None
     """Stop once the success on 1000 starts is at least this; left out: use all steps."""

@@ -4,6 +4,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -12,8 +13,20 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray
 from e2efly.env import Env, EnvState, Step
 from e2efly.physics import State
 
-Act = Callable[[Float[Array, "n o"]], Float[Array, "n 4"]]
-"""A policy: actions from observations."""
+
+@dataclass(frozen=True)
+class Act:
+    """A policy, as a function that JAX can compile."""
+
+    act: Callable[[Float[Array, "n o"], tuple[Array, ...], Array], tuple[Float[Array, "n 4"], Array]]
+    """(observation, images, memory) -> (action, next memory)."""
+    begin: Callable[[int], Array] = lambda n: jnp.zeros((n, 0))
+    """How many -> their memory at the start of an episode, (n, k)."""
+
+    @staticmethod
+    def of(function: Callable[[Float[Array, "n o"]], Float[Array, "n 4"]]) -> "Act":
+        """Of a function of the observation alone."""
+        return Act(lambda observation, images, memory: (function(observation), memory))
 
 
 @jax.tree_util.register_dataclass
@@ -64,12 +77,13 @@ def run_episodes(
     state, observation = _part(*env.reset(key, n), part)
     n = observation.shape[0]
     zero, no = jnp.zeros(n), jnp.zeros(n, bool)
-    first = (state, observation, no, Episodes(no, zero, zero, zero, zero, zero, zero, zero, no), zero)
+    first = (state, observation, act.begin(n), no, Episodes(no, zero, zero, zero, zero, zero, zero, zero, no), zero)
 
     def step(carry: tuple, _: None) -> tuple[tuple, None]:
-        state, observation, over, e, counted = carry
-        action = act(observation)
+        state, observation, memory, over, e, counted = carry
+        action, memory = act.act(observation, state.images, memory)
         reached, out = env.advance(state, action)
+        reached = env.look(reached, no)
         live = 1.0 - over
         counts = live * (reached.time > settle)
         speed = jnp.linalg.norm(reached.vehicle.velocity, axis=-1)
@@ -86,9 +100,9 @@ def run_episodes(
             reward=e.reward + live * out.reward,
             crashed=e.crashed | (out.terminated & ~out.success & ~over),
         )
-        return (reached, out.final_observation, over | out.done, e, counted + counts), None
+        return (reached, out.final_observation, memory, over | out.done, e, counted + counts), None
 
-    (_, _, _, e, counted), _ = jax.lax.scan(step, first, None, length=steps)
+    (*_, e, counted), _ = jax.lax.scan(step, first, None, length=steps)
     flown = jnp.maximum(e.duration / env.control_period, 1.0)
     return dataclasses.replace(e, mean_error=e.mean_error / jnp.maximum(counted, 1.0), roughness=e.roughness / flown)
 
@@ -114,15 +128,17 @@ def trace(
         then, and the outcome. An episode goes on after its end: `Step.done` tells where that was.
     """
     state, observation = env.reset(key, n)
+    no = jnp.zeros(n, bool)
 
-    def step(carry: tuple[EnvState, Array], _: None) -> tuple[tuple[EnvState, Array], tuple[State, Array, Array, Step]]:
-        state, observation = carry
-        action = act(observation)
+    def step(carry: tuple[EnvState, Array, Array], _: None) -> tuple[tuple[EnvState, Array, Array], Any]:
+        state, observation, memory = carry
+        action, memory = act.act(observation, state.images, memory)
         reached, out = env.advance(state, action)
+        reached = env.look(reached, no)
         goal = env.task.goal(reached.memory, reached.time)
-        return (reached, out.final_observation), (reached.vehicle, env.command(action), goal, out)
+        return (reached, out.final_observation, memory), (reached.vehicle, env.command(action), goal, out)
 
-    return jax.lax.scan(step, (state, observation), None, length=steps)[1]
+    return jax.lax.scan(step, (state, observation, act.begin(n)), None, length=steps)[1]
 
 
 def wilson(successes: int, n: int, z: float = 1.96) -> tuple[float, float]:

@@ -9,12 +9,21 @@ from collections.abc import Callable
 
 from e2efly.config import (
     AlgorithmConfig,
+    AvoidConfig,
     BPTTConfig,
+    CameraConfig,
+    EnvConfig,
+    GapConfig,
+    HoverAwareConfig,
     HoverConfig,
     LandConfig,
+    LandVisualConfig,
+    NetworkConfig,
     PPOConfig,
+    RaceClutterConfig,
     RaceConfig,
     RewardConfig,
+    StageConfig,
     TaskConfig,
     TrackConfig,
     TrainConfig,
@@ -26,24 +35,60 @@ TASKS: dict[str, TaskConfig] = {
     "land": LandConfig(),
     "track": TrackConfig(),
     "race": RaceConfig(laps=0),
+    "hover_aware": HoverAwareConfig(),
+    "gap": GapConfig(collisions_end=False),
+    "land_visual": LandVisualConfig(),
+    "avoid": AvoidConfig(collisions_end=False),
+    "race_clutter": RaceClutterConfig(laps=0, collisions_end=False),
 }
 """The task that each name trains on. Races go on for lap after lap; evaluation ends after one."""
 
 ALGORITHMS: dict[str, AlgorithmConfig] = {"ppo": PPOConfig(), "bptt": BPTTConfig()}
 """Algorithms by name, with the defaults of their presets."""
 
+D435I = CameraConfig(fov=(math.radians(87), math.radians(58)), reach=(0.28, 10.0))
+"""Depth of an Intel RealSense D435i."""
+_EYES: dict[str, tuple[CameraConfig, ...]] = {
+    "land_visual": (CameraConfig("mask", 32, 32, fov=(math.pi / 2, math.pi / 2), pitch=math.pi / 2),),
+    "race_clutter": (dataclasses.replace(D435I, width=48, height=24, pitch=-0.35),),
+    "avoid": (dataclasses.replace(D435I, width=32, height=12),),
+}
+"""What the policies of the visual tasks see."""
+
 _PAPER_WEIGHTS: dict[str, dict[str, float]] = {
     "hover": {"prog2": 0.01, "ori2": 0.0001, "v1": 0.002, "anglev": 0.002},
     "land": {"progxy": 0.04, "vz": 0.1, "anglev": 0.001},
     "track": {"prog2": 0.02, "ori2": 0.001, "v1": 0.002, "anglev": 0.002},
     "race": {"prog1": 0.9, "ori2": 0.001, "v1": 0.002, "anglev": 0.002},
+    "land_visual": {"progxy": 0.04, "ori2": 0.003, "vz": 0.1, "anglev": 0.001},
+    "race_clutter": {"prog1": 0.9, "act3": 1.0, "ori1": 0.04, "avoid1": 0.01},
+    "avoid": {"prog1": 0.9, "ori1": 0.04, "v3": 0.002, "anglev": 0.002, "avoid2": 0.01},
 }
 _PAPER_PPO_EXTRA: dict[str, dict[str, float]] = {
     "hover": {"act3": 1.0, "goal": 1.0, "crash": 1.0},
     "land": {"act3": 1.0, "goal": 1.0, "crash": 1.0},
     "track": {"act3": 1.0, "crash": 1.0},
     "race": {"act3": 1.0, "goal": 5.0, "crash": 4.0},
+    "land_visual": {"act3": 1.0, "goal": 1.0, "crash": 1.0},
+    "race_clutter": {"goal": 5.0, "crash": 4.0},
+    "avoid": {"goal": 5.0, "crash": 4.0},
 }
+_PAPER_STEPS: dict[str, tuple[int, int]] = {
+    "hover": (50, 10), "land": (100, 10), "track": (50, 20), "race": (100, 50), "land_visual": (100, 1),
+    "race_clutter": (100, 50), "avoid": (100, 50),
+}  # fmt: skip
+"""Millions of environment steps by PPO and by BPTT."""
+CURRICULA: dict[str, tuple[StageConfig, ...]] = {
+    "avoid": (
+        StageConfig({"forest.density": 0.0, "speed": (2.0, 4.0)}, success=0.9, steps=1_000_000),
+        StageConfig({"forest.density": 0.03, "speed": (2.0, 5.0)}, success=0.8, steps=2_000_000),
+    ),
+    "race_clutter": (
+        StageConfig({"clutter.obstacles": 0.0}, success=0.8, steps=2_000_000),
+        StageConfig({"clutter.obstacles": 5.0}, success=0.7, steps=2_000_000),
+    ),
+}
+"""The paper's curricula: no obstacles, few, and then the task itself. Its table gives no numbers."""
 
 
 def _hover(algo: str) -> TrainConfig:
@@ -52,6 +97,14 @@ def _hover(algo: str) -> TrainConfig:
         return TrainConfig(HoverConfig(), PPOConfig(), RewardConfig(weights), steps=2_500_000)
     weights = {"prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02}
     return TrainConfig(HoverConfig(), BPTTConfig(), RewardConfig(weights), steps=1_000_000, chunk=10)
+
+
+def _hover_aware(algo: str) -> TrainConfig:
+    if algo == "ppo":
+        weights = {"near": 1.0, "ori1": 1.0, "ori3": 1.0, "v1": 0.02, "anglev_sq": 0.002, "act2_sq": 0.02}
+        return TrainConfig(HoverAwareConfig(), PPOConfig(), RewardConfig(weights), steps=3_000_000)
+    weights = {"prog2": 1.0, "ori1": 1.0, "ori3": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02}
+    return TrainConfig(HoverAwareConfig(), BPTTConfig(), RewardConfig(weights), steps=1_000_000, chunk=10)
 
 
 def _land(algo: str) -> TrainConfig:
@@ -64,6 +117,69 @@ def _land(algo: str) -> TrainConfig:
         return TrainConfig(LandConfig(), settings, RewardConfig(weights), steps=2_000_000)
     weights = {"progxy": 1.0, "descent": 1.0, "upright": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02}
     return TrainConfig(LandConfig(), BPTTConfig(learning_rate=8e-3), RewardConfig(weights), steps=1_000_000, chunk=10)
+
+
+def _land_visual(algo: str) -> TrainConfig:
+    weights = {"progxy": 1.0, "descent": 1.0, "upright": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02}
+    settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=1.2e-4)
+    if algo == "ppo":
+        weights = {
+            "prog1": 4.0, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02, "goal": 10.0,
+            "crash": 10.0,
+        }  # fmt: skip
+        settings = PPOConfig(learning_rate=2e-3)
+    network, seen = NetworkConfig((128, 64)), EnvConfig(cameras=_EYES["land_visual"])
+    return TrainConfig(
+        LandVisualConfig(), settings, RewardConfig(weights), seen, network, steps=1_000_000, chunk=30,
+        eval_episodes=100,
+    )  # fmt: skip
+
+
+def _avoid(algo: str) -> TrainConfig:
+    weights = {"vel": 3.5, "avoid": 10.0, "ori2": 0.1, "anglev_sq": 0.01, "act2_sq": 0.02}
+    settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=1.2e-4, gradient_decay=2.5)
+    task, network = TASKS["avoid"], NetworkConfig((128, 64), pool=(6, 32), recurrent=64)
+    curriculum: tuple[StageConfig, ...] = ()
+    if algo == "ppo":
+        weights = {"vel": 0.3, "avoid": 0.1, "anglev_sq": 0.002, "act2_sq": 0.02, "goal": 5.0, "crash": 5.0}
+        settings, task = PPOConfig(learning_rate=2e-3, gamma=0.98), AvoidConfig()
+        network, curriculum = dataclasses.replace(network, recurrent=0), CURRICULA["avoid"]
+    return TrainConfig(
+        task, settings, RewardConfig(weights), EnvConfig(cameras=_EYES["avoid"]), network, steps=4_000_000, chunk=100,
+        eval_episodes=100, curriculum=curriculum,
+    )  # fmt: skip
+
+
+def _gap(algo: str) -> TrainConfig:
+    if algo == "ppo":
+        weights = {
+            "prog1": 1.0, "ori4": 0.1, "fit": 1.0, "overspeed": 0.02, "anglev_sq": 0.0005, "act2_sq": 0.005,
+            "goal": 1.0, "crash": 1.0,
+        }  # fmt: skip
+        reward = RewardConfig(weights, {"desired_speed": 2.0, "fit_margin": 0.02, "fit_limit": 0.1})
+        settings: AlgorithmConfig = PPOConfig(gamma=0.97, learning_rate=5e-3, learning_rate_end=5e-4)
+        return TrainConfig(TASKS["gap"], settings, reward, steps=3_000_000)
+    weights = {
+        "prog1": 1.0, "near": 0.1, "ori4": 0.1, "fit": 1.0, "overspeed": 0.02, "anglev_sq": 0.0005, "act2_sq": 0.005,
+    }  # fmt: skip
+    reward = RewardConfig(weights, {"desired_speed": 2.0, "fit_margin": 0.02, "fit_limit": 0.1})
+    settings = BPTTConfig(learning_rate=6e-3, max_grad_norm=1.0, gradient_decay=1.0)
+    return TrainConfig(TASKS["gap"], settings, reward, steps=1_500_000, chunk=20)
+
+
+def _race_clutter(algo: str) -> TrainConfig:
+    weights = {"prog1": 1.0, "near": 0.1, "avoid": 0.1, "overspeed": 0.01, "anglev_sq": 0.0005, "act2_sq": 0.005}
+    settings: AlgorithmConfig = BPTTConfig(learning_rate=8e-3, max_grad_norm=1.0, gradient_decay=1.5)
+    task, curriculum = TASKS["race_clutter"], ()
+    if algo == "ppo":
+        weights |= {"goal": 1.0, "crash": 1.0}
+        settings = PPOConfig(gamma=0.97, learning_rate=3e-3, learning_rate_end=3e-4)
+        task, curriculum = RaceClutterConfig(laps=0), CURRICULA["race_clutter"]
+    network, seen = NetworkConfig((128, 64), pool=(12, 24)), EnvConfig(cameras=_EYES["race_clutter"])
+    return TrainConfig(
+        task, settings, RewardConfig(weights), seen, network, steps=6_000_000, chunk=100, eval_episodes=100,
+        curriculum=curriculum,
+    )  # fmt: skip
 
 
 def _track(algo: str) -> TrainConfig:
@@ -86,7 +202,17 @@ def _race(algo: str) -> TrainConfig:
     return TrainConfig(RaceConfig(laps=0), settings, RewardConfig(weights), steps=2_500_000, chunk=15)
 
 
-_OURS: dict[str, Callable[[str], TrainConfig]] = {"hover": _hover, "land": _land, "track": _track, "race": _race}
+_OURS: dict[str, Callable[[str], TrainConfig]] = {
+    "hover": _hover,
+    "hover_aware": _hover_aware,
+    "land": _land,
+    "land_visual": _land_visual,
+    "avoid": _avoid,
+    "gap": _gap,
+    "race_clutter": _race_clutter,
+    "track": _track,
+    "race": _race,
+}
 
 
 def _paper(task: str, algo: str) -> TrainConfig:
@@ -98,11 +224,14 @@ def _paper(task: str, algo: str) -> TrainConfig:
             envs=100, horizon=256, minibatch=25_600, epochs=10, learning_rate=1e-4, learning_rate_end=1e-5,
             gamma=0.99,
         )  # fmt: skip
-        steps = {"hover": 50, "land": 100, "track": 50, "race": 100}[task] * 1_000_000
     else:
         settings = BPTTConfig(envs=100, horizon=96, learning_rate=1e-3, learning_rate_end=1e-5)
-        steps = {"hover": 10, "land": 10, "track": 20, "race": 50}[task] * 1_000_000
-    return TrainConfig(TASKS[task], settings, RewardConfig(weights), steps=steps, chunk=10)
+    steps = _PAPER_STEPS[task][algo != "ppo"] * 1_000_000
+    seen = tuple(dataclasses.replace(camera, width=64, height=64) for camera in _EYES.get(task, ()))
+    return TrainConfig(
+        TASKS[task], settings, RewardConfig(weights), EnvConfig(cameras=seen), steps=steps, chunk=10,
+        curriculum=CURRICULA.get(task, ()),
+    )  # fmt: skip
 
 
 PRESETS: dict[str, Callable[[str, str], TrainConfig]] = {
@@ -116,11 +245,16 @@ def preset(task: str, algo: str, name: str = "ours") -> TrainConfig:
     """The configuration of a task and an algorithm.
 
     Raises:
-        ValueError: for an unknown name, with the nearest one and all there are.
+        ValueError: for an unknown name, with the nearest one and all there are; for the paper's preset of a task that
+            the paper gives no numbers for.
     """
     for kind, value, known in (("task", task, TASKS), ("algorithm", algo, ALGORITHMS), ("preset", name, PRESETS)):
         if value not in known:
             raise ValueError(unknown(kind, value, known))
+    if name == "paper" and task not in _PAPER_WEIGHTS:
+        raise ValueError(
+            f"preset 'paper': the paper has no reward for task {task!r}; accepted: {', '.join(_PAPER_WEIGHTS)}"
+        )
     return PRESETS[name](task, algo)
 
 
@@ -147,6 +281,15 @@ def suites(config: TaskConfig) -> dict[str, TaskConfig]:
         }
     if isinstance(config, RaceConfig):
         return {"race": dataclasses.replace(config, laps=max(config.laps, 1))}
+    if isinstance(config, RaceClutterConfig):
+        return {"race_clutter": dataclasses.replace(config, laps=max(config.laps, 1), collisions_end=True)}
+    if isinstance(config, AvoidConfig):
+        return {
+            f"avoid_{speed:g}": dataclasses.replace(config, speed=(speed, speed), collisions_end=True)
+            for speed in (5.0, 8.0)
+        }
+    if isinstance(config, GapConfig):
+        return {"gap": dataclasses.replace(config, collisions_end=True)}
     return {task_name(config): config}
 
 

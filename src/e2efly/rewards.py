@@ -163,6 +163,33 @@ def avoid2(
     return -jnp.maximum(approach_speed, 0.0) * near
 
 
+def vel(velocity: Vector, desired_velocity: Vector) -> Scalar:
+    """Minus the error of the velocity as a share of the desired speed, at least 1 m/s. Ours."""
+    return -norm(velocity - desired_velocity) / jnp.maximum(norm(desired_velocity), 1.0)
+
+
+def overspeed(velocity: Vector, desired_speed: Scalar | float = 1.0) -> Scalar:
+    """-relu(speed - v_d)^2, (m/s)^2: only being too fast costs. Ours."""
+    return -(jnp.maximum(norm(velocity) - desired_speed, 0.0) ** 2)
+
+
+def avoid(
+    gaps: Float[Array, "*n k"],
+    closing: Float[Array, "*n k"],
+    avoid_reach: float | Array = 0.8,
+    avoid_barrier: float | Array = 0.5,
+    avoid_steepness: float | Array = 16.0,
+) -> Scalar:
+    """Of all things within reach: -(relu(reach - d)^2 + barrier softplus(-k d)) (1 + v), v the closing speed, m/s.
+
+    The gradient goes through the distances alone. Ours: the sum over things, not the nearest, so that a gap between
+    two of them has a middle.
+    """
+    speed = jax.lax.stop_gradient(jnp.maximum(closing, 0.0))
+    near = jnp.maximum(avoid_reach - gaps, 0.0) ** 2 + avoid_barrier * jax.nn.softplus(-avoid_steepness * gaps)
+    return -jnp.sum(near * (1 + speed), axis=-1)
+
+
 def goal(arrived: Bool[Array, "*n"]) -> Scalar:
     """1 in the step that arrives at a goal (Eq. goal)."""
     return arrived.astype(jnp.float32)
@@ -208,6 +235,14 @@ def upright(quaternion: Float[Array, "*n 4"]) -> Scalar:
     return -2.0 * (quaternion[..., 1] ** 2 + quaternion[..., 2] ** 2)
 
 
+def fit(overhang: Float[Array, "*n k"], fit_margin: float | Array = 0.02, fit_limit: float | Array = 0.1) -> Scalar:
+    """Minus how far parts of the vehicle stand out of the opening that they pass, and of a margin in it, m. Ours.
+
+    What stands out farther than the limit costs no more: being beside the opening is not worse than turning back.
+    """
+    return -jnp.sum(jnp.clip(overhang + fit_margin, 0.0, fit_limit), axis=-1)
+
+
 Kind = Literal["differentiable", "partly", "sparse"]
 
 
@@ -234,9 +269,9 @@ class Term:
 _KINDS: dict[Kind, tuple[Callable[..., Array], ...]] = {
     "differentiable": (
         prog1, prog2, progxy, progx, progy, progz, act1, act2, act3, ori1, ori3, v1, v2, v3, anglev, near,
-        anglev_sq, act2_sq, upright,
+        anglev_sq, act2_sq, upright, vel, overspeed,
     ),
-    "partly": (ori2, ori4, vz, avoid1, avoid2, descent),
+    "partly": (ori2, ori4, vz, avoid1, avoid2, avoid, descent, fit),
     "sparse": (goal, crash),
 }  # fmt: skip
 TERMS: dict[str, Term] = {

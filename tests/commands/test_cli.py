@@ -26,8 +26,11 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     ("arguments", "said"),
     [
         (["trian"], "unknown command 'trian'; did you mean 'train'?"),
-        (["train", "hoover"], "unknown task 'hoover'; did you mean 'hover'? (there are: hover, land, race, track)"),
-        (["train"], "train needs a task first: hover, land, track, race"),
+        (
+            ["train", "hoover"],
+            "unknown task 'hoover'; did you mean 'hover'? (there are: avoid, gap, hover, hover_aware, land, ",
+        ),
+        (["train"], "train needs a task first: hover, land, track, race, hover_aware, gap"),
         (["train", "hover", "--algo", "bppt"], "unknown algorithm 'bppt'; did you mean 'bptt'?"),
         (["train", "hover", "--preset", "papr"], "unknown preset 'papr'; did you mean 'paper'?"),
         (["train", "hover", "--vehicle", "vis_x"], "unknown vehicle 'vis_x'; did you mean 'vis_r'?"),
@@ -44,6 +47,13 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["eval", "nowhere.onnx"], "nowhere.onnx"),
         (["eval", "nowhere.onnx", "--episodes", "0"], "--episodes is 0; accepted: more than 0"),
         (["export", "nowhere"], "nowhere holds no run"),
+        (
+            ["render", "forst"],
+            "unknown scene 'forst'; did you mean 'forest'? (there are: circle_3d, clutter, corridor,",
+        ),
+        (["render", "nowhere.toml"], "nowhere.toml: No such file or directory; accepted: the path of a .toml file"),
+        (["render", "forest", "--width", "4"], "--width is 4; accepted: 8 to 4096 pixels"),
+        (["render", "forest", "--camera", "fvp"], "--camera"),
     ],
 )
 def test_bad_input_is_named_with_what_exists(
@@ -60,7 +70,8 @@ def test_a_folder_that_cannot_be_made_is_named(capsys: pytest.CaptureFixture[str
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["train", "--help"], ["train", "race", "--algo", "bptt", "--help"],
-                                       ["eval", "--help"], ["bench", "--help"], ["--version"]])  # fmt: skip
+                                       ["eval", "--help"], ["bench", "--help"], ["render", "--help"],
+                                       ["--version"]])  # fmt: skip
 def test_help_imports_no_jax(arguments: list[str]) -> None:
     code = (
         "import sys; from e2efly.cli import run\n"

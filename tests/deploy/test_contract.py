@@ -15,7 +15,7 @@ from e2efly.physics import COMMAND_MODES
 Path = tuple[str | int, ...]
 
 EXAMPLE = {
-    "contract_version": 1,
+    "contract_version": 2,
     "e2efly_version": "0.1.0",
     "task": "hover",
     "vehicle": "vis_r",
@@ -29,6 +29,45 @@ EXAMPLE = {
         {"name": "attitude", "size": 4, "frame": "world_body", "unit": "1", "scale": 1.0, "description": "wxyz"},
         {"name": "body_rate", "size": 3, "frame": "body", "unit": "rad/s", "scale": 4.0, "description": "of the body"},
     ],
+    "images": [
+        {
+            "name": "image_0",
+            "sees": "mask",
+            "of": "pad",
+            "width": 64,
+            "height": 48,
+            "projection": "pinhole",
+            "fov_rad": [1.5, 1.0],
+            "reach_m": [0.0, 20.0],
+            "position_m": [0.1, 0.0, -0.02],
+            "pitch_rad": 1.57,
+            "rate_hz": 15.0,
+            "latency_range_s": [0.02, 0.03],
+            "encoding": "none",
+            "pool": [12, 16],
+            "description": "1 where pad is seen, else 0",
+            "preprocessing": "averaged",
+        },
+        {
+            "name": "image_1",
+            "sees": "range",
+            "of": "none",
+            "width": 360,
+            "height": 16,
+            "projection": "spherical",
+            "fov_rad": [6.28, 0.5],
+            "reach_m": [0.3, 50.0],
+            "position_m": [0.0, 0.0, 0.0],
+            "pitch_rad": 0.0,
+            "rate_hz": 30.0,
+            "latency_range_s": [0.0, 0.0],
+            "encoding": "inverse",
+            "pool": [16, 360],
+            "description": "distance, m",
+            "preprocessing": "convolved",
+        },
+    ],
+    "memory_size": 32,
     "action": {
         "mode": "ctbr",
         "fields": ["collective_thrust", "roll_rate", "pitch_rate", "yaw_rate"],
@@ -92,7 +131,7 @@ def test_the_mapping_is_written_as_it_is_computed() -> None:
 def test_a_value_of_the_wrong_type_is_refused_by_name(path: Path) -> None:
     whole_list = len(path) > 2 and path[1] in ("fields", "units")  # these are shown as one
     name = re.escape(spelled(path[:2] if whole_list else path))
-    for value in (None, [], True, "", math.nan):
+    for value in (None, True, "", math.nan, *([[]] if path != ("images",) else [])):  # no images is a policy, too
         with pytest.raises(ValueError, match=rf"^contract: {name} is .*; accepted: \S"):
             Contract.from_json(changed(path, value))
     with pytest.raises(ValueError, match=rf"^contract: ({name} is .*; accepted: \S|missing key '{name}\.)"):
@@ -120,8 +159,8 @@ def test_an_unknown_key_is_named_with_what_was_meant(path: Path) -> None:
 @pytest.mark.parametrize(
     ("path", "value", "accepted"),
     [
-        (("contract_version",), 2, "1; export it again"),
-        (("contract_version",), 1.0, "1; export it again"),
+        (("contract_version",), 1, "2; export it again"),
+        (("contract_version",), 2.0, "2; export it again"),
         (("vehicle_hash",), "0123456789ABCDEF", "16 hex digits"),
         (("vehicle_hash",), "0123", "16 hex digits"),
         (("control_rate_hz",), 0, "a positive number of Hz"),
@@ -140,6 +179,8 @@ def test_an_unknown_key_is_named_with_what_was_meant(path: Path) -> None:
         (("observation", 0, "scale"), math.inf, "a finite number"),
         (("observation",), EXAMPLE["observation"][:1], "exactly one attitude"),
         (("observation",), [EXAMPLE["observation"][1]] * 2, "different names"),
+        (("images",), None, "a list of images"),
+        (("memory_size",), -1, "a whole number, 0 or more"),
         (("action", "mode"), "rates", "'ctbr'"),
         (("action", "mode"), "velocity", "as action.mode is 'velocity'"),
         (("action", "units"), ["m/s^2", "deg/s", "deg/s", "deg/s"], "'rad/s'"),

@@ -35,7 +35,7 @@ def contract(task: str, **env: Any) -> Contract:
 
 @pytest.fixture(scope="module")
 def contracts() -> dict[str, Contract]:
-    return {task: contract(task) for task in presets.TASKS}
+    return {task: contract(task) for task in ("hover", "land", "track", "race")}
 
 
 def at(position: Any) -> Odometry:

@@ -16,11 +16,12 @@ from onnx import TensorProto, helper, numpy_helper
 
 import e2efly.deploy
 from e2efly import presets
+from e2efly.config import NetworkConfig
 from e2efly.deploy.contract import METADATA_KEY
 from e2efly.deploy.policy import Policy, load_policy
 from e2efly.env import Env
 from e2efly.learn.export import contract_of, export_policy, random_observations
-from e2efly.learn.networks import Features, init_mlp
+from e2efly.learn.networks import Actor, Weights, init_mlp
 from e2efly.vehicles import load_vehicle
 
 Change = Callable[[onnx.ModelProto], None]
@@ -31,9 +32,9 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A random hovering policy."""
     config = presets.preset("hover", "ppo")
     env = Env.of(config.task, config.reward, config.env)
-    features, out = Features(env.fields), tmp_path_factory.mktemp("policy") / "policy.onnx"
-    layers = init_mlp(np.random.default_rng(0), (features.size, 16, 4), 1.0)
-    export_policy(out, layers, features, "relu", contract_of(env, config))
+    actor, out = Actor.of(env.fields, (), NetworkConfig((16,))), tmp_path_factory.mktemp("policy") / "policy.onnx"
+    layers = init_mlp(np.random.default_rng(0), (actor.features.size, 16, 4), 1.0)
+    export_policy(out, Weights((), None, layers), actor, contract_of(env, config))
     return out
 
 
@@ -62,36 +63,36 @@ def edited(path: Path, tmp_path: Path) -> Callable[[Change], Path]:
 
 
 def test_a_batch_and_its_rows_act_alike(policy: Policy, observations: np.ndarray) -> None:
-    batch = policy.act(observations)
+    batch, memory = policy.act(observations)
+    assert memory.shape == (50, 0)
     assert batch.shape == (50, 4)
     assert batch.dtype == np.float32
     assert np.ptp(batch) > 0.5
     for row, action in zip(observations, batch, strict=True):
-        single = policy.act(row)
+        single, _ = policy.act(row)
         assert single.shape == (4,)
         np.testing.assert_allclose(single, action, atol=1e-6)
-    assert policy.act(observations[:0]).shape == (0, 4)
+    assert policy.act(observations[:0])[0].shape == (0, 4)
 
 
 def test_other_number_types_are_taken(policy: Policy, observations: np.ndarray) -> None:
-    np.testing.assert_array_equal(policy.act(observations.astype(np.float64)), policy.act(observations))
+    np.testing.assert_array_equal(policy.act(observations.astype(np.float64))[0], policy.act(observations)[0])
     level = np.array([0, 0, 0, 1, *[0] * (observations.shape[1] - 4)])
-    np.testing.assert_array_equal(policy.act(level), policy.act(level.astype(np.float32)))
-    np.testing.assert_array_equal(policy.act(observations[::2, ::1]), policy.act(observations[::2].copy()))
+    np.testing.assert_array_equal(policy.act(level)[0], policy.act(level.astype(np.float32))[0])
+    np.testing.assert_array_equal(policy.act(observations[::2, ::1])[0], policy.act(observations[::2].copy())[0])
 
 
 def test_saturated_actions_stay_in_range(tmp_path: Path) -> None:
     """Some arguments between 8 and 9 bring ONNX Runtime's tanh to 1.0000001."""
     config = presets.preset("hover", "ppo")
     env = Env.of(config.task, config.reward, config.env)
-    features = Features(env.fields)
-    weight = np.zeros((features.size, 4), np.float32)
+    actor, path = Actor.of(env.fields, (), NetworkConfig(())), tmp_path / "policy.onnx"
+    weight = np.zeros((actor.features.size, 4), np.float32)
     weight[0] = [1, -1, 1, -1]
-    layers, path = [(weight, np.zeros(4, np.float32))], tmp_path / "policy.onnx"
-    export_policy(path, layers, features, "relu", contract_of(env, config))
+    export_policy(path, Weights((), None, [(weight, np.zeros(4, np.float32))]), actor, contract_of(env, config))
     x = np.zeros((2000, env.observation_size), np.float32)
     x[:, 0], x[:, 3] = np.linspace(0.0, 20.0, 2000), 1.0
-    assert np.abs(load_policy(path).act(x)).max() == 1.0
+    assert np.abs(load_policy(path).act(x)[0]).max() == 1.0
 
 
 def test_command_is_the_mapping(policy: Policy) -> None:
@@ -259,7 +260,7 @@ def _no_squashing(model: onnx.ModelProto) -> None:
     [
         (lambda model: model.ClearField("metadata_props"), "metadata key 'contract' is missing"),
         (_metadata("{}"), "contract: missing key 'contract_version'"),
-        (_metadata('{"contract_version": 2}'), "contract: contract_version is 2; accepted: 1"),
+        (_metadata('{"contract_version": 1}'), "contract: contract_version is 1; accepted: 2; export it again"),
         (_metadata("hover"), "contract: not JSON"),
         (_rename("input", "state"), "input of the graph is [('state', 'tensor(float)'"),
         (_rename("output", "command"), "output of the graph is [('command', 'tensor(float)'"),

@@ -15,6 +15,7 @@ import onnx
 import pytest
 
 from e2efly import presets
+from e2efly.config import NetworkConfig
 from e2efly.deploy import policy_worker, runtime
 from e2efly.deploy.goal_options import GoalOptions, goal_for
 from e2efly.deploy.odometry import Odometry
@@ -23,7 +24,7 @@ from e2efly.deploy.policy_worker import PolicyWorker
 from e2efly.deploy.runtime import Runtime
 from e2efly.env import Env
 from e2efly.learn.export import contract_of, export_policy
-from e2efly.learn.networks import Features, init_mlp
+from e2efly.learn.networks import Actor, Weights, init_mlp
 from e2efly.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
@@ -37,10 +38,10 @@ def policy_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A policy that about hovers."""
     config = presets.preset("hover", "ppo")
     env = Env.of(config.task, config.reward, config.env)
-    features, path = Features(env.fields), tmp_path_factory.mktemp("policy") / "policy.onnx"
-    layers = init_mlp(np.random.default_rng(0), (features.size, 16, 4), 0.05)
+    actor, path = Actor.of(env.fields, (), NetworkConfig((16,))), tmp_path_factory.mktemp("policy") / "policy.onnx"
+    layers = init_mlp(np.random.default_rng(0), (actor.features.size, 16, 4), 0.05)
     layers = [*layers[:-1], (np.asarray(layers[-1][0]), np.arctanh(np.asarray(env.hover, np.float32)))]
-    export_policy(path, layers, features, "relu", contract_of(env, config))
+    export_policy(path, Weights((), None, layers), actor, contract_of(env, config))
     return path
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from e2efly import presets
-from e2efly.config import EnvConfig, ImuConfig, TaskConfig
+from e2efly.config import EnvConfig, ImuConfig, NetworkConfig, TaskConfig
 from e2efly.courses.tracks import load_track
 from e2efly.deploy.contract import Contract
 from e2efly.deploy.goal_options import GoalOptions, goal_for
@@ -26,7 +26,7 @@ from e2efly.deploy.policy import Policy, load_policy
 from e2efly.deploy.runtime import Envelope, Imu, Runtime, RuntimeState, act, begin, check, due, outside
 from e2efly.env import Env, EnvState, random_key
 from e2efly.learn.export import contract_of, export_policy
-from e2efly.learn.networks import Features, init_mlp
+from e2efly.learn.networks import Actor, Weights, init_mlp
 from e2efly.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
@@ -41,11 +41,11 @@ def make(folder: Path, task: TaskConfig, config: EnvConfig | None = None) -> tup
     preset = presets.preset(presets.task_name(task), "ppo")
     preset = dataclasses.replace(preset, task=task, env=config or preset.env)
     env = Env.of(task, preset.reward, preset.env)
-    features, path = Features(env.fields), folder / "policy.onnx"
-    layers = init_mlp(np.random.default_rng(0), (features.size, 16, 4), 0.05)
+    actor, path = Actor.of(env.fields, (), NetworkConfig((16,))), folder / "policy.onnx"
+    layers = init_mlp(np.random.default_rng(0), (actor.features.size, 16, 4), 0.05)
     hover = np.arctanh(np.asarray(env.hover, np.float32))
     layers = [*layers[:-1], (np.asarray(layers[-1][0]), hover)]
-    export_policy(path, layers, features, "relu", contract_of(env, preset))
+    export_policy(path, Weights((), None, layers), actor, contract_of(env, preset))
     return env, path
 
 
@@ -196,7 +196,7 @@ def test_a_decision_is_the_policys(runtime: Runtime) -> None:
     state = begin(runtime, still(), START)
     state, first = act(runtime, state, still(), START)
     policy = runtime.policy
-    np.testing.assert_array_equal(first.action, policy.act(first.observation))
+    np.testing.assert_array_equal(first.action, policy.act(first.observation)[0])
     np.testing.assert_allclose(first.command, policy.command(first.action), rtol=1e-12)
     assert (first.mode, first.late_s) == ("ctbr", 0.0)
     assert 0 < first.inference_s < 10

@@ -23,6 +23,7 @@ class ProbeState:
 
     vehicle: State
     count: Array
+    images: tuple[()] = ()
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class Probe:
     fields = FIELDS
     control_period = 1.0
     hover = np.zeros(4, np.float32)
+    cameras = ()
+    privileged_size = 0
 
     def reset(self, n: int) -> tuple[ProbeState, Array]:
         zero = jnp.zeros((n, 3))
@@ -71,6 +74,13 @@ class Probe:
 
     def restart(self, state: ProbeState, out: Step) -> tuple[ProbeState, Step]:
         return dataclasses.replace(state, count=jnp.where(out.done, 0.0, state.count)), out
+
+    def look(self, state: ProbeState, renewed: Array) -> ProbeState:
+        del renewed
+        return state
+
+    def privileged(self, state: ProbeState) -> Array:
+        return jnp.zeros((state.count.shape[0], 0))
 
     def step(self, state: ProbeState, action: Array) -> tuple[ProbeState, Step]:
         return self.restart(*self.advance(state, action))

@@ -14,11 +14,11 @@ from e2efly.env import random_key
 from e2efly.learn.algorithm import TrainState, adam, annealed
 from e2efly.learn.bptt import BPTT
 from e2efly.learn.devices import OWN, on_each, own, stacked
-from e2efly.learn.networks import Features, mlp, policy
+from e2efly.learn.networks import Actor, mlp
 from e2efly.learn.ppo import PPO, gae
 from tests.learn.probe import Probe
 
-NETWORK = NetworkConfig((16,), "tanh")
+ACTOR = Actor.of(Probe.fields, (), NetworkConfig((16,), "tanh"))
 PPO_CONFIG = PPOConfig(envs=64, horizon=16, minibatch=256, epochs=4, learning_rate=1e-2, learning_rate_end=1e-3)
 BPTT_CONFIG = BPTTConfig(envs=4, horizon=8, learning_rate=2e-2, learning_rate_end=1e-3, max_grad_norm=10.0)
 
@@ -26,12 +26,12 @@ BPTT_CONFIG = BPTTConfig(envs=4, horizon=8, learning_rate=2e-2, learning_rate_en
 def learn(
     probe: Probe, config: AlgorithmConfig, updates: int, devices: int = 2
 ) -> tuple[Any, TrainState, dict[str, jax.Array]]:
-    features = Features(probe.fields)
-    algorithm = PPO(features, NETWORK) if isinstance(config, PPOConfig) else BPTT(features, NETWORK)
+    algorithm = PPO(ACTOR) if isinstance(config, PPOConfig) else BPTT(ACTOR)
     parameters = jax.tree.map(jnp.asarray, algorithm.init(probe, config, 0))  # type: ignore[arg-type]
     optimizer = adam(config.max_grad_norm).init(ravel_pytree(parameters)[0])
+    n = config.envs // devices
     states = [
-        TrainState(parameters, optimizer, *probe.reset(config.envs // devices), random_key(i)) for i in range(devices)
+        TrainState(parameters, optimizer, *probe.reset(n), ACTOR.memory(n), random_key(i)) for i in range(devices)
     ]
 
     def run(state: TrainState) -> tuple[TrainState, dict[str, jax.Array]]:
@@ -47,13 +47,13 @@ def learn(
 
 
 def learned_action(state: TrainState) -> np.ndarray:
-    features = Features(Probe.fields)
-    return np.asarray(policy(state.parameters.policy, features(state.observation[:1]), NETWORK.activation)[0])
+    action, _ = ACTOR(state.parameters.policy, ACTOR.features(state.observation[:1]), state.memory[:1])
+    return np.asarray(action[0])
 
 
 def learned_value(state: TrainState) -> float:
-    features = Features(Probe.fields)
-    return float(mlp(state.parameters.critic, features(state.observation[:1]), NETWORK.activation)[0, 0])
+    known = ACTOR.features(state.observation[:1])
+    return float(mlp(state.parameters.critic, known, ACTOR.network.activation)[0, 0])
 
 
 @pytest.mark.parametrize("delay", [0, 1])

@@ -10,12 +10,12 @@ import onnx
 import pytest
 
 from e2efly import presets
-from e2efly.config import EnvConfig, ImuConfig, TrainConfig
+from e2efly.config import EnvConfig, ImuConfig, NetworkConfig, TrainConfig
 from e2efly.deploy.contract import METADATA_KEY, Contract
 from e2efly.deploy.policy import load_policy
 from e2efly.env import Env
 from e2efly.learn.export import contract_of, export_policy, parity, random_observations
-from e2efly.learn.networks import ACTIVATIONS, Features, Layers, init_mlp
+from e2efly.learn.networks import ACTIVATIONS, Actor, Layers, Weights, init_mlp
 from e2efly.observation import ATTITUDE, BODY_RATE, VELOCITY, Field, past_actions
 from e2efly.physics import COMMAND_MODES
 from e2efly.vehicles import load_vehicle, vehicle_names
@@ -29,11 +29,28 @@ def configured(task: str = "hover", **env: Any) -> tuple[TrainConfig, Env]:
     return config, Env.of(config.task, config.reward, config.env)
 
 
-def network(features: Features, hidden: tuple[int, ...] = (64, 64)) -> Layers:
-    """Random layers of the size that training ends at; biases included."""
+def shaped(fields: tuple[Field, ...], activation: Any = "relu", hidden: tuple[int, ...] = (64, 64)) -> Actor:
+    """A policy without cameras."""
+    return Actor.of(fields, (), NetworkConfig(hidden, activation))
+
+
+def learned(actor: Actor) -> Weights:
+    """Random weights of the size that training ends at; biases included."""
     rng = np.random.default_rng(1)
-    layers = init_mlp(rng, (features.size, *hidden, 4), 1.0)
-    return [(w, rng.normal(0.0, 0.3, b.shape).astype(np.float32)) for w, b in layers]
+    layers = init_mlp(rng, (actor.features.size, *actor.network.hidden, 4), 1.0)
+    return Weights((), None, [(w, rng.normal(0.0, 0.3, b.shape).astype(np.float32)) for w, b in layers])
+
+
+def of_head(layers: Layers) -> Weights:
+    return Weights((), None, layers)
+
+
+def with_layer(weights: Weights, index: int, weight: Any = None, bias: Any = None) -> Weights:
+    """With another weight or bias of one layer of the head."""
+    layers = list(weights.head)
+    w, b = layers[index]
+    layers[index] = (w if weight is None else weight, b if bias is None else bias)
+    return of_head(layers)
 
 
 def a_contract(fields: tuple[Field, ...]) -> Contract:
@@ -45,18 +62,17 @@ def a_contract(fields: tuple[Field, ...]) -> Contract:
 @pytest.mark.parametrize("task", list(presets.TASKS))
 def test_parity_on_ten_thousand_observations(tmp_path: Path, task: str, activation: str) -> None:
     config, env = configured(task)
-    features = Features(env.fields)
-    layers, path = network(features), tmp_path / "policy.onnx"
-    export_policy(path, layers, features, activation, contract_of(env, config))
-    assert parity(path, layers, features, activation) <= 1e-5
+    actor, path = shaped(env.fields, activation), tmp_path / "policy.onnx"
+    export_policy(path, learned(actor), actor, contract_of(env, config))
+    assert parity(path, learned(actor), actor) <= 1e-5
 
 
 def test_parity_with_inertial_sensors_and_many_past_actions(tmp_path: Path) -> None:
-    config, env = configured("race", imu=ImuConfig(), past_actions=5, command_mode="velocity")
-    features = Features(env.fields)
-    layers, path = network(features, (32,)), tmp_path / "policy.onnx"
-    export_policy(path, layers, features, "elu", contract_of(env, config))
-    assert parity(path, layers, features, "elu", count=1000) <= 1e-5
+    config, env = configured("race", imu=ImuConfig(observed=True), past_actions=5, command_mode="velocity")
+    assert "gyroscope" in [f.name for f in env.fields]
+    actor, path = shaped(env.fields, "elu", (32,)), tmp_path / "policy.onnx"
+    export_policy(path, learned(actor), actor, contract_of(env, config))
+    assert parity(path, learned(actor), actor, count=1000) <= 1e-5
 
 
 @pytest.mark.parametrize(
@@ -65,26 +81,24 @@ def test_parity_with_inertial_sensors_and_many_past_actions(tmp_path: Path) -> N
     ids=lambda fields: "-".join(f.name for f in fields),
 )
 def test_parity_in_any_order_of_fields(tmp_path: Path, fields: tuple[Field, ...]) -> None:
-    features = Features(fields)
-    layers, path = network(features, ()), tmp_path / "policy.onnx"
-    export_policy(path, layers, features, "tanh", a_contract(fields))
-    assert parity(path, layers, features, "tanh", count=100) <= 1e-5
+    actor, path = shaped(fields, "tanh", ()), tmp_path / "policy.onnx"
+    export_policy(path, learned(actor), actor, a_contract(fields))
+    assert parity(path, learned(actor), actor, count=100) <= 1e-5
 
 
 def test_parity_sees_a_difference(tmp_path: Path) -> None:
     config, env = configured()
-    features = Features(env.fields)
-    layers, path = network(features), tmp_path / "policy.onnx"
-    export_policy(path, layers, features, "relu", contract_of(env, config))
-    layers[1] = (layers[1][0], layers[1][1] + 0.01)
-    assert parity(path, layers, features, "relu", count=100) > 1e-4
-    assert parity(path, network(features), features, "tanh", count=100) > 1e-2
+    actor, path = shaped(env.fields), tmp_path / "policy.onnx"
+    weights = learned(actor)
+    export_policy(path, weights, actor, contract_of(env, config))
+    assert parity(path, with_layer(weights, 1, bias=weights.head[1][1] + 0.01), actor, count=100) > 1e-4
+    assert parity(path, weights, shaped(env.fields, "tanh"), count=100) > 1e-2
 
 
 def test_a_turn_of_the_world_about_up_changes_nothing(tmp_path: Path) -> None:
     fields = (GOALS, ATTITUDE, VELOCITY, BODY_RATE)
-    path = tmp_path / "policy.onnx"
-    export_policy(path, network(Features(fields)), Features(fields), "relu", a_contract(fields))
+    actor, path = shaped(fields), tmp_path / "policy.onnx"
+    export_policy(path, learned(actor), actor, a_contract(fields))
     policy = load_policy(path)
     x = random_observations(np.random.default_rng(2), fields, 200)
     angle = 1.2
@@ -96,18 +110,18 @@ def test_a_turn_of_the_world_about_up_changes_nothing(tmp_path: Path) -> None:
     w, z = np.cos(angle / 2), np.sin(angle / 2)
     left = np.array([[w, 0, 0, -z], [0, w, -z, 0], [0, z, w, 0], [z, 0, 0, w]])
     turned[:, 6:10] = x[:, 6:10] @ left.T
-    np.testing.assert_allclose(policy.act(turned), policy.act(x), atol=1e-5)
+    np.testing.assert_allclose(policy.act(turned)[0], policy.act(x)[0], atol=1e-5)
     turned[:, 6:10] = x[:, 6:10]  # but turning only the vectors does
-    assert np.abs(policy.act(turned) - policy.act(x)).max() > 0.1
+    assert np.abs(policy.act(turned)[0] - policy.act(x)[0]).max() > 0.1
 
 
 def test_the_opposite_quaternion_is_the_same_attitude(tmp_path: Path) -> None:
     fields = (GOALS, ATTITUDE)
-    path = tmp_path / "policy.onnx"
-    export_policy(path, network(Features(fields)), Features(fields), "relu", a_contract(fields))
+    actor, path = shaped(fields), tmp_path / "policy.onnx"
+    export_policy(path, learned(actor), actor, a_contract(fields))
     x = random_observations(np.random.default_rng(2), fields, 20)
     other = np.concatenate([x[:, :6], -x[:, 6:]], axis=1)
-    np.testing.assert_array_equal(load_policy(path).act(other), load_policy(path).act(x))
+    np.testing.assert_array_equal(load_policy(path).act(other)[0], load_policy(path).act(x)[0])
 
 
 def test_features_by_hand(tmp_path: Path) -> None:
@@ -116,17 +130,19 @@ def test_features_by_hand(tmp_path: Path) -> None:
     fields, path = (goal, ATTITUDE), tmp_path / "policy.onnx"
     weight = np.zeros((6, 4), np.float32)
     weight[[0, 1, 3, 5], range(4)] = 1.0
-    export_policy(path, [(weight, np.zeros(4, np.float32))], Features(fields), "relu", a_contract(fields))
+    weights = Weights((), None, [(weight, np.zeros(4, np.float32))])
+    export_policy(path, weights, shaped(fields, hidden=()), a_contract(fields))
     h = np.sqrt(0.5)
     x = np.array([[0, 1, 0, h, 0, 0, h], [0, 0, 0, h, 0, h, 0]])
     expected = np.tanh([[0.5, 0, 0, 1], [0, 0, -1, 0]])
-    np.testing.assert_allclose(load_policy(path).act(x), expected, atol=1e-6)
+    np.testing.assert_allclose(load_policy(path).act(x)[0], expected, atol=1e-6)
 
 
 def test_the_file(tmp_path: Path) -> None:
     config, env = configured()
     contract, path = contract_of(env, config), tmp_path / "policy.onnx"
-    export_policy(path, network(Features(env.fields)), Features(env.fields), "relu", contract)
+    actor = shaped(env.fields)
+    export_policy(path, learned(actor), actor, contract)
     model = onnx.load(str(path))
     onnx.checker.check_model(model, full_check=True)
     assert [(o.domain, o.version) for o in model.opset_import] == [("", 17)]
@@ -143,10 +159,9 @@ def test_the_file(tmp_path: Path) -> None:
 
 def test_the_same_policy_is_the_same_file(tmp_path: Path) -> None:
     config, env = configured()
+    actor = shaped(env.fields)
     for name in ("a", "b"):
-        export_policy(
-            tmp_path / name, network(Features(env.fields)), Features(env.fields), "relu", contract_of(env, config)
-        )
+        export_policy(tmp_path / name, learned(actor), actor, contract_of(env, config))
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
@@ -198,30 +213,35 @@ def test_another_position_range_is_refused() -> None:
         contract_of(configured(command_mode="position", position_range=9.0)[1], config)
 
 
-def _with(layers: Layers, index: int, weight: np.ndarray | None = None, bias: np.ndarray | None = None) -> Layers:
-    w, b = layers[index]
-    return [*layers[:index], (w if weight is None else weight, b if bias is None else bias), *layers[index + 1 :]]
-
-
 def test_what_does_not_fit_is_refused_and_the_old_file_stays(tmp_path: Path) -> None:
     config, env = configured()
-    contract, features, path = contract_of(env, config), Features(env.fields), tmp_path / "policy.onnx"
-    layers = network(features)
+    contract, actor, path = contract_of(env, config), shaped(env.fields), tmp_path / "policy.onnx"
+    weights = learned(actor)
     path.write_text("old")
     nan = np.full((64, 64), np.nan, np.float32)
-    cases: list[tuple[Layers, Features, str, Contract, str]] = [
-        ([], features, "relu", contract, "layers is empty"),
-        (layers[:2], features, "relu", contract, r"layers\[1\] has shapes \(64, 64\).*accepted: \(64, 4\)"),
-        (layers[1:], features, "relu", contract, r"layers\[0\] has shapes \(64, 64\)"),
-        (_with(layers, 1, bias=np.zeros(63)), features, "relu", contract, r"layers\[1\] has shapes"),
-        (_with(layers, 1, weight=nan), features, "relu", contract, r"layers\[1\] is not finite"),
-        (layers, features, "gelu", contract, "activation is 'gelu'; accepted: relu, tanh, elu"),
-        (layers, Features(env.fields[::-1]), "relu", contract, r"contract.observation is .*accepted: the fields"),
-        (layers, features, "relu", dataclasses.replace(contract, task=""), "contract: task is ''"),
+    cases: list[tuple[Weights, Actor, Contract, str]] = [
+        (of_head([]), actor, contract, r"weights has the arrays ; accepted: \.head\[0\]\[0\], "),
+        (of_head(weights.head[:2]), actor, contract, r"weights has the arrays .*, \.head\[1\]\[1\]; accepted: "),
+        (
+            with_layer(weights, 0, weight=nan),
+            actor,
+            contract,
+            r"head\[0\]\[0\] has shape \(64, 64\); accepted: \(20, 64\)",
+        ),
+        (
+            with_layer(weights, 1, bias=np.zeros(63)),
+            actor,
+            contract,
+            r"weights\.head\[1\]\[1\] has shape \(63,\); accepted: \(64,\)",
+        ),
+        (with_layer(weights, 1, weight=nan), actor, contract, r"weights\.head\[1\]\[0\] is not finite"),
+        (weights, shaped(env.fields, "gelu"), contract, "activation is 'gelu'; accepted: relu, tanh, elu"),
+        (weights, shaped(env.fields[::-1]), contract, r"contract.observation is .*accepted: that of the policy"),
+        (weights, actor, dataclasses.replace(contract, task=""), "contract: task is ''"),
     ]
-    for stack, seen, activation, about, message in cases:
+    for given, shape, about, message in cases:
         with pytest.raises(ValueError, match=message):
-            export_policy(path, stack, seen, activation, about)
+            export_policy(path, given, shape, about)
     assert path.read_text() == "old"
     assert [file.name for file in tmp_path.iterdir()] == ["policy.onnx"]
 
@@ -235,6 +255,6 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
     path.write_text("old")
     monkeypatch.setattr("os.fsync", full)
     with pytest.raises(OSError, match=r"cannot write .*policy.onnx"):
-        export_policy(path, network(Features(env.fields)), Features(env.fields), "relu", contract_of(env, config))
+        export_policy(path, learned(shaped(env.fields)), shaped(env.fields), contract_of(env, config))
     assert path.read_text() == "old"
     assert [file.name for file in tmp_path.iterdir()] == ["policy.onnx"]

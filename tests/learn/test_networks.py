@@ -3,9 +3,10 @@
 import jax
 import numpy as np
 
-from e2efly.config import HoverConfig, RewardConfig
+from e2efly.config import HoverConfig, NetworkConfig, RewardConfig
 from e2efly.env import Env
-from e2efly.learn.networks import Features, init_mlp, init_policy, policy
+from e2efly.learn.networks import Actor, Features, init_mlp
+from e2efly.observation import ATTITUDE, VELOCITY
 from e2efly.physics.rotation import from_euler, multiply, rotate
 
 
@@ -26,9 +27,12 @@ def test_features_do_not_change_with_the_heading() -> None:
 
 def test_a_fresh_policy_hovers() -> None:
     hover = np.array([-0.3, 0.0, 0.1, 0.0], np.float32)
-    layers = init_policy(np.random.default_rng(0), 10, (32, 32), hover)
-    x = np.random.default_rng(1).normal(size=(5, 10)).astype(np.float32)
-    np.testing.assert_allclose(jax.jit(lambda x: policy(layers, x, "relu"))(x), np.tile(hover, (5, 1)), atol=0.05)
+    actor = Actor.of((ATTITUDE, VELOCITY), (), NetworkConfig((32, 32), recurrent=8))
+    weights = actor.init(np.random.default_rng(0), hover)
+    x = np.random.default_rng(1).normal(size=(5, actor.features.size)).astype(np.float32)
+    action, memory = jax.jit(actor)(weights, x, actor.memory(5))
+    np.testing.assert_allclose(action, np.tile(hover, (5, 1)), atol=0.05)
+    assert memory.shape == (5, 8)
 
 
 def test_hidden_layers_are_orthogonal() -> None:

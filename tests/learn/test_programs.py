@@ -12,7 +12,7 @@ import pytest
 from e2efly import presets
 from e2efly.config import NetworkConfig, TrainConfig
 from e2efly.env import Env, random_key
-from e2efly.evaluate import run_episodes
+from e2efly.evaluate import Act, run_episodes
 from e2efly.learn.devices import share
 from e2efly.learn.programs import Programs, evaluation_program
 from e2efly.learn.setup import Setup
@@ -88,7 +88,7 @@ def test_an_evaluation_is_the_same_on_one_device_and_on_two() -> None:
 
 def test_parts_of_the_episodes_are_the_whole() -> None:
     env = Env.of(presets.TASKS["hover"], config().reward)
-    act = lambda o: jnp.broadcast_to(env.hover, (o.shape[0], 4))  # noqa: E731
+    act = Act.of(lambda o: jnp.broadcast_to(env.hover, (o.shape[0], 4)))
     fly = jax.jit(lambda key, index: run_episodes(env, act, key, 7, 10, part=(index, 3)))
     whole = jax.jit(lambda key: run_episodes(env, act, key, 7, 10))(random_key(0))
     parts = [fly(random_key(0), i) for i in range(3)]

@@ -37,10 +37,9 @@ def test_embree_sees_the_same_depth_and_normals() -> None:
     mount, pattern = camera.mount(CONFIG, WORLDS), camera.pattern(CONFIG)
     origin, matrix = camera.pose(mount, position, jnp.tile(LEVEL, (WORLDS, 1)))
     images = cast(scene, origin, matrix, pattern, ("depth", "normal", "label"))
-    rays = np.asarray(pattern.image(jnp.moveaxis(jnp.asarray(pattern.tiles), 1, 0)))
     same, alike, hits = [], [], []
     for world in range(WORLDS):
-        directions = np.moveaxis(rays, 0, -1).reshape(-1, 3) @ np.asarray(matrix[world]).T
+        directions = pattern.directions.reshape(-1, 3) @ np.asarray(matrix[world]).T
         depth, normal = by_embree(scene, world, np.asarray(origin[world]), directions)
         mine, my_normal = np.asarray(images["depth"][world]).ravel(), np.asarray(images["normal"][world]).reshape(-1, 3)
         near = (mine < 30) | (depth < 30)

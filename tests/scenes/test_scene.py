@@ -14,7 +14,7 @@ from e2efly.config import ClutterConfig, ForestConfig
 from e2efly.env import random_key
 from e2efly.scenes.file import load_scene
 from e2efly.scenes.generate import clutter, corridor, forest, room
-from e2efly.scenes.scene import CLASSES, Scene, Solids, approach, choose, clearance, distances
+from e2efly.scenes.scene import CLASSES, Scene, Solids, approach, clearance, distances
 from e2efly.scenes.shapes import FAR, SHAPES
 
 
@@ -82,12 +82,6 @@ class TestMoving:
         later, earlier = (clearance(scene, p + s * 1e-3 * v, time + s * 1e-3) for s in (1, -1))
         np.testing.assert_allclose(gap, clearance(scene, p, time))
         np.testing.assert_allclose(closing, -(later - earlier) / 2e-3, rtol=1e-3)
-
-
-def test_worlds_are_chosen_one_by_one() -> None:
-    a, b = (Scene.of({"sphere": Solids.of("sphere", np.full((2, 1, 3), x), [0.5])}, 2) for x in (1.0, 2.0))
-    mixed = choose(jnp.array([True, False]), a, b)
-    np.testing.assert_array_equal(mixed.solids["sphere"].centre[:, 0, 0], [1.0, 2.0])
 
 
 class TestGenerators:

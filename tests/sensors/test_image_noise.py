@@ -1,14 +1,19 @@
 """Noise of images: mean and deviation against each formula."""
 
+import dataclasses
 import math
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from e2efly.config import CameraConfig, ImageNoiseConfig
 from e2efly.env import random_key
 from e2efly.sensors.image_noise import (
+    add_image_noise,
+    check,
     d435i,
     gaussian,
     inverse_depth,
@@ -125,3 +130,93 @@ def test_seeds_and_single_programs() -> None:
         f = jax.jit(noise)
         np.testing.assert_array_equal(f(KEY), f(KEY))
         assert not np.array_equal(f(KEY), f(random_key(4)))
+
+
+DEPTH = CameraConfig(fov=(FOV, 1.0), reach=(0.3, 8.0))
+LABEL = CameraConfig("label")
+ALL = ImageNoiseConfig(0.005, True, "synthetic", 0.02, 256.0, 0.01, 0.02)
+
+
+def test_a_configuration_applies_its_noises_in_order_each_with_its_own_draws() -> None:
+    image = flat(4.0).at[:, :20].set(0.0)
+    one = {name: add_image_noise(dataclasses.replace(ImageNoiseConfig(), **{name: value}), KEY, image, DEPTH)
+           for name, value in vars(ALL).items() if name not in ("speckle", "poisson")}  # fmt: skip
+    keys = {name: jax.random.fold_in(KEY, i) for i, name in enumerate(vars(ALL))}
+    np.testing.assert_allclose(one["d435i"], d435i(keys["d435i"], image, FOV), rtol=1e-6)
+    np.testing.assert_allclose(one["redwood"], redwood(keys["redwood"], image, synthetic_distortion()), rtol=1e-6)
+    chain = inverse_depth(keys["inverse_depth"], image, 0.02)
+    chain = jnp.where(image > 0, gaussian(keys["gaussian"], jnp.minimum(chain / 8.0, 1.0), 0.01), 0.0)
+    chain = salt_and_pepper(keys["salt_and_pepper"], chain, 0.03) * 8.0
+    config = ImageNoiseConfig(inverse_depth=0.02, gaussian=0.01, salt_and_pepper=0.03)
+    np.testing.assert_allclose(add_image_noise(config, KEY, image, DEPTH), jnp.where(chain < 0.3, 0.0, chain))
+    assert float(jnp.std(1 / one["inverse_depth"][:, 20:])) == pytest.approx(0.005, rel=0.05)
+    assert float(one["gaussian"][:, 20:].std()) == pytest.approx(0.01 * 8.0, rel=0.05)
+    assert np.all(one["gaussian"][:, :20] == 0) and np.all(one["inverse_depth"][:, :20] == 0)
+    assert float(jnp.mean(one["salt_and_pepper"][:, :20] == 8.0)) == pytest.approx(0.01, rel=0.3)
+
+
+def test_the_reach_of_the_camera_holds_after_the_noise() -> None:
+    noisy = add_image_noise(ImageNoiseConfig(inverse_depth=0.3, gaussian=0.2), KEY, flat(1.0), DEPTH)
+    assert np.all((noisy == 0) | ((noisy >= 0.3) & (noisy <= 8.0))) and float(noisy.max()) == 8.0
+    assert np.all(add_image_noise(ImageNoiseConfig(d435i=True), KEY, flat(8.0), DEPTH) == 0)
+    np.testing.assert_array_equal(add_image_noise(ImageNoiseConfig(), KEY, flat(8.0), DEPTH), flat(8.0))
+
+
+def test_masks_and_colours_are_noised_as_values() -> None:
+    mask, colours = jnp.zeros((2, 100, 100)), jnp.full((2, 60, 60, 3), 0.5)
+    noisy = add_image_noise(ImageNoiseConfig(salt_and_pepper=0.1), KEY, mask, LABEL)
+    assert float(noisy.mean()) == pytest.approx(0.05, rel=0.1) and set(np.unique(noisy)) == {0.0, 1.0}
+    noisy = add_image_noise(ImageNoiseConfig(gaussian=0.05), KEY, colours, CameraConfig("rgb"))
+    assert noisy.shape == colours.shape and float(noisy.std()) == pytest.approx(0.05, rel=0.03)
+    assert abs(np.corrcoef(noisy[..., 0].ravel(), noisy[..., 1].ravel())[0, 1]) < 0.05
+
+
+def test_strengths_are_leaves_of_one_program_and_which_noises_are_in_is_not() -> None:
+    traced = []
+
+    @jax.jit
+    def noisy(config: ImageNoiseConfig, key: jax.Array, image: jax.Array) -> jax.Array:
+        traced.append(config)
+        return add_image_noise(config, key, image, DEPTH)
+
+    image = flat(4.0, 24, 32)
+    a, b, other = noisy(ALL, KEY, image), noisy(ALL, KEY, image), noisy(ALL, random_key(4), image)
+    np.testing.assert_array_equal(a, b)
+    assert not np.array_equal(a, other)
+    changed = noisy(dataclasses.replace(ALL, inverse_depth=0.02), KEY, image)
+    assert len(traced) == 1 and not np.array_equal(a, changed)
+    assert jax.tree.structure(ALL) != jax.tree.structure(dataclasses.replace(ALL, speckle=None))
+    eager = np.asarray(add_image_noise(ALL, KEY, image, DEPTH))
+    assert np.mean(np.isclose(a, eager, rtol=1e-5)) > 0.99  # rounded disparities may fall to the other side
+
+
+@pytest.mark.parametrize(
+    ("config", "camera", "said"),
+    [
+        ({"gaussian": -0.1}, DEPTH, "camera.noise.gaussian is -0.1; accepted: 0 or more"),
+        ({"speckle": math.nan}, DEPTH, "camera.noise.speckle is nan"),
+        ({"salt_and_pepper": 1.5}, DEPTH, r"camera.noise.salt_and_pepper is 1.5; accepted: a number in \[0, 1\]"),
+        ({"poisson": 0.0}, DEPTH, r"camera.noise.poisson is 0.0; accepted: a number in \[2, 65536\]"),
+        ({"inverse_depth": 0.1}, LABEL, "camera.noise.inverse_depth is 0.1; accepted: None where"),
+        ({"d435i": True}, CameraConfig("range"), "camera.noise.d435i is on; accepted with camera.sees depth"),
+        ({"redwood": "synthetic"}, CameraConfig(projection="spherical"), "camera.noise.redwood is on; accepted with"),
+        ({"redwood": "nowhere.npy"}, DEPTH, "camera.noise.redwood is 'nowhere.npy': .*accepted: synthetic, or a .npy"),
+        ({"gaussian": 0.1}, CameraConfig("normal"), "camera.noise.gaussian is on; accepted where camera.sees is"),
+    ],
+)
+def test_bad_noise_is_named(config: dict, camera: CameraConfig, said: str) -> None:
+    check(ALL, DEPTH)
+    with pytest.raises(ValueError, match=said):
+        check(ImageNoiseConfig(**config), camera)
+
+
+def test_a_table_of_one_s_own(tmp_path: Path) -> None:
+    good, small, zero = (str(tmp_path / f"{name}.npy") for name in ("good", "small", "zero"))
+    np.save(good, np.full((80, 80, 5), 0.8))
+    np.save(small, np.ones((80, 80)))
+    np.save(zero, np.zeros((80, 80, 5)))
+    noisy = add_image_noise(ImageNoiseConfig(redwood=good), KEY, flat(2.0), DEPTH)
+    assert float(noisy.mean()) == pytest.approx(2.5, rel=0.01)
+    for path, said in ((small, r"of \(80, 80\); accepted"), (zero, "not positive; accepted")):
+        with pytest.raises(ValueError, match=said):
+            check(ImageNoiseConfig(redwood=path), DEPTH)

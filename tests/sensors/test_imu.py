@@ -13,6 +13,7 @@ from e2efly.physics import State, rotation
 from e2efly.sensors import imu
 from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.view.noise import allan_deviation
 
 DT = 1 / 30
 SILENT = ImuConfig(gyro_noise=0.0, gyro_bias=0.0, accel_noise=0.0, accel_bias=0.0)
@@ -76,6 +77,21 @@ def test_white_noise(what: str, density: float, record: imu.ImuState) -> None:
     means = noise.reshape(4, 100, 400, 3).mean(1)
     allan = np.sqrt(np.mean(np.diff(means, axis=0) ** 2) / 2)
     assert allan == pytest.approx(density / np.sqrt(100 * DT), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("what", "density", "walk"), [("gyro", 1e-3, 2e-3 / 50.0**0.5), ("accel", 4e-3, 3e-3 / 80.0**0.5)]
+)
+def test_allan_deviation(what: str, density: float, walk: float, record: imu.ImuState) -> None:
+    """Of white noise N / sqrt(tau): N at 1 s; of a random walk K sqrt(tau / 3); of both, the root of their squares."""
+    reading = {"gyro": record.gyroscope, "accel": record.accelerometer - [0, 0, GRAVITY]}[what]
+    bias = {"gyro": record.gyro_bias, "accel": record.accel_bias}[what]
+    assert allan_deviation(reading - bias, 30) == pytest.approx(density, rel=0.03)
+    assert allan_deviation(bias, 30) == pytest.approx(walk * np.sqrt(1 / 3), rel=0.03)
+    for group in (30, 60, 120):
+        tau = group * DT
+        expected = np.hypot(density / np.sqrt(tau), walk * np.sqrt(tau / 3))
+        assert allan_deviation(reading, group) == pytest.approx(expected, rel=0.05)
 
 
 @pytest.mark.parametrize(("what", "instability", "tau"), [("gyro", 2e-3, 50.0), ("accel", 3e-3, 80.0)])

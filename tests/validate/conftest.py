@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from e2efly import presets
+from e2efly.config import NetworkConfig
 from e2efly.env import Env
 from e2efly.learn.export import contract_of, export_policy
-from e2efly.learn.networks import Features, Layers
+from e2efly.learn.networks import Actor, Features, Layers, Weights
 from e2efly.vehicles.vehicle import GRAVITY
 
 POSITION, VELOCITY, ATTITUDE = 2.0, 2.4, 6.0
@@ -67,7 +68,8 @@ def policy_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
         path = folder / f"{task}-{sink}-{'-'.join(env_options)}" / "policy.onnx"
         if not path.exists():
             path.parent.mkdir()
-            export_policy(path, controller(env, sink), Features(env.fields), "relu", contract_of(env, config))
+            actor = Actor.of(env.fields, (), NetworkConfig(()))
+            export_policy(path, Weights((), None, controller(env, sink)), actor, contract_of(env, config))
         return path
 
     return make

@@ -10,7 +10,7 @@ from matplotlib.image import imread
 from e2efly import presets
 from e2efly.config import RewardConfig, TaskConfig
 from e2efly.env import Env, random_key
-from e2efly.evaluate import Episodes, wilson
+from e2efly.evaluate import Act, Episodes, wilson
 from e2efly.tasks import Shape, Task, make_task
 from e2efly.view import plots
 from e2efly.view.flights import Flights, fly
@@ -160,7 +160,7 @@ def test_fly_ends_each_episode_where_the_environment_does() -> None:
     def fall(observation: jax.Array) -> jax.Array:
         return jnp.tile(jnp.array([-1.0, 0.0, 0.0, 0.0]), (observation.shape[0], 1))
 
-    flown = fly(env, fall, random_key(0), n, 40)
+    flown = fly(env, Act.of(fall), random_key(0), n, 40)
     assert flown.time[0] == pytest.approx(1 / 30)
     assert flown.position.shape == (40, n, 3)
     assert not flown.success.any()

@@ -11,15 +11,16 @@ from rich.console import Console
 from rich.table import Table
 
 from e2efly import presets
-from e2efly.config import EnvConfig, RewardConfig, TaskConfig
+from e2efly.config import CameraConfig, EnvConfig, ImuConfig, RewardConfig, TaskConfig
+from e2efly.deploy.images import NONE, Image
 from e2efly.deploy.policy import Policy, load_policy
 from e2efly.device import prepare
 from e2efly.learn.checkpoint import write_atomically
 from e2efly.learn.rundir import RunDirectory
 from e2efly.vehicles import load_vehicle
 
-BATCH = 250
-"""Starts that are flown at once."""
+BATCH, DRAWN = 250, 12
+"""Starts that are flown at once, and flights that are drawn."""
 
 
 def eval_command(
@@ -76,8 +77,28 @@ def config_from_contract(policy: Policy) -> tuple[TaskConfig, EnvConfig]:
         action_latency=(c.latency_range_s[0], c.latency_range_s[1]),
         observation_latency=(c.observation_latency_range_s[0], c.observation_latency_range_s[1]),
         past_actions=counts.get("past_actions", 0) // 4,
+        imu=ImuConfig(observed="gyroscope" in counts),
+        cameras=tuple(_camera(image) for image in c.images),
     )
     return presets.preset(c.task, "ppo").task, config
+
+
+def _camera(image: Image) -> CameraConfig:
+    """The camera of a contract's image."""
+    known: dict[str, Any] = {"sees": image.sees, "projection": image.projection}
+    known |= {"of": image.of} if image.of != NONE else {}
+    known |= {"encoding": image.encoding} if image.encoding != NONE else {}
+    return CameraConfig(
+        width=image.width,
+        height=image.height,
+        fov=(image.fov_rad[0], image.fov_rad[1]),
+        position=(image.position_m[0], image.position_m[1], image.position_m[2]),
+        pitch=image.pitch_rad,
+        reach=(image.reach_m[0], image.reach_m[1]),
+        rate=image.rate_hz,
+        latency=(image.latency_range_s[0], image.latency_range_s[1]),
+        **known,
+    )
 
 
 def fly_suites(
@@ -111,15 +132,23 @@ def fly_suites(
 
 
 def callback(policy: Policy) -> Any:
-    """The ONNX file as a function inside compiled programs."""
+    """The ONNX file as an `e2efly.evaluate.Act`, inside compiled programs."""
     import jax
     import jax.numpy as jnp
 
-    def act(observation: Any) -> Any:
-        shape = jax.ShapeDtypeStruct((observation.shape[0], 4), jnp.float32)
-        return jax.pure_callback(lambda o: policy.act(np.asarray(o)), shape, observation)
+    from e2efly.evaluate import Act
 
-    return act
+    size = policy.contract.memory_size
+
+    def act(observation: Any, images: Any, memory: Any) -> Any:
+        n = observation.shape[0]
+        shapes = jax.ShapeDtypeStruct((n, 4), jnp.float32), jax.ShapeDtypeStruct((n, size), jnp.float32)
+        return jax.pure_callback(onnx, shapes, observation, images, memory)
+
+    def onnx(observation: Any, images: Any, memory: Any) -> Any:
+        return policy.act(np.asarray(observation), [np.asarray(x) for x in images], np.asarray(memory))
+
+    return Act(act, lambda n: jnp.zeros((n, size)))
 
 
 def episode_steps(task: TaskConfig, env: Any) -> int:
@@ -128,10 +157,10 @@ def episode_steps(task: TaskConfig, env: Any) -> int:
 
 
 def check_observation(policy: Policy, env: Any) -> None:
-    """Refuse a policy whose observation is not the environment's.
+    """Refuse a policy whose observation or images are not the environment's.
 
     Raises:
-        ValueError: naming the field, and what either side has.
+        ValueError: naming the field or the image, and what either side has.
     """
     wanted = [(f.name, f.size, f.frame, f.unit) for f in policy.contract.observation]
     offered = [(f.name, f.size, f.frame, f.unit) for f in env.fields]
@@ -140,6 +169,10 @@ def check_observation(policy: Policy, env: Any) -> None:
         raise ValueError(
             f"observation: the policy wants {wanted}, the environment gives {offered}; they differ in {odd}"
         )
+    seen = [(i.sees, i.of, i.height, i.width) for i in policy.contract.images]
+    shown = [(c.sees, c.of if c.sees == "mask" else NONE, c.height, c.width) for c in env.cameras]
+    if seen != shown:
+        raise ValueError(f"images: the policy wants {seen}, the cameras of the environment give {shown}")
 
 
 def _table(flown: dict[str, Any], episodes: int) -> Table:
@@ -215,8 +248,11 @@ def _draw(
     folder: Path,
     run: RunDirectory | None,
 ) -> None:
+    import jax
+
     from e2efly.env import Env, random_key
     from e2efly.view import plots
+    from e2efly.view.worlds import plot_flights_in_worlds
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -225,9 +261,13 @@ def _draw(
     title = f"{policy.contract.task} on {policy.contract.vehicle}"
     for name, suite in presets.suites(task).items():
         env = Env.of(suite, RewardConfig({"prog2": 1.0}), env_config)
-        flights = plots.fly(env, callback(policy), random_key(seed), 12, episode_steps(suite, env))
+        flights = plots.fly(env, callback(policy), random_key(seed), DRAWN, episode_steps(suite, env))
         tag = f"{title}: {name}" if len(flown) > 1 else title
-        plots.plot_flights(env.task, flights, folder / f"flights_{name}.png", tag)
+        if env_config.cameras:  # every flight has a world of its own
+            begun = jax.jit(Env.reset, static_argnums=2)(env, random_key(seed), DRAWN)[0]
+            plot_flights_in_worlds(flights, env.task.scene(begun.memory), folder / f"flights_{name}.png", tag)
+        else:
+            plots.plot_flights(env.task, flights, folder / f"flights_{name}.png", tag)
         plots.plot_time(flights, 0, folder / f"time_{name}.png", tag)
     plots.plot_errors(flown, folder / "errors.png", title, plots.limits(presets.suites(task)))
     if run and (rows := run.rows()):

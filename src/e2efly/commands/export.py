@@ -12,13 +12,13 @@ def export_command(run_path: Path, out: Path | None, which: str) -> int:
     prepare("cpu")
     from e2efly.learn.export import contract_of, export_policy
     from e2efly.learn.rundir import RunDirectory
-    from e2efly.learn.runner import load_policy_layers
+    from e2efly.learn.runner import load_policy_weights
     from e2efly.learn.setup import Setup
 
     run = RunDirectory(run_path)
     setup = Setup.of(run.config())
-    layers = load_policy_layers(setup, run, which)
+    weights = load_policy_weights(setup, run, which)
     path = out or run.policy
-    export_policy(path, layers, setup.features, setup.config.network.activation, contract_of(setup.env, setup.config))
+    export_policy(path, weights, setup.actor, contract_of(setup.env, setup.config))
     Console(highlight=False).print(f"Wrote the {which} policy of {run_path} to {path}")
     return 0

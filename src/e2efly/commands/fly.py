@@ -31,7 +31,7 @@ from e2efly.deploy.policy import load_policy
 from e2efly.deploy.policy_worker import PolicyWorker
 from e2efly.deploy.pose.checks import Checks
 from e2efly.deploy.pose.source import PoseSource, open_source
-from e2efly.deploy.runtime import Envelope, Runtime
+from e2efly.deploy.runtime import Envelope, Runtime, check
 from e2efly.deploy.settings import FlightSettings
 from e2efly.deploy.settings import check as check_settings
 from e2efly.deploy.state_machine import take_off_refusals
@@ -97,6 +97,8 @@ def fly_command(options: Fly) -> int:
     body = load_vehicle(options.vehicle or (loaded.contract.vehicle if loaded else ""))
     runtime = None
     if loaded is not None:
+        if reasons := check(loaded.contract, body, imu=True):
+            raise ValueError("\n".join(reasons))
         where = goal_for(loaded.contract, options.goal, body)
         runtime = Runtime.of(loaded, where, body, envelope=options.envelope, imu=True)
     saved = options.throttle_map

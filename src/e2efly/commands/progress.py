@@ -36,7 +36,8 @@ class TerminalProgress:
         """Show that nothing is flying yet."""
         self._bar.update(self._task, figures="compiling (seconds; cached for the next run)")
 
-    def progress(self, steps: int, total: int, rate: float, success: float, best: float) -> None:
+    def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
         """Move the bar."""
         figures = f"{steps / 1e6:.2f}M steps  {rate / 1e3:.0f}k/s  success {success:.1%}  best {best:.1%}"
+        figures += f"  {stage}" if stage else ""
         self._bar.update(self._task, completed=steps, total=total, figures=figures)

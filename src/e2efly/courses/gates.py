@@ -27,11 +27,12 @@ class Gates:
     start_yaw: Any
     """Heading there, rad."""
     position: Any
-    """(g + 1, 3) centres, world, m; the last row is what the policy is shown behind the last gate."""
+    """(g + 1, 3) or, each world its own, (n, g + 1, 3): centres, world, m. The last row is what the policy is shown
+    behind the last gate."""
     cos: Any
-    """(g,) cosine of each yaw."""
+    """(g,) or (n, g) cosine of each yaw."""
     sin: Any
-    """(g,) sine of each yaw."""
+    """(g,) or (n, g) sine of each yaw."""
     half: Any
     """(g, 2) half of the opening's width and height, m."""
 
@@ -48,12 +49,12 @@ class Gates:
     @property
     def count(self) -> int:
         """Gates of the track."""
-        return self.cos.shape[0]
+        return self.cos.shape[-1]
 
     def local(self, point: Any) -> tuple[Any, Any, Any]:
         """Coordinates of points (n, 3) in every gate's frame, each (n, g)."""
         xp = point.__array_namespace__()
-        d = point[:, None] - self.position[:-1]
+        d = point[:, None] - self.position[..., :-1, :]
         x, y, cos, sin = d[..., 0], d[..., 1], xp.asarray(self.cos), xp.asarray(self.sin)
         return cos * x + sin * y, cos * y - sin * x, d[..., 2]
 

@@ -5,16 +5,16 @@ It travels as JSON in the metadata of `policy.onnx` under the key `METADATA_KEY`
 
 import dataclasses
 import json
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 from typing import Any
 
+from e2efly.deploy import contract_json as read
+from e2efly.deploy.images import Image
 from e2efly.observation import Field
-from e2efly.vehicles.names import nearest
 
-CONTRACT_VERSION = 1
+CONTRACT_VERSION = 2
 """Version of the meaning of these fields; a policy of another version is refused."""
 METADATA_KEY = "contract"
 """Key of the contract in the metadata of the ONNX file."""
@@ -80,7 +80,11 @@ class Contract:
     observation_latency_range_s: tuple[float, ...]
     """Smallest and largest age of the observed state in training, s."""
     observation: tuple[Field, ...]
-    """What the policy sees, in order."""
+    """What the policy is told, in order."""
+    images: tuple[Image, ...]
+    """What it sees besides, camera by camera."""
+    memory_size: int
+    """Numbers that it hands from one question to the next (the state of its GRU); 0: none."""
     action: Action
     """What it commands."""
     hover_action: tuple[float, ...]
@@ -120,148 +124,100 @@ class Contract:
             ValueError: naming the field, the value and what is accepted.
         """
         try:
-            content = json.loads(text, object_pairs_hook=_unique)
+            content = json.loads(text, object_pairs_hook=read.unique)
         except (ValueError, RecursionError) as error:
             raise ValueError(f"contract: not JSON: {error}") from None
         if isinstance(content, dict) and "contract_version" in content:  # first: other versions have other keys
             version = content["contract_version"]
             if type(version) is not int or version != CONTRACT_VERSION:
-                raise _refusal("contract_version", version, f"{CONTRACT_VERSION}; export it again with this e2efly")
-        return _contract(_table(content, "", Contract))
+                raise read.refusal("contract_version", version, f"{CONTRACT_VERSION}; export it again with this e2efly")
+        return _contract(read.table(content, "", Contract))
 
 
 def _contract(x: dict[str, Any]) -> Contract:
-    latency = _range(x["latency_range_s"], "latency_range_s")
-    latency_s = _number(x["latency_s"], "latency_s")
+    latency = read.seconds_range(x["latency_range_s"], "latency_range_s")
+    latency_s = read.number(x["latency_s"], "latency_s")
     if not latency[0] <= latency_s <= latency[1]:
-        raise _refusal("latency_s", latency_s, f"a number of seconds within latency_range_s, {list(latency)}")
-    rate = _number(x["control_rate_hz"], "control_rate_hz")
+        raise read.refusal("latency_s", latency_s, f"a number of seconds within latency_range_s, {list(latency)}")
+    rate = read.number(x["control_rate_hz"], "control_rate_hz")
     if rate <= 0:
-        raise _refusal("control_rate_hz", rate, "a positive number of Hz")
-    vehicle_hash = _text(x["vehicle_hash"], "vehicle_hash")
+        raise read.refusal("control_rate_hz", rate, "a positive number of Hz")
+    vehicle_hash = read.text(x["vehicle_hash"], "vehicle_hash")
     if len(vehicle_hash) != 16 or set(vehicle_hash) - set("0123456789abcdef"):
-        raise _refusal("vehicle_hash", vehicle_hash, "16 hex digits in lower case")
-    hover = _numbers(x["hover_action"], "hover_action", ACTION_SIZE)
+        raise read.refusal("vehicle_hash", vehicle_hash, "16 hex digits in lower case")
+    hover = read.numbers(x["hover_action"], "hover_action", ACTION_SIZE)
     if not all(ACTION_LIMITS[0] <= value <= ACTION_LIMITS[1] for value in hover):
-        raise _refusal("hover_action", list(hover), "four numbers in [-1, 1]")
+        raise read.refusal("hover_action", list(hover), "four numbers in [-1, 1]")
     return Contract(
         contract_version=x["contract_version"],
-        e2efly_version=_text(x["e2efly_version"], "e2efly_version"),
-        task=_text(x["task"], "task"),
-        vehicle=_text(x["vehicle"], "vehicle"),
+        e2efly_version=read.text(x["e2efly_version"], "e2efly_version"),
+        task=read.text(x["task"], "task"),
+        vehicle=read.text(x["vehicle"], "vehicle"),
         vehicle_hash=vehicle_hash,
         control_rate_hz=rate,
         latency_s=latency_s,
         latency_range_s=latency,
-        observation_latency_range_s=_range(x["observation_latency_range_s"], "observation_latency_range_s"),
+        observation_latency_range_s=read.seconds_range(x["observation_latency_range_s"], "observation_latency_range_s"),
         observation=_observation(x["observation"]),
+        images=_images(x["images"], rate),
+        memory_size=read.whole(x["memory_size"], "memory_size", 0),
         action=_action(x["action"]),
         hover_action=hover,
     )
 
 
 def _observation(value: Any) -> tuple[Field, ...]:
-    entries = _list(value, "observation", None)
+    entries = read.entries(value, "observation", None)
     fields = tuple(_field(entry, f"observation[{i}]") for i, entry in enumerate(entries))
     names = [field.name for field in fields]
     if len(set(names)) != len(names):
-        raise _refusal("observation", names, "fields of different names")
+        raise read.refusal("observation", names, "fields of different names")
     if sum(field.frame == "world_body" for field in fields) != 1:
-        raise _refusal("observation", names, "fields with exactly one attitude (frame 'world_body')")
+        raise read.refusal("observation", names, "fields with exactly one attitude (frame 'world_body')")
     return fields
 
 
 def _field(value: Any, where: str) -> Field:
-    x = _table(value, where, Field)
-    size, frame = x["size"], _text(x["frame"], f"{where}.frame")
+    x = read.table(value, where, Field)
+    size, frame = read.whole(x["size"], f"{where}.size", 1), read.text(x["frame"], f"{where}.frame")
     if frame not in FRAMES:
-        raise _refusal(f"{where}.frame", frame, " or ".join(map(repr, FRAMES)))
-    if type(size) is not int or size < 1:
-        raise _refusal(f"{where}.size", size, "a whole number, 1 or more")
+        raise read.refusal(f"{where}.frame", frame, " or ".join(map(repr, FRAMES)))
     if (frame == "world" and size % 3) or (frame == "world_body" and size != 4):
         needed = "a multiple of 3, as its frame is 'world'" if frame == "world" else "4, as its frame is 'world_body'"
-        raise _refusal(f"{where}.size", size, needed)
-    scale = _number(x["scale"], f"{where}.scale")
+        raise read.refusal(f"{where}.size", size, needed)
+    scale = read.number(x["scale"], f"{where}.scale")
     if scale <= 0:
-        raise _refusal(f"{where}.scale", scale, "a positive number")
-    name, unit, text = (_text(x[key], f"{where}.{key}") for key in ("name", "unit", "description"))
+        raise read.refusal(f"{where}.scale", scale, "a positive number")
+    name, unit, text = (read.text(x[key], f"{where}.{key}") for key in ("name", "unit", "description"))
     return Field(name, size, frame, unit, scale, text)
 
 
+def _images(value: Any, rate: float) -> tuple[Image, ...]:
+    if not isinstance(value, list):
+        raise read.refusal("images", value, "a list of images, empty for a policy that sees none")
+    images = tuple(Image.of_json(entry, f"images[{i}]") for i, entry in enumerate(value))
+    names = [image.name for image in images]
+    if len(set(names)) != len(names):
+        raise read.refusal("images", names, "images of different names")
+    for i, image in enumerate(images):
+        if image.rate_hz > rate * (1 + 1e-6):
+            raise read.refusal(f"images[{i}].rate_hz", image.rate_hz, f"at most control_rate_hz, {rate:g}")
+    return images
+
+
 def _action(value: Any) -> Action:
-    x = _table(value, "action", Action)
-    mode = _text(x["mode"], "action.mode")
+    x = read.table(value, "action", Action)
+    mode = read.text(x["mode"], "action.mode")
     if mode not in COMMANDS:
-        raise _refusal("action.mode", mode, " or ".join(map(repr, COMMANDS)))
+        raise read.refusal("action.mode", mode, " or ".join(map(repr, COMMANDS)))
     for key, accepted in zip(("fields", "units"), COMMANDS[mode], strict=True):
         if x[key] != list(accepted):
-            raise _refusal(f"action.{key}", x[key], f"{list(accepted)}, as action.mode is {mode!r}")
-    if _numbers(x["limits"], "action.limits", 2) != ACTION_LIMITS:
-        raise _refusal("action.limits", x["limits"], f"{list(ACTION_LIMITS)}")
+            raise read.refusal(f"action.{key}", x[key], f"{list(accepted)}, as action.mode is {mode!r}")
+    if read.numbers(x["limits"], "action.limits", 2) != ACTION_LIMITS:
+        raise read.refusal("action.limits", x["limits"], f"{list(ACTION_LIMITS)}")
     if x["mapping"] != ACTION_MAPPING:
-        raise _refusal("action.mapping", x["mapping"], repr(ACTION_MAPPING))
-    low, high = (_numbers(x[key], f"action.{key}", ACTION_SIZE) for key in ("low", "high"))
+        raise read.refusal("action.mapping", x["mapping"], repr(ACTION_MAPPING))
+    low, high = (read.numbers(x[key], f"action.{key}", ACTION_SIZE) for key in ("low", "high"))
     if not all(a < b for a, b in zip(low, high, strict=True)):
-        raise _refusal("action.low", list(low), f"four numbers below action.high, {list(high)}")
+        raise read.refusal("action.low", list(low), f"four numbers below action.high, {list(high)}")
     return Action(mode, *COMMANDS[mode], low, high)
-
-
-def _table(value: Any, where: str, kind: type) -> dict[str, Any]:
-    """A JSON object that has the fields of the dataclass `kind` and no others."""
-    known = [field.name for field in dataclasses.fields(kind)]
-    if not isinstance(value, dict):
-        raise _refusal(where or "contract", value, f"an object with {', '.join(known)}")
-    prefix = f"{where}." if where else ""
-    for key in value:
-        if key not in known:
-            guess = nearest(key, known)
-            hint = f"; did you mean {guess!r}?" if guess else ""
-            raise ValueError(f"contract: unknown key '{prefix}{key}'{hint} (accepted: {', '.join(known)})")
-    if missing := [key for key in known if key not in value]:
-        raise ValueError(f"contract: missing key {', '.join(repr(prefix + key) for key in missing)}")
-    return value
-
-
-def _text(value: Any, where: str) -> str:
-    if not isinstance(value, str) or not value.strip():
-        raise _refusal(where, value, "a text that is not empty")
-    return value
-
-
-def _number(value: Any, where: str) -> float:
-    if type(value) in (int, float):  # not bool, which is an int to Python
-        try:
-            number = float(value)
-        except OverflowError:
-            number = math.inf
-        if math.isfinite(number):
-            return number
-    raise _refusal(where, value, "a finite number")
-
-
-def _list(value: Any, where: str, count: int | None) -> list[Any]:
-    if not isinstance(value, list) or not value or (count is not None and len(value) != count):
-        raise _refusal(where, value, "a list that is not empty" if count is None else f"a list of {count} numbers")
-    return value
-
-
-def _numbers(value: Any, where: str, count: int) -> tuple[float, ...]:
-    return tuple(_number(entry, f"{where}[{i}]") for i, entry in enumerate(_list(value, where, count)))
-
-
-def _range(value: Any, where: str) -> tuple[float, ...]:
-    low, high = _numbers(value, where, 2)
-    if not 0 <= low <= high:
-        raise _refusal(where, value, "two rising numbers of seconds, 0 or more")
-    return low, high
-
-
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    keys = [key for key, _ in pairs]
-    if len(set(keys)) != len(keys):
-        raise ValueError(f"a key is there twice among {', '.join(keys)}")
-    return dict(pairs)
-
-
-def _refusal(where: str, value: Any, accepted: str) -> ValueError:
-    return ValueError(f"contract: {where} is {value!r}; accepted: {accepted}")

@@ -3,6 +3,7 @@
 The file is refused when it does not agree with its own contract, or with what the caller is about to fly.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,11 +14,13 @@ from e2efly.deploy.contract import ACTION_LIMITS, ACTION_SIZE, METADATA_KEY, Con
 from e2efly.vehicles import Vehicle
 
 INPUT, OUTPUT = "observation", "action"
-"""Names of the graph's only input and output."""
+"""Names of the graph's first input and output; images go in under their own names."""
+MEMORY, NEXT_MEMORY = "memory", "next_memory"
+"""Names of the input and the output of a policy with memory."""
 UNIT_TOLERANCE = 0.01
 """How far the length of the attitude quaternion may be from 1."""
 ROUNDING = 1e-6
-"""How far beyond 1 an action may lie: ONNX Runtime's tanh reaches 1.0000001."""
+"""How far beyond 1 an action or a memory may lie: ONNX Runtime's tanh reaches 1.0000001."""
 _LARGEST = np.finfo(np.float32).max
 
 
@@ -30,32 +33,46 @@ class Policy:
     session: ort.InferenceSession
     """The loaded graph."""
 
-    def act(self, observation: np.ndarray) -> np.ndarray:
-        """The actions of observations.
+    def act(
+        self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The actions of observations and images, and what to remember.
 
         Args:
             observation: shape (o,) or (n, o), laid out as `contract.observation` says, in its units and frames.
+            images: as `contract.images` says, in that order; shape (h, w) or (n, h, w), of colours (..., h, w, 3).
+            memory: what the last call returned, (k,) or (n, k); None at the start of a flight.
 
         Returns:
-            Float32 in [-1, 1], shape (4,) or (n, 4).
+            The action, float32 in [-1, 1], shape (4,) or (n, 4); and the memory for the next call, (k,) or (n, k):
+            of size 0 where `contract.memory_size` is.
 
         Raises:
-            ValueError: naming the observation field, for a wrong shape, a non-finite number or an attitude that is no
-                unit quaternion; for an observation so large that the network overflows.
+            ValueError: naming the observation field or the image, for a wrong shape, a number that is not finite or
+                out of range, or an attitude that is no unit quaternion; for an observation so large that the network
+                overflows.
         """
         x = np.asarray(observation)
         self._check(x)
-        batch = np.ascontiguousarray(x if x.ndim == 2 else x[None], np.float32)
-        action = np.asarray(self.session.run([OUTPUT], {INPUT: batch})[0])
+        lead = x.shape[:-1]
+        fed = {INPUT: x} | self._seen(images, lead)
+        size = self.contract.memory_size
+        known = np.zeros((*lead, size), np.float32) if memory is None else self._remembered(memory, lead)
+        if size:
+            fed[MEMORY] = known
+        batches = {name: np.ascontiguousarray(v if lead else v[None], np.float32) for name, v in fed.items()}
+        action, *after = (np.asarray(y) for y in self.session.run([OUTPUT, *([NEXT_MEMORY] if size else [])], batches))
         good = np.abs(action) <= 1 + ROUNDING  # false for NaN
         if not good.all():
             row = int(np.argmin(good.all(-1)))
             raise ValueError(
-                f"action is {action[row].tolist()} for the observation {batch[row].tolist()}; accepted: numbers in "
-                "[-1, 1]; the observation is far outside of what flies, or the policy file is damaged"
+                f"action is {action[row].tolist()} for the observation {batches[INPUT][row].tolist()}; accepted: "
+                "numbers in [-1, 1]; the observation is far outside of what flies, or the policy file is damaged"
             )
         action = np.minimum(np.maximum(action, -1), 1)
-        return action if x.ndim == 2 else action[0]
+        if size:
+            known = after[0] if lead else after[0][0]
+        return action if lead else action[0], known
 
     def command(self, action: np.ndarray) -> np.ndarray:
         """The commands of actions, shape (4,) or (n, 4), in `contract.action.units`; actions are clipped to [-1, 1].
@@ -70,6 +87,26 @@ class Policy:
             raise ValueError(f"action is {a.tolist()}; accepted: finite numbers")
         low, high = np.array(self.contract.action.low), np.array(self.contract.action.high)
         return low + (np.clip(a, *ACTION_LIMITS) + 1) / 2 * (high - low)
+
+    def _seen(self, images: Sequence[np.ndarray], lead: tuple[int, ...]) -> dict[str, np.ndarray]:
+        """The images by name, checked."""
+        wanted = self.contract.images
+        if len(images) != len(wanted):
+            layout = ", ".join(f"{image.name!r} {image.shape}" for image in wanted) or "none"
+            raise ValueError(f"{len(images)} images; accepted: {len(wanted)}: {layout}")
+        seen = {image.name: np.asarray(x) for image, x in zip(wanted, images, strict=True)}
+        for image in wanted:
+            image.check(seen[image.name], lead)
+        return seen
+
+    def _remembered(self, memory: np.ndarray, lead: tuple[int, ...]) -> np.ndarray:
+        """The memory, checked."""
+        m, shape = np.asarray(memory), (*lead, self.contract.memory_size)
+        if m.shape != shape or m.dtype.kind not in "fiu":
+            raise ValueError(f"memory has shape {m.shape} and type {m.dtype}; accepted: float32 of shape {shape}")
+        if not (np.abs(m) <= 1 + ROUNDING).all():  # false for NaN
+            raise ValueError(f"memory is {m.tolist()}; accepted: numbers in [-1, 1], as `act` returned them")
+        return m
 
     def _check(self, x: np.ndarray) -> None:
         """Refuse what the network must not see; quick when all is well, as it runs at every control step."""
@@ -127,7 +164,7 @@ def load_policy(
     _check_use(where, contract, task, vehicle, control_rate_hz, command_mode)
     policy = Policy(contract, session)
     try:  # also warms the session up
-        policy.act(_level_and_still(contract))
+        policy.act(_level_and_still(contract), [np.zeros(image.shape, np.float32) for image in contract.images])
     except Exception as error:  # ONNX Runtime's errors share no other base
         raise ValueError(f"{where}: does not run on the observation of a level, still vehicle: {error}") from None
     return policy
@@ -158,19 +195,22 @@ def _session(where: str) -> ort.InferenceSession:
 
 
 def _check_graph(where: str, session: ort.InferenceSession, contract: Contract) -> None:
-    """One float32 input and one float32 output, of the names and sizes of the contract, with a free batch axis."""
-    sides = (
-        ("input", session.get_inputs(), INPUT, contract.observation_size),
-        ("output", session.get_outputs(), OUTPUT, ACTION_SIZE),
-    )
-    for side, nodes, name, size in sides:
+    """Float32 inputs and outputs, of the names and sizes of the contract, with a free batch axis."""
+    inputs: dict[str, tuple[int, ...]] = {INPUT: (contract.observation_size,)}
+    inputs |= {image.name: image.shape for image in contract.images}
+    outputs: dict[str, tuple[int, ...]] = {OUTPUT: (ACTION_SIZE,)}
+    if contract.memory_size:
+        inputs[MEMORY] = outputs[NEXT_MEMORY] = (contract.memory_size,)
+    for side, nodes, wanted in (("input", session.get_inputs(), inputs), ("output", session.get_outputs(), outputs)):
         has = [(node.name, node.type, node.shape) for node in nodes]
-        good = len(nodes) == 1 and nodes[0].name == name and nodes[0].type == "tensor(float)"
-        shape = nodes[0].shape if nodes else []
-        if not good or len(shape) != 2 or isinstance(shape[0], int) or shape[1] != size:
+        said = [(name, "tensor(float)", ["n", *shape]) for name, shape in wanted.items()]
+        free = [
+            (name, kind, [*(axis if isinstance(axis, int) else "n" for axis in shape[:1]), *shape[1:]])
+            for name, kind, shape in has
+        ]
+        if free != said:
             raise ValueError(
-                f"{where}: {side} of the graph is {has}; its contract says [({name!r}, 'tensor(float)', "
-                f"['n', {size}])]; export the policy again"
+                f"{where}: {side} of the graph is {has}; its contract says {said}; export the policy again"
             )
 
 

@@ -121,6 +121,8 @@ class RuntimeState:
     """The motion that was last judged by the goal."""
     past_actions: np.ndarray
     """(k, 4) float32, the policy's last actions, newest first; of k as many as it sees."""
+    memory: np.ndarray | None
+    """(m,) float32, what the policy remembers; None: it was not yet asked."""
     began: float
     """When the policy took over, s on the monotonic clock."""
     slots: int
@@ -179,6 +181,11 @@ def check(
             f"action.mode of the policy is {contract.action.mode!r}; accepted: {' or '.join(map(repr, MODES))}, "
             "which become collective thrust and body rates"
         )
+    for image in contract.images:
+        reasons.append(
+            f"image {image.name!r} ({image.sees}, {image.height} rows, {image.width} columns): there is no camera; "
+            "accepted: a policy without images (from Python, `Policy.act` takes them)"
+        )
     known = (*GOAL_FIELDS, *_STATE_FIELDS, PAST_ACTIONS)
     for field in contract.observation:
         same = _STATE_FIELDS.get(field.name)
@@ -216,7 +223,7 @@ def begin(runtime: Runtime, odometry: Odometry, now: float) -> RuntimeState:
     past = contract.slices.get(PAST_ACTIONS, slice(0, 0))
     count = (past.stop - past.start) // ACTION_SIZE
     actions = np.tile(np.asarray(contract.hover_action, np.float32), (count, 1))
-    return RuntimeState(runtime.goal.start(odometry, now), odometry, actions, began=now, slots=0, steps=0)
+    return RuntimeState(runtime.goal.start(odometry, now), odometry, actions, None, began=now, slots=0, steps=0)
 
 
 def due(runtime: Runtime, state: RuntimeState) -> float:
@@ -245,7 +252,7 @@ def act(
     observation = observe(runtime, targets, state.past_actions, odometry, imu)
     started = time.perf_counter()
     try:
-        action = runtime.policy.act(observation)
+        action, memory = runtime.policy.act(observation, memory=state.memory)
     except ValueError:
         raise
     except Exception as error:  # ONNX Runtime's errors share no other base
@@ -265,7 +272,7 @@ def act(
         late_s=late,
         inference_s=spent,
     )
-    return RuntimeState(goal, odometry, past, state.began, state.slots + over + 1, state.steps + 1), decision
+    return RuntimeState(goal, odometry, past, memory, state.began, state.slots + over + 1, state.steps + 1), decision
 
 
 def observe(

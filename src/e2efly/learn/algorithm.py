@@ -9,10 +9,10 @@ import optax
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from e2efly.config import AlgorithmConfig, BPTTConfig, NetworkConfig, PPOConfig
+from e2efly.config import AlgorithmConfig, BPTTConfig, PPOConfig
 from e2efly.env import Env, EnvState
 from e2efly.learn.devices import AXIS
-from e2efly.learn.networks import Features
+from e2efly.learn.networks import Actor
 
 for _config in (PPOConfig, BPTTConfig):
     _shapes = [name for name, kind in _config.__annotations__.items() if kind is int]
@@ -33,6 +33,8 @@ class TrainState:
     optimizer: Any
     env: EnvState
     observation: Float[Array, "n o"]
+    memory: Float[Array, "n k"]
+    """Of the policy's GRU."""
     key: PRNGKeyArray
 
 
@@ -58,12 +60,12 @@ def adam(max_grad_norm: float | Array) -> optax.GradientTransformation:
     return optax.chain(optax.clip_by_global_norm(max_grad_norm), optax.scale_by_adam())
 
 
-def begin(env: Env, config: AlgorithmConfig, parameters: Any, key: PRNGKeyArray) -> TrainState:
+def begin(actor: Actor, env: Env, config: AlgorithmConfig, parameters: Any, key: PRNGKeyArray) -> TrainState:
     """A device's first state of a run: its environments as started, the optimiser at rest."""
     key = jax.random.fold_in(key, jax.lax.axis_index(AXIS))
     env_state, observation = env.reset(jax.random.fold_in(key, 0), config.envs // jax.lax.axis_size(AXIS))
     optimizer = adam(config.max_grad_norm).init(ravel_pytree(parameters)[0])
-    return TrainState(parameters, optimizer, env_state, observation, key)
+    return TrainState(parameters, optimizer, env_state, observation, actor.memory(observation.shape[0]), key)
 
 
 def descend(
@@ -95,10 +97,10 @@ def annealed(config: AlgorithmConfig, progress: Float[Array, ""]) -> Float[Array
     return config.learning_rate * (config.learning_rate_end / config.learning_rate) ** progress
 
 
-def make_algorithm(config: AlgorithmConfig, env: Env, network: NetworkConfig) -> Algorithm:
+def make_algorithm(config: AlgorithmConfig, actor: Actor) -> Algorithm:
     """The algorithm of a configuration."""
     from e2efly.learn.bptt import BPTT
     from e2efly.learn.ppo import PPO
 
     makers: dict[type, type] = {PPOConfig: PPO, BPTTConfig: BPTT}
-    return makers[type(config)](Features(env.fields), network)
+    return makers[type(config)](actor)

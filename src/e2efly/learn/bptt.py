@@ -14,10 +14,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from e2efly.config import BPTTConfig, NetworkConfig
+from e2efly.config import BPTTConfig
 from e2efly.env import Env, EnvState
 from e2efly.learn.algorithm import TrainState, annealed, descend, episode_metrics
-from e2efly.learn.networks import Features, Layers, init_policy, policy
+from e2efly.learn.networks import Actor, Weights
 
 
 @jax.tree_util.register_dataclass
@@ -25,21 +25,20 @@ from e2efly.learn.networks import Features, Layers, init_policy, policy
 class Parameters:
     """What BPTT learns."""
 
-    policy: Layers
+    policy: Weights
 
 
 @dataclass(frozen=True)
 class BPTT:
     """The algorithm on one environment's shapes; its numbers come in with `config` at every call."""
 
-    features: Features
-    network: NetworkConfig
+    actor: Actor
 
     def init(self, env: Env, config: BPTTConfig, seed: int) -> Parameters:
         """A fresh network, made by NumPy."""
         del config
         rng = np.random.default_rng(seed)
-        return Parameters(init_policy(rng, self.features.size, self.network.hidden, np.asarray(env.hover)))
+        return Parameters(self.actor.init(rng, np.asarray(env.hover)))
 
     def update(
         self, env: Env, config: BPTTConfig, state: TrainState, progress: Float[Array, ""]
@@ -59,20 +58,21 @@ class BPTT:
         def loss(parameters: Parameters) -> tuple[Array, Any]:
             return self._window(env, config, parameters, state)
 
-        grads, (env_state, observation, metrics) = jax.grad(loss, has_aux=True)(state.parameters)
+        grads, (env_state, observation, memory, metrics) = jax.grad(loss, has_aux=True)(state.parameters)
         rate = annealed(config, progress)
         parameters, optimizer, norm = descend(config, rate, state.parameters, state.optimizer, grads)
         metrics["loss/gradient_norm"] = norm
         return dataclasses.replace(
-            state, parameters=parameters, optimizer=optimizer, env=env_state, observation=observation
+            state, parameters=parameters, optimizer=optimizer, env=env_state, observation=observation, memory=memory
         ), metrics
 
     def _window(self, env: Env, config: BPTTConfig, parameters: Parameters, state: TrainState) -> tuple[Array, Any]:
         keep = jnp.exp(-config.gradient_decay * env.control_period)
 
-        def step(carry: tuple[EnvState, Array, Array], _: None) -> tuple[Any, Any]:
-            env_state, observation, discount = carry
-            action = policy(parameters.policy, self.features(observation), self.network.activation)
+        def step(carry: tuple[EnvState, Array, Array, Array], _: None) -> tuple[Any, Any]:
+            env_state, observation, memory, discount = carry
+            features = self.actor.features(observation, env_state.images)
+            action, memory = self.actor(parameters.policy, features, memory)
             env_state, out = env.step(env_state, action)
             env_state = dataclasses.replace(env_state, vehicle=_damped(env_state.vehicle, keep))
             gathered = (
@@ -81,17 +81,21 @@ class BPTT:
                 jnp.sum(out.success),
                 {name: jnp.mean(x) for name, x in out.terms.items()},
             )
-            return (env_state, out.observation, discount * config.gamma), (discount * jnp.mean(out.reward), gathered)
+            memory = jnp.where(out.done[:, None], 0.0, memory)
+            return (env_state, out.observation, memory, discount * config.gamma), (
+                discount * jnp.mean(out.reward),
+                gathered,
+            )
 
-        first = (state.env, state.observation, jnp.float32(1.0))
-        (env_state, observation, _), (gain, gathered) = jax.lax.scan(step, first, None, length=config.horizon)
+        first = (state.env, state.observation, state.memory, jnp.float32(1.0))
+        (env_state, observation, memory, _), (gain, gathered) = jax.lax.scan(step, first, None, length=config.horizon)
         reward, done, success, terms = gathered
         metrics = {
             "reward": jnp.mean(reward),
             **episode_metrics(done, success),
             **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()},
         }
-        return -jnp.sum(gain) / config.horizon, (env_state, observation, metrics)
+        return -jnp.sum(gain) / config.horizon, (env_state, observation, memory, metrics)
 
 
 def _damped(tree: Any, keep: Array) -> Any:

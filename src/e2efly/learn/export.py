@@ -6,15 +6,17 @@ from typing import Any
 import jax
 import numpy as np
 import onnx
-from onnx import TensorProto, helper, numpy_helper
+from onnx import helper
 
 from e2efly import __version__
 from e2efly.config import TrainConfig
 from e2efly.deploy.contract import CONTRACT_VERSION, METADATA_KEY, Action, Contract
-from e2efly.deploy.policy import INPUT, OUTPUT, load_policy
+from e2efly.deploy.images import NONE, Image
+from e2efly.deploy.policy import load_policy
 from e2efly.env import Env
 from e2efly.learn.checkpoint import write_atomically
-from e2efly.learn.networks import Features, Layers, policy
+from e2efly.learn.graph import OPERATORS, policy_graph
+from e2efly.learn.networks import FAINTEST, NEAREST, Actor, View, Weights
 from e2efly.observation import Field
 from e2efly.physics import COMMAND_MODES, command_limits
 from e2efly.vehicles import load_vehicle
@@ -22,10 +24,6 @@ from e2efly.vehicles.vehicle import quantities
 
 OPSET, IR_VERSION = 17, 8
 """Old enough for the ONNX Runtime of any companion computer in use."""
-_OPERATORS = {"relu": "Relu", "tanh": "Tanh", "elu": "Elu"}
-_PAIRS = ("xx", "yy", "zz", "xy", "xz", "yz", "wx", "wy", "wz")
-_R_WORLD_BODY = ("-yy-zz", "+xy-wz", "+xz+wy", "+xy+wz", "-xx-zz", "+yz-wx", "+xz-wy", "+yz+wx", "-xx-yy")
-"""Row by row, half of R_world_body less the identity, as sums of products of quaternion entries."""
 
 
 def contract_of(env: Env, config: TrainConfig) -> Contract:
@@ -48,6 +46,9 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         _same(f"vehicle {vehicle.name}: {name}", getattr(physics.nominal, name), getattr(vehicle, name))
     _same("position_range (centre of the commands)", env.center, (low + high) / 2)
     _same("position_range (half range of the commands)", env.half, (high - low) / 2)
+    if env.cameras != about.cameras:
+        raise ValueError(f"cameras of the environment are {env.cameras}; its configuration says {about.cameras}")
+    actor = Actor.of(env.fields, env.cameras, config.network)
     latency = _decimals(env.latency_range)
     limits = (tuple(map(float, low)), tuple(map(float, high)))
     return Contract(
@@ -61,48 +62,88 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         latency_range_s=latency,
         observation_latency_range_s=_decimals(env.observation_latency_range),
         observation=env.fields,
+        images=images_of(actor, float(rate)),
+        memory_size=config.network.recurrent,
         action=Action(mode.name, mode.fields, mode.units, *limits),
         hover_action=_decimals(env.hover),
     )
 
 
-def export_policy(path: Path, layers: Layers, features: Features, activation: str, contract: Contract) -> None:
+def images_of(actor: Actor, control_rate: float) -> tuple[Image, ...]:
+    """What the contract says of the images of a policy that is asked so many times a second."""
+    return tuple(_image(f"image_{i}", view, control_rate) for i, view in enumerate(actor.features.views))
+
+
+def _image(name: str, view: View, control_rate: float) -> Image:
+    c = view.camera
+    measures = c.sees in ("depth", "range")
+    ends = f"; 0: a hole, or nearer than {c.reach[0]:g} m; {c.reach[1]:g}: that far or farther"
+    shows = {
+        "depth": f"depth along the optical axis, m{ends}",
+        "range": f"distance, m{ends}",
+        "mask": f"1 where {c.of} is seen, else 0",
+        "rgb": "red, green, blue in [0, 1]",
+        "normal": "outward normal of the surface that is seen, world; 0, 0, 0: nothing",
+    }
+    done = []
+    if measures and c.encoding == "inverse":
+        done.append(f"1 m over it, at most {1 / NEAREST:g}, a hole: 0")
+    elif measures:
+        done.append(f"divided by {c.reach[1]:g} m")
+    if not view.patches:
+        how = "the largest of each cell of" if view.keeps_nearest else "averaged to"
+        done.append(f"{how} {view.rows} rows and {view.columns} columns")
+    if c.sees == "mask":
+        done.append(f"beside itself times {view.contrast:g} over (its norm plus {FAINTEST:g})")
+    if view.patches:
+        done.append(f"convolved in patches of side {', '.join(map(str, view.patches))}")
+    return Image(
+        name=name,
+        sees=c.sees,
+        of=c.of if c.sees == "mask" else NONE,
+        width=c.width,
+        height=c.height,
+        projection=c.projection,
+        fov_rad=_floats(c.fov),
+        reach_m=_floats(c.reach),
+        position_m=_floats(c.position),
+        pitch_rad=float(c.pitch),
+        rate_hz=control_rate if c.rate is None else float(c.rate),
+        latency_range_s=_floats(c.latency),
+        encoding=c.encoding if measures else NONE,
+        pool=(view.rows, view.columns),
+        description=shows[c.sees],
+        preprocessing="inside the graph: " + "; ".join(done),
+    )
+
+
+def export_policy(path: Path, weights: Weights, actor: Actor, contract: Contract) -> None:
     """Write a policy as ONNX, atomically: float32 `observation` (n, o) -> `action` (n, 4) in [-1, 1].
+
+    A policy with cameras has an input `image_0`, ... for each, (n, h, w) or (n, h, w, 3): what the camera measures. One
+    with a GRU has `memory` (n, k) -> `next_memory` (n, k).
 
     Args:
         path: where to.
-        layers: weights (inputs, outputs) and biases of the network.
-        features: what the network is fed, made of the observation inside the graph.
-        activation: relu, tanh or elu, of the hidden layers.
+        weights: what was learned.
+        actor: the policy's shape; its features are made of observation and images inside the graph.
         contract: what the file says of itself.
 
     Raises:
-        ValueError: naming what does not fit together: layers, features, activation or contract.
+        ValueError: naming what does not fit together: weights, actor or contract.
         OSError: when the file cannot be written.
     """
     about = contract.to_json()
-    if contract.observation != features.fields:
-        raise ValueError(
-            f"contract.observation is {contract.observation}; accepted: the fields of the features, {features.fields}"
-        )
-    arrays = [(np.asarray(weight, np.float32), np.asarray(bias, np.float32)) for weight, bias in layers]
-    _check(arrays, features, activation)
-    size = contract.observation_size
-    nodes, constants = _feature_nodes(features)
-    for i, (weight, bias) in enumerate(arrays):
-        constants |= {f"weight_{i}": weight, f"bias_{i}": bias}
-        source = f"hidden_{i}" if i else "features"
-        nodes.append(helper.make_node("Gemm", [source, f"weight_{i}", f"bias_{i}"], [f"linear_{i}"]))
-        last = i == len(arrays) - 1
-        operator, target = ("Tanh", OUTPUT) if last else (_OPERATORS[activation], f"hidden_{i + 1}")
-        nodes.append(helper.make_node(operator, [f"linear_{i}"], [target]))
-    graph = helper.make_graph(
-        nodes,
-        "policy",
-        [helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, ["n", size])],
-        [helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["n", 4])],
-        [numpy_helper.from_array(np.ascontiguousarray(value), name) for name, value in constants.items()],
-    )
+    images = images_of(actor, contract.control_rate_hz)
+    for name, has, wanted in (
+        ("observation", contract.observation, actor.features.fields),
+        ("images", contract.images, images),
+        ("memory_size", contract.memory_size, actor.network.recurrent),
+    ):
+        if has != wanted:
+            raise ValueError(f"contract.{name} is {has}; accepted: that of the policy, {wanted}")
+    _check(weights, actor)
+    graph = policy_graph(jax.tree.map(lambda x: np.asarray(x, np.float32), weights), actor, [i.name for i in images])
     model = helper.make_model(
         graph,
         opset_imports=[helper.make_opsetid("", OPSET)],
@@ -115,25 +156,32 @@ def export_policy(path: Path, layers: Layers, features: Features, activation: st
     write_atomically(Path(path), model.SerializeToString())
 
 
-def parity(
-    path: Path, layers: Layers, features: Features, activation: str, count: int = 10_000, seed: int = 0
-) -> float:
+def parity(path: Path, weights: Weights, actor: Actor, count: int = 10_000, seed: int = 0) -> float:
     """The largest absolute difference between an exported policy and the one it was exported from.
+
+    Both act on random observations and images; a GRU, from random memories.
 
     Args:
         path: the `policy.onnx`, run as on the vehicle.
-        layers: as for `export_policy`.
-        features: as for `export_policy`.
-        activation: as for `export_policy`.
+        weights: as for `export_policy`.
+        actor: as for `export_policy`.
         count: how many random observations.
         seed: of the observations.
 
     Returns:
         The difference of actions, whose range is [-1, 1].
     """
-    observation = random_observations(np.random.default_rng(seed), features.fields, count)
-    wanted = jax.jit(lambda layers, x: policy(layers, features(x), activation))(layers, observation)
-    return float(np.max(np.abs(load_policy(path).act(observation) - np.asarray(wanted))))
+    rng, exported = np.random.default_rng(seed), load_policy(path)
+    observation = random_observations(rng, actor.features.fields, count)
+    images = [random_images(rng, image, count) for image in exported.contract.images]
+    memory = rng.uniform(-1, 1, (count, actor.network.recurrent)).astype(np.float32)
+
+    @jax.jit
+    def wanted(weights: Weights, observation: Any, images: Any, memory: Any) -> Any:
+        return actor(weights, actor.features(observation, images), memory)
+
+    both = zip(exported.act(observation, images, memory), wanted(weights, observation, images, memory), strict=True)
+    return float(max(np.max(np.abs(a - np.asarray(b)), initial=0.0) for a, b in both))
 
 
 def random_observations(rng: np.random.Generator, fields: tuple[Field, ...], count: int) -> np.ndarray:
@@ -150,78 +198,32 @@ def random_observations(rng: np.random.Generator, fields: tuple[Field, ...], cou
     return np.concatenate([draw(field) for field in fields], axis=-1).astype(np.float32)
 
 
-def _feature_nodes(features: Features) -> tuple[list[onnx.NodeProto], dict[str, np.ndarray]]:
-    """The nodes from `observation` to `features` and their constants: `Features` again, for ONNX."""
-    starts = np.cumsum([0, *(field.size for field in features.fields)])
-    columns = [(field, list(range(a, a + field.size))) for field, a in zip(features.fields, starts, strict=False)]
-    attitude = next(where[0] for field, where in columns if field.frame == "world_body")
-    vectors = [i for field, where in columns if field.frame == "world" for i in where]
-    rest = [i for field, where in columns if field.frame in ("body", "none") for i in where]
-    # turned vectors, up and the rest lie side by side in `parts`; `order` puts them into the order of the fields,
-    # up, of three numbers and no scale, in the place of the attitude's first three
-    place = {column: p for p, column in enumerate([*vectors, *range(attitude, attitude + 3), *rest])}
-    order = [place[i] for _, where in columns for i in where if i in place]
-    scale = [1.0 if f.frame == "world_body" else f.scale for f, where in columns for i in where if i in place]
-
-    table = np.zeros((len(_PAIRS), 9), np.float32)
-    for entry, terms in enumerate(_R_WORLD_BODY):
-        for sign, pair in ((terms[0], terms[1:3]), (terms[3], terms[4:6])):
-            table[_PAIRS.index(pair), entry] = 2.0 if sign == "+" else -2.0
-    first, second = ([attitude + "wxyz".index(pair[i]) for pair in _PAIRS] for i in (0, 1))
-    constants: dict[str, Any] = {
-        "first_index": first,
-        "second_index": second,
-        "up_index": [6, 7, 8],
-        "vectors_index": vectors,
-        "rest_index": rest,
-        "order": order,
-        "matrix_shape": [0, 3, 3],  # 0: as it is
-        "vectors_shape": [0, len(vectors) // 3, 3],
-        "flat_shape": [0, len(vectors)],
-    }
-    constants = {name: np.array(value, np.int64) for name, value in constants.items()}
-    floats = {"table": table, "identity": np.eye(3).reshape(9), "scale": scale}
-    constants |= {name: np.array(value, np.float32) for name, value in floats.items()}
-
-    def gather(data: str, index: str, output: str) -> onnx.NodeProto:
-        return helper.make_node("Gather", [data, index], [output], axis=1)
-
-    nodes = [
-        gather(INPUT, "first_index", "first"),
-        gather(INPUT, "second_index", "second"),
-        helper.make_node("Mul", ["first", "second"], ["products"]),
-        helper.make_node("Gemm", ["products", "table", "identity"], ["R_flat"]),
-        gather("R_flat", "up_index", "up"),
-        helper.make_node("Reshape", ["R_flat", "matrix_shape"], ["R_world_body"]),
-        gather(INPUT, "vectors_index", "vectors_flat"),
-        helper.make_node("Reshape", ["vectors_flat", "vectors_shape"], ["vectors_world"]),
-        # vectors are rows: v^T R_world_body is R_body_world v
-        helper.make_node("MatMul", ["vectors_world", "R_world_body"], ["vectors_body"]),
-        helper.make_node("Reshape", ["vectors_body", "flat_shape"], ["turned"]),
-        gather(INPUT, "rest_index", "rest"),
-        helper.make_node("Concat", ["turned", "up", "rest"], ["parts"], axis=1),
-        gather("parts", "order", "ordered"),
-        helper.make_node("Div", ["ordered", "scale"], ["features"]),
-    ]
-    return nodes, constants
+def random_images(rng: np.random.Generator, image: Image, count: int) -> np.ndarray:
+    """Float32 (count, h, w) or (count, h, w, 3): values all over their range, a part of them 0; a mask: 0 and 1."""
+    low, high = image.limits
+    x = rng.uniform(low, high, (count, *image.shape))
+    shown = rng.random((count, *image.shape)) < rng.random((count, *(1,) * len(image.shape)))
+    return (shown * (1.0 if image.sees == "mask" else x)).astype(np.float32)
 
 
-def _check(layers: list[tuple[np.ndarray, np.ndarray]], features: Features, activation: str) -> None:
-    if activation not in _OPERATORS:
-        raise ValueError(f"activation is {activation!r}; accepted: {', '.join(_OPERATORS)}")
-    size = features.size
-    for i, (weight, bias) in enumerate(layers):
-        outputs = 4 if i == len(layers) - 1 else bias.size
-        if weight.shape != (size, outputs) or bias.shape != (outputs,):
-            raise ValueError(
-                f"layers[{i}] has shapes {weight.shape} and {bias.shape}; accepted: "
-                f"({size}, {outputs}) and ({outputs},)"
-            )
-        if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
-            raise ValueError(f"layers[{i}] is not finite; accepted: finite numbers (did the training diverge?)")
-        size = outputs
-    if not layers:
-        raise ValueError("layers is empty; accepted: at least one layer")
+def _check(weights: Weights, actor: Actor) -> None:
+    """Every array as the policy's shape says, and finite."""
+    if actor.network.activation not in OPERATORS:
+        raise ValueError(f"activation is {actor.network.activation!r}; accepted: {', '.join(OPERATORS)}")
+    wanted = _arrays(actor.init(np.random.default_rng(0), np.zeros(4)))
+    has = _arrays(weights)
+    if list(has) != list(wanted):
+        raise ValueError(f"weights has the arrays {', '.join(has)}; accepted: {', '.join(wanted)}")
+    for name, array in has.items():
+        if array.shape != wanted[name].shape:
+            raise ValueError(f"weights{name} has shape {array.shape}; accepted: {wanted[name].shape}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"weights{name} is not finite; accepted: finite numbers (did the training diverge?)")
+
+
+def _arrays(weights: Weights) -> dict[str, np.ndarray]:
+    """By place: .head[0][1] is the bias of the head's first layer."""
+    return {jax.tree_util.keystr(at): np.asarray(x) for at, x in jax.tree_util.tree_leaves_with_path(weights)}
 
 
 def _same(name: str, has: Any, wanted: Any) -> None:
@@ -229,6 +231,10 @@ def _same(name: str, has: Any, wanted: Any) -> None:
     same = has == wanted if isinstance(wanted, str) else np.allclose(has, wanted, rtol=1e-6, atol=0.0)
     if not same:
         raise ValueError(f"{name} of the environment is {has}; its configuration and vehicle say {wanted}")
+
+
+def _floats(values: Any) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)
 
 
 def _decimals(values: Any) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from e2efly.env import random_key
 from e2efly.evaluate import Episodes
-from e2efly.learn.networks import Layers
+from e2efly.learn.networks import Weights
 from e2efly.learn.setup import Setup
 
 WATCHED, REPORTED = 1, 2
@@ -16,14 +16,14 @@ WATCHED, REPORTED = 1, 2
 
 
 def judge(
-    setup: Setup, evaluate: Any, layers: Layers, stream: int, episodes: int, seed: int = 0
+    setup: Setup, evaluate: Any, weights: Weights, stream: int, episodes: int, seed: int = 0, stage: int = -1
 ) -> dict[str, Episodes]:
-    """Fly at least `episodes` starts of a stream for every criterion; NumPy arrays."""
+    """Fly at least `episodes` starts of a stream for every criterion of a stage; NumPy arrays."""
     once = setup.config.eval_episodes
     flown = {}
-    for name, env in setup.judges.items():
+    for name, env in setup.stages[stage].judges.items():
         keys = [random_key(seed, stream, i) for i in range(math.ceil(episodes / once))]
-        parts = [jax.tree.map(lambda x: np.asarray(x)[:once], evaluate(env, layers, key)) for key in keys]
+        parts = [jax.tree.map(lambda x: np.asarray(x)[:once], evaluate(env, weights, key)) for key in keys]
         flown[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
     return flown
 

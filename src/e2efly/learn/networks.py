@@ -1,9 +1,10 @@
-"""Policy and critic: body-frame features of the observation, then a small multi-layer perceptron.
+"""Policy and critic: features of observation and images, encoders of the images, perhaps a GRU, then a perceptron.
 
-The features are part of the policy and of its exported graph: the observation stays what the vehicle measures.
+The features are part of the policy and of its exported graph: observation and images stay what the vehicle measures.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -12,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from e2efly.config import CameraConfig, NetworkConfig
 from e2efly.observation import Field
 from e2efly.physics.rotation import unrotate
 
@@ -22,23 +24,150 @@ ACTIVATIONS = {"relu": jax.nn.relu, "tanh": jnp.tanh, "elu": jax.nn.elu}
 """Activations by name."""
 
 
+NEAREST = 0.3
+"""Inverse encoding of depth d is 1 m / d; what is nearer than this is not told apart, m."""
+FAINTEST = 1e-2
+"""Keeps a mask that shows nothing from being divided by its mean, which is 0."""
+
+
+@dataclass(frozen=True)
+class View:
+    """One camera's part of the features: its image, averaged over the cells of a grid (of inverse depth the nearest is
+    kept); then its encoder.
+
+    A mask is followed by itself divided by its mean: what is far is small, and seen as clearly as what is near.
+    """
+
+    camera: CameraConfig
+    rows: int
+    columns: int
+    patches: tuple[int, ...] = ()
+    """Sides of the patches of the encoder's convolutions."""
+
+    @staticmethod
+    def of(camera: CameraConfig, network: NetworkConfig) -> "View":
+        """Check that the grid, or the convolutions, divide the image and that a network can take it.
+
+        Raises:
+            ValueError: naming the field, the value and what is accepted.
+        """
+        if camera.sees in ("label", "instance"):
+            raise ValueError(f"camera.sees is {camera.sees!r}; accepted for a policy: depth, range, mask, rgb, normal")
+        if network.convolution:
+            return View(camera, camera.height, camera.width, _patches(camera, network.convolution))
+        pool = network.pool
+        rows, columns = min(pool[0], camera.height), min(pool[1], camera.width)
+        if rows < 1 or columns < 1 or camera.height % rows or camera.width % columns:
+            raise ValueError(
+                f"network.pool is {pool}; accepted: divisors of the image's {camera.height} rows and "
+                f"{camera.width} columns"
+            )
+        return View(camera, rows, columns)
+
+    @property
+    def channels(self) -> int:
+        """Of the features."""
+        return {"mask": 2, "rgb": 3, "normal": 3}.get(self.camera.sees, 1)
+
+    @property
+    def size(self) -> int:
+        """Numbers that the encoder takes: row by row, column by column, channel by channel."""
+        return self.rows * self.columns * self.channels
+
+    @property
+    def keeps_nearest(self) -> bool:
+        """Whether a cell shows the largest of its values, not their mean."""
+        return self.camera.sees in ("depth", "range") and self.camera.encoding == "inverse"
+
+    @property
+    def contrast(self) -> float:
+        """Times a mask over its norm: that is a quarter of itself over its root mean square."""
+        return math.sqrt(self.rows * self.columns) / 4
+
+    def __call__(self, image: Float[Array, "*image"]) -> Float[Array, "*n f"]:
+        """The features of an image."""
+        c = self.camera
+        channels = 3 if c.sees in ("rgb", "normal") else 1
+        if c.sees in ("depth", "range"):
+            inverse = jnp.where(image > 0, 1.0 / jnp.maximum(image, NEAREST), 0.0)
+            image = inverse if c.encoding == "inverse" else image / c.reach[1]
+        lead = image.shape[: image.ndim - (3 if channels == 3 else 2)]
+        cells = image.reshape(*lead, self.rows, c.height // self.rows, self.columns, c.width // self.columns, channels)
+        x = (jnp.max if self.keeps_nearest else jnp.mean)(cells, axis=(-4, -2))
+        if c.sees == "mask":
+            norm = jnp.sqrt(jnp.sum(x**2, axis=(-3, -2, -1), keepdims=True))
+            x = jnp.concatenate([x, self.contrast * x / (norm + FAINTEST)], axis=-1)
+        return x.reshape(*lead, -1)
+
+    def init(self, rng: np.random.Generator, network: NetworkConfig) -> Layers:
+        """Weights of the encoder: of each convolution, (side * side * channels, next channels); then of the layers."""
+        layers, shape = [], (self.rows, self.columns, self.channels)
+        for side, channels in zip(self.patches, network.convolution, strict=True):
+            layers += init_mlp(rng, (side * side * shape[2], channels), math.sqrt(2))
+            shape = (shape[0] // side, shape[1] // side, channels)
+        return layers + init_mlp(rng, (math.prod(shape), *network.encoder), math.sqrt(2))
+
+    def encode(self, layers: Layers, features: Float[Array, "*n f"], activation: str) -> Float[Array, "*n e"]:
+        """What the encoder makes of the features."""
+        act, lead = ACTIVATIONS[activation], features.shape[:-1]
+        x = features.reshape(*lead, self.rows, self.columns, self.channels)
+        for side, (weight, bias) in zip(self.patches, layers, strict=False):
+            *_, rows, columns, channels = x.shape
+            x = x.reshape(*lead, rows // side, side, columns // side, side, channels)
+            x = jnp.swapaxes(x, -4, -3).reshape(*lead, rows // side, columns // side, side * side * channels)
+            x = act(x @ weight + bias)
+        return act(mlp(layers[len(self.patches) :], x.reshape(*lead, -1), activation))
+
+
+def _patches(camera: CameraConfig, convolution: tuple[int, ...]) -> tuple[int, ...]:
+    """The side of each convolution's patches."""
+    sides, rows, columns = [], camera.height, camera.width
+    for _ in convolution:
+        side = next((k for k in (4, 2) if rows % k == 0 and columns % k == 0), None)
+        if side is None:
+            raise ValueError(
+                f"network.convolution is {convolution}; accepted: no more layers than halve or quarter the image's "
+                f"{camera.height} rows and {camera.width} columns: {len(sides)}"
+            )
+        sides.append(side)
+        rows, columns = rows // side, columns // side
+    return tuple(sides)
+
+
 @dataclass(frozen=True)
 class Features:
     """What the networks are fed: static, as it is the same for every vehicle.
 
     World vectors are turned into the body frame and the attitude becomes the world's up axis seen from the body, so
-    that nothing changes with the heading; every entry is divided by its field's scale.
+    that nothing changes with the heading; every entry is divided by its field's scale. The images' features follow.
     """
 
     fields: tuple[Field, ...]
+    views: tuple[View, ...] = ()
+
+    @property
+    def state_size(self) -> int:
+        """Numbers of the observation's features: the attitude's four become three."""
+        return sum(3 if f.frame == "world_body" else f.size for f in self.fields)
 
     @property
     def size(self) -> int:
-        """Numbers of the feature vector: the attitude's four become three."""
-        return sum(3 if f.frame == "world_body" else f.size for f in self.fields)
+        """Numbers of the feature vector."""
+        return self.state_size + sum(view.size for view in self.views)
 
-    def __call__(self, observation: Float[Array, "*n o"]) -> Float[Array, "*n f"]:
-        """The features of an observation."""
+    def __call__(self, observation: Float[Array, "*n o"], images: Sequence[Array] = ()) -> Float[Array, "*n f"]:
+        """The features of an observation and of the cameras' images."""
+        state = self.of_state(observation)
+        seen = [view(image) for view, image in zip(self.views, images, strict=True)]
+        return jnp.concatenate([state, *seen], axis=-1) if seen else state
+
+    def apart(self, features: Float[Array, "*n f"]) -> list[Float[Array, "*n p"]]:
+        """The observation's part of a feature vector, and each image's."""
+        ends = np.cumsum([self.state_size, *(view.size for view in self.views)])
+        return jnp.split(features, ends[:-1], axis=-1) if self.views else [features]
+
+    def of_state(self, observation: Float[Array, "*n o"]) -> Float[Array, "*n s"]:
+        """The features of an observation alone."""
         offsets = np.cumsum([0, *(f.size for f in self.fields)])
         parts = {f: observation[..., a : a + f.size] for f, a in zip(self.fields, offsets, strict=False)}
         attitude = next(part for f, part in parts.items() if f.frame == "world_body")
@@ -76,13 +205,90 @@ def mlp(layers: Layers, x: Float[Array, "*n f"], activation: str) -> Float[Array
     return x @ weight + bias
 
 
-def init_policy(rng: np.random.Generator, features: int, hidden: tuple[int, ...], hover: np.ndarray) -> Layers:
-    """A policy that starts near `hover`, the action that hovers."""
-    layers = init_mlp(rng, (features, *hidden, 4), 0.01)
-    layers[-1] = (layers[-1][0], np.arctanh(np.clip(hover, -0.9, 0.9)).astype(np.float32))
-    return layers
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Gru:
+    """A gated recurrent unit (Cho et al. 2014), its three gates side by side: update, reset, candidate."""
+
+    inputs: Array | np.ndarray
+    """(i, 3 k)."""
+    recurrent: Array | np.ndarray
+    """(k, 3 k)."""
+    bias: Array | np.ndarray
+    """(3 k,) beside the inputs."""
+    recurrent_bias: Array | np.ndarray
+    """(3 k,) beside the memory."""
+
+    def __call__(self, x: Float[Array, "*n i"], memory: Float[Array, "*n k"]) -> Float[Array, "*n k"]:
+        """The next memory."""
+        update, reset, candidate = jnp.split(x @ self.inputs + self.bias, 3, axis=-1)
+        by_update, by_reset, by_candidate = jnp.split(memory @ self.recurrent + self.recurrent_bias, 3, axis=-1)
+        keep = jax.nn.sigmoid(update + by_update)
+        new = jnp.tanh(candidate + jax.nn.sigmoid(reset + by_reset) * by_candidate)
+        return (1 - keep) * new + keep * memory
 
 
-def policy(layers: Layers, features: Float[Array, "*n f"], activation: str) -> Float[Array, "*n 4"]:
-    """The action: tanh of the network, in (-1, 1)."""
-    return jnp.tanh(mlp(layers, features, activation))
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Weights:
+    """What a policy learns."""
+
+    encoders: tuple[Layers, ...]
+    """An image's each."""
+    cell: Gru | None
+    head: Layers
+
+
+@dataclass(frozen=True)
+class Actor:
+    """A policy's shape: features, encoders, GRU, head. Its weights come in at every call."""
+
+    features: Features
+    network: NetworkConfig
+
+    @staticmethod
+    def of(fields: tuple[Field, ...], cameras: Sequence[CameraConfig], network: NetworkConfig) -> "Actor":
+        """The policy of an environment's observation and cameras.
+
+        Raises:
+            ValueError: naming the field, the value and what is accepted.
+        """
+        sizes = (*network.convolution, *network.encoder, *network.hidden)
+        if min(sizes, default=1) < 1 or network.recurrent < 0 or (cameras and not network.encoder):
+            raise ValueError(
+                f"network has the sizes convolution {network.convolution}, encoder {network.encoder}, hidden "
+                f"{network.hidden}, recurrent {network.recurrent}; accepted: 1 or more (recurrent: or 0), one encoder "
+                "layer or more where there are cameras"
+            )
+        return Actor(Features(fields, tuple(View.of(camera, network) for camera in cameras)), network)
+
+    def init(self, rng: np.random.Generator, hover: np.ndarray) -> Weights:
+        """Weights that start near `hover`, the action that hovers; made by NumPy: nothing to compile."""
+        encoders = tuple(view.init(rng, self.network) for view in self.features.views)
+        size = self.features.state_size + len(encoders) * self.network.encoder[-1]
+        cell, units = None, self.network.recurrent
+        if units:
+            (recurrent, _), zero = init_mlp(rng, (units, 3 * units), 1.0)[0], np.zeros(3 * units, np.float32)
+            cell = Gru(init_mlp(rng, (size, 3 * units), 1.0)[0][0], recurrent, zero, zero)
+            size += units
+        head = init_mlp(rng, (size, *self.network.hidden, 4), 0.01)
+        head[-1] = (head[-1][0], np.arctanh(np.clip(hover, -0.9, 0.9)).astype(np.float32))
+        return Weights(encoders, cell, head)
+
+    def memory(self, n: int) -> Float[Array, "n k"]:
+        """What the GRUs of n policies know at the start of an episode: nothing."""
+        return jnp.zeros((n, self.network.recurrent))
+
+    def __call__(
+        self, weights: Weights, features: Float[Array, "*n f"], memory: Float[Array, "*n k"]
+    ) -> tuple[Float[Array, "*n 4"], Float[Array, "*n k"]]:
+        """The action: tanh of the network, in (-1, 1); and the GRU's next memory."""
+        activation = self.network.activation
+        state, *images = self.features.apart(features)
+        of_images = zip(self.features.views, weights.encoders, images, strict=True)
+        encoded = [view.encode(layers, x, activation) for view, layers, x in of_images]
+        x = jnp.concatenate([state, *encoded], axis=-1) if encoded else state
+        if weights.cell is not None:
+            memory = weights.cell(x, memory)
+            x = jnp.concatenate([x, memory], axis=-1)
+        return jnp.tanh(mlp(weights.head, x, activation)), memory

@@ -1,7 +1,9 @@
 """Proximal policy optimisation (Schulman et al. 2017) on the environment, one update a call.
 
 The policy is a tanh network with Gaussian noise of learned, state-independent size; actions are clipped to [-1, 1]
-by the environment's action map. Time-outs bootstrap with the value of the observation before the new start.
+by the environment's action map. Time-outs bootstrap with the value of the observation before the new start. Where
+there are cameras the critic sees no images but the true scene (`Env.privileged`). The gradient of a GRU reaches one
+step back: its memory is stored with the sample.
 """
 
 from dataclasses import dataclass
@@ -12,10 +14,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from e2efly.config import NetworkConfig, PPOConfig
+from e2efly.config import PPOConfig
 from e2efly.env import Env, EnvState
 from e2efly.learn.algorithm import TrainState, annealed, descend, episode_metrics
-from e2efly.learn.networks import Features, Layers, init_mlp, init_policy, mlp, policy
+from e2efly.learn.networks import Actor, Layers, Weights, init_mlp, mlp
 
 
 @jax.tree_util.register_dataclass
@@ -23,7 +25,7 @@ from e2efly.learn.networks import Features, Layers, init_mlp, init_policy, mlp, 
 class Parameters:
     """What PPO learns."""
 
-    policy: Layers
+    policy: Weights
     log_std: Float[Array | np.ndarray, "4"]
     critic: Layers
 
@@ -34,6 +36,9 @@ class Samples:
     """What a rollout gathers, each leaf (steps, n, ...) or flat."""
 
     features: Float[Array, "*t f"]
+    memory: Float[Array, "*t k"]
+    known: Float[Array, "*t c"]
+    """What the critic is fed."""
     action: Float[Array, "*t 4"]
     log_prob: Float[Array, "*t"]
     advantage: Float[Array, "*t"]
@@ -82,16 +87,16 @@ def log_prob(
 class PPO:
     """The algorithm on one environment's shapes; its numbers come in with `config` at every call."""
 
-    features: Features
-    network: NetworkConfig
+    actor: Actor
 
     def init(self, env: Env, config: PPOConfig, seed: int) -> Parameters:
         """Fresh networks, made by NumPy."""
         rng = np.random.default_rng(seed)
+        known = self.actor.features.state_size + env.privileged_size
         return Parameters(
-            init_policy(rng, self.features.size, self.network.hidden, np.asarray(env.hover)),
+            self.actor.init(rng, np.asarray(env.hover)),
             np.full(4, config.log_std, np.float32),
-            init_mlp(rng, (self.features.size, *self.network.hidden, 1), 1.0),
+            init_mlp(rng, (known, *self.actor.network.hidden, 1), 1.0),
         )
 
     def update(
@@ -109,12 +114,12 @@ class PPO:
             The new state and the metrics of this update.
         """
         key, rollout_key, epoch_key = jax.random.split(state.key, 3)
-        samples, env_state, observation, metrics = self._rollout(env, config, state, rollout_key)
+        samples, env_state, observation, memory, metrics = self._rollout(env, config, state, rollout_key)
         size, batches_an_epoch = samples.advantage.size, config.envs * config.horizon // config.minibatch
         # one sort of random bits: sorting is slow on a CPU, so that both epochs share the order
         order = jnp.argsort(jax.random.bits(epoch_key, (size,)))
         flat = jax.tree.map(lambda x: x.reshape(size, *x.shape[2:])[order], samples)
-        batches = jax.tree.map(lambda x: x.reshape(batches_an_epoch, -1, *x.shape[1:]), flat)
+        batches = jax.tree.map(lambda x: x.reshape(batches_an_epoch, size // batches_an_epoch, *x.shape[1:]), flat)
         rate = annealed(config, progress)
 
         def minibatch(carry: tuple[Parameters, Any], batch: Samples) -> tuple[tuple[Parameters, Any], dict[str, Array]]:
@@ -131,55 +136,65 @@ class PPO:
         )
         metrics |= {f"loss/{name}": jnp.mean(x) for name, x in losses.items()}
         metrics["std"] = jnp.mean(jnp.exp(parameters.log_std))
-        return TrainState(parameters, optimizer, env_state, observation, key), metrics
+        return TrainState(parameters, optimizer, env_state, observation, memory, key), metrics
 
     def _rollout(
         self, env: Env, config: PPOConfig, state: TrainState, key: PRNGKeyArray
-    ) -> tuple[Samples, EnvState, Array, dict[str, Array]]:
+    ) -> tuple[Samples, EnvState, Array, Array, dict[str, Array]]:
         parameters = state.parameters
-        activation = self.network.activation
         noise = jax.random.normal(key, (config.horizon, *state.observation.shape[:1], 4))
 
-        def step(carry: tuple[EnvState, Array], z: Array) -> tuple[tuple[EnvState, Array], Any]:
-            env_state, observation = carry
-            features = self.features(observation)
-            mean = policy(parameters.policy, features, activation)
+        def step(carry: tuple[EnvState, Array, Array], z: Array) -> tuple[tuple[EnvState, Array, Array], Any]:
+            env_state, observation, memory = carry
+            features = self.actor.features(observation, env_state.images)
+            mean, next_memory = self.actor(parameters.policy, features, memory)
             action = mean + jnp.exp(parameters.log_std) * z
-            env_state, out = env.step(env_state, action)
+            known = self._known(env, env_state, observation)
+            reached, out = env.advance(env_state, action)
+            final_known = self._known(env, reached, out.final_observation)
+            env_state, out = env.restart(reached, out)
+            env_state = env.look(env_state, out.done)
+            next_memory = jnp.where(out.done[:, None], 0.0, next_memory)
             gathered = (
-                features,
+                (features, memory, known),
                 action,
-                self.features(out.final_observation),
+                final_known,
                 out.reward,
                 out.terminated.astype(jnp.float32),
                 out.done.astype(jnp.float32),
                 out.success.astype(jnp.float32),
                 {name: jnp.mean(x) for name, x in out.terms.items()},
             )
-            return (env_state, out.observation), gathered
+            return (env_state, out.observation, next_memory), gathered
 
-        (env_state, observation), gathered = jax.lax.scan(step, (state.env, state.observation), noise)
-        features, action, final_features, reward, terminated, done, success, terms = gathered
-        value = mlp(parameters.critic, features, activation)[..., 0]
-        next_value = mlp(parameters.critic, final_features, activation)[..., 0]
+        first = (state.env, state.observation, state.memory)
+        (env_state, observation, memory), gathered = jax.lax.scan(step, first, noise)
+        (features, memories, known), action, final_known, reward, terminated, done, success, terms = gathered
+        value, next_value = self._value(parameters, known), self._value(parameters, final_known)
         advantage = gae(reward, value, next_value, terminated, done, config.gamma, config.gae_lambda)
         density = -jnp.sum(0.5 * noise**2 + parameters.log_std + 0.5 * jnp.log(2 * jnp.pi), axis=-1)
-        samples = Samples(features, action, density, advantage, advantage + value)
+        samples = Samples(features, memories, known, action, density, advantage, advantage + value)
         metrics = {
             "reward": jnp.mean(reward),
             **episode_metrics(done, success),
             **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()},
         }
-        return samples, env_state, observation, metrics
+        return samples, env_state, observation, memory, metrics
+
+    def _known(self, env: Env, state: EnvState, observation: Array) -> Array:
+        seen = self.actor.features.of_state(observation)
+        return jnp.concatenate([seen, env.privileged(state)], axis=-1) if env.privileged_size else seen
+
+    def _value(self, parameters: Parameters, known: Array) -> Array:
+        return mlp(parameters.critic, known, self.actor.network.activation)[..., 0]
 
     def _loss(self, parameters: Parameters, config: PPOConfig, batch: Samples) -> tuple[Array, dict[str, Array]]:
-        activation = self.network.activation
-        mean = policy(parameters.policy, batch.features, activation)
+        mean, _ = self.actor(parameters.policy, batch.features, batch.memory)
         ratio = jnp.exp(log_prob(batch.action, mean, parameters.log_std) - batch.log_prob)
         advantage = (batch.advantage - jnp.mean(batch.advantage)) / (jnp.std(batch.advantage) + 1e-8)
         clipped = jnp.clip(ratio, 1 - config.clip, 1 + config.clip)
         policy_loss = -jnp.mean(jnp.minimum(ratio * advantage, clipped * advantage))
-        value = mlp(parameters.critic, batch.features, activation)[..., 0]
+        value = self._value(parameters, batch.known)
         value_loss = 0.5 * jnp.mean((value - batch.value_target) ** 2)
         entropy = jnp.sum(parameters.log_std)
         total = policy_loss + config.value_weight * value_loss - config.entropy_weight * entropy

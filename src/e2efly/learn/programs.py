@@ -22,11 +22,11 @@ import numpy as np
 from jax import export
 
 from e2efly.env import Env, random_key
-from e2efly.evaluate import Episodes, run_episodes
+from e2efly.evaluate import Act, Episodes, run_episodes
 from e2efly.learn.algorithm import TrainState, begin
 from e2efly.learn.checkpoint import write_atomically
 from e2efly.learn.devices import AXIS, OWN, SAME, on_each, own, shardings, stacked
-from e2efly.learn.networks import Layers, policy
+from e2efly.learn.networks import Actor, Weights
 from e2efly.learn.setup import Setup
 
 FAST_COMPILE: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
@@ -42,8 +42,8 @@ class Programs:
     chunk: Callable[[Env, Any, TrainState, int, int], tuple[TrainState, dict[str, jax.Array]]]
     """(environment, numbers of the algorithm, state, first update, updates of the run) -> the state after
     `config.chunk` updates, and the metrics of each. The state that goes in is gone."""
-    evaluate: Callable[[Env, Layers, jax.Array], Episodes]
-    """(environment, policy layers, key) -> `eval_episodes` episodes, or a few repeated more."""
+    evaluate: Callable[[Env, Weights, jax.Array], Episodes]
+    """(environment, policy weights, key) -> `eval_episodes` episodes, or a few repeated more."""
 
     @staticmethod
     def compile(setup: Setup, parameters: Any, traced: Path | None = None) -> "Programs":
@@ -83,13 +83,13 @@ def start_program(setup: Setup) -> Any:
     """The program (environment, parameters, key) -> the first `TrainState` of each device."""
 
     def start(env: Env, parameters: Any, key: jax.Array) -> TrainState:
-        return stacked(begin(env, setup.config.algo, parameters, key))
+        return stacked(begin(setup.actor, env, setup.config.algo, parameters, key))
 
     return on_each(start, setup.devices, (SAME, SAME, SAME), OWN)
 
 
 def evaluation_program(setup: Setup) -> Any:
-    """The program (environment, policy layers, key) -> `Episodes` of `eval_episodes` starts, or a few repeated more."""
+    """The program (environment, weights, key) -> `Episodes` of `eval_episodes` starts, or a few repeated more."""
     return on_each(_evaluate(setup), setup.devices, (SAME, SAME, SAME), OWN)
 
 
@@ -106,15 +106,22 @@ def _chunk(setup: Setup) -> Callable[..., tuple[TrainState, dict[str, jax.Array]
     return chunk
 
 
-def _evaluate(setup: Setup) -> Callable[[Env, Layers, jax.Array], Episodes]:
-    config, features = setup.config, setup.features
+def _evaluate(setup: Setup) -> Callable[[Env, Weights, jax.Array], Episodes]:
+    config, actor = setup.config, setup.actor
 
-    def evaluate(env: Env, layers: Layers, key: jax.Array) -> Episodes:
-        act = lambda observation: policy(layers, features(observation), config.network.activation)  # noqa: E731
+    def evaluate(env: Env, weights: Weights, key: jax.Array) -> Episodes:
+        act = acting(actor, weights)
         part = jax.lax.axis_index(AXIS), setup.devices
         return run_episodes(env, act, key, config.eval_episodes, setup.episode_steps, setup.settle, part)
 
     return evaluate
+
+
+def acting(actor: Actor, weights: Weights) -> Act:
+    """A policy with these weights, for `e2efly.evaluate`."""
+    return Act(
+        lambda observation, images, memory: actor(weights, actor.features(observation, images), memory), actor.memory
+    )
 
 
 def _of_leaves(function: Callable, args: tuple, result: Callable[[Any], Any]) -> Callable:

@@ -14,7 +14,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from e2efly.config import TrainConfig
+from e2efly.config import CameraConfig, StageConfig, TrainConfig
 from e2efly.learn.checkpoint import write_atomically
 from e2efly.presets import algorithm_name, preset, task_name
 
@@ -174,6 +174,12 @@ def _value(like: Any, name: str, value: Any, where: str) -> Any:
     default = getattr(like, name)
     if dataclasses.is_dataclass(default):
         return _read(default, value, f"{where}: {name}")
+    if name == "cameras":
+        return tuple(_read(CameraConfig(), camera, f"{where}: {name}[{i}]") for i, camera in enumerate(value))
+    if name == "curriculum":
+        return tuple(_read(StageConfig({}), stage, f"{where}: {name}[{i}]") for i, stage in enumerate(value))
+    if isinstance(value, dict):
+        return {key: tuple(x) if isinstance(x, list) else x for key, x in value.items()}
     return tuple(value) if isinstance(value, list) else value
 
 

@@ -27,7 +27,7 @@ from e2efly.learn.checkpoint import load_checkpoint, read_about, save_checkpoint
 from e2efly.learn.clock import peak_memory, since_process_start
 from e2efly.learn.devices import placed
 from e2efly.learn.judge import REPORTED, WATCHED, digest, judge, score, success
-from e2efly.learn.networks import Layers
+from e2efly.learn.networks import Weights
 from e2efly.learn.programs import Programs, start_program
 from e2efly.learn.rundir import RunDirectory, differences, versions
 from e2efly.learn.setup import Setup
@@ -42,8 +42,10 @@ class Reporter(Protocol):
         """The programs are being compiled."""
         ...
 
-    def progress(self, steps: int, total: int, rate: float, success: float, best: float) -> None:
-        """Environment steps done, of how many, steps/s, success of the last and of the best evaluation."""
+    def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
+        """Environment steps done, of how many, steps/s, success of the last and of the best evaluation, and the stage
+        of the curriculum, where there is one.
+        """
         ...
 
 
@@ -57,6 +59,10 @@ class Progress:
     best_update: int = 0
     best_success: float = 0.0
     last_success: float = 0.0
+    stage: int = 0
+    """Of the curriculum."""
+    stage_update: int = 0
+    """The update at which it began."""
     reached: dict[str, float] = dataclasses.field(default_factory=dict)
     """Seconds from process start and environment steps at the first evaluation at `stop_at`; empty before."""
 
@@ -118,31 +124,37 @@ def _loop(
     with SummaryWriter(str(run.events), purge_step=progress.update) as events, _interruptible() as stop:
         while progress.update < setup.updates and not stop.is_set():
             began = time.perf_counter()
-            state, metrics = programs.chunk(setup.env, config.algo, state, progress.update, setup.updates)
+            number, stages = progress.stage, len(setup.stages)
+            stage, final = setup.stages[number], number == stages - 1
+            state, metrics = programs.chunk(stage.env, config.algo, state, progress.update, setup.updates)
             metrics = {name: np.asarray(x, np.float64) for name, x in metrics.items()}
             _check_finite(metrics, progress.update)
             rate = config.chunk * setup.steps_per_update / (time.perf_counter() - began)
-            layers = policy_of(state)
-            flown = judge(setup, programs.evaluate, layers, WATCHED, config.eval_episodes)
+            weights = policy_of(state)
+            flown = judge(setup, programs.evaluate, weights, WATCHED, config.eval_episodes, stage=number)
             reached, last, now = progress.reached, success(flown), score(task, flown)
-            if config.stop_at and not reached and last >= config.stop_at:
-                confirmed = judge(setup, programs.evaluate, layers, REPORTED, REPORT_EPISODES)
+            if config.stop_at and final and not reached and last >= config.stop_at:
+                confirmed = judge(setup, programs.evaluate, weights, REPORTED, REPORT_EPISODES)
                 if success(confirmed) >= config.stop_at:
                     steps = (progress.update + config.chunk) * setup.steps_per_update
                     reached = {"seconds": before + since_process_start(), "steps": steps}
-            better = now > progress.best_score
+            update = progress.update + config.chunk
+            promoted = stage.is_over(last, (update - progress.stage_update) * setup.steps_per_update)
+            better = now > progress.best_score or not final  # a policy counts by the task itself
             progress = Progress(
-                update=progress.update + config.chunk,
+                update=update,
                 seconds=before + since_process_start(),
-                best_score=now if better else progress.best_score,
-                best_update=progress.update + config.chunk if better else progress.best_update,
+                best_score=-math.inf if not final else now if better else progress.best_score,
+                best_update=update if better else progress.best_update,
                 best_success=last if better else progress.best_success,
                 last_success=last,
+                stage=number + promoted,
+                stage_update=update if promoted else progress.stage_update,
                 reached=reached,
             )
             if better:
-                best = layers
-            rows = _rows(setup, metrics, progress, rate, flown)
+                best = weights
+            rows = _rows(setup, metrics, progress, rate, flown, number)
             run.append(rows)
             for name, value in rows[-1].items():
                 events.add_scalar(name, value, int(rows[-1]["update"]))
@@ -153,6 +165,7 @@ def _loop(
                 rate,
                 last,
                 progress.best_success,
+                f"stage {progress.stage + 1} of {stages}" if stages > 1 else "",
             )
             if reached:
                 break
@@ -169,7 +182,7 @@ def _finish(
     config = setup.config
     by_best = judge(setup, programs.evaluate, best, REPORTED, REPORT_EPISODES)
     by_last = judge(setup, programs.evaluate, policy_of(state), REPORTED, REPORT_EPISODES)
-    export_policy(run.policy, best, setup.features, config.network.activation, contract_of(setup.env, config))
+    export_policy(run.policy, best, setup.actor, contract_of(setup.env, config))
     summary = {
         "task": presets.task_name(config.task),
         "algorithm": presets.algorithm_name(config.algo),
@@ -190,13 +203,18 @@ def _finish(
     return summary
 
 
-def policy_of(state: TrainState) -> Layers:
+def policy_of(state: TrainState) -> Weights:
     """The policy on the host: every device has the same."""
     return jax.tree.map(lambda x: np.asarray(x)[0], state.parameters.policy)
 
 
 def _rows(
-    setup: Setup, metrics: dict[str, np.ndarray], progress: Progress, rate: float, flown: dict[str, Episodes]
+    setup: Setup,
+    metrics: dict[str, np.ndarray],
+    progress: Progress,
+    rate: float,
+    flown: dict[str, Episodes],
+    stage: int,
 ) -> list[dict[str, float]]:
     """A row an update; the evaluation stands in the chunk's last."""
     chunk = setup.config.chunk
@@ -206,6 +224,8 @@ def _rows(
         last = i == chunk - 1
         row: dict[str, Any] = {"update": update, "steps": update * setup.steps_per_update}
         row |= {"seconds": round(progress.seconds, 3) if last else "", "rate": round(rate) if last else ""}
+        if len(setup.stages) > 1:
+            row["stage"] = stage + 1
         for name, e in flown.items():
             row[f"eval/{name}/success"] = float(np.mean(e.success)) if last else ""
             row[f"eval/{name}/final_error"] = float(np.mean(e.final_error)) if last else ""
@@ -261,7 +281,7 @@ def _interruptible() -> Iterator[threading.Event]:
         signal.signal(signal.SIGINT, old)
 
 
-def load_policy_layers(setup: Setup, run: RunDirectory, which: str) -> Layers:
+def load_policy_weights(setup: Setup, run: RunDirectory, which: str) -> Weights:
     """The `best` or the `last` policy of a run's checkpoint.
 
     Raises:

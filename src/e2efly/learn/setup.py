@@ -8,8 +8,9 @@ from e2efly import presets
 from e2efly.config import TrainConfig
 from e2efly.env import Env
 from e2efly.learn.algorithm import Algorithm, make_algorithm
+from e2efly.learn.curriculum import Stage, stages
 from e2efly.learn.devices import share
-from e2efly.learn.networks import Features
+from e2efly.learn.networks import Actor
 
 
 @dataclass(frozen=True)
@@ -17,11 +18,10 @@ class Setup:
     """What a configuration comes to, before anything is compiled."""
 
     config: TrainConfig
-    env: Env
-    judges: dict[str, Env]
-    """The environments of the evaluation, by the name of their criterion."""
+    stages: tuple[Stage, ...]
+    """Of the curriculum; the last is the task itself."""
     algorithm: Algorithm
-    features: Features
+    actor: Actor
     updates: int
     """Updates of the whole run."""
     devices: int
@@ -35,14 +35,25 @@ class Setup:
             ValueError: naming the field, the value and what is accepted.
         """
         presets.check(config)
-        env = Env.of(config.task, config.reward, config.env)
-        judges = {name: Env.of(t, config.reward, config.env) for name, t in presets.suites(config.task).items()}
-        algorithm = make_algorithm(config.algo, env, config.network)
+        course = stages(config)
+        env = course[-1].env
+        actor = Actor.of(env.fields, env.cameras, config.network)
+        algorithm = make_algorithm(config.algo, actor)
         per_update = config.algo.envs * config.algo.horizon
         chunks = math.ceil(config.steps / (per_update * config.chunk))
         devices = share(config.algo.envs, getattr(config.algo, "minibatch", None), config.devices)
         config = dataclasses.replace(config, devices=devices)
-        return Setup(config, env, judges, algorithm, Features(env.fields), chunks * config.chunk, devices)
+        return Setup(config, course, algorithm, actor, chunks * config.chunk, devices)
+
+    @property
+    def env(self) -> Env:
+        """The task's environment."""
+        return self.stages[-1].env
+
+    @property
+    def judges(self) -> dict[str, Env]:
+        """The environments of the evaluation, by the name of their criterion."""
+        return self.stages[-1].judges
 
     @property
     def steps_per_update(self) -> int:

@@ -11,13 +11,16 @@ from jaxtyping import Array, Float, PRNGKeyArray
 from e2efly.config import CameraConfig
 from e2efly.physics.rotation import from_euler, rotate, to_matrix
 from e2efly.scenes.cast import Light, Pattern, cast, usual_light
-from e2efly.scenes.scene import Scene
+from e2efly.scenes.scene import CLASSES, Scene
+from e2efly.vehicles.names import unknown
 
 PRESETS: dict[str, CameraConfig] = {
     "d435i": CameraConfig(fov=(math.radians(87), math.radians(58)), reach=(0.28, 10.0)),
     "fpv": CameraConfig("rgb", fov=(math.radians(120), math.radians(90)), pitch=-math.radians(30)),
-    "down": CameraConfig("label", fov=(math.radians(90), math.radians(90)), pitch=math.pi / 2),
-    "lidar": CameraConfig("range", 360, 16, "spherical", (2 * math.pi, math.radians(30)), reach=(0.3, 50.0)),
+    "down": CameraConfig("mask", fov=(math.radians(90), math.radians(90)), pitch=math.pi / 2),
+    "lidar": CameraConfig(
+        "range", width=360, height=16, projection="spherical", fov=(2 * math.pi, math.radians(30)), reach=(0.3, 50.0)
+    ),
 }
 """Cameras by name: Intel RealSense D435i depth, an FPV camera tilted up by 30 degrees, one that looks straight down, a
 LiDAR of 16 rings."""
@@ -37,12 +40,7 @@ class Mount:
 
 
 def pattern(config: CameraConfig) -> Pattern:
-    """Directions of a camera's rays: of a pinhole in units of half its field of view, depth along the optical axis.
-
-    Raises:
-        ValueError: naming the field, the value and what is accepted.
-    """
-    check(config)
+    """Directions of a camera's rays: of a pinhole in units of half its field of view, depth along the optical axis."""
     rows, columns = ((np.arange(k) + 0.5) / k * 2 - 1 for k in (config.height, config.width))
     if config.projection == "pinhole":
         x, y = np.meshgrid(columns, rows)
@@ -90,15 +88,17 @@ def look(
 
     Returns:
         What `config.sees`: (n, h, w), colours and normals (n, h, w, 3). Depth and range, m: 0 where something is nearer
-        than they reach, the farthest where nothing is within reach.
+        than they reach, the farthest where nothing is within reach. A mask: 1 where the class is seen, else 0.
     """
     rays = pattern(config)
     measures = config.sees in ("depth", "range")
-    channel = "depth" if measures else config.sees
+    channel = {"range": "depth", "mask": "label"}.get(config.sees, config.sees)
     if channel == "rgb" and light is None:
         light = usual_light(scene.worlds)
     origin, matrix = pose(mount, position, quaternion)
-    image = cast(scene, origin, matrix, rays, (channel,), light)[channel]
+    image = cast(scene, origin, matrix, rays, (channel,), light, config.reach[1] if measures else math.inf)[channel]
+    if config.sees == "mask":
+        return (image == CLASSES.index(config.of)).astype(jnp.float32)
     if not measures:
         return image
     if config.sees == "range":
@@ -124,6 +124,8 @@ def check(config: CameraConfig) -> None:
     most = math.pi if config.projection == "pinhole" else 2 * math.pi + 1e-6
     if not all(0 < angle < most for angle in config.fov):
         raise ValueError(f"camera.fov is {config.fov}; accepted: angles in (0, {most:.4g}) rad")
+    if config.sees == "mask" and config.of not in CLASSES:
+        raise ValueError(f"camera.of: {unknown('class', config.of, CLASSES)}")
     near, far = config.reach
     if not 0 <= near < far:
         raise ValueError(f"camera.reach is {config.reach}; accepted: two rising numbers of metres, not negative")

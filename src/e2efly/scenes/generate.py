@@ -38,7 +38,7 @@ def forest(key: PRNGKeyArray, n: int, config: ForestConfig, start: Array, goal: 
     shape = (n, config.room)
     u = jax.random.uniform(place, (*shape, 2))
     middle = (start + goal)[:, None, :2] / 2
-    xy = middle + (u - 0.5) * jnp.array([1.0, 1.0]) * jnp.stack([jnp.asarray(config.length), jnp.asarray(config.width)])
+    xy = middle + (u - 0.5) * jnp.stack([jnp.asarray(config.length), jnp.asarray(config.width)])
     radius, height = _between(thick, shape, config.radius), _between(tall, shape, config.height)
     wanted = config.density * config.length * config.width
     there = jnp.arange(config.room) < jnp.minimum(jnp.floor(wanted + jax.random.uniform(many, (n, 1))), config.room)
@@ -70,7 +70,7 @@ def clutter(
 
     Returns:
         Solids by kind, their centres over the ground.
-    """  # fmt: skip
+    """
     each = config.room // len(CLUTTER)
     found = {}
     for index, kind in enumerate(CLUTTER):
@@ -96,14 +96,10 @@ def clutter(
         clear = is_clear(places, reach, keep, radius + config.clear) & (places[..., 2] > 0.0)
         chosen = jax.nn.one_hot(jnp.argmax(clear, axis=-1), TRIES)
         centre = jnp.einsum("nkc,nkci->nki", chosen, places)
-        solids = Solids.of(kind, centre, size, yaw=yaw)
         there &= jnp.any(clear, axis=-1)
-        found[kind] = _moving(solids, there, way, rate)
+        solids = Solids.of(kind, centre, size, yaw=yaw, active=there)
+        found[kind] = dataclasses.replace(solids, cosine=way, rate=rate * swings)
     return found
-
-
-def _moving(solids: Solids, there: Array, way: Array, rate: Array) -> Solids:
-    return dataclasses.replace(solids, active=there, cosine=way, rate=rate * jnp.any(way != 0, axis=-1))
 
 
 def is_clear(

@@ -6,33 +6,49 @@ import numpy as np
 import trimesh
 from jaxtyping import Float, Int
 
-from e2efly.scenes.scene import Scene, to_world
+from e2efly.physics.rotation import to_matrix
+from e2efly.scenes.meshes.scene import Part
+from e2efly.scenes.scene import Scene
 from e2efly.scenes.shapes import DISC, SQUARE
 
 GROUND = 500.0
 """Half the side of the square that stands for the ground, m."""
 
 
-def tessellate(scene: Scene, world: int, segments: int = 64) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, "f 3"]]:
-    """Vertices, m, and triangles of one world; round things are inscribed with so many segments around."""
-    meshes = []
+def parts(scene: Scene, world: int, segments: int = 64) -> list[Part]:
+    """One world as the objects of a `MeshScene`: the ground, then solids in the order of their instance numbers.
+
+    Args:
+        scene: worlds.
+        world: which of them.
+        segments: around round things, which are inscribed.
+    """
+    found = []
     ground = float(scene.ground[world])
     if ground > -GROUND:
         corners = GROUND * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) + [0.0, 0.0, ground]
-        meshes.append(trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False))
+        found.append(Part("ground", corners, np.array([[0, 1, 2], [0, 2, 3]])))
     for kind in scene.kinds:
         solids = scene.solids[kind]
-        turned = np.asarray(to_world(solids)[world], np.float64)
+        turned = np.asarray(to_matrix(solids.quaternion[world]), np.float64)
         for i in np.flatnonzero(np.asarray(solids.active[world])):
             pose = np.eye(4)
             pose[:3, :3], pose[:3, 3] = turned[i], solids.centre[world, i]
-            for mesh in _meshes(kind, np.asarray(solids.size[world, i], np.float64), segments):
-                mesh.apply_transform(pose)
-                meshes.append(mesh)
-    if not meshes:
+            mesh: Any = trimesh.util.concatenate(_meshes(kind, np.asarray(solids.size[world, i], np.float64), segments))
+            mesh.apply_transform(pose)
+            look = {"colour": np.asarray(solids.colour[world, i]), "label": int(solids.label[world, i])}
+            found.append(Part(f"{kind} {i}", np.asarray(mesh.vertices), np.asarray(mesh.faces), **look))
+    return found
+
+
+def tessellate(scene: Scene, world: int, segments: int = 64) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, "f 3"]]:
+    """Vertices, m, and triangles of one world; round things are inscribed with so many segments around."""
+    found = parts(scene, world, segments)
+    if not found:
         return np.zeros((0, 3)), np.zeros((0, 3), int)
-    whole: Any = trimesh.util.concatenate(meshes)
-    return np.asarray(whole.vertices), np.asarray(whole.faces)
+    before = np.cumsum([0] + [len(part.vertices) for part in found[:-1]])
+    faces = [part.faces + first for part, first in zip(found, before, strict=True)]
+    return np.concatenate([part.vertices for part in found]), np.concatenate(faces)
 
 
 def _meshes(kind: str, size: np.ndarray, segments: int) -> list[trimesh.Trimesh]:

@@ -13,13 +13,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from e2efly.physics.rotation import from_euler, to_matrix, unrotate
+from e2efly.physics.rotation import from_euler, unrotate
 from e2efly.scenes.shapes import FAR, SHAPES, SIZES
 
 SKY, GROUND, OBSTACLE, GATE, PAD, WALL = range(6)
 """Semantic classes."""
 CLASSES = ("sky", "ground", "obstacle", "gate", "pad", "wall")
 """Their names."""
+USUAL_CLASS = dict.fromkeys(SHAPES, OBSTACLE) | {"gate": GATE, "pad": PAD}
+"""Of the solids of each kind, unless said otherwise."""
 _BY_CLASS = [
     [0.55, 0.72, 0.92],
     [0.45, 0.47, 0.42],
@@ -79,7 +81,7 @@ class Solids:
         """
         centre = jnp.asarray(centre, jnp.float32)
         n, k, _ = centre.shape
-        label = {"gate": GATE, "pad": PAD}.get(kind, OBSTACLE) if label is None else label
+        label = USUAL_CLASS[kind] if label is None else label
         size = jnp.asarray(size, jnp.float32)
         size = jnp.pad(size, [(0, 0)] * (size.ndim - 1) + [(0, SIZES - size.shape[-1])])
         angle = jnp.broadcast_to(jnp.asarray(yaw, jnp.float32), (n, k))
@@ -152,11 +154,6 @@ def join(*solids: Solids) -> Solids:
     return jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis=1), *solids)
 
 
-def choose(mask: Bool[Array, " n"], a: Scene, b: Scene) -> Scene:
-    """World by world, `a` where the mask holds."""
-    return jax.tree.map(lambda x, y: jnp.where(mask.reshape(mask.shape + (1,) * (x.ndim - 1)), x, y), a, b)
-
-
 def first_instance(scene: Scene, kind: str) -> int:
     """Instance number of the first solid of a kind; sky is 0, the ground 1, then kind after kind."""
     before = scene.kinds[: scene.kinds.index(kind)]
@@ -165,16 +162,19 @@ def first_instance(scene: Scene, kind: str) -> int:
 
 def clearance(scene: Scene, position: Float[Array, "n 3"], time: Float[Array, " n"]) -> Float[Array, " n"]:
     """Signed distance of a point of each world to what is nearest, m; negative inside. Differentiable."""
-    nearest = position[:, 2] - scene.ground
-    for kind in scene.kinds:
-        nearest = jnp.minimum(nearest, jnp.min(distances(kind, scene.solids[kind], position, time), axis=1))
-    return nearest
+    return jnp.min(gaps(scene, position, time), axis=1)
+
+
+def gaps(scene: Scene, position: Float[Array, "n 3"], time: Float[Array, " n"]) -> Float[Array, "n 1+k"]:
+    """Signed distance of a point of each world to the ground and to each solid, m; `FAR` to what is not there."""
+    each = [distances(kind, scene.solids[kind], position, time) for kind in scene.kinds]
+    return jnp.concatenate([position[:, 2:] - scene.ground[:, None], *each], axis=1)
 
 
 def distances(
     kind: str, solids: Solids, position: Float[Array, "n 3"], time: Float[Array, " n"]
 ) -> Float[Array, "n k"]:
-    """Signed distance of a point of each world to each solid, m; `FAR` to what is not there."""  # fmt: skip
+    """Signed distance of a point of each world to each solid, m; `FAR` to what is not there."""
     local = unrotate(solids.quaternion, position[:, None] - solids.position(time))
     return jnp.where(solids.active, SHAPES[kind].distance(solids.size, local), FAR)
 
@@ -186,8 +186,3 @@ def approach(
     still = jnp.ones_like(time)
     gap, growing = jax.jvp(lambda p, t: clearance(scene, p, t), (position, time), (velocity, still))
     return gap, -growing
-
-
-def to_world(solids: Solids) -> Float[Array, "n k 3 3"]:
-    """Rotation matrices, solid's frame to world."""
-    return to_matrix(solids.quaternion)

@@ -21,8 +21,8 @@ DISC, SQUARE, TRIANGLE = 0, 1, 2
 _TINY = 1e-9
 
 Components = tuple[Array, Array, Array]
-Interval = tuple[Array, Array, Components]
-"""Where a ray is inside a convex part: from, to, and the outward normal where it enters."""
+Interval = tuple[Array, Array]
+"""Where a ray is inside a convex part: from, to."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,11 @@ class Shape:
 
     names: tuple[str, ...]
     """What the entries of `size` are, m unless said."""
-    enter: Callable[[Array, Components, Components], tuple[Array, Components]]
-    """(size (4,), ray's origin, ray's direction) -> parameter of the first point inside, `FAR` for none, and the
-    outward normal there. All in the solid's frame."""
+    enter: Callable[[Array, Components, Components], Array]
+    """(size (4,), ray's origin, ray's direction) -> parameter of the first point inside, `FAR` for none. In the
+    solid's frame."""
+    normal: Callable[[Array, Components], Components]
+    """(size (4,), point on the surface) -> outward normal."""
     distance: Callable[[Float[Array, "*n 4"], Float[Array, "*n 3"]], Float[Array, "*n"]]
     """(size, point) -> signed distance of a point of the solid's frame, m."""
     reach: Callable[[Float[Array, "*n 4"]], Float[Array, "*n"]]
@@ -44,57 +46,69 @@ SIZES = 4
 """Entries of `size`."""
 
 
-def _slab(o: Array, d: Array, half: Array, axis: int) -> Interval:
-    """Between two planes at +-half across an axis."""
+def _slab(o: Array, d: Array, half: Array) -> Interval:
+    """Between two planes at +-half across an axis, of which these are the components."""
     inverse = 1.0 / jnp.where(jnp.abs(d) < _TINY, _TINY, d)
     middle, width = -o * inverse, jnp.abs(half * inverse)
-    side = -jnp.sign(d)
-    zero = jnp.zeros_like(d)
-    return middle - width, middle + width, tuple(side if i == axis else zero for i in range(3))  # pyright: ignore
+    return middle - width, middle + width
 
 
 def _plane(o: Components, d: Components, normal: tuple[float, float], offset: Array) -> Interval:
     """On the inner side of a plane that stands upright, `normal . (x, y) <= offset`."""
     speed = normal[0] * d[0] + normal[1] * d[1]
     t = (offset - normal[0] * o[0] - normal[1] * o[1]) / jnp.where(jnp.abs(speed) < _TINY, _TINY, speed)
-    entering = speed < 0
-    zero = jnp.zeros_like(d[0])
-    return jnp.where(entering, t, -FAR), jnp.where(entering, FAR, t), (zero + normal[0], zero + normal[1], zero)
+    return jnp.where(speed < 0, t, -FAR), jnp.where(speed < 0, FAR, t)
 
 
-def _round(o: Components, d: Components, radius: Array, axes: tuple[int, ...]) -> Interval:
-    """Within a radius of the origin, counting only `axes`: a ball of three, an endless cylinder of two."""
-    a = sum(d[i] * d[i] for i in axes) + 1e-12
-    b = sum(o[i] * d[i] for i in axes)
-    c = sum(o[i] * o[i] for i in axes) - radius * radius
-    square = b * b - a * c
-    root, inverse = jnp.sqrt(jnp.maximum(square, 0.0)), 1.0 / a
-    enter = jnp.where(square > 0, (-b - root) * inverse, FAR)
-    leave = jnp.where(square > 0, (root - b) * inverse, -FAR)
-    zero = jnp.zeros_like(a)
-    normal = tuple((o[i] + enter * d[i]) / radius if i in axes else zero for i in range(3))
-    return enter, leave, normal  # pyright: ignore
+def _round(radius: Array, *along: tuple[Array, Array]) -> Interval:
+    """Within a radius of the origin by some components (o, d): a ball by three, an endless cylinder by two.
+
+    From the ray's point nearest to the origin, which float32 bears: Haines, Günther, Akenine-Möller, "Precision
+    improvements for ray/sphere intersection" (Ray Tracing Gems, 2019).
+    """
+    inverse = 1.0 / (sum(d * d for _, d in along) + 1e-12)
+    middle = -sum(o * d for o, d in along) * inverse
+    square = radius * radius - sum((o + middle * d) ** 2 for o, d in along)
+    root = jnp.sqrt(jnp.maximum(square, 0.0) * inverse)
+    return jnp.where(square > 0, middle - root, FAR), jnp.where(square > 0, middle + root, -FAR)
 
 
 def _common(*parts: Interval) -> Interval:
     """Inside all of them."""
-    enter, leave, normal = parts[0]
-    for e, end, n in parts[1:]:
-        later = e > enter
-        normal = tuple(jnp.where(later, new, old) for new, old in zip(n, normal, strict=True))
-        enter, leave = jnp.maximum(enter, e), jnp.minimum(leave, end)
-    return enter, leave, normal  # pyright: ignore
+    enter, leave = zip(*parts, strict=True)
+    return _largest(*enter), -_largest(*(-end for end in leave))
 
 
-def _first(part: Interval) -> tuple[Array, Components]:
+def _first(part: Interval) -> Array:
     """Where a ray that begins at t = 0 is first inside."""
-    enter, leave, normal = part
-    return jnp.where((enter <= leave) & (leave > 0), jnp.maximum(enter, 0.0), FAR), normal
+    enter, leave = part
+    return jnp.where((enter <= leave) & (leave > 0), jnp.maximum(enter, 0.0), FAR)
 
 
-def _nearer(a: tuple[Array, Components], b: tuple[Array, Components]) -> tuple[Array, Components]:
-    first = a[0] <= b[0]
-    return jnp.minimum(a[0], b[0]), tuple(jnp.where(first, m, n) for m, n in zip(a[1], b[1], strict=True))  # pyright: ignore
+def _facing(*faces: tuple[Array, Components]) -> Components:
+    """The normal of the face that a point is on, of those given as (distance to its plane, normal)."""
+    nearest, normal = faces[0]
+    for distance, other in faces[1:]:
+        nearer = jnp.abs(distance) < jnp.abs(nearest)
+        nearest = jnp.where(nearer, distance, nearest)
+        normal = tuple(jnp.where(nearer, new, old) for new, old in zip(other, normal, strict=True))
+    return normal  # pyright: ignore
+
+
+def _along(axis: int, value: Array) -> Components:
+    """A vector along an axis."""
+    return tuple(value if i == axis else jnp.zeros_like(value) for i in range(3))  # pyright: ignore
+
+
+def _face(p: Array, half: Array, axis: int) -> tuple[Array, Components]:
+    """Of the planes at +-half across an axis, the one on the point's side."""
+    return jnp.abs(p) - half, _along(axis, jnp.sign(p))
+
+
+def _mantle(p: Components, radius: Array) -> tuple[Array, Components]:
+    """Of an upright cylinder."""
+    x, y = p[0] / radius, p[1] / radius
+    return (x * x + y * y - 1.0) * radius / 2.0, (x, y, jnp.zeros_like(x))
 
 
 def _length(*parts: Array) -> Array:
@@ -113,35 +127,56 @@ def _largest(*values: Array) -> Array:
     return result
 
 
-def _box_enter(size: Array, o: Components, d: Components) -> tuple[Array, Components]:
-    return _first(_common(*(_slab(o[i], d[i], size[i], i) for i in range(3))))
+def _box_enter(size: Array, o: Components, d: Components) -> Array:
+    return _first(_common(*(_slab(o[i], d[i], size[i]) for i in range(3))))
+
+
+def _box_normal(size: Array, p: Components) -> Components:
+    return _facing(*(_face(p[i], size[i], i) for i in range(3)))
 
 
 def _box_distance(size: Array, p: Array) -> Array:
     return _outside(*(jnp.abs(p[..., i]) - size[..., i] for i in range(3)))
 
 
-def _sphere_enter(size: Array, o: Components, d: Components) -> tuple[Array, Components]:
-    return _first(_round(o, d, size[0], (0, 1, 2)))
+def _sphere_enter(size: Array, o: Components, d: Components) -> Array:
+    return _first(_round(size[0], *zip(o, d, strict=True)))
+
+
+def _sphere_normal(size: Array, p: Components) -> Components:
+    return p[0] / size[0], p[1] / size[0], p[2] / size[0]
 
 
 def _sphere_distance(size: Array, p: Array) -> Array:
     return _length(p[..., 0], p[..., 1], p[..., 2]) - size[..., 0]
 
 
-def _cylinder_enter(size: Array, o: Components, d: Components) -> tuple[Array, Components]:
-    return _first(_common(_round(o, d, size[0], (0, 1)), _slab(o[2], d[2], size[1], 2)))
+def _cylinder_enter(size: Array, o: Components, d: Components) -> Array:
+    return _first(_common(_round(size[0], (o[0], d[0]), (o[1], d[1])), _slab(o[2], d[2], size[1])))
+
+
+def _cylinder_normal(size: Array, p: Components) -> Components:
+    return _facing(_mantle(p, size[0]), _face(p[2], size[1], 2))
 
 
 def _cylinder_distance(size: Array, p: Array) -> Array:
     return _outside(_length(p[..., 0], p[..., 1]) - size[..., 0], jnp.abs(p[..., 2]) - size[..., 1])
 
 
-def _capsule_enter(size: Array, o: Components, d: Components) -> tuple[Array, Components]:
-    best = _first(_common(_round(o, d, size[0], (0, 1)), _slab(o[2], d[2], size[1], 2)))
-    for end in (-size[1], size[1]):
-        best = _nearer(best, _first(_round((o[0], o[1], o[2] - end), d, size[0], (0, 1, 2))))
-    return best
+def _capsule_enter(size: Array, o: Components, d: Components) -> Array:
+    """Through the side if the endless cylinder is entered between the ends, else through the ball at the end there."""
+    radius, half = size[0], size[1]
+    side, _ = _round(radius, (o[0], d[0]), (o[1], d[1]))
+    height = o[2] + side * d[2]
+    end, _ = _round(radius, (o[0], d[0]), (o[1], d[1]), (o[2] - jnp.where(height > 0, half, -half), d[2]))
+    enter = jnp.where((jnp.abs(height) <= half) | (side == FAR), side, end)
+    inside = o[0] ** 2 + o[1] ** 2 + jnp.maximum(jnp.abs(o[2]) - half, 0.0) ** 2 < radius**2
+    return jnp.where(enter > 0, enter, jnp.where(inside, 0.0, FAR))
+
+
+def _capsule_normal(size: Array, p: Components) -> Components:
+    beyond = p[2] - jnp.clip(p[2], -size[1], size[1])
+    return p[0] / size[0], p[1] / size[0], beyond / size[0]
 
 
 def _capsule_distance(size: Array, p: Array) -> Array:
@@ -149,20 +184,21 @@ def _capsule_distance(size: Array, p: Array) -> Array:
     return _length(p[..., 0], p[..., 1], beyond) - size[..., 0]
 
 
-def _gate_enter(size: Array, o: Components, d: Components) -> tuple[Array, Components]:
+def _gate_enter(size: Array, o: Components, d: Components) -> Array:
     """The frame is a box without the opening through it: a ray that enters in the opening meets its inner side."""
-    enter, leave, normal = _common(
-        _slab(o[0], d[0], size[3], 0), _slab(o[1], d[1], size[0] + size[2], 1), _slab(o[2], d[2], size[1] + size[2], 2)
-    )
-    (y0, y1, _), (z0, z1, _) = _slab(o[1], d[1], size[0], 1), _slab(o[2], d[2], size[1], 2)
+    width, height, bar, depth = size
+    opened, closed = _common(_slab(o[1], d[1], width), _slab(o[2], d[2], height))
+    enter, leave = _common(_slab(o[0], d[0], depth), _slab(o[1], d[1], width + bar), _slab(o[2], d[2], height + bar))
     start = jnp.maximum(enter, 0.0)
-    opened, closed = jnp.maximum(y0, z0), jnp.minimum(y1, z1)
-    through = (opened < start) & (start < closed)
-    t = jnp.where(through, closed, start)
-    zero = jnp.zeros_like(t)
-    inner = (zero, jnp.where(y1 <= z1, -jnp.sign(d[1]), 0.0), jnp.where(y1 <= z1, 0.0, -jnp.sign(d[2])))
-    normal = tuple(jnp.where(through, m, n) for m, n in zip(inner, normal, strict=True))
-    return jnp.where((enter <= leave) & (t < leave), t, FAR), normal  # pyright: ignore
+    t = jnp.where((opened < start) & (start < closed), closed, start)
+    return jnp.where((enter <= leave) & (t < leave), t, FAR)
+
+
+def _gate_normal(size: Array, p: Components) -> Components:
+    width, height, bar, depth = size
+    outer = (_face(p[0], depth, 0), _face(p[1], width + bar, 1), _face(p[2], height + bar, 2))
+    (y, side), (z, end) = _face(-p[1], width, 1), _face(-p[2], height, 2)
+    return _facing(*outer, (jnp.where(z < 0, y, FAR), side), (jnp.where(y < 0, z, FAR), end))
 
 
 def _gate_distance(size: Array, p: Array) -> Array:
@@ -184,21 +220,29 @@ def _outward(edge: tuple[tuple[float, float], tuple[float, float]]) -> tuple[flo
     return (by - ay) / 2.0, (ax - bx) / 2.0
 
 
-def _pad_enter(size: Array, o: Components, d: Components) -> tuple[Array, Components]:
+def _pad_enter(size: Array, o: Components, d: Components) -> Array:
     half, outline = size[0], size[2]
-    disc = _round(o, d, half, (0, 1))
-    square = _common(_slab(o[0], d[0], half, 0), _slab(o[1], d[1], half, 1))
-    inner = half / np.sqrt(3.0)
-    triangle = _common(*(_plane(o, d, _outward(edge), inner) for edge in _EDGES))
-    side = _chosen(outline, disc, _chosen(outline - 1, square, triangle))
-    return _first(_common(side, _slab(o[2], d[2], size[1], 2)))
+    disc = _round(half, (o[0], d[0]), (o[1], d[1]))
+    square = _common(_slab(o[0], d[0], half), _slab(o[1], d[1], half))
+    triangle = _common(*(_plane(o, d, _outward(edge), half / np.sqrt(3.0)) for edge in _EDGES))
+    side = [
+        jnp.where(outline == DISC, a, jnp.where(outline == SQUARE, b, c))
+        for a, b, c in zip(disc, square, triangle, strict=True)
+    ]
+    return _first(_common((side[0], side[1]), _slab(o[2], d[2], size[1])))
 
 
-def _chosen(outline: Array, first: Interval, other: Interval) -> Interval:
-    """`first` where the outline is 0."""
-    is_first = outline < 0.5
-    normal = tuple(jnp.where(is_first, m, n) for m, n in zip(first[2], other[2], strict=True))
-    return jnp.where(is_first, first[0], other[0]), jnp.where(is_first, first[1], other[1]), normal  # pyright: ignore
+def _pad_normal(size: Array, p: Components) -> Components:
+    half, outline = size[0], size[2]
+    edges = [(_outward(edge), jnp.zeros_like(p[0])) for edge in _EDGES]
+    triangle = [
+        (n[0] * p[0] + n[1] * p[1] - half / np.sqrt(3.0), (zero + n[0], zero + n[1], zero)) for n, zero in edges
+    ]
+    sides = [
+        (DISC, [_mantle(p, half)]), (SQUARE, [_face(p[0], half, 0), _face(p[1], half, 1)]), (TRIANGLE, triangle)
+    ]  # fmt: skip
+    faces = [(jnp.where(outline == which, d, FAR), normal) for which, side in sides for d, normal in side]
+    return _facing(_face(p[2], size[1], 2), *faces)
 
 
 def _pad_distance(size: Array, p: Array) -> Array:
@@ -213,28 +257,40 @@ def _pad_distance(size: Array, p: Array) -> Array:
         away.append(_length(x - (ax + along * ex) * half, y - (ay + along * ey) * half))
     triangle = jnp.where(inside > 0, -_largest(*(-length for length in away)), inside)
     outline = size[..., 2]
-    flat = jnp.where(outline < 0.5, disc, jnp.where(outline < 1.5, square, triangle))
+    flat = jnp.where(outline == DISC, disc, jnp.where(outline == SQUARE, square, triangle))
     return _outside(flat, jnp.abs(p[..., 2]) - size[..., 1])
 
 
 SHAPES: dict[str, Shape] = {
     "box": Shape(
-        ("half x", "half y", "half z"), _box_enter, _box_distance, lambda s: _length(s[..., 0], s[..., 1], s[..., 2])
+        ("half x", "half y", "half z"),
+        _box_enter,
+        _box_normal,
+        _box_distance,
+        lambda s: _length(s[..., 0], s[..., 1], s[..., 2]),
     ),
-    "sphere": Shape(("radius",), _sphere_enter, _sphere_distance, lambda s: s[..., 0]),
+    "sphere": Shape(("radius",), _sphere_enter, _sphere_normal, _sphere_distance, lambda s: s[..., 0]),
     "cylinder": Shape(
-        ("radius", "half length"), _cylinder_enter, _cylinder_distance, lambda s: _length(s[..., 0], s[..., 1])
+        ("radius", "half length"),
+        _cylinder_enter,
+        _cylinder_normal,
+        _cylinder_distance,
+        lambda s: _length(s[..., 0], s[..., 1]),
     ),
-    "capsule": Shape(("radius", "half length"), _capsule_enter, _capsule_distance, lambda s: s[..., 0] + s[..., 1]),
+    "capsule": Shape(
+        ("radius", "half length"), _capsule_enter, _capsule_normal, _capsule_distance, lambda s: s[..., 0] + s[..., 1]
+    ),
     "gate": Shape(
         ("half width of the opening", "half height of the opening", "width of the bars", "half depth of the bars"),
         _gate_enter,
+        _gate_normal,
         _gate_distance,
         lambda s: _length(s[..., 0] + s[..., 2], s[..., 1] + s[..., 2], s[..., 3]),
     ),
     "pad": Shape(
         ("half width", "half height", "outline: 0 disc, 1 square, 2 triangle"),
         _pad_enter,
+        _pad_normal,
         _pad_distance,
         lambda s: _length(np.sqrt(2.0) * s[..., 0], s[..., 1]),
     ),

@@ -11,6 +11,7 @@ from e2efly.config import HoverConfig
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
+from e2efly.scenes.scene import Scene
 from e2efly.tasks.task import Outcome, Shape, at_rest, touches_ground, uniform
 
 
@@ -45,9 +46,13 @@ class Hover:
         del time
         return jnp.broadcast_to(jnp.asarray(self.config.target), (*memory.shape, 3))
 
-    def targets(self, memory: Float[Array, " n"], time: Float[Array, " n"]) -> Float[Array, "n 1 3"]:
-        """The target."""
-        return self.goal(memory, time)[:, None]
+    def observe(self, memory: Float[Array, " n"], time: Float[Array, " n"], state: State) -> Float[Array, "n 3"]:
+        """Target minus position."""
+        return self.goal(memory, time) - state.position
+
+    def scene(self, memory: Float[Array, " n"]) -> Scene:
+        """Level ground."""
+        return Scene.of({}, memory.shape[0])
 
     def desired_yaw(self, memory: Float[Array, " n"], state: State) -> Float[Array, " n"]:
         """Along world x."""

@@ -11,6 +11,8 @@ from e2efly.config import LandConfig
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import cos_tilt, from_euler
+from e2efly.scenes.scene import Scene, Solids
+from e2efly.scenes.shapes import DISC
 from e2efly.tasks.task import Outcome, Shape, at_rest, touches_ground, uniform
 
 
@@ -48,9 +50,16 @@ class Land:
         zero = jnp.zeros_like(time)
         return jnp.stack([zero, zero, zero + self.shape.feet_height], axis=-1)
 
-    def targets(self, memory: Float[Array, "n 0"], time: Float[Array, " n"]) -> Float[Array, "n 1 3"]:
-        """The same."""
-        return self.goal(memory, time)[:, None]
+    def observe(self, memory: Float[Array, "n 0"], time: Float[Array, " n"], state: State) -> Float[Array, "n 3"]:
+        """Goal minus position."""
+        return self.goal(memory, time) - state.position
+
+    def scene(self, memory: Float[Array, "n 0"]) -> Scene:
+        """A flat pad on level ground."""
+        n = memory.shape[0]
+        return Scene.of(
+            {"pad": Solids.of("pad", jnp.zeros((n, 1, 3)), jnp.array([2 * self.config.radius, 0.002, DISC]))}, n
+        )
 
     def desired_yaw(self, memory: Float[Array, "n 0"], state: State) -> Float[Array, " n"]:
         """Along world x."""

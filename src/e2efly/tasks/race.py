@@ -14,7 +14,9 @@ from e2efly.courses.tracks import load_track
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
-from e2efly.tasks.task import Outcome, Shape, at_rest, into_ball, touches_ground, uniform
+from e2efly.scenes.course import frames
+from e2efly.scenes.scene import Scene
+from e2efly.tasks.task import Outcome, Shape, at_rest, into_ball, offsets, touches_ground, uniform
 
 LOWEST_START = 0.3
 """Starts are drawn at least this high over the feet, m."""
@@ -80,6 +82,15 @@ class Race:
         del time
         index = memory % self.count
         return jnp.asarray(self.gates.position)[jnp.stack([index, index + 1], axis=-1)]
+
+    def observe(self, memory: Int[Array, " n"], time: Float[Array, " n"], state: State) -> Float[Array, "n 6"]:
+        """The same, minus position."""
+        return offsets(self.targets(memory, time), state)
+
+    def scene(self, memory: Int[Array, " n"]) -> Scene:
+        """The gates over level ground."""
+        n = memory.shape[0]
+        return Scene.of({"gate": frames(self.gates, n)}, n)
 
     def desired_yaw(self, memory: Int[Array, " n"], state: State) -> Float[Array, " n"]:
         """Towards the next gate."""

@@ -1,6 +1,6 @@
 """What a task is to the environment."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Protocol
 
@@ -8,15 +8,35 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.config import HoverConfig, LandConfig, RaceConfig, TrackConfig
+from e2efly.config import (
+    AvoidConfig,
+    ClutterConfig,
+    ForestConfig,
+    GapConfig,
+    HoverAwareConfig,
+    HoverConfig,
+    LandConfig,
+    LandVisualConfig,
+    RaceClutterConfig,
+    RaceConfig,
+    TrackConfig,
+)
 from e2efly.observation import Field
 from e2efly.physics import State
+from e2efly.scenes.scene import Scene, gaps
 
 for _config, _static in (
     (HoverConfig, ()),
     (LandConfig, ()),
+    (LandVisualConfig, ()),
     (TrackConfig, ("reference",)),
     (RaceConfig, ("track",)),
+    (ForestConfig, ("room",)),
+    (ClutterConfig, ("room",)),
+    (RaceClutterConfig, ("track",)),
+    (AvoidConfig, ()),
+    (GapConfig, ()),
+    (HoverAwareConfig, ()),
 ):
     jax.tree_util.register_dataclass(
         _config,
@@ -51,6 +71,8 @@ class Outcome:
     """The vehicle hit something or left the fence in this step."""
     error: Float[Array, " n"]
     """The task's error now, m."""
+    signals: dict[str, Array] = field(default_factory=dict)
+    """What the task offers to the terms of the reward, beside what every environment does."""
 
 
 class Task(Protocol):
@@ -68,7 +90,7 @@ class Task(Protocol):
 
     @property
     def fields(self) -> tuple[Field, ...]:
-        """The task's own observation fields: positions relative to the vehicle, world, m."""
+        """The task's own observation fields."""
         ...
 
     @property
@@ -84,8 +106,12 @@ class Task(Protocol):
         """Where to be now, world, m."""
         ...
 
-    def targets(self, memory: Any, time: Float[Array, " n"]) -> Float[Array, "n k 3"]:
-        """The positions that the policy is shown, world, m."""
+    def observe(self, memory: Any, time: Float[Array, " n"], state: State) -> Float[Array, "n o"]:
+        """The task's own observation fields, of the state as the policy is told it."""
+        ...
+
+    def scene(self, memory: Any) -> Scene:
+        """The worlds that the vehicles fly in: what their cameras see, and what the terms of avoidance keep off."""
         ...
 
     def desired_yaw(self, memory: Any, state: State) -> Float[Array, " n"]:
@@ -99,9 +125,35 @@ class Task(Protocol):
         ...
 
 
+def offsets(targets: Float[Array, "n k 3"], state: State) -> Float[Array, "n 3k"]:
+    """Positions minus the vehicle's, world, m, target after target."""
+    return (targets - state.position[:, None]).reshape(targets.shape[0], -1)
+
+
 def touches_ground(shape: Shape, state: State) -> Bool[Array, " n"]:
     """Touching: the feet, `feet_height` below the centre of mass, at or under the ground z = 0."""
     return state.position[:, 2] <= shape.feet_height
+
+
+def struck(
+    scene: Scene,
+    before: State,
+    after: State,
+    time: Float[Array, " n"],
+    period: float,
+    checks: int,
+    radius: float | Array,
+) -> Bool[Array, " n"]:
+    """Whether a vehicle's sphere touched a solid or the ground during a control step.
+
+    Checked `checks` times, on the cubic through positions and velocities at both ends, without gradient.
+    """
+    s = (1 + jnp.arange(checks)) / checks
+    h = jnp.stack([(1 + 2 * s) * (1 - s) ** 2, period * s * (1 - s) ** 2, s**2 * (3 - 2 * s), period * s**2 * (s - 1)])
+    ends = jnp.stack([before.position, before.velocity, after.position, after.velocity])
+    path = jnp.einsum("hs,hni->sni", h, jax.lax.stop_gradient(ends))
+    nearest = jax.vmap(lambda p, t: jnp.min(gaps(scene, p, t), axis=1))(path, time - period + period * s[:, None])
+    return jnp.any(nearest < radius, axis=0)
 
 
 def uniform(key: PRNGKeyArray, n: int, size: int) -> Float[Array, "n size"]:

@@ -14,8 +14,9 @@ from e2efly.courses.references import POINTS, SPACING, Lissajous, Spline, knot_c
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
+from e2efly.scenes.scene import Scene
 from e2efly.tasks.references import polynomial
-from e2efly.tasks.task import Outcome, Shape, at_rest, into_ball, touches_ground, uniform
+from e2efly.tasks.task import Outcome, Shape, at_rest, into_ball, offsets, touches_ground, uniform
 from e2efly.vehicles.names import unknown
 
 
@@ -113,6 +114,14 @@ class Track:
     def targets(self, memory: Memory, time: Float[Array, " n"]) -> Float[Array, "n k 3"]:
         """The reference points for now and the second ahead."""
         return memory.reference.position(time[:, None] + SPACING * jnp.arange(POINTS))
+
+    def observe(self, memory: Memory, time: Float[Array, " n"], state: State) -> Float[Array, "n 30"]:
+        """The same, minus position."""
+        return offsets(self.targets(memory, time), state)
+
+    def scene(self, memory: Memory) -> Scene:
+        """Level ground."""
+        return Scene.of({}, memory.steps.shape[0])
 
     def desired_yaw(self, memory: Memory, state: State) -> Float[Array, " n"]:
         """Along world x."""

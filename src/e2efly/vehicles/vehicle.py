@@ -6,7 +6,6 @@ Rotor order is Betaflight's: rear right, front right, rear left, front left. Bod
 import dataclasses
 import hashlib
 import json
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.vehicles.names import nearest, unknown
+from e2efly.vehicles.tables import read_table
 
 GRAVITY = 9.81
 """Standard gravity of the paper, m/s^2."""
@@ -135,11 +135,7 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
         if text.endswith(".toml"):
             raise ValueError(f"vehicle file {text!r} does not exist")
         raise ValueError(unknown("vehicle", text, vehicle_names()) + ", or the path of a .toml file")
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: not a TOML file: {error}") from None
-    return _from_table(path.stem, table, str(path))
+    return _from_table(path.stem, read_table(path), str(path))
 
 
 def _from_table(name: str, table: dict[str, Any], where: str) -> Vehicle:

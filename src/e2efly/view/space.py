@@ -1,15 +1,15 @@
 """Flights in space: in 3D and from above."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
@@ -21,36 +21,20 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from e2efly.view.flights import Flights
 from e2efly.view.scene import Face, Line, Mark, Thing, scene
-from e2efly.view.style import GREY, INK, PALE, VERMILLION, figure
-
-SPEED = LinearSegmentedColormap.from_list("speed", colormaps["viridis"](np.linspace(0.0, 0.92, 256)))
-"""Viridis without its pale end, which white paper swallows."""
+from e2efly.view.style import FAILURE, GREY, INK, MARK, PALE, SPEED, START, figure
+from e2efly.view.worlds import Body, draw_plan, draw_space
 
 Corner = Float[np.ndarray, "3"]
 Solid = Any
 """An `Axes3D`: Matplotlib ships no types for it."""
 
-_MARK: dict[str, Any] = {
-    "color": INK,
-    "markersize": 12,
-    "markeredgecolor": "white",
-    "markeredgewidth": 0.8,
-    "linestyle": "",
-}
 _TEXT: dict[str, Any] = {
     "color": INK, "ha": "center", "va": "center", "weight": "bold", "zorder": 6,
     "path_effects": [withStroke(linewidth=3, foreground="white")],
 }  # fmt: skip
-_START: dict[str, Any] = {
-    "marker": "o", "markersize": 5, "markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 1.2,
-    "linestyle": "",
-}  # fmt: skip
-_FAILURE: dict[str, Any] = {
-    "marker": "X", "markersize": 8, "markerfacecolor": VERMILLION, "markeredgecolor": "white", "linestyle": "",
-}  # fmt: skip
 
 
-def plot_flights(task: Any, flights: Flights, path: str | Path, title: str) -> None:
+def plot_flights(task: Any, flights: Flights, path: str | Path, title: str, solids: Sequence[Body] = ()) -> None:
     """Draw episodes in space, in 3D and from above, coloured by speed, with what the task has there.
 
     Args:
@@ -58,10 +42,11 @@ def plot_flights(task: Any, flights: Flights, path: str | Path, title: str) -> N
         flights: the episodes.
         path: the PNG file.
         title: of the figure.
+        solids: of the world that all of them fly in.
     """
     things = scene(task, flights)
     tracks = [flights.position[:k, i] for i, k in enumerate(flights.length)]
-    low, high = _bounds(tracks, things)
+    low, high = _bounds(tracks, things, solids)
     speeds = _paths(flights)[1]
     fastest = speeds[np.isfinite(speeds)].max(initial=0.0)
     norm = Normalize(0.0, max(fastest, 0.1))
@@ -69,8 +54,10 @@ def plot_flights(task: Any, flights: Flights, path: str | Path, title: str) -> N
         solid: Solid = fig.add_axes((0.01, 0.10, 0.55, 0.83), projection="3d", computed_zorder=False)
         _solid(solid, flights, things, low, high, norm)
         _fit(fig, solid, low, high, Bbox.from_extents(0.012, 0.09, 0.55, 0.91))
+        draw_space(solid, solids)
         plan = fig.add_axes((0.63, 0.21, 0.275, 0.65))
         _plan(plan, flights, things, low, high, norm)
+        draw_plan(plan, solids)
         bar_axes = fig.add_axes((0.928, 0.21, 0.014, 0.65))
         bar = fig.colorbar(ScalarMappable(norm, SPEED), cax=bar_axes)
         bar.set_label("speed (m/s)")
@@ -101,9 +88,10 @@ def _fit(fig: Figure, ax: Solid, low: Corner, high: Corner, room: Bbox) -> None:
     ax.set_position((at.x0 + shift[0], at.y0 + shift[1], at.width, at.height))
 
 
-def _bounds(tracks: list[np.ndarray], things: list[Thing]) -> tuple[Corner, Corner]:
+def _bounds(tracks: list[np.ndarray], things: list[Thing], solids: Sequence[Body]) -> tuple[Corner, Corner]:
     """Corners of a box about all that is drawn, ground included, at least 0.6 m wide with a margin."""
     points = [np.atleast_2d(thing.point if isinstance(thing, Mark) else thing.points) for thing in things]
+    points += [body.quads.reshape(-1, 3) for body in solids]
     whole = np.concatenate([*tracks, *points]) if tracks or points else np.zeros((1, 3))
     whole = whole[np.isfinite(whole).all(axis=1)]
     whole = whole if len(whole) else np.zeros((1, 3))
@@ -150,13 +138,13 @@ def _solid(ax: Solid, flights: Flights, things: list[Thing], low: Corner, high: 
         elif thing.text:
             ax.text(*thing.point, thing.text, **_TEXT)
         else:
-            ax.plot(*thing.point[:, None], marker=thing.marker, **_MARK, zorder=5)
+            ax.plot(*thing.point[:, None], marker=thing.marker, **MARK, zorder=5)
     lines = Line3DCollection(segments, array=speeds, cmap=SPEED, norm=norm, linewidths=1.5, zorder=3)
     lines.set_capstyle("round")
     ax.add_collection3d(lines, autolim=False)
     starts, failures = _ends(flights)
-    ax.plot(*starts.T, **_START, zorder=4)
-    ax.plot(*failures.T, **_FAILURE, zorder=7)
+    ax.plot(*starts.T, **START, zorder=4)
+    ax.plot(*failures.T, **FAILURE, zorder=7)
     ax.set_xlim(x0, x1)
     ax.set_ylim(y0, y1)
     ax.set_zlim(z0, high[2])
@@ -183,14 +171,14 @@ def _plan(ax: Axes, flights: Flights, things: list[Thing], low: Corner, high: Co
         elif thing.text:
             ax.text(thing.point[0], thing.point[1], thing.text, **_TEXT)
         else:
-            ax.plot(*thing.point[:2, None], marker=thing.marker, **_MARK, zorder=5)
+            ax.plot(*thing.point[:2, None], marker=thing.marker, **MARK, zorder=5)
     segments, speeds = _paths(flights)
     lines = LineCollection(list(segments[..., :2]), array=speeds, cmap=SPEED, norm=norm, linewidths=1.4, zorder=3)
     lines.set_capstyle("round")
     ax.add_collection(lines)
     starts, failures = _ends(flights)
-    ax.plot(*starts.T[:2], **_START, zorder=4)
-    ax.plot(*failures.T[:2], **_FAILURE, zorder=7)
+    ax.plot(*starts.T[:2], **START, zorder=4)
+    ax.plot(*failures.T[:2], **FAILURE, zorder=7)
     ax.set_xlim(low[0], high[0])
     ax.set_ylim(low[1], high[1])
     ax.set_aspect("equal", adjustable="box")
@@ -201,7 +189,7 @@ def _plan(ax: Axes, flights: Flights, things: list[Thing], low: Corner, high: Co
 
 
 def _legend(flights: Flights, things: list[Thing]) -> list[Line2D | Patch]:
-    handles: list[Line2D | Patch] = [Line2D([], [], label="start", **_START)]
+    handles: list[Line2D | Patch] = [Line2D([], [], label="start", **START)]
     for thing in things:
         if not thing.label:
             continue
@@ -210,8 +198,8 @@ def _legend(flights: Flights, things: list[Thing]) -> list[Line2D | Patch]:
         elif isinstance(thing, Face):
             handles.append(Patch(facecolor=thing.color, label=thing.label))
         else:
-            handles.append(Line2D([], [], marker=thing.marker, label=thing.label, **_MARK))
+            handles.append(Line2D([], [], marker=thing.marker, label=thing.label, **MARK))
     failed = len(_ends(flights)[1])
     if failed:
-        handles.append(Line2D([], [], label=f"no success ({failed} of {len(flights.length)})", **_FAILURE))
+        handles.append(Line2D([], [], label=f"no success ({failed} of {len(flights.length)})", **FAILURE))
     return [*handles, Line2D([], [], color=PALE, label="shadow on the ground")]

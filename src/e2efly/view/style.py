@@ -5,9 +5,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from matplotlib import rc_context
+from matplotlib import colormaps, rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
@@ -17,6 +18,22 @@ INK, GREY, PALE, HALO = "#222222", "#767676", "#D0D0D0", "#F5CE85"
 
 WIDTH, DPI = 10.0, 120
 """Inches and dots an inch: 1200 pixels."""
+
+SPEED = LinearSegmentedColormap.from_list("speed", [colormaps["viridis"](0.92 * i / 255) for i in range(256)])
+"""Viridis without its pale end, which white paper swallows."""
+MARK: dict[str, Any] = {
+    "color": INK, "markersize": 12, "markeredgecolor": "white", "markeredgewidth": 0.8, "linestyle": "",
+}  # fmt: skip
+"""A place."""
+START: dict[str, Any] = {
+    "marker": "o", "markersize": 5, "markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 1.2,
+    "linestyle": "",
+}  # fmt: skip
+"""Where a flight begins."""
+FAILURE: dict[str, Any] = {
+    "marker": "X", "markersize": 8, "markerfacecolor": VERMILLION, "markeredgecolor": "white", "linestyle": "",
+}  # fmt: skip
+"""Where one without success ends."""
 
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans", "font.size": 10, "axes.titlesize": 11, "axes.labelsize": 10,

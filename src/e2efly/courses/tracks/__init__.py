@@ -1,7 +1,6 @@
 """Race tracks as data files, and their loader."""
 
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.vehicles.names import unknown
+from e2efly.vehicles.tables import number, numbers, read_table
 
 _HERE = Path(__file__).parent
 _ACCEPTED = "accepted: closed (true or false), start {position [x, y, z], yaw}, gates [{position, yaw, opening [w, h]}]"
@@ -47,10 +47,7 @@ def load_track(name_or_path: str) -> RaceTrack:
     path = Path(name_or_path) if name_or_path.endswith(".toml") else _HERE / f"{name_or_path}.toml"
     if not path.is_file():
         raise ValueError(unknown("track", name_or_path, track_names()) + ", or the path of a .toml file")
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: not a TOML file: {error}") from None
+    table = read_table(path)
     _keys(path, "the file", table, {"closed", "start", "gates"})
     if not isinstance(table["closed"], bool):
         raise ValueError(f"{path}: closed is {table['closed']!r}; accepted: true or false")
@@ -60,8 +57,8 @@ def load_track(name_or_path: str) -> RaceTrack:
     _keys(path, "start", table["start"], {"position", "yaw"})
     for i, gate in enumerate(gates):
         _keys(path, f"gates[{i}]", gate, {"position", "yaw", "opening"})
-    opening = np.stack([_numbers(path, f"gates[{i}].opening", g["opening"], (2,)) for i, g in enumerate(gates)])
-    position = np.stack([_numbers(path, f"gates[{i}].position", g["position"], (3,)) for i, g in enumerate(gates)])
+    opening = np.stack([numbers(f"{path}: gates[{i}].opening", g["opening"], 2) for i, g in enumerate(gates)])
+    position = np.stack([numbers(f"{path}: gates[{i}].position", g["position"], 3) for i, g in enumerate(gates)])
     for i, (p, o) in enumerate(zip(position, opening, strict=True)):
         if np.any(o <= 0.3):
             raise ValueError(f"{path}: gates[{i}].opening is {o.tolist()}; accepted: more than 0.3 m")
@@ -70,10 +67,10 @@ def load_track(name_or_path: str) -> RaceTrack:
     return RaceTrack(
         name=path.stem,
         closed=table["closed"],
-        start=_numbers(path, "start.position", table["start"]["position"], (3,)),
-        start_yaw=math.radians(float(_numbers(path, "start.yaw", table["start"]["yaw"], ()))),
+        start=numbers(f"{path}: start.position", table["start"]["position"], 3),
+        start_yaw=math.radians(number(f"{path}: start.yaw", table["start"]["yaw"])),
         position=position,
-        yaw=np.radians([float(_numbers(path, f"gates[{i}].yaw", g["yaw"], ())) for i, g in enumerate(gates)]),
+        yaw=np.radians([number(f"{path}: gates[{i}].yaw", g["yaw"]) for i, g in enumerate(gates)]),
         opening=opening,
     )
 
@@ -82,14 +79,3 @@ def _keys(path: Path, where: str, table: Any, wanted: set[str]) -> None:
     if not isinstance(table, dict) or set(table) != wanted:
         found = sorted(table) if isinstance(table, dict) else table
         raise ValueError(f"{path}: {where} has {found}; {_ACCEPTED}")
-
-
-def _numbers(path: Path, where: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    try:
-        array = np.full((), np.nan) if np.asarray(value).dtype == bool else np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        array = np.full((), np.nan)
-    if array.shape != shape or not np.all(np.isfinite(array)):
-        expected = "a finite number" if shape == () else f"{shape[0]} finite numbers"
-        raise ValueError(f"{path}: {where} is {value!r}; accepted: {expected}")
-    return array

@@ -2,11 +2,11 @@
 
 A control step: the action joins the queue of the latency, the physics runs its sub-steps under the commands that
 the queue lets through, the task judges, the reward is summed, the policy's observation is built from the (delayed,
-noisy) state, and vehicles whose episode ended start anew. All of it is differentiable but the events.
+noisy) state, vehicles whose episode ended start anew, and their cameras look. All of it is differentiable but the
+events and the images.
 """
 
 import dataclasses
-import math
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -17,90 +17,31 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from e2efly import rewards
-from e2efly.config import EnvConfig, ImuConfig, NoiseConfig, RewardConfig, TaskConfig
+from e2efly.config import CameraConfig, EnvConfig, ImuConfig, NoiseConfig, RewardConfig, TaskConfig
+from e2efly.env.check import check
+from e2efly.env.state import EnvState, Step
 from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field, past_actions
 from e2efly.physics import COMMAND_MODES, Physics, State, command_limits, step
 from e2efly.physics.body import hover_rotor_speed
-from e2efly.physics.rotation import from_euler, yaw
+from e2efly.physics.rotation import from_euler, unrotate, yaw
+from e2efly.scenes import scene as scenes
 from e2efly.sensors import imu, latency
+from e2efly.sensors.eyes import Eye, image_shape, see
 from e2efly.sensors.noise import add_noise
 from e2efly.tasks import Shape, Task, make_task
 from e2efly.tasks.task import into_ball, uniform
-from e2efly.vehicles import Vehicle, load_vehicle, unknown
-from e2efly.vehicles.vehicle import GRAVITY, quantities
+from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles.vehicle import GRAVITY
 
-GENERATOR = "rbg"
-"""XLA's own random generator: it compiles in a seventh of the time of JAX's default."""
 DEFAULT = EnvConfig()
 """The VIS-R, nothing random but the starts."""
-
-
-def random_key(*seed: int) -> PRNGKeyArray:
-    """The key of a seed, or of several numbers; made by NumPy: nothing to compile."""
-    return jax.random.wrap_key_data(jnp.asarray(np.random.SeedSequence(seed).generate_state(4)), impl=GENERATOR)
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class EnvState:
-    """Everything that one step hands to the next, each leaf of shape (n, ...) but the key and the tick."""
-
-    vehicle: State
-    memory: Any
-    """The task's own state."""
-    time: Float[Array, " n"]
-    """Since the start of the episode, s."""
-    actions: Float[Array, "n k 4"]
-    """The policy's last actions, newest first."""
-    action_latency: Float[Array, " n"]
-    """s."""
-    plant: dict[str, Array]
-    """The randomised vehicle parameters."""
-    wind: Float[Array, "n 3"] | None
-    """World, m/s."""
-    past: State | None
-    """The last states, newest first, when observations are late."""
-    observation_latency: Float[Array, " n"] | None
-    """s."""
-    imu: imu.ImuState | None
-    """Biases and the last measurement."""
-    key: PRNGKeyArray
-    tick: Int[Array, ""]
-    """Steps since `reset`; with the key it seeds everything random."""
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Step:
-    """What a step returns beside the new state, each leaf of shape (n, ...)."""
-
-    observation: Float[Array, "n o"]
-    """What to act on next: of a new episode where the last one ended."""
-    final_observation: Float[Array, "n o"]
-    """What was reached, before any new start: the one to bootstrap from."""
-    reward: Float[Array, " n"]
-    terms: dict[str, Float[Array, " n"]]
-    """The weighted terms of the reward."""
-    terminated: Bool[Array, " n"]
-    """The episode ended for good: no value after it."""
-    truncated: Bool[Array, " n"]
-    """The time was out, and nothing else."""
-    success: Bool[Array, " n"]
-    """The episode ended in this step and met the criterion."""
-    error: Float[Array, " n"]
-    """The task's error, m."""
-
-    @property
-    def done(self) -> Bool[Array, " n"]:
-        """Terminated or truncated."""
-        return self.terminated | self.truncated
 
 
 @partial(
     jax.tree_util.register_dataclass,
     data_fields=[
         "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range",
-        "observation_latency_range", "randomize", "wind", "noise", "imu",
+        "observation_latency_range", "randomize", "wind", "noise", "imu", "cameras",
     ],
     meta_fields=["queue", "seen_actions", "past"],
 )  # fmt: skip
@@ -126,12 +67,13 @@ class Env:
     """Largest wind speed, m/s; None: still air."""
     noise: NoiseConfig | None
     imu: ImuConfig | None
+    cameras: tuple[CameraConfig, ...]
     queue: int
     """Actions that are kept."""
     seen_actions: int
     """Past actions in the observation."""
     past: int
-    """States that are kept for late observations; 0: none."""
+    """States that are kept for late observations and images; 0: none."""
 
     @staticmethod
     def of(task: TaskConfig, reward: RewardConfig, config: EnvConfig = DEFAULT, dtype: type = np.float32) -> "Env":
@@ -145,7 +87,7 @@ class Env:
             vehicle, config.command_mode, config.integrator, config.control_rate, config.largest_step, dtype
         )
         period = physics.control_period
-        _check(config, task)
+        check(config, task)
         rewards.check(reward.weights, reward.parameters)
         late = config.action_latency or (vehicle.latency, vehicle.latency)
         frames = latency.frames(late[1], period)
@@ -153,9 +95,10 @@ class Env:
         low, high = command_limits(COMMAND_MODES[config.command_mode], vehicle, config.position_range)
         noisy = config.noise != NoiseConfig()
         shape = Shape(vehicle.feet_height, vehicle.radius)
+        oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
         return Env(
             physics=physics,
-            task=make_task(task, shape, period),
+            task=make_task(task, shape, period, physics.substeps),
             weights=dict(reward.weights),
             parameters=dict(reward.parameters),
             center=((low + high) / 2).astype(dtype),
@@ -167,9 +110,10 @@ class Env:
             wind=config.wind or None,
             noise=config.noise if noisy else None,
             imu=config.imu if config.imu.observed else None,
+            cameras=config.cameras,
             queue=max(frames + 1, seen, 2),
             seen_actions=seen,
-            past=latency.frames(config.observation_latency[1], period) + 1 if config.observation_latency[1] else 0,
+            past=latency.frames(oldest, period) + 1 if oldest else 0,
         )
 
     @property
@@ -200,12 +144,64 @@ class Env:
             The state and the first observation.
         """
         state = self._start(key, n, jnp.zeros((), jnp.int32))
-        return state, self._observe(state)
+        return self.look(state, jnp.ones(n, bool)), self._observe(state)
 
     def step(self, state: EnvState, action: Float[Array, "n 4"]) -> tuple[EnvState, Step]:
         """One control step, with new starts where an episode ended."""
-        reached, out = self.advance(state, action)
-        return self.restart(reached, out)
+        state, out = self.restart(*self.advance(state, action))
+        return self.look(state, out.done), out
+
+    def look(self, state: EnvState, renewed: Bool[Array, " n"]) -> EnvState:
+        """The state with the images that are there to act on.
+
+        New are those of cameras whose turn it is, and those of vehicles whose episode is new.
+        """
+        if not self.cameras:
+            return state
+        still = jax.lax.stop_gradient(state)
+        scene = self.task.scene(still.memory)
+        images = []
+        for index, (camera, eye, old) in enumerate(zip(self.cameras, still.eyes, still.images, strict=True)):
+            every = 1 if camera.rate is None else round(1 / (camera.rate * self.control_period))
+            due = state.tick % every == 0
+
+            def new(_: None, index: int = index, camera: CameraConfig = camera, eye: Eye = eye) -> Array:
+                then, seen = still.time, still.vehicle
+                if still.past is not None:
+                    then = jnp.maximum(then - eye.latency, 0.0)
+                    seen = latency.delayed_state(still.past, eye.latency, self.control_period)
+                key = jax.random.fold_in(jax.random.fold_in(still.key, 2 * still.tick + 1), index)
+                return see(camera, eye, scene.at(then), seen, key)
+
+            if every == 1:
+                images.append(new(None))
+                continue
+            fresh = jax.lax.cond(due | jnp.any(renewed), new, lambda _, old=old: old, None)
+            images.append(_where(due | renewed, fresh, old))
+        return dataclasses.replace(state, images=tuple(images))
+
+    @property
+    def privileged_size(self) -> int:
+        """Numbers of `privileged`."""
+        return 11 if self.cameras else 0
+
+    def privileged(self, state: EnvState) -> Float[Array, "n p"]:
+        """What a critic may know beside the observation, where there are cameras; nothing without.
+
+        The way to the goal; the clearance where the vehicle will be if it flies straight on, from now to one and a
+        half seconds; the direction to what is nearest. Body frame, m, clipped to a few metres.
+        """
+        n = state.time.shape[0]
+        if not self.cameras:
+            return jnp.zeros((n, 0))
+        s, scene = jax.lax.stop_gradient(state.vehicle), self.task.scene(jax.lax.stop_gradient(state.memory))
+        away = unrotate(s.quaternion, self.task.goal(state.memory, state.time) - s.position)
+        ahead = [scenes.clearance(scene, s.position + t * s.velocity, state.time + t) for t in (0.25, 0.5, 1.0, 1.5)]
+        towards = jax.grad(lambda p: jnp.sum(scenes.clearance(scene, p, state.time)))(s.position)
+        now = scenes.clearance(scene, s.position, state.time)
+        clear = jnp.clip(jnp.stack([now, *ahead], axis=-1), -1.0, 3.0)
+        seen = jnp.concatenate([jnp.clip(away, -5.0, 5.0), clear, unrotate(s.quaternion, -towards)], axis=-1)
+        return jax.lax.stop_gradient(seen)
 
     def restart(self, state: EnvState, out: Step) -> tuple[EnvState, Step]:
         """Start anew where `out` says that the episode ended; all of it under a full mask is a reset."""
@@ -245,6 +241,8 @@ class Env:
             past=None if state.past is None else _push(state.past, after),
             observation_latency=state.observation_latency,
             imu=inertial,
+            eyes=state.eyes,
+            images=state.images,
             key=state.key,
             tick=tick,
         )
@@ -259,12 +257,15 @@ class Env:
             "body_rate": after.body_rate,
             "action": action,
             "previous_action": state.actions[:, 0],
-            "height": after.position[:, 2] - self.task.shape.feet_height,
+            "height": after.position[:, 2] - goal_now[:, 2],
             "yaw_error": _wrap(yaw(after.quaternion) - wanted_yaw),
             "desired_quaternion": from_euler(zero, zero, wanted_yaw),
             "arrived": outcome.arrived,
             "crashed": outcome.crashed,
         }
+        signals |= outcome.signals
+        if self._reads("clearance", "gaps"):
+            signals |= self._dangers(memory, after, time)
         total, terms = rewards.reward(self.weights, self.parameters, signals)
         observation = self._observe(reached)
         return reached, Step(
@@ -297,21 +298,42 @@ class Env:
             plant=_perturbed(plant_key, n, nominal, self.randomize),
             wind=None if self.wind is None else self.wind * into_ball(uniform(wind_key, n, 3)),
             past=past,
-            observation_latency=_between(observation_key, n, self.observation_latency_range) if self.past else None,
+            observation_latency=_between(observation_key, n, self.observation_latency_range),
             imu=None if self.imu is None else imu.ImuState.at(vehicle),
+            eyes=tuple(Eye.of(c, jax.random.fold_in(key, i), n) for i, c in enumerate(self.cameras)),
+            images=tuple(jnp.zeros((n, *image_shape(camera))) for camera in self.cameras),
             key=key,
             tick=tick,
         )
 
+    def _reads(self, *signals: str) -> bool:
+        """Whether a term of the reward reads one of them."""
+        return any(signal in rewards.TERMS[name].inputs for name in self.weights for signal in signals)
+
+    def _dangers(self, memory: Any, state: State, time: Float[Array, " n"]) -> dict[str, Array]:
+        """How far the vehicle's sphere is from things, m, and how fast they come nearer, m/s."""
+        scene, radius = self.task.scene(memory), self.task.shape.radius
+
+        def gaps(position: Array, time: Array) -> Array:
+            return scenes.gaps(scene, position, time) - radius
+
+        each, growing = jax.jvp(gaps, (state.position, time), (state.velocity, jnp.ones_like(time)))
+        nearest = jax.nn.one_hot(jnp.argmin(each, axis=-1), each.shape[-1])
+        return {
+            "gaps": each,
+            "closing": -growing,
+            "clearance": jnp.sum(nearest * each, axis=-1),
+            "approach_speed": -jnp.sum(nearest * growing, axis=-1),
+        }
+
     def _observe(self, state: EnvState) -> Float[Array, "n o"]:
         seen = state.vehicle
-        if state.past is not None and state.observation_latency is not None:
+        if state.past is not None:
             seen = latency.delayed_state(state.past, state.observation_latency, self.control_period)
         if self.noise is not None:
             seen = add_noise(self.noise, jax.random.fold_in(state.key, 2 * state.tick + 1), seen)
         n = seen.position.shape[0]
-        targets = self.task.targets(state.memory, state.time) - seen.position[:, None]
-        parts = [targets.reshape(n, -1), seen.quaternion, seen.velocity, seen.body_rate]
+        parts = [self.task.observe(state.memory, state.time, seen), seen.quaternion, seen.velocity, seen.body_rate]
         if state.imu is not None:
             parts += [state.imu.gyroscope, state.imu.accelerometer]
         parts.append(state.actions[:, : self.seen_actions].reshape(n, -1))
@@ -356,29 +378,3 @@ def _hover_command(mode: str, vehicle: Vehicle) -> np.ndarray:
 def _wrap(angle: Array) -> Array:
     """Into [-pi, pi]."""
     return jnp.arctan2(jnp.sin(angle), jnp.cos(angle))
-
-
-def _check(config: EnvConfig, task: TaskConfig) -> None:
-    """Check the numbers of a configuration.
-
-    Raises:
-        ValueError: naming the field, the value and what is accepted.
-    """
-    names = [f.name for f in quantities()]
-    for name, width in config.randomize.items():
-        if name not in names:
-            raise ValueError(unknown("vehicle parameter", name, names))
-        if not 0 <= width < 1:
-            raise ValueError(f"env.randomize.{name} is {width}; accepted: at least 0 and below 1")
-    for field, bounds in (
-        ("action_latency", config.action_latency),
-        ("observation_latency", config.observation_latency),
-    ):
-        if bounds is not None and not (0 <= bounds[0] <= bounds[1] <= 1):
-            raise ValueError(f"env.{field} is {bounds}; accepted: two rising numbers of seconds in [0, 1]")
-    if config.past_actions is not None and config.past_actions < 0:
-        raise ValueError(f"env.past_actions is {config.past_actions}; accepted: 0 or more")
-    if not (math.isfinite(config.wind) and config.wind >= 0):
-        raise ValueError(f"env.wind is {config.wind}; accepted: 0 or more, m/s")
-    if not (math.isfinite(task.episode_s) and task.episode_s > 0):
-        raise ValueError(f"task.episode_s is {task.episode_s}; accepted: a positive number of seconds")

@@ -1,0 +1,19 @@
+"""Race courses as solids."""
+
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from e2efly.courses.gates import FRAME, Gates
+from e2efly.scenes.scene import Solids
+
+HALF_DEPTH = 0.05
+"""Half the depth of a gate's bars, m."""
+
+
+def frames(gates: Gates, n: int, bar: float | Array = FRAME) -> Solids:
+    """The gates' frames, the same in each of n worlds or each world's own."""
+    half = jnp.asarray(gates.half)
+    size = jnp.concatenate([half, jnp.full_like(half[:, :1], bar), jnp.full_like(half[:, :1], HALF_DEPTH)], axis=-1)
+    centre = jnp.asarray(gates.position)[..., :-1, :]
+    yaw = jnp.arctan2(jnp.asarray(gates.sin), jnp.asarray(gates.cos))
+    return Solids.of("gate", jnp.broadcast_to(centre, (n, *centre.shape[-2:])), size, yaw=yaw)

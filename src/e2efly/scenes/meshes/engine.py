@@ -1,0 +1,69 @@
+"""What follows rays through triangles: Embree on a CPU, Warp on CUDA."""
+
+from typing import NamedTuple, Protocol
+from weakref import WeakKeyDictionary
+
+import jax
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from e2efly.scenes.meshes.scene import MeshScene
+
+
+class Hits(NamedTuple):
+    """What each of c cameras' r rays meets first."""
+
+    depth: Float[np.ndarray, "c r"]
+    """Parameter of the ray; `FAR` where it meets nothing."""
+    face: Int[np.ndarray, "c r"]
+    """Triangle; -1 for none."""
+    u: Float[np.ndarray, "c r"]
+    """Weight of its second corner."""
+    v: Float[np.ndarray, "c r"]
+    """Weight of its third."""
+
+
+class Engine(Protocol):
+    """One scene, ready."""
+
+    threads: int
+    """How many parts of a batch it works on at a time."""
+
+    def depth(
+        self, origin: Float[np.ndarray, "c 3"], matrix: Float[np.ndarray, "c 3 3"], rays: Float[np.ndarray, "3 r"]
+    ) -> Float[np.ndarray, "c r"]:
+        """Depth of what cameras' rays `origin + t matrix ray` meet first; `FAR` for nothing."""
+        ...
+
+    def hits(
+        self, origin: Float[np.ndarray, "c 3"], matrix: Float[np.ndarray, "c 3 3"], rays: Float[np.ndarray, "3 r"]
+    ) -> Hits:
+        """All about what they meet first."""
+        ...
+
+    def blocked(self, origin: Float[np.ndarray, "m 3"], direction: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
+        """Whether single rays meet anything."""
+        ...
+
+
+_READY: WeakKeyDictionary[MeshScene, Engine] = WeakKeyDictionary()
+
+
+def engine(scene: MeshScene) -> Engine:
+    """The engine of where JAX computes; made once for a scene.
+
+    Raises:
+        ValueError: naming the package that is missing, and how to install it.
+    """
+    if scene not in _READY:
+        cuda = jax.default_backend() == "gpu"
+        try:
+            if cuda:
+                from e2efly.scenes.meshes.warp import Warp as Kind
+            else:
+                from e2efly.scenes.meshes.embree import Embree as Kind
+        except ModuleNotFoundError as error:
+            extra = "mesh-cuda" if cuda else "mesh"
+            raise ValueError(f"mesh scenes need the package {error.name}: pip install 'e2efly[{extra}]'") from None
+        _READY[scene] = Kind(scene.triangles)
+    return _READY[scene]

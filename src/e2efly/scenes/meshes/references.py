@@ -1,0 +1,112 @@
+"""What mesh files name beside themselves: `trimesh` passes over what is missing, these checks do not."""
+
+import json
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+_PLAIN = ("KHR_materials_", "KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "EXT_texture_webp")
+"""Beginnings of the glTF extensions that a file may require: triangles are right without them."""
+
+
+def textured_materials(path: Path) -> set[str]:
+    """Names of the materials of a file that have a texture, after a check that all it names is there.
+
+    Raises:
+        ValueError: naming the file, what it names, and what is accepted.
+    """
+    match path.suffix.lower():
+        case ".obj":
+            return _obj(path)
+        case ".ply":
+            return _ply(path)
+        case _:
+            return _gltf(path)
+
+
+def _there(path: Path, what: str, name: str) -> Path:
+    folder = path.parent.resolve()
+    other = (folder / name.replace("\\", "/")).resolve()
+    if not other.is_relative_to(folder) or not other.is_file():
+        raise ValueError(f"{path}: {what} {name!r} is missing; accepted: a file in the folder of the mesh or below it")
+    return other
+
+
+def _words(path: Path) -> Iterator[tuple[str, str]]:
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        word, _, rest = line.strip().partition(" ")
+        yield word.lower(), rest.strip()
+
+
+def _obj(path: Path) -> set[str]:
+    libraries, used = [], set()
+    for word, rest in _words(path):
+        if word == "mtllib":
+            libraries.append(rest)
+        elif word == "usemtl":
+            used.add(rest)
+    if len(libraries) > 1:
+        raise ValueError(f"{path}: mtllib names {libraries}; accepted: one file of materials")
+    known, textured, name = set(), set(), ""
+    for library in libraries:
+        for word, rest in _words(_there(path, "the file of materials", library)):
+            if word == "newmtl":
+                name = rest
+                known.add(name)
+            elif word == "map_kd":
+                _there(path, f"material {name!r}: the texture", rest)
+                textured.add(name)
+    if lost := sorted(used - known):
+        raise ValueError(
+            f"{path}: the material {lost[0]!r} is missing; accepted: {sorted(known) or 'a file, by mtllib'}"
+        )
+    return textured & used
+
+
+def _ply(path: Path) -> set[str]:
+    with path.open("rb") as file:
+        for raw in file:
+            words = raw.decode("utf-8", errors="replace").strip().split(maxsplit=2)
+            if len(words) == 3 and words[0] == "comment" and words[1].lower() == "texturefile":
+                _there(path, "the texture", words[2])
+                return {""}
+            if words == ["end_header"]:
+                break
+    return set()
+
+
+def _gltf(path: Path) -> set[str]:
+    header = _header(path)
+    required = [name for name in header.get("extensionsRequired", []) if not name.startswith(_PLAIN)]
+    if required:
+        raise ValueError(f"{path}: requires {', '.join(required)}; accepted: files without compression of that kind")
+    for kind in ("buffers", "images"):
+        for entry in header.get(kind, []):
+            uri = entry.get("uri", "data:")
+            if not uri.startswith("data:"):
+                _there(path, f"the {kind[:-1]}", unquote(uri))
+    for mesh in header.get("meshes", []):
+        modes = {primitive.get("mode", 4) for primitive in mesh["primitives"]}
+        if other := modes - {4, 5}:
+            name = mesh.get("name", "")
+            raise ValueError(
+                f"{path}: mesh {name!r} has primitives of mode {sorted(other)}; accepted: 4 (triangles) and 5"
+            )
+    materials = header.get("materials", [])
+    textured = [m for m in materials if "baseColorTexture" in m.get("pbrMetallicRoughness", {})]
+    return {material.get("name", "") for material in textured}
+
+
+def _header(path: Path) -> dict[str, Any]:
+    raw = path.read_bytes()
+    try:
+        if path.suffix.lower() == ".glb":
+            magic, _, _, length, kind = struct.unpack("<4sII I4s", raw[:20])
+            if magic != b"glTF" or kind != b"JSON":
+                raise ValueError("its first bytes are not those of glTF")
+            raw = raw[20 : 20 + length]
+        return json.loads(raw)
+    except (struct.error, ValueError) as error:
+        raise ValueError(f"{path}: not a {path.suffix} file: {error}") from None

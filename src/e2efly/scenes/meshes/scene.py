@@ -1,0 +1,174 @@
+"""A world of triangles, one for all environments. World frame: x, y level, z up, m."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from e2efly.scenes.scene import CLASSES, COLOURS, GROUND, OBSTACLE, SKY
+
+_FLAT = 1e-7
+"""A triangle is degenerate whose height is at most this share of its longest side."""
+_WHITE = np.full((1, 1, 3), 255, np.uint8)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A surface with one texture at most; parts of one name are one object."""
+
+    name: str
+    vertices: Float[np.ndarray, "v 3"]
+    """World, m."""
+    faces: Int[np.ndarray, "f 3"]
+    """Counter-clockwise as seen from where one can fly."""
+    colour: Any = None
+    """RGB in [0, 1]: (3,), (v, 3) or (f, 1, 3); multiplies the texture. Usual for the class, or white beneath a
+    texture, when left out."""
+    uv: Float[np.ndarray, "v 2"] | None = None
+    """Place in the texture, from its lower left corner; it repeats."""
+    texture: UInt8[np.ndarray, "h w 3"] | None = None
+    label: int | None = None
+    """Semantic class; `class_of` the name when left out."""
+
+
+def class_of(name: str) -> int:
+    """Semantic class by an object's name: its first word if that is one of `CLASSES`, else obstacle.
+
+    A word ends before a `.`, `_`, `-`, space or digit: `gate.001`, `Wall_north`, `pad 2`.
+    """
+    head = re.split(r"[._\-\s\d]", name.strip().lower(), maxsplit=1)[0]
+    return CLASSES.index(head) if head in CLASSES else OBSTACLE
+
+
+@dataclass(frozen=True, eq=False)
+class MeshScene:
+    """Triangles with what is known of each; compared by identity, constant in compiled programs."""
+
+    triangles: Float[np.ndarray, "f 3 3"]
+    """Corners, world, m."""
+    label: Int[np.ndarray, " f"]
+    """Semantic class."""
+    instance: Int[np.ndarray, " f"]
+    """Number of the object: the ground is 1, whatever is of that class; the others follow in the order of the file."""
+    names: tuple[str, ...]
+    """Of objects, by instance number; 0 is the sky."""
+    colour: Float[np.ndarray, "f 3 3"]
+    """RGB in [0, 1] of each corner; multiplies the texture."""
+    uv: Float[np.ndarray, "f 3 2"]
+    """Place of each corner in its texture."""
+    texture: Int[np.ndarray, " f"]
+    """Number of the texture; 0 is white."""
+    textures: tuple[UInt8[np.ndarray, "h w 3"], ...]
+    dropped: int
+    """Degenerate triangles that the parts had beside those here."""
+
+    @staticmethod
+    def of(parts: Sequence[Part]) -> "MeshScene":
+        """One world of parts, without their degenerate triangles, which are counted.
+
+        Raises:
+            ValueError: naming the object, what is wrong with it and what is accepted.
+        """
+        names, textures, pieces = ["sky", "ground"], [_WHITE], []
+        for part in parts:
+            _check(part)
+            label = class_of(part.name) if part.label is None else part.label
+            if label != GROUND and part.name not in names[2:]:
+                names.append(part.name)
+            corners = np.asarray(part.vertices, np.float32)[part.faces]
+            count = len(corners)
+            if part.texture is not None:
+                textures.append(np.ascontiguousarray(part.texture))
+            piece = {
+                "triangles": corners,
+                "label": np.full(count, label, np.int32),
+                "instance": np.full(count, 1 if label == GROUND else 2 + names[2:].index(part.name), np.int32),
+                "colour": _corner_colours(part, label),
+                "uv": np.zeros((count, 3, 2)) if part.uv is None else np.asarray(part.uv)[part.faces],
+                "texture": np.full(count, 0 if part.texture is None else len(textures) - 1, np.int32),
+            }
+            full = ~_degenerate(corners)
+            pieces.append({name: value[full] for name, value in piece.items()} | {"dropped": np.sum(~full)})
+        if not sum(len(piece["label"]) for piece in pieces):
+            raise ValueError("there are no triangles of any area; accepted: at least one")
+        whole = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0] if name != "dropped"}
+        whole |= {name: whole[name].astype(np.float32) for name in ("colour", "uv")}
+        dropped = int(sum(piece["dropped"] for piece in pieces))
+        return MeshScene(**whole, names=tuple(names), textures=tuple(textures), dropped=dropped)
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest corner, m."""
+        corners = self.triangles.reshape(-1, 3)
+        return corners.min(axis=0), corners.max(axis=0)
+
+    @cached_property
+    def normal(self) -> Float[np.ndarray, "f 3"]:
+        """Unit vectors to the side from which the corners run counter-clockwise."""
+        a, b, c = np.moveaxis(self.triangles.astype(np.float64), 1, 0)
+        cross = np.cross(b - a, c - a)
+        return (cross / np.linalg.norm(cross, axis=1, keepdims=True)).astype(np.float32)
+
+    @cached_property
+    def _texels(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """All textures one after the other, where each begins, and their heights and widths."""
+        sizes = np.array([image.shape[:2] for image in self.textures])
+        begins = np.concatenate([[0], np.cumsum(np.prod(sizes, axis=1))[:-1]])
+        return np.concatenate([image.reshape(-1, 3) for image in self.textures]), begins, sizes
+
+    def colours(
+        self, face: Int[np.ndarray, " r"], u: Float[np.ndarray, " r"], v: Float[np.ndarray, " r"]
+    ) -> Float[np.ndarray, "r 3"]:
+        """RGB at points of triangles, the nearest texel of the texture.
+
+        Args:
+            face: triangle that each is in.
+            u: weight of the second corner.
+            v: weight of the third.
+        """
+        weight = np.stack([1 - u - v, u, v], axis=1)[:, None]
+        texels, begins, sizes = self._texels
+        x, y = (weight @ self.uv[face])[:, 0].T
+        number = self.texture[face]
+        height, width = sizes[number].T
+        row = np.minimum(((1 - (y - np.floor(y))) * height).astype(np.int64), height - 1)
+        column = np.minimum(((x - np.floor(x)) * width).astype(np.int64), width - 1)
+        colour = (weight @ self.colour[face])[:, 0]
+        return colour * texels[begins[number] + row * width + column] * np.float32(1 / 255)
+
+
+def _check(part: Part) -> None:
+    where = f"object {part.name!r}"
+    if part.vertices.ndim != 2 or part.vertices.shape[1] != 3 or not np.all(np.isfinite(part.vertices)):
+        raise ValueError(f"{where}: vertices are not all finite; accepted: (v, 3) finite numbers of metres")
+    faces = part.faces
+    if (
+        faces.ndim != 2
+        or faces.shape[1] != 3
+        or (faces.size and not 0 <= faces.min() <= faces.max() < len(part.vertices))
+    ):
+        raise ValueError(f"{where}: faces name vertices that are not there; accepted: 3 of {len(part.vertices)} each")
+    if part.texture is not None and part.uv is None:
+        raise ValueError(f"{where}: has a texture, but no texture coordinates; accepted: both or none")
+    if part.uv is not None and not (part.uv.shape == (len(part.vertices), 2) and np.all(np.isfinite(part.uv))):
+        raise ValueError(f"{where}: texture coordinates are not all finite; accepted: 2 finite numbers a vertex")
+    if part.label is not None and not SKY < part.label < len(CLASSES):
+        raise ValueError(f"{where}: label is {part.label}; accepted: 1 to {len(CLASSES) - 1}")
+
+
+def _corner_colours(part: Part, label: int) -> Float[np.ndarray, "f 3 3"]:
+    usual = COLOURS[label] if part.texture is None else np.ones(3)
+    colour = np.asarray(usual if part.colour is None else part.colour, np.float32)
+    if colour.ndim == 2:
+        colour = colour[part.faces]
+    return np.broadcast_to(colour, (len(part.faces), 3, 3))
+
+
+def _degenerate(corners: Float[np.ndarray, "f 3 3"]) -> np.ndarray:
+    a, b, c = np.moveaxis(corners.astype(np.float64), 1, 0)
+    longest = np.max([np.sum((q - p) ** 2, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1) <= _FLAT * longest

@@ -1,0 +1,144 @@
+"""What hits look like: labels, normals, and colours under a sun that throws shadows."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from e2efly.scenes.scene import COLOURS, GROUND, SKY
+from e2efly.scenes.shapes import FAR, SHAPES, Components
+from e2efly.scenes.sight import Form, Kinds, Sight, number, over, turned
+
+ODD = 0.5
+"""Stands for instance 1, the ground, on every other square of it."""
+_DARK = 0.75
+"""Brightness of these squares."""
+_BIAS = 1e-3
+"""A shadow is looked for from this far over the surface, m."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Light:
+    """What makes colours of a scene; leaves."""
+
+    sun: Float[Array | np.ndarray, "n 3"]
+    """Unit vector to the sun, world."""
+    strength: Float[Array | np.ndarray, " n"]
+    """Of the sun, beside the ambient light `1 - strength`."""
+    checker: Float[Array | np.ndarray, " n"]
+    """Side of the squares on the ground, m; 0: plain."""
+
+
+def usual_light(n: int) -> Light:
+    """A sun 50 degrees high in the south-west, squares of a metre on the ground."""
+    sun = np.array([-0.45, -0.45, 0.77], np.float32)
+    sun = sun / np.linalg.norm(sun)
+    return Light(np.tile(sun, (n, 1)), np.full(n, 0.65, np.float32), np.ones(n, np.float32))
+
+
+def squares(seen: Sight, light: Light, d: Float[Array, "3 r"], t: Float[Array, " r"]) -> Float[Array, " r"]:
+    """The instance on the ground, `ODD` on every other square, and the sky's."""
+    world = turned(seen.matrix.reshape(9), d)
+    scale = jnp.where(light.checker > 0, 1.0 / jnp.where(light.checker > 0, light.checker, 1.0), 0.0)
+    half = sum(jnp.floor((seen.origin[i] + t * world[i]) * scale) for i in (0, 1)) / 2.0
+    return jnp.where(t < FAR, 1.0 - (half - jnp.floor(half)) * 2.0 * (1.0 - ODD), 0.0)
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Of the rays of one tile of one camera."""
+
+    seen: Sight
+    kinds: Kinds
+    tile: Array
+    d: Float[Array, "3 r"]
+    t: Float[Array, " r"]
+    who: Float[Array, " r"]
+    """Instance number, or `ODD`."""
+
+    def looks(self, channels: tuple[str, ...], light: Light | None) -> dict[str, Array]:
+        """Planes of `channels`: label; nx, ny, nz; r, g, b."""
+        if self.seen.looks is None:
+            return {}
+        t, who, table = self.t, self.who, self.seen.looks
+        ground, zero = who > 0, jnp.zeros_like(t)
+        planes: dict[str, Array] = {}
+        if "label" in channels:
+            planes["label"] = jnp.where(ground, float(GROUND), float(SKY))
+        if "normal" in channels:
+            planes |= {"nx": zero, "ny": zero, "nz": jnp.where(ground, 1.0, 0.0)}
+        if light is not None:
+            for c, name in enumerate("rgb"):
+                tone = jnp.where(who == ODD, _DARK, 1.0) * COLOURS[GROUND, c]
+                planes[name] = jnp.where(ground, tone, COLOURS[SKY, c])
+            planes["bright"] = jnp.where(ground, _brightness(light, light.sun[2]), 1.0)
+
+        def added(kind: str, i: Array, planes: dict[str, Array]) -> dict[str, Array]:
+            row = table[:, i]
+            form = Form.of(self.seen, i)
+            point = tuple(o + t * v for o, v in zip(form.origin, form.direction(self.d), strict=True))
+            normal = SHAPES[kind].normal(form.size, point)  # pyright: ignore
+            x, y, z = turned(row[4:13].reshape(3, 3).T.reshape(9), normal)
+            new = {"label": row[0], "r": row[1], "g": row[2], "b": row[3], "nx": x, "ny": y, "nz": z}
+            if light is not None:
+                new["bright"] = _brightness(light, _dot(normal, turned(row[4:13], light.sun)))
+            return {name: jnp.where(who == number(i), new[name], plane) for name, plane in planes.items()}
+
+        following = self.seen.following[self.tile]
+        planes = over(self.kinds, lambda i: following[i + 1], added, planes)
+        if light is not None:
+            bright = self._shadowed(light, planes.pop("bright"), table)
+            planes |= {name: planes[name] * bright for name in "rgb"}
+        return planes
+
+    def _shadowed(self, light: Light, bright: Array, table: Array) -> Array:
+        """The brightness, with the sun's part gone where something stands before it."""
+        t, dark = self.t, 1.0 - light.strength
+        if not self.kinds:
+            return bright
+        wanted = self._throwing(light, (t < FAR) & (bright > dark), table)
+        places = jnp.arange(wanted.shape[0], dtype=jnp.int32)
+
+        def after(i: Array) -> Array:
+            return jnp.min(jnp.where(wanted & (places > i), places, places.shape[0]))
+
+        def darkened(kind: str, i: Array, bright: Array) -> Array:
+            form, sun = Form.of(self.seen, i), turned(table[4:13, i], light.sun)
+            near = t * (1.0 - _BIAS)
+            x, y, z = (
+                o + near * v + _BIAS * s for o, v, s in zip(form.origin, form.direction(self.d), sun, strict=True)
+            )
+            struck = SHAPES[kind].enter(form.size, (x, y, z), sun) < FAR
+            return jnp.where(struck & (t < FAR), dark, bright)
+
+        return over(self.kinds, after, darkened, bright)
+
+    def _throwing(self, light: Light, lit: Array, table: Array) -> Array:
+        """Solids (k,) that may throw a shadow on a lit hit: a line from the ball's centre, away from the sun, meets the
+        box of these hits, wider by the ball's reach.
+        """
+        world, reach = turned(self.seen.matrix.reshape(9), self.d), table[16]
+        enter, leave = jnp.zeros_like(reach), jnp.full_like(reach, FAR)
+        for axis in range(3):
+            place = self.t * world[axis]
+            low = jnp.min(jnp.where(lit, place, FAR)) - table[13 + axis] - reach
+            high = jnp.max(jnp.where(lit, place, -FAR)) - table[13 + axis] + reach
+            slope = light.sun[axis]
+            inverse = -1.0 / jnp.where(jnp.abs(slope) < 1e-9, 1e-9, slope)
+            enter = jnp.maximum(enter, jnp.minimum(low * inverse, high * inverse))
+            leave = jnp.minimum(leave, jnp.maximum(low * inverse, high * inverse))
+        return (enter <= leave) & self.seen.active & jnp.any(lit)
+
+
+def _brightness(light: Light, cosine: Array) -> Array:
+    """Of a surface that the sun shines on, by the cosine of the angle between it and the normal."""
+    strength = jnp.asarray(light.strength)
+    return 1.0 - strength + strength * jnp.maximum(cosine, 0.0)
+
+
+def _dot(a: Components, b: Any) -> Array:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -1,0 +1,159 @@
+"""Rays of one tile against the solids of one world: the nearest hit of each.
+
+Solids stand in a table, kind after kind. A list leads from each to the next that the tile may see, so that one loop
+for each kind visits these only. XLA makes one machine function of it, which works in the first-level cache. It fuses
+each array that a loop carries by itself, with all that it is computed from: so that an intersection is computed once,
+a loop compares the one of the round before.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from e2efly.control.vectors import Quat, Vec3
+from e2efly.scenes.scene import Scene, Solids, distances, join
+from e2efly.scenes.shapes import FAR, SHAPES, SIZES, Components
+from e2efly.scenes.tiles import Pattern, following, longest, seen_by_tiles
+
+Kinds = tuple[tuple[str, int], ...]
+"""Each kind of solids in a table, and where it ends."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Sight:
+    """What each of n cameras' loops need."""
+
+    origin: Float[Array, "n 3"]
+    matrix: Float[Array, "n 3 3"]
+    ground: Float[Array, " n"]
+    following: Int[Array, "n t k+1"]
+    active: Bool[Array, "n k"]
+    forms: Float[Array, "n 16 k"]
+    """Size, the rays' origin in the solid's frame, and the matrix from the sensor's frame to the solid's."""
+    looks: Float[Array, "n 17 k"] | None
+    """Label, colour, rotation from world to solid, place from the camera, reach; for what is more than a distance."""
+
+
+def sight(
+    scene: Scene,
+    origin: Float[Array, "n 3"],
+    matrix: Float[Array, "n 3 3"],
+    pattern: Pattern,
+    looks: bool,
+    farthest: float,
+) -> tuple[Sight, Kinds]:
+    """The solids as cameras see them, but for those wholly beyond a depth."""
+    each = [(kind, scene.solids[kind]) for kind in scene.kinds]
+    kinds = tuple((kind, sum(s.count for _, s in each[: i + 1])) for i, (kind, _) in enumerate(each))
+    if not each:
+        each = [("sphere", Solids.of("sphere", jnp.zeros((scene.worlds, 0, 3)), [1.0]))]
+    solids = join(*(s for _, s in each))
+    reach = jnp.concatenate([SHAPES[kind].reach(s.size) for kind, s in each], axis=1)
+    turn, away = Quat.of(solids.quaternion), Vec3.of(solids.centre) - Vec3.of(origin[:, None])
+
+    def rows(m: Any) -> list[Array]:
+        columns = [turn.unrotate(Vec3(*(m[:, i, j, None] for i in range(3)))) for j in range(3)]
+        return [getattr(column, axis) for axis in "xyz" for column in columns]
+
+    start = turn.unrotate(away) * -1.0
+    size, colour = (jnp.moveaxis(x, -1, 0) for x in (solids.size, solids.colour))
+    forms = [*size, start.x, start.y, start.z, *rows(matrix)]
+    about = [solids.label.astype(jnp.float32), *colour, *rows(jnp.eye(3)[None]), away.x, away.y, away.z, reach]
+    near = solids.active
+    if math.isfinite(farthest):
+        gaps = [distances(kind, s, origin, jnp.zeros(scene.worlds)) for kind, s in each]
+        near &= jnp.concatenate(gaps, axis=1) < farthest * longest(pattern, matrix)[:, None]
+    visible = seen_by_tiles(pattern, matrix, away, reach) & near[:, None]
+    found = Sight(
+        origin, matrix, scene.ground, following(visible), solids.active, jnp.stack(forms, axis=1),
+        jnp.stack([jnp.broadcast_to(x, reach.shape) for x in about], axis=1) if looks else None,
+    )  # fmt: skip
+    return found, kinds
+
+
+@dataclass(frozen=True)
+class Form:
+    """A solid as one camera sees it: scalars."""
+
+    size: Array
+    origin: Array
+    matrix: Array
+
+    @staticmethod
+    def of(seen: Sight, i: Array) -> "Form":
+        """The one at a place in the table."""
+        row = seen.forms[:, i]
+        return Form(row[:SIZES], row[SIZES : SIZES + 3], row[SIZES + 3 :])
+
+    def direction(self, d: Float[Array, "3 r"]) -> Components:
+        """Of the sensor's rays in the solid's frame."""
+        return turned(self.matrix, d)
+
+
+def turned(matrix: Float[Array, " 9"], d: Any) -> Components:
+    """A matrix, row after row, times a vector's components."""
+    x, y, z = (sum(matrix[3 * i + j] * d[j] for j in range(3)) for i in range(3))
+    return x, y, z  # pyright: ignore
+
+
+def number(i: Array) -> Array:
+    """Instance number of the solid at a place in the table."""
+    return (i + 2).astype(jnp.float32)
+
+
+def over(kinds: Kinds, after: Callable[[Array], Array], body: Callable[[str, Array, Any], Any], state: Any) -> Any:
+    """Fold `body(kind, place, state)` over the places of a table; `after` leads from each to the next, from -1 on."""
+    i = after(jnp.int32(-1))
+    for kind, end in kinds:
+        i, state = jax.lax.while_loop(
+            lambda s, end=end: s[0] < end, lambda s, kind=kind: (after(s[0]), body(kind, s[0], s[1])), (i, state)
+        )
+    return state
+
+
+def ground(seen: Sight, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
+    """Where rays meet the ground; `FAR`: nowhere."""
+    speed = turned(seen.matrix.reshape(9), d)[2]
+    below = speed < -1e-6
+    t = (seen.ground - seen.origin[2]) / jnp.where(below, speed, 1.0)
+    return jnp.where(below, jnp.clip(t, 0.0, FAR), FAR)
+
+
+def entered(kind: str, seen: Sight, i: Array, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
+    """Where rays enter a solid."""
+    form = Form.of(seen, i)
+    x, y, z = form.origin
+    return SHAPES[kind].enter(form.size, (x, y, z), form.direction(d))
+
+
+def depth(seen: Sight, kinds: Kinds, tile: Array, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
+    """Of the nearest hits."""
+    following = seen.following[tile]
+    return over(
+        kinds,
+        lambda i: following[i + 1],
+        lambda kind, i, t: jnp.minimum(t, entered(kind, seen, i, d)),
+        ground(seen, d),
+    )
+
+
+def hits(
+    seen: Sight, kinds: Kinds, tile: Array, d: Float[Array, "3 r"], below: Float[Array, " r"]
+) -> tuple[Float[Array, " r"], Float[Array, " r"]]:
+    """Depth of the nearest hits, and the instance number of what is hit; `below`: where it is no solid."""
+    following = seen.following[tile]
+
+    def settled(t: Array, who: Array, last: Array, name: Array) -> tuple[Array, Array]:
+        return jnp.minimum(t, last), jnp.where(last < t, name, who)
+
+    def tried(kind: str, i: Array, state: Any) -> Any:
+        return (*settled(*state), entered(kind, seen, i, d), number(i))
+
+    t = ground(seen, d)
+    return settled(*over(kinds, lambda i: following[i + 1], tried, (t, below, jnp.full_like(t, FAR), jnp.float32(0))))

@@ -1,0 +1,75 @@
+"""Cameras on a batch of vehicles: what they show at an instant, of worlds and poses as they were a while ago."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PRNGKeyArray
+
+from e2efly.config import CameraConfig
+from e2efly.physics import State
+from e2efly.scenes import camera
+from e2efly.scenes.camera import Mount
+from e2efly.scenes.cast import Light, usual_light
+from e2efly.scenes.scene import Scene
+from e2efly.sensors.image_noise import add_image_noise
+
+_STATIC = ("sees", "of", "width", "height", "projection", "fov", "reach", "encoding", "rate")
+jax.tree_util.register_dataclass(
+    CameraConfig,
+    data_fields=[f.name for f in dataclasses.fields(CameraConfig) if f.name not in _STATIC],
+    meta_fields=list(_STATIC),
+)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Eye:
+    """One camera on each of n vehicles, as it is for an episode; leaves."""
+
+    mount: Mount
+    latency: Float[Array, " n"]
+    """Age of its images, s."""
+    light: Light | None
+    """Where it sees colours."""
+
+    @staticmethod
+    def of(config: CameraConfig, key: PRNGKeyArray, n: int) -> "Eye":
+        """Draw how the cameras sit, how late they are and under what light they look."""
+        mount_key, latency_key, light_key = jax.random.split(key, 3)
+        low, high = config.latency
+        latency = low + (high - low) * jax.random.uniform(latency_key, (n,))
+        light = _light(config, light_key, n) if config.sees == "rgb" else None
+        return Eye(camera.mount(config, n, mount_key), latency, light)
+
+
+def _light(config: CameraConfig, key: PRNGKeyArray, n: int) -> Light:
+    usual, u = usual_light(n), jax.random.uniform(key, (n, 4), minval=-1.0, maxval=1.0)
+    sun = jnp.maximum(usual.sun + config.light_spread * u[:, :3], jnp.array([-jnp.inf, -jnp.inf, 0.2]))
+    strength = jnp.clip(usual.strength * (1 + config.light_spread * u[:, 3]), 0.0, 1.0)
+    return Light(sun / jnp.linalg.norm(sun, axis=-1, keepdims=True), strength, jnp.asarray(usual.checker))
+
+
+def image_shape(config: CameraConfig) -> tuple[int, ...]:
+    """(h, w), or (h, w, 3) of colours and normals."""
+    return (config.height, config.width, *((3,) if config.sees in ("rgb", "normal") else ()))
+
+
+def see(config: CameraConfig, eye: Eye, scene: Scene, state: State, key: PRNGKeyArray) -> Array:
+    """The images of n vehicles.
+
+    Args:
+        config: the camera.
+        eye: how it sits on each.
+        scene: n worlds, standing still.
+        state: of the vehicles.
+        key: of the noise.
+
+    Returns:
+        Depth and range in m (0: a hole), a mask, 0 or 1, of shape (n, h, w); colours in [0, 1], normals, (n, h, w, 3).
+    """
+    position, quaternion = (x.astype(jnp.float32) for x in (state.position, state.quaternion))
+    image = camera.look(config, scene, eye.mount, position, quaternion, eye.light)
+    noisy = any(x is not None and x is not False for x in vars(config.noise).values())
+    return add_image_noise(config.noise, key, image, config) if noisy else image

@@ -1,0 +1,93 @@
+"""Visual landing: touch down gently on a pad that is only seen, of random size and shape."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
+
+from e2efly.config import LandVisualConfig
+from e2efly.observation import Field
+from e2efly.physics import State
+from e2efly.physics.rotation import cos_tilt, from_euler
+from e2efly.scenes.scene import Scene, Solids, distances
+from e2efly.scenes.shapes import DISC, TRIANGLE
+from e2efly.tasks.task import Outcome, Shape, at_rest, uniform
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class LandVisual:
+    """The pad stands at the world's origin. The task's memory is the pad."""
+
+    config: LandVisualConfig
+    shape: Shape
+
+    name = "land_visual"
+    fields = (Field("height", 1, "none", "m", 1.0, "height of the feet over the ground"),)
+
+    @property
+    def episode_s(self) -> float | Array:
+        """Time limit, s."""
+        return self.config.episode_s
+
+    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Solids]:
+        """Level, any heading, over and beside the pad."""
+        state_key, outline_key = jax.random.split(key)
+        c, u = self.config, uniform(state_key, n, 9)
+        low, high = c.height
+        height = self.shape.feet_height + c.pad_height + (low + high) / 2 + (high - low) / 2 * u[:, 2]
+        state = at_rest(jnp.stack([c.sideways * u[:, 0], c.sideways * u[:, 1], height], axis=-1))
+        zero = jnp.zeros(n)
+        quaternion = from_euler(zero, zero, jnp.pi * u[:, 6])
+        low, high = c.pad_size
+        half = (low + high) / 4 + (high - low) / 4 * u[:, 7]
+        outline = jax.random.randint(outline_key, (n,), DISC, TRIANGLE + 1)
+        size = jnp.stack([half, zero + c.pad_height / 2, outline.astype(half.dtype)], axis=-1)
+        centre = jnp.stack([zero, zero, zero + c.pad_height / 2], axis=-1)
+        pad = Solids.of("pad", centre[:, None], size[:, None], yaw=jnp.pi * u[:, 8:])
+        return dataclasses.replace(state, velocity=c.velocity * u[:, 3:6], quaternion=quaternion), pad
+
+    def goal(self, memory: Solids, time: Float[Array, " n"]) -> Float[Array, "n 3"]:
+        """The centre of mass of a vehicle that stands on the pad."""
+        del memory
+        zero = jnp.zeros_like(time)
+        return jnp.stack([zero, zero, zero + self.config.pad_height + self.shape.feet_height], axis=-1)
+
+    def observe(self, memory: Solids, time: Float[Array, " n"], state: State) -> Float[Array, "n 1"]:
+        """Height over the ground."""
+        del memory, time
+        return state.position[:, 2:] - self.shape.feet_height
+
+    def scene(self, memory: Solids) -> Scene:
+        """The pad on level ground."""
+        return Scene.of({"pad": memory}, memory.active.shape[0])
+
+    def desired_yaw(self, memory: Solids, state: State) -> Float[Array, " n"]:
+        """Along world x."""
+        del memory
+        return jnp.zeros_like(state.position[:, 0])
+
+    def advance(
+        self, memory: Solids, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
+    ) -> tuple[Solids, Outcome]:
+        """The episode ends at the first touch of pad or ground, judged at the step's end.
+
+        Success: on the pad's top, near its centre, slow, upright.
+        """
+        del before, timed_out
+        c = self.config
+        offset = after.position - self.goal(memory, time)
+        sideways = jnp.linalg.norm(offset[:, :2], axis=-1)
+        feet = after.position - jnp.array([0.0, 0.0, 1.0]) * self.shape.feet_height
+        touched = (feet[:, 2] <= 0) | (distances("pad", memory, feet, time)[:, 0] <= 0)
+        success = (
+            touched
+            & (sideways < c.radius)
+            & (jnp.abs(offset[:, 2]) < c.height_error)
+            & (jnp.linalg.norm(after.velocity, axis=-1) < c.speed)
+            & (cos_tilt(after.quaternion) > jnp.cos(c.tilt))
+        )
+        lost = (sideways > c.fence) | (offset[:, 2] > c.fence)
+        return memory, Outcome(touched | lost, success, success, (touched & ~success) | lost, sideways)

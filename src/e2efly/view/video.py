@@ -1,0 +1,91 @@
+"""Videos of flights from the vehicle's eyes: GIF by Pillow, MP4 where the program ffmpeg is there."""
+
+import shutil
+import subprocess
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
+from PIL import Image, ImageDraw, ImageFont
+
+from e2efly.config import CameraConfig
+from e2efly.scenes.meshes.scene import MeshScene
+from e2efly.scenes.scene import Scene
+from e2efly.view.images import in_colours, look_around, shape_of
+from e2efly.view.tour import Tour
+
+PANELS = {"rgb": "Colour", "depth": "Depth", "label": "Class"}
+HEAD, GAP = 20, 6
+"""Room of a title over a panel, and between panels, pixels."""
+STRETCHED = 3.0
+"""Pictures wider than so many times their height are stacked, others stand side by side."""
+
+Frame = UInt8[np.ndarray, "h w 3"]
+
+
+def frames(camera: CameraConfig, scene: Scene | MeshScene, tour: Tour, width: int) -> Iterator[Frame]:
+    """The flight, frame by frame.
+
+    Args:
+        camera: of the vehicle.
+        scene: one world.
+        tour: the flight.
+        width: of a panel, pixels.
+    """
+    high, wide = shape_of(camera)
+    size = (width, max(round(width * high / wide), 24))
+    for time, position, quaternion in zip(tour.time, tour.position, tour.quaternion, strict=True):
+        images = look_around(camera, scene, time, position, quaternion, tuple(PANELS)).images
+        pictures = {name: in_colours(name, images[name], camera.reach[1]) for name in PANELS}
+        yield compose(pictures, size, f"{time:.1f} s", stacked=wide > STRETCHED * high)
+
+
+def compose(pictures: dict[str, np.ndarray], size: tuple[int, int], clock: str, stacked: bool) -> Frame:
+    """Panels side by side or under each other, with their titles: even numbers of rows and columns, as codecs want."""
+    width, height = size
+    across, down = (0, height + HEAD) if stacked else (width + GAP, 0)
+    count = len(pictures) - 1
+    whole = (width + count * across + 1) // 2 * 2, (height + HEAD + count * down + 1) // 2 * 2
+    canvas = Image.new("RGB", whole, "white")
+    draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(size=13)
+    for i, (name, picture) in enumerate(pictures.items()):
+        panel = Image.fromarray(np.rint(255 * picture).astype(np.uint8)).resize(size, Image.Resampling.NEAREST)
+        canvas.paste(panel, (i * across, HEAD + i * down))
+        draw.text((i * across + 2, i * down + 2), PANELS[name], fill="#222222", font=font)
+    draw.text((width - 4, 2), clock, fill="#222222", font=font, anchor="ra")
+    return np.asarray(canvas)
+
+
+def write_video(film: Iterable[Frame], path: Path, period: float) -> list[Path]:
+    """Write `path`.gif and, where ffmpeg is there, `path`.mp4.
+
+    Args:
+        film: the frames.
+        path: without suffix.
+        period: seconds from frame to frame.
+
+    Returns:
+        What was written.
+
+    Raises:
+        OSError: where ffmpeg is there and fails: what it says.
+    """
+    kept = [np.asarray(frame) for frame in film]
+    palette = Image.fromarray(np.concatenate(kept[:: max(1, len(kept) // 8)])).quantize(
+        128, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE
+    )
+    pages = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in kept]
+    gif = path.with_suffix(".gif")
+    pages[0].save(gif, save_all=True, append_images=pages[1:], duration=round(1000 * period), loop=0, optimize=False)
+    return [gif, _mp4(kept, path.with_suffix(".mp4"), period)] if shutil.which("ffmpeg") else [gif]
+
+
+def _mp4(film: list[Frame], path: Path, period: float) -> Path:
+    height, width, _ = film[0].shape
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{1 / period:g}", "-i", "-"]
+    command = ["ffmpeg", "-y", "-loglevel", "error", *raw, "-pix_fmt", "yuv420p", str(path)]
+    done = subprocess.run(command, input=b"".join(frame.tobytes() for frame in film), capture_output=True, check=False)
+    if done.returncode:
+        raise OSError(f"ffmpeg cannot write {path}: {done.stderr.decode(errors='replace').strip()}")
+    return path

@@ -1,0 +1,148 @@
+"""Tasks that are flown by sight: what counts as touching, landing, passing."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from e2efly.config import AvoidConfig, LandVisualConfig, RaceClutterConfig
+from e2efly.env import random_key
+from e2efly.physics import State
+from e2efly.physics.rotation import from_euler
+from e2efly.scenes.scene import Solids, clearance
+from e2efly.scenes.shapes import DISC, SQUARE, TRIANGLE
+from e2efly.tasks import Outcome, Shape, make_task
+from e2efly.tasks.task import at_rest, struck
+
+SHAPE = Shape(0.05, 0.15)
+PERIOD = 1 / 30
+
+
+def at(position: Any, velocity: Any = (0.0, 0.0, 0.0), tilt: float = 0.0) -> State:
+    position = jnp.atleast_2d(jnp.asarray(position, jnp.float32))
+    n = len(position)
+    turned = from_euler(jnp.full(n, tilt), jnp.zeros(n), jnp.zeros(n))
+    state = at_rest(position)
+    return dataclasses.replace(
+        state, velocity=jnp.broadcast_to(jnp.asarray(velocity, jnp.float32), (n, 3)), quaternion=turned
+    )
+
+
+def judged(task: Any, memory: Any, before: State, after: State, time: float = 1.0) -> Outcome:
+    n = after.position.shape[0]
+    return task.advance(memory, before, after, jnp.full(n, time), jnp.zeros(n, bool))[1]
+
+
+def pad(outline: int, yaw: float = 0.0) -> Solids:
+    return Solids.of("pad", jnp.array([[[0.0, 0.0, 0.1]]]), jnp.array([0.25, 0.1, float(outline)]), yaw=yaw)
+
+
+@pytest.mark.parametrize(
+    ("place", "velocity", "tilt", "outline", "touched", "success"),
+    [
+        ((0.05, 0.05, 0.249), (0, 0, -0.3), 0.0, SQUARE, True, True),
+        ((0.05, 0.05, 0.249), (0, 0, -0.3), 0.0, DISC, True, True),
+        ((0.05, 0.05, 0.249), (0, 0, -0.3), 0.0, TRIANGLE, True, True),
+        ((0.0, 0.0, 0.26), (0, 0, -0.3), 0.0, SQUARE, False, False),
+        ((0.0, 0.0, 0.249), (0, 0, -0.6), 0.0, SQUARE, True, False),  # too fast
+        ((0.0, 0.0, 0.249), (0, 0, -0.3), 0.4, SQUARE, True, False),  # tilted
+        ((0.24, 0.24, 0.249), (0, 0, -0.3), 0.0, SQUARE, True, False),  # in its corner
+        ((0.24, 0.24, 0.249), (0, 0, -0.3), 0.0, DISC, False, False),  # a disc has none
+        ((0.0, -0.24, 0.249), (0, 0, -0.3), 0.0, TRIANGLE, False, False),  # beside the base of the triangle
+        ((0.6, 0.0, 0.049), (0, 0, -0.3), 0.0, SQUARE, True, False),  # on the ground
+    ],
+)  # fmt: skip
+def test_landing_counts_on_top_of_the_pad(
+    place: Any, velocity: Any, tilt: float, outline: int, touched: bool, success: bool
+) -> None:
+    task = make_task(LandVisualConfig(), SHAPE, PERIOD)
+    after = at(place, velocity, tilt)
+    out = judged(task, pad(outline), after, after)
+    assert (bool(out.terminated[0]), bool(out.success[0])) == (touched, success)
+
+
+def test_pads_are_of_all_shapes_and_sizes_and_starts_over_them() -> None:
+    task = make_task(LandVisualConfig(), SHAPE, PERIOD)
+    state, memory = jax.jit(task.start, static_argnums=1)(random_key(0), 500)
+    size = np.asarray(memory.size[:, 0])
+    assert set(size[:, 2]) == {DISC, SQUARE, TRIANGLE}
+    assert 0.2 <= size[:, 0].min() < 0.21 and 0.29 < size[:, 0].max() <= 0.3
+    feet = np.asarray(state.position[:, 2]) - SHAPE.feet_height - 0.2
+    assert feet.min() >= 1.0 and feet.max() <= 3.0 and np.abs(np.asarray(state.position[:, :2])).max() <= 1.0
+
+
+def test_a_collision_is_found_between_the_ends_of_a_control_step() -> None:
+    trees = Solids.of("cylinder", jnp.array([[[0.0, 0.0, 2.0]]]), jnp.array([0.05, 2.0]))
+    task = make_task(AvoidConfig(), Shape(0.05, 0.02), PERIOD, 7)
+    memory = jax.tree.map(lambda x: x, dataclasses.replace(task.start(random_key(0), 1)[1], trees=trees))
+    before, after = at((-0.3, 0.0, 1.5), (18.0, 0, 0)), at((0.3, 0.0, 1.5), (18.0, 0, 0))
+    scene = task.scene(memory)
+    for checks, found in ((1, False), (7, True)):
+        hit = struck(scene, before, after, jnp.ones(1), PERIOD, checks, 0.02)
+        assert bool(hit[0]) == found
+    beside = [dataclasses.replace(s, position=s.position.at[:, 1].set(0.08)) for s in (before, after)]
+    assert not struck(scene, *beside, jnp.ones(1), PERIOD, 7, 0.02)[0]
+
+
+@pytest.mark.parametrize(("ends", "over"), [(True, True), (False, False)])
+def test_the_forest_is_passed_untouched_inside_its_lane(ends: bool, over: bool) -> None:
+    task = make_task(AvoidConfig(collisions_end=ends), SHAPE, PERIOD, 7)
+    _, memory = task.start(random_key(1), 1)
+    trees = dataclasses.replace(memory.trees, active=jnp.zeros_like(memory.trees.active))
+    free = dataclasses.replace(memory, trees=trees)
+    through = judged(task, free, at((39.9, 0, 1.5), (5, 0, 0)), at((40.05, 0, 1.5), (5, 0, 0)))
+    assert through.success[0] and through.terminated[0] and not through.crashed[0]
+    for place in ((20.0, 8.1, 1.5), (20.0, 0.0, 3.1), (20.0, 0.0, 0.04), (-5.1, 0.0, 1.5)):
+        out = judged(task, free, at(place), at(place))
+        assert out.terminated[0] and out.crashed[0] and not out.success[0]
+    tree = np.asarray(memory.trees.centre[0, np.flatnonzero(np.asarray(memory.trees.active[0]))[0]])
+    inside = at((tree[0], tree[1], 1.5))
+    out = judged(task, memory, inside, inside)
+    assert out.crashed[0] and bool(out.terminated[0]) == over and not out.success[0]
+
+
+def test_a_forest_is_as_dense_as_asked_and_clear_of_the_start() -> None:
+    task = make_task(AvoidConfig(), SHAPE, PERIOD, 7)
+    state, memory = jax.jit(task.start, static_argnums=1)(random_key(2), 300)
+    count = np.asarray(memory.trees.active).sum(axis=1).mean()
+    assert 0.9 * 64 < count <= 64
+    assert np.asarray(clearance(task.scene(memory), state.position, jnp.zeros(300))).min() > 1.0
+    assert len(np.unique(np.asarray(memory.trees.centre[:, 0, 0]))) == 300
+
+
+@pytest.mark.parametrize("track", ["s_shaped", "circle_3d", "j_shaped"])
+def test_clutter_leaves_gates_and_start_free(track: str) -> None:
+    task = make_task(RaceClutterConfig(track=track), SHAPE, PERIOD, 7)
+    n = 200
+    state, memory = jax.jit(task.start, static_argnums=1)(random_key(3), n)
+    scene, zero = task.scene(memory), jnp.zeros(n)
+    assert np.asarray(clearance(scene, state.position, zero)).min() > SHAPE.radius
+    obstacles = dataclasses.replace(scene, solids=memory.obstacles)
+    for gate in range(task.count):
+        assert np.asarray(clearance(obstacles, memory.gates.position[:, gate], zero)).min() > 0.7
+    moved = np.asarray(memory.gates.position - task.gates.position)
+    assert 0.25 < np.abs(moved).max() <= 0.3 + 1e-6
+    turned = np.arctan2(memory.gates.sin, memory.gates.cos) - np.arctan2(task.gates.sin, task.gates.cos)
+    turned = np.arctan2(np.sin(turned), np.cos(turned))
+    assert 0.17 < np.abs(turned).max() <= 0.2 + 1e-5
+
+
+def test_a_lap_in_clutter_is_the_gates_in_order_without_a_touch() -> None:
+    task = make_task(
+        RaceClutterConfig(clutter=dataclasses.replace(RaceClutterConfig().clutter, obstacles=0.0)), SHAPE, PERIOD, 7
+    )
+    _, memory = task.start(random_key(4), 1)
+    for gate in range(task.count):
+        centre = np.asarray(memory.gates.position[0, gate])
+        axis = np.array([memory.gates.cos[0, gate], memory.gates.sin[0, gate], 0.0])
+        np.testing.assert_allclose(task.goal(memory, jnp.zeros(1))[0], centre, atol=1e-5)
+        np.testing.assert_allclose(task.axes(memory)[0, 0], axis, atol=1e-6)
+        beside = [at(centre + 0.1 * s * axis + np.array([0.0, 0.0, 0.9]), 6 * axis) for s in (-1, 1)]
+        lost = judged(task, memory, *beside)
+        assert lost.terminated[0] and lost.crashed[0] and not lost.arrived[0]
+        through = [at(centre + 0.1 * s * axis, 6 * axis) for s in (-1, 1)]
+        memory, out = task.advance(memory, *through, jnp.ones(1), jnp.zeros(1, bool))
+        assert out.arrived[0] and not out.crashed[0] and bool(out.success[0]) == (gate == task.count - 1)

@@ -1,0 +1,85 @@
+"""Solids in plots: where they stand, what they cover, and that flights are drawn among them."""
+
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from scipy.spatial import ConvexHull
+
+from e2efly.config import HoverConfig
+from e2efly.scenes.generate import room
+from e2efly.scenes.scene import Scene, Solids, distances
+from e2efly.view import plots
+from e2efly.view.worlds import bodies, draw_plan, plot_flights_in_worlds
+from tests.view.test_plots import check_png, flights, task_of
+
+SIZES = {
+    "box": [0.5, 0.3, 0.2], "sphere": [0.6], "cylinder": [0.4, 1.0], "capsule": [0.3, 0.5],
+    "gate": [0.5, 0.4, 0.1, 0.05], "pad": [0.5, 0.1, 0],
+}  # fmt: skip
+AREA = {
+    "box": 4 * 0.5 * 0.3, "sphere": np.pi * 0.36, "cylinder": np.pi * 0.16, "capsule": np.pi * 0.09,
+    "gate": 4 * 0.6 * 0.05, "pad": np.pi * 0.25,
+}  # fmt: skip
+
+
+def one(kind: str) -> Scene:
+    place = jnp.array([[[2.0, 1.0, 1.5], [9.0, 9.0, 9.0]]])
+    solids = Solids.of(kind, place, SIZES[kind], yaw=0.7, active=jnp.array([[True, False]]))
+    return Scene.of({kind: solids}, 1)
+
+
+@pytest.mark.parametrize("kind", list(SIZES))
+def test_what_is_drawn_lies_on_the_solid_and_covers_its_area(kind: str) -> None:
+    scene = one(kind)
+    (body,) = bodies(scene)
+    points = body.quads.reshape(-1, 3)
+    corners = points[np.linalg.norm(points[:, :2] - [2.0, 1.0], axis=1) > 1e-6]  # not the middles of ends
+    solids = jax.tree.map(lambda x: jnp.repeat(x, len(corners), axis=0), scene.solids[kind])
+    away = distances(kind, solids, jnp.asarray(corners, jnp.float32), jnp.zeros(len(corners)))[:, 0]
+    np.testing.assert_allclose(away, 0.0, atol=1e-5)
+    assert ConvexHull(body.outline).volume == pytest.approx(AREA[kind], rel=0.03)
+    np.testing.assert_allclose(body.outline.mean(axis=0), [2.0, 1.0], atol=0.02)
+
+
+def test_what_moves_is_drawn_where_it_is_then_with_its_way() -> None:
+    scene = one("sphere")
+    solids = scene.solids["sphere"]
+    moving = Solids(**{**vars(solids), "sine": solids.sine.at[..., 1].set(2.0), "rate": solids.rate + 0.5})
+    (body,) = bodies(Scene.of({"sphere": moving}, 1), time=np.pi)
+    np.testing.assert_allclose(body.quads.mean(axis=(0, 1)), [2.0, 3.0, 1.5], atol=0.05)
+    assert body.path is not None
+    np.testing.assert_allclose(np.ptp(body.path, axis=0), [0.0, 4.0, 0.0], atol=1e-6)
+    assert bodies(scene)[0].path is None
+
+
+def test_a_ceiling_hides_nothing_from_above() -> None:
+    scene = Scene.of({"box": room(1, 6.0, 4.0, 3.0)}, 1)
+    assert len(bodies(scene)) == 4
+    assert len(bodies(scene, ceilings=True)) == 5
+    ax = Figure().add_subplot()
+    draw_plan(ax, bodies(scene))
+    assert len(ax.collections[0].get_paths()) == 4
+
+
+def test_flights_each_in_its_own_world(tmp_path: Path) -> None:
+    flown = flights(4)
+    flown.success[1] = False
+    centre = jnp.asarray(np.random.default_rng(0).uniform(-2, 2, (4, 3, 3)))
+    scene = Scene.of({"cylinder": Solids.of("cylinder", centre, [0.1, 1.0])}, 4)
+    for count, name in ((3, "few"), (9, "all")):
+        plot_flights_in_worlds(flown, scene, tmp_path / f"{name}.png", "avoid", count)
+        check_png(tmp_path / f"{name}.png")
+    plot_flights_in_worlds(flown, one("box"), tmp_path / "same.png", "one world")
+    check_png(tmp_path / "same.png")
+
+
+def test_flights_in_space_among_solids(tmp_path: Path) -> None:
+    task = task_of(HoverConfig())
+    plots.plot_flights(task, flights(), tmp_path / "bare.png", "hover")
+    plots.plot_flights(task, flights(), tmp_path / "among.png", "hover", bodies(one("cylinder")))
+    check_png(tmp_path / "among.png")
+    assert (tmp_path / "bare.png").read_bytes() != (tmp_path / "among.png").read_bytes()
