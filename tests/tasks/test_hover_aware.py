@@ -27,6 +27,9 @@ LATER, NOW = jnp.zeros(1, bool), jnp.ones(1, bool)
 LEVEL = jnp.array([[1.0, 0.0, 0.0, 0.0]])
 
 
+advance = jax.jit(HoverAware.advance)
+
+
 def make(**changes: Any) -> HoverAware:
     return HoverAware(HoverAwareConfig(**changes), SHAPE, PERIOD)
 
@@ -104,7 +107,7 @@ def test_the_pixels_velocity_against_differences() -> None:
 
 
 def signals(task: HoverAware, memory: Memory, state: State) -> dict[str, jax.Array]:
-    return task.advance(memory, state, state, jnp.zeros(1), LATER)[1].signals
+    return advance(task, memory, state, state, jnp.zeros(1), LATER)[1].signals
 
 
 @pytest.mark.parametrize("place", [(-4.0, 0.0, 3.0), (0.0, 3.0, 3.0), (0.0, 0.0, 3.0), (4.0, 0.0, 3.0)])
@@ -112,6 +115,7 @@ def test_ori3_and_its_gradient_are_finite_everywhere(place: Any) -> None:
     """Behind, abeam, in the camera itself, in its middle."""
     task, memory = make(), ball(place)
 
+    @jax.jit
     def term(quaternion: jax.Array, position: jax.Array, velocity: jax.Array, rate: jax.Array) -> jax.Array:
         s = signals(task, memory, State(position, velocity, quaternion, rate, jnp.zeros((1, 4))))
         return rewards.ori3(s["pixel"], s["pixel_velocity"])[0]
@@ -132,21 +136,21 @@ def test_all_must_be_well_for_the_last_second() -> None:
     aside = dataclasses.replace(here, quaternion=turned(yaw=0.3))  # 0.33 of the half image
     memory = ball((4.0, 0.0, 3.0))
     for i in range(29):
-        memory, out = task.advance(memory, here, here, (i + 1) * jnp.array([PERIOD]), LATER)
+        memory, out = advance(task, memory, here, here, (i + 1) * jnp.array([PERIOD]), LATER)
     assert float(memory.held[0]) == pytest.approx(29 * PERIOD, rel=1e-4)
     for state, good in ((here, True), (away, False), (aside, False)):
-        after, out = task.advance(memory, here, state, jnp.array([1.0]), NOW)
+        after, out = advance(task, memory, here, state, jnp.array([1.0]), NOW)
         assert bool(out.success[0]) == good
         assert bool(after.held[0] > 0) == good
     late = dataclasses.replace(memory, held=memory.held - PERIOD)
-    assert not task.advance(late, here, here, jnp.array([1.0]), NOW)[1].success[0]
-    assert not task.advance(memory, here, here, jnp.array([1.0]), LATER)[1].terminated[0]
+    assert not advance(task, late, here, here, jnp.array([1.0]), NOW)[1].success[0]
+    assert not advance(task, memory, here, here, jnp.array([1.0]), LATER)[1].terminated[0]
 
 
 @pytest.mark.parametrize("place", [(0.0, 6.1, 3.0), (0.0, 0.0, 0.04), (3.7, 0.0, 3.0)])
 def test_the_fence_the_ground_and_the_ball_end_it(place: Any) -> None:
     state = at_rest(jnp.array([place]))
-    out = make().advance(ball((4.0, 0.0, 3.0)), state, state, jnp.zeros(1), NOW)[1]
+    out = advance(make(), ball((4.0, 0.0, 3.0)), state, state, jnp.zeros(1), NOW)[1]
     assert (bool(out.terminated[0]), bool(out.crashed[0]), bool(out.success[0])) == (True, True, False)
 
 
