@@ -269,7 +269,8 @@ def _command(name: str) -> Callable[[list[str]], int]:
 
 def _train(arguments: list[str]) -> int:
     task = next((a for a in arguments[:1] if not a.startswith("-")), "hover")
-    options, defaults = train_options(task, _peek(arguments, "--algo", "ppo"), _peek(arguments, "--preset", "ours"))
+    algo = _peek(arguments, "--algo", presets.default_algorithm(task))
+    options, defaults = train_options(task, algo, _peek(arguments, "--preset", "ours"))
     if arguments[:1] != [task] and not {"-h", "--help"} & set(arguments):
         raise ValueError(f"train needs a task first: {_join(presets.TASKS)}")
     parsed = tyro.cli(

@@ -90,8 +90,9 @@ class CameraConfig:
     """Depth: nearest and farthest, m; nearer is a hole, farther is the farthest (sets the program)."""
     of: str = "pad"
     """mask: the class that it is of: sky, ground, obstacle, gate, pad or wall (sets the program)."""
-    encoding: Literal["inverse", "linear"] = "inverse"
-    """How a policy takes depth d: 1 m over d, or d over the farthest; a hole is 0 (sets the program)."""
+    encoding: Literal["inverse", "log", "linear"] = "inverse"
+    """How a policy takes depth d: 1 m over d, the logarithm of the farthest over d, or d over the farthest; a hole is 0
+    (sets the program)."""
     rate: float | None = None
     """Images a second, a whole part of the control rate; every control step when left out (sets the program)."""
     latency: tuple[float, float] = (0.0, 0.0)
@@ -106,6 +107,8 @@ class CameraConfig:
     """What it does to the image."""
     light_spread: float = 0.0
     """Colours: relative half-width of the sun's random strength and direction, an episode."""
+    colour_spread: float = 0.0
+    """Colours: half-width of what is added at random to red, green and blue of each solid, an episode."""
 
 
 @dataclass(frozen=True)
@@ -330,10 +333,12 @@ class RaceConfig:
 class RaceClutterConfig:
     """Fly through gates in order, among obstacles that are only seen."""
 
-    episode_s: float = 12.0
+    episode_s: float = 20.0
     """Length of an episode, s."""
     track: str = "s_shaped"
     """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file (its gate count sets shapes)."""
+    scale: float = 2.0
+    """The track's ground plan is this many times larger: wide enough for 10 m/s."""
     clutter: ClutterConfig = ClutterConfig()
     """The obstacles."""
     gate_position: float = 0.3
@@ -346,7 +351,7 @@ class RaceClutterConfig:
     """Start within this ball about the track's start, m."""
     laps: int = 1
     """Laps that end the episode with success; 0: fly on until time is out."""
-    fence: float = defaults.RACE_FENCE
+    fence: float = 20.0
     """Farther than this from the next gate the episode fails, m."""
     collisions_end: bool = True
     """Whether a collision ends the episode; training goes on, so that it learns from what comes after."""
@@ -516,7 +521,39 @@ class BPTTConfig:
     """Decay of the gradient through the state, 1/s of backward time; 0: the exact gradient."""
 
 
-AlgorithmConfig = PPOConfig | BPTTConfig
+@dataclass(frozen=True)
+class SHACConfig:
+    """Short-horizon actor-critic (Xu et al. 2022): the exact gradient over a window, and a critic's beyond it."""
+
+    envs: int = 64
+    """Environments side by side (sets shapes)."""
+    horizon: int = 32
+    """Steps of a window (sets shapes)."""
+    epochs: int = 4
+    """Passes of the critic over the samples of a window (sets shapes)."""
+    minibatch: int = 512
+    """Samples of a gradient step of the critic; divides envs * horizon (sets shapes)."""
+    learning_rate: float = 4e-3
+    """Adam's step at the start."""
+    learning_rate_end: float = 1e-4
+    """Adam's step at the end; exponential in between."""
+    critic_rate: float = 0.5
+    """The critic's step over the policy's."""
+    gamma: float = 0.98
+    """Discount a step."""
+    td_lambda: float = 0.95
+    """Lambda of the returns that the critic learns."""
+    target_share: float = 0.2
+    """How far the critic's slow copy follows it, an update."""
+    noise: float = 0.0
+    """Standard deviation of the noise on the action."""
+    max_grad_norm: float = 0.5
+    """Norm to which a gradient is clipped."""
+    gradient_decay: float = 0.0
+    """Decay of the gradient through the state, 1/s of backward time; 0: the exact gradient."""
+
+
+AlgorithmConfig = PPOConfig | BPTTConfig | SHACConfig
 
 
 @dataclass(frozen=True)

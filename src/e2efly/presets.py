@@ -23,6 +23,7 @@ from e2efly.config import (
     RaceClutterConfig,
     RaceConfig,
     RewardConfig,
+    SHACConfig,
     StageConfig,
     TaskConfig,
     TrackConfig,
@@ -43,13 +44,16 @@ TASKS: dict[str, TaskConfig] = {
 }
 """The task that each name trains on. Races go on for lap after lap; evaluation ends after one."""
 
-ALGORITHMS: dict[str, AlgorithmConfig] = {"ppo": PPOConfig(), "bptt": BPTTConfig()}
+ALGORITHMS: dict[str, AlgorithmConfig] = {"ppo": PPOConfig(), "bptt": BPTTConfig(), "shac": SHACConfig()}
 """Algorithms by name, with the defaults of their presets."""
+
+FIRST_ORDER = ("land_visual", "avoid", "race_clutter")
+"""Tasks that BPTT learns better than PPO does (docs/benchmarks.md)."""
 
 D435I = CameraConfig(fov=(math.radians(87), math.radians(58)), reach=(0.28, 10.0))
 """Depth of an Intel RealSense D435i."""
 _EYES: dict[str, tuple[CameraConfig, ...]] = {
-    "land_visual": (CameraConfig("mask", 32, 32, fov=(math.pi / 2, math.pi / 2), pitch=math.pi / 2),),
+    "land_visual": (CameraConfig("mask", 16, 16, fov=(math.pi / 2, math.pi / 2), pitch=math.pi / 2),),
     "race_clutter": (dataclasses.replace(D435I, width=48, height=24, pitch=-0.35),),
     "avoid": (dataclasses.replace(D435I, width=32, height=12),),
 }
@@ -121,23 +125,23 @@ def _land(algo: str) -> TrainConfig:
 
 def _land_visual(algo: str) -> TrainConfig:
     weights = {"progxy": 1.0, "descent": 1.0, "upright": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02}
-    settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=1.2e-4)
+    settings: AlgorithmConfig = BPTTConfig(envs=32, horizon=48, learning_rate_end=1.2e-4)
+    steps = 650_000
     if algo == "ppo":
         weights = {
             "prog1": 4.0, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02, "goal": 10.0,
             "crash": 10.0,
         }  # fmt: skip
-        settings = PPOConfig(learning_rate=2e-3)
+        settings, steps = PPOConfig(learning_rate=2e-3), 2_000_000
     network, seen = NetworkConfig((128, 64)), EnvConfig(cameras=_EYES["land_visual"])
     return TrainConfig(
-        LandVisualConfig(), settings, RewardConfig(weights), seen, network, steps=1_000_000, chunk=30,
-        eval_episodes=100,
-    )  # fmt: skip
+        LandVisualConfig(), settings, RewardConfig(weights), seen, network, steps=steps, chunk=30, eval_episodes=100
+    )
 
 
 def _avoid(algo: str) -> TrainConfig:
     weights = {"vel": 3.5, "avoid": 10.0, "ori2": 0.1, "anglev_sq": 0.01, "act2_sq": 0.02}
-    settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=1.2e-4, gradient_decay=2.5)
+    settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=1.2e-4, gradient_decay=1.5)
     task, network = TASKS["avoid"], NetworkConfig((128, 64), pool=(6, 32), recurrent=64)
     curriculum: tuple[StageConfig, ...] = ()
     if algo == "ppo":
@@ -168,17 +172,23 @@ def _gap(algo: str) -> TrainConfig:
 
 
 def _race_clutter(algo: str) -> TrainConfig:
-    weights = {"prog1": 1.0, "near": 0.1, "avoid": 0.1, "overspeed": 0.01, "anglev_sq": 0.0005, "act2_sq": 0.005}
-    settings: AlgorithmConfig = BPTTConfig(learning_rate=8e-3, max_grad_norm=1.0, gradient_decay=1.5)
-    task, curriculum = TASKS["race_clutter"], ()
+    weights = {
+        "vel": 2.0, "near": 1.0, "avoid": 12.0, "fit": 20.0, "ori2": 0.3, "anglev_sq": 0.01, "act2_sq": 0.02,
+    }  # fmt: skip
+    parameters = {"fit_margin": 0.25, "fit_limit": 2.0}
+    settings: AlgorithmConfig = BPTTConfig(horizon=48, gradient_decay=1.5)
+    task, curriculum, network = TASKS["race_clutter"], (), NetworkConfig((128, 64), pool=(24, 48), recurrent=64)
     if algo == "ppo":
-        weights |= {"goal": 1.0, "crash": 1.0}
-        settings = PPOConfig(gamma=0.97, learning_rate=3e-3, learning_rate_end=3e-4)
+        weights = {
+            "prog1": 1.0, "overspeed": 0.01, "avoid": 0.05, "ori2": 0.1, "anglev_sq": 0.0005, "act2_sq": 0.005,
+            "goal": 1.0, "crash": 2.0,
+        }  # fmt: skip
+        settings, parameters = PPOConfig(gamma=0.97), {}
         task, curriculum = RaceClutterConfig(laps=0), CURRICULA["race_clutter"]
-    network, seen = NetworkConfig((128, 64), pool=(12, 24)), EnvConfig(cameras=_EYES["race_clutter"])
+        network = dataclasses.replace(network, recurrent=0)
     return TrainConfig(
-        task, settings, RewardConfig(weights), seen, network, steps=6_000_000, chunk=100, eval_episodes=100,
-        curriculum=curriculum,
+        task, settings, RewardConfig(weights, parameters), EnvConfig(cameras=_EYES["race_clutter"]), network,
+        steps=9_000_000, chunk=200, eval_episodes=500, curriculum=curriculum,
     )  # fmt: skip
 
 
@@ -215,6 +225,16 @@ _OURS: dict[str, Callable[[str], TrainConfig]] = {
 }
 
 
+def _shac(task: str) -> TrainConfig:
+    """BPTT's preset with a critic behind a shorter window."""
+    config = _OURS[task]("bptt")
+    shared = {f.name: getattr(config.algo, f.name) for f in dataclasses.fields(BPTTConfig) if f.name in _SHARED}
+    return dataclasses.replace(config, algo=SHACConfig(**shared))
+
+
+_SHARED = ("envs", "learning_rate", "learning_rate_end", "max_grad_norm", "gradient_decay")
+
+
 def _paper(task: str, algo: str) -> TrainConfig:
     """The paper's rewards, sizes and learning rates (its tables; see docs/rewards.md for what it leaves open)."""
     weights = dict(_PAPER_WEIGHTS[task])
@@ -235,7 +255,7 @@ def _paper(task: str, algo: str) -> TrainConfig:
 
 
 PRESETS: dict[str, Callable[[str, str], TrainConfig]] = {
-    "ours": lambda task, algo: _OURS[task](algo),
+    "ours": lambda task, algo: _shac(task) if algo == "shac" else _OURS[task](algo),
     "paper": _paper,
 }
 """Presets by name: functions of the task's and the algorithm's name."""
@@ -251,11 +271,18 @@ def preset(task: str, algo: str, name: str = "ours") -> TrainConfig:
     for kind, value, known in (("task", task, TASKS), ("algorithm", algo, ALGORITHMS), ("preset", name, PRESETS)):
         if value not in known:
             raise ValueError(unknown(kind, value, known))
+    if name == "paper" and algo == "shac":
+        raise ValueError("preset 'paper': the paper does not train by 'shac'; accepted: ppo, bptt")
     if name == "paper" and task not in _PAPER_WEIGHTS:
         raise ValueError(
             f"preset 'paper': the paper has no reward for task {task!r}; accepted: {', '.join(_PAPER_WEIGHTS)}"
         )
     return PRESETS[name](task, algo)
+
+
+def default_algorithm(task: str) -> str:
+    """The algorithm that a task is best learned by; for a name that is none, ppo."""
+    return "bptt" if task in FIRST_ORDER else "ppo"
 
 
 def task_name(config: TaskConfig) -> str:
@@ -305,14 +332,14 @@ def check(config: TrainConfig) -> None:
         "algo.envs": algo.envs, "algo.horizon": algo.horizon, "algo.learning_rate": algo.learning_rate,
         "algo.learning_rate_end": algo.learning_rate_end, "algo.max_grad_norm": algo.max_grad_norm,
     }  # fmt: skip
-    if isinstance(algo, PPOConfig):
+    if isinstance(algo, PPOConfig | SHACConfig):
         positive |= {"algo.epochs": algo.epochs, "algo.minibatch": algo.minibatch}
     for name, value in positive.items():
         if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} is {value}; accepted: more than 0")
     if not 0 < algo.gamma <= 1:
         raise ValueError(f"algo.gamma is {algo.gamma}; accepted: above 0, at most 1")
-    if isinstance(algo, PPOConfig) and (algo.envs * algo.horizon) % algo.minibatch:
+    if isinstance(algo, PPOConfig | SHACConfig) and (algo.envs * algo.horizon) % algo.minibatch:
         raise ValueError(
             f"algo.minibatch is {algo.minibatch}; accepted: a divisor of algo.envs * algo.horizon "
             f"({algo.envs * algo.horizon})"

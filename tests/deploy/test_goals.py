@@ -143,7 +143,7 @@ def test_behind_the_last_gate_of_an_open_track_it_goes_straight_on(contracts: di
     state = fly(goal, through("s_shaped", 3))
     np.testing.assert_allclose(goal.targets(state, START), [track.position[-1], on], rtol=1e-6)
     assert not goal.done(state)
-    state = fly(goal, [*through("s_shaped", 4), [19.0, -2.0, 1.5], [0.0, 0.0, 1.5], *through("s_shaped", 1)])
+    state = fly(goal, [*through("s_shaped", 4), [19.0, -1.0, 1.5], [0.0, 0.0, 1.5], *through("s_shaped", 1)])
     np.testing.assert_allclose(goal.targets(state, START), [on, on], rtol=1e-6)
     assert (state.passed, goal.done(state), goal.failed(state)) == (4, True, "")
 

@@ -36,12 +36,17 @@ class Probe:
     weight: float = 1.0
     length: int = 4
     ends_for_good: bool = True
+    told: bool = False
+    """Whether a critic is told the last action."""
 
     fields = FIELDS
     control_period = 1.0
     hover = np.zeros(4, np.float32)
     cameras = ()
-    privileged_size = 0
+
+    @property
+    def privileged_size(self) -> int:
+        return 4 if self.told else 0
 
     def reset(self, n: int) -> tuple[ProbeState, Array]:
         zero = jnp.zeros((n, 3))
@@ -80,7 +85,7 @@ class Probe:
         return state
 
     def privileged(self, state: ProbeState) -> Array:
-        return jnp.zeros((state.count.shape[0], 0))
+        return state.vehicle.rotor_speed[:, : self.privileged_size]
 
     def step(self, state: ProbeState, action: Array) -> tuple[ProbeState, Step]:
         return self.restart(*self.advance(state, action))

@@ -1,4 +1,4 @@
-"""PPO and BPTT on probe problems with known answers; GAE by hand."""
+"""PPO, BPTT and SHAC on probe problems with known answers; GAE by hand."""
 
 import dataclasses
 from typing import Any
@@ -7,28 +7,30 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from jax.flatten_util import ravel_pytree
 
-from e2efly.config import AlgorithmConfig, BPTTConfig, NetworkConfig, PPOConfig
+from e2efly.config import AlgorithmConfig, BPTTConfig, NetworkConfig, PPOConfig, SHACConfig
 from e2efly.env import random_key
-from e2efly.learn.algorithm import TrainState, adam, annealed
-from e2efly.learn.bptt import BPTT
+from e2efly.learn.algorithm import TrainState, annealed, make_algorithm
+from e2efly.learn.critic import gae
 from e2efly.learn.devices import OWN, on_each, own, stacked
 from e2efly.learn.networks import Actor, mlp
-from e2efly.learn.ppo import PPO, gae
 from tests.learn.probe import Probe
 
 ACTOR = Actor.of(Probe.fields, (), NetworkConfig((16,), "tanh"))
 PPO_CONFIG = PPOConfig(envs=64, horizon=16, minibatch=256, epochs=4, learning_rate=1e-2, learning_rate_end=1e-3)
 BPTT_CONFIG = BPTTConfig(envs=4, horizon=8, learning_rate=2e-2, learning_rate_end=1e-3, max_grad_norm=10.0)
 
+SHAC_CONFIG = SHACConfig(
+    envs=32, horizon=8, minibatch=128, learning_rate=2e-2, learning_rate_end=1e-3, gamma=0.9, max_grad_norm=10.0
+)
+
 
 def learn(
     probe: Probe, config: AlgorithmConfig, updates: int, devices: int = 2
 ) -> tuple[Any, TrainState, dict[str, jax.Array]]:
-    algorithm = PPO(ACTOR) if isinstance(config, PPOConfig) else BPTT(ACTOR)
+    algorithm = make_algorithm(config, ACTOR)
     parameters = jax.tree.map(jnp.asarray, algorithm.init(probe, config, 0))  # type: ignore[arg-type]
-    optimizer = adam(config.max_grad_norm).init(ravel_pytree(parameters)[0])
+    optimizer = algorithm.optimizer(config, parameters)
     n = config.envs // devices
     states = [
         TrainState(parameters, optimizer, *probe.reset(n), ACTOR.memory(n), random_key(i)) for i in range(devices)
@@ -68,6 +70,29 @@ def test_ppo_finds_the_action_that_pays_best(delay: int) -> None:
     probe = Probe(delay=delay, length=1000, ends_for_good=False)
     _, state, _ = learn(probe, dataclasses.replace(PPO_CONFIG, gamma=0.9), 150)
     np.testing.assert_allclose(learned_action(state), probe.target, atol=0.08)
+
+
+@pytest.mark.parametrize("delay", [0, 1])
+def test_shac_finds_the_action_that_pays_best(delay: int) -> None:
+    _, state, _ = learn(Probe(delay=delay, length=1000), SHAC_CONFIG, 200)
+    np.testing.assert_allclose(learned_action(state), Probe.target, atol=0.02)
+
+
+def test_the_critic_of_shac_sees_beyond_the_window() -> None:
+    # each action pays a step later: in a window of one step its gradient is the critic's alone
+    probe = Probe(delay=1, length=1000, told=True)
+    short = dataclasses.replace(SHAC_CONFIG, horizon=1, minibatch=32, learning_rate=1e-2, noise=0.3)
+    _, state, _ = learn(probe, short, 1500)
+    np.testing.assert_allclose(learned_action(state), probe.target, atol=0.1)
+    _, blind, _ = learn(probe, dataclasses.replace(BPTT_CONFIG, horizon=1), 300)
+    assert np.abs(learned_action(blind) - np.array(probe.target)).max() > 0.3
+
+
+def test_the_critic_of_shac_knows_what_follows_a_time_out_and_that_nothing_follows_an_end() -> None:
+    for ends, worth in ((False, 2.0), (True, 1.0)):
+        probe = Probe(constant=1.0, weight=0.0, length=1, ends_for_good=ends)
+        _, state, _ = learn(probe, dataclasses.replace(SHAC_CONFIG, gamma=0.5), 150)
+        assert learned_value(state) == pytest.approx(worth, abs=0.05)
 
 
 def test_the_gradient_of_bptt_is_the_mean_over_devices() -> None:

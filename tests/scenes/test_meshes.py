@@ -64,6 +64,15 @@ class TestCast:
             assert mine[name].shape == theirs[name].shape and mine[name].dtype == theirs[name].dtype
             assert np.mean(np.abs(mine[name] - np.asarray(theirs[name])) <= limit) > 0.997, name
 
+    @pytest.mark.parametrize("sees", ["depth", "range", "mask"])
+    def test_a_camera_looks_at_triangles_as_at_solids(self, sees: str) -> None:
+        solids = Scene.of({kind: some for kind, some in crowd(1, 7).solids.items() if kind in ("box", "gate")}, 1)
+        seen = dataclasses.replace(CONFIG, sees=sees, of="gate", reach=(0.5, 6.0))
+        mount, pose = camera.mount(seen, 1), (jnp.asarray(AHEAD), jnp.asarray(LEVEL))
+        theirs, mine = (camera.look(seen, world, mount, *pose) for world in (solids, MeshScene.of(parts(solids, 0))))
+        assert mine.shape == theirs.shape and len(np.unique(np.asarray(mine))) > 1
+        assert np.mean(np.abs(mine - theirs) <= 5e-3) > 0.997
+
     def test_depth_alone_is_that_among_others_and_misses_are_far(self) -> None:
         scene = MeshScene.of([box((1, 1, 1), (4.0, 0.0, 2.0))])
         images = see(scene)

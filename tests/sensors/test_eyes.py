@@ -74,6 +74,16 @@ def test_cameras_sit_differently_in_every_episode_where_they_are_told_to() -> No
     assert np.ptp(np.asarray(same.matrix), axis=0).max() == 0
 
 
+def test_colours_differ_between_episodes_where_they_are_told_to() -> None:
+    pad = LandVisualConfig(sideways=0.0, height=(0.8, 0.8), velocity=0.0)
+    camera = CameraConfig("rgb", 8, 8, fov=(0.2, 0.2), pitch=math.pi / 2)
+    same, mixed = (fly(env_with(c, task=pad), 0)[0].images[0] for c in (
+        camera, dataclasses.replace(camera, colour_spread=0.4)
+    ))  # fmt: skip
+    assert np.ptp(np.asarray(same[:, 4, 4]), axis=0).max() < 1e-3
+    assert np.ptp(np.asarray(mixed[:, 4, 4]), axis=0).min() > 0.05
+
+
 def test_images_have_no_gradient_and_let_others_through() -> None:
     env = env_with(DOWN)
     state, _ = jax.jit(Env.reset, static_argnums=2)(env, random_key(0), N)

@@ -12,7 +12,7 @@ SEES = ("depth", "range", "mask", "rgb", "normal")
 """What the image of a policy can show."""
 PROJECTIONS = ("pinhole", "spherical")
 """A camera, or equal angles between columns and rows."""
-ENCODINGS = ("inverse", "linear")
+ENCODINGS = ("inverse", "log", "linear")
 """How the graph takes depth and range."""
 NONE = "none"
 """In place of what an image does not have: a class but of a mask, an encoding but of depth and range."""

@@ -33,6 +33,8 @@ from e2efly.tasks.task import into_ball, uniform
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
+LEADS = (0.0, 0.25, 0.5, 1.0, 1.5)
+"""How far ahead a critic is told the clearance, s."""
 DEFAULT = EnvConfig()
 """The VIS-R, nothing random but the starts."""
 
@@ -183,25 +185,21 @@ class Env:
     @property
     def privileged_size(self) -> int:
         """Numbers of `privileged`."""
-        return 11 if self.cameras else 0
+        return 3 + len(LEADS) if self.cameras else 0
 
     def privileged(self, state: EnvState) -> Float[Array, "n p"]:
         """What a critic may know beside the observation, where there are cameras; nothing without.
 
-        The way to the goal; the clearance where the vehicle will be if it flies straight on, from now to one and a
-        half seconds; the direction to what is nearest. Body frame, m, clipped to a few metres.
+        The way to the goal, body frame, and the clearance where the vehicle will be after each of `LEADS` if it flies
+        straight on: m, clipped to a few metres.
         """
         n = state.time.shape[0]
         if not self.cameras:
             return jnp.zeros((n, 0))
-        s, scene = jax.lax.stop_gradient(state.vehicle), self.task.scene(jax.lax.stop_gradient(state.memory))
+        s, scene = state.vehicle, self.task.scene(jax.lax.stop_gradient(state.memory))
         away = unrotate(s.quaternion, self.task.goal(state.memory, state.time) - s.position)
-        ahead = [scenes.clearance(scene, s.position + t * s.velocity, state.time + t) for t in (0.25, 0.5, 1.0, 1.5)]
-        towards = jax.grad(lambda p: jnp.sum(scenes.clearance(scene, p, state.time)))(s.position)
-        now = scenes.clearance(scene, s.position, state.time)
-        clear = jnp.clip(jnp.stack([now, *ahead], axis=-1), -1.0, 3.0)
-        seen = jnp.concatenate([jnp.clip(away, -5.0, 5.0), clear, unrotate(s.quaternion, -towards)], axis=-1)
-        return jax.lax.stop_gradient(seen)
+        ahead = jax.vmap(lambda t: scenes.clearance(scene, s.position + t * s.velocity, state.time + t), out_axes=1)
+        return jnp.concatenate([jnp.clip(away, -5.0, 5.0), jnp.clip(ahead(jnp.asarray(LEADS)), -1.0, 3.0)], axis=-1)
 
     def restart(self, state: EnvState, out: Step) -> tuple[EnvState, Step]:
         """Start anew where `out` says that the episode ended; all of it under a full mask is a reset."""
@@ -311,8 +309,12 @@ class Env:
         return any(signal in rewards.TERMS[name].inputs for name in self.weights for signal in signals)
 
     def _dangers(self, memory: Any, state: State, time: Float[Array, " n"]) -> dict[str, Array]:
-        """How far the vehicle's sphere is from things, m, and how fast they come nearer, m/s."""
+        """How far the vehicle's sphere is from things, m, and how fast they come nearer, m/s.
+
+        Gates do not count: kept away from, they are not flown through.
+        """
         scene, radius = self.task.scene(memory), self.task.shape.radius
+        scene = dataclasses.replace(scene, solids={k: s for k, s in scene.solids.items() if k != "gate"})
 
         def gaps(position: Array, time: Array) -> Array:
             return scenes.gaps(scene, position, time) - radius

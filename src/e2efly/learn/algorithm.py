@@ -9,12 +9,12 @@ import optax
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from e2efly.config import AlgorithmConfig, BPTTConfig, PPOConfig
+from e2efly.config import AlgorithmConfig, BPTTConfig, PPOConfig, SHACConfig
 from e2efly.env import Env, EnvState
 from e2efly.learn.devices import AXIS
 from e2efly.learn.networks import Actor
 
-for _config in (PPOConfig, BPTTConfig):
+for _config in (PPOConfig, BPTTConfig, SHACConfig):
     _shapes = [name for name, kind in _config.__annotations__.items() if kind is int]
     jax.tree_util.register_dataclass(
         _config,
@@ -41,8 +41,17 @@ class TrainState:
 class Algorithm(Protocol):
     """A learning algorithm on the shapes of one environment."""
 
+    @property
+    def actor(self) -> Actor:
+        """The policy that learns."""
+        ...
+
     def init(self, env: Env, config: Any, seed: int) -> Any:
         """Fresh parameters, made by NumPy: nothing to compile."""
+        ...
+
+    def optimizer(self, config: Any, parameters: Any) -> Any:
+        """The optimiser's first state."""
         ...
 
     def update(
@@ -60,12 +69,17 @@ def adam(max_grad_norm: float | Array) -> optax.GradientTransformation:
     return optax.chain(optax.clip_by_global_norm(max_grad_norm), optax.scale_by_adam())
 
 
-def begin(actor: Actor, env: Env, config: AlgorithmConfig, parameters: Any, key: PRNGKeyArray) -> TrainState:
+def at_rest(config: AlgorithmConfig, parameters: Any) -> Any:
+    """Adam's state before its first step on these parameters."""
+    return adam(config.max_grad_norm).init(ravel_pytree(parameters)[0])
+
+
+def begin(algorithm: Algorithm, env: Env, config: AlgorithmConfig, parameters: Any, key: PRNGKeyArray) -> TrainState:
     """A device's first state of a run: its environments as started, the optimiser at rest."""
     key = jax.random.fold_in(key, jax.lax.axis_index(AXIS))
     env_state, observation = env.reset(jax.random.fold_in(key, 0), config.envs // jax.lax.axis_size(AXIS))
-    optimizer = adam(config.max_grad_norm).init(ravel_pytree(parameters)[0])
-    return TrainState(parameters, optimizer, env_state, observation, actor.memory(observation.shape[0]), key)
+    optimizer, memory = algorithm.optimizer(config, parameters), algorithm.actor.memory(observation.shape[0])
+    return TrainState(parameters, optimizer, env_state, observation, memory, key)
 
 
 def descend(
@@ -86,6 +100,11 @@ def descend(
     return parameters, optimizer, jnp.linalg.norm(flat)
 
 
+def damped(tree: Any, keep: Array) -> Any:
+    """The same values; their gradient scaled by `keep`."""
+    return jax.tree.map(lambda x: keep * x + jax.lax.stop_gradient((1 - keep) * x), tree)
+
+
 def episode_metrics(done: Array, success: Array) -> dict[str, Array]:
     """How many episodes ended on all devices, and the share of them that met the criterion."""
     episodes, successes = jax.lax.psum((jnp.sum(done), jnp.sum(success)), AXIS)
@@ -101,6 +120,7 @@ def make_algorithm(config: AlgorithmConfig, actor: Actor) -> Algorithm:
     """The algorithm of a configuration."""
     from e2efly.learn.bptt import BPTT
     from e2efly.learn.ppo import PPO
+    from e2efly.learn.shac import SHAC
 
-    makers: dict[type, type] = {PPOConfig: PPO, BPTTConfig: BPTT}
+    makers: dict[type, type] = {PPOConfig: PPO, BPTTConfig: BPTT, SHACConfig: SHAC}
     return makers[type(config)](actor)

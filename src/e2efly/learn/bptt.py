@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 
 from e2efly.config import BPTTConfig
 from e2efly.env import Env, EnvState
-from e2efly.learn.algorithm import TrainState, annealed, descend, episode_metrics
+from e2efly.learn.algorithm import TrainState, annealed, at_rest, damped, descend, episode_metrics
 from e2efly.learn.networks import Actor, Weights
 
 
@@ -39,6 +39,10 @@ class BPTT:
         del config
         rng = np.random.default_rng(seed)
         return Parameters(self.actor.init(rng, np.asarray(env.hover)))
+
+    def optimizer(self, config: BPTTConfig, parameters: Parameters) -> Any:
+        """Adam at rest."""
+        return at_rest(config, parameters)
 
     def update(
         self, env: Env, config: BPTTConfig, state: TrainState, progress: Float[Array, ""]
@@ -74,7 +78,7 @@ class BPTT:
             features = self.actor.features(observation, env_state.images)
             action, memory = self.actor(parameters.policy, features, memory)
             env_state, out = env.step(env_state, action)
-            env_state = dataclasses.replace(env_state, vehicle=_damped(env_state.vehicle, keep))
+            env_state = dataclasses.replace(env_state, vehicle=damped(env_state.vehicle, keep))
             gathered = (
                 jnp.mean(out.reward),
                 jnp.sum(out.done),
@@ -96,8 +100,3 @@ class BPTT:
             **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()},
         }
         return -jnp.sum(gain) / config.horizon, (env_state, observation, memory, metrics)
-
-
-def _damped(tree: Any, keep: Array) -> Any:
-    """The same values; their gradient scaled by `keep`."""
-    return jax.tree.map(lambda x: keep * x + jax.lax.stop_gradient((1 - keep) * x), tree)

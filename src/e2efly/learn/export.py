@@ -88,6 +88,8 @@ def _image(name: str, view: View, control_rate: float) -> Image:
     done = []
     if measures and c.encoding == "inverse":
         done.append(f"1 m over it, at most {1 / NEAREST:g}, a hole: 0")
+    elif measures and c.encoding == "log":
+        done.append(f"logarithm of {c.reach[1]:g} m over it, nearer than {NEAREST:g} m as there, a hole: 0")
     elif measures:
         done.append(f"divided by {c.reach[1]:g} m")
     if not view.patches:

@@ -87,11 +87,14 @@ def _encoded(graph: _Graph, name: str, view: View, layers: Layers, operator: str
         x = graph.node("Transpose", [name], at("planes"), perm=[0, 3, 1, 2])
     else:
         x = graph.node("Reshape", [name, graph.constant(at("planes_shape"), [0, 1, c.height, c.width])], at("planes"))
-    if c.sees in ("depth", "range") and c.encoding == "inverse":
-        nearest, hole = number("nearest", NEAREST), number("hole", 0)
-        near = graph.node(
-            "Div", [number("metre", 1), graph.node("Max", [x, nearest], at("beyond_nearest"))], at("inverse")
-        )
+    if c.sees in ("depth", "range") and c.encoding != "linear":
+        hole = number("hole", 0)
+        beyond = graph.node("Max", [x, number("nearest", NEAREST)], at("beyond_nearest"))
+        if c.encoding == "inverse":
+            near = graph.node("Div", [number("metre", 1), beyond], at("inverse"))
+        else:
+            share = graph.node("Div", [number("farthest", c.reach[1]), beyond], at("share"))
+            near = graph.node("Log", [share], at("log"))
         x = graph.node("Where", [graph.node("Greater", [x, hole], at("measured")), near, hole], at("encoded"))
     elif c.sees in ("depth", "range"):
         x = graph.node("Div", [x, number("farthest", c.reach[1])], at("encoded"))

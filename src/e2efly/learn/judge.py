@@ -37,7 +37,7 @@ def score(task: str, flown: dict[str, Episodes]) -> float:
     """What the best policy is chosen by: success first, then precision (racing: lap time)."""
 
     def cost(e: Episodes) -> float:
-        if task == "race":
+        if task in ("race", "race_clutter"):
             return float(np.mean(e.duration)) / 10
         return float(np.mean(e.mean_error if task == "track" else e.final_error))
 

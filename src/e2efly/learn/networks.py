@@ -25,15 +25,15 @@ ACTIVATIONS = {"relu": jax.nn.relu, "tanh": jnp.tanh, "elu": jax.nn.elu}
 
 
 NEAREST = 0.3
-"""Inverse encoding of depth d is 1 m / d; what is nearer than this is not told apart, m."""
+"""Encodings of depth tell nothing apart that is nearer than this, m."""
 FAINTEST = 1e-2
 """Keeps a mask that shows nothing from being divided by its mean, which is 0."""
 
 
 @dataclass(frozen=True)
 class View:
-    """One camera's part of the features: its image, averaged over the cells of a grid (of inverse depth the nearest is
-    kept); then its encoder.
+    """One camera's part of the features: its image, averaged over the cells of a grid (of inverse or logarithmic depth
+    the nearest is kept); then its encoder.
 
     A mask is followed by itself divided by its mean: what is far is small, and seen as clearly as what is near.
     """
@@ -77,7 +77,7 @@ class View:
     @property
     def keeps_nearest(self) -> bool:
         """Whether a cell shows the largest of its values, not their mean."""
-        return self.camera.sees in ("depth", "range") and self.camera.encoding == "inverse"
+        return self.camera.sees in ("depth", "range") and self.camera.encoding != "linear"
 
     @property
     def contrast(self) -> float:
@@ -89,8 +89,7 @@ class View:
         c = self.camera
         channels = 3 if c.sees in ("rgb", "normal") else 1
         if c.sees in ("depth", "range"):
-            inverse = jnp.where(image > 0, 1.0 / jnp.maximum(image, NEAREST), 0.0)
-            image = inverse if c.encoding == "inverse" else image / c.reach[1]
+            image = _encoded(c, image)
         lead = image.shape[: image.ndim - (3 if channels == 3 else 2)]
         cells = image.reshape(*lead, self.rows, c.height // self.rows, self.columns, c.width // self.columns, channels)
         x = (jnp.max if self.keeps_nearest else jnp.mean)(cells, axis=(-4, -2))
@@ -117,6 +116,15 @@ class View:
             x = jnp.swapaxes(x, -4, -3).reshape(*lead, rows // side, columns // side, side * side * channels)
             x = act(x @ weight + bias)
         return act(mlp(layers[len(self.patches) :], x.reshape(*lead, -1), activation))
+
+
+def _encoded(camera: CameraConfig, image: Array) -> Array:
+    """Depth as the network takes it; a hole is 0."""
+    if camera.encoding == "linear":
+        return image / camera.reach[1]
+    near = jnp.maximum(image, NEAREST)
+    encoded = 1.0 / near if camera.encoding == "inverse" else jnp.log(camera.reach[1] / near)
+    return jnp.where(image > 0, encoded, 0.0)
 
 
 def _patches(camera: CameraConfig, convolution: tuple[int, ...]) -> tuple[int, ...]:

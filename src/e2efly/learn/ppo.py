@@ -16,8 +16,9 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import PPOConfig
 from e2efly.env import Env, EnvState
-from e2efly.learn.algorithm import TrainState, annealed, descend, episode_metrics
-from e2efly.learn.networks import Actor, Layers, Weights, init_mlp, mlp
+from e2efly.learn.algorithm import TrainState, annealed, at_rest, descend, episode_metrics
+from e2efly.learn.critic import gae, init_critic, known, value
+from e2efly.learn.networks import Actor, Layers, Weights
 
 
 @jax.tree_util.register_dataclass
@@ -45,36 +46,6 @@ class Samples:
     value_target: Float[Array, "*t"]
 
 
-def gae(
-    reward: Float[Array, "t n"],
-    value: Float[Array, "t n"],
-    next_value: Float[Array, "t n"],
-    terminated: Float[Array, "t n"],
-    done: Float[Array, "t n"],
-    gamma: float | Array,
-    lam: float | Array,
-) -> Float[Array, "t n"]:
-    """Generalised advantage estimate (Schulman et al. 2016).
-
-    Args:
-        reward: of each step.
-        value: of the observation acted on.
-        next_value: of the observation reached, before any new start.
-        terminated: the step ended the episode for good: nothing follows.
-        done: the step ended the episode, also by time-out: the sum stops, the bootstrap stays.
-        gamma: discount.
-        lam: lambda.
-    """
-    delta = reward + gamma * (1.0 - terminated) * next_value - value
-
-    def backward(carry: Array, x: tuple[Array, Array]) -> tuple[Array, Array]:
-        step_delta, step_done = x
-        carry = step_delta + gamma * lam * (1.0 - step_done) * carry
-        return carry, carry
-
-    return jax.lax.scan(backward, jnp.zeros_like(delta[0]), (delta, done), reverse=True)[1]
-
-
 def log_prob(
     action: Float[Array, "*t 4"], mean: Float[Array, "*t 4"], log_std: Float[Array | np.ndarray, "4"]
 ) -> Float[Array, "*t"]:
@@ -92,12 +63,15 @@ class PPO:
     def init(self, env: Env, config: PPOConfig, seed: int) -> Parameters:
         """Fresh networks, made by NumPy."""
         rng = np.random.default_rng(seed)
-        known = self.actor.features.state_size + env.privileged_size
         return Parameters(
             self.actor.init(rng, np.asarray(env.hover)),
             np.full(4, config.log_std, np.float32),
-            init_mlp(rng, (known, *self.actor.network.hidden, 1), 1.0),
+            init_critic(rng, self.actor, env),
         )
+
+    def optimizer(self, config: PPOConfig, parameters: Parameters) -> Any:
+        """Adam at rest."""
+        return at_rest(config, parameters)
 
     def update(
         self, env: Env, config: PPOConfig, state: TrainState, progress: Float[Array, ""]
@@ -149,16 +123,16 @@ class PPO:
             features = self.actor.features(observation, env_state.images)
             mean, next_memory = self.actor(parameters.policy, features, memory)
             action = mean + jnp.exp(parameters.log_std) * z
-            known = self._known(env, env_state, observation)
+            from_here = known(self.actor, env, env_state, observation)
             reached, out = env.advance(env_state, action)
-            final_known = self._known(env, reached, out.final_observation)
+            to_there = known(self.actor, env, reached, out.final_observation)
             env_state, out = env.restart(reached, out)
             env_state = env.look(env_state, out.done)
             next_memory = jnp.where(out.done[:, None], 0.0, next_memory)
             gathered = (
-                (features, memory, known),
+                (features, memory, from_here),
                 action,
-                final_known,
+                to_there,
                 out.reward,
                 out.terminated.astype(jnp.float32),
                 out.done.astype(jnp.float32),
@@ -169,11 +143,11 @@ class PPO:
 
         first = (state.env, state.observation, state.memory)
         (env_state, observation, memory), gathered = jax.lax.scan(step, first, noise)
-        (features, memories, known), action, final_known, reward, terminated, done, success, terms = gathered
-        value, next_value = self._value(parameters, known), self._value(parameters, final_known)
-        advantage = gae(reward, value, next_value, terminated, done, config.gamma, config.gae_lambda)
+        (features, memories, from_here), action, to_there, reward, terminated, done, success, terms = gathered
+        here, follows = (value(self.actor, parameters.critic, x) for x in (from_here, to_there))
+        advantage = gae(reward, here, follows, terminated, done, config.gamma, config.gae_lambda)
         density = -jnp.sum(0.5 * noise**2 + parameters.log_std + 0.5 * jnp.log(2 * jnp.pi), axis=-1)
-        samples = Samples(features, memories, known, action, density, advantage, advantage + value)
+        samples = Samples(features, memories, from_here, action, density, advantage, advantage + here)
         metrics = {
             "reward": jnp.mean(reward),
             **episode_metrics(done, success),
@@ -181,21 +155,14 @@ class PPO:
         }
         return samples, env_state, observation, memory, metrics
 
-    def _known(self, env: Env, state: EnvState, observation: Array) -> Array:
-        seen = self.actor.features.of_state(observation)
-        return jnp.concatenate([seen, env.privileged(state)], axis=-1) if env.privileged_size else seen
-
-    def _value(self, parameters: Parameters, known: Array) -> Array:
-        return mlp(parameters.critic, known, self.actor.network.activation)[..., 0]
-
     def _loss(self, parameters: Parameters, config: PPOConfig, batch: Samples) -> tuple[Array, dict[str, Array]]:
         mean, _ = self.actor(parameters.policy, batch.features, batch.memory)
         ratio = jnp.exp(log_prob(batch.action, mean, parameters.log_std) - batch.log_prob)
         advantage = (batch.advantage - jnp.mean(batch.advantage)) / (jnp.std(batch.advantage) + 1e-8)
         clipped = jnp.clip(ratio, 1 - config.clip, 1 + config.clip)
         policy_loss = -jnp.mean(jnp.minimum(ratio * advantage, clipped * advantage))
-        value = self._value(parameters, batch.known)
-        value_loss = 0.5 * jnp.mean((value - batch.value_target) ** 2)
+        estimate = value(self.actor, parameters.critic, batch.known)
+        value_loss = 0.5 * jnp.mean((estimate - batch.value_target) ** 2)
         entropy = jnp.sum(parameters.log_std)
         total = policy_loss + config.value_weight * value_loss - config.entropy_weight * entropy
         return total, {"policy": policy_loss, "value": value_loss, "ratio": jnp.mean(ratio)}

@@ -83,7 +83,7 @@ def start_program(setup: Setup) -> Any:
     """The program (environment, parameters, key) -> the first `TrainState` of each device."""
 
     def start(env: Env, parameters: Any, key: jax.Array) -> TrainState:
-        return stacked(begin(setup.actor, env, setup.config.algo, parameters, key))
+        return stacked(begin(setup.algorithm, env, setup.config.algo, parameters, key))
 
     return on_each(start, setup.devices, (SAME, SAME, SAME), OWN)
 

@@ -10,7 +10,10 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import CameraConfig
 from e2efly.physics.rotation import from_euler, rotate, to_matrix
-from e2efly.scenes.cast import Light, Pattern, cast, usual_light
+from e2efly.scenes import cast as solids
+from e2efly.scenes.cast import Light, Pattern, usual_light
+from e2efly.scenes.meshes import cast as meshes
+from e2efly.scenes.meshes.scene import MeshScene
 from e2efly.scenes.scene import CLASSES, Scene
 from e2efly.vehicles.names import unknown
 
@@ -70,7 +73,7 @@ def pose(
 
 def look(
     config: CameraConfig,
-    scene: Scene,
+    scene: Scene | MeshScene,
     mount: Mount,
     position: Float[Array, "n 3"],
     quaternion: Float[Array, "n 4"],
@@ -80,7 +83,7 @@ def look(
 
     Args:
         config: the camera.
-        scene: n worlds, standing still (`Scene.at`).
+        scene: n worlds, standing still (`Scene.at`); or the one world of triangles that all of them are in.
         mount: how each camera sits.
         position: of the vehicles, world, m.
         quaternion: of the vehicles, body to world.
@@ -94,9 +97,13 @@ def look(
     measures = config.sees in ("depth", "range")
     channel = {"range": "depth", "mask": "label"}.get(config.sees, config.sees)
     if channel == "rgb" and light is None:
-        light = usual_light(scene.worlds)
+        light = usual_light(position.shape[0])
     origin, matrix = pose(mount, position, quaternion)
-    image = cast(scene, origin, matrix, rays, (channel,), light, config.reach[1] if measures else math.inf)[channel]
+    if isinstance(scene, MeshScene):
+        image = meshes.cast(scene, origin, matrix, rays, (channel,), light)[channel]
+    else:
+        far = config.reach[1] if measures else math.inf
+        image = solids.cast(scene, origin, matrix, rays, (channel,), light, far)[channel]
     if config.sees == "mask":
         return (image == CLASSES.index(config.of)).astype(jnp.float32)
     if not measures:

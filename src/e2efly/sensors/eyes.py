@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import CameraConfig
@@ -15,6 +16,8 @@ from e2efly.scenes.cast import Light, usual_light
 from e2efly.scenes.scene import Scene
 from e2efly.sensors.image_noise import add_image_noise
 
+TINTS = 8
+"""Random tints in a world."""
 _STATIC = ("sees", "of", "width", "height", "projection", "fov", "reach", "encoding", "rate")
 jax.tree_util.register_dataclass(
     CameraConfig,
@@ -33,15 +36,20 @@ class Eye:
     """Age of its images, s."""
     light: Light | None
     """Where it sees colours."""
+    tints: Float[Array, "n 8 3"] | None
+    """Where it sees colours: what is added to those of solids, in turn."""
 
     @staticmethod
     def of(config: CameraConfig, key: PRNGKeyArray, n: int) -> "Eye":
         """Draw how the cameras sit, how late they are and under what light they look."""
-        mount_key, latency_key, light_key = jax.random.split(key, 3)
+        mount_key, latency_key, light_key, tint_key = jax.random.split(key, 4)
         low, high = config.latency
         latency = low + (high - low) * jax.random.uniform(latency_key, (n,))
-        light = _light(config, light_key, n) if config.sees == "rgb" else None
-        return Eye(camera.mount(config, n, mount_key), latency, light)
+        mount = camera.mount(config, n, mount_key)
+        if config.sees != "rgb":
+            return Eye(mount, latency, None, None)
+        tints = config.colour_spread * jax.random.uniform(tint_key, (n, TINTS, 3), minval=-1.0, maxval=1.0)
+        return Eye(mount, latency, _light(config, light_key, n), tints)
 
 
 def _light(config: CameraConfig, key: PRNGKeyArray, n: int) -> Light:
@@ -49,6 +57,16 @@ def _light(config: CameraConfig, key: PRNGKeyArray, n: int) -> Light:
     sun = jnp.maximum(usual.sun + config.light_spread * u[:, :3], jnp.array([-jnp.inf, -jnp.inf, 0.2]))
     strength = jnp.clip(usual.strength * (1 + config.light_spread * u[:, 3]), 0.0, 1.0)
     return Light(sun / jnp.linalg.norm(sun, axis=-1, keepdims=True), strength, jnp.asarray(usual.checker))
+
+
+def _tinted(scene: Scene, tints: Float[Array, "n t 3"]) -> Scene:
+    """The scene with a tint on each solid."""
+    solids = {}
+    for first, kind in enumerate(scene.kinds):
+        old = scene.solids[kind]
+        turn = (first + np.arange(old.colour.shape[1])) % TINTS
+        solids[kind] = dataclasses.replace(old, colour=jnp.clip(old.colour + tints[:, turn], 0.0, 1.0))
+    return dataclasses.replace(scene, solids=solids)
 
 
 def image_shape(config: CameraConfig) -> tuple[int, ...]:
@@ -70,6 +88,8 @@ def see(config: CameraConfig, eye: Eye, scene: Scene, state: State, key: PRNGKey
         Depth and range in m (0: a hole), a mask, 0 or 1, of shape (n, h, w); colours in [0, 1], normals, (n, h, w, 3).
     """
     position, quaternion = (x.astype(jnp.float32) for x in (state.position, state.quaternion))
+    if eye.tints is not None:
+        scene = _tinted(scene, eye.tints)
     image = camera.look(config, scene, eye.mount, position, quaternion, eye.light)
     noisy = any(x is not None and x is not False for x in vars(config.noise).values())
     return add_image_noise(config.noise, key, image, config) if noisy else image

@@ -6,21 +6,27 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from e2efly.config import RaceClutterConfig
 from e2efly.courses.gates import Gates
-from e2efly.courses.tracks import load_track
+from e2efly.courses.tracks import RaceTrack, load_track
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.course import frames
 from e2efly.scenes.generate import clutter
 from e2efly.scenes.scene import Scene, Solids
+from e2efly.scenes.shapes import FAR
 from e2efly.tasks.task import Outcome, Shape, at_rest, into_ball, offsets, struck, uniform
 
 APPROACH = 0.7
 """Obstacles keep clear of the points this far before and behind a gate, too, m."""
+PASSING = 1.5
+"""Within this of its plane a vehicle should be in line with a gate's opening, m."""
+BEHIND = 0.3
+"""The wanted velocity points to this far behind a gate, m."""
 
 
 @jax.tree_util.register_dataclass
@@ -69,7 +75,7 @@ class RaceClutter:
         Raises:
             ValueError: for an unknown or broken track.
         """
-        track = load_track(config.track)
+        track = _drawn_larger(load_track(config.track), config.scale)
         numbers = dataclasses.replace(config, track="")  # resolved here: tracks share a compiled program
         return RaceClutter(numbers, shape, Gates.of(track), track.closed, control_period, checks)
 
@@ -142,10 +148,27 @@ class RaceClutter:
         axes = self.axes(memory).reshape(n, -1)
         return jnp.concatenate([offsets(self.targets(memory), state), axes, memory.speed[:, None]], axis=-1)
 
+    def desired_velocity(self, memory: Memory, state: State) -> Float[Array, "n 3"]:
+        """At the commanded speed towards a point close behind the next gate: in its middle still straight through."""
+        behind = self.targets(memory)[:, 0] + BEHIND * self.axes(memory)[:, 0]
+        away = behind - state.position
+        return memory.speed[:, None] * away / (jnp.linalg.norm(away, axis=-1, keepdims=True) + 1e-3)
+
     def scene(self, memory: Memory) -> Scene:
         """Gates and obstacles over level ground."""
         n = memory.speed.shape[0]
         return Scene.of({**memory.obstacles, "gate": frames(memory.gates, n)}, n)
+
+    def overhang(self, memory: Memory, state: State) -> Float[Array, "n 1"]:
+        """How far the vehicle's sphere stands out of the next gate's opening, m; `-FAR` off its plane."""
+        axis = self.axes(memory)[:, 0]
+        d = state.position - self.targets(memory)[:, 0]
+        index = memory.passed % self.count
+        half = jax.nn.one_hot(index, self.count) @ jnp.asarray(self.gates.half)
+        ahead = d[:, 0] * axis[:, 0] + d[:, 1] * axis[:, 1]
+        beside = d[:, 1] * axis[:, 0] - d[:, 0] * axis[:, 1]
+        out = jnp.maximum(jnp.abs(beside) - half[:, 0], jnp.abs(d[:, 2]) - half[:, 1]) + self.shape.radius
+        return jnp.where(jnp.abs(ahead) < PASSING, out, -FAR)[:, None]
 
     def desired_yaw(self, memory: Memory, state: State) -> Float[Array, " n"]:
         """Towards the next gate."""
@@ -162,7 +185,7 @@ class RaceClutter:
         passed, missed, _ = memory.gates.judge(index, before.position, after.position, self.shape.radius)
         error = jnp.linalg.norm(after.position - self.goal(memory, time), axis=-1)
         hit = struck(self.scene(memory), before, after, time, self.control_period, self.checks, self.shape.radius)
-        lost = missed | (error > c.fence)
+        lost = missed | (error > c.fence) | (after.position[:, 2] < self.shape.feet_height)
         crashed = hit | lost
         passed = passed & ~lost
         moved = dataclasses.replace(memory, passed=memory.passed + passed)
@@ -170,8 +193,18 @@ class RaceClutter:
         finished = passed & (laps > 0) & (moved.passed >= laps * self.count)
         success = finished & ~crashed
         ends = lost | finished | (hit & (c.collisions_end > 0))
-        signals = {"desired_speed": memory.speed}
+        signals = {
+            "desired_speed": memory.speed,
+            "desired_velocity": self.desired_velocity(memory, after),
+            "overhang": self.overhang(memory, after),
+        }
         return moved, Outcome(ends, success, passed, crashed, error, signals)
+
+
+def _drawn_larger(track: RaceTrack, scale: float) -> RaceTrack:
+    """The track with its ground plan `scale` times as large; heights and openings stay."""
+    size = np.array([scale, scale, 1.0])
+    return dataclasses.replace(track, start=track.start * size, position=track.position * size)
 
 
 def _rows(table: Float[Array, "n g 3"], index: Int[Array, "n k"]) -> Float[Array, "n k 3"]:

@@ -1,0 +1,174 @@
+"""Short-horizon actor-critic (Xu et al. 2022): back-propagation through a short window, and a critic at its end.
+
+The policy ascends the exact gradient of the window's discounted reward plus the value of where it ends; the critic
+gives what lies beyond, and smooths events (a crash, a gate) that have no gradient of their own. It learns TD(lambda)
+returns of a slowly following copy of itself. Where there are cameras it sees the true scene (`Env.privileged`).
+"""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, PRNGKeyArray
+
+from e2efly.config import SHACConfig
+from e2efly.env import Env, EnvState
+from e2efly.learn.algorithm import TrainState, annealed, at_rest, damped, descend, episode_metrics
+from e2efly.learn.critic import gae, init_critic, known, value
+from e2efly.learn.networks import Actor, Layers, Weights
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Parameters:
+    """What SHAC learns."""
+
+    policy: Weights
+    critic: Layers
+    target: Layers
+    """The critic as it was, on average, a while ago."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Samples:
+    """What the critic learns from, each leaf (steps, n, ...) or flat."""
+
+    known: Float[Array, "*t c"]
+    value_target: Float[Array, "*t"]
+
+
+@dataclass(frozen=True)
+class SHAC:
+    """The algorithm on one environment's shapes; its numbers come in with `config` at every call."""
+
+    actor: Actor
+
+    def init(self, env: Env, config: SHACConfig, seed: int) -> Parameters:
+        """Fresh networks, made by NumPy."""
+        del config
+        rng = np.random.default_rng(seed)
+        policy, critic = self.actor.init(rng, np.asarray(env.hover)), init_critic(rng, self.actor, env)
+        return Parameters(policy, critic, jax.tree.map(np.copy, critic))
+
+    def optimizer(self, config: SHACConfig, parameters: Parameters) -> dict[str, Any]:
+        """Adam at rest, of the policy and of the critic."""
+        return {name: at_rest(config, getattr(parameters, name)) for name in ("policy", "critic")}
+
+    def update(
+        self, env: Env, config: SHACConfig, state: TrainState, progress: Float[Array, ""]
+    ) -> tuple[TrainState, dict[str, Array]]:
+        """One window, one gradient step of the policy, and epochs of minibatches of the critic.
+
+        Args:
+            env: the environment.
+            config: numbers of the algorithm.
+            state: where the last window ended.
+            progress: share of the run that is done, in [0, 1]: sets the learning rates.
+
+        Returns:
+            The new state and the metrics of this update.
+        """
+        key, noise_key, batch_key = jax.random.split(state.key, 3)
+        learned, rate = state.parameters, annealed(config, progress)
+
+        def loss(policy: Weights) -> tuple[Array, Any]:
+            return self._window(env, config, policy, learned.target, state, noise_key)
+
+        grads, (env_state, observation, memory, samples, metrics) = jax.grad(loss, has_aux=True)(learned.policy)
+        policy, policy_adam, norm = descend(config, rate, learned.policy, state.optimizer["policy"], grads)
+        metrics["loss/gradient_norm"] = norm
+        critic, critic_adam, metrics["loss/value"] = self._fit(
+            config, config.critic_rate * rate, learned.critic, state.optimizer["critic"], samples, batch_key
+        )
+        share = config.target_share
+        target = jax.tree.map(lambda old, new: old + share * (new - old), learned.target, critic)
+        return dataclasses.replace(
+            state,
+            parameters=Parameters(policy, critic, target),
+            optimizer={"policy": policy_adam, "critic": critic_adam},
+            env=env_state,
+            observation=observation,
+            memory=memory,
+            key=key,
+        ), metrics
+
+    def _window(
+        self, env: Env, config: SHACConfig, policy: Weights, target: Layers, state: TrainState, key: PRNGKeyArray
+    ) -> tuple[Array, Any]:
+        keep = jnp.exp(-config.gradient_decay * env.control_period)
+        noise = config.noise * jax.random.normal(key, (config.horizon, *state.observation.shape[:1], 4))
+
+        def worth(env_state: EnvState, observation: Array) -> tuple[Array, Array]:
+            fed = known(self.actor, env, env_state, observation)
+            return fed, value(self.actor, target, fed)
+
+        def step(carry: tuple[EnvState, Array, Array, Array, Array], z: Array) -> tuple[Any, Any]:
+            env_state, observation, memory, discount, from_here = carry
+            features = self.actor.features(observation, env_state.images)
+            action, memory = self.actor(policy, features, memory)
+            reached, out = env.advance(env_state, action + z)
+            reached = dataclasses.replace(reached, vehicle=damped(reached.vehicle, keep))
+            to_there, follows = worth(*jax.lax.stop_gradient((reached, out.final_observation)))
+            gain = discount * (out.reward + out.truncated * config.gamma * follows)
+            env_state, out = env.restart(reached, out)
+            env_state = env.look(env_state, out.done)
+            anew = jax.lax.stop_gradient((env_state, out.observation))
+            from_there = jax.lax.cond(jnp.any(out.done), lambda: worth(*anew)[0], lambda: to_there)
+            memory = jnp.where(out.done[:, None], 0.0, memory)
+            discount = jnp.where(out.done, 1.0, discount * config.gamma)
+            gathered = (
+                from_here, follows, out.reward, out.terminated, out.done, out.success,
+                {name: jnp.mean(x) for name, x in out.terms.items()},
+            )  # fmt: skip
+            carry = (env_state, out.observation, memory, discount, from_there)
+            return carry, (jnp.mean(gain), jax.lax.stop_gradient(gathered))
+
+        n = state.observation.shape[0]
+        first = (state.env, state.observation, state.memory, jnp.ones(n), worth(state.env, state.observation)[0])
+        (env_state, observation, memory, discount, _), (gain, gathered) = jax.lax.scan(step, first, noise)
+        beyond = jnp.mean(discount * worth(env_state, observation)[1])
+        from_here, follows, reward, terminated, done, success, terms = gathered
+        here = value(self.actor, target, from_here)
+        ended = (terminated.astype(jnp.float32), done.astype(jnp.float32))
+        advantage = gae(reward, here, follows, *ended, config.gamma, config.td_lambda)
+        samples = jax.lax.stop_gradient(Samples(from_here, here + advantage))
+        metrics = {
+            "reward": jnp.mean(reward),
+            "value": jnp.mean(here),
+            **episode_metrics(done, success),
+            **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()},
+        }
+        return -(jnp.sum(gain) + beyond) / config.horizon, (env_state, observation, memory, samples, metrics)
+
+    def _fit(
+        self,
+        config: SHACConfig,
+        rate: Float[Array, ""],
+        critic: Layers,
+        optimizer: Any,
+        samples: Samples,
+        key: PRNGKeyArray,
+    ) -> tuple[Layers, Any, Array]:
+        size, count = samples.value_target.size, config.envs * config.horizon // config.minibatch
+        order = jnp.argsort(jax.random.bits(key, (size,)))
+        flat = jax.tree.map(lambda x: x.reshape(size, *x.shape[2:])[order], samples)
+        batches = jax.tree.map(lambda x: x.reshape(count, size // count, *x.shape[1:]), flat)
+
+        def error(critic: Layers, batch: Samples) -> Array:
+            return 0.5 * jnp.mean((value(self.actor, critic, batch.known) - batch.value_target) ** 2)
+
+        def minibatch(carry: tuple[Layers, Any], batch: Samples) -> tuple[tuple[Layers, Any], Array]:
+            critic, optimizer = carry
+            loss, grads = jax.value_and_grad(error)(critic, batch)
+            critic, optimizer, _ = descend(config, rate, critic, optimizer, grads)
+            return (critic, optimizer), loss
+
+        def epoch(carry: tuple[Layers, Any], _: None) -> tuple[Any, Array]:
+            return jax.lax.scan(minibatch, carry, batches)
+
+        (critic, optimizer), losses = jax.lax.scan(epoch, (critic, optimizer), None, length=config.epochs)
+        return critic, optimizer, jnp.mean(losses)
