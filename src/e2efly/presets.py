@@ -188,7 +188,7 @@ def _race_clutter(algo: str) -> TrainConfig:
         network = dataclasses.replace(network, recurrent=0)
     return TrainConfig(
         task, settings, RewardConfig(weights, parameters), EnvConfig(cameras=_EYES["race_clutter"]), network,
-        steps=9_000_000, chunk=200, eval_episodes=500, curriculum=curriculum,
+        steps=8_000_000, chunk=200, eval_episodes=250, curriculum=curriculum,
     )  # fmt: skip
 
 

@@ -81,8 +81,8 @@ def test_shac_finds_the_action_that_pays_best(delay: int) -> None:
 def test_the_critic_of_shac_sees_beyond_the_window() -> None:
     # each action pays a step later: in a window of one step its gradient is the critic's alone
     probe = Probe(delay=1, length=1000, told=True)
-    short = dataclasses.replace(SHAC_CONFIG, horizon=1, minibatch=32, learning_rate=1e-2, noise=0.3)
-    _, state, _ = learn(probe, short, 1500)
+    short = dataclasses.replace(SHAC_CONFIG, horizon=1, minibatch=32, learning_rate=2e-3, critic_rate=10.0, noise=0.3)
+    _, state, _ = learn(probe, short, 2000)
     np.testing.assert_allclose(learned_action(state), probe.target, atol=0.1)
     _, blind, _ = learn(probe, dataclasses.replace(BPTT_CONFIG, horizon=1), 300)
     assert np.abs(learned_action(blind) - np.array(probe.target)).max() > 0.3
