@@ -2,12 +2,13 @@
 
     python benchmarks/visual_tasks.py [--cases land_visual avoid ...] [--algos bptt ppo] [--seeds 3] [--json FILE]
 
-A case is a task, for racing with the track's name behind a colon. Seconds are from the start of the training process,
-with an empty compilation cache. The noise row flies the same policy with the D435i's depth noise, at the vehicle's
-latency of 0.060 s, which all of them are trained with.
+A case is a task, for racing with the track's name behind a colon. Rows of the file that are not measured anew stay.
+Seconds are from the start of the training process, with an empty compilation cache. The noise row flies the same policy
+with the D435i's depth noise, at the vehicle's latency of 0.060 s, which all of them are trained with.
 """
 
 import dataclasses
+import json
 import os
 import subprocess
 import sys
@@ -15,7 +16,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from common import arguments, table, write
+from common import RESULTS, arguments, table, write
 
 from e2efly.device import prepare
 
@@ -67,9 +68,15 @@ def under_noise(out: Path) -> dict[str, float]:
     return found
 
 
+def _earlier(path: Path) -> list[dict[str, Any]]:
+    """The rows of a file of results."""
+    return json.loads(path.read_text())["table"] if path.exists() else []
+
+
 def main() -> None:
     """Train, print a table, write JSON."""
     options = arguments(__doc__ or "", cases=CASES, algos=["bptt", "ppo"], seeds=3)
+    known = _earlier(options.json or RESULTS / "visual_tasks.json")
     rows, every = [], []
     for algo in options.algos:
         for case in options.cases:
@@ -98,7 +105,9 @@ def main() -> None:
                     }
                 )
                 print(rows[-1], flush=True)
-            write("visual_tasks", options.json, {"table": rows, "runs": every})
+            anew = {(row["algorithm"], row["task"]) for row in rows}
+            kept = [row for row in known if (row["algorithm"], row["task"]) not in anew]
+            write("visual_tasks", options.json, {"table": [*rows, *kept], "runs": every})
     print(table(rows))
 
 

@@ -13,6 +13,7 @@ TITLES = {
     "rates": "Rates",
     "mesh_rendering": "Rendering of mesh scenes",
     "rendering": "Images of the clutter scene: ground, 4 gates, 16 obstacles, another world for each camera",
+    "visual_tasks": "Tasks flown by sight: 1000 unseen starts and worlds, full presets",
     "time_to_criterion": "Time to the criterion, from process start",
     "success": "Success over 1000 unseen starts, full presets",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",

@@ -159,10 +159,10 @@ NOT_IN_THE_PAPER = ("hover_aware", "gap")
 
 
 @pytest.mark.parametrize(
-    ("name", "task"),
-    [(n, t) for n in presets.PRESETS for t in presets.TASKS if n == "ours" or t not in NOT_IN_THE_PAPER],
+    ("name", "task", "algo"),
+    [("ours", t, a) for t in presets.TASKS for a in presets.ALGORITHMS]
+    + [("paper", t, a) for t in presets.TASKS if t not in NOT_IN_THE_PAPER for a in ("ppo", "bptt")],
 )
-@pytest.mark.parametrize("algo", list(presets.ALGORITHMS))
 def test_every_preset_is_complete_and_survives_json(task: str, algo: str, name: str) -> None:
     config = presets.preset(task, algo, name)
     presets.check(config)
@@ -173,6 +173,16 @@ def test_every_preset_is_complete_and_survives_json(task: str, algo: str, name: 
 def test_a_preset_that_the_paper_does_not_give_is_refused(task: str) -> None:
     with pytest.raises(ValueError, match=f"the paper has no reward for task '{task}'; accepted: hover, land"):
         presets.preset(task, "ppo", "paper")
+
+
+def test_the_paper_does_not_train_by_shac() -> None:
+    with pytest.raises(ValueError, match="the paper does not train by 'shac'; accepted: ppo, bptt"):
+        presets.preset("hover", "shac", "paper")
+
+
+@pytest.mark.parametrize(("task", "algo"), [("hover", "ppo"), ("race", "ppo"), ("avoid", "bptt"), ("no such", "ppo")])
+def test_the_algorithm_left_out_is_the_task_s_best(task: str, algo: str) -> None:
+    assert presets.default_algorithm(task) == algo
 
 
 @pytest.mark.parametrize(

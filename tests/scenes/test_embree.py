@@ -14,7 +14,7 @@ from e2efly.scenes.scene import Scene
 from e2efly.scenes.shapes import FAR
 from tests.scenes.test_cast import LEVEL, crowd
 
-WORLDS = 12
+WORLDS = 6
 CONFIG = CameraConfig(width=64, height=64, fov=(1.4, 1.4))
 
 
