@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -178,25 +179,22 @@ def check_observation(policy: Policy, env: Any) -> None:
 def _table(flown: dict[str, Any], episodes: int) -> Table:
     from e2efly.evaluate import wilson
 
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in (
-        "criterion", f"success of {episodes}", "95 % interval", "final error", "mean error", "time", "top speed",
-        "roughness",
-    ):  # fmt: skip
-        table.add_column(heading, no_wrap=True)
-    for name, e in flown.items():
-        ok = np.asarray(e.success)
-        low, high = wilson(int(ok.sum()), len(ok))
-        table.add_row(
-            name,
-            f"{ok.mean():.2%}",
-            f"{low:.2%} to {high:.2%}",
-            f"{100 * e.final_error.mean():.2f} cm",
-            f"{100 * e.mean_error.mean():.2f} cm",
-            f"{e.duration[ok].mean():.2f} s" if ok.any() else "none",
-            f"{e.top_speed.max():.1f} m/s",
-            f"{e.roughness.mean():.3f}",
-        )
+    table = Table(f"of {episodes} starts", *flown, box=None, header_style="bold", pad_edge=False)
+
+    def row(heading: str, show: Callable[[Any], str]) -> None:
+        table.add_row(heading, *(show(e) for e in flown.values()))
+
+    def interval(e: Any) -> str:
+        low, high = wilson(int(e.success.sum()), len(e.success))
+        return f"{low:.2%} to {high:.2%}"
+
+    row("success", lambda e: f"{e.success.mean():.2%}")
+    row("95 % interval", interval)
+    row("final error", lambda e: f"{100 * e.final_error.mean():.2f} cm")
+    row("mean error", lambda e: f"{100 * e.mean_error.mean():.2f} cm")
+    row("time of a success", lambda e: f"{e.duration[e.success].mean():.2f} s" if e.success.any() else "none")
+    row("top speed", lambda e: f"{e.top_speed.max():.1f} m/s")
+    row("roughness", lambda e: f"{e.roughness.mean():.3f}")
     return table
 
 

@@ -36,14 +36,15 @@ def train_command(config: TrainConfig, out: Path, resume: bool, device: str | No
 
 def _report(console: Console, summary: dict[str, Any]) -> None:
     table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in ("policy", "success", "final error", "mean error", "time", "top speed"):
+    for heading in ("policy", "update", "success", "final error", "mean error", "time", "top speed"):
         table.add_column(heading, no_wrap=True)
-    for which in ("shipped", "last"):
+    for which, called in (("shipped", "best"), ("last", "last")):
         for name, d in summary[which].items():
             if name == "update":
                 continue
             table.add_row(
-                f"{name}, {which} (update {summary[which]['update']})",
+                f"{name}, {called}",
+                str(summary[which]["update"]),
                 f"{d['success']:.1%}",
                 f"{100 * d['final_error_m']:.1f} cm",
                 f"{100 * d['mean_error_m']:.1f} cm",
