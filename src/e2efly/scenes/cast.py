@@ -55,7 +55,8 @@ def cast(
     elif light is None:
         light = usual_light(scene.worlds)
     looks = not set(channels).isdisjoint(("label", "normal", "rgb"))
-    seen, kinds = sight(scene, origin, matrix, pattern, looks, reach)
+    sun = None if light is None else jnp.asarray(light.sun)
+    seen, kinds = sight(scene, origin, matrix, pattern, looks, sun, reach)
     tiles, indices = jnp.asarray(pattern.tiles), jnp.arange(pattern.tiles.shape[0])
     serial = jax.default_backend() == "cpu"
 

@@ -97,41 +97,18 @@ class Hits:
 
     def _shadowed(self, light: Light, bright: Array, table: Array) -> Array:
         """The brightness, with the sun's part gone where something stands before it."""
-        t, dark = self.t, 1.0 - light.strength
-        if not self.kinds:
+        if self.seen.shading is None:
             return bright
-        wanted = self._throwing(light, (t < FAR) & (bright > dark), table)
-        places = jnp.arange(wanted.shape[0], dtype=jnp.int32)
-
-        def after(i: Array) -> Array:
-            return jnp.min(jnp.where(wanted & (places > i), places, places.shape[0]))
+        near, dark, shading = self.t * (1.0 - _BIAS), 1.0 - light.strength, self.seen.shading[self.tile]
 
         def darkened(kind: str, i: Array, bright: Array) -> Array:
             form, sun = Form.of(self.seen, i), turned(table[4:13, i], light.sun)
-            near = t * (1.0 - _BIAS)
             x, y, z = (
                 o + near * v + _BIAS * s for o, v, s in zip(form.origin, form.direction(self.d), sun, strict=True)
             )
-            struck = SHAPES[kind].enter(form.size, (x, y, z), sun) < FAR
-            return jnp.where(struck & (t < FAR), dark, bright)
+            return jnp.where(SHAPES[kind].enter(form.size, (x, y, z), sun) < FAR, dark, bright)
 
-        return over(self.kinds, after, darkened, bright)
-
-    def _throwing(self, light: Light, lit: Array, table: Array) -> Array:
-        """Solids (k,) that may throw a shadow on a lit hit: a line from the ball's centre, away from the sun, meets the
-        box of these hits, wider by the ball's reach.
-        """
-        world, reach = turned(self.seen.matrix.reshape(9), self.d), table[16]
-        enter, leave = jnp.zeros_like(reach), jnp.full_like(reach, FAR)
-        for axis in range(3):
-            place = self.t * world[axis]
-            low = jnp.min(jnp.where(lit, place, FAR)) - table[13 + axis] - reach
-            high = jnp.max(jnp.where(lit, place, -FAR)) - table[13 + axis] + reach
-            slope = light.sun[axis]
-            inverse = -1.0 / jnp.where(jnp.abs(slope) < 1e-9, 1e-9, slope)
-            enter = jnp.maximum(enter, jnp.minimum(low * inverse, high * inverse))
-            leave = jnp.minimum(leave, jnp.maximum(low * inverse, high * inverse))
-        return (enter <= leave) & self.seen.active & jnp.any(lit)
+        return jnp.where(self.t < FAR, over(self.kinds, lambda i: shading[i + 1], darkened, bright), bright)
 
 
 def _brightness(light: Light, cosine: Array) -> Array:

@@ -13,6 +13,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from e2efly.control.vectors import Quat, Vec3
@@ -33,11 +34,12 @@ class Sight:
     matrix: Float[Array, "n 3 3"]
     ground: Float[Array, " n"]
     following: Int[Array, "n t k+1"]
-    active: Bool[Array, "n k"]
     forms: Float[Array, "n 16 k"]
     """Size, the rays' origin in the solid's frame, and the matrix from the sensor's frame to the solid's."""
-    looks: Float[Array, "n 17 k"] | None
-    """Label, colour, rotation from world to solid, place from the camera, reach; for what is more than a distance."""
+    looks: Float[Array, "n 13 k"] | None
+    """Label, colour, rotation from world to solid; for what is more than a distance."""
+    shading: Int[Array, "n t k+1"] | None
+    """Leads from each solid to the next that may throw a shadow on what the tile shows; for colours."""
 
 
 def sight(
@@ -46,9 +48,10 @@ def sight(
     matrix: Float[Array, "n 3 3"],
     pattern: Pattern,
     looks: bool,
+    sun: Float[Array, "n 3"] | None,
     farthest: float,
 ) -> tuple[Sight, Kinds]:
-    """The solids as cameras see them, but for those wholly beyond a depth."""
+    """The solids as cameras see them, but for those wholly beyond a depth; with a sun their shadows, too."""
     each = [(kind, scene.solids[kind]) for kind in scene.kinds]
     kinds = tuple((kind, sum(s.count for _, s in each[: i + 1])) for i, (kind, _) in enumerate(each))
     if not each:
@@ -64,17 +67,54 @@ def sight(
     start = turn.unrotate(away) * -1.0
     size, colour = (jnp.moveaxis(x, -1, 0) for x in (solids.size, solids.colour))
     forms = [*size, start.x, start.y, start.z, *rows(matrix)]
-    about = [solids.label.astype(jnp.float32), *colour, *rows(jnp.eye(3)[None]), away.x, away.y, away.z, reach]
+    about = [solids.label.astype(jnp.float32), *colour, *rows(jnp.eye(3)[None])]
     near = solids.active
     if math.isfinite(farthest):
         gaps = [distances(kind, s, origin, jnp.zeros(scene.worlds)) for kind, s in each]
         near &= jnp.concatenate(gaps, axis=1) < farthest * longest(pattern, matrix)[:, None]
     visible = seen_by_tiles(pattern, matrix, away, reach) & near[:, None]
-    found = Sight(
-        origin, matrix, scene.ground, following(visible), solids.active, jnp.stack(forms, axis=1),
-        jnp.stack([jnp.broadcast_to(x, reach.shape) for x in about], axis=1) if looks else None,
-    )  # fmt: skip
+    table = jnp.stack([jnp.broadcast_to(x, reach.shape) for x in about], axis=1) if looks else None
+    shading = None
+    if sun is not None:
+        height = (origin[:, 2] - scene.ground)[:, None]
+        hollow = np.array([kind == "gate" for kind, s in each for _ in range(s.count)], bool)
+        throwing = _throwing(pattern, matrix, away, reach, height, Vec3.of(sun[:, None]), visible, hollow)
+        shading = following(throwing & solids.active[:, None])
+    found = Sight(origin, matrix, scene.ground, following(visible), jnp.stack(forms, axis=1), table, shading)
     return found, kinds
+
+
+def _throwing(
+    pattern: Pattern,
+    matrix: Float[Array, "n 3 3"],
+    away: Vec3,
+    reach: Float[Array, "n k"],
+    height: Float[Array, "n 1"],
+    sun: Vec3,
+    visible: Bool[Array, "n t k"],
+    hollow: Bool[np.ndarray, " k"],
+) -> Bool[Array, "n t k"]:
+    """Whether the shadows of solids' balls may fall on what tiles show: on the ground there, or on a solid's ball.
+
+    Args:
+        pattern: the tiles.
+        matrix: sensor's frame to world.
+        away: from the sensor to the balls' centres, world, components (n, k), m.
+        reach: the balls' radii, m.
+        height: of the sensor over the ground, m.
+        sun: unit vectors to it, components (n, 1).
+        visible: solids in the cones of the tiles.
+        hollow: which throw shadows on themselves.
+    """
+    steep = jnp.maximum(sun.z, 1e-3)
+    on_ground = seen_by_tiles(pattern, matrix, away - sun * ((away.z + height) / steep), reach / steep)
+    apart = Vec3(*(jnp.expand_dims(x, 1) - jnp.expand_dims(x, 2) for x in (away.x, away.y, away.z)))  # (n, onto, from)
+    touching = reach[:, :, None] + reach[:, None]
+    nearer = apart.dot(Vec3(*(x[:, None] for x in (sun.x, sun.y, sun.z))))
+    beside = apart.dot(apart) - nearer**2
+    between = (beside <= touching**2) & (nearer > -touching) & (hollow | ~np.eye(len(hollow), dtype=bool))
+    on_solids = jnp.einsum("ntb,nba->nta", visible.astype(jnp.float32), between.astype(jnp.float32)) > 0
+    return on_ground | on_solids
 
 
 @dataclass(frozen=True)
