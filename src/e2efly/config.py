@@ -500,6 +500,11 @@ class PPOConfig:
     max_grad_norm: float = 0.5
     """Norm to which a gradient is clipped."""
 
+    @property
+    def steps(self) -> int:
+        """Environment steps of an update."""
+        return self.envs * self.horizon
+
 
 @dataclass(frozen=True)
 class BPTTConfig:
@@ -519,6 +524,11 @@ class BPTTConfig:
     """Norm to which a gradient is clipped."""
     gradient_decay: float = 0.0
     """Decay of the gradient through the state, 1/s of backward time; 0: the exact gradient."""
+
+    @property
+    def steps(self) -> int:
+        """Environment steps of an update."""
+        return self.envs * self.horizon
 
 
 @dataclass(frozen=True)
@@ -552,8 +562,62 @@ class SHACConfig:
     gradient_decay: float = 0.0
     """Decay of the gradient through the state, 1/s of backward time; 0: the exact gradient."""
 
+    @property
+    def steps(self) -> int:
+        """Environment steps of an update."""
+        return self.envs * self.horizon
 
-AlgorithmConfig = PPOConfig | BPTTConfig | SHACConfig
+
+@dataclass(frozen=True)
+class ABPTConfig:
+    """Amended back-propagation through time (Li et al. 2025): windows of exact gradients between values of critics that
+    learn from a replay buffer.
+    """
+
+    envs: int = 64
+    """Environments side by side (sets shapes)."""
+    horizon: int = 32
+    """Steps of a window (sets shapes)."""
+    collect: int = 8
+    """Steps of each environment into the replay buffer, an update (sets shapes)."""
+    buffer: int = 65_536
+    """Transitions in the replay buffer, a multiple of envs * collect (sets shapes)."""
+    places: int = 1024
+    """Visited states that windows may begin at, a multiple of envs (sets shapes)."""
+    minibatch: int = 1024
+    """Samples of a gradient step of the critics (sets shapes)."""
+    fits: int = 8
+    """Gradient steps of the critics, an update (sets shapes)."""
+    learning_rate: float = 4e-3
+    """Adam's step at the start."""
+    learning_rate_end: float = 1e-4
+    """Adam's step at the end; exponential in between."""
+    critic_rate: float = 0.5
+    """The critics' step over the policy's."""
+    gamma: float = 0.98
+    """Discount a step."""
+    target_share: float = 0.02
+    """How far the critics' slow copies follow them, a gradient step."""
+    fresh_share: float = 0.5
+    """Share of the windows that begin at a new start; the others begin at visited states."""
+    at_once: float = 0.5
+    """Weight of the critics' value of a window's first action; the window's own return has the rest."""
+    entropy_weight: float = 1e-3
+    """Weight of the entropy bonus."""
+    log_std: float = -2.0
+    """Initial log standard deviation of the action noise."""
+    max_grad_norm: float = 0.5
+    """Norm to which a gradient is clipped."""
+    gradient_decay: float = 0.0
+    """Decay of the gradient through the state, 1/s of backward time; 0: the exact gradient."""
+
+    @property
+    def steps(self) -> int:
+        """Environment steps of an update."""
+        return self.envs * (self.collect + self.horizon)
+
+
+AlgorithmConfig = PPOConfig | BPTTConfig | SHACConfig | ABPTConfig
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable
 
 from e2efly.config import (
+    ABPTConfig,
     AlgorithmConfig,
     AvoidConfig,
     BPTTConfig,
@@ -16,6 +17,7 @@ from e2efly.config import (
     GapConfig,
     HoverAwareConfig,
     HoverConfig,
+    ImageNoiseConfig,
     LandConfig,
     LandVisualConfig,
     NetworkConfig,
@@ -44,7 +46,9 @@ TASKS: dict[str, TaskConfig] = {
 }
 """The task that each name trains on. Races go on for lap after lap; evaluation ends after one."""
 
-ALGORITHMS: dict[str, AlgorithmConfig] = {"ppo": PPOConfig(), "bptt": BPTTConfig(), "shac": SHACConfig()}
+ALGORITHMS: dict[str, AlgorithmConfig] = {
+    "ppo": PPOConfig(), "bptt": BPTTConfig(), "shac": SHACConfig(), "abpt": ABPTConfig()
+}  # fmt: skip
 """Algorithms by name, with the defaults of their presets."""
 
 FIRST_ORDER = ("land_visual", "avoid", "race_clutter")
@@ -55,7 +59,7 @@ D435I = CameraConfig(fov=(math.radians(87), math.radians(58)), reach=(0.28, 10.0
 _EYES: dict[str, tuple[CameraConfig, ...]] = {
     "land_visual": (CameraConfig("mask", 16, 16, fov=(math.pi / 2, math.pi / 2), pitch=math.pi / 2),),
     "race_clutter": (dataclasses.replace(D435I, width=48, height=24, pitch=-0.35),),
-    "avoid": (dataclasses.replace(D435I, width=32, height=12),),
+    "avoid": (dataclasses.replace(D435I, width=32, height=12, noise=ImageNoiseConfig(d435i=True)),),
 }
 """What the policies of the visual tasks see."""
 
@@ -140,17 +144,18 @@ def _land_visual(algo: str) -> TrainConfig:
 
 
 def _avoid(algo: str) -> TrainConfig:
-    weights = {"vel": 3.5, "avoid": 10.0, "ori2": 0.1, "anglev_sq": 0.01, "act2_sq": 0.02}
+    weights = {"vel": 3.0, "avoid": 20.0, "ori2": 0.1, "anglev_sq": 0.01, "act2_sq": 0.02}
+    parameters = {"avoid_reach": 0.5}
     settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=1.2e-4, gradient_decay=1.5)
     task, network = TASKS["avoid"], NetworkConfig((128, 64), pool=(6, 32), recurrent=64)
     curriculum: tuple[StageConfig, ...] = ()
     if algo == "ppo":
         weights = {"vel": 0.3, "avoid": 0.1, "anglev_sq": 0.002, "act2_sq": 0.02, "goal": 5.0, "crash": 5.0}
-        settings, task = PPOConfig(learning_rate=2e-3, gamma=0.98), AvoidConfig()
+        settings, task, parameters = PPOConfig(learning_rate=2e-3, gamma=0.98), AvoidConfig(), {}
         network, curriculum = dataclasses.replace(network, recurrent=0), CURRICULA["avoid"]
     return TrainConfig(
-        task, settings, RewardConfig(weights), EnvConfig(cameras=_EYES["avoid"]), network, steps=4_000_000, chunk=100,
-        eval_episodes=100, curriculum=curriculum,
+        task, settings, RewardConfig(weights, parameters), EnvConfig(cameras=_EYES["avoid"]), network,
+        steps=3_000_000, chunk=100, eval_episodes=250, curriculum=curriculum,
     )  # fmt: skip
 
 
@@ -225,14 +230,18 @@ _OURS: dict[str, Callable[[str], TrainConfig]] = {
 }
 
 
-def _shac(task: str) -> TrainConfig:
-    """BPTT's preset with a critic behind a shorter window."""
-    config = _OURS[task]("bptt")
-    shared = {f.name: getattr(config.algo, f.name) for f in dataclasses.fields(BPTTConfig) if f.name in _SHARED}
-    return dataclasses.replace(config, algo=SHACConfig(**shared))
+def _ours(task: str, algo: str) -> TrainConfig:
+    return _OURS[task](algo)
 
 
 _SHARED = ("envs", "learning_rate", "learning_rate_end", "max_grad_norm", "gradient_decay")
+
+
+def _with_critic(task: str, algo: str) -> TrainConfig:
+    """BPTT's preset with critics behind a shorter window."""
+    config = _OURS[task]("bptt")
+    shared = {name: getattr(config.algo, name) for name in _SHARED}
+    return dataclasses.replace(config, algo=dataclasses.replace(ALGORITHMS[algo], **shared))
 
 
 def _paper(task: str, algo: str) -> TrainConfig:
@@ -243,6 +252,11 @@ def _paper(task: str, algo: str) -> TrainConfig:
         settings: AlgorithmConfig = PPOConfig(
             envs=100, horizon=256, minibatch=25_600, epochs=10, learning_rate=1e-4, learning_rate_end=1e-5,
             gamma=0.99,
+        )  # fmt: skip
+    elif algo == "abpt":
+        settings = ABPTConfig(
+            envs=100, horizon=96, collect=10, buffer=100_000, places=1000, minibatch=25_600, learning_rate=1e-3,
+            learning_rate_end=1e-5, critic_rate=1.0, gamma=0.99, target_share=0.005,
         )  # fmt: skip
     else:
         settings = BPTTConfig(envs=100, horizon=96, learning_rate=1e-3, learning_rate_end=1e-5)
@@ -255,7 +269,7 @@ def _paper(task: str, algo: str) -> TrainConfig:
 
 
 PRESETS: dict[str, Callable[[str, str], TrainConfig]] = {
-    "ours": lambda task, algo: _shac(task) if algo == "shac" else _OURS[task](algo),
+    "ours": lambda task, algo: (_with_critic if algo in ("shac", "abpt") else _ours)(task, algo),
     "paper": _paper,
 }
 """Presets by name: functions of the task's and the algorithm's name."""
@@ -272,7 +286,7 @@ def preset(task: str, algo: str, name: str = "ours") -> TrainConfig:
         if value not in known:
             raise ValueError(unknown(kind, value, known))
     if name == "paper" and algo == "shac":
-        raise ValueError("preset 'paper': the paper does not train by 'shac'; accepted: ppo, bptt")
+        raise ValueError("preset 'paper': the paper does not train by 'shac'; accepted: ppo, bptt, abpt")
     if name == "paper" and task not in _PAPER_WEIGHTS:
         raise ValueError(
             f"preset 'paper': the paper has no reward for task {task!r}; accepted: {', '.join(_PAPER_WEIGHTS)}"
@@ -334,6 +348,13 @@ def check(config: TrainConfig) -> None:
     }  # fmt: skip
     if isinstance(algo, PPOConfig | SHACConfig):
         positive |= {"algo.epochs": algo.epochs, "algo.minibatch": algo.minibatch}
+    if isinstance(algo, ABPTConfig):
+        positive |= {"algo.collect": algo.collect, "algo.fits": algo.fits, "algo.minibatch": algo.minibatch}
+        for name, value, of in (
+            ("buffer", algo.buffer, algo.envs * algo.collect), ("places", algo.places, algo.envs)
+        ):  # fmt: skip
+            if value < 1 or of < 1 or value % of:
+                raise ValueError(f"algo.{name} is {value}; accepted: a positive multiple of {of}, what an update adds")
     for name, value in positive.items():
         if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} is {value}; accepted: more than 0")

@@ -24,6 +24,8 @@ class ProbeState:
     vehicle: State
     count: Array
     images: tuple[()] = ()
+    key: None = None
+    tick: None = None
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,8 @@ class Probe:
     def privileged_size(self) -> int:
         return 4 if self.told else 0
 
-    def reset(self, n: int) -> tuple[ProbeState, Array]:
+    def reset(self, key: Array, n: int) -> tuple[ProbeState, Array]:
+        del key
         zero = jnp.zeros((n, 3))
         level = jnp.tile(jnp.array([1.0, 0, 0, 0]), (n, 1))
         return ProbeState(State(zero, zero, level, zero, jnp.zeros((n, 4))), jnp.zeros(n)), self._observe(n)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.config import AlgorithmConfig, BPTTConfig, NetworkConfig, PPOConfig, SHACConfig
+from e2efly.config import ABPTConfig, AlgorithmConfig, BPTTConfig, NetworkConfig, PPOConfig, SHACConfig
 from e2efly.env import random_key
 from e2efly.learn.algorithm import TrainState, annealed, make_algorithm
 from e2efly.learn.critic import gae
@@ -23,6 +23,10 @@ BPTT_CONFIG = BPTTConfig(envs=4, horizon=8, learning_rate=2e-2, learning_rate_en
 SHAC_CONFIG = SHACConfig(
     envs=32, horizon=8, minibatch=128, learning_rate=2e-2, learning_rate_end=1e-3, gamma=0.9, max_grad_norm=10.0
 )
+ABPT_CONFIG = ABPTConfig(
+    envs=32, horizon=8, collect=8, buffer=4096, places=128, minibatch=256, fits=4, learning_rate=2e-2,
+    learning_rate_end=1e-3, gamma=0.9, max_grad_norm=10.0, target_share=0.1,
+)  # fmt: skip
 
 
 def learn(
@@ -32,9 +36,9 @@ def learn(
     parameters = jax.tree.map(jnp.asarray, algorithm.init(probe, config, 0))  # type: ignore[arg-type]
     optimizer = algorithm.optimizer(config, parameters)
     n = config.envs // devices
-    states = [
-        TrainState(parameters, optimizer, *probe.reset(n), ACTOR.memory(n), random_key(i)) for i in range(devices)
-    ]
+    first = probe.reset(random_key(0), n)
+    replay = algorithm.replay(probe, config, *first)  # type: ignore[arg-type]
+    states = [TrainState(parameters, optimizer, *first, ACTOR.memory(n), random_key(i), replay) for i in range(devices)]
 
     def run(state: TrainState) -> tuple[TrainState, dict[str, jax.Array]]:
         def update(state: TrainState, i: jax.Array) -> tuple[TrainState, dict[str, jax.Array]]:
@@ -70,6 +74,12 @@ def test_ppo_finds_the_action_that_pays_best(delay: int) -> None:
     probe = Probe(delay=delay, length=1000, ends_for_good=False)
     _, state, _ = learn(probe, dataclasses.replace(PPO_CONFIG, gamma=0.9), 150)
     np.testing.assert_allclose(learned_action(state), probe.target, atol=0.08)
+
+
+@pytest.mark.parametrize("delay", [0, 1])
+def test_abpt_finds_the_action_that_pays_best(delay: int) -> None:
+    _, state, _ = learn(Probe(delay=delay, length=1000), ABPT_CONFIG, 200)
+    np.testing.assert_allclose(learned_action(state), Probe.target, atol=0.05)
 
 
 @pytest.mark.parametrize("delay", [0, 1])

@@ -9,12 +9,12 @@ import optax
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from e2efly.config import AlgorithmConfig, BPTTConfig, PPOConfig, SHACConfig
+from e2efly.config import ABPTConfig, AlgorithmConfig, BPTTConfig, PPOConfig, SHACConfig
 from e2efly.env import Env, EnvState
 from e2efly.learn.devices import AXIS
 from e2efly.learn.networks import Actor
 
-for _config in (PPOConfig, BPTTConfig, SHACConfig):
+for _config in (PPOConfig, BPTTConfig, SHACConfig, ABPTConfig):
     _shapes = [name for name, kind in _config.__annotations__.items() if kind is int]
     jax.tree_util.register_dataclass(
         _config,
@@ -36,6 +36,8 @@ class TrainState:
     memory: Float[Array, "n k"]
     """Of the policy's GRU."""
     key: PRNGKeyArray
+    replay: Any = None
+    """What an off-policy method keeps of earlier steps."""
 
 
 class Algorithm(Protocol):
@@ -52,6 +54,10 @@ class Algorithm(Protocol):
 
     def optimizer(self, config: Any, parameters: Any) -> Any:
         """The optimiser's first state."""
+        ...
+
+    def replay(self, env: Env, config: Any, state: EnvState, observation: Float[Array, "n o"]) -> Any:
+        """What an off-policy method keeps of earlier steps, as it is at first; None: nothing."""
         ...
 
     def update(
@@ -79,7 +85,8 @@ def begin(algorithm: Algorithm, env: Env, config: AlgorithmConfig, parameters: A
     key = jax.random.fold_in(key, jax.lax.axis_index(AXIS))
     env_state, observation = env.reset(jax.random.fold_in(key, 0), config.envs // jax.lax.axis_size(AXIS))
     optimizer, memory = algorithm.optimizer(config, parameters), algorithm.actor.memory(observation.shape[0])
-    return TrainState(parameters, optimizer, env_state, observation, memory, key)
+    replay = algorithm.replay(env, config, env_state, observation)
+    return TrainState(parameters, optimizer, env_state, observation, memory, key, replay)
 
 
 def descend(
@@ -118,9 +125,10 @@ def annealed(config: AlgorithmConfig, progress: Float[Array, ""]) -> Float[Array
 
 def make_algorithm(config: AlgorithmConfig, actor: Actor) -> Algorithm:
     """The algorithm of a configuration."""
+    from e2efly.learn.abpt import ABPT
     from e2efly.learn.bptt import BPTT
     from e2efly.learn.ppo import PPO
     from e2efly.learn.shac import SHAC
 
-    makers: dict[type, type] = {PPOConfig: PPO, BPTTConfig: BPTT, SHACConfig: SHAC}
+    makers: dict[type, type] = {PPOConfig: PPO, BPTTConfig: BPTT, SHACConfig: SHAC, ABPTConfig: ABPT}
     return makers[type(config)](actor)

@@ -44,6 +44,9 @@ class BPTT:
         """Adam at rest."""
         return at_rest(config, parameters)
 
+    def replay(self, env: Env, config: BPTTConfig, state: EnvState, observation: Float[Array, "n o"]) -> None:
+        """Nothing: each update learns from its own steps."""
+
     def update(
         self, env: Env, config: BPTTConfig, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[TrainState, dict[str, Array]]:

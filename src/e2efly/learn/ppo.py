@@ -73,6 +73,9 @@ class PPO:
         """Adam at rest."""
         return at_rest(config, parameters)
 
+    def replay(self, env: Env, config: PPOConfig, state: EnvState, observation: Float[Array, "n o"]) -> None:
+        """Nothing: each update learns from its own steps."""
+
     def update(
         self, env: Env, config: PPOConfig, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[TrainState, dict[str, Array]]:

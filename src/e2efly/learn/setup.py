@@ -39,7 +39,7 @@ class Setup:
         env = course[-1].env
         actor = Actor.of(env.fields, env.cameras, config.network)
         algorithm = make_algorithm(config.algo, actor)
-        per_update = config.algo.envs * config.algo.horizon
+        per_update = config.algo.steps
         chunks = math.ceil(config.steps / (per_update * config.chunk))
         devices = share(config.algo.envs, getattr(config.algo, "minibatch", None), config.devices)
         config = dataclasses.replace(config, devices=devices)
@@ -58,7 +58,7 @@ class Setup:
     @property
     def steps_per_update(self) -> int:
         """Environment steps of one update."""
-        return self.config.algo.envs * self.config.algo.horizon
+        return self.config.algo.steps
 
     @property
     def episode_steps(self) -> int:

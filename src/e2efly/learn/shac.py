@@ -58,6 +58,9 @@ class SHAC:
         """Adam at rest, of the policy and of the critic."""
         return {name: at_rest(config, getattr(parameters, name)) for name in ("policy", "critic")}
 
+    def replay(self, env: Env, config: SHACConfig, state: EnvState, observation: Float[Array, "n o"]) -> None:
+        """Nothing: each update learns from its own steps."""
+
     def update(
         self, env: Env, config: SHACConfig, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[TrainState, dict[str, Array]]:

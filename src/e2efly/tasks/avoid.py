@@ -15,11 +15,14 @@ from e2efly.physics.rotation import from_euler
 from e2efly.scenes.generate import forest
 from e2efly.scenes.scene import Scene, Solids
 from e2efly.tasks.task import Outcome, Shape, at_rest, struck, uniform
+from e2efly.tasks.way import open_heading
 
 BEYOND = 10.0
 """The vehicle is sent to a point this far behind the end of the forest, m."""
 CLIMB = 1.0
 """Largest commanded vertical speed, m/s."""
+ROOM = 0.4
+"""What an open way leaves between the vehicle and a tree, m."""
 
 
 @jax.tree_util.register_dataclass
@@ -77,6 +80,14 @@ class Avoid:
         level = away[:, :2] / jnp.linalg.norm(away[:, :2], axis=-1, keepdims=True)
         return jnp.concatenate([memory.speed[:, None] * level, jnp.clip(away[:, 2:], -CLIMB, CLIMB)], axis=-1)
 
+    def open_velocity(self, memory: Memory, state: State) -> Float[Array, "n 3"]:
+        """The desired velocity, turned to where the way is open: what a reward may know and the policy may not."""
+        wanted = self.desired_velocity(memory, state)
+        bearing = jnp.arctan2(wanted[:, 1], wanted[:, 0])
+        side = self.config.forest.width / 2 - ROOM
+        heading = open_heading(memory.trees, state.position[:, :2], bearing, self.shape.radius + ROOM, side)
+        return jnp.concatenate([memory.speed[:, None] * heading, wanted[:, 2:]], axis=-1)
+
     def observe(self, memory: Memory, time: Float[Array, " n"], state: State) -> Float[Array, "n 4"]:
         """The desired velocity and the height."""
         del time
@@ -104,7 +115,7 @@ class Avoid:
         success = (x >= c.forest.length) & ~crashed
         ends = left | (hit & (c.collisions_end > 0))
         signals = {
-            "desired_velocity": self.desired_velocity(memory, after),
+            "desired_velocity": self.open_velocity(memory, after),
             "desired_speed": memory.speed,
         }
         error = jnp.maximum(c.forest.length - x, 0.0)
