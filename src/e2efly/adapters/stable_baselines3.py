@@ -1,0 +1,78 @@
+"""Our batch of vehicles as a vectorised environment of Stable-Baselines3. `pip install e2efly[sb3]`."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from stable_baselines3.common.vec_env import VecEnv
+
+from e2efly.adapters.gym import QuadrotorVectorEnv
+from e2efly.config import TrainConfig
+
+
+class SB3VecEnv(VecEnv):
+    """What Stable-Baselines3's algorithms train on.
+
+    model = PPO("MlpPolicy", SB3VecEnv("hover", 64))
+    """
+
+    def __init__(self, task: str | TrainConfig = "hover", num_envs: int = 64, raw: bool = False) -> None:
+        """Make it; see `e2efly.adapters.gym.QuadrotorVectorEnv`.
+
+        Raises:
+            ValueError: naming the field, the value and what is accepted; for a task with cameras.
+        """
+        self.envs = QuadrotorVectorEnv(task, num_envs, raw)
+        if self.envs.stepper.env.cameras:
+            raise ValueError(f"task is {task!r}, which has cameras; accepted: tasks flown by state")
+        self._actions: np.ndarray | None = None
+        self._seed: int | None = None
+        self._nothing: list[dict[str, Any]] = [{} for _ in range(num_envs)]
+        super().__init__(num_envs, self.envs.single_observation_space, self.envs.single_action_space)
+
+    def reset(self) -> Any:
+        """Start all episodes."""
+        first, _ = self.envs.reset(seed=self._seed)
+        self._seed = None
+        return first
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Of the next reset."""
+        self._seed = seed
+        return [seed] * self.num_envs
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Take note of the actions."""
+        self._actions = actions
+
+    def step_wait(self) -> Any:
+        """Step: observations, rewards, dones, and infos, of episodes that ended with what was reached."""
+        assert self._actions is not None
+        observations, rewards, terminated, truncated, info = self.envs.step(self._actions)
+        dones, told = terminated | truncated, list(self._nothing)
+        for i in np.flatnonzero(dones):
+            told[i] = {
+                "terminal_observation": info["final_obs"][i],
+                "TimeLimit.truncated": bool(truncated[i]),
+                "is_success": bool(info["success"][i]),
+            }
+        return observations, rewards, dones, told
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute, once for each vehicle asked for."""
+        return [getattr(self.envs, attr_name)] * len(list(self._get_indices(indices)))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """The vehicles share what they have."""
+        raise NotImplementedError("the vehicles are one program: make another SB3VecEnv instead of changing this one")
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """The vehicles have no methods of their own."""
+        raise NotImplementedError("the vehicles are one program: none has methods of its own")
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """No vehicle is."""
+        return [False] * len(list(self._get_indices(indices)))

@@ -1,0 +1,160 @@
+"""Back-propagation from PyTorch through our steps: the state goes to and fro by DLPack, without a copy.
+
+`pip install e2efly[torch]`. The gradient is that of JAX, by its transposed program; as everywhere, a new start cuts it.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import torch
+
+from e2efly.adapters.stepper import Stepper, configured
+from e2efly.config import TrainConfig
+from e2efly.env import Env, EnvState, random_key
+
+
+@dataclass(frozen=True)
+class TorchState:
+    """The state of a batch of environments. Its tensors share memory with JAX: never change them in place."""
+
+    moving: tuple[torch.Tensor, ...]
+    """What has a gradient."""
+    rest: tuple[jax.Array, ...]
+    """What has none: counters, keys, masks."""
+
+    def detach(self) -> "TorchState":
+        """The same, cut from the graph: where the next window of truncated back-propagation begins."""
+        return TorchState(tuple(x.detach() for x in self.moving), self.rest)
+
+
+@dataclass(frozen=True)
+class TorchStep:
+    """What a step says, each tensor (n, ...); the first two have a gradient."""
+
+    observation: torch.Tensor
+    """What to act on next: of a new episode where the last one ended."""
+    reward: torch.Tensor
+    final_observation: torch.Tensor
+    """What was reached, before any new start."""
+    terminated: torch.Tensor
+    truncated: torch.Tensor
+    success: torch.Tensor
+    images: tuple[torch.Tensor, ...]
+    """The newest of each camera."""
+
+
+class TorchEnv:
+    """A batch of vehicles whose steps PyTorch differentiates through.
+
+    state, observation = env.reset(seed)
+    state, step = env.step(state, policy(observation))
+    """
+
+    def __init__(self, task: str | TrainConfig = "hover", num_envs: int = 64, raw: bool = False) -> None:
+        """Make it.
+
+        Args:
+            task: the name of a task, with its preset for PPO, or a configuration, of which task, reward and
+                environment count.
+            num_envs: vehicles.
+            raw: observations as measured, not as features (`learn.networks.Features`).
+
+        Raises:
+            ValueError: naming the field, the value and what is accepted.
+        """
+        if num_envs < 1:
+            raise ValueError(f"num_envs is {num_envs}; accepted: 1 or more")
+        config = configured(task)
+        self.num_envs = num_envs
+        self.stepper = Stepper(Env.of(config.task, config.reward, config.env), raw)
+        shape = jax.eval_shape(lambda key: self.stepper.env.reset(key, num_envs)[0], random_key(0))
+        leaves, self._structure = jax.tree.flatten(shape)
+        self._moves = [jnp.issubdtype(x.dtype, jnp.floating) for x in leaves]
+        self._forward = jax.jit(self._advance)
+        self._backward = jax.jit(self._transposed)
+
+    @property
+    def observation_size(self) -> int:
+        """Numbers of an observation, images aside."""
+        return self.stepper.size
+
+    def reset(self, seed: int = 0) -> tuple[TorchState, torch.Tensor]:
+        """Start all episodes: the state and the first observations (n, o)."""
+        state, observation = self.stepper.begin(random_key(seed), self.num_envs)
+        moving, rest = self._apart(state)
+        return TorchState(tuple(map(torch.from_dlpack, moving)), rest), torch.from_dlpack(observation)
+
+    def step(self, state: TorchState, action: torch.Tensor) -> tuple[TorchState, TorchStep]:
+        """A control step, with new starts where an episode ended.
+
+        Args:
+            state: of `reset` or the last step.
+            action: (n, 4), in [-1, 1]: what is beyond is clipped.
+
+        Raises:
+            ValueError: for actions of another shape or type.
+        """
+        if tuple(action.shape) != (self.num_envs, 4) or action.dtype != torch.float32:
+            raise ValueError(
+                f"actions are {action.dtype} of shape {tuple(action.shape)}; accepted: torch.float32 of "
+                f"{(self.num_envs, 4)}"
+            )
+        told: dict[str, Any] = {}
+        *moving, observation, reward = _Step.apply(self, state.rest, told, action, *state.moving)  # pyright: ignore
+        signs = {name: torch.from_dlpack(told[name]) for name in ("final_observation", *_SIGNS)}
+        images = tuple(map(torch.from_dlpack, told["images"]))
+        return TorchState(tuple(moving), told["rest"]), TorchStep(observation, reward, images=images, **signs)
+
+    def _apart(self, state: EnvState) -> tuple[tuple[jax.Array, ...], tuple[jax.Array, ...]]:
+        leaves = list(zip(jax.tree.leaves(state), self._moves, strict=True))
+        return tuple(x for x, moves in leaves if moves), tuple(x for x, moves in leaves if not moves)
+
+    def _together(self, moving: tuple[jax.Array, ...], rest: tuple[jax.Array, ...]) -> EnvState:
+        one, other = iter(moving), iter(rest)
+        return jax.tree.unflatten(self._structure, [next(one if moves else other) for moves in self._moves])
+
+    def _advance(self, moving: tuple, rest: tuple, action: jax.Array) -> tuple[Any, dict[str, Any]]:
+        """(what has a gradient: state, observation, reward), and the rest."""
+        state = self._together(moving, rest)
+        state, out = self.stepper.env.step(state, action)
+        moving, rest = self._apart(state)
+        seen, reached = self.stepper.seen(out.observation), self.stepper.seen(out.final_observation)
+        told = {name: getattr(out, name) for name in _SIGNS}
+        return (moving, seen, out.reward), told | {
+            "final_observation": reached, "rest": rest, "images": state.images
+        }  # fmt: skip
+
+    def _transposed(self, moving: tuple, rest: tuple, action: jax.Array, cotangent: Any) -> tuple[Any, jax.Array]:
+        _, pull, _ = jax.vjp(lambda m, a: self._advance(m, rest, a), moving, action, has_aux=True)
+        return pull(cotangent)
+
+
+_SIGNS = ("terminated", "truncated", "success")
+
+
+class _Step(torch.autograd.Function):
+    """One step in PyTorch's graph. Its transposed program computes the step again: no residual is kept."""
+
+    @staticmethod
+    def forward(ctx: Any, env: TorchEnv, rest: tuple, told: dict[str, Any], action: torch.Tensor, *moving: Any) -> Any:
+        ctx.env, ctx.rest = env, rest
+        ctx.save_for_backward(action, *moving)
+        (after, observation, reward), more = env._forward(_to_jax(moving), rest, *_to_jax((action,)))
+        told |= more
+        return tuple(map(torch.from_dlpack, (*after, observation, reward)))
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx: Any, *cotangents: torch.Tensor) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
+        action, *moving = ctx.saved_tensors
+        *after, observation, reward = _to_jax(cotangents)
+        found, of_action = ctx.env._backward(
+            _to_jax(moving), ctx.rest, *_to_jax((action,)), (tuple(after), observation, reward)
+        )
+        return None, None, None, *map(torch.from_dlpack, (of_action, *found))
+
+
+def _to_jax(tensors: Any) -> tuple[jax.Array, ...]:
+    return tuple(jax.dlpack.from_dlpack(x.detach().contiguous()) for x in tensors)

@@ -1,0 +1,88 @@
+"""PyTorch's gradients through our steps."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import torch
+
+from e2efly import presets
+from e2efly.adapters.torch import TorchEnv
+from e2efly.env import Env, random_key
+from e2efly.learn.networks import Features
+
+N, STEPS = 4, 12
+
+
+def weights(size: int) -> np.ndarray:
+    return np.random.default_rng(0).normal(scale=0.1, size=(size, 4)).astype(np.float32)
+
+
+@pytest.mark.parametrize("task", ["hover", "race"])
+def test_gradients_through_a_flight_are_those_of_jax(task: str) -> None:
+    config = presets.preset(task, "bptt")
+    env, features = Env.of(config.task, config.reward, config.env), None
+    features = Features(env.fields)
+
+    def loss(w: jax.Array) -> jax.Array:
+        state, observation = env.reset(random_key(5), N)
+        total = jnp.float32(0.0)
+        for _ in range(STEPS):
+            state, out = env.step(state, jnp.tanh(features.of_state(observation) @ w) + env.hover)
+            observation, total = out.observation, total + jnp.mean(out.reward)
+        return total
+
+    w = weights(features.state_size)
+    value, gradient = jax.jit(jax.value_and_grad(loss))(w)
+
+    ours = TorchEnv(config, N)
+    learned = torch.tensor(w, requires_grad=True)
+    state, observation = ours.reset(5)
+    total = torch.tensor(0.0)
+    for _ in range(STEPS):
+        state, step = ours.step(state, torch.tanh(observation @ learned) + torch.tensor(env.hover))
+        observation, total = step.observation, total + step.reward.mean()
+    total.backward()
+    assert total.item() == pytest.approx(float(value), rel=1e-5)
+    assert learned.grad is not None
+    np.testing.assert_allclose(learned.grad, gradient, rtol=1e-3, atol=1e-4 * float(np.abs(gradient).max()))
+    assert np.abs(gradient).max() > 1e-3
+
+
+def test_a_torch_policy_learns_by_it() -> None:
+    torch.manual_seed(0)
+    env = TorchEnv(presets.preset("hover", "bptt"), 32)
+    policy = torch.nn.Sequential(torch.nn.Linear(env.observation_size, 32), torch.nn.Tanh(), torch.nn.Linear(32, 4))
+    torch.nn.init.zeros_(policy[2].weight)
+    with torch.no_grad():
+        policy[2].bias.copy_(torch.tensor(np.asarray(env.stepper.env.hover)))
+    adam = torch.optim.Adam(policy.parameters(), 4e-3)
+    state, observation = env.reset(0)
+    windows = []
+    for _ in range(25):
+        state, observation, total = state.detach(), observation.detach(), torch.tensor(0.0)
+        for _ in range(24):
+            state, step = env.step(state, policy(observation))
+            observation, total = step.observation, total + step.reward.mean()
+        adam.zero_grad()
+        (-total).backward()
+        torch.nn.utils.clip_grad_norm_(policy.parameters(), 0.5)
+        adam.step()
+        windows.append(total.item())
+    assert np.mean(windows[-5:]) > np.mean(windows[:5]) + 0.2 * abs(np.mean(windows[:5]))
+
+
+def test_nothing_is_copied_on_the_way() -> None:
+    env = TorchEnv("hover", N)
+    state, _ = env.reset(0)
+    for x in state.moving:
+        assert jax.dlpack.from_dlpack(x).unsafe_buffer_pointer() == x.data_ptr()
+
+
+def test_actions_of_another_shape_or_type_are_refused() -> None:
+    env = TorchEnv("hover", N)
+    state, _ = env.reset(0)
+    with pytest.raises(ValueError, match=r"torch.float64 of shape \(4, 4\); accepted: torch.float32"):
+        env.step(state, torch.zeros(4, 4, dtype=torch.float64))
+    with pytest.raises(ValueError, match=r"shape \(3, 4\)"):
+        env.step(state, torch.zeros(3, 4))
