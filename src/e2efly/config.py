@@ -524,6 +524,10 @@ class BPTTConfig:
     """Norm to which a gradient is clipped."""
     gradient_decay: float = 0.0
     """Decay of the gradient through the state, 1/s of backward time; 0: the exact gradient."""
+    horizon_start: int = 0
+    """Steps after which the gradient is cut at first; they grow to the window's over the run. 0: never cut."""
+    term_gradients: bool = False
+    """Whether to log the norm of the gradient of each term of the reward; an update takes as many times as long."""
 
     @property
     def steps(self) -> int:
@@ -561,6 +565,10 @@ class SHACConfig:
     """Norm to which a gradient is clipped."""
     gradient_decay: float = 0.0
     """Decay of the gradient through the state, 1/s of backward time; 0: the exact gradient."""
+    horizon_start: int = 0
+    """Steps after which the gradient is cut at first; they grow to the window's over the run. 0: never cut."""
+    term_gradients: bool = False
+    """Whether to log the norm of the gradient of each term of the reward; an update takes as many times as long."""
 
     @property
     def steps(self) -> int:
@@ -610,6 +618,10 @@ class ABPTConfig:
     """Norm to which a gradient is clipped."""
     gradient_decay: float = 0.0
     """Decay of the gradient through the state, 1/s of backward time; 0: the exact gradient."""
+    horizon_start: int = 0
+    """Steps after which the gradient is cut at first; they grow to the window's over the run. 0: never cut."""
+    term_gradients: bool = False
+    """Whether to log the norm of the gradient of each term of the reward; an update takes as many times as long."""
 
     @property
     def steps(self) -> int:

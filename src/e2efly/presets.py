@@ -56,10 +56,11 @@ FIRST_ORDER = ("land_visual", "avoid", "race_clutter")
 
 D435I = CameraConfig(fov=(math.radians(87), math.radians(58)), reach=(0.28, 10.0))
 """Depth of an Intel RealSense D435i."""
+_NOISY = dataclasses.replace(D435I, noise=ImageNoiseConfig(d435i=True))
 _EYES: dict[str, tuple[CameraConfig, ...]] = {
     "land_visual": (CameraConfig("mask", 16, 16, fov=(math.pi / 2, math.pi / 2), pitch=math.pi / 2),),
-    "race_clutter": (dataclasses.replace(D435I, width=48, height=24, pitch=-0.35),),
-    "avoid": (dataclasses.replace(D435I, width=32, height=12, noise=ImageNoiseConfig(d435i=True)),),
+    "race_clutter": (dataclasses.replace(_NOISY, width=48, height=24, pitch=-0.35),),
+    "avoid": (dataclasses.replace(_NOISY, width=32, height=12),),
 }
 """What the policies of the visual tasks see."""
 
@@ -178,11 +179,11 @@ def _gap(algo: str) -> TrainConfig:
 
 def _race_clutter(algo: str) -> TrainConfig:
     weights = {
-        "vel": 2.0, "near": 1.0, "avoid": 12.0, "fit": 20.0, "ori2": 0.3, "anglev_sq": 0.01, "act2_sq": 0.02,
+        "vel": 1.5, "near": 1.0, "avoid": 12.0, "fit": 20.0, "ori2": 0.3, "anglev_sq": 0.01, "act2_sq": 0.02,
     }  # fmt: skip
     parameters = {"fit_margin": 0.25, "fit_limit": 2.0}
     settings: AlgorithmConfig = BPTTConfig(horizon=48, gradient_decay=1.5)
-    task, curriculum, network = TASKS["race_clutter"], (), NetworkConfig((128, 64), pool=(24, 48), recurrent=64)
+    task, curriculum, network = TASKS["race_clutter"], (), NetworkConfig((128, 64), pool=(12, 48), recurrent=64)
     if algo == "ppo":
         weights = {
             "prog1": 1.0, "overspeed": 0.01, "avoid": 0.05, "ori2": 0.1, "anglev_sq": 0.0005, "act2_sq": 0.005,
@@ -193,7 +194,7 @@ def _race_clutter(algo: str) -> TrainConfig:
         network = dataclasses.replace(network, recurrent=0)
     return TrainConfig(
         task, settings, RewardConfig(weights, parameters), EnvConfig(cameras=_EYES["race_clutter"]), network,
-        steps=8_000_000, chunk=200, eval_episodes=250, curriculum=curriculum,
+        steps=8_000_000, chunk=200, eval_episodes=500, curriculum=curriculum,
     )  # fmt: skip
 
 

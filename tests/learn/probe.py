@@ -72,7 +72,7 @@ class Probe:
             observation=observation,
             final_observation=observation,
             reward=self.constant - self.weight * error**2,
-            terms={},
+            terms={"constant": jnp.full(n, self.constant), "error": -self.weight * error**2},
             terminated=over if self.ends_for_good else no,
             truncated=no if self.ends_for_good else over,
             success=over,

@@ -10,7 +10,7 @@ import pytest
 
 from e2efly.config import ABPTConfig, AlgorithmConfig, BPTTConfig, NetworkConfig, PPOConfig, SHACConfig
 from e2efly.env import random_key
-from e2efly.learn.algorithm import TrainState, annealed, make_algorithm
+from e2efly.learn.algorithm import TrainState, annealed, ends, make_algorithm
 from e2efly.learn.critic import gae
 from e2efly.learn.devices import OWN, on_each, own, stacked
 from e2efly.learn.networks import Actor, mlp
@@ -99,10 +99,48 @@ def test_the_critic_of_shac_sees_beyond_the_window() -> None:
 
 
 def test_the_critic_of_shac_knows_what_follows_a_time_out_and_that_nothing_follows_an_end() -> None:
-    for ends, worth in ((False, 2.0), (True, 1.0)):
-        probe = Probe(constant=1.0, weight=0.0, length=1, ends_for_good=ends)
+    for for_good, worth in ((False, 2.0), (True, 1.0)):
+        probe = Probe(constant=1.0, weight=0.0, length=1, ends_for_good=for_good)
         _, state, _ = learn(probe, dataclasses.replace(SHAC_CONFIG, gamma=0.5), 150)
         assert learned_value(state) == pytest.approx(worth, abs=0.05)
+
+
+def test_the_pieces_of_a_window_grow_over_the_run() -> None:
+    config = dataclasses.replace(BPTT_CONFIG, horizon=16, horizon_start=4)
+    cuts = {p: np.flatnonzero(np.asarray(ends(config, jnp.float32(p)))).tolist() for p in (0.0, 0.5, 1.0)}
+    assert cuts == {0.0: [4, 8, 12], 0.5: [8], 1.0: []}
+    assert not np.asarray(ends(BPTT_CONFIG, jnp.float32(0.0))).any()
+
+
+@pytest.mark.parametrize("config", [BPTT_CONFIG, SHAC_CONFIG], ids=["bptt", "shac"])
+def test_a_cut_keeps_the_gradient_from_what_came_before(config: Any) -> None:
+    # each action pays a step later, critics are not told it: with a cut before every step nothing is learned of it
+    probe, algorithm = Probe(delay=1, length=1000), make_algorithm(config, ACTOR)
+    for start, learns in ((1, False), (0, True)):
+        one = dataclasses.replace(config, horizon_start=start)
+        parameters = jax.tree.map(jnp.asarray, algorithm.init(probe, one, 0))  # type: ignore[arg-type]
+        first = probe.reset(random_key(0), 32)
+        state = TrainState(
+            parameters, algorithm.optimizer(one, parameters), *first, ACTOR.memory(32), random_key(0),
+            algorithm.replay(probe, one, *first),  # type: ignore[arg-type]
+        )  # fmt: skip
+
+        def run(state: TrainState, one: Any = one) -> jax.Array:
+            return algorithm.update(probe, one, own(state), jnp.float32(0.0))[1]["loss/gradient_norm"][None]  # type: ignore[arg-type]
+
+        norm = on_each(run, 1, (OWN,), OWN)(stacked(state))
+        assert (float(norm[0]) > 1e-3) == learns
+
+
+@pytest.mark.parametrize("config", [BPTT_CONFIG, SHAC_CONFIG, ABPT_CONFIG], ids=["bptt", "shac", "abpt"])
+def test_the_gradient_of_each_term_is_told_apart_and_they_add_up(config: Any) -> None:
+    probe = Probe(constant=1.0, length=1000)
+    _, together, _ = learn(probe, config, 3)
+    _, apart, metrics = learn(probe, dataclasses.replace(config, term_gradients=True), 3)
+    for a, b in zip(jax.tree.leaves(together.parameters), jax.tree.leaves(apart.parameters), strict=True):
+        np.testing.assert_allclose(a, b, atol=2e-5)
+    assert float(metrics["gradient/constant"][0]) == 0.0
+    assert float(metrics["gradient/error"][0]) > 1e-3
 
 
 def test_the_gradient_of_bptt_is_the_mean_over_devices() -> None:

@@ -146,3 +146,28 @@ def test_a_lap_in_clutter_is_the_gates_in_order_without_a_touch() -> None:
         through = [at(centre + 0.1 * s * axis, 6 * axis) for s in (-1, 1)]
         memory, out = task.advance(memory, *through, jnp.ones(1), jnp.zeros(1, bool))
         assert out.arrived[0] and not out.crashed[0] and bool(out.success[0]) == (gate == task.count - 1)
+
+
+def test_a_racer_is_to_look_at_its_gate_and_near_it_round_the_corner() -> None:
+    task = make_task(RaceClutterConfig(track="j_shaped"), SHAPE, PERIOD, 7)
+    _, memory = task.start(random_key(5), 1)
+    memory = dataclasses.replace(memory, passed=jnp.array([2]))
+    here, there = (np.asarray(memory.gates.position[0, i]) for i in (2, 3))
+    for away, towards in ((6.0, here), (1.0, here + (there - here) * 4.0 / np.linalg.norm(there - here))):
+        place = here - [away, 0.0, 0.0]
+        wanted = np.arctan2(*(towards - place)[1::-1])
+        assert float(task.desired_yaw(memory, at(place))[0]) == pytest.approx(wanted, abs=0.02)
+    last = dataclasses.replace(memory, passed=jnp.array([task.count - 1]))  # an open track has no gate behind it
+    assert np.isfinite(task.desired_yaw(last, at(np.asarray(memory.gates.position[0, task.count - 1])))).all()
+
+
+def test_the_open_way_through_a_forest_is_flown_at_the_commanded_speed() -> None:
+    task = make_task(AvoidConfig(), SHAPE, PERIOD, 7)
+    state, memory = task.start(random_key(6), 50)
+    inside = dataclasses.replace(state, position=state.position + jnp.array([15.0, 0.0, 0.0]))
+    asked, way = task.desired_velocity(memory, inside), task.open_velocity(memory, inside)
+    np.testing.assert_allclose(np.linalg.norm(way[:, :2], axis=1), memory.speed, rtol=1e-5)
+    np.testing.assert_array_equal(way[:, 2], asked[:, 2])
+    assert 0.2 < np.mean(np.abs(way - asked).max(axis=1) > 0.1) < 1.0  # many are turned aside
+    empty = dataclasses.replace(memory, trees=dataclasses.replace(memory.trees, active=memory.trees.active & False))
+    np.testing.assert_allclose(task.open_velocity(empty, inside), asked, atol=1e-4)

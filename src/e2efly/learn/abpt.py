@@ -17,7 +17,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import ABPTConfig
 from e2efly.env import Env, EnvState
-from e2efly.learn.algorithm import TrainState, annealed, at_rest, damped, descend, episode_metrics
+from e2efly.learn.algorithm import TrainState, annealed, ascended, at_rest, damped, descend, ends, episode_metrics
 from e2efly.learn.critic import known
 from e2efly.learn.networks import Actor, Layers, Weights, init_mlp, mlp
 from e2efly.learn.replay import Places, Ring
@@ -123,11 +123,12 @@ class ABPT:
             config, config.critic_rate * rate, policy, learned, state.optimizer["critics"], ring, critic_key
         )
 
-        def loss(policy: Stochastic) -> tuple[Array, dict[str, Array]]:
-            start = self._start(env, config, places, env_state, start_key)
-            return self._window(env, config, policy, targets, start, window_key)
+        start = self._start(env, config, places, env_state, start_key)
 
-        grads, more = jax.grad(loss, has_aux=True)(policy)
+        def gain(policy: Stochastic) -> tuple[dict[str, Array], dict[str, Array]]:
+            return self._window(env, config, policy, targets, start, window_key, progress)
+
+        grads, more, norms = ascended(gain, policy, config.term_gradients)
         policy, policy_adam, norm = descend(config, rate, policy, state.optimizer["policy"], grads)
         log_std = jnp.maximum(policy.log_std, QUIETEST)
         return TrainState(
@@ -138,7 +139,7 @@ class ABPT:
             memory=memory,
             key=key,
             replay={"transitions": ring, "places": places},
-        ), metrics | more | {"loss/gradient_norm": norm, "std": jnp.mean(jnp.exp(log_std))}
+        ), metrics | more | norms | {"loss/gradient_norm": norm, "std": jnp.mean(jnp.exp(log_std))}
 
     def _situation(self, env: Env, state: EnvState, observation: Array, memory: Array) -> Situation:
         features = self.actor.features(observation, state.images)
@@ -246,36 +247,43 @@ class ABPT:
         targets: tuple[Layers, Layers],
         start: tuple[EnvState, Array, Array],
         key: PRNGKeyArray,
-    ) -> tuple[Array, dict[str, Array]]:
+        progress: Float[Array, ""],
+    ) -> tuple[dict[str, Array], dict[str, Array]]:
         keep = jnp.exp(-config.gradient_decay * env.control_period)
         n = start[1].shape[0]
         noise = jax.random.normal(key, (config.horizon + 2, n, 4))
 
-        def step(carry: tuple[EnvState, Array, Array, Array], z: Array) -> tuple[Any, Any]:
+        def step(carry: tuple[EnvState, Array, Array, Array], x: tuple[Array, Array]) -> tuple[Any, Any]:
+            z, cut = x
+            late = jnp.float32(0.0)
+            if config.horizon_start:  # a piece ends like a window
+                late = cut * jnp.mean(carry[3] * self._worth(policy, targets, self._situation(env, *carry[:3]), z))
+                carry = (*damped(carry[:3], 1.0 - cut), jnp.where(cut, 1.0, carry[3]))
             env_state, observation, memory, discount = carry
             features = self.actor.features(observation, env_state.images)
             mean, memory = self.actor(policy.mean, features, memory)
             reached, out = env.advance(env_state, mean + jnp.exp(policy.log_std) * z)
             reached = dataclasses.replace(reached, vehicle=damped(reached.vehicle, keep))
             there = jax.lax.stop_gradient(self._situation(env, reached, out.final_observation, memory))
-            late = out.truncated * config.gamma * self._worth(jax.lax.stop_gradient(policy), targets, there, 0.0 * z)
-            gain = discount * (out.reward + late)
+            follows = self._worth(jax.lax.stop_gradient(policy), targets, there, jnp.zeros_like(z))
+            terms = out.terms if config.term_gradients else {"reward": out.reward}
+            gain = {name: jnp.mean(discount * x) for name, x in terms.items()}
+            gain["value"] = late + jnp.mean(discount * out.truncated * config.gamma * follows)
             env_state, out = env.restart(reached, out)
             env_state = env.look(env_state, out.done)
             memory = jnp.where(out.done[:, None], 0.0, memory)
             discount = jnp.where(out.done, 1.0, discount * config.gamma)
-            terms = {name: jnp.mean(x) for name, x in out.terms.items()}
-            return (env_state, out.observation, memory, discount), (jnp.mean(gain), terms)
+            means = {name: jnp.mean(x) for name, x in out.terms.items()}
+            return (env_state, out.observation, memory, discount), (gain, means)
 
-        here = jax.lax.stop_gradient(self._situation(env, *start))
-        at_once = jnp.mean(self._worth(policy, targets, here, noise[-1]))
-        (env_state, observation, memory, discount), (gain, terms) = jax.lax.scan(
-            step, (*start, jnp.ones(n)), noise[: config.horizon]
-        )
-        there = self._situation(env, env_state, observation, memory)
+        at_once = jnp.mean(self._worth(policy, targets, self._situation(env, *start), noise[-1]))
+        along = (noise[: config.horizon], ends(config, progress))
+        end, (gain, terms) = jax.lax.scan(step, (*start, jnp.ones(n)), along)
+        there, discount = self._situation(env, *end[:3]), end[3]
         beyond = jnp.mean(discount * self._worth(policy, targets, there, noise[-2]))
-        share, entropy = config.at_once, jnp.sum(policy.log_std)
-        total = (1 - share) * (jnp.sum(gain) + beyond) + share * at_once + config.entropy_weight * entropy
-        return -total / config.horizon, {
-            "value": at_once, **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()}
-        }  # fmt: skip
+        share, scale = config.at_once, 1.0 / config.horizon
+        gain = {name: scale * (1 - share) * jnp.sum(x) for name, x in gain.items()}
+        gain["value"] += scale * (1 - share) * beyond
+        gain["at_once"] = scale * share * at_once
+        gain["entropy"] = scale * config.entropy_weight * jnp.sum(policy.log_std)
+        return gain, {"value": at_once, **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()}}

@@ -1,5 +1,6 @@
 """What every algorithm is to the runner, and what they share."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -7,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import optax
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.config import ABPTConfig, AlgorithmConfig, BPTTConfig, PPOConfig, SHACConfig
 from e2efly.env import Env, EnvState
@@ -15,7 +16,7 @@ from e2efly.learn.devices import AXIS
 from e2efly.learn.networks import Actor
 
 for _config in (PPOConfig, BPTTConfig, SHACConfig, ABPTConfig):
-    _shapes = [name for name, kind in _config.__annotations__.items() if kind is int]
+    _shapes = [name for name, kind in _config.__annotations__.items() if kind in (int, bool)]
     jax.tree_util.register_dataclass(
         _config,
         data_fields=[name for name in _config.__annotations__ if name not in _shapes],
@@ -109,7 +110,49 @@ def descend(
 
 def damped(tree: Any, keep: Array) -> Any:
     """The same values; their gradient scaled by `keep`."""
-    return jax.tree.map(lambda x: keep * x + jax.lax.stop_gradient((1 - keep) * x), tree)
+
+    def damp(x: Array) -> Array:
+        return keep * x + jax.lax.stop_gradient((1 - keep) * x) if jnp.issubdtype(x.dtype, jnp.floating) else x
+
+    return jax.tree.map(damp, tree)
+
+
+def ascended(
+    parts: Callable[[Any], tuple[dict[str, Array], Any]], parameters: Any, apart: bool
+) -> tuple[Any, Any, dict[str, Array]]:
+    """The gradient of minus the sum of an objective's parts.
+
+    Args:
+        parts: parameters -> the parts by name, scalars, and what else comes of it.
+        parameters: where.
+        apart: whether to go back for each part by itself, which takes as many times as long.
+
+    Returns:
+        The gradient; what else came; and, apart, the norm of each part's gradient on this device, `gradient/NAME`.
+    """
+
+    def loss(parameters: Any) -> tuple[Array, Any]:
+        found, more = parts(parameters)
+        return -sum(found.values(), start=jnp.float32(0.0)), more
+
+    if not apart:
+        grads, more = jax.grad(loss, has_aux=True)(parameters)
+        return grads, more, {}
+    found, pull, more = jax.vjp(parts, parameters, has_aux=True)
+    each = jax.vmap(lambda one: pull(dict(zip(found, -one, strict=True)))[0])(jnp.eye(len(found)))
+    flat = jax.vmap(lambda tree: ravel_pytree(tree)[0])(each)
+    norms = {f"gradient/{name}": norm for name, norm in zip(found, jnp.linalg.norm(flat, axis=1), strict=True)}
+    return jax.tree.map(lambda x: jnp.sum(x, axis=0), each), more, norms
+
+
+def ends(config: Any, progress: Float[Array, ""]) -> Bool[Array, " h"]:
+    """Before which steps of a window the gradient is cut: every `horizon_start` at first, nowhere at last; in between
+    the pieces grow exponentially. Without `horizon_start` it is cut nowhere.
+    """
+    step = jnp.arange(config.horizon)
+    start = config.horizon_start or config.horizon
+    piece = jnp.round(start * (config.horizon / start) ** progress).astype(jnp.int32)
+    return (step % piece == 0) & (step > 0)
 
 
 def episode_metrics(done: Array, success: Array) -> dict[str, Array]:

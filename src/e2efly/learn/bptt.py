@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 
 from e2efly.config import BPTTConfig
 from e2efly.env import Env, EnvState
-from e2efly.learn.algorithm import TrainState, annealed, at_rest, damped, descend, episode_metrics
+from e2efly.learn.algorithm import TrainState, annealed, ascended, at_rest, damped, descend, ends, episode_metrics
 from e2efly.learn.networks import Actor, Weights
 
 
@@ -62,21 +62,27 @@ class BPTT:
             The new state and the metrics of this update.
         """
 
-        def loss(parameters: Parameters) -> tuple[Array, Any]:
-            return self._window(env, config, parameters, state)
+        def gain(parameters: Parameters) -> tuple[dict[str, Array], Any]:
+            return self._window(env, config, parameters, state, progress)
 
-        grads, (env_state, observation, memory, metrics) = jax.grad(loss, has_aux=True)(state.parameters)
+        grads, (env_state, observation, memory, metrics), norms = ascended(
+            gain, state.parameters, config.term_gradients
+        )
         rate = annealed(config, progress)
         parameters, optimizer, norm = descend(config, rate, state.parameters, state.optimizer, grads)
-        metrics["loss/gradient_norm"] = norm
+        metrics |= {"loss/gradient_norm": norm, **norms}
         return dataclasses.replace(
             state, parameters=parameters, optimizer=optimizer, env=env_state, observation=observation, memory=memory
         ), metrics
 
-    def _window(self, env: Env, config: BPTTConfig, parameters: Parameters, state: TrainState) -> tuple[Array, Any]:
+    def _window(
+        self, env: Env, config: BPTTConfig, parameters: Parameters, state: TrainState, progress: Float[Array, ""]
+    ) -> tuple[dict[str, Array], Any]:
         keep = jnp.exp(-config.gradient_decay * env.control_period)
 
-        def step(carry: tuple[EnvState, Array, Array, Array], _: None) -> tuple[Any, Any]:
+        def step(carry: tuple[EnvState, Array, Array, Array], cut: Array) -> tuple[Any, Any]:
+            if config.horizon_start:
+                carry = (*damped(carry[:3], 1.0 - cut), jnp.where(cut, 1.0, carry[3]))
             env_state, observation, memory, discount = carry
             features = self.actor.features(observation, env_state.images)
             action, memory = self.actor(parameters.policy, features, memory)
@@ -89,17 +95,17 @@ class BPTT:
                 {name: jnp.mean(x) for name, x in out.terms.items()},
             )
             memory = jnp.where(out.done[:, None], 0.0, memory)
-            return (env_state, out.observation, memory, discount * config.gamma), (
-                discount * jnp.mean(out.reward),
-                gathered,
-            )
+            parts = gathered[-1] if config.term_gradients else {"reward": gathered[0]}
+            gain = {name: discount * x for name, x in parts.items()}
+            return (env_state, out.observation, memory, discount * config.gamma), (gain, gathered)
 
         first = (state.env, state.observation, state.memory, jnp.float32(1.0))
-        (env_state, observation, memory, _), (gain, gathered) = jax.lax.scan(step, first, None, length=config.horizon)
+        (env_state, observation, memory, _), (gain, gathered) = jax.lax.scan(step, first, ends(config, progress))
         reward, done, success, terms = gathered
         metrics = {
             "reward": jnp.mean(reward),
             **episode_metrics(done, success),
             **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()},
         }
-        return -jnp.sum(gain) / config.horizon, (env_state, observation, memory, metrics)
+        gain = {name: jnp.sum(x) / config.horizon for name, x in gain.items()}
+        return gain, (env_state, observation, memory, metrics)

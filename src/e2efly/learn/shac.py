@@ -16,7 +16,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import SHACConfig
 from e2efly.env import Env, EnvState
-from e2efly.learn.algorithm import TrainState, annealed, at_rest, damped, descend, episode_metrics
+from e2efly.learn.algorithm import TrainState, annealed, ascended, at_rest, damped, descend, ends, episode_metrics
 from e2efly.learn.critic import gae, init_critic, known, value
 from e2efly.learn.networks import Actor, Layers, Weights
 
@@ -78,12 +78,14 @@ class SHAC:
         key, noise_key, batch_key = jax.random.split(state.key, 3)
         learned, rate = state.parameters, annealed(config, progress)
 
-        def loss(policy: Weights) -> tuple[Array, Any]:
-            return self._window(env, config, policy, learned.target, state, noise_key)
+        def gain(policy: Weights) -> tuple[dict[str, Array], Any]:
+            return self._window(env, config, policy, learned.target, state, noise_key, progress)
 
-        grads, (env_state, observation, memory, samples, metrics) = jax.grad(loss, has_aux=True)(learned.policy)
+        grads, (env_state, observation, memory, samples, metrics), norms = ascended(
+            gain, learned.policy, config.term_gradients
+        )
         policy, policy_adam, norm = descend(config, rate, learned.policy, state.optimizer["policy"], grads)
-        metrics["loss/gradient_norm"] = norm
+        metrics |= {"loss/gradient_norm": norm, **norms}
         critic, critic_adam, metrics["loss/value"] = self._fit(
             config, config.critic_rate * rate, learned.critic, state.optimizer["critic"], samples, batch_key
         )
@@ -100,8 +102,15 @@ class SHAC:
         ), metrics
 
     def _window(
-        self, env: Env, config: SHACConfig, policy: Weights, target: Layers, state: TrainState, key: PRNGKeyArray
-    ) -> tuple[Array, Any]:
+        self,
+        env: Env,
+        config: SHACConfig,
+        policy: Weights,
+        target: Layers,
+        state: TrainState,
+        key: PRNGKeyArray,
+        progress: Float[Array, ""],
+    ) -> tuple[dict[str, Array], Any]:
         keep = jnp.exp(-config.gradient_decay * env.control_period)
         noise = config.noise * jax.random.normal(key, (config.horizon, *state.observation.shape[:1], 4))
 
@@ -109,14 +118,21 @@ class SHAC:
             fed = known(self.actor, env, env_state, observation)
             return fed, value(self.actor, target, fed)
 
-        def step(carry: tuple[EnvState, Array, Array, Array, Array], z: Array) -> tuple[Any, Any]:
+        def step(carry: tuple[EnvState, Array, Array, Array, Array], x: tuple[Array, Array]) -> tuple[Any, Any]:
+            z, cut = x
+            late = jnp.float32(0.0)
+            if config.horizon_start:  # a piece ends like a window
+                late = cut * jnp.mean(carry[3] * worth(carry[0], carry[1])[1])
+                carry = (*damped(carry[:3], 1.0 - cut), jnp.where(cut, 1.0, carry[3]), carry[4])
             env_state, observation, memory, discount, from_here = carry
             features = self.actor.features(observation, env_state.images)
             action, memory = self.actor(policy, features, memory)
             reached, out = env.advance(env_state, action + z)
             reached = dataclasses.replace(reached, vehicle=damped(reached.vehicle, keep))
             to_there, follows = worth(*jax.lax.stop_gradient((reached, out.final_observation)))
-            gain = discount * (out.reward + out.truncated * config.gamma * follows)
+            terms = out.terms if config.term_gradients else {"reward": out.reward}
+            gain = {name: jnp.mean(discount * x) for name, x in terms.items()}
+            gain["value"] = late + jnp.mean(discount * out.truncated * config.gamma * follows)
             env_state, out = env.restart(reached, out)
             env_state = env.look(env_state, out.done)
             anew = jax.lax.stop_gradient((env_state, out.observation))
@@ -128,12 +144,14 @@ class SHAC:
                 {name: jnp.mean(x) for name, x in out.terms.items()},
             )  # fmt: skip
             carry = (env_state, out.observation, memory, discount, from_there)
-            return carry, (jnp.mean(gain), jax.lax.stop_gradient(gathered))
+            return carry, (gain, jax.lax.stop_gradient(gathered))
 
         n = state.observation.shape[0]
         first = (state.env, state.observation, state.memory, jnp.ones(n), worth(state.env, state.observation)[0])
-        (env_state, observation, memory, discount, _), (gain, gathered) = jax.lax.scan(step, first, noise)
-        beyond = jnp.mean(discount * worth(env_state, observation)[1])
+        along = (noise, ends(config, progress))
+        (env_state, observation, memory, discount, _), (gain, gathered) = jax.lax.scan(step, first, along)
+        gain = {name: jnp.sum(x) / config.horizon for name, x in gain.items()}
+        gain["value"] += jnp.mean(discount * worth(env_state, observation)[1]) / config.horizon
         from_here, follows, reward, terminated, done, success, terms = gathered
         here = value(self.actor, target, from_here)
         ended = (terminated.astype(jnp.float32), done.astype(jnp.float32))
@@ -145,7 +163,7 @@ class SHAC:
             **episode_metrics(done, success),
             **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()},
         }
-        return -(jnp.sum(gain) + beyond) / config.horizon, (env_state, observation, memory, samples, metrics)
+        return gain, (env_state, observation, memory, samples, metrics)
 
     def _fit(
         self,

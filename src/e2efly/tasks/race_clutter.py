@@ -27,6 +27,8 @@ PASSING = 1.5
 """Within this of its plane a vehicle should be in line with a gate's opening, m."""
 BEHIND = 0.3
 """The wanted velocity points to this far behind a gate, m."""
+LOOKING = 5.0
+"""How far ahead on its way a vehicle should look, m."""
 
 
 @jax.tree_util.register_dataclass
@@ -171,9 +173,12 @@ class RaceClutter:
         return jnp.where(jnp.abs(ahead) < PASSING, out, -FAR)[:, None]
 
     def desired_yaw(self, memory: Memory, state: State) -> Float[Array, " n"]:
-        """Towards the next gate."""
-        d = self.goal(memory, memory.speed) - state.position
-        return jnp.arctan2(d[:, 1], d[:, 0] + 1e-6)
+        """Towards where the way through the next two gates is `LOOKING` ahead: near a gate, behind its corner."""
+        here, there = (self.targets(memory)[:, i] for i in range(2))
+        leg, away = there - here, jnp.linalg.norm(here - state.position, axis=-1, keepdims=True)
+        length = jnp.maximum(jnp.linalg.norm(leg, axis=-1, keepdims=True), 1.0)
+        d = here + leg * jnp.clip((LOOKING - away) / length, 0.0, 1.0) - state.position
+        return jax.lax.stop_gradient(jnp.arctan2(d[:, 1], d[:, 0] + 1e-6))
 
     def advance(
         self, memory: Memory, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
