@@ -22,6 +22,7 @@ _ABOUT = f"""e2efly {__version__}: train an end-to-end quadrotor policy in secon
   e2efly train hover               learn to hover, evaluate, export policy.onnx
   e2efly train race --algo bptt    another task, another algorithm
   e2efly eval runs/hover-ppo-0     fly a policy from 1000 unseen starts, draw plots
+  e2efly ablate hover              what each reward term is good for: a figure and a table
   e2efly export RUN                write policy.onnx from a checkpoint again
   e2efly validate POLICY           fly it on another physics, or through the real firmware
   e2efly fly POLICY                fly it on a Betaflight quadrotor
@@ -50,6 +51,26 @@ class Eval:
     """Seed of the starts."""
     vehicle: str | None = None
     """Fly another vehicle than the contract's: a name or a .toml file. The policy is not changed."""
+    device: Literal["cpu", "gpu"] | None = None
+    """Where to compute."""
+
+
+@dataclass(frozen=True)
+class Ablate:
+    """Learn tasks without each term of their reward in turn, over several seeds in one compiled program; draw it."""
+
+    tasks: tyro.conf.Positional[tuple[str, ...]] = ("hover", "land", "track", "race")
+    """Which; the paper's four when left out."""
+    algos: tuple[str, ...] = ("ppo", "bptt")
+    """By which algorithms; a figure each."""
+    preset: str = "ours"
+    """Where rewards and sizes come from: ours or paper."""
+    seeds: int = 3
+    """Runs of each variant."""
+    steps: int | None = None
+    """Environment steps of each run; the preset's when left out."""
+    out: Path = Path("runs/ablation")
+    """Folder of the figures, the table and the curves. What is there already is not trained again."""
     device: Literal["cpu", "gpu"] | None = None
     """Where to compute."""
 
@@ -259,7 +280,7 @@ def run(arguments: list[str]) -> int:
 
 def _command(name: str) -> Callable[[list[str]], int]:
     commands = {
-        "train": _train, "eval": _eval, "export": _export, "validate": _validate, "fly": _fly,
+        "train": _train, "ablate": _ablate, "eval": _eval, "export": _export, "validate": _validate, "fly": _fly,
         "fly-report": _fly_report, "render": _render, "firmware": _firmware, "bench": _bench, "list": _list,
     }  # fmt: skip
     if name not in commands:
@@ -281,6 +302,13 @@ def _train(arguments: list[str]) -> int:
     from e2efly.commands.train import train_command
 
     return train_command(config, out, resume=parsed.resume, device=parsed.device, plots=parsed.plots)
+
+
+def _ablate(arguments: list[str]) -> int:
+    o = tyro.cli(Ablate, args=arguments, prog="e2efly ablate")
+    from e2efly.commands.ablate import Request, ablate_command
+
+    return ablate_command(Request(**vars(o)))
 
 
 def _eval(arguments: list[str]) -> int:

@@ -269,9 +269,19 @@ def _paper(task: str, algo: str) -> TrainConfig:
     )  # fmt: skip
 
 
+def _thrown(task: str, algo: str) -> TrainConfig:
+    """Hover from any attitude, tumbling and fast, as a vehicle that was thrown."""
+    if task != "hover":
+        raise ValueError(f"preset 'thrown': accepted for task hover, not {task!r}")
+    config = PRESETS["ours"](task, algo)
+    thrown = HoverConfig(episode_s=10.0, velocity=3.0, tilt=math.pi, body_rate=6.0)
+    return dataclasses.replace(config, task=thrown)
+
+
 PRESETS: dict[str, Callable[[str, str], TrainConfig]] = {
     "ours": lambda task, algo: (_with_critic if algo in ("shac", "abpt") else _ours)(task, algo),
     "paper": _paper,
+    "thrown": _thrown,
 }
 """Presets by name: functions of the task's and the algorithm's name."""
 

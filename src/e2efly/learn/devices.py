@@ -45,12 +45,14 @@ def share(envs: int, minibatch: int | None, asked: int | None) -> int:
     return asked
 
 
-def mesh(count: int) -> Mesh:
+def mesh(count: int, axis: str = AXIS) -> Mesh:
     """The first `count` devices."""
-    return jax.make_mesh((count,), (AXIS,), axis_types=(AxisType.Auto,), devices=jax.devices()[:count])
+    return jax.make_mesh((count,), (axis,), axis_types=(AxisType.Auto,), devices=jax.devices()[:count])
 
 
-def on_each(function: Callable, count: int, takes: Any, returns: Any, donate: tuple[int, ...] = ()) -> Any:
+def on_each(
+    function: Callable, count: int, takes: Any, returns: Any, donate: tuple[int, ...] = (), axis: str = AXIS
+) -> Any:
     """`function`, compiled to run on each of `count` devices.
 
     Args:
@@ -59,16 +61,19 @@ def on_each(function: Callable, count: int, takes: Any, returns: Any, donate: tu
         takes: `SAME` or `OWN` for each argument (a tree of them for the parts of one).
         returns: the same for the result.
         donate: arguments whose memory the result may take.
+        axis: name of the devices' axis, `AXIS` where what they hold belongs together.
     """
-    mapped = jax.shard_map(function, mesh=mesh(count), in_specs=takes, out_specs=returns, check_vma=False)
-    return jax.jit(
-        mapped, in_shardings=shardings(takes, count), out_shardings=shardings(returns, count), donate_argnums=donate
+    takes, returns = (
+        jax.tree.map(lambda place: SAME if place == SAME else PartitionSpec(axis), x) for x in (takes, returns)
     )
+    mapped = jax.shard_map(function, mesh=mesh(count, axis), in_specs=takes, out_specs=returns, check_vma=False)
+    inside, outside = (shardings(x, count, axis) for x in (takes, returns))
+    return jax.jit(mapped, in_shardings=inside, out_shardings=outside, donate_argnums=donate)
 
 
-def shardings(places: Any, count: int) -> Any:
+def shardings(places: Any, count: int, axis: str = AXIS) -> Any:
     """JAX's shardings of a tree of `SAME` and `OWN`."""
-    return jax.tree.map(lambda place: NamedSharding(mesh(count), place), places)
+    return jax.tree.map(lambda place: NamedSharding(mesh(count, axis), place), places)
 
 
 def placed(tree: Any, count: int) -> Any:

@@ -1,0 +1,149 @@
+"""`e2efly ablate`."""
+
+import dataclasses
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from e2efly import presets
+from e2efly.commands.progress import TerminalProgress
+from e2efly.config import TrainConfig
+from e2efly.device import prepare
+
+BY_ERROR = ("hover", "track")
+"""Tasks whose curves are errors, as in the paper; of the others they are success."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to compare."""
+
+    tasks: tuple[str, ...]
+    algos: tuple[str, ...]
+    preset: str
+    seeds: int
+    steps: int | None
+    out: Path
+    device: str | None
+
+
+def ablate_command(request: Request) -> int:
+    """Train every variant of every task by every algorithm; write JSON, a table and a figure an algorithm.
+
+    What an earlier run with the same configuration wrote is taken, not trained again.
+
+    Raises:
+        ValueError: for unknown names, and numbers that cannot be used.
+        OSError: when the folder cannot be written.
+    """
+    prepare(request.device)
+    from e2efly.learn.checkpoint import write_atomically
+    from e2efly.view.ablation import Panel, plot_ablation
+
+    console = Console(highlight=False)
+    configs = {(algo, task): _config(request, task, algo) for algo in request.algos for task in request.tasks}
+    request.out.mkdir(parents=True, exist_ok=True)
+    lines: list[str] = []
+    for algo in request.algos:
+        panels = []
+        for task in request.tasks:
+            began = time.perf_counter()
+            curves, known = _curves(request, configs[algo, task], console)
+            panels.append(Panel(task, curves, task in BY_ERROR))
+            rows = _rows(curves)
+            took = "as found" if known else f"in {time.perf_counter() - began:.0f} s"
+            console.print(f"\n{task} by {algo.upper()}: {len(curves.variants)} rewards, {request.seeds} seeds, {took}")
+            console.print(_table(rows))
+            lines += [f"## {task} by {algo.upper()}", "", *_markdown(rows), ""]
+        path = request.out / f"ablation_{algo}.png"
+        plot_ablation(panels, path, f"What each reward term is good for: {algo.upper()}")
+        console.print(f"Figure: {path}")
+    write_atomically(request.out / "ablation.md", "\n".join(lines).encode())
+    console.print(f"Table: {request.out / 'ablation.md'}")
+    return 0
+
+
+def _config(request: Request, task: str, algo: str) -> TrainConfig:
+    config = dataclasses.replace(presets.preset(task, algo, request.preset), curriculum=())
+    if request.steps is not None:
+        config = dataclasses.replace(config, steps=request.steps)
+    presets.check(config)
+    return config
+
+
+def _curves(request: Request, config: TrainConfig, console: Console) -> tuple[Any, bool]:
+    """The curves of a configuration, and whether they were there already."""
+    from e2efly.learn.ablation import Curves, ablate
+    from e2efly.learn.checkpoint import write_atomically
+    from e2efly.learn.rundir import to_json
+
+    task, algo = presets.task_name(config.task), presets.algorithm_name(config.algo)
+    path, about = request.out / f"{task}_{algo}.json", {"seeds": request.seeds, "config": to_json(config)}
+    if path.exists():
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if found["about"] == json.loads(json.dumps(about)):
+            parts = {part: {k: np.array(v) for k, v in found[part].items()} for part in ("success", "error")}
+            return Curves(tuple(found["variants"]), np.array(found["steps"]), **parts), True
+    steps = config.steps * request.seeds * (len(config.reward.weights) + 1)
+    with TerminalProgress(console, f"{task} by {algo}") as progress:
+        progress.compiling()
+        began, best = time.perf_counter(), 0.0
+
+        def told(share: float, success: float) -> None:
+            nonlocal best
+            best = max(best, success)
+            done = share * steps
+            progress.progress(int(done), steps, done / (time.perf_counter() - began), success, best, "")
+
+        curves = ablate(config, request.seeds, told)
+    content = {
+        "about": about,
+        "variants": list(curves.variants),
+        "steps": curves.steps.tolist(),
+        "success": {name: x.tolist() for name, x in curves.success.items()},
+        "error": {name: x.tolist() for name, x in curves.error.items()},
+    }
+    write_atomically(path, (json.dumps(content) + "\n").encode())
+    return curves, False
+
+
+def _rows(curves: Any) -> list[dict[str, str]]:
+    """A row a variant: its last evaluation, over seeds."""
+    from e2efly.view.ablation import worst
+
+    success, error = worst(curves, False), worst(curves, True)
+    reached = [np.flatnonzero(s.mean(axis=0) >= 95.0) for s in success]
+    return [
+        {
+            "reward": variant if i == 0 else f"without {variant}",
+            "success": f"{success[i, :, -1].mean():.1f} %",
+            "worst seed": f"{success[i, :, -1].min():.1f} %",
+            "error": f"{100 * error[i, :, -1].mean():.1f} cm",
+            "95 % at": f"{curves.steps[reached[i][0]] / 1e6:.2f} M" if len(reached[i]) else "-",
+        }
+        for i, variant in enumerate(curves.variants)
+    ]
+
+
+def _table(rows: list[dict[str, str]]) -> Table:
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for heading in rows[0]:
+        table.add_column(heading, no_wrap=True)
+    for row in rows:
+        table.add_row(*row.values())
+    return table
+
+
+def _markdown(rows: list[dict[str, str]]) -> list[str]:
+    heads = list(rows[0])
+    return [
+        "| " + " | ".join(heads) + " |",
+        "| " + " | ".join("---" for _ in heads) + " |",
+        *("| " + " | ".join(row.values()) + " |" for row in rows),
+    ]

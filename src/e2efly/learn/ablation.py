@@ -1,0 +1,154 @@
+"""What each term of a reward is good for: the full reward and each without one term, over several seeds, at once.
+
+All of them are members of one compiled program: weights of the reward and seeds are its leaves. The devices share the
+members, where a single run shares its environments; each member is a run on one device.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from e2efly.config import TrainConfig
+from e2efly.env import Env, random_key
+from e2efly.evaluate import Episodes, run_episodes
+from e2efly.learn.algorithm import TrainState, begin
+from e2efly.learn.devices import AXIS, OWN, SAME, on_each
+from e2efly.learn.judge import WATCHED
+from e2efly.learn.networks import Weights
+from e2efly.learn.programs import acting
+from e2efly.learn.setup import Setup
+
+FULL = "full"
+"""Name of the reward with all terms."""
+
+
+@dataclass(frozen=True)
+class Curves:
+    """How each variant learned."""
+
+    variants: tuple[str, ...]
+    """`FULL` and the names of the terms that were left out."""
+    steps: Float[np.ndarray, " t"]
+    """Environment steps at each evaluation."""
+    success: dict[str, Float[np.ndarray, "v s t"]]
+    """By criterion: of each variant and seed at each evaluation."""
+    error: dict[str, Float[np.ndarray, "v s t"]]
+    """The task's error, m: over a flight where the task follows something, else at its end."""
+
+
+def ablate(config: TrainConfig, seeds: int, told: Callable[[float, float], None] = lambda share, best: None) -> Curves:
+    """Train all variants.
+
+    Args:
+        config: of the full reward; its seed is the first.
+        seeds: runs of each variant.
+        told: (share of the work done, mean success of the full reward) after each evaluation.
+
+    Raises:
+        ValueError: for a configuration that cannot be used: with a curriculum, a reward of one term.
+    """
+    terms = tuple(config.reward.weights)
+    if len(terms) < 2 or seeds < 1 or config.curriculum:
+        raise ValueError(
+            f"an ablation of {len(terms)} reward terms over {seeds} seeds, with {len(config.curriculum)} stages of a "
+            "curriculum; accepted: two terms or more, a seed or more, no curriculum"
+        )
+    setup = Setup.of(dataclasses.replace(config, devices=1))
+    variants = (FULL, *terms)
+    members = len(variants) * seeds
+    devices = min(len(jax.devices()), members)
+    room = -(-members // devices) * devices  # the last member repeated fills the devices
+    places = np.minimum(np.arange(room), members - 1)
+    of_seed = places % seeds
+    weights = {
+        term: np.array([0.0 if variants[i // seeds] == term else weight for i in places], np.float32)
+        for term, weight in config.reward.weights.items()
+    }
+    each = [setup.algorithm.init(setup.env, config.algo, config.seed + i) for i in range(seeds)]
+    parameters = jax.tree.map(lambda *x: np.stack([np.asarray(x[i]) for i in of_seed]), *each)
+    keys = jnp.stack([random_key(config.seed + int(i)) for i in of_seed])
+    start, chunk, evaluate = _programs(setup, devices)
+    state, points = start(setup.env, weights, parameters, keys), setup.updates // config.chunk
+    found: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {name: [] for name in setup.judges}
+    for point in range(points):
+        state = chunk(setup.env, weights, state, point * config.chunk)
+        for name, env in setup.judges.items():
+            flown = evaluate(env, state.parameters.policy)
+            measured = (flown.success, flown.mean_error if setup.settle else flown.final_error)
+            found[name].append(tuple(np.asarray(jnp.mean(x, axis=1))[:members] for x in measured))  # pyright: ignore
+        told((point + 1) / points, min(float(np.mean(x[-1][0][:seeds])) for x in found.values()))
+
+    def shaped(which: int) -> dict[str, np.ndarray]:
+        stacked = {name: np.stack([x[which] for x in rows], axis=-1) for name, rows in found.items()}
+        return {name: x.reshape(len(variants), seeds, points) for name, x in stacked.items()}
+
+    steps = (1.0 + np.arange(points)) * config.chunk * setup.steps_per_update
+    return Curves(variants, steps, shaped(0), shaped(1))
+
+
+def _programs(setup: Setup, devices: int) -> tuple[Callable, Callable, Callable]:
+    """Programs on members, the leading axis of all that has one.
+
+    Returns:
+        (environment, weights, parameters, keys) -> states; (environment, weights, states, first update) -> states after
+        a chunk; (environment, policies) -> episodes.
+    """
+    config, algorithm = setup.config, setup.algorithm
+
+    def weighted(env: Env, weights: dict[str, Any]) -> Env:
+        return dataclasses.replace(env, weights=weights)
+
+    def start(env: Env, weights: Any, parameters: Any, keys: Any) -> TrainState:
+        def one(w: Any, p: Any, k: Any) -> TrainState:
+            return begin(algorithm, weighted(env, w), config.algo, p, k)
+
+        return _each(_alone(one), weights, parameters, keys)
+
+    def chunk(env: Env, weights: Any, state: TrainState, first: Any) -> TrainState:
+        def one(w: Any, state: TrainState) -> TrainState:
+            def update(state: TrainState, index: jax.Array) -> tuple[TrainState, None]:
+                return algorithm.update(weighted(env, w), config.algo, state, index / setup.updates)[0], None
+
+            return jax.lax.scan(update, state, first + jnp.arange(config.chunk))[0]
+
+        return _each(_alone(one), weights, state)
+
+    def evaluate(env: Env, policy: Weights) -> Episodes:
+        def one(policy: Weights) -> Episodes:
+            act = acting(setup.actor, policy)
+            return run_episodes(
+                env, act, random_key(0, WATCHED, 0), config.eval_episodes, setup.episode_steps, setup.settle
+            )
+
+        return _each(one, policy)
+
+    return (
+        on_each(start, devices, (SAME, OWN, OWN, OWN), OWN, axis="members"),
+        on_each(chunk, devices, (SAME, OWN, OWN, SAME), OWN, donate=(2,), axis="members"),
+        on_each(evaluate, devices, (SAME, OWN), OWN, axis="members"),
+    )
+
+
+def _each(function: Callable, *members: Any) -> Any:
+    """A function of every member. On a CPU one follows another: that takes two thirds of the time, and draws the random
+    numbers of a run alone, which those of a batch are not.
+    """
+    if jax.default_backend() == "cpu":
+        return jax.lax.map(lambda member: function(*member), members)
+    return jax.vmap(function)(*members)
+
+
+def _alone(function: Callable) -> Callable:
+    """A function that takes means over the devices, on one that is alone."""
+
+    def called(*args: Any) -> Any:
+        out = jax.vmap(lambda _: function(*args), axis_name=AXIS, axis_size=1)(jnp.zeros(1))
+        return jax.tree.map(lambda x: x[0], out)
+
+    return called

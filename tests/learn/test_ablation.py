@@ -1,0 +1,79 @@
+"""Rewards without each of their terms, learned side by side."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from e2efly import presets
+from e2efly.cli import run
+from e2efly.config import TrainConfig
+from e2efly.learn.ablation import FULL, ablate
+from e2efly.learn.rundir import RunDirectory
+from e2efly.learn.runner import train
+from tests.learn.test_runner import Silent
+
+
+def small(algo: str, steps: int = 4096) -> TrainConfig:
+    config = presets.preset("hover", algo)
+    sizes = {"envs": 16, "horizon": 16} | ({"minibatch": 128} if algo == "ppo" else {})
+    return dataclasses.replace(
+        config,
+        task=dataclasses.replace(config.task, episode_s=1.0),
+        algo=dataclasses.replace(config.algo, **sizes),
+        steps=steps, chunk=4, eval_episodes=20, devices=1, fast_compile=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("algo", ["ppo", "bptt"])
+def test_a_member_learns_as_a_run_alone_does(algo: str, tmp_path: Path) -> None:
+    config = small(algo)
+    curves = ablate(config, 2)
+    assert curves.variants == (FULL, *config.reward.weights)
+    assert curves.success["hover"].shape == (len(curves.variants), 2, 4)
+    variants = [(0, 1, config.reward.weights), (2, 0, {**config.reward.weights, curves.variants[2]: 0.0})]
+    for variant, seed, weights in variants:
+        reward = dataclasses.replace(config.reward, weights=weights)
+        out = tmp_path / f"{variant}"
+        train(dataclasses.replace(config, reward=reward, seed=seed), out, Silent())
+        rows = [row for row in RunDirectory(out).rows() if "eval/hover/final_error" in row]
+        alone = [row["eval/hover/final_error"] for row in rows]
+        np.testing.assert_allclose(curves.error["hover"][variant, seed], alone, rtol=0.02)
+        np.testing.assert_array_equal(curves.steps, [row["steps"] for row in rows])
+
+
+def test_members_differ_by_their_terms_and_seeds() -> None:
+    error = ablate(small("bptt"), 2).error["hover"][..., -1]
+    assert len(np.unique(np.round(error, 5))) == error.size
+
+
+def test_what_cannot_be_compared_is_refused() -> None:
+    one = dataclasses.replace(small("bptt"), reward=dataclasses.replace(small("bptt").reward, weights={"prog2": 1.0}))
+    with pytest.raises(ValueError, match="1 reward terms"):
+        ablate(one, 2)
+    with pytest.raises(ValueError, match="over 0 seeds"):
+        ablate(small("bptt"), 0)
+
+
+def test_the_command_draws_and_takes_what_is_there_already(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    command = ["ablate", "hover", "--algos", "bptt", "--seeds", "1", "--steps", "40960", "--out", "found"]
+    assert run(command) == 0
+    first = (tmp_path / "found" / "hover_bptt.json").read_bytes()
+    text = (tmp_path / "found" / "ablation.md").read_text()
+    assert "| without prog2 |" in text and "| full |" in text
+    assert (tmp_path / "found" / "ablation_bptt.png").stat().st_size > 20_000
+    capsys.readouterr()
+    assert run(command) == 0
+    assert "as found" in capsys.readouterr().out
+    assert (tmp_path / "found" / "hover_bptt.json").read_bytes() == first
+    assert run([*command[:-2], "--steps", "81920", "--out", "found"]) == 0  # another configuration: trained anew
+    assert (tmp_path / "found" / "hover_bptt.json").read_bytes() != first
+
+
+def test_an_unknown_task_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert run(["ablate", "hoover", "--out", str(tmp_path)]) == 2
+    assert "did you mean 'hover'" in " ".join(capsys.readouterr().err.split())
