@@ -8,7 +8,6 @@ the noise of a D435i, whatever the policy was trained with, always at the vehicl
 """
 
 import dataclasses
-import json
 import os
 import subprocess
 import sys
@@ -16,7 +15,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from common import RESULTS, arguments, table, write
+from common import arguments, table, with_earlier, write
 
 from e2efly.device import prepare
 
@@ -56,7 +55,7 @@ def flown(out: Path, noise: ImageNoiseConfig) -> dict[str, float]:
     config = run.config()
     setup = Setup.of(config)
     weights = load_policy_weights(setup, run, "best")
-    cameras = tuple(dataclasses.replace(c, noise=noise) for c in config.env.cameras)
+    cameras = tuple(dataclasses.replace(c, noise=noise, noise_share=1.0) for c in config.env.cameras)
     found = {}
     for name, suite in presets.suites(config.task).items():
         env = Env.of(suite, config.reward, dataclasses.replace(config.env, cameras=cameras))
@@ -73,15 +72,9 @@ def by_noise(out: Path) -> dict[str, dict[str, float]]:
     return {name: flown(out, noise) for name, noise in noises.items()}
 
 
-def _earlier(path: Path) -> list[dict[str, Any]]:
-    """The rows of a file of results."""
-    return json.loads(path.read_text())["table"] if path.exists() else []
-
-
 def main() -> None:
     """Train, print a table, write JSON."""
     options = arguments(__doc__ or "", cases=CASES, algos=["bptt", "ppo"], seeds=3)
-    known = _earlier(options.json or RESULTS / "visual_tasks.json")
     rows, every = [], []
     for algo in options.algos:
         for case in options.cases:
@@ -112,9 +105,8 @@ def main() -> None:
                     }
                 )
                 print(rows[-1], flush=True)
-            anew = {(row["algorithm"], row["task"]) for row in rows}
-            kept = [row for row in known if (row["algorithm"], row["task"]) not in anew]
-            write("visual_tasks", options.json, {"table": [*rows, *kept], "runs": every})
+            whole = with_earlier("visual_tasks", options.json, rows)
+            write("visual_tasks", options.json, {"table": whole, "runs": every})
     print(table(rows))
 
 

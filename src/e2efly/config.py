@@ -105,6 +105,8 @@ class CameraConfig:
     """Half-width of the random mounting position, m an axis, an episode."""
     noise: ImageNoiseConfig = ImageNoiseConfig()
     """What it does to the image."""
+    noise_share: float = 1.0
+    """Share of the episodes that have the noise; the others have clean images."""
     light_spread: float = 0.0
     """Colours: relative half-width of the sun's random strength and direction, an episode."""
     colour_spread: float = 0.0
@@ -629,7 +631,52 @@ class ABPTConfig:
         return self.envs * (self.collect + self.horizon)
 
 
-AlgorithmConfig = PPOConfig | BPTTConfig | SHACConfig | ABPTConfig
+@dataclass(frozen=True)
+class FOPPOConfig:
+    """PPO refined by first-order gradients: epochs over a rollout, then a step along its exact gradient. Ours."""
+
+    envs: int = 64
+    """Environments side by side (sets shapes)."""
+    horizon: int = 32
+    """Steps of a rollout, which is the window of the exact gradient (sets shapes)."""
+    epochs: int = 2
+    """Passes over the samples of an update (sets shapes)."""
+    minibatch: int = 512
+    """Samples of a gradient step; divides envs * horizon (sets shapes)."""
+    learning_rate: float = 3e-3
+    """Adam's step at the start."""
+    learning_rate_end: float = 3e-4
+    """Adam's step at the end; exponential in between."""
+    exact_rate: float = 1.0
+    """The step along the exact gradient over that of the epochs."""
+    gamma: float = 0.98
+    """Discount a step."""
+    gae_lambda: float = 0.95
+    """Lambda of the generalised advantage estimate."""
+    clip: float = 0.2
+    """Clip of the probability ratio."""
+    value_weight: float = 0.5
+    """Weight of the critic's loss."""
+    entropy_weight: float = 0.0
+    """Weight of the entropy bonus."""
+    log_std: float = -1.0
+    """Initial log standard deviation of the action noise."""
+    max_grad_norm: float = 0.5
+    """Norm to which a gradient is clipped."""
+    gradient_decay: float = 0.0
+    """Decay of the gradient through the state, 1/s of backward time; 0: the exact gradient."""
+    horizon_start: int = 0
+    """Steps after which the gradient is cut at first; they grow to the window's over the run. 0: never cut."""
+    term_gradients: bool = False
+    """Whether to log the norm of the gradient of each term of the reward; an update takes as many times as long."""
+
+    @property
+    def steps(self) -> int:
+        """Environment steps of an update."""
+        return self.envs * self.horizon
+
+
+AlgorithmConfig = PPOConfig | BPTTConfig | SHACConfig | ABPTConfig | FOPPOConfig
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from e2efly.config import (
     BPTTConfig,
     CameraConfig,
     EnvConfig,
+    FOPPOConfig,
     GapConfig,
     HoverAwareConfig,
     HoverConfig,
@@ -47,7 +48,8 @@ TASKS: dict[str, TaskConfig] = {
 """The task that each name trains on. Races go on for lap after lap; evaluation ends after one."""
 
 ALGORITHMS: dict[str, AlgorithmConfig] = {
-    "ppo": PPOConfig(), "bptt": BPTTConfig(), "shac": SHACConfig(), "abpt": ABPTConfig()
+    "ppo": PPOConfig(), "bptt": BPTTConfig(), "shac": SHACConfig(), "abpt": ABPTConfig(),
+    "foppo": FOPPOConfig(),
 }  # fmt: skip
 """Algorithms by name, with the defaults of their presets."""
 
@@ -59,7 +61,7 @@ D435I = CameraConfig(fov=(math.radians(87), math.radians(58)), reach=(0.28, 10.0
 _NOISY = dataclasses.replace(D435I, noise=ImageNoiseConfig(d435i=True))
 _EYES: dict[str, tuple[CameraConfig, ...]] = {
     "land_visual": (CameraConfig("mask", 16, 16, fov=(math.pi / 2, math.pi / 2), pitch=math.pi / 2),),
-    "race_clutter": (dataclasses.replace(_NOISY, width=48, height=24, pitch=-0.35),),
+    "race_clutter": (dataclasses.replace(_NOISY, width=48, height=24, pitch=-0.35, noise_share=0.5),),
     "avoid": (dataclasses.replace(_NOISY, width=32, height=12),),
 }
 """What the policies of the visual tasks see."""
@@ -145,10 +147,10 @@ def _land_visual(algo: str) -> TrainConfig:
 
 
 def _avoid(algo: str) -> TrainConfig:
-    weights = {"vel": 3.0, "avoid": 20.0, "ori2": 0.1, "anglev_sq": 0.01, "act2_sq": 0.02}
+    weights = {"vel": 4.0, "avoid": 20.0, "ori2": 0.1, "anglev_sq": 0.01, "act2_sq": 0.02}
     parameters = {"avoid_reach": 0.5}
     settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=1.2e-4, gradient_decay=1.5)
-    task, network = TASKS["avoid"], NetworkConfig((128, 64), pool=(6, 32), recurrent=64)
+    task, network = TASKS["avoid"], NetworkConfig((128, 64), pool=(12, 32), recurrent=64)
     curriculum: tuple[StageConfig, ...] = ()
     if algo == "ppo":
         weights = {"vel": 0.3, "avoid": 0.1, "anglev_sq": 0.002, "act2_sq": 0.02, "goal": 5.0, "crash": 5.0}
@@ -156,7 +158,7 @@ def _avoid(algo: str) -> TrainConfig:
         network, curriculum = dataclasses.replace(network, recurrent=0), CURRICULA["avoid"]
     return TrainConfig(
         task, settings, RewardConfig(weights, parameters), EnvConfig(cameras=_EYES["avoid"]), network,
-        steps=3_000_000, chunk=100, eval_episodes=250, curriculum=curriculum,
+        steps=4_000_000, chunk=100, eval_episodes=250, curriculum=curriculum,
     )  # fmt: skip
 
 
@@ -241,7 +243,7 @@ _SHARED = ("envs", "learning_rate", "learning_rate_end", "max_grad_norm", "gradi
 def _with_critic(task: str, algo: str) -> TrainConfig:
     """BPTT's preset with critics behind a shorter window."""
     config = _OURS[task]("bptt")
-    shared = {name: getattr(config.algo, name) for name in _SHARED}
+    shared = {name: getattr(config.algo, name) for name in (_SHARED if algo != "foppo" else _SHARED[:1])}
     return dataclasses.replace(config, algo=dataclasses.replace(ALGORITHMS[algo], **shared))
 
 
@@ -279,7 +281,7 @@ def _thrown(task: str, algo: str) -> TrainConfig:
 
 
 PRESETS: dict[str, Callable[[str, str], TrainConfig]] = {
-    "ours": lambda task, algo: (_with_critic if algo in ("shac", "abpt") else _ours)(task, algo),
+    "ours": lambda task, algo: (_ours if algo in ("ppo", "bptt") else _with_critic)(task, algo),
     "paper": _paper,
     "thrown": _thrown,
 }
@@ -296,8 +298,8 @@ def preset(task: str, algo: str, name: str = "ours") -> TrainConfig:
     for kind, value, known in (("task", task, TASKS), ("algorithm", algo, ALGORITHMS), ("preset", name, PRESETS)):
         if value not in known:
             raise ValueError(unknown(kind, value, known))
-    if name == "paper" and algo == "shac":
-        raise ValueError("preset 'paper': the paper does not train by 'shac'; accepted: ppo, bptt, abpt")
+    if name == "paper" and algo in ("shac", "foppo"):
+        raise ValueError(f"preset 'paper': the paper does not train by {algo!r}; accepted: ppo, bptt, abpt")
     if name == "paper" and task not in _PAPER_WEIGHTS:
         raise ValueError(
             f"preset 'paper': the paper has no reward for task {task!r}; accepted: {', '.join(_PAPER_WEIGHTS)}"
@@ -357,7 +359,7 @@ def check(config: TrainConfig) -> None:
         "algo.envs": algo.envs, "algo.horizon": algo.horizon, "algo.learning_rate": algo.learning_rate,
         "algo.learning_rate_end": algo.learning_rate_end, "algo.max_grad_norm": algo.max_grad_norm,
     }  # fmt: skip
-    if isinstance(algo, PPOConfig | SHACConfig):
+    if isinstance(algo, PPOConfig | SHACConfig | FOPPOConfig):
         positive |= {"algo.epochs": algo.epochs, "algo.minibatch": algo.minibatch}
     if isinstance(algo, ABPTConfig):
         positive |= {"algo.collect": algo.collect, "algo.fits": algo.fits, "algo.minibatch": algo.minibatch}
@@ -371,7 +373,7 @@ def check(config: TrainConfig) -> None:
             raise ValueError(f"{name} is {value}; accepted: more than 0")
     if not 0 < algo.gamma <= 1:
         raise ValueError(f"algo.gamma is {algo.gamma}; accepted: above 0, at most 1")
-    if isinstance(algo, PPOConfig | SHACConfig) and (algo.envs * algo.horizon) % algo.minibatch:
+    if isinstance(algo, PPOConfig | SHACConfig | FOPPOConfig) and (algo.envs * algo.horizon) % algo.minibatch:
         raise ValueError(
             f"algo.minibatch is {algo.minibatch}; accepted: a divisor of algo.envs * algo.horizon "
             f"({algo.envs * algo.horizon})"

@@ -1,4 +1,4 @@
-"""PPO, BPTT and SHAC on probe problems with known answers; GAE by hand."""
+"""The algorithms on probe problems with known answers; GAE by hand."""
 
 import dataclasses
 from typing import Any
@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.config import ABPTConfig, AlgorithmConfig, BPTTConfig, NetworkConfig, PPOConfig, SHACConfig
+from e2efly.config import ABPTConfig, AlgorithmConfig, BPTTConfig, FOPPOConfig, NetworkConfig, PPOConfig, SHACConfig
 from e2efly.env import random_key
 from e2efly.learn.algorithm import TrainState, annealed, ends, make_algorithm
 from e2efly.learn.critic import gae
@@ -27,6 +27,10 @@ ABPT_CONFIG = ABPTConfig(
     envs=32, horizon=8, collect=8, buffer=4096, places=128, minibatch=256, fits=4, learning_rate=2e-2,
     learning_rate_end=1e-3, gamma=0.9, max_grad_norm=10.0, target_share=0.1,
 )  # fmt: skip
+
+FOPPO_CONFIG = FOPPOConfig(
+    envs=32, horizon=8, minibatch=128, learning_rate=1e-2, learning_rate_end=1e-3, gamma=0.9, max_grad_norm=10.0
+)
 
 
 def learn(
@@ -83,6 +87,21 @@ def test_abpt_finds_the_action_that_pays_best(delay: int) -> None:
 
 
 @pytest.mark.parametrize("delay", [0, 1])
+def test_foppo_finds_the_action_that_pays_best(delay: int) -> None:
+    _, state, _ = learn(Probe(delay=delay, length=1000), FOPPO_CONFIG, 200)
+    np.testing.assert_allclose(learned_action(state), Probe.target, atol=0.05)
+
+
+def test_each_half_of_foppo_learns_alone() -> None:
+    probe = Probe(length=1000)
+    by_epochs = dataclasses.replace(FOPPO_CONFIG, exact_rate=0.0, epochs=4)
+    by_gradient = dataclasses.replace(FOPPO_CONFIG, clip=0.0, exact_rate=2.0)  # clipped at once: no step of PPO's
+    for config in (by_epochs, by_gradient):
+        _, state, _ = learn(probe, config, 200)
+        np.testing.assert_allclose(learned_action(state), probe.target, atol=0.1)
+
+
+@pytest.mark.parametrize("delay", [0, 1])
 def test_shac_finds_the_action_that_pays_best(delay: int) -> None:
     _, state, _ = learn(Probe(delay=delay, length=1000), SHAC_CONFIG, 200)
     np.testing.assert_allclose(learned_action(state), Probe.target, atol=0.02)
@@ -98,11 +117,12 @@ def test_the_critic_of_shac_sees_beyond_the_window() -> None:
     assert np.abs(learned_action(blind) - np.array(probe.target)).max() > 0.3
 
 
-def test_the_critic_of_shac_knows_what_follows_a_time_out_and_that_nothing_follows_an_end() -> None:
-    for for_good, worth in ((False, 2.0), (True, 1.0)):
-        probe = Probe(constant=1.0, weight=0.0, length=1, ends_for_good=for_good)
-        _, state, _ = learn(probe, dataclasses.replace(SHAC_CONFIG, gamma=0.5), 150)
-        assert learned_value(state) == pytest.approx(worth, abs=0.05)
+def test_critics_know_what_follows_a_time_out_and_that_nothing_follows_an_end() -> None:
+    for config in (SHAC_CONFIG, FOPPO_CONFIG):
+        for for_good, worth in ((False, 2.0), (True, 1.0)):
+            probe = Probe(constant=1.0, weight=0.0, length=1, ends_for_good=for_good)
+            _, state, _ = learn(probe, dataclasses.replace(config, gamma=0.5), 150)
+            assert learned_value(state) == pytest.approx(worth, abs=0.05)
 
 
 def test_the_pieces_of_a_window_grow_over_the_run() -> None:
@@ -132,7 +152,9 @@ def test_a_cut_keeps_the_gradient_from_what_came_before(config: Any) -> None:
         assert (float(norm[0]) > 1e-3) == learns
 
 
-@pytest.mark.parametrize("config", [BPTT_CONFIG, SHAC_CONFIG, ABPT_CONFIG], ids=["bptt", "shac", "abpt"])
+@pytest.mark.parametrize(
+    "config", [BPTT_CONFIG, SHAC_CONFIG, ABPT_CONFIG, FOPPO_CONFIG], ids=["bptt", "shac", "abpt", "foppo"]
+)
 def test_the_gradient_of_each_term_is_told_apart_and_they_add_up(config: Any) -> None:
     probe = Probe(constant=1.0, length=1000)
     _, together, _ = learn(probe, config, 3)

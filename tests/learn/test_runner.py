@@ -22,6 +22,8 @@ from e2efly.learn.runner import NonFiniteError, train
 SMALL = ["--steps", "6144", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16", "--algo.horizon", "16",
          "--algo.minibatch", "128", "--network.hidden", "8", "--task.episode-s", "1", "--no-plots"]  # fmt: skip
 
+MORE = {"abpt": ["--algo.buffer", "1024", "--algo.places", "64"]}
+
 
 class Silent:
     """A reporter that keeps what it was told."""
@@ -88,10 +90,10 @@ def timeless(rows: list[dict[str, float]]) -> list[dict[str, float]]:
     return [{name: value for name, value in row.items() if name not in ("seconds", "rate")} for row in rows]
 
 
-@pytest.mark.parametrize("algo", ["ppo", "bptt"])
+@pytest.mark.parametrize("algo", ["ppo", "bptt", "abpt"])
 def test_a_killed_run_ends_bit_for_bit_like_one_that_was_not(algo: str, tmp_path: Path) -> None:
-    small_flags = [f for i, f in enumerate(SMALL) if algo == "ppo" or i not in (10, 11)]
-    flags = ["train", "hover", "--algo", algo, *small_flags, "--devices", "2"]
+    small_flags = [f for i, f in enumerate(SMALL) if algo != "bptt" or i not in (10, 11)]
+    flags = ["train", "hover", "--algo", algo, *small_flags, "--devices", "2", *MORE.get(algo, ())]
     whole = cli(*flags, "--out", "whole", cwd=tmp_path)
     assert whole.wait() == 0, output_of(tmp_path)
     for round_, updates in enumerate((4, 12)):
@@ -161,7 +163,8 @@ NOT_IN_THE_PAPER = ("hover_aware", "gap")
 @pytest.mark.parametrize(
     ("name", "task", "algo"),
     [("ours", t, a) for t in presets.TASKS for a in presets.ALGORITHMS]
-    + [("paper", t, a) for t in presets.TASKS if t not in NOT_IN_THE_PAPER for a in ("ppo", "bptt")],
+    + [("paper", t, a) for t in presets.TASKS if t not in NOT_IN_THE_PAPER for a in ("ppo", "bptt", "abpt")]
+    + [("thrown", "hover", a) for a in presets.ALGORITHMS],
 )
 def test_every_preset_is_complete_and_survives_json(task: str, algo: str, name: str) -> None:
     config = presets.preset(task, algo, name)
@@ -175,9 +178,15 @@ def test_a_preset_that_the_paper_does_not_give_is_refused(task: str) -> None:
         presets.preset(task, "ppo", "paper")
 
 
-def test_the_paper_does_not_train_by_shac() -> None:
-    with pytest.raises(ValueError, match="the paper does not train by 'shac'; accepted: ppo, bptt"):
-        presets.preset("hover", "shac", "paper")
+@pytest.mark.parametrize("algo", ["shac", "foppo"])
+def test_the_paper_does_not_train_by(algo: str) -> None:
+    with pytest.raises(ValueError, match=f"the paper does not train by '{algo}'; accepted: ppo, bptt, abpt"):
+        presets.preset("hover", algo, "paper")
+
+
+def test_only_hover_starts_thrown() -> None:
+    with pytest.raises(ValueError, match="preset 'thrown': accepted for task hover, not 'race'"):
+        presets.preset("race", "ppo", "thrown")
 
 
 @pytest.mark.parametrize(("task", "algo"), [("hover", "ppo"), ("race", "ppo"), ("avoid", "bptt"), ("no such", "ppo")])

@@ -96,6 +96,18 @@ def test_images_have_no_gradient_and_let_others_through() -> None:
     assert np.all(np.asarray(by_image) == 0) and np.abs(np.asarray(by_reward)).max() > 0
 
 
+def test_noise_comes_on_in_a_share_of_the_episodes_and_stays() -> None:
+    n = 400
+    noisy = dataclasses.replace(DOWN, noise=ImageNoiseConfig(salt_and_pepper=0.5), noise_share=0.3)
+    env, clean = env_with(noisy), env_with(DOWN)
+    state, plain = (jax.jit(e.reset, static_argnums=1)(random_key(0), n)[0] for e in (env, clean))
+    first = np.any(np.asarray(state.images[0] != plain.images[0]), axis=(1, 2))
+    assert 0.2 < first.mean() < 0.4
+    step = jax.jit(lambda env, state: env.step(state, jnp.zeros((n, 4)))[0])
+    later = np.any(np.asarray(step(env, state).images[0] != step(clean, plain).images[0]), axis=(1, 2))
+    np.testing.assert_array_equal(first, later)
+
+
 def test_a_mask_shows_the_pad_and_noise_its_salt() -> None:
     camera = CameraConfig("mask", 16, 16, fov=(math.pi / 2, math.pi / 2), pitch=math.pi / 2)
     task = LandVisualConfig(sideways=0.0, velocity=0.0, height=(1.0, 1.0), pad_size=(0.5, 0.5))
@@ -117,6 +129,7 @@ def test_a_mask_shows_the_pad_and_noise_its_salt() -> None:
         (dataclasses.replace(DOWN, rate=7.0), r"camera.rate is 7.0; accepted: the control rate, 30 Hz"),
         (dataclasses.replace(DOWN, latency=(0.1, 0.05)), r"env.cameras.0.latency is \(0.1, 0.05\)"),
         (dataclasses.replace(DOWN, of="gait", sees="mask"), r"camera.of: unknown class 'gait'.*gate"),
+        (dataclasses.replace(DOWN, noise_share=1.5), "camera.noise_share is 1.5; accepted: 0 to 1"),
         (dataclasses.replace(DOWN, reach=(2.0, 1.0)), r"camera.reach is \(2.0, 1.0\)"),
         (dataclasses.replace(DOWN, noise=ImageNoiseConfig(gaussian=-1.0)), r"camera.noise.gaussian is -1.0"),
     ],

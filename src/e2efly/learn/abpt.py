@@ -131,7 +131,8 @@ class ABPT:
         grads, more, norms = ascended(gain, policy, config.term_gradients)
         policy, policy_adam, norm = descend(config, rate, policy, state.optimizer["policy"], grads)
         log_std = jnp.maximum(policy.log_std, QUIETEST)
-        return TrainState(
+        return dataclasses.replace(
+            state,
             parameters=Parameters(policy.mean, log_std, critics, targets),
             optimizer={"policy": policy_adam, "critics": critics_adam},
             env=env_state,

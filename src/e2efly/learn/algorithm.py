@@ -10,12 +10,12 @@ import optax
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.config import ABPTConfig, AlgorithmConfig, BPTTConfig, PPOConfig, SHACConfig
+from e2efly.config import ABPTConfig, AlgorithmConfig, BPTTConfig, FOPPOConfig, PPOConfig, SHACConfig
 from e2efly.env import Env, EnvState
 from e2efly.learn.devices import AXIS
 from e2efly.learn.networks import Actor
 
-for _config in (PPOConfig, BPTTConfig, SHACConfig, ABPTConfig):
+for _config in (PPOConfig, BPTTConfig, SHACConfig, ABPTConfig, FOPPOConfig):
     _shapes = [name for name, kind in _config.__annotations__.items() if kind in (int, bool)]
     jax.tree_util.register_dataclass(
         _config,
@@ -170,8 +170,11 @@ def make_algorithm(config: AlgorithmConfig, actor: Actor) -> Algorithm:
     """The algorithm of a configuration."""
     from e2efly.learn.abpt import ABPT
     from e2efly.learn.bptt import BPTT
+    from e2efly.learn.foppo import FOPPO
     from e2efly.learn.ppo import PPO
     from e2efly.learn.shac import SHAC
 
-    makers: dict[type, type] = {PPOConfig: PPO, BPTTConfig: BPTT, SHACConfig: SHAC, ABPTConfig: ABPT}
+    makers: dict[type, type] = {
+        PPOConfig: PPO, BPTTConfig: BPTT, SHACConfig: SHAC, ABPTConfig: ABPT, FOPPOConfig: FOPPO
+    }  # fmt: skip
     return makers[type(config)](actor)

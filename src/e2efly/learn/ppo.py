@@ -6,6 +6,7 @@ there are cameras the critic sees no images but the true scene (`Env.privileged`
 step back: its memory is stored with the sample.
 """
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
@@ -92,28 +93,20 @@ class PPO:
         """
         key, rollout_key, epoch_key = jax.random.split(state.key, 3)
         samples, env_state, observation, memory, metrics = self._rollout(env, config, state, rollout_key)
-        size, batches_an_epoch = samples.advantage.size, config.envs * config.horizon // config.minibatch
-        # one sort of random bits: sorting is slow on a CPU, so that both epochs share the order
-        order = jnp.argsort(jax.random.bits(epoch_key, (size,)))
-        flat = jax.tree.map(lambda x: x.reshape(size, *x.shape[2:])[order], samples)
-        batches = jax.tree.map(lambda x: x.reshape(batches_an_epoch, size // batches_an_epoch, *x.shape[1:]), flat)
-        rate = annealed(config, progress)
-
-        def minibatch(carry: tuple[Parameters, Any], batch: Samples) -> tuple[tuple[Parameters, Any], dict[str, Array]]:
-            parameters, optimizer = carry
-            grads, losses = jax.grad(self._loss, has_aux=True)(parameters, config, batch)
-            parameters, optimizer, norm = descend(config, rate, parameters, optimizer, grads)
-            return (parameters, optimizer), {**losses, "gradient_norm": norm}
-
-        def epoch(carry: tuple[Parameters, Any], _: None) -> tuple[Any, dict[str, Array]]:
-            return jax.lax.scan(minibatch, carry, batches)
-
-        (parameters, optimizer), losses = jax.lax.scan(
-            epoch, (state.parameters, state.optimizer), None, length=config.epochs
+        parameters, optimizer, losses = improve(
+            self.actor, config, annealed(config, progress), state.parameters, state.optimizer, samples, epoch_key
         )
-        metrics |= {f"loss/{name}": jnp.mean(x) for name, x in losses.items()}
+        metrics |= losses
         metrics["std"] = jnp.mean(jnp.exp(parameters.log_std))
-        return TrainState(parameters, optimizer, env_state, observation, memory, key), metrics
+        return dataclasses.replace(
+            state,
+            parameters=parameters,
+            optimizer=optimizer,
+            env=env_state,
+            observation=observation,
+            memory=memory,
+            key=key,
+        ), metrics
 
     def _rollout(
         self, env: Env, config: PPOConfig, state: TrainState, key: PRNGKeyArray
@@ -158,14 +151,48 @@ class PPO:
         }
         return samples, env_state, observation, memory, metrics
 
-    def _loss(self, parameters: Parameters, config: PPOConfig, batch: Samples) -> tuple[Array, dict[str, Array]]:
-        mean, _ = self.actor(parameters.policy, batch.features, batch.memory)
-        ratio = jnp.exp(log_prob(batch.action, mean, parameters.log_std) - batch.log_prob)
-        advantage = (batch.advantage - jnp.mean(batch.advantage)) / (jnp.std(batch.advantage) + 1e-8)
-        clipped = jnp.clip(ratio, 1 - config.clip, 1 + config.clip)
-        policy_loss = -jnp.mean(jnp.minimum(ratio * advantage, clipped * advantage))
-        estimate = value(self.actor, parameters.critic, batch.known)
-        value_loss = 0.5 * jnp.mean((estimate - batch.value_target) ** 2)
-        entropy = jnp.sum(parameters.log_std)
-        total = policy_loss + config.value_weight * value_loss - config.entropy_weight * entropy
-        return total, {"policy": policy_loss, "value": value_loss, "ratio": jnp.mean(ratio)}
+
+def improve(
+    actor: Actor,
+    config: Any,
+    rate: Float[Array, ""],
+    parameters: Parameters,
+    optimizer: Any,
+    samples: Samples,
+    key: PRNGKeyArray,
+) -> tuple[Parameters, Any, dict[str, Array]]:
+    """Epochs of minibatches over the samples of a rollout.
+
+    Returns:
+        New parameters and optimiser, and the mean losses, `loss/NAME`.
+    """
+    size, batches_an_epoch = samples.advantage.size, config.envs * config.horizon // config.minibatch
+    # one sort of random bits: sorting is slow on a CPU, so that both epochs share the order
+    order = jnp.argsort(jax.random.bits(key, (size,)))
+    flat = jax.tree.map(lambda x: x.reshape(size, *x.shape[2:])[order], samples)
+    batches = jax.tree.map(lambda x: x.reshape(batches_an_epoch, size // batches_an_epoch, *x.shape[1:]), flat)
+
+    def minibatch(carry: tuple[Parameters, Any], batch: Samples) -> tuple[tuple[Parameters, Any], dict[str, Array]]:
+        parameters, optimizer = carry
+        grads, losses = jax.grad(_loss, argnums=1, has_aux=True)(actor, parameters, config, batch)
+        parameters, optimizer, norm = descend(config, rate, parameters, optimizer, grads)
+        return (parameters, optimizer), {**losses, "gradient_norm": norm}
+
+    def epoch(carry: tuple[Parameters, Any], _: None) -> tuple[Any, dict[str, Array]]:
+        return jax.lax.scan(minibatch, carry, batches)
+
+    (parameters, optimizer), losses = jax.lax.scan(epoch, (parameters, optimizer), None, length=config.epochs)
+    return parameters, optimizer, {f"loss/{name}": jnp.mean(x) for name, x in losses.items()}
+
+
+def _loss(actor: Actor, parameters: Parameters, config: Any, batch: Samples) -> tuple[Array, dict[str, Array]]:
+    mean, _ = actor(parameters.policy, batch.features, batch.memory)
+    ratio = jnp.exp(log_prob(batch.action, mean, parameters.log_std) - batch.log_prob)
+    advantage = (batch.advantage - jnp.mean(batch.advantage)) / (jnp.std(batch.advantage) + 1e-8)
+    clipped = jnp.clip(ratio, 1 - config.clip, 1 + config.clip)
+    policy_loss = -jnp.mean(jnp.minimum(ratio * advantage, clipped * advantage))
+    estimate = value(actor, parameters.critic, batch.known)
+    value_loss = 0.5 * jnp.mean((estimate - batch.value_target) ** 2)
+    entropy = jnp.sum(parameters.log_std)
+    total = policy_loss + config.value_weight * value_loss - config.entropy_weight * entropy
+    return total, {"policy": policy_loss, "value": value_loss, "ratio": jnp.mean(ratio)}

@@ -136,3 +136,5 @@ def check(config: CameraConfig) -> None:
     near, far = config.reach
     if not 0 <= near < far:
         raise ValueError(f"camera.reach is {config.reach}; accepted: two rising numbers of metres, not negative")
+    if not 0 <= config.noise_share <= 1:
+        raise ValueError(f"camera.noise_share is {config.noise_share}; accepted: 0 to 1")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.config import CameraConfig
 from e2efly.physics import State
@@ -34,6 +34,8 @@ class Eye:
     mount: Mount
     latency: Float[Array, " n"]
     """Age of its images, s."""
+    noisy: Bool[Array, " n"]
+    """Whether its images have the noise."""
     light: Light | None
     """Where it sees colours."""
     tints: Float[Array, "n 8 3"] | None
@@ -42,14 +44,15 @@ class Eye:
     @staticmethod
     def of(config: CameraConfig, key: PRNGKeyArray, n: int) -> "Eye":
         """Draw how the cameras sit, how late they are and under what light they look."""
-        mount_key, latency_key, light_key, tint_key = jax.random.split(key, 4)
+        mount_key, latency_key, light_key, tint_key, noise_key = jax.random.split(key, 5)
         low, high = config.latency
         latency = low + (high - low) * jax.random.uniform(latency_key, (n,))
         mount = camera.mount(config, n, mount_key)
+        noisy = jax.random.uniform(noise_key, (n,)) < config.noise_share
         if config.sees != "rgb":
-            return Eye(mount, latency, None, None)
+            return Eye(mount, latency, noisy, None, None)
         tints = config.colour_spread * jax.random.uniform(tint_key, (n, TINTS, 3), minval=-1.0, maxval=1.0)
-        return Eye(mount, latency, _light(config, light_key, n), tints)
+        return Eye(mount, latency, noisy, _light(config, light_key, n), tints)
 
 
 def _light(config: CameraConfig, key: PRNGKeyArray, n: int) -> Light:
@@ -92,4 +95,7 @@ def see(config: CameraConfig, eye: Eye, scene: Scene, state: State, key: PRNGKey
         scene = _tinted(scene, eye.tints)
     image = camera.look(config, scene, eye.mount, position, quaternion, eye.light)
     noisy = any(x is not None and x is not False for x in vars(config.noise).values())
-    return add_image_noise(config.noise, key, image, config) if noisy else image
+    if not noisy:
+        return image
+    each = eye.noisy.reshape(-1, *[1] * (image.ndim - 1))
+    return jnp.where(each, add_image_noise(config.noise, key, image, config), image)
