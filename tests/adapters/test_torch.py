@@ -1,5 +1,7 @@
 """PyTorch's gradients through our steps."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -25,12 +27,12 @@ def test_gradients_through_a_flight_are_those_of_jax(task: str) -> None:
     features = Features(env.fields)
 
     def loss(w: jax.Array) -> jax.Array:
-        state, observation = env.reset(random_key(5), N)
-        total = jnp.float32(0.0)
-        for _ in range(STEPS):
+        def step(carry: Any, _: None) -> tuple[Any, jax.Array]:
+            state, observation = carry
             state, out = env.step(state, jnp.tanh(features.of_state(observation) @ w) + env.hover)
-            observation, total = out.observation, total + jnp.mean(out.reward)
-        return total
+            return (state, out.observation), jnp.mean(out.reward)
+
+        return jnp.sum(jax.lax.scan(step, env.reset(random_key(5), N), None, length=STEPS)[1])
 
     w = weights(features.state_size)
     value, gradient = jax.jit(jax.value_and_grad(loss))(w)
