@@ -233,16 +233,16 @@ _OURS: dict[str, Callable[[str], TrainConfig]] = {
 }
 
 
-def _ours(task: str, algo: str) -> TrainConfig:
-    return _OURS[task](algo)
-
-
 _SHARED = ("envs", "learning_rate", "learning_rate_end", "max_grad_norm", "gradient_decay")
+
+
+def _ours(task: str, algo: str) -> TrainConfig:
+    return _OURS[task](algo) if algo in ("ppo", "bptt") else _with_critic(task, algo)
 
 
 def _with_critic(task: str, algo: str) -> TrainConfig:
     """BPTT's preset with critics behind a shorter window."""
-    config = _OURS[task]("bptt")
+    config = _ours(task, "bptt")
     shared = {name: getattr(config.algo, name) for name in (_SHARED if algo != "foppo" else _SHARED[:1])}
     return dataclasses.replace(config, algo=dataclasses.replace(ALGORITHMS[algo], **shared))
 
@@ -275,13 +275,13 @@ def _thrown(task: str, algo: str) -> TrainConfig:
     """Hover from any attitude, tumbling and fast, as a vehicle that was thrown."""
     if task != "hover":
         raise ValueError(f"preset 'thrown': accepted for task hover, not {task!r}")
-    config = PRESETS["ours"](task, algo)
+    config = _ours(task, algo)
     thrown = HoverConfig(episode_s=10.0, velocity=3.0, tilt=math.pi, body_rate=6.0)
     return dataclasses.replace(config, task=thrown)
 
 
 PRESETS: dict[str, Callable[[str, str], TrainConfig]] = {
-    "ours": lambda task, algo: (_ours if algo in ("ppo", "bptt") else _with_critic)(task, algo),
+    "ours": _ours,
     "paper": _paper,
     "thrown": _thrown,
 }
@@ -373,10 +373,9 @@ def check(config: TrainConfig) -> None:
             raise ValueError(f"{name} is {value}; accepted: more than 0")
     if not 0 < algo.gamma <= 1:
         raise ValueError(f"algo.gamma is {algo.gamma}; accepted: above 0, at most 1")
-    if isinstance(algo, PPOConfig | SHACConfig | FOPPOConfig) and (algo.envs * algo.horizon) % algo.minibatch:
+    if isinstance(algo, PPOConfig | SHACConfig | FOPPOConfig) and algo.steps % algo.minibatch:
         raise ValueError(
-            f"algo.minibatch is {algo.minibatch}; accepted: a divisor of algo.envs * algo.horizon "
-            f"({algo.envs * algo.horizon})"
+            f"algo.minibatch is {algo.minibatch}; accepted: a divisor of algo.envs * algo.horizon ({algo.steps})"
         )
     if not config.network.hidden or min(config.network.hidden) <= 0:
         raise ValueError(f"network.hidden is {config.network.hidden}; accepted: one or more positive sizes")

@@ -27,7 +27,6 @@ class SB3VecEnv(VecEnv):
             raise ValueError(f"task is {task!r}, which has cameras; accepted: tasks flown by state")
         self._actions: np.ndarray | None = None
         self._seed: int | None = None
-        self._nothing: list[dict[str, Any]] = [{} for _ in range(num_envs)]
         super().__init__(num_envs, self.envs.single_observation_space, self.envs.single_action_space)
 
     def reset(self) -> Any:
@@ -49,7 +48,8 @@ class SB3VecEnv(VecEnv):
         """Step: observations, rewards, dones, and infos, of episodes that ended with what was reached."""
         assert self._actions is not None
         observations, rewards, terminated, truncated, info = self.envs.step(self._actions)
-        dones, told = terminated | truncated, list(self._nothing)
+        dones = terminated | truncated
+        told: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for i in np.flatnonzero(dones):
             told[i] = {
                 "terminal_observation": info["final_obs"][i],
