@@ -45,12 +45,12 @@ def write(name: str, path: Path | None, content: dict[str, Any]) -> None:
     path.write_text(json.dumps({"machine": machine(), "date": day, **content}, indent=1) + "\n")
 
 
-def with_earlier(name: str, path: Path | None, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The rows, and those of the file whose algorithm and task were not measured anew."""
+def with_earlier(name: str, path: Path | None, part: str, keys: tuple[str, ...], rows: list[Any]) -> list[Any]:
+    """The rows, and those of a part of the file that were not measured anew: none with their values of the keys."""
     path = path or RESULTS / f"{name}.json"
-    known = json.loads(path.read_text())["table"] if path.exists() else []
-    anew = {(row["algorithm"], row["task"]) for row in rows}
-    return [*rows, *(row for row in known if (row["algorithm"], row["task"]) not in anew)]
+    known = json.loads(path.read_text())[part] if path.exists() else []
+    anew = {tuple(row[key] for key in keys) for row in rows}
+    return [*rows, *(row for row in known if tuple(row[key] for key in keys) not in anew)]
 
 
 def table(rows: list[dict[str, Any]]) -> str:

@@ -131,7 +131,9 @@ def ours(scene: Scene, config: CameraConfig, channels: tuple[str, ...], origin: 
     """A call that renders all cameras, their worlds shared among the devices."""
     count = len(jax.devices())
     pattern = camera.pattern(config)
-    program = on_each(lambda *a: cast(*a[:3], pattern, channels, a[3]), count, (OWN,) * 4, OWN)
+    program = on_each(
+        lambda *a: cast(*a[:3], pattern, channels, a[3]), count, (OWN,) * 4, OWN, vehicles=scene.worlds // count
+    )
     given = placed((scene, origin, matrix, jax.tree.map(jnp.asarray, usual_light(scene.worlds))), count)
     return lambda: jax.block_until_ready(program(*given))
 

@@ -76,8 +76,9 @@ def main() -> None:
                     "paper, s": PAPER.get(algo, {}).get(task, "-"),
                 }
             )
-            whole = with_earlier("time_to_criterion", options.json, rows)
-            write("time_to_criterion", options.json, {"table": whole, "runs": every})
+            whole = with_earlier("time_to_criterion", options.json, "table", ("algorithm", "task"), rows)
+            runs = with_earlier("time_to_criterion", options.json, "runs", ("algo", "task"), every)
+            write("time_to_criterion", options.json, {"table": whole, "runs": runs})
     print(table(rows))
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 from common import arguments, table, with_earlier, write
 
-from e2efly.device import prepare
+from e2efly.device import prepare, wide_vectors
 
 prepare("cpu")
 
@@ -59,7 +59,10 @@ def flown(out: Path, noise: ImageNoiseConfig) -> dict[str, float]:
     found = {}
     for name, suite in presets.suites(config.task).items():
         env = Env.of(suite, config.reward, dataclasses.replace(config.env, cameras=cameras))
-        fly = jax.jit(lambda env, key: run_episodes(env, acting(setup.actor, weights), key, BATCH, setup.episode_steps))
+        fly = jax.jit(
+            lambda env, key: run_episodes(env, acting(setup.actor, weights), key, BATCH, setup.episode_steps),
+            compiler_options=wide_vectors(BATCH),
+        )
         each = [fly(env, random_key(7, i)) for i in range(FLIGHTS // BATCH)]
         found[name] = float(np.mean([np.mean(e.success) for e in each]))
     return found
@@ -105,8 +108,9 @@ def main() -> None:
                     }
                 )
                 print(rows[-1], flush=True)
-            whole = with_earlier("visual_tasks", options.json, rows)
-            write("visual_tasks", options.json, {"table": whole, "runs": every})
+            whole = with_earlier("visual_tasks", options.json, "table", ("algorithm", "task"), rows)
+            runs = with_earlier("visual_tasks", options.json, "runs", ("algorithm", "case"), every)
+            write("visual_tasks", options.json, {"table": whole, "runs": runs})
     print(table(rows))
 
 

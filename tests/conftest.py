@@ -29,6 +29,13 @@ WITHOUT = tuple(filter(None, os.environ.get("E2EFLY_WITHOUT", "").split(",")))
 """Parts whose tests are left out by the environment's word, which the summary repeats."""
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _programs_go() -> Iterator[None]:
+    """A file's compiled programs go with it: all together they are many gigabytes."""
+    yield
+    jax.clear_caches()
+
+
 @pytest.fixture
 def x64() -> Iterator[None]:
     with jax.enable_x64(True):

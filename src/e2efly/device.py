@@ -18,10 +18,24 @@ XLA_OPTIONS = {
     "xla_backend_extra_options": "xla_cpu_small_while_loop_byte_threshold=1000000",
     # cores work on vehicles of their own (e2efly.learn.devices), not together on one small matrix
     "xla_cpu_multi_thread_eigen": "false",
-    # XLA takes half of what AVX-512 offers, for the clock of processors of old
-    "xla_cpu_prefer_vector_width": "512",
+    # see wide_vectors
+    "xla_cpu_prefer_vector_width": "128",
 }
 """What makes XLA fast on small batches on a CPU; docs/architecture.md says why."""
+
+
+def wide_vectors(vehicles: int) -> dict[str, Any]:
+    """Options of XLA for a program in which a device steps so many vehicles: `jax.jit(f, compiler_options=...)`.
+
+    Programs on many vehicles run in a third of the time on whole vectors of AVX-512. Where arrays are no longer than
+    one vector, LLVM makes one block of all operations of a step, and takes gigabytes to compile its gradient; hence
+    narrow vectors for few vehicles, and wherever the number is not known. What the user's XLA_FLAGS say stays.
+    """
+    import jax
+
+    ours = f"--xla_cpu_prefer_vector_width={XLA_OPTIONS['xla_cpu_prefer_vector_width']}"
+    many = vehicles > 16 and jax.default_backend() == "cpu" and ours in os.environ.get("XLA_FLAGS", "").split()
+    return {"xla_cpu_prefer_vector_width": 512} if many else {}
 
 
 def set_xla_options() -> None:

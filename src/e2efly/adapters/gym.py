@@ -61,14 +61,14 @@ class QuadrotorEnv(gymnasium.Env[Any, np.ndarray]):
             ValueError: naming the field, the value and what is accepted.
         """
         config = configured(task)
-        self.stepper = Stepper(Env.of(config.task, config.reward, config.env), raw)
+        self.stepper = Stepper(Env.of(config.task, config.reward, config.env), 1, raw)
         self.observation_space, self.action_space = observation_space(self.stepper), action_space()
         self.render_mode = render_mode
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict]:
         """Start an episode."""
         super().reset(seed=seed, options=options)
-        first = self.stepper.reset(_drawn(self.np_random), 1)
+        first = self.stepper.reset(_drawn(self.np_random))
         return self._whole(first), {}
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -103,7 +103,7 @@ class QuadrotorVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
             raise ValueError(f"num_envs is {num_envs}; accepted: 1 or more")
         config = configured(task)
         self.num_envs, self.render_mode = num_envs, render_mode
-        self.stepper = Stepper(Env.of(config.task, config.reward, config.env), raw)
+        self.stepper = Stepper(Env.of(config.task, config.reward, config.env), num_envs, raw)
         self.single_observation_space, self.single_action_space = observation_space(self.stepper), action_space()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -111,7 +111,7 @@ class QuadrotorVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict]:
         """Start all episodes."""
         super().reset(seed=seed, options=options)
-        first = self.stepper.reset(_drawn(self.np_random), self.num_envs)
+        first = self.stepper.reset(_drawn(self.np_random))
         return _with_images(self.stepper, first), {}
 
     def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 
 from e2efly import presets
 from e2efly.config import NetworkConfig, TrainConfig
+from e2efly.device import wide_vectors
 from e2efly.env import Env, EnvState, Step, random_key
 from e2efly.learn.networks import Features, View
 
@@ -27,6 +28,8 @@ class Stepper:
     """An environment with its state; observations as `e2efly.learn` feeds its own networks, or as measured."""
 
     env: Env
+    n: int
+    """Vehicles."""
     raw: bool = False
     """Observations as measured; else as features: body frame, heading-free, scaled (`learn.networks.Features`)."""
     state: EnvState | None = None
@@ -36,17 +39,17 @@ class Stepper:
         whole = NetworkConfig(pool=(1 << 30, 1 << 30))  # images come apart from the features
         views = tuple(View.of(camera, whole) for camera in self.env.cameras)
         self.features = Features(self.env.fields, views)
-        self.begin = jax.jit(self._begin, static_argnums=1)
-        self._advance = jax.jit(self._one, static_argnums=2)
+        self.begin = jax.jit(self._begin)
+        self._advance = jax.jit(self._one, static_argnums=2, compiler_options=wide_vectors(self.n))
 
     @property
     def size(self) -> int:
         """Numbers of an observation, images aside."""
         return self.env.observation_size if self.raw else self.features.state_size
 
-    def reset(self, seed: int, n: int) -> Float[np.ndarray, "n o"]:
-        """Start n episodes: their observations."""
-        self.state, observation = self.begin(random_key(seed), n)
+    def reset(self, seed: int) -> Float[np.ndarray, "n o"]:
+        """Start all episodes: their observations."""
+        self.state, observation = self.begin(random_key(seed))
         return np.array(observation)
 
     def step(self, action: Float[np.ndarray, "n 4"], renew: bool) -> tuple[Step, np.ndarray, np.ndarray]:
@@ -61,9 +64,8 @@ class Stepper:
         """
         if self.state is None:
             raise RuntimeError("step before the first reset")
-        n = self.state.time.shape[0]
-        if np.shape(action) != (n, 4):
-            raise ValueError(f"actions have the shape {np.shape(action)}; accepted: {(n, 4)}")
+        if np.shape(action) != (self.n, 4):
+            raise ValueError(f"actions have the shape {np.shape(action)}; accepted: {(self.n, 4)}")
         self.state, out, seen, reached = self._advance(self.state, np.asarray(action, np.float32), renew)
         return jax.tree.map(np.array, out), np.array(seen), np.array(reached)  # copies: callers change them
 
@@ -76,8 +78,8 @@ class Stepper:
         """An observation as the framework gets it."""
         return observation if self.raw else self.features.of_state(observation)
 
-    def _begin(self, key: jax.Array, n: int) -> tuple[EnvState, Array]:
-        state, observation = self.env.reset(key, n)
+    def _begin(self, key: jax.Array) -> tuple[EnvState, Array]:
+        state, observation = self.env.reset(key, self.n)
         return state, self.seen(observation)
 
     def _one(self, state: EnvState, action: Array, renew: bool) -> tuple[EnvState, Step, Array, Array]:

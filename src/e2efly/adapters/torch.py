@@ -12,6 +12,7 @@ import torch
 
 from e2efly.adapters.stepper import Stepper, configured
 from e2efly.config import TrainConfig
+from e2efly.device import wide_vectors
 from e2efly.env import Env, EnvState, random_key
 
 
@@ -68,12 +69,13 @@ class TorchEnv:
             raise ValueError(f"num_envs is {num_envs}; accepted: 1 or more")
         config = configured(task)
         self.num_envs = num_envs
-        self.stepper = Stepper(Env.of(config.task, config.reward, config.env), raw)
+        self.stepper = Stepper(Env.of(config.task, config.reward, config.env), num_envs, raw)
         shape = jax.eval_shape(lambda key: self.stepper.env.reset(key, num_envs)[0], random_key(0))
         leaves, self._structure = jax.tree.flatten(shape)
         self._moves = [jnp.issubdtype(x.dtype, jnp.floating) for x in leaves]
-        self._forward = jax.jit(self._advance)
-        self._backward = jax.jit(self._transposed)
+        options = wide_vectors(num_envs)
+        self._forward = jax.jit(self._advance, compiler_options=options)
+        self._backward = jax.jit(self._transposed, compiler_options=options)
 
     @property
     def observation_size(self) -> int:
@@ -82,7 +84,7 @@ class TorchEnv:
 
     def reset(self, seed: int = 0) -> tuple[TorchState, torch.Tensor]:
         """Start all episodes: the state and the first observations (n, o)."""
-        state, observation = self.stepper.begin(random_key(seed), self.num_envs)
+        state, observation = self.stepper.begin(random_key(seed))
         moving, rest = self._apart(state)
         return TorchState(tuple(map(torch.from_dlpack, moving)), rest), torch.from_dlpack(observation)
 

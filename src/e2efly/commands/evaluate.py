@@ -15,7 +15,7 @@ from e2efly import presets
 from e2efly.config import CameraConfig, EnvConfig, ImuConfig, RewardConfig, TaskConfig
 from e2efly.deploy.images import NONE, Image
 from e2efly.deploy.policy import Policy, load_policy
-from e2efly.device import prepare
+from e2efly.device import prepare, wide_vectors
 from e2efly.learn.checkpoint import write_atomically
 from e2efly.learn.rundir import RunDirectory
 from e2efly.vehicles import load_vehicle
@@ -117,7 +117,7 @@ def fly_suites(
 
     flown, starts = {}, {}
 
-    @partial(jax.jit, static_argnums=2)
+    @partial(jax.jit, static_argnums=2, compiler_options=wide_vectors(BATCH))
     def program(env: Env, key: Any, steps: int, settle: float) -> Any:
         start = env.reset(key, BATCH)[0].vehicle
         return run_episodes(env, callback(policy), key, BATCH, steps, settle), start

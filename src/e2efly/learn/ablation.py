@@ -130,8 +130,8 @@ def _programs(setup: Setup, devices: int) -> tuple[Callable, Callable, Callable]
 
     return (
         on_each(start, devices, (SAME, OWN, OWN, OWN), OWN, axis="members"),
-        on_each(chunk, devices, (SAME, OWN, OWN, SAME), OWN, donate=(2,), axis="members"),
-        on_each(evaluate, devices, (SAME, OWN), OWN, axis="members"),
+        on_each(chunk, devices, (SAME, OWN, OWN, SAME), OWN, donate=(2,), axis="members", vehicles=config.algo.envs),
+        on_each(evaluate, devices, (SAME, OWN), OWN, axis="members", vehicles=config.eval_episodes),
     )
 
 

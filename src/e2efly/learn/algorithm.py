@@ -1,5 +1,6 @@
 """What every algorithm is to the runner, and what they share."""
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -16,11 +17,11 @@ from e2efly.learn.devices import AXIS
 from e2efly.learn.networks import Actor
 
 for _config in (PPOConfig, BPTTConfig, SHACConfig, ABPTConfig, FOPPOConfig):
-    _shapes = [name for name, kind in _config.__annotations__.items() if kind in (int, bool)]
+    _fields = dataclasses.fields(_config)
     jax.tree_util.register_dataclass(
         _config,
-        data_fields=[name for name in _config.__annotations__ if name not in _shapes],
-        meta_fields=_shapes,
+        data_fields=[field.name for field in _fields if field.type is float],
+        meta_fields=[field.name for field in _fields if field.type is not float],
     )
 
 

@@ -32,7 +32,10 @@ def physics_substeps(vehicles: int, calls: int = 200) -> float:
         body = lambda s, _: (step(physics, physics.nominal, s, command), None)  # noqa: E731
         return jax.lax.scan(body, state, None, length=calls)[0]
 
-    program, start = on_each(run, devices, (OWN, OWN), OWN), placed((state, command), devices)
+    program, start = (
+        on_each(run, devices, (OWN, OWN), OWN, vehicles=vehicles // devices),
+        placed((state, command), devices),
+    )
     return best_rate(vehicles * calls * physics.substeps, lambda: jax.block_until_ready(program(*start)))
 
 
@@ -55,7 +58,7 @@ def environment_steps(task: str, envs: int, steps: int = 200, env_config: EnvCon
         return stacked(jax.lax.scan(body, own(state), jnp.arange(steps)))
 
     state = on_each(start, devices, (SAME, SAME), OWN)(env, random_key(0))
-    program, actions = on_each(run, devices, (SAME, OWN, OWN), OWN), placed(actions, devices)
+    program, actions = on_each(run, devices, (SAME, OWN, OWN), OWN, vehicles=envs // devices), placed(actions, devices)
     return best_rate(envs * steps, lambda: jax.block_until_ready(program(env, state, actions)))
 
 
@@ -72,7 +75,7 @@ def training_steps(task: str, algo: str, wide: bool = False) -> float:
         update = lambda state, _: setup.algorithm.update(env, algo, state, jnp.float32(0.5))  # noqa: E731
         return stacked(jax.lax.scan(update, own(state), None, length=5))
 
-    program = on_each(run, setup.devices, (SAME, SAME, OWN), OWN)
+    program = on_each(run, setup.devices, (SAME, SAME, OWN), OWN, vehicles=setup.vehicles)
     state = start_program(setup)(setup.env, parameters, random_key(0))
     return best_rate(
         5 * setup.steps_per_update, lambda: jax.block_until_ready(program(setup.env, config.algo, state)), rounds=15

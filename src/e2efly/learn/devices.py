@@ -11,6 +11,8 @@ from typing import Any
 import jax
 from jax.sharding import AxisType, Mesh, NamedSharding, PartitionSpec
 
+from e2efly.device import wide_vectors
+
 AXIS = "devices"
 """Name of the axis over which a program may take means and sums."""
 SAME, OWN = PartitionSpec(), PartitionSpec(AXIS)
@@ -51,7 +53,13 @@ def mesh(count: int, axis: str = AXIS) -> Mesh:
 
 
 def on_each(
-    function: Callable, count: int, takes: Any, returns: Any, donate: tuple[int, ...] = (), axis: str = AXIS
+    function: Callable,
+    count: int,
+    takes: Any,
+    returns: Any,
+    donate: tuple[int, ...] = (),
+    axis: str = AXIS,
+    vehicles: int = 0,
 ) -> Any:
     """`function`, compiled to run on each of `count` devices.
 
@@ -62,13 +70,15 @@ def on_each(
         returns: the same for the result.
         donate: arguments whose memory the result may take.
         axis: name of the devices' axis, `AXIS` where what they hold belongs together.
+        vehicles: how many a device steps together, where it is known: see `e2efly.device.wide_vectors`.
     """
     takes, returns = (
         jax.tree.map(lambda place: SAME if place == SAME else PartitionSpec(axis), x) for x in (takes, returns)
     )
     mapped = jax.shard_map(function, mesh=mesh(count, axis), in_specs=takes, out_specs=returns, check_vma=False)
     inside, outside = (shardings(x, count, axis) for x in (takes, returns))
-    return jax.jit(mapped, in_shardings=inside, out_shardings=outside, donate_argnums=donate)
+    options = wide_vectors(vehicles)
+    return jax.jit(mapped, in_shardings=inside, out_shardings=outside, donate_argnums=donate, compiler_options=options)
 
 
 def shardings(places: Any, count: int, axis: str = AXIS) -> Any:

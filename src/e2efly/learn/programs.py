@@ -21,6 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import export
 
+from e2efly.device import wide_vectors
 from e2efly.env import Env, random_key
 from e2efly.evaluate import Act, Episodes, run_episodes
 from e2efly.learn.algorithm import TrainState, begin
@@ -65,11 +66,12 @@ class Programs:
         of_leaves = _of_leaves(_chunk(setup), training, lambda out: (jax.tree.leaves(out[0]), out[1]))
         lowered = _lower(of_leaves, setup, training, (SAME, SAME, OWN, SAME, SAME), (OWN, SAME), traced, "chunk")
         with ThreadPoolExecutor(1) as pool:
-            compiling = pool.submit(lowered.compile, compiler_options=options)
+            compiling = pool.submit(lowered.compile, compiler_options=options | wide_vectors(setup.vehicles))
             of_leaves = _of_leaves(_evaluate(setup), evaluating, vars)
             lowered = _lower(of_leaves, setup, evaluating, (SAME, SAME, SAME), OWN, traced, "evaluate")
             start = started.lower().compile(compiler_options=options)
-            evaluate, chunk = lowered.compile(compiler_options=options), compiling.result()
+            evaluate = lowered.compile(compiler_options=options | wide_vectors(setup.watched))
+            chunk = compiling.result()
         structure = jax.tree.structure(state)
 
         def run_chunk(*args: Any) -> tuple[TrainState, dict[str, jax.Array]]:
@@ -90,7 +92,7 @@ def start_program(setup: Setup) -> Any:
 
 def evaluation_program(setup: Setup) -> Any:
     """The program (environment, weights, key) -> `Episodes` of `eval_episodes` starts, or a few repeated more."""
-    return on_each(_evaluate(setup), setup.devices, (SAME, SAME, SAME), OWN)
+    return on_each(_evaluate(setup), setup.devices, (SAME, SAME, SAME), OWN, vehicles=setup.watched)
 
 
 def _chunk(setup: Setup) -> Callable[..., tuple[TrainState, dict[str, jax.Array]]]:

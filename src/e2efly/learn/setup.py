@@ -46,6 +46,16 @@ class Setup:
         return Setup(config, course, algorithm, actor, chunks * config.chunk, devices)
 
     @property
+    def vehicles(self) -> int:
+        """Vehicles that a device steps together."""
+        return self.config.algo.envs // self.devices
+
+    @property
+    def watched(self) -> int:
+        """Vehicles that a device flies together in an evaluation."""
+        return -(-self.config.eval_episodes // self.devices)
+
+    @property
     def env(self) -> Env:
         """The task's environment."""
         return self.stages[-1].env
