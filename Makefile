@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 TEST_READY := $(VENV)/.test-ready
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint bench docs clean
+.PHONY: demo test lint bench zoo docs clean
 
 demo: $(READY)
 	@rm -rf runs/demo
@@ -34,6 +34,9 @@ lint: $(TEST_READY)
 
 bench: $(TEST_READY)
 	$(BIN)/python benchmarks/run_all.py
+
+zoo: $(READY)
+	$(BIN)/python benchmarks/zoo.py
 
 docs: $(READY)
 	$(BIN)/python docs/figures.py

@@ -52,16 +52,18 @@ def main() -> None:
     options = arguments(__doc__ or "", crazyflow_python=None, rounds=5)
     prepare("cpu")
     python = Path(options.crazyflow_python) if options.crazyflow_python else crazyflow_python()
-    ours, theirs, steps = [], [], []
+    ours, general, theirs, steps = [], [], [], []
     for _ in range(options.rounds):
         theirs.append(crazyflow(python))
         ours.append(physics_substeps(WORLDS))
+        general.append(physics_substeps(WORLDS, general=True))
         steps.append(environment_steps("hover", WORLDS))
-    substeps, peer, env = median(ours), median(theirs), median(steps)
+    substeps, own, peer, env = median(ours), median(general), median(theirs), median(steps)
     figures = {
         f"Crazyflow 0.4 physics steps, {WORLDS} worlds over all cores": peer,
         f"Crazyflow 0.4 control steps (10 physics steps), {WORLDS} worlds": peer / 10,
         f"e2efly physics sub-steps, {WORLDS} vehicles": substeps,
+        f"e2efly physics sub-steps, {WORLDS} vehicles, each with parameters of its own": own,
         f"e2efly environment steps (7 sub-steps, everything included), {WORLDS} environments, hover": env,
         "e2efly PPO training steps, hover": training_steps("hover", "ppo"),
         "e2efly BPTT training steps, hover": training_steps("hover", "bptt"),
@@ -70,10 +72,14 @@ def main() -> None:
         ),
     }
     rows = [{"what": name, "a second": f"{value:,.0f}"} for name, value in figures.items()]
-    ratios = {"physics": substeps / peer, "environment over Crazyflow's bare control steps": env / (peer / 10)}
-    rows += [{"what": f"ratio, {name}", "a second": f"{value:.1f}"} for name, value in ratios.items()]
-    write("rates", options.json, {"table": rows, "figures": figures, "ratios": ratios,
-                                  "rounds": {"e2efly": ours, "crazyflow": theirs, "environment": steps}})  # fmt: skip
+    ratios = {
+        "physics": substeps / peer,
+        "physics, parameters as constants over each its own": substeps / own,
+        "environment over Crazyflow's bare control steps": env / (peer / 10),
+    }
+    rows += [{"what": f"ratio, {name}", "a second": f"{value:.2f}"} for name, value in ratios.items()]
+    rounds = {"e2efly": ours, "general": general, "crazyflow": theirs, "environment": steps}
+    write("rates", options.json, {"table": rows, "figures": figures, "ratios": ratios, "rounds": rounds})
     print(table(rows))
 
 

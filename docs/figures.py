@@ -15,6 +15,7 @@ TITLES = {
     "rendering": "Images of the clutter scene: ground, 4 gates, 16 obstacles, another world for each camera",
     "visual_tasks": "Tasks flown by sight: 1000 unseen starts and worlds, full presets",
     "time_to_criterion": "Time to the criterion, from process start",
+    "stable_baselines3_ppo": "Time to the hover criterion, beside Stable-Baselines3 on the same environment",
     "success": "Success over 1000 unseen starts, full presets",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",

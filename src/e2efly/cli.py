@@ -15,6 +15,7 @@ from rich.console import Console
 
 from e2efly import __version__, presets
 from e2efly.config import EnvConfig, NetworkConfig, RewardConfig
+from e2efly.device import Hosts
 from e2efly.vehicles import unknown
 
 _ABOUT = f"""e2efly {__version__}: train an end-to-end quadrotor policy in seconds, check it, and fly it.
@@ -40,7 +41,7 @@ class Eval:
     """Fly a policy from unseen starts and report how it did."""
 
     policy: tyro.conf.Positional[Path]
-    """A run directory, or a policy.onnx."""
+    """A run directory, a policy.onnx, or a task: the zoo's policy, of --vehicle."""
     episodes: int = 1000
     """Starts of each criterion."""
     json: Path | None = None
@@ -92,7 +93,7 @@ class Validate:
     """Fly a policy on another plant, from the starts of `eval`; exit status 1 when success drops too far."""
 
     policy: tyro.conf.Positional[Path]
-    """A run directory, or a policy.onnx."""
+    """A run directory, a policy.onnx, or a task: the zoo's policy, of --vehicle."""
     plant: Literal["simulator", "mujoco", "betaflight"] = "mujoco"
     """What flies: our own simulator by the bridge's runtime, MuJoCo, or the real firmware over our rigid body."""
     episodes: int | None = None
@@ -203,6 +204,7 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
         ("fast_compile", Annotated[bool, arg(help="On a CPU: compile in half the time, run up to a tenth slower.")]),
         ("curriculum", Annotated[bool, arg(help="Go through the stages of the preset's curriculum, if it has one.")]),
         ("stop_at", Annotated[float | None, arg(help="Stop once the success on 1000 starts is at least this.")]),
+        ("hosts", Hosts),
         ("env", EnvConfig),
         ("task", Annotated[type(config.task), arg(name="task")]),
         ("algo", Annotated[type(config.algo), arg(name="algo")]),
@@ -220,7 +222,7 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
     parts["reward"] = RewardConfig()  # changes to the preset's; a filled dictionary would take no new names
     defaults = options(
         task_name=tyro.MISSING, algo_name=algo, preset=preset, vehicle=config.env.vehicle, out=None, resume=False,
-        device=None, plots=True, curriculum=True, **top, **parts,
+        device=None, plots=True, curriculum=True, hosts=Hosts(), **top, **parts,
     )  # fmt: skip
     return options, defaults
 
@@ -301,7 +303,9 @@ def _train(arguments: list[str]) -> int:
     out = parsed.out or Path("runs") / f"{task}-{parsed.algo_name}-{config.seed}"
     from e2efly.commands.train import train_command
 
-    return train_command(config, out, resume=parsed.resume, device=parsed.device, plots=parsed.plots)
+    return train_command(
+        config, out, resume=parsed.resume, device=parsed.device, plots=parsed.plots, hosts=parsed.hosts
+    )
 
 
 def _ablate(arguments: list[str]) -> int:

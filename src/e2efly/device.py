@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -92,16 +93,57 @@ def compute_at_once() -> None:
     jax.config.update("jax_cpu_enable_async_dispatch", False)
 
 
-def prepare(device: str | None = None) -> None:
+@dataclass(frozen=True)
+class Hosts:
+    """Processes that train together, each on the devices of its own machine."""
+
+    coordinator: str | None = None
+    """HOST:PORT that process 0 opens and the others find it at. Left out: one process alone."""
+    count: int = 1
+    """Processes."""
+    index: int = 0
+    """Which of them this is; 0 writes the files."""
+
+    def join(self) -> None:
+        """Wait for the others. Before anything computes.
+
+        Raises:
+            ValueError: naming the option, its value and what is accepted.
+            OSError: when they do not all come within a minute.
+        """
+        if self.coordinator is None:
+            if (self.count, self.index) != (1, 0):
+                raise ValueError("hosts.coordinator is missing; accepted with hosts.count: HOST:PORT of process 0")
+            return
+        host, _, port = self.coordinator.rpartition(":")
+        if not host or not port.isdigit():
+            raise ValueError(f"hosts.coordinator is {self.coordinator!r}; accepted: HOST:PORT of process 0")
+        if not 0 <= self.index < self.count:
+            raise ValueError(f"hosts.index is {self.index}; accepted: 0 to hosts.count - 1 ({self.count - 1})")
+        import jax
+
+        try:
+            jax.distributed.initialize(
+                self.coordinator, self.count, self.index, coordinator_bind_address=self.coordinator,
+                initialization_timeout=60, heartbeat_timeout_seconds=20,
+            )  # fmt: skip
+        except RuntimeError as error:
+            reason = str(error).splitlines()[0]
+            raise OSError(f"not all {self.count} processes met at {self.coordinator}: {reason}") from None
+
+
+def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:
     """Choose the device, set `XLA_OPTIONS` and turn on the persistent compilation cache.
 
     What JAX's own variables and XLA_FLAGS say stays. Call it before anything computes with JAX.
 
     Args:
         device: `cpu`, `gpu`, or None: whatever JAX finds.
+        hosts: the processes of the run.
 
     Raises:
         ValueError: for an unknown device, or one that this machine or this JAX does not have: never another instead.
+        OSError: when the processes do not come together.
     """
     if device not in (None, "cpu", "gpu"):
         raise ValueError(f"--device is {device!r}; accepted: cpu, gpu")
@@ -111,6 +153,7 @@ def prepare(device: str | None = None) -> None:
     _configure("jax_compilation_cache_dir", str(cache_folder() / "jax"))
     _configure("jax_persistent_cache_min_compile_time_secs", 0.05)
     _configure("jax_persistent_cache_min_entry_size_bytes", -1)
+    hosts.join()
     import jax
 
     try:

@@ -74,7 +74,7 @@ def run_episodes(
         part: which of how many equal parts of the episodes to fly. All parts together, in order, are the `n` episodes
             of the one part (0, 1), whatever their number; where it does not divide `n`, the last ends with repetitions.
     """
-    state, observation = _part(*env.reset(key, n), part)
+    state, observation = part_of(*env.reset(key, n), part)
     n = observation.shape[0]
     zero, no = jnp.zeros(n), jnp.zeros(n, bool)
     first = (state, observation, act.begin(n), no, Episodes(no, zero, zero, zero, zero, zero, zero, zero, no), zero)
@@ -107,7 +107,10 @@ def run_episodes(
     return dataclasses.replace(e, mean_error=e.mean_error / jnp.maximum(counted, 1.0), roughness=e.roughness / flown)
 
 
-def _part(state: EnvState, observation: Array, part: tuple[Array | int, int]) -> tuple[EnvState, Array]:
+def part_of(state: EnvState, observation: Array, part: tuple[Array | int, int]) -> tuple[EnvState, Array]:
+    """One of so many equal parts of a batch, (index, count), with random numbers of its own; the last part is filled up
+    with repetitions.
+    """
     index, count = part
     if count == 1:
         return state, observation

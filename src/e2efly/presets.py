@@ -158,7 +158,7 @@ def _avoid(algo: str) -> TrainConfig:
         network, curriculum = dataclasses.replace(network, recurrent=0), CURRICULA["avoid"]
     return TrainConfig(
         task, settings, RewardConfig(weights, parameters), EnvConfig(cameras=_EYES["avoid"]), network,
-        steps=4_000_000, chunk=100, eval_episodes=250, curriculum=curriculum,
+        steps=4_000_000, chunk=100, eval_episodes=250, curriculum=curriculum, fast_compile=False,
     )  # fmt: skip
 
 
@@ -196,7 +196,7 @@ def _race_clutter(algo: str) -> TrainConfig:
         network = dataclasses.replace(network, recurrent=0)
     return TrainConfig(
         task, settings, RewardConfig(weights, parameters), EnvConfig(cameras=_EYES["race_clutter"]), network,
-        steps=8_000_000, chunk=200, eval_episodes=500, curriculum=curriculum,
+        steps=8_000_000, chunk=200, eval_episodes=500, curriculum=curriculum, fast_compile=False,
     )  # fmt: skip
 
 

@@ -19,6 +19,7 @@ from e2efly.device import prepare, wide_vectors
 from e2efly.learn.checkpoint import write_atomically
 from e2efly.learn.rundir import RunDirectory
 from e2efly.vehicles import load_vehicle
+from e2efly.zoo import beside, policy_path
 
 BATCH, DRAWN = 250, 12
 """Starts that are flown at once, and flights that are drawn."""
@@ -37,6 +38,7 @@ def eval_command(
     """Fly the ONNX file itself from unseen starts; print a table, write the report and the plots."""
     if episodes <= 0:
         raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
+    path = policy_path(path, vehicle)
     prepare(device)
     run = RunDirectory(path) if path.is_dir() else None
     policy = load_policy(run.policy if run else path)
@@ -55,7 +57,7 @@ def eval_command(
             report, (json.dumps(_report(policy, path, env_config, flown, starts, seed), indent=1) + "\n").encode()
         )
         console.print(f"Report: {report}")
-    folder = plots or (run.plots if run else path.parent / "plots")
+    folder = plots or (run.plots if run else beside(path) / "plots")
     _draw(policy, task, env_config, flown, seed, folder, run)
     console.print(f"Plots: {folder}")
     return 0

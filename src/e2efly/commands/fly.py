@@ -39,6 +39,7 @@ from e2efly.deploy.sticks import sticks_of
 from e2efly.deploy.telemetry import Telemetry
 from e2efly.deploy.watchdog import WatchedLink
 from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.zoo import policy_path
 
 CONNECT_S = 5.0
 """How long the controller may take to answer first, s."""
@@ -51,7 +52,7 @@ class Fly:
     """Fly on a Betaflight quadrotor; the pilot's switches decide. See docs/flying.md before the first flight."""
 
     policy: tyro.conf.Positional[Path | None] = None
-    """A policy.onnx, or a run directory; left out: take-off, hover and landing only."""
+    """A policy.onnx, a run directory, or a task (the zoo's policy); left out: take-off, hover and landing only."""
     link: str = "/dev/ttyACM0"
     """To the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT."""
     pose: str = "udp:9870"
@@ -91,6 +92,7 @@ def fly_command(options: Fly) -> int:
     check_settings(settings)
     loaded = None
     if policy is not None:
+        policy = policy_path(policy, options.vehicle)
         loaded = load_policy(policy / "policy.onnx" if policy.is_dir() else policy)
     if loaded is None and options.vehicle is None:
         raise ValueError("--vehicle is left out; accepted: a vehicle's name or .toml file, as no policy names one")

@@ -1,5 +1,7 @@
 """`e2efly train`."""
 
+import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -8,16 +10,36 @@ from rich.table import Table
 
 from e2efly.commands.progress import TerminalProgress
 from e2efly.config import TrainConfig
-from e2efly.device import cache_folder, prepare
+from e2efly.device import Hosts, cache_folder, prepare
 from e2efly.presets import algorithm_name, task_name
 
 
-def train_command(config: TrainConfig, out: Path, resume: bool, device: str | None, plots: bool) -> int:
+def train_command(
+    config: TrainConfig,
+    out: Path,
+    resume: bool,
+    device: str | None,
+    plots: bool,
+    hosts: Hosts,
+) -> int:
     """Train, ship the best policy, evaluate it and draw plots; exit status 0, or 130 when the user stopped it."""
-    prepare(device)
+    prepare(device, hosts)
+    from e2efly.learn.hosts import LostHostError
+
+    try:
+        return _train(config, out, resume, plots, Console(highlight=False, quiet=hosts.index > 0))
+    except (LostHostError, ValueError, OSError, FloatingPointError) as error:
+        if hosts.count == 1:
+            raise
+        lost = isinstance(error, LostHostError)
+        again = f"; start all {hosts.count} again with --out {out} --resume" if lost else ""
+        print(f"error: {error}{again}", file=sys.stderr, flush=True)
+        os._exit(2)  # JAX would wait for the others, and abort
+
+
+def _train(config: TrainConfig, out: Path, resume: bool, plots: bool, console: Console) -> int:
     from e2efly.learn.runner import train
 
-    console = Console(highlight=False)
     task, algo = task_name(config.task), algorithm_name(config.algo)
     with TerminalProgress(console, f"{task} by {algo}") as progress:
         summary = train(config, out, progress, resume, traced=cache_folder() / "traced")
@@ -25,7 +47,7 @@ def train_command(config: TrainConfig, out: Path, resume: bool, device: str | No
     if summary["stopped_by_user"]:
         console.print(f"Stopped. Go on with: e2efly train {task} --algo {algo} --out {out} --resume")
         return 130
-    if plots:
+    if plots and not console.quiet:
         from e2efly.commands.evaluate import eval_command
 
         eval_command(out, 1000, None, None, 1_000_000, None, None, quiet=True)

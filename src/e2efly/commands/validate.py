@@ -19,6 +19,7 @@ from e2efly.device import compute_at_once, prepare
 from e2efly.learn.rundir import RunDirectory
 from e2efly.validate.plant import plant_kind
 from e2efly.vehicles import load_vehicle
+from e2efly.zoo import beside, policy_path
 
 EPISODES = {"betaflight": 20}
 """Starts of each criterion unless told, where they are not 200: the firmware takes seconds for each."""
@@ -41,7 +42,7 @@ def validate_command(
     """Fly policy.onnx by the bridge's runtime on another plant, from the starts of `e2efly eval`.
 
     Args:
-        policy: a policy.onnx, or a run directory.
+        policy: a policy.onnx, a run directory, or a task: the zoo's.
         plant: a name of `PLANTS`.
         episodes: starts of each criterion; left out: `EPISODES` of the plant.
         out: folder of the plots; RUN/validation, or the folder `validation` beside the policy, when left out.
@@ -66,6 +67,7 @@ def validate_command(
         raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
     if not (math.isfinite(max_drop) and max_drop >= 0):
         raise ValueError(f"--max-drop is {max_drop}; accepted: 0 or more points of success")
+    policy = policy_path(policy, vehicle)
     run = RunDirectory(policy) if policy.is_dir() else None
     loaded = load_policy(run.policy if run else policy)
     compute_at_once()
@@ -80,7 +82,7 @@ def validate_command(
     path = run.policy if run else policy
     found = _validate(path, loaded, plant, task, env_config, vehicle, episodes, seed, console)
     console.print(_table(found, plant))
-    folder = out or (run.path if run else path.parent) / "validation"
+    folder = out or (run.path if run else beside(path)) / "validation"
     _draw(found, loaded, path, plant, task, env_config, folder)
     console.print(f"Plots: {folder}")
     if json:

@@ -13,6 +13,7 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.config import ABPTConfig, AlgorithmConfig, BPTTConfig, FOPPOConfig, PPOConfig, SHACConfig
 from e2efly.env import Env, EnvState
+from e2efly.evaluate import part_of
 from e2efly.learn.devices import AXIS
 from e2efly.learn.networks import Actor
 
@@ -83,9 +84,13 @@ def at_rest(config: AlgorithmConfig, parameters: Any) -> Any:
 
 
 def begin(algorithm: Algorithm, env: Env, config: AlgorithmConfig, parameters: Any, key: PRNGKeyArray) -> TrainState:
-    """A device's first state of a run: its environments as started, the optimiser at rest."""
-    key = jax.random.fold_in(key, jax.lax.axis_index(AXIS))
-    env_state, observation = env.reset(jax.random.fold_in(key, 0), config.envs // jax.lax.axis_size(AXIS))
+    """A device's first state of a run: its part of the environments as started, the optimiser at rest.
+
+    All devices together start the same environments, however many they are.
+    """
+    part = jax.lax.axis_index(AXIS), jax.lax.axis_size(AXIS)
+    env_state, observation = part_of(*env.reset(jax.random.fold_in(key, 0), config.envs), part)
+    key = jax.random.fold_in(key, part[0])
     optimizer, memory = algorithm.optimizer(config, parameters), algorithm.actor.memory(observation.shape[0])
     replay = algorithm.replay(env, config, env_state, observation)
     return TrainState(parameters, optimizer, env_state, observation, memory, key, replay)

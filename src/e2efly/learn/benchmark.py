@@ -17,25 +17,32 @@ from e2efly.learn.programs import start_program
 from e2efly.learn.setup import Setup
 from e2efly.physics import Physics, State, step
 from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.vehicle import quantities
 
 
-def physics_substeps(vehicles: int, calls: int = 200) -> float:
-    """Physics sub-steps/s of VIS-R under CTBR commands: 10 sub-steps of 5 ms a call, all in one scan."""
+def physics_substeps(vehicles: int, calls: int = 200, general: bool = False) -> float:
+    """Physics sub-steps/s of VIS-R under CTBR commands: 10 sub-steps of 5 ms a call, all in one scan.
+
+    `general`: every parameter of every vehicle is a number of its own; else they are constants of the program.
+    """
     vehicle = load_vehicle("vis_r")
     physics = Physics.of(vehicle, control_rate=20.0)
     devices = share(vehicles, None, None)
     state = State.hovering(vehicle, jnp.zeros((vehicles, 3), jnp.float32))
-    spread = np.random.default_rng(0).normal(size=(vehicles, 4)).astype(np.float32)
-    command = 0.5 * spread + np.array([9.81, 0, 0, 0], np.float32)
+    rng = np.random.default_rng(0)
+    command = (0.5 * rng.normal(size=(vehicles, 4)) + np.array([9.81, 0, 0, 0])).astype(np.float32)
+    plants: dict[str, Any] = {}
+    for name in (field.name for field in quantities() if general):
+        value = np.asarray(getattr(physics.nominal, name))
+        plants[name] = (value * rng.uniform(0.9, 1.1, (vehicles, *value.shape))).astype(np.float32)
 
-    def run(state: State, command: jax.Array) -> State:
-        body = lambda s, _: (step(physics, physics.nominal, s, command), None)  # noqa: E731
+    def run(state: State, command: jax.Array, plants: dict[str, Any]) -> State:
+        plant = dataclasses.replace(physics.nominal, **plants)
+        body = lambda s, _: (step(physics, plant, s, command), None)  # noqa: E731
         return jax.lax.scan(body, state, None, length=calls)[0]
 
-    program, start = (
-        on_each(run, devices, (OWN, OWN), OWN, vehicles=vehicles // devices),
-        placed((state, command), devices),
-    )
+    program = on_each(run, devices, (OWN, OWN, OWN), OWN, vehicles=vehicles // devices)
+    start = placed((state, command, plants), devices)
     return best_rate(vehicles * calls * physics.substeps, lambda: jax.block_until_ready(program(*start)))
 
 

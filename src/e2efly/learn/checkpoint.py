@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from e2efly.env import GENERATOR
+from e2efly.env import is_key, key_of, numbers_of
 
 FORMAT = 1
 """Version of the layout of a checkpoint."""
@@ -77,28 +76,21 @@ def load_checkpoint(path: Path, like: Any) -> Any:
     found = []
     for where, leaf in leaves:
         name = jax.tree_util.keystr(where)
-        key = _is_key(leaf)
-        wanted = jax.eval_shape(jax.random.key_data, leaf) if key else leaf
+        key = is_key(leaf)
+        wanted = jax.eval_shape(numbers_of, leaf)
         array = arrays.pop(name, None)
         if array is None or array.shape != wanted.shape or array.dtype != wanted.dtype:
             has = "is missing" if array is None else f"is {array.dtype}{list(array.shape)}"
             raise ValueError(f"checkpoint {path}: {name} {has}; accepted: {wanted.dtype}{list(wanted.shape)}")
-        found.append(jax.random.wrap_key_data(array, impl=GENERATOR) if key else array)
+        found.append(key_of(array) if key else array)
     if arrays:
         raise ValueError(f"checkpoint {path}: {', '.join(sorted(arrays))} belong to no part of this run")
     return jax.tree_util.tree_unflatten(structure, found)
 
 
-def _is_key(leaf: Any) -> bool:
-    return hasattr(leaf, "dtype") and jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key)
-
-
 def _arrays(tree: Any) -> dict[str, np.ndarray]:
     leaves = jax.tree_util.tree_flatten_with_path(tree)[0]
-    return {
-        jax.tree_util.keystr(where): np.asarray(jax.random.key_data(leaf) if _is_key(leaf) else leaf, order="C")
-        for where, leaf in leaves
-    }
+    return {jax.tree_util.keystr(where): np.asarray(numbers_of(leaf), order="C") for where, leaf in leaves}
 
 
 def _checksum(arrays: dict[str, np.ndarray]) -> int:

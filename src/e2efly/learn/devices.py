@@ -9,9 +9,11 @@ from collections.abc import Callable
 from typing import Any
 
 import jax
+import numpy as np
 from jax.sharding import AxisType, Mesh, NamedSharding, PartitionSpec
 
 from e2efly.device import wide_vectors
+from e2efly.env import is_key, key_of, numbers_of
 
 AXIS = "devices"
 """Name of the axis over which a program may take means and sums."""
@@ -36,20 +38,25 @@ def share(envs: int, minibatch: int | None, asked: int | None) -> int:
     def divides(count: int) -> bool:
         return envs % count == 0 and (minibatch or 0) % count == 0
 
-    found = len(jax.devices())
+    found, hosts = len(jax.devices()), jax.process_count()
     if asked is None:
         most = max(1, min(found, envs // LEAST))
-        return next(count for count in range(most, 0, -1) if divides(count))
+        fits = (count for count in range(most, 0, -1) if divides(count) and count % hosts == 0)
+        asked = next(fits, hosts)
     if not 1 <= asked <= found:
         raise ValueError(f"devices is {asked}; accepted: 1 to {found}, which JAX has here")
+    if asked % hosts:
+        raise ValueError(f"devices is {asked}; accepted: a multiple of the number of processes ({hosts})")
     if not divides(asked):
         raise ValueError(f"devices is {asked}; accepted: a divisor of algo.envs ({envs}) and of algo.minibatch")
     return asked
 
 
 def mesh(count: int, axis: str = AXIS) -> Mesh:
-    """The first `count` devices."""
-    return jax.make_mesh((count,), (axis,), axis_types=(AxisType.Auto,), devices=jax.devices()[:count])
+    """The first devices of each process, `count` in all."""
+    each, hosts = count // jax.process_count(), range(jax.process_count())
+    chosen = [d for host in hosts for d in [d for d in jax.devices() if d.process_index == host][:each]]
+    return jax.make_mesh((count,), (axis,), axis_types=(AxisType.Auto,), devices=chosen)
 
 
 def on_each(
@@ -88,7 +95,11 @@ def shardings(places: Any, count: int, axis: str = AXIS) -> Any:
 
 def placed(tree: Any, count: int) -> Any:
     """A tree from the host, with the leading axis of every leaf shared out."""
-    return jax.device_put(tree, shardings(OWN, count))
+
+    def put(x: Any) -> jax.Array:
+        return key_of(put(np.asarray(numbers_of(x)))) if is_key(x) else jax.device_put(x, shardings(OWN, count))
+
+    return jax.tree.map(put, tree)
 
 
 def own(tree: Any) -> Any:

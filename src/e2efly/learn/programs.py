@@ -68,7 +68,7 @@ class Programs:
         with ThreadPoolExecutor(1) as pool:
             compiling = pool.submit(lowered.compile, compiler_options=options | wide_vectors(setup.vehicles))
             of_leaves = _of_leaves(_evaluate(setup), evaluating, vars)
-            lowered = _lower(of_leaves, setup, evaluating, (SAME, SAME, SAME), OWN, traced, "evaluate")
+            lowered = _lower(of_leaves, setup, evaluating, (SAME, SAME, SAME), SAME, traced, "evaluate")
             start = started.lower().compile(compiler_options=options)
             evaluate = lowered.compile(compiler_options=options | wide_vectors(setup.watched))
             chunk = compiling.result()
@@ -92,7 +92,7 @@ def start_program(setup: Setup) -> Any:
 
 def evaluation_program(setup: Setup) -> Any:
     """The program (environment, weights, key) -> `Episodes` of `eval_episodes` starts, or a few repeated more."""
-    return on_each(_evaluate(setup), setup.devices, (SAME, SAME, SAME), OWN, vehicles=setup.watched)
+    return on_each(_evaluate(setup), setup.devices, (SAME, SAME, SAME), SAME, vehicles=setup.watched)
 
 
 def _chunk(setup: Setup) -> Callable[..., tuple[TrainState, dict[str, jax.Array]]]:
@@ -114,7 +114,8 @@ def _evaluate(setup: Setup) -> Callable[[Env, Weights, jax.Array], Episodes]:
     def evaluate(env: Env, weights: Weights, key: jax.Array) -> Episodes:
         act = acting(actor, weights)
         part = jax.lax.axis_index(AXIS), setup.devices
-        return run_episodes(env, act, key, config.eval_episodes, setup.episode_steps, setup.settle, part)
+        flown = run_episodes(env, act, key, config.eval_episodes, setup.episode_steps, setup.settle, part)
+        return jax.tree.map(lambda x: jax.lax.all_gather(x, AXIS, tiled=True), flown)
 
     return evaluate
 

@@ -9,7 +9,7 @@ import math
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +22,7 @@ from e2efly import presets
 from e2efly.config import TrainConfig
 from e2efly.env import random_key
 from e2efly.evaluate import Episodes
+from e2efly.learn import hosts
 from e2efly.learn.algorithm import TrainState
 from e2efly.learn.checkpoint import load_checkpoint, read_about, save_checkpoint
 from e2efly.learn.clock import peak_memory, since_process_start
@@ -29,7 +30,7 @@ from e2efly.learn.devices import placed
 from e2efly.learn.judge import REPORTED, WATCHED, digest, judge, score, success
 from e2efly.learn.networks import Weights
 from e2efly.learn.programs import Programs, start_program
-from e2efly.learn.rundir import RunDirectory, differences, versions
+from e2efly.learn.rundir import RunDirectory, differences, from_json, to_json, versions
 from e2efly.learn.setup import Setup
 
 REPORT_EPISODES = 1000
@@ -71,6 +72,7 @@ class NonFiniteError(FloatingPointError):
     """A loss or reward term was not finite."""
 
 
+@hosts.together()
 def train(
     config: TrainConfig, out: Path, reporter: Reporter, resume: bool = False, traced: Path | None = None
 ) -> dict[str, Any]:
@@ -88,27 +90,30 @@ def train(
 
     Raises:
         ValueError: for a configuration, folder or checkpoint that cannot be used.
+        LostHostError: when another process of the run is gone; the last checkpoint is kept.
         OSError: when the folder cannot be written.
         NonFiniteError: naming the term and the update; the last good checkpoint is kept.
     """
     run = RunDirectory(out)
     setup = Setup.of(config)
-    if resume:
-        _check_resume(run, setup.config)
+    if hosts.first():
+        hosts.told(to_json(setup.config))
+        if resume:
+            _check_resume(run, setup.config)
+        else:
+            run.create(setup.config)
     else:
-        run.create(setup.config)
+        _check_same(setup.config)
     parameters = setup.algorithm.init(setup.env, config.algo, config.seed)
     reporter.compiling()
-    programs = Programs.compile(setup, parameters, traced)
-    key = random_key(config.seed)
-    progress, best = Progress(), parameters.policy
-    if resume and run.checkpoint.exists():
-        loaded = load_checkpoint(run.checkpoint, _checkpoint_like(setup, parameters))
-        state, best = placed(loaded["state"], setup.devices), loaded["best"]
-        progress = Progress(**{f.name: read_about(run.checkpoint)[f.name] for f in dataclasses.fields(Progress)})
+    programs = Programs.compile(setup, parameters, traced if jax.process_count() == 1 else None)
+    if resume and hosts.told(run.checkpoint.exists()):
+        state, best, progress = _resumed(setup, run, parameters)
     else:
-        state = programs.begin(setup.env, parameters, key)
-    run.forget_after(progress.update)
+        state, best = programs.begin(setup.env, parameters, random_key(config.seed)), parameters.policy
+        progress = Progress()
+    if hosts.first():
+        run.forget_after(progress.update)
     state, best, progress, stopped = _loop(setup, programs, run, reporter, state, best, progress)
     return _finish(setup, programs, run, state, best, progress, stopped)
 
@@ -117,12 +122,10 @@ def _loop(
     setup: Setup, programs: Programs, run: RunDirectory, reporter: Reporter, state: Any, best: Any, progress: Progress
 ) -> tuple[Any, Any, Progress, bool]:
     """Chunks of updates, an evaluation and a checkpoint after each. Ends at the last update, the goal, or Ctrl-C."""
-    from tensorboardX import SummaryWriter
-
     config, task = setup.config, presets.task_name(setup.config.task)
-    before = progress.seconds  # of earlier processes of this run
-    with SummaryWriter(str(run.events), purge_step=progress.update) as events, _interruptible() as stop:
-        while progress.update < setup.updates and not stop.is_set():
+    before, stopped = progress.seconds, False  # of earlier processes of this run
+    with _writing(run, progress.update) as write, _interruptible() as stop:
+        while progress.update < setup.updates and not (stopped := hosts.any_of(stop.is_set())):
             began = time.perf_counter()
             number, stages = progress.stage, len(setup.stages)
             stage, final = setup.stages[number], number == stages - 1
@@ -154,11 +157,10 @@ def _loop(
             )
             if better:
                 best = weights
-            rows = _rows(setup, metrics, progress, rate, flown, number)
-            run.append(rows)
-            for name, value in rows[-1].items():
-                events.add_scalar(name, value, int(rows[-1]["update"]))
-            save_checkpoint(run.checkpoint, {"state": state, "best": best}, _about(config, progress))
+            write(_rows(setup, metrics, progress, rate, flown, number))
+            whole = hosts.whole({"state": state, "best": best})
+            if hosts.first():
+                save_checkpoint(run.checkpoint, whole, _about(config, progress))
             reporter.progress(
                 progress.update * setup.steps_per_update,
                 setup.updates * setup.steps_per_update,
@@ -169,7 +171,7 @@ def _loop(
             )
             if reached:
                 break
-        return state, best, progress, stop.is_set()
+        return state, best, progress, stopped
 
 
 def _finish(
@@ -182,7 +184,6 @@ def _finish(
     config = setup.config
     by_best = judge(setup, programs.evaluate, best, REPORTED, REPORT_EPISODES)
     by_last = judge(setup, programs.evaluate, policy_of(state), REPORTED, REPORT_EPISODES)
-    export_policy(run.policy, best, setup.actor, contract_of(setup.env, config))
     summary = {
         "task": presets.task_name(config.task),
         "algorithm": presets.algorithm_name(config.algo),
@@ -199,13 +200,35 @@ def _finish(
         "episodes": REPORT_EPISODES,
         "versions": versions(),
     }
-    run.write_json("summary.json", summary)
+    if hosts.first():
+        export_policy(run.policy, best, setup.actor, contract_of(setup.env, config))
+        run.write_json("summary.json", summary)
     return summary
 
 
 def policy_of(state: TrainState) -> Weights:
     """The policy on the host: every device has the same."""
-    return jax.tree.map(lambda x: np.asarray(x)[0], state.parameters.policy)
+    return jax.tree.map(
+        lambda x: np.asarray(x.addressable_data(0) if isinstance(x, jax.Array) else x)[0], state.parameters.policy
+    )
+
+
+@contextmanager
+def _writing(run: RunDirectory, update: int) -> Iterator[Callable[[list[dict[str, float]]], None]]:
+    """Writes rows to metrics.csv, and the last of them to TensorBoard's events; in process 0."""
+    from tensorboardX import SummaryWriter
+
+    if not hosts.first():
+        yield lambda rows: None
+        return
+    with SummaryWriter(str(run.events), purge_step=update) as events:
+
+        def write(rows: list[dict[str, float]]) -> None:
+            run.append(rows)
+            for name, value in rows[-1].items():
+                events.add_scalar(name, value, int(rows[-1]["update"]))
+
+        yield write
 
 
 def _rows(
@@ -246,6 +269,13 @@ def _check_finite(metrics: dict[str, np.ndarray], update: int) -> None:
 
 def _about(config: TrainConfig, progress: Progress) -> dict[str, Any]:
     return {**dataclasses.asdict(progress), "version": versions()["e2efly"], "seed": config.seed}
+
+
+def _check_same(config: TrainConfig) -> None:
+    """Refuse a configuration that is not process 0's."""
+    wanted = from_json(hosts.told(None), "process 0")
+    if different := list(differences(wanted, config)):
+        raise ValueError(f"process 0 was started with another configuration: {'; '.join(different)}")
 
 
 def _check_resume(run: RunDirectory, config: TrainConfig) -> None:
@@ -290,6 +320,16 @@ def load_policy_weights(setup: Setup, run: RunDirectory, which: str) -> Weights:
     parameters = setup.algorithm.init(setup.env, setup.config.algo, setup.config.seed)
     loaded = load_checkpoint(run.checkpoint, _checkpoint_like(setup, parameters))
     return loaded["best"] if which == "best" else policy_of(loaded["state"])
+
+
+def _resumed(setup: Setup, run: RunDirectory, parameters: Any) -> tuple[TrainState, Weights, Progress]:
+    """Where process 0's checkpoint is."""
+    like, loaded, about = _checkpoint_like(setup, parameters), None, None
+    if hosts.first():
+        loaded, about = load_checkpoint(run.checkpoint, like), read_about(run.checkpoint)
+    loaded, about = hosts.of_first(loaded, like), hosts.told(about)
+    progress = Progress(**{field.name: about[field.name] for field in dataclasses.fields(Progress)})
+    return placed(loaded["state"], setup.devices), loaded["best"], progress
 
 
 def _checkpoint_like(setup: Setup, parameters: Any) -> dict[str, Any]:
