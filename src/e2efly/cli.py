@@ -201,7 +201,7 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
         ("chunk", Annotated[int, arg(help="Updates between two evaluations (sets shapes).")]),
         ("eval_episodes", Annotated[int, arg(help="Starts of an evaluation while training (sets shapes).")]),
         ("devices", Annotated[int | None, arg(help="Devices (CPU: cores) to share the environments among.")]),
-        ("fast_compile", Annotated[bool, arg(help="On a CPU: compile in half the time, run up to a tenth slower.")]),
+        ("fast_compile", Annotated[bool, arg(help="On a CPU: compile faster, run slower; right for runs of seconds.")]),
         ("curriculum", Annotated[bool, arg(help="Go through the stages of the preset's curriculum, if it has one.")]),
         ("stop_at", Annotated[float | None, arg(help="Stop once the success on 1000 starts is at least this.")]),
         ("hosts", Hosts),

@@ -53,7 +53,7 @@ ALGORITHMS: dict[str, AlgorithmConfig] = {
 }  # fmt: skip
 """Algorithms by name, with the defaults of their presets."""
 
-FIRST_ORDER = ("land_visual", "avoid", "race_clutter")
+FIRST_ORDER = ("land_visual", "avoid", "race_clutter", "gap")
 """Tasks that BPTT learns better than PPO does (docs/benchmarks.md)."""
 
 D435I = CameraConfig(fov=(math.radians(87), math.radians(58)), reach=(0.28, 10.0))
@@ -176,7 +176,7 @@ def _gap(algo: str) -> TrainConfig:
     }  # fmt: skip
     reward = RewardConfig(weights, {"desired_speed": 2.0, "fit_margin": 0.02, "fit_limit": 0.1})
     settings = BPTTConfig(learning_rate=6e-3, max_grad_norm=1.0, gradient_decay=1.0)
-    return TrainConfig(TASKS["gap"], settings, reward, steps=1_500_000, chunk=20)
+    return TrainConfig(TASKS["gap"], settings, reward, steps=6_000_000, chunk=60)
 
 
 def _race_clutter(algo: str) -> TrainConfig:

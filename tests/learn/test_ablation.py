@@ -60,18 +60,18 @@ def test_the_command_draws_and_takes_what_is_there_already(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    command = ["ablate", "hover", "--algos", "bptt", "--seeds", "1", "--steps", "40960", "--out", "found"]
+    command = ["ablate", "hover", "--algos", "ppo", "--seeds", "1", "--steps", "40960", "--out", "found"]
     assert run(command) == 0
-    first = (tmp_path / "found" / "hover_bptt.json").read_bytes()
+    first = (tmp_path / "found" / "hover_ppo.json").read_bytes()
     text = (tmp_path / "found" / "ablation.md").read_text()
-    assert "| without prog2 |" in text and "| full |" in text
-    assert (tmp_path / "found" / "ablation_bptt.png").stat().st_size > 20_000
+    assert "| without near |" in text and "| full |" in text
+    assert (tmp_path / "found" / "ablation_ppo.png").stat().st_size > 20_000
     capsys.readouterr()
     assert run(command) == 0
     assert "as found" in capsys.readouterr().out
-    assert (tmp_path / "found" / "hover_bptt.json").read_bytes() == first
+    assert (tmp_path / "found" / "hover_ppo.json").read_bytes() == first
     assert run([*command[:-2], "--steps", "81920", "--out", "found"]) == 0  # another configuration: trained anew
-    assert (tmp_path / "found" / "hover_bptt.json").read_bytes() != first
+    assert (tmp_path / "found" / "hover_ppo.json").read_bytes() != first
 
 
 def test_an_unknown_task_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -74,7 +74,7 @@ class TrainConfig:
     devices: int | None = None
     """Devices (CPU: cores) that share the environments; left out: all there are, 32 environments or more on each."""
     fast_compile: bool = True
-    """On a CPU: compile in half the time, run up to a tenth slower; right for runs of a minute."""
+    """On a CPU: compile faster, run slower: right for runs of seconds; half the rate or less with cameras."""
     curriculum: tuple[StageConfig, ...] = ()
     """Stages before the task itself."""
     stop_at: float | None = None

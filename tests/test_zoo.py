@@ -1,0 +1,67 @@
+"""The policy zoo: every policy does what is said of it."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+
+from e2efly import presets
+from e2efly.commands.evaluate import callback, config_from_contract, episode_steps
+from e2efly.config import RewardConfig
+from e2efly.deploy.policy import load_policy
+from e2efly.device import wide_vectors
+from e2efly.env import Env, random_key
+from e2efly.evaluate import run_episodes
+from e2efly.vehicles import vehicle_names
+from e2efly.zoo import FOLDER, USUAL, beside, contents, policy_path
+
+STARTS = 200
+POLICIES = [(vehicle, task) for vehicle, tasks in contents().items() for task in tasks]
+
+
+@pytest.mark.parametrize(("vehicle", "task"), POLICIES)
+def test_every_policy_succeeds_as_often_as_it_says(vehicle: str, task: str) -> None:
+    policy, about = load_policy(policy_path(Path(task), vehicle)), contents()[vehicle][task]
+    wanted, config = config_from_contract(policy)
+    for name, suite in presets.suites(wanted).items():
+        env = Env.of(suite, RewardConfig({"prog2": 1.0}), config)
+        steps = episode_steps(suite, env)
+        flown = jax.jit(
+            lambda env, key, steps=steps: run_episodes(env, callback(policy), key, STARTS, steps),
+            compiler_options=wide_vectors(STARTS),
+        )(env, random_key(123))
+        stated = about["success"][name]
+        chance = 4 * np.sqrt(max(stated * (1 - stated), 0.003) / STARTS)  # four standard deviations
+        assert np.mean(flown.success) >= stated - chance
+
+
+def test_it_has_every_task_for_the_usual_vehicle_and_none_is_large() -> None:
+    assert set(contents()[USUAL]) == set(presets.TASKS)
+    assert set(contents()) == set(vehicle_names())
+    assert {file.stem for file in FOLDER.glob("*/*.onnx")} == set(presets.TASKS)
+    assert max(file.stat().st_size for file in FOLDER.glob("*/*.onnx")) < 1_000_000
+
+
+def test_a_task_is_the_name_of_its_policy(tmp_path: Path) -> None:
+    assert policy_path(Path("hover")) == FOLDER / USUAL / "hover.onnx"
+    assert policy_path(Path("hover"), "crazyflie") == FOLDER / "crazyflie" / "hover.onnx"
+    assert policy_path(tmp_path) == tmp_path
+    assert policy_path(Path("runs/mine")) == Path("runs/mine")
+    with pytest.raises(ValueError, match=r"unknown policy 'hovr'.*hover"):
+        policy_path(Path("hovr"))
+    with pytest.raises(ValueError, match=r"no policy 'avoid' of vehicle 'crazyflie'; accepted: vis_r"):
+        policy_path(Path("avoid"), "crazyflie")
+    assert beside(FOLDER / USUAL / "hover.onnx") == Path("runs/zoo-hover-vis_r")
+
+
+def test_eval_by_name_works_at_once_and_writes_nothing_into_the_package(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "e2efly", "eval", "hover", "--episodes", "20", "--json", "report.json"]
+    subprocess.run(command, cwd=tmp_path, env=os.environ, check=True, stdout=subprocess.DEVNULL)
+    assert json.loads((tmp_path / "report.json").read_text())["criteria"]["hover"]["mean"]["success"] == 1.0
+    assert (tmp_path / "runs/zoo-hover-vis_r/plots/errors.png").exists()
+    assert not (FOLDER / USUAL / "plots").exists()
