@@ -90,7 +90,7 @@ def test_letting_go_gives_everything_back_and_can_be_said_twice() -> None:
     line = Lifeline()
     line.close()
     line.close()
-    assert set(Path("/proc/self/fd").iterdir()) == before
+    assert set(Path("/proc/self/fd").iterdir()) <= before  # whatever else was let go meanwhile
 
 
 def test_it_stays_held_when_another_thread_lets_go() -> None:
