@@ -6,17 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import jax
 import numpy as np
 import pytest
 
 from e2efly import presets
-from e2efly.commands.evaluate import callback, config_from_contract, episode_steps
-from e2efly.config import RewardConfig
+from e2efly.commands.evaluate import config_from_contract, fly_suites
 from e2efly.deploy.policy import load_policy
-from e2efly.device import wide_vectors
-from e2efly.env import Env, random_key
-from e2efly.evaluate import run_episodes
 from e2efly.vehicles import vehicle_names
 from e2efly.zoo import FOLDER, USUAL, beside, contents, policy_path
 
@@ -27,17 +22,10 @@ POLICIES = [(vehicle, task) for vehicle, tasks in contents().items() for task in
 @pytest.mark.parametrize(("vehicle", "task"), POLICIES)
 def test_every_policy_succeeds_as_often_as_it_says(vehicle: str, task: str) -> None:
     policy, about = load_policy(policy_path(Path(task), vehicle)), contents()[vehicle][task]
-    wanted, config = config_from_contract(policy)
-    for name, suite in presets.suites(wanted).items():
-        env = Env.of(suite, RewardConfig({"prog2": 1.0}), config)
-        steps = episode_steps(suite, env)
-        flown = jax.jit(
-            lambda env, key, steps=steps: run_episodes(env, callback(policy), key, STARTS, steps),
-            compiler_options=wide_vectors(STARTS),
-        )(env, random_key(123))
-        stated = about["success"][name]
+    flown, _ = fly_suites(policy, *config_from_contract(policy), STARTS, 123)
+    for name, stated in about["success"].items():
         chance = 4 * np.sqrt(max(stated * (1 - stated), 0.003) / STARTS)  # four standard deviations
-        assert np.mean(flown.success) >= stated - chance
+        assert np.mean(flown[name].success) >= stated - chance
 
 
 def test_it_has_every_task_for_the_usual_vehicle_and_none_is_large() -> None:

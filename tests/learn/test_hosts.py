@@ -26,12 +26,15 @@ def start(cwd: Path, out: str, *flags: str, devices: int, told: str = "output.tx
         return subprocess.Popen(command, cwd=cwd, stdout=output, stderr=output, env=environment)
 
 
-def pair(cwd: Path, out: str, *flags: str) -> list[Process]:
-    """Two processes of one run, with a device each; `output.txt` is of the first, `other.txt` of the second."""
+def address() -> str:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
-        where = f"127.0.0.1:{free.getsockname()[1]}"
-    hosts = ["--hosts.coordinator", where, "--hosts.count", "2", "--hosts.index"]
+        return f"127.0.0.1:{free.getsockname()[1]}"
+
+
+def pair(cwd: Path, out: str, *flags: str) -> list[Process]:
+    """Two processes of one run, with a device each; `output.txt` is of the first, `other.txt` of the second."""
+    hosts = ["--hosts.coordinator", address(), "--hosts.count", "2", "--hosts.index"]
     return [
         start(cwd, out, *flags, *hosts, str(i), devices=1, told=told)
         for i, told in enumerate(("output.txt", "other.txt"))
@@ -91,10 +94,7 @@ def test_a_run_that_lost_a_process_says_so_and_resumes(tmp_path: Path) -> None:
 
 
 def test_processes_with_other_configurations_do_not_run(tmp_path: Path) -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        where = f"127.0.0.1:{free.getsockname()[1]}"
-    hosts = ["--hosts.coordinator", where, "--hosts.count", "2", "--devices", "2", "--hosts.index"]
+    hosts = ["--hosts.coordinator", address(), "--hosts.count", "2", "--devices", "2", "--hosts.index"]
     both = [
         start(tmp_path, "run", *PPO, "--seed", str(i), *hosts, str(i), devices=1, told=f"{i}.txt") for i in range(2)
     ]

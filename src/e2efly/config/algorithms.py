@@ -33,8 +33,8 @@ class _FirstOrder(_Batch):
 
 
 @dataclass(frozen=True)
-class PPOConfig(_Batch):
-    """Proximal policy optimisation (Schulman et al. 2017)."""
+class _Proximal(_Batch):
+    """What proximal policy optimisation and what builds on it have."""
 
     epochs: int = 2
     """Passes over the samples of an update (sets shapes)."""
@@ -44,8 +44,6 @@ class PPOConfig(_Batch):
     """Adam's step at the start."""
     learning_rate_end: float = 3e-4
     """Adam's step at the end; exponential in between."""
-    gamma: float = 0.96
-    """Discount a step."""
     gae_lambda: float = 0.95
     """Lambda of the generalised advantage estimate."""
     clip: float = 0.2
@@ -56,6 +54,14 @@ class PPOConfig(_Batch):
     """Weight of the entropy bonus."""
     log_std: float = -1.0
     """Initial log standard deviation of the action noise."""
+
+
+@dataclass(frozen=True)
+class PPOConfig(_Proximal):
+    """Proximal policy optimisation (Schulman et al. 2017)."""
+
+    gamma: float = 0.96
+    """Discount a step."""
 
 
 @dataclass(frozen=True)
@@ -140,33 +146,15 @@ class ABPTConfig(_FirstOrder):
 
 
 @dataclass(frozen=True)
-class FOPPOConfig(_FirstOrder):
+class FOPPOConfig(_Proximal, _FirstOrder):
     """PPO refined by first-order gradients: epochs over a rollout, then a step along its exact gradient. Ours."""
 
     horizon: int = 32
     """Steps of a rollout, which is the window of the exact gradient (sets shapes)."""
-    epochs: int = 2
-    """Passes over the samples of an update (sets shapes)."""
-    minibatch: int = 512
-    """Samples of a gradient step; divides envs * horizon (sets shapes)."""
-    learning_rate: float = 3e-3
-    """Adam's step at the start."""
-    learning_rate_end: float = 3e-4
-    """Adam's step at the end; exponential in between."""
     exact_rate: float = 1.0
     """The step along the exact gradient over that of the epochs."""
     gamma: float = 0.98
     """Discount a step."""
-    gae_lambda: float = 0.95
-    """Lambda of the generalised advantage estimate."""
-    clip: float = 0.2
-    """Clip of the probability ratio."""
-    value_weight: float = 0.5
-    """Weight of the critic's loss."""
-    entropy_weight: float = 0.0
-    """Weight of the entropy bonus."""
-    log_std: float = -1.0
-    """Initial log standard deviation of the action noise."""
 
 
 AlgorithmConfig = PPOConfig | BPTTConfig | SHACConfig | ABPTConfig | FOPPOConfig
