@@ -14,7 +14,7 @@ import tyro
 from rich.console import Console
 
 from e2efly import __version__, presets
-from e2efly.config import EnvConfig, NetworkConfig, RewardConfig
+from e2efly.config import EnvConfig, NetworkConfig, RewardConfig, TrainConfig
 from e2efly.device import Hosts
 from e2efly.vehicles import unknown
 
@@ -24,6 +24,7 @@ _ABOUT = f"""e2efly {__version__}: train an end-to-end quadrotor policy in secon
   e2efly train race --algo bptt    another task, another algorithm
   e2efly eval runs/hover-ppo-0     fly a policy from 1000 unseen starts, draw plots
   e2efly ablate hover              what each reward term is good for: a figure and a table
+  e2efly sweep hover --seeds 5     over seeds and options, side by side on Ray
   e2efly export RUN                write policy.onnx from a checkpoint again
   e2efly validate POLICY           fly it on another physics, or through the real firmware
   e2efly fly POLICY                fly it on a Betaflight quadrotor
@@ -74,6 +75,30 @@ class Ablate:
     """Folder of the figures, the table and the curves. What is there already is not trained again."""
     device: Literal["cpu", "gpu"] | None = None
     """Where to compute."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Learn a task over seeds and options, runs side by side on Ray (pip install 'e2efly[ray]')."""
+
+    task: tyro.conf.Positional[str]
+    """What to learn."""
+    algo: str | None = None
+    """By which algorithm; what learns the task best when left out."""
+    preset: str = "ours"
+    """Where everything that is not varied comes from."""
+    seeds: int = 5
+    """Runs of each variant: seeds 0, 1, ..."""
+    vary: tuple[str, ...] = ()
+    """Options of `e2efly train` with their values: algo.learning-rate=1e-3,4e-3 steps=500000. Each with each."""
+    out: Path | None = None
+    """Folder of the runs and the table; runs/sweep-TASK-ALGO when left out. All machines of a cluster must share it."""
+    cores: int = 1
+    """Cores of a run, each a device where there are no GPUs."""
+    gpus: int = 0
+    """GPUs of a run, each a device; 0: it computes on the CPU."""
+    address: str | None = None
+    """A Ray cluster's address, or auto; left out: this machine alone, bound to loopback."""
 
 
 @dataclass(frozen=True)
@@ -227,7 +252,7 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
     return options, defaults
 
 
-def train_config(options: Any) -> Any:
+def train_config(options: Any) -> TrainConfig:
     """The `TrainConfig` of parsed options."""
     config = presets.preset(options.task_name, options.algo_name, options.preset)
     shared = {f.name: getattr(options, f.name) for f in dataclasses.fields(config)}
@@ -282,8 +307,9 @@ def run(arguments: list[str]) -> int:
 
 def _command(name: str) -> Callable[[list[str]], int]:
     commands = {
-        "train": _train, "ablate": _ablate, "eval": _eval, "export": _export, "validate": _validate, "fly": _fly,
-        "fly-report": _fly_report, "render": _render, "firmware": _firmware, "bench": _bench, "list": _list,
+        "train": _train, "ablate": _ablate, "sweep": _sweep, "eval": _eval, "export": _export, "validate": _validate,
+        "fly": _fly, "fly-report": _fly_report, "render": _render, "firmware": _firmware, "bench": _bench,
+        "list": _list,
     }  # fmt: skip
     if name not in commands:
         raise ValueError(unknown("command", name, commands))
@@ -291,6 +317,17 @@ def _command(name: str) -> Callable[[list[str]], int]:
 
 
 def _train(arguments: list[str]) -> int:
+    parsed, config = _parsed(arguments)
+    out = parsed.out or Path("runs") / f"{parsed.task_name}-{parsed.algo_name}-{config.seed}"
+    from e2efly.commands.train import train_command
+
+    return train_command(
+        config, out, resume=parsed.resume, device=parsed.device, plots=parsed.plots, hosts=parsed.hosts
+    )
+
+
+def _parsed(arguments: list[str]) -> tuple[Any, TrainConfig]:
+    """The options of `train` and the configuration that they make."""
     task = next((a for a in arguments[:1] if not a.startswith("-")), "hover")
     algo = _peek(arguments, "--algo", presets.default_algorithm(task))
     options, defaults = train_options(task, algo, _peek(arguments, "--preset", "ours"))
@@ -299,13 +336,17 @@ def _train(arguments: list[str]) -> int:
     parsed = tyro.cli(
         options, default=defaults, args=arguments, prog="e2efly train", config=(tyro.conf.AvoidSubcommands,)
     )
-    config = train_config(parsed)
-    out = parsed.out or Path("runs") / f"{task}-{parsed.algo_name}-{config.seed}"
-    from e2efly.commands.train import train_command
+    return parsed, train_config(parsed)
 
-    return train_command(
-        config, out, resume=parsed.resume, device=parsed.device, plots=parsed.plots, hosts=parsed.hosts
-    )
+
+def _sweep(arguments: list[str]) -> int:
+    o = tyro.cli(Sweep, args=arguments, prog="e2efly sweep")
+    from e2efly.commands.sweep import Request, sweep_command
+
+    algo = o.algo or presets.default_algorithm(o.task)
+    out = o.out or Path("runs") / f"sweep-{o.task}-{algo}"
+    request = Request(**{**vars(o), "algo": algo, "out": out})
+    return sweep_command(request, lambda given: _parsed(given)[1])
 
 
 def _ablate(arguments: list[str]) -> int:

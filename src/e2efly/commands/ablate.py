@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from e2efly import presets
 from e2efly.commands.progress import TerminalProgress
+from e2efly.commands.tables import console_table, markdown
 from e2efly.config import TrainConfig
 from e2efly.device import prepare
 
@@ -59,8 +59,8 @@ def ablate_command(request: Request) -> int:
             rows = _rows(curves)
             took = "as found" if known else f"in {time.perf_counter() - began:.0f} s"
             console.print(f"\n{task} by {algo.upper()}: {len(curves.variants)} rewards, {request.seeds} seeds, {took}")
-            console.print(_table(rows))
-            lines += [f"## {task} by {algo.upper()}", "", *_markdown(rows), ""]
+            console.print(console_table(rows))
+            lines += [f"## {task} by {algo.upper()}", "", *markdown(rows), ""]
         path = request.out / f"ablation_{algo}.png"
         plot_ablation(panels, path, f"What each reward term is good for: {algo.upper()}")
         console.print(f"Figure: {path}")
@@ -128,22 +128,4 @@ def _rows(curves: Any) -> list[dict[str, str]]:
             "95 % at": f"{curves.steps[reached[i][0]] / 1e6:.2f} M" if len(reached[i]) else "-",
         }
         for i, variant in enumerate(curves.variants)
-    ]
-
-
-def _table(rows: list[dict[str, str]]) -> Table:
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in rows[0]:
-        table.add_column(heading, no_wrap=True)
-    for row in rows:
-        table.add_row(*row.values())
-    return table
-
-
-def _markdown(rows: list[dict[str, str]]) -> list[str]:
-    heads = list(rows[0])
-    return [
-        "| " + " | ".join(heads) + " |",
-        "| " + " | ".join("---" for _ in heads) + " |",
-        *("| " + " | ".join(row.values()) + " |" for row in rows),
     ]

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
 from e2efly.commands.progress import TerminalProgress
+from e2efly.commands.tables import console_table
 from e2efly.config import TrainConfig
 from e2efly.device import Hosts, cache_folder, prepare
 from e2efly.presets import algorithm_name, task_name
@@ -57,26 +57,24 @@ def _train(config: TrainConfig, out: Path, resume: bool, plots: bool, console: C
 
 
 def _report(console: Console, summary: dict[str, Any]) -> None:
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in ("policy", "update", "success", "final error", "mean error", "time", "top speed"):
-        table.add_column(heading, no_wrap=True)
-    for which, called in (("shipped", "best"), ("last", "last")):
-        for name, d in summary[which].items():
-            if name == "update":
-                continue
-            table.add_row(
-                f"{name}, {called}",
-                str(summary[which]["update"]),
-                f"{d['success']:.1%}",
-                f"{100 * d['final_error_m']:.1f} cm",
-                f"{100 * d['mean_error_m']:.1f} cm",
-                f"{d['seconds_of_success']:.2f} s",
-                f"{d['top_speed_m_s']:.1f} m/s",
-            )
+    rows = [
+        {
+            "policy": f"{name}, {called}",
+            "update": summary[which]["update"],
+            "success": f"{d['success']:.1%}",
+            "final error": f"{100 * d['final_error_m']:.1f} cm",
+            "mean error": f"{100 * d['mean_error_m']:.1f} cm",
+            "time": f"{d['seconds_of_success']:.2f} s",
+            "top speed": f"{d['top_speed_m_s']:.1f} m/s",
+        }
+        for which, called in (("shipped", "best"), ("last", "last"))
+        for name, d in summary[which].items()
+        if name != "update"
+    ]
     seconds = summary["seconds_trained_from_process_start"]
     console.print(
         f"\nLearned to {summary['task']} by {summary['algorithm'].upper()} in {seconds:.1f} s from the start of the "
         f"process ({summary['env_steps'] / 1e6:.2f} M environment steps). "
         f"Flown from {summary['episodes']} starts that it never saw:"
     )
-    console.print(table)
+    console.print(console_table(rows))

@@ -1,0 +1,224 @@
+"""`e2efly sweep`: a task learned over seeds and options, many runs side by side on Ray.
+
+Each run is a process of `e2efly train` in a folder of its own. What is finished there is not trained again, what was
+cut short goes on: after an end of the sweep, and, by Ray, after the loss of a worker.
+"""
+
+import dataclasses
+import fcntl
+import itertools
+import json
+import logging
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from e2efly import presets
+from e2efly.commands.tables import console_table, markdown
+from e2efly.config import TrainConfig
+from e2efly.device import cores
+
+_GIVEN = ("seed", "out", "resume", "algo", "preset", "device", "devices", "plots", "no-plots")
+"""Options of `e2efly train` that a sweep gives itself."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to run, and where."""
+
+    task: str
+    algo: str
+    preset: str
+    seeds: int
+    vary: tuple[str, ...]
+    out: Path
+    cores: int
+    gpus: int
+    address: str | None
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One run."""
+
+    variant: str
+    """What is the same for all its seeds."""
+    seed: int
+    arguments: tuple[str, ...]
+    """Of `e2efly train`."""
+    out: Path
+
+    def ended(self) -> dict[str, Any] | None:
+        """The summary of the run, where it has come to its end."""
+        summary = self.out / "summary.json"
+        found = json.loads(summary.read_text(encoding="utf-8")) if summary.exists() else {}
+        return found if found.get("finished") else None
+
+
+def sweep_command(request: Request, config_of: Callable[[list[str]], TrainConfig]) -> int:
+    """Run every variant with every seed; write sweep.json and a table. Exit status 1 when a run failed.
+
+    Args:
+        request: what to run.
+        config_of: the configuration of arguments of `e2efly train`; ends the program for what it cannot understand.
+
+    Raises:
+        ValueError: for options that cannot be varied so, and for a folder with runs of another configuration.
+        OSError: when the folder cannot be written or the cluster not reached.
+    """
+    console, trials = Console(highlight=False), list(trials_of(request))
+    if len({trial.out for trial in trials}) < len(trials):
+        raise ValueError(f"--vary {' '.join(request.vary)}: two variants share a folder; accepted: values that differ")
+    for trial in trials:
+        _check(trial, config_of(list(trial.arguments)))
+    request.out.mkdir(parents=True, exist_ok=True)
+    found = {trial.out: summary for trial in trials if (summary := trial.ended())}
+    console.print(f"{len(trials)} runs of {request.task} by {request.algo.upper()}, {len(found)} of them there already")
+    left, failed = [trial for trial in trials if trial.out not in found], 0
+    for trial, how in _run(left, request) if left else ():
+        summary = trial.ended()
+        if summary is None:
+            failed += 1
+            console.print(f"[bold red]failed:[/] {trial.out.name}: ", end="")
+            console.print(how, markup=False)
+            continue
+        found[trial.out] = summary
+        seconds = summary["seconds_trained_from_process_start"]
+        console.print(f"{len(found)} of {len(trials)}: {trial.out.name}: {_success(summary):.1%} in {seconds:.0f} s")
+    _report(request, trials, found, console)
+    return 1 if failed else 0
+
+
+def trials_of(request: Request) -> Iterator[Trial]:
+    """Every combination of the values of the varied options, with every seed.
+
+    Raises:
+        ValueError: naming the option and what is accepted.
+    """
+    if request.seeds < 1:
+        raise ValueError(f"--seeds is {request.seeds}; accepted: 1 or more")
+    varied: dict[str, list[str]] = {}
+    for item in request.vary:
+        option, equals, values = item.partition("=")
+        option = option.lstrip("-").replace("_", "-")
+        if not equals or not values or option in _GIVEN or option.startswith("hosts"):
+            raise ValueError(
+                f"--vary {item!r}; accepted: OPTION=VALUE,VALUE,... with an option of `e2efly train` such as "
+                f"algo.learning-rate, but not hosts, {', '.join(_GIVEN)}"
+            )
+        if option in varied:
+            raise ValueError(f"--vary {option} twice; accepted: all of its values behind one")
+        varied[option] = values.split(",")
+    for values in itertools.product(*varied.values()):
+        chosen = dict(zip(varied, values, strict=True))
+        told = [f"{option} {value}" for option, value in chosen.items() if len(varied[option]) > 1]
+        variant = ", ".join(told) or request.preset
+        given = [part for option, value in chosen.items() for part in (f"--{option}", *value.split())]
+        for seed in range(request.seeds):
+            folder = re.sub(r"[^\w.+-]", "-", "_".join([*told, f"seed {seed}"]))
+            arguments = (
+                request.task, "--algo", request.algo, "--preset", request.preset, "--seed", str(seed), "--no-plots",
+                "--devices", str(request.gpus or request.cores), "--device", "gpu" if request.gpus else "cpu", *given,
+            )  # fmt: skip
+            yield Trial(variant, seed, arguments, (request.out / folder).absolute())
+
+
+def train_trial(trial: Trial) -> int:
+    """Run `e2efly train` into a folder, or go on with what it holds; its words go to train.log there."""
+    trial.out.mkdir(parents=True, exist_ok=True)
+    with (trial.out / "train.log").open("ab") as log:
+        fcntl.flock(log, fcntl.LOCK_EX)  # the process holds it, too: one that outlives its worker is waited for
+        if trial.ended():
+            return 0
+        again = ["--resume"] if (trial.out / "config.json").exists() else []
+        command = [sys.executable, "-m", "e2efly", "train", *trial.arguments, "--out", str(trial.out), *again]
+        return subprocess.run(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, check=False).returncode
+
+
+def _check(trial: Trial, config: TrainConfig) -> None:
+    """Refuse numbers that cannot be used, and a folder that holds a run of another configuration."""
+    presets.check(config)
+    if not (trial.out / "config.json").exists():
+        return
+    from e2efly.learn.rundir import RunDirectory, differences
+
+    if different := list(differences(RunDirectory(trial.out).config(), config)):
+        raise ValueError(f"{trial.out} holds a run of another configuration: {'; '.join(different)}")
+
+
+def _run(trials: list[Trial], request: Request) -> Iterator[tuple[Trial, str]]:
+    """The trials as they end, and how each did."""
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # before the import: nothing is told to anybody
+    try:
+        import ray
+        from ray.exceptions import RayError
+    except ModuleNotFoundError as error:
+        raise ValueError(f"a sweep needs the package {error.name}: pip install 'e2efly[ray]'") from None
+    here: dict[str, Any] = {"num_cpus": cores(), "include_dashboard": False, "_node_ip_address": "127.0.0.1"}
+    where: dict[str, Any] = {"address": "local", **here} if request.address is None else {"address": request.address}
+    try:
+        ray.init(**where, log_to_driver=False, logging_level=logging.ERROR)
+    except ConnectionError as error:
+        raise OSError(f"--address {request.address}: {error}") from None
+    try:
+        machines = [node["Resources"] for node in ray.nodes() if node["Alive"]]
+        if not any(m.get("CPU", 0) >= request.cores and m.get("GPU", 0) >= request.gpus for m in machines):
+            known = "; ".join(f"{m.get('CPU', 0):g} cores and {m.get('GPU', 0):g} GPUs" for m in machines)
+            raise ValueError(f"--cores {request.cores} --gpus {request.gpus}; accepted: what one machine has: {known}")
+        remote = ray.remote(num_cpus=request.cores, num_gpus=request.gpus, max_retries=3)(train_trial)
+        waiting = {remote.remote(trial): trial for trial in trials}
+        while waiting:
+            (done, *_), _ = ray.wait(list(waiting))
+            trial = waiting.pop(done)
+            try:
+                status = ray.get(done)
+            except RayError as error:
+                yield trial, str(error)
+            else:
+                yield trial, f"status {status}: {_last_line(trial)}"
+    finally:
+        ray.shutdown()
+
+
+def _success(summary: dict[str, Any]) -> float:
+    """Of the shipped policy, by its worst criterion."""
+    return min(found["success"] for name, found in summary["shipped"].items() if name != "update")
+
+
+def _last_line(trial: Trial) -> str:
+    log = trial.out / "train.log"
+    lines = log.read_text(errors="replace").strip().splitlines() if log.exists() else []
+    return lines[-1] if lines else "it said nothing"
+
+
+def _report(request: Request, trials: list[Trial], found: dict[Path, dict[str, Any]], console: Console) -> None:
+    """A row a variant, and a file with every run."""
+    from e2efly.learn.checkpoint import write_atomically
+
+    rows = []
+    for variant in dict.fromkeys(trial.variant for trial in trials):
+        of = [found[trial.out] for trial in trials if trial.variant == variant and trial.out in found]
+        success = [_success(summary) for summary in of]
+        seconds = [summary["seconds_trained_from_process_start"] for summary in of]
+        rows.append(
+            {
+                "variant": variant,
+                "runs": len(of),
+                "success": f"{np.mean(success):.1%}" if of else "-",
+                "worst seed": f"{min(success):.1%}" if of else "-",
+                "trained": f"{np.median(seconds):.0f} s" if of else "-",
+            }
+        )
+    runs = [{**dataclasses.asdict(trial), "out": trial.out.name, "summary": found.get(trial.out)} for trial in trials]
+    write_atomically(request.out / "sweep.json", (json.dumps(runs, indent=1) + "\n").encode())
+    write_atomically(request.out / "sweep.md", ("\n".join(markdown(rows)) + "\n").encode())
+    console.print(console_table(rows))
+    console.print(f"Table: {request.out / 'sweep.md'}   every run: {request.out / 'sweep.json'}")

@@ -1,0 +1,139 @@
+"""Sweeps: runs side by side on a real Ray, resumed and never trained twice."""
+
+import dataclasses
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from e2efly.commands.sweep import Request, trials_of
+
+SMALL = ["steps=6144", "chunk=2", "eval-episodes=20", "algo.envs=16", "algo.horizon=16", "algo.minibatch=128",
+         "task.episode-s=1"]  # fmt: skip
+
+
+def request(*vary: str, seeds: int = 1) -> Request:
+    return Request("hover", "ppo", "ours", seeds, vary, Path("sweep"), 1, 0.0, None)
+
+
+def sweep(cwd: Path, *flags: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "e2efly", "sweep", "hover", "--out", "sweep", *flags]
+    return subprocess.Popen(command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+def test_every_value_goes_with_every_other_and_every_seed() -> None:
+    trials = list(trials_of(request("algo.gamma=0.9,0.99", "steps=1000", "network.hidden=8,8 8", seeds=2)))
+    assert [t.out.name for t in trials[:3]] == [
+        "algo.gamma-0.9_network.hidden-8_seed-0", "algo.gamma-0.9_network.hidden-8_seed-1",
+        "algo.gamma-0.9_network.hidden-8-8_seed-0",
+    ]  # fmt: skip
+    assert len({t.out for t in trials}) == 8
+    assert trials[-1].variant == "algo.gamma 0.99, network.hidden 8 8"
+    assert trials[-1].arguments[-7:] == ("--algo.gamma", "0.99", "--steps", "1000", "--network.hidden", "8", "8")
+    assert trials[-1].arguments[5:7] == ("--seed", "1")
+
+
+@pytest.mark.parametrize("vary", ["seed=1,2", "device=gpu", "hosts.count=2", "algo.gamma", "algo.gamma="])
+def test_what_cannot_be_varied_is_refused(vary: str) -> None:
+    with pytest.raises(ValueError, match=f"--vary '{vary}'; accepted: OPTION=VALUE"):
+        list(trials_of(request(vary)))
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (["--vary", "algo.gamma=0.9,0.9"], "two variants share a folder"),
+        (["--vary", "algo.gamma=0.9", "algo.gamma=0.8"], "--vary algo.gamma twice"),
+        (["--vary", "algo.gamma=0.9,1.9"], "algo.gamma is 1.9; accepted: above 0"),
+        (["--cores", "1000"], "--cores 1000 --gpus 0; accepted: what one machine has: "),
+    ],
+)
+def test_what_cannot_run_is_refused_before_anything_does(flags: list[str], message: str, tmp_path: Path) -> None:
+    process = sweep(tmp_path, *flags)
+    told, _ = process.communicate()
+    assert process.returncode == 2
+    assert message in " ".join(told.split())
+    assert not list(tmp_path.glob("sweep/*"))
+
+
+def test_no_seeds_are_refused() -> None:
+    with pytest.raises(ValueError, match="--seeds is 0; accepted: 1 or more"):
+        list(trials_of(dataclasses.replace(request(), seeds=0)))
+
+
+def test_a_sweep_trains_on_ray_and_nothing_twice(tmp_path: Path) -> None:
+    flags = ["--seeds", "1", "--vary", *SMALL, "network.hidden=8,8 8"]
+    first = sweep(tmp_path, *flags)
+    told, _ = first.communicate()
+    assert first.returncode == 0, told
+    runs = json.loads((tmp_path / "sweep/sweep.json").read_text())
+    assert [run["variant"] for run in runs] == ["network.hidden 8", "network.hidden 8 8"]
+    assert all(run["summary"]["env_steps"] == 6144 for run in runs)
+    assert (tmp_path / "sweep/sweep.md").read_text().count("| network.hidden") == 2
+    policy = tmp_path / "sweep/network.hidden-8_seed-0/policy.onnx"
+    before = policy.stat().st_mtime_ns
+    again = sweep(tmp_path, *flags)
+    told, _ = again.communicate()
+    assert again.returncode == 0
+    assert "2 of them there already" in told
+    assert policy.stat().st_mtime_ns == before
+    other = sweep(tmp_path, *flags, "algo.gamma=0.9")
+    told, _ = other.communicate()
+    assert other.returncode == 2
+    assert "another configuration: algo.gamma: 0.96 and 0.9" in " ".join(told.split())
+
+
+def test_a_run_that_was_cut_goes_on_and_a_lost_worker_is_replaced(tmp_path: Path) -> None:
+    flags = [item if not item.startswith("steps") else "steps=300000" for item in SMALL]
+    folder = tmp_path / "sweep/seed-0"
+
+    def training() -> Path:
+        return next(p for p in Path("/proc").iterdir() if p.name.isdigit() and str(folder) in _command(p))
+
+    first = sweep(tmp_path, "--seeds", "1", "--vary", *flags)
+    while _updates(folder) < 20:
+        assert first.poll() is None, first.communicate()[0]
+        time.sleep(0.01)
+    os.kill(int(training().name), signal.SIGKILL)
+    told, _ = first.communicate()
+    assert first.returncode == 1, told
+    assert "failed: seed-0: status -9" in " ".join(told.split())
+    done, began = _updates(folder), (folder / "config.json").stat().st_mtime_ns
+    second = sweep(tmp_path, "--seeds", "1", "--vary", *flags)
+    while _updates(folder) <= done:
+        assert second.poll() is None, second.communicate()[0]
+        time.sleep(0.01)
+    worker = int((training() / "stat").read_text().rsplit(")", 1)[1].split()[1])
+    os.kill(worker, signal.SIGKILL)
+    told, _ = second.communicate()
+    assert second.returncode == 0, told
+    assert json.loads((folder / "summary.json").read_text())["env_steps"] >= 300_000
+    assert (folder / "config.json").stat().st_mtime_ns == began
+    updates = [int(line.split(",")[0]) for line in (folder / "metrics.csv").read_text().splitlines()[1:]]
+    assert updates == list(range(1, len(updates) + 1))
+
+
+def test_a_run_that_fails_is_told_and_the_others_end(tmp_path: Path) -> None:
+    process = sweep(tmp_path, "--seeds", "1", "--vary", *SMALL, "algo.learning-rate=1e30,1e-3")
+    told, _ = process.communicate()
+    assert process.returncode == 1
+    assert "failed: algo.learning-rate-1e30_seed-0, status 2: error:" in " ".join(told.split())
+    assert (tmp_path / "sweep/algo.learning-rate-1e-3_seed-0/policy.onnx").exists()
+
+
+def _updates(folder: Path) -> int:
+    """Rows of a run's metrics so far."""
+    metrics = folder / "metrics.csv"
+    return metrics.read_text().count("\n") - 1 if metrics.exists() else 0
+
+
+def _command(process: Path) -> str:
+    try:
+        return (process / "cmdline").read_text()
+    except OSError:
+        return ""
