@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 import os
 import platform
 import statistics
@@ -9,6 +10,8 @@ from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
+
+from e2efly.commands.tables import markdown
 
 RESULTS = Path(__file__).parent / "results"
 """Where the published figures are kept."""
@@ -55,11 +58,9 @@ def with_earlier(name: str, path: Path | None, part: str, keys: tuple[str, ...],
 
 def table(rows: list[dict[str, Any]]) -> str:
     """A markdown table."""
-    heads = list(rows[0])
-    lines = ["| " + " | ".join(heads) + " |", "| " + " | ".join("---" for _ in heads) + " |"]
-    return "\n".join(lines + ["| " + " | ".join(str(row[h]) for h in heads) + " |" for row in rows])
+    return "\n".join(markdown(rows))
 
 
 def median(values: list[float]) -> float:
-    """The median; NaN of nothing."""
-    return statistics.median(values) if values else float("nan")
+    """The median, where NaN is what never came; NaN of nothing."""
+    return statistics.median(math.inf if math.isnan(x) else x for x in values) if values else math.nan

@@ -10,6 +10,8 @@ from e2efly.device import cache_folder, cores
 PEERS = {
     "Crazyflow 0.4": ("crazyflow_rate.py", {1, cores()}, ("crazyflow==0.4.0",)),
     "RotorPy 3.0": ("rotorpy_rate.py", {1}, ("rotorpy[batched]==3.0.0", "torch==2.13.0")),
+    "L2F 2.0, RK4": ("l2f_rate.py", {1}, ("l2f==2.0.18", "numpy")),
+    "PyFlyt 0.29, 64 vehicles": ("pyflyt_rate.py", {1}, ("pyflyt==0.29.0",)),
 }
 """By name: the script that prints physics steps/s, on how many XLA devices to run it, and what it needs."""
 

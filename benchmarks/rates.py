@@ -2,8 +2,9 @@
 
     python benchmarks/rates.py [--rounds 5] [--json FILE]
 
-Crazyflow and RotorPy are installed into virtual environments of their own (`peers.py`). All are timed in turn, `rounds`
-times; the table has the medians, and the ratio to the median of the best peer.
+Crazyflow, RotorPy, L2F and PyFlyt are installed into virtual environments of their own (`peers.py`). All are timed in
+turn, `rounds` times, on 1024 vehicles where nothing else is said; the table has the medians, and the ratio to the
+median of the best peer.
 """
 
 from common import arguments, median, table, write
@@ -29,9 +30,10 @@ def main() -> None:
         steps.append(environment_steps("hover", WORLDS))
     substeps, own, env = median(ours), median(general), median(steps)
     peer = max(median(found) for found in theirs.values())
+    bare = median(theirs["Crazyflow 0.4"]) / 10
     figures = {
-        **{f"{name} physics steps, {WORLDS} worlds": median(found) for name, found in theirs.items()},
-        f"the best of them, control steps (10 physics steps), {WORLDS} worlds": peer / 10,
+        **{f"{name}: physics steps": median(found) for name, found in theirs.items()},
+        "Crazyflow 0.4: control steps (10 physics steps)": bare,
         f"e2efly physics sub-steps, {WORLDS} vehicles": substeps,
         f"e2efly physics sub-steps, {WORLDS} vehicles, each with parameters of its own": own,
         f"e2efly environment steps (7 sub-steps, everything included), {WORLDS} environments, hover": env,
@@ -43,9 +45,9 @@ def main() -> None:
     }
     rows = [{"what": name, "a second": f"{value:,.0f}"} for name, value in figures.items()]
     ratios = {
-        "physics over the best of them": substeps / peer,
+        "physics over the best of the others": substeps / peer,
         "physics, parameters as constants over each its own": substeps / own,
-        "environment over its bare control steps": env / (peer / 10),
+        "environment over Crazyflow's bare control steps": env / bare,
     }
     rows += [{"what": f"ratio, {name}", "a second": f"{value:.2f}"} for name, value in ratios.items()]
     rounds = {"e2efly": ours, "general": general, "environment": steps, **theirs}

@@ -1,6 +1,8 @@
 """Success over 1000 unseen starts of the shipped policy of the full presets, for every task, algorithm and seed.
 
 python benchmarks/success.py [--tasks hover ...] [--algos ppo bptt] [--seeds 5] [--json FILE]
+
+Rows that are not measured anew stay.
 """
 
 import json
@@ -10,7 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from common import arguments, table, write
+from common import arguments, table, with_earlier, write
 
 TASKS = ["hover", "land", "track", "race"]
 
@@ -51,7 +53,9 @@ def main() -> None:
                     }
                 )
                 print(rows[-1], flush=True)
-            write("success", options.json, {"table": rows, "runs": every})
+            whole = with_earlier("success", options.json, "table", ("algorithm", "criterion"), rows)
+            runs = with_earlier("success", options.json, "runs", ("algorithm", "task"), every)
+            write("success", options.json, {"table": whole, "runs": runs})
     print(table(rows))
 
 

@@ -7,6 +7,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from e2efly.commands.tables import markdown
+
 DOCS = Path(__file__).parent
 RESULTS = DOCS.parent / "benchmarks" / "results"
 TITLES = {
@@ -15,8 +17,11 @@ TITLES = {
     "rendering": "Images of the clutter scene: ground, 4 gates, 16 obstacles, another world for each camera",
     "visual_tasks": "Tasks flown by sight: 1000 unseen starts and worlds, full presets",
     "time_to_criterion": "Time to the criterion, from process start",
+    "thrown": "Catching a thrown vehicle: success over 1000 unseen starts, full presets",
+    "thrown_starts": "Thrown starts that nothing saves",
     "stable_baselines3_ppo": "Time to the hover criterion, beside Stable-Baselines3 on the same environment",
     "success": "Success over 1000 unseen starts, full presets",
+    "ablation": "The reward ablation, from process start, empty cache",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
     "firmware_faults": "Faults injected into flights of the real firmware",
@@ -25,16 +30,6 @@ TITLES = {
     "runtime_speed": "The runtime on a companion computer",
     "msp_fuzz": "MSP codec under fuzzing",
 }
-
-
-def markdown(rows: list[dict[str, str]]) -> list[str]:
-    """A markdown table."""
-    heads = list(rows[0])
-    return [
-        "| " + " | ".join(heads) + " |",
-        "| " + " | ".join("---" for _ in heads) + " |",
-        *("| " + " | ".join(str(row[h]) for h in heads) + " |" for row in rows),
-    ]
 
 
 def noise() -> None:
@@ -62,8 +57,36 @@ def noise() -> None:
         small.save(path, optimize=True)
 
 
+def thrown() -> None:
+    """docs/thrown.png: success while learning to catch a thrown vehicle, by environment steps and by seconds."""
+    import numpy as np
+
+    from e2efly.view.style import CYCLE, figure
+
+    path = RESULTS / "thrown.json"
+    if not path.exists():
+        return
+    curves = json.loads(path.read_text())["curves"]
+    notes = [
+        "success over 250 starts; line: median of 5 seeds, band: worst to best; seconds from process start, empty cache"
+    ]
+    with figure(DOCS / "thrown.png", "Catching a thrown vehicle", 3.6, notes) as fig:
+        axes = fig.subplots(1, 2, sharey=True)
+        for color, curve in zip(CYCLE, curves, strict=False):
+            success = 100 * np.array([seed["success"] for seed in curve["seeds"]])
+            for ax, unit, scale in zip(axes, ("steps", "seconds"), (1e-6, 1.0), strict=True):
+                x = scale * np.median([seed[unit] for seed in curve["seeds"]], axis=0)
+                ax.fill_between(x, success.min(axis=0), success.max(axis=0), color=color, alpha=0.12, linewidth=0)
+                ax.plot(x, np.median(success, axis=0), color=color, label=curve["algorithm"].upper())
+        for ax, label in zip(axes, ("environment steps (million)", "time (s)"), strict=True):
+            ax.set_xlabel(label)
+            ax.set_xscale("log")
+        axes[0].set_ylabel("success (%)")
+        axes[1].legend(loc="lower right")
+
+
 def main() -> None:
-    """Write docs/benchmarks.md; with `--noise` draw docs/noise.md; with `--pictures` train and draw the racer, too."""
+    """Write docs/benchmarks.md and thrown.png; with `--noise` draw docs/noise.md; with `--pictures` the racer, too."""
     source = "Written by `make docs` from `benchmarks/results/*.json`; measured by the scripts in `benchmarks/`."
     lines = ["# Benchmarks", "", source, ""]
     for name, title in TITLES.items():
@@ -74,6 +97,7 @@ def main() -> None:
             about = f"`benchmarks/{name}.py`, {content['date']}, {m['cores']} cores of {m['cpu']}, JAX {m['jax']}."
             lines += [f"## {title}", "", about, "", *markdown(content["table"]), ""]
     (DOCS / "benchmarks.md").write_text("\n".join(lines))
+    thrown()
     if "--noise" in sys.argv or "--pictures" in sys.argv:
         noise()
     if "--pictures" in sys.argv:

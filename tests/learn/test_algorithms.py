@@ -29,8 +29,9 @@ ABPT_CONFIG = ABPTConfig(
 )  # fmt: skip
 
 FOPPO_CONFIG = FOPPOConfig(
-    envs=32, horizon=8, minibatch=128, learning_rate=1e-2, learning_rate_end=1e-3, gamma=0.9, max_grad_norm=10.0
-)
+    envs=32, horizon=8, minibatch=128, learning_rate=1e-2, learning_rate_end=1e-3, gamma=0.9, max_grad_norm=10.0,
+    exact_rate=1.0, log_std=-1.0,
+)  # fmt: skip
 
 
 def learn(

@@ -151,7 +151,9 @@ class FOPPOConfig(_Proximal, _FirstOrder):
 
     horizon: int = 32
     """Steps of a rollout, which is the window of the exact gradient (sets shapes)."""
-    exact_rate: float = 1.0
+    log_std: float = -1.5
+    """Initial log standard deviation of the action noise."""
+    exact_rate: float = 3.0
     """The step along the exact gradient over that of the epochs."""
     gamma: float = 0.98
     """Discount a step."""

@@ -51,6 +51,8 @@ class HoverConfig:
 
     episode_s: float = 8.0
     """Length of an episode, s."""
+    judged_s: float = 0.0
+    """Length of the episodes that the policy is judged by, s; 0: the same."""
     target: tuple[float, float, float] = defaults.TARGET
     """Where to hover, world, m."""
     position: float = 2.0

@@ -125,7 +125,9 @@ def _loop(
     config, task = setup.config, presets.task_name(setup.config.task)
     before, stopped = progress.seconds, False  # of earlier processes of this run
     with _writing(run, progress.update) as write, _interruptible() as stop:
-        while progress.update < setup.updates and not (stopped := hosts.any_of(stop.is_set())):
+        while progress.update < setup.updates and not progress.reached:
+            if stopped := hosts.any_of(stop.is_set()):
+                break
             began = time.perf_counter()
             number, stages = progress.stage, len(setup.stages)
             stage, final = setup.stages[number], number == stages - 1
@@ -143,7 +145,8 @@ def _loop(
                     reached = {"seconds": before + since_process_start(), "steps": steps}
             update = progress.update + config.chunk
             promoted = stage.is_over(last, (update - progress.stage_update) * setup.steps_per_update)
-            better = now > progress.best_score or not final  # a policy counts by the task itself
+            # a policy counts by the task itself; what met the criterion is what is shipped
+            better = now > progress.best_score or not final or bool(reached)
             progress = Progress(
                 update=update,
                 seconds=before + since_process_start(),
@@ -169,8 +172,6 @@ def _loop(
                 progress.best_success,
                 f"stage {progress.stage + 1} of {stages}" if stages > 1 else "",
             )
-            if reached:
-                break
         return state, best, progress, stopped
 
 

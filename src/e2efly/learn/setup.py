@@ -72,8 +72,9 @@ class Setup:
 
     @property
     def episode_steps(self) -> int:
-        """Control steps of the longest episode."""
-        return math.ceil(float(self.config.task.episode_s) / self.env.control_period - 1e-6)
+        """Control steps of the longest episode that the policy is judged by."""
+        longest = max(float(task.episode_s) for task in presets.suites(self.config.task).values())
+        return math.ceil(longest / self.env.control_period - 1e-6)
 
     @property
     def settle(self) -> float:
