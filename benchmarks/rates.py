@@ -31,14 +31,17 @@ def main() -> None:
     substeps, own, env = median(ours), median(general), median(steps)
     peer = max(median(found) for found in theirs.values())
     bare = median(theirs["Crazyflow 0.4"]) / 10
+    ppo, bptt = ([training_steps("hover", algo, general=own) for own in (False, True)] for algo in ("ppo", "bptt"))
     figures = {
         **{f"{name}: physics steps": median(found) for name, found in theirs.items()},
         "Crazyflow 0.4: control steps (10 physics steps)": bare,
         f"e2efly physics sub-steps, {WORLDS} vehicles": substeps,
         f"e2efly physics sub-steps, {WORLDS} vehicles, each with parameters of its own": own,
         f"e2efly environment steps (7 sub-steps, everything included), {WORLDS} environments, hover": env,
-        "e2efly PPO training steps, hover": training_steps("hover", "ppo"),
-        "e2efly BPTT training steps, hover": training_steps("hover", "bptt"),
+        "e2efly PPO training steps, hover": ppo[0],
+        "e2efly PPO training steps, hover, each vehicle with parameters of its own": ppo[1],
+        "e2efly BPTT training steps, hover": bptt[0],
+        "e2efly BPTT training steps, hover, each vehicle with parameters of its own": bptt[1],
         "e2efly BPTT training steps, hover, 100 environments, horizon 96, networks 192-96": training_steps(
             "hover", "bptt", wide=True
         ),
@@ -47,6 +50,8 @@ def main() -> None:
     ratios = {
         "physics over the best of the others": substeps / peer,
         "physics, parameters as constants over each its own": substeps / own,
+        "PPO training, parameters as constants over each its own": ppo[0] / ppo[1],
+        "BPTT training, parameters as constants over each its own": bptt[0] / bptt[1],
         "environment over Crazyflow's bare control steps": env / bare,
     }
     rows += [{"what": f"ratio, {name}", "a second": f"{value:.2f}"} for name, value in ratios.items()]

@@ -18,7 +18,7 @@ SMALL = ["steps=6144", "chunk=2", "eval-episodes=20", "algo.envs=16", "algo.hori
 
 
 def request(*vary: str, seeds: int = 1) -> Request:
-    return Request("hover", "ppo", "ours", seeds, vary, Path("sweep"), 1, 0.0, None)
+    return Request("hover", "ppo", "ours", seeds, vary, Path("sweep"), 1, 0, None)
 
 
 def sweep(cwd: Path, *flags: str) -> subprocess.Popen[str]:
@@ -61,9 +61,10 @@ def test_what_cannot_run_is_refused_before_anything_does(flags: list[str], messa
     assert not list(tmp_path.glob("sweep/*"))
 
 
-def test_no_seeds_are_refused() -> None:
-    with pytest.raises(ValueError, match="--seeds is 0; accepted: 1 or more"):
-        list(trials_of(dataclasses.replace(request(), seeds=0)))
+@pytest.mark.parametrize(("name", "value"), [("seeds", 0), ("cores", 0), ("gpus", -1)])
+def test_too_little_is_refused(name: str, value: int) -> None:
+    with pytest.raises(ValueError, match=f"--{name} is {value}; accepted: {value + 1} or more"):
+        list(trials_of(dataclasses.replace(request(), **{name: value})))
 
 
 def test_a_sweep_trains_on_ray_and_nothing_twice(tmp_path: Path) -> None:
@@ -122,7 +123,7 @@ def test_a_run_that_fails_is_told_and_the_others_end(tmp_path: Path) -> None:
     process = sweep(tmp_path, "--seeds", "1", "--vary", *SMALL, "algo.learning-rate=1e30,1e-3")
     told, _ = process.communicate()
     assert process.returncode == 1
-    assert "failed: algo.learning-rate-1e30_seed-0, status 2: error:" in " ".join(told.split())
+    assert "failed: algo.learning-rate-1e30_seed-0: status 2: error:" in " ".join(told.split())
     assert (tmp_path / "sweep/algo.learning-rate-1e-3_seed-0/policy.onnx").exists()
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from e2efly.control.vectors import Vec3
 from e2efly.physics import INTEGRATORS, Physics, State, step
+from e2efly.physics.plant import Plant
 from e2efly.physics.state import Parts, split4
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.vehicles.vehicle import quantities
@@ -86,10 +87,11 @@ def fly_open_loop() -> Fly:
         integrator: str, plant: Vehicle, state: State, commands: jax.Array, wind: Any, period: Any, substeps: Any
     ) -> State:
         air, dt = Vec3.of(wind), period / substeps
+        parts_of_plant = Plant.of(plant, dt)
 
         def one(parts: Parts, command: jax.Array) -> tuple[Parts, State]:
             def substep(_: jax.Array, parts: Parts) -> Parts:
-                return INTEGRATORS[integrator](plant, parts, split4(command), air, dt)
+                return INTEGRATORS[integrator](parts_of_plant, parts, split4(command), air, dt)
 
             parts = jax.lax.fori_loop(0, substeps, substep, parts)
             return parts, parts.join()

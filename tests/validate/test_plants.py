@@ -150,7 +150,7 @@ def test_rate_loop_and_mixer_are_the_simulators(vis_r: Vehicle) -> None:
         rate = rng.uniform(-12, 12, 3)
         wanted = np.clip(command[1:], -vis_r.body_rate_max, vis_r.body_rate_max)
         torque = vis_r.inertia * vis_r.rate_gain * (wanted - rate)
-        torque = torque + np.array(gyroscopic_torque(vis_r, Vec3(*rate)).stack())
+        torque = torque + np.array(gyroscopic_torque(Vec3.of(vis_r.inertia), Vec3(*rate)).stack())
         ours = mixer.thrusts(vis_r.mass * command[0], Vec3(*(jnp.asarray(x) for x in torque)))
         theirs = law(command.tolist(), rate.tolist())
         np.testing.assert_allclose(theirs, np.array(ours), rtol=1e-5, atol=1e-5)

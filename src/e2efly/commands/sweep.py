@@ -103,8 +103,9 @@ def trials_of(request: Request) -> Iterator[Trial]:
     Raises:
         ValueError: naming the option and what is accepted.
     """
-    if request.seeds < 1:
-        raise ValueError(f"--seeds is {request.seeds}; accepted: 1 or more")
+    for name, least in (("seeds", 1), ("cores", 1), ("gpus", 0)):
+        if getattr(request, name) < least:
+            raise ValueError(f"--{name} is {getattr(request, name)}; accepted: {least} or more")
     varied: dict[str, list[str]] = {}
     for item in request.vary:
         option, equals, values = item.partition("=")

@@ -69,9 +69,22 @@ def environment_steps(task: str, envs: int, steps: int = 200, env_config: EnvCon
     return best_rate(envs * steps, lambda: jax.block_until_ready(program(env, state, actions)))
 
 
-def training_steps(task: str, algo: str, wide: bool = False) -> float:
-    """Environment steps/s of training by a preset; `wide`: 100 environments, horizon 96, networks of 192 and 96."""
+_OWN = (
+    "mass", "inertia", "rotor_position", "thrust_map", "torque_ratio", "motor_time_constant", "drag_linear",
+    "drag_quadratic",
+)  # fmt: skip
+GENERAL = dict.fromkeys(_OWN, 0.1)
+"""What makes every vehicle's flight its own: shares by which parameters are drawn anew in every episode."""
+
+
+def training_steps(task: str, algo: str, wide: bool = False, general: bool = False) -> float:
+    """Environment steps/s of training by a preset.
+
+    `wide`: 100 environments, horizon 96, networks of 192 and 96. `general`: vehicles with parameters of their own.
+    """
     config = presets.preset(task, algo)
+    if general:
+        config = dataclasses.replace(config, env=dataclasses.replace(config.env, randomize=GENERAL))
     if wide and isinstance(config.algo, BPTTConfig):
         algo_config = dataclasses.replace(config.algo, envs=100, horizon=96)
         config = dataclasses.replace(config, algo=algo_config, network=NetworkConfig((192, 96)))

@@ -5,17 +5,16 @@ import jax.numpy as jnp
 from jax import Array
 
 from e2efly.control.vectors import Quat, Vec3
-from e2efly.physics.state import Parts, split4
+from e2efly.physics.plant import Plant, Rotors
+from e2efly.physics.state import Parts
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle, quantities
-
-Rotors = tuple[Array, Array, Array, Array]
 
 jax.tree_util.register_dataclass(Vehicle, data_fields=[f.name for f in quantities()], meta_fields=["name"])
 
 
-def rotor_thrust(vehicle: Vehicle, rotor_speed: Rotors) -> Rotors:
+def rotor_thrust(plant: Plant, rotor_speed: Rotors) -> Rotors:
     """Thrust of each rotor, N: the quadratic thrust map, never negative."""
-    k2, k1, k0 = (vehicle.thrust_map[..., i] for i in range(3))
+    k2, k1, k0 = plant.thrust_map
     a, b, c, d = (jnp.maximum((k2 * w + k1) * w + k0, 0.0) for w in rotor_speed)
     return a, b, c, d
 
@@ -34,53 +33,51 @@ def hover_rotor_speed(vehicle: Vehicle) -> Array:
     return rotor_speed_for(vehicle, (f, f, f, f))[0]
 
 
-def rotor_wrench(vehicle: Vehicle, thrust: Rotors) -> tuple[Array, Vec3]:
+def rotor_wrench(plant: Plant, thrust: Rotors) -> tuple[Array, Vec3]:
     """Collective thrust along body z, N, and torque about the body axes, N*m: arms times thrust, and reaction."""
-    x, y = (split4(vehicle.rotor_position[..., i]) for i in range(2))
-    spin = split4(vehicle.rotor_spin)
     collective = thrust[0] + thrust[1] + thrust[2] + thrust[3]
-    roll, pitch, yaw = _weighted(y, thrust), -_weighted(x, thrust), _weighted(spin, thrust)
-    return collective, Vec3(roll, pitch, vehicle.torque_ratio * yaw)
+    roll, pitch = _weighted(plant.arm_y, thrust), -_weighted(plant.arm_x, thrust)
+    return collective, Vec3(roll, pitch, plant.torque_ratio * _weighted(plant.spin, thrust))
 
 
-def drag(vehicle: Vehicle, air_velocity: Vec3) -> Vec3:
+def drag(plant: Plant, air_velocity: Vec3) -> Vec3:
     """Drag in the body frame, N: -(k1 v + k2 v |v|) an axis of the body-frame air-relative velocity, m/s.
 
     The paper writes k v v, which has no sign and pushes a vehicle that flies backwards.
     """
-    k1, k2 = Vec3.of(vehicle.drag_linear), Vec3.of(vehicle.drag_quadratic)
+    k1, k2 = plant.drag_linear, plant.drag_quadratic
     return air_velocity.times(k1 + air_velocity.abs().times(k2)) * -1.0
 
 
-def acceleration(vehicle: Vehicle, attitude: Quat, velocity: Vec3, collective: Array, wind: Vec3 | None) -> Vec3:
+def acceleration(plant: Plant, attitude: Quat, velocity: Vec3, collective: Array, wind: Vec3 | None) -> Vec3:
     """Acceleration of the centre of mass in the world, m/s^2."""
     air_velocity = attitude.unrotate(velocity if wind is None else velocity - wind)
-    force = drag(vehicle, air_velocity)
+    force = drag(plant, air_velocity)
     force = Vec3(force.x, force.y, force.z + collective)
-    a = attitude.rotate(force) * (1 / vehicle.mass)
+    a = attitude.rotate(force) * plant.specific
     return Vec3(a.x, a.y, a.z - GRAVITY)
 
 
-def angular_acceleration(vehicle: Vehicle, body_rate: Vec3, torque: Vec3) -> Vec3:
+def angular_acceleration(plant: Plant, body_rate: Vec3, torque: Vec3) -> Vec3:
     """Euler's equation in the body frame, rad/s^2: J^-1 (torque - w x J w)."""
-    return (torque - gyroscopic_torque(vehicle, body_rate)).times(Vec3.of(1 / vehicle.inertia))
+    return (torque - gyroscopic_torque(plant.inertia, body_rate)).times(plant.mobility)
 
 
-def gyroscopic_torque(vehicle: Vehicle, body_rate: Vec3) -> Vec3:
+def gyroscopic_torque(inertia: Vec3, body_rate: Vec3) -> Vec3:
     """W x J w of a diagonal inertia J, N*m."""
-    j, w = Vec3.of(vehicle.inertia), body_rate
+    j, w = inertia, body_rate
     return Vec3((j.z - j.y) * w.y * w.z, (j.x - j.z) * w.z * w.x, (j.y - j.x) * w.x * w.y)
 
 
-def derivative(vehicle: Vehicle, parts: Parts, wind: Vec3 | None) -> Parts:
+def derivative(plant: Plant, parts: Parts, wind: Vec3 | None) -> Parts:
     """Time derivative of the body's state at the rotor speeds of `parts`; the rotors' own entry is zero."""
-    collective, torque = rotor_wrench(vehicle, rotor_thrust(vehicle, parts.rotor_speed))
+    collective, torque = rotor_wrench(plant, rotor_thrust(plant, parts.rotor_speed))
     zero = jnp.zeros_like(collective)
     return Parts(
         position=parts.velocity,
-        velocity=acceleration(vehicle, parts.attitude, parts.velocity, collective, wind),
+        velocity=acceleration(plant, parts.attitude, parts.velocity, collective, wind),
         attitude=parts.attitude.derivative(parts.body_rate),
-        body_rate=angular_acceleration(vehicle, parts.body_rate, torque),
+        body_rate=angular_acceleration(plant, parts.body_rate, torque),
         rotor_speed=(zero, zero, zero, zero),
     )
 

@@ -12,8 +12,9 @@ import numpy as np
 from jax import Array
 
 from e2efly.control import CASCADE, Ctbr, Vec3
-from e2efly.physics.body import Rotors, gyroscopic_torque, rotor_speed_for
+from e2efly.physics.body import gyroscopic_torque, rotor_speed_for
 from e2efly.physics.mixer import Mixer
+from e2efly.physics.plant import Rotors
 from e2efly.physics.state import Parts
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -41,7 +42,8 @@ def _law(name: str) -> Law:
 def _rates(vehicle: Vehicle, mixer: Mixer, parts: Parts, wanted: Ctbr) -> Rotors:
     """The rate loop: torque = J K (wanted - w) + w x J w."""
     stiffness = Vec3.of(vehicle.inertia * vehicle.rate_gain)
-    torque = stiffness.times(wanted.rate - parts.body_rate) + gyroscopic_torque(vehicle, parts.body_rate)
+    held = gyroscopic_torque(Vec3.of(vehicle.inertia), parts.body_rate)
+    torque = stiffness.times(wanted.rate - parts.body_rate) + held
     return rotor_speed_for(vehicle, mixer.thrusts(vehicle.mass * wanted.thrust, torque))
 
 

@@ -4,40 +4,36 @@ import dataclasses
 from collections.abc import Callable
 
 import jax
-import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from e2efly.control.vectors import Vec3
-from e2efly.physics.body import Rotors, acceleration, angular_acceleration, derivative, rotor_thrust, rotor_wrench
+from e2efly.physics.body import acceleration, angular_acceleration, derivative, rotor_thrust, rotor_wrench
+from e2efly.physics.plant import Plant, Rotors
 from e2efly.physics.state import Parts
-from e2efly.vehicles.vehicle import Vehicle
 
-Integrator = Callable[[Vehicle, Parts, Rotors, Vec3 | None, float], Parts]
-"""(vehicle, state, rotor speed commands, wind, step in s) -> state one step later."""
-
-
-def spin_up(vehicle: Vehicle, speed: Rotors, command: Rotors, dt: float) -> Rotors:
-    """Rotor speeds after `dt` seconds of first-order lag towards a constant command: exact."""
-    return _lag(speed, command, jnp.exp(-dt / vehicle.motor_time_constant))
+Integrator = Callable[[Plant, Parts, Rotors, Vec3 | None, float], Parts]
+"""(plant, state, rotor speed commands, wind, step in s) -> state one step later."""
 
 
-def _lag(speed: Rotors, command: Rotors, decay: Array) -> Rotors:
+def lagged(speed: Rotors, command: Rotors, decay: Array | np.ndarray) -> Rotors:
+    """Rotor speeds after a time of first-order lag towards a constant command: exact."""
     a, b, c, d = (u + (w - u) * decay for w, u in zip(speed, command, strict=True))
     return a, b, c, d
 
 
-def euler(vehicle: Vehicle, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
+def euler(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
     """Explicit Euler: all rates at the start of the step. First order."""
-    moved = _advance(parts, derivative(vehicle, parts, wind), dt)
-    return _finish(moved, spin_up(vehicle, parts.rotor_speed, command, dt))
+    moved = _advance(parts, derivative(plant, parts, wind), dt)
+    return _finish(moved, lagged(parts.rotor_speed, command, plant.decay))
 
 
-def semi_implicit(vehicle: Vehicle, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
+def semi_implicit(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
     """Semi-implicit (symplectic) Euler: velocities first, poses with the new velocities. First order, most stable."""
-    speed = spin_up(vehicle, parts.rotor_speed, command, dt)
-    collective, torque = rotor_wrench(vehicle, rotor_thrust(vehicle, speed))
-    velocity = parts.velocity + acceleration(vehicle, parts.attitude, parts.velocity, collective, wind) * dt
-    body_rate = parts.body_rate + angular_acceleration(vehicle, parts.body_rate, torque) * dt
+    speed = lagged(parts.rotor_speed, command, plant.decay)
+    collective, torque = rotor_wrench(plant, rotor_thrust(plant, speed))
+    velocity = parts.velocity + acceleration(plant, parts.attitude, parts.velocity, collective, wind) * dt
+    body_rate = parts.body_rate + angular_acceleration(plant, parts.body_rate, torque) * dt
     return Parts(
         position=parts.position + velocity * dt,
         velocity=velocity,
@@ -47,14 +43,13 @@ def semi_implicit(vehicle: Vehicle, parts: Parts, command: Rotors, wind: Vec3 | 
     )
 
 
-def rk4(vehicle: Vehicle, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
+def rk4(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
     """Classical Runge-Kutta with the exact rotor speeds at the start, middle and end. Fourth order."""
-    half_decay = jnp.exp(-0.5 * dt / vehicle.motor_time_constant)
-    middle = _lag(parts.rotor_speed, command, half_decay)
-    end = _lag(middle, command, half_decay)
+    middle = lagged(parts.rotor_speed, command, plant.half_decay)
+    end = lagged(middle, command, plant.half_decay)
 
     def rate(at: Parts, speed: Rotors) -> Parts:
-        return derivative(vehicle, dataclasses.replace(at, rotor_speed=speed), wind)
+        return derivative(plant, dataclasses.replace(at, rotor_speed=speed), wind)
 
     k1 = rate(parts, parts.rotor_speed)
     k2 = rate(_advance(parts, k1, dt / 2), middle)

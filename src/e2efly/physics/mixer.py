@@ -8,7 +8,7 @@ import numpy as np
 from jax import Array
 
 from e2efly.control.vectors import Vec3
-from e2efly.physics.body import Rotors
+from e2efly.physics.plant import Rotors
 from e2efly.vehicles.vehicle import Vehicle, allocation_matrix
 
 

@@ -13,6 +13,7 @@ from e2efly.control.vectors import Vec3
 from e2efly.physics.control import COMMAND_MODES, Command
 from e2efly.physics.integrate import INTEGRATORS
 from e2efly.physics.mixer import Mixer
+from e2efly.physics.plant import Plant
 from e2efly.physics.state import Parts, State, split4
 from e2efly.vehicles.names import unknown
 from e2efly.vehicles.vehicle import Vehicle
@@ -93,6 +94,7 @@ def step(
     law = COMMAND_MODES[physics.command_mode].law
     integrate = INTEGRATORS[physics.integrator]
     dt = physics.control_period / physics.substeps
+    plant = Plant.of(vehicle, dt)
     air = None if wind is None else Vec3.of(wind)
     after = split4(command)
     before = None if previous is None else split4(previous)
@@ -103,7 +105,7 @@ def step(
             done = jnp.clip((index + 1) - switch_time / dt, 0.0, 1.0).astype(command.dtype)
             acting = _blend(before, after, done)
         rotor_command = law(physics.nominal, physics.mixer, parts, acting)
-        return integrate(vehicle, parts, rotor_command, air, dt), None
+        return integrate(plant, parts, rotor_command, air, dt), None
 
     # a gradient computes each sub-step again from its start: faster than storing what is inside, and far smaller
     again = jax.checkpoint(substep, prevent_cse=False)

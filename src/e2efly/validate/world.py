@@ -15,6 +15,7 @@ import numpy as np
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.physics import State
 from e2efly.physics.integrate import rk4
+from e2efly.physics.plant import Plant
 from e2efly.physics.state import Parts
 from e2efly.validate.sitl import FirmwareState
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
@@ -78,14 +79,14 @@ class World:
     @cached_property
     def _steps(self) -> Any:
         """(row of state, rotor commands and wind; steps) -> row of state, with the vehicle's numbers built in."""
-        vehicle = self.vehicle
+        vehicle, plant = self.vehicle, Plant.of(self.vehicle, STEP_S)
 
         def run(row: Any, steps: int) -> Any:
             state = State(row[:3], row[3:6], row[6:10], row[10:13], row[13:17])
             command, air = tuple(row[17:21]), Vec3.of(row[21:24])
 
             def step(parts: Parts, _: None) -> tuple[Parts, None]:
-                free = rk4(vehicle, parts, command, air, STEP_S)  # type: ignore[arg-type]
+                free = rk4(plant, parts, command, air, STEP_S)  # type: ignore[arg-type]
                 return _stand(vehicle, free), None
 
             after = jax.lax.scan(step, Parts.of(state), None, length=steps)[0].join()

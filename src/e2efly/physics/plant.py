@@ -1,0 +1,68 @@
+"""A vehicle as its sub-steps compute with it."""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from e2efly.control.vectors import Vec3
+from e2efly.physics.state import split4
+from e2efly.vehicles.vehicle import Vehicle
+
+Rotors = tuple[Array, Array, Array, Array]
+
+
+@dataclass(frozen=True)
+class Plant:
+    """What moves the body, taken apart into numbers of the batch's shape, with what follows from them.
+
+    Made once a control step: where every vehicle has parameters of its own, picking them out of arrays with an axis of
+    components, divisions and exponentials take most of a sub-step's time. Constants stay constants.
+    """
+
+    thrust_map: tuple[Array, Array, Array]
+    """Of rotor speed squared, rotor speed, and one; N, s/rad."""
+    arm_x: Rotors
+    """Places of the rotors, body, m."""
+    arm_y: Rotors
+    spin: Rotors
+    """Signs of their yaw torques."""
+    torque_ratio: Array
+    """Yaw torque over thrust, m."""
+    specific: Array
+    """One over the mass, 1/kg."""
+    inertia: Vec3
+    """kg*m^2."""
+    mobility: Vec3
+    """One over the inertia."""
+    drag_linear: Vec3
+    """N*s/m."""
+    drag_quadratic: Vec3
+    """N*s^2/m^2."""
+    decay: Array | np.ndarray
+    """What is left of a rotor's lag after a sub-step, ..."""
+    half_decay: Array | np.ndarray
+    """... and after half of one."""
+
+    @staticmethod
+    def of(vehicle: Vehicle, dt: float) -> "Plant":
+        """Of a vehicle, any field of which may be batched, for sub-steps of `dt` seconds."""
+        v, time = vehicle, vehicle.motor_time_constant
+        exp = jnp.exp if isinstance(time, jax.Array) else np.exp
+        k2, k1, k0 = (v.thrust_map[..., i] for i in range(3))
+        return Plant(
+            thrust_map=(k2, k1, k0),
+            arm_x=split4(v.rotor_position[..., 0]),
+            arm_y=split4(v.rotor_position[..., 1]),
+            spin=split4(v.rotor_spin),
+            torque_ratio=v.torque_ratio,
+            specific=1 / v.mass,
+            inertia=Vec3.of(v.inertia),
+            mobility=Vec3.of(1 / v.inertia),
+            drag_linear=Vec3.of(v.drag_linear),
+            drag_quadratic=Vec3.of(v.drag_quadratic),
+            decay=exp(-dt / time),
+            half_decay=exp(-0.5 * dt / time),
+        )
