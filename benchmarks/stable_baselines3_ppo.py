@@ -1,6 +1,6 @@
 """Seconds from process start to the hover criterion: our PPO and Stable-Baselines3's, on the same environment.
 
-    python benchmarks/stable_baselines3_ppo.py [--seeds 3] [--limit 900] [--json FILE]
+    python benchmarks/stable_baselines3_ppo.py [--seeds 3] [--limit 200] [--json FILE]
 
 Both step 64 vehicles with the rewards, features and starts of our PPO preset. Stable-Baselines3's PPO learns with its
 own defaults, and with what of our preset it has: rollout, minibatch, epochs, discount, learning rate, first noise,
@@ -81,7 +81,7 @@ def main() -> None:
         kind, seed, limit = sys.argv[2:]
         print(json.dumps(theirs(kind, int(seed), float(limit))))
         return
-    options = arguments(__doc__ or "", seeds=3, limit=900.0)
+    options = arguments(__doc__ or "", seeds=3, limit=200.0)
     found: dict[str, list[dict[str, Any]]] = {"e2efly, first run": [], "e2efly, later": []}
     found |= {f"Stable-Baselines3, {kind}": [] for kind in KINDS}
     for seed in range(options.seeds):

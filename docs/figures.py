@@ -19,7 +19,7 @@ TITLES = {
     "time_to_criterion": "Time to the criterion, from process start",
     "thrown": "Catching a thrown vehicle: success over 1000 unseen starts, full presets",
     "thrown_starts": "Thrown starts that nothing saves",
-    "stable_baselines3_ppo": "Time to the hover criterion, beside Stable-Baselines3 on the same environment",
+    "stable_baselines3_ppo": "Time to the hover criterion, Stable-Baselines3 on the same environment, at most 200 s",
     "success": "Success over 1000 unseen starts, full presets",
     "ablation": "The reward ablation, from process start, empty cache",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
