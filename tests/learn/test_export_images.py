@@ -47,6 +47,7 @@ def exported(
     [
         ((DEPTH,), POOLED),
         ((dataclasses.replace(DEPTH, encoding="linear"),), dataclasses.replace(POOLED, activation="tanh")),
+        ((dataclasses.replace(DEPTH, encoding="log"),), POOLED),
         ((dataclasses.replace(DEPTH, sees="range", projection="spherical"),), POOLED),
         ((MASK,), POOLED),
         ((RGB,), POOLED),
@@ -55,7 +56,7 @@ def exported(
         ((dataclasses.replace(RGB, sees="normal"), DEPTH), dataclasses.replace(POOLED, recurrent=7)),
         ((), NetworkConfig((8,), recurrent=7)),
     ],
-    ids=["inverse", "linear", "range", "mask", "rgb", "convolved", "convolved-gru", "normal-depth-gru", "gru"],
+    ids=["inverse", "linear", "log", "range", "mask", "rgb", "convolved", "convolved-gru", "normal-depth-gru", "gru"],
 )
 def test_parity(tmp_path: Path, cameras: tuple[CameraConfig, ...], network: NetworkConfig) -> None:
     path, weights, actor, _, _ = exported(tmp_path, cameras, network)
@@ -104,8 +105,8 @@ def test_the_contract_of_images(tmp_path: Path) -> None:
         "encoding": "inverse",
         "pool": [4, 4],
         "description": "depth along the optical axis, m; 0: a hole, or nearer than 0.3 m; 8: that far or farther",
-        "preprocessing": "inside the graph: 1 m over it, at most 3.33333, a hole: 0; the largest of each cell of "
-        "4 rows and 4 columns",
+        "preprocessing": "inside the graph: 1 m over it, less 1 m over 8 m; nearer than 0.3 m as there; a hole: 0, as "
+        "the farthest; the largest of each cell of 4 rows and 4 columns",
     }
     mask = said["images"][1]
     assert [mask[key] for key in ("name", "sees", "of", "encoding", "rate_hz")] == [
@@ -153,6 +154,25 @@ def test_cameras_of_another_environment_are_refused(tmp_path: Path) -> None:
         export_policy(path, weights, actor, dataclasses.replace(contract, images=()))
     with pytest.raises(ValueError, match=r"contract\.memory_size is 3; accepted: that of the policy, 0"):
         export_policy(path, weights, actor, dataclasses.replace(contract, memory_size=3))
+
+
+@pytest.mark.parametrize(
+    ("encoding", "at"),
+    [
+        ("inverse", lambda d: 1 / d - 1 / 8),
+        ("log", lambda d: np.log(8 / d)),
+        ("linear", lambda d: 1 - d / 8),
+    ],
+)
+def test_what_is_near_stands_out_and_a_hole_is_as_the_farthest(encoding: Any, at: Any) -> None:
+    """A camera shows what is beyond its range as a hole, or as the farthest: the network sees the same."""
+    camera = dataclasses.replace(DEPTH, width=4, height=2, encoding=encoding)
+    image = np.array([[0.0, 8.0, 0.1, 0.3], [0.5, 2.0, 4.0, 7.0]], np.float32)
+    got = View.of(camera, NetworkConfig(pool=(2, 4)))(image)
+    expected = [0.0, 0.0, at(0.3), at(0.3), at(0.5), at(2.0), at(4.0), at(7.0)]
+    np.testing.assert_allclose(got, expected, atol=1e-5)
+    cells = View.of(camera, NetworkConfig(pool=(1, 2)))(image)
+    np.testing.assert_allclose(cells, [at(0.5), at(0.3)], atol=1e-5)
 
 
 def test_a_convolution_is_that_of_patches() -> None:

@@ -85,8 +85,8 @@ class CameraConfig:
     of: str = "pad"
     """mask: the class that it is of: sky, ground, obstacle, gate, pad or wall (sets the program)."""
     encoding: Literal["inverse", "log", "linear"] = "inverse"
-    """How a policy takes depth d: 1 m over d, the logarithm of the farthest over d, or d over the farthest; a hole is 0
-    (sets the program)."""
+    """How a policy takes depth d, f the farthest: 1 m / d - 1 m / f, log(f / d) or 1 - d / f. 0 is the farthest, and a
+    hole (sets the program)."""
     rate: float | None = None
     """Images a second, a whole part of the control rate; every control step when left out (sets the program)."""
     latency: tuple[float, float] = (0.0, 0.0)

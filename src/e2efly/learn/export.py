@@ -76,7 +76,6 @@ def images_of(actor: Actor, control_rate: float) -> tuple[Image, ...]:
 
 def _image(name: str, view: View, control_rate: float) -> Image:
     c = view.camera
-    measures = c.sees in ("depth", "range")
     ends = f"; 0: a hole, or nearer than {c.reach[0]:g} m; {c.reach[1]:g}: that far or farther"
     shows = {
         "depth": f"depth along the optical axis, m{ends}",
@@ -86,14 +85,15 @@ def _image(name: str, view: View, control_rate: float) -> Image:
         "normal": "outward normal of the surface that is seen, world; 0, 0, 0: nothing",
     }
     done = []
-    if measures and c.encoding == "inverse":
-        done.append(f"1 m over it, at most {1 / NEAREST:g}, a hole: 0")
-    elif measures and c.encoding == "log":
-        done.append(f"logarithm of {c.reach[1]:g} m over it, nearer than {NEAREST:g} m as there, a hole: 0")
-    elif measures:
-        done.append(f"divided by {c.reach[1]:g} m")
+    if view.measures:
+        taken = {
+            "inverse": f"1 m over it, less 1 m over {c.reach[1]:g} m",
+            "log": f"logarithm of {c.reach[1]:g} m over it",
+            "linear": f"1 less its share of {c.reach[1]:g} m",
+        }
+        done.append(f"{taken[c.encoding]}; nearer than {NEAREST:g} m as there; a hole: 0, as the farthest")
     if not view.patches:
-        how = "the largest of each cell of" if view.keeps_nearest else "averaged to"
+        how = "the largest of each cell of" if view.measures else "averaged to"
         done.append(f"{how} {view.rows} rows and {view.columns} columns")
     if c.sees == "mask":
         done.append(f"beside itself times {view.contrast:g} over (its norm plus {FAINTEST:g})")
@@ -112,7 +112,7 @@ def _image(name: str, view: View, control_rate: float) -> Image:
         pitch_rad=float(c.pitch),
         rate_hz=control_rate if c.rate is None else float(c.rate),
         latency_range_s=_floats(c.latency),
-        encoding=c.encoding if measures else NONE,
+        encoding=c.encoding if view.measures else NONE,
         pool=(view.rows, view.columns),
         description=shows[c.sees],
         preprocessing="inside the graph: " + "; ".join(done),

@@ -87,21 +87,22 @@ def _encoded(graph: _Graph, name: str, view: View, layers: Layers, operator: str
         x = graph.node("Transpose", [name], at("planes"), perm=[0, 3, 1, 2])
     else:
         x = graph.node("Reshape", [name, graph.constant(at("planes_shape"), [0, 1, c.height, c.width])], at("planes"))
-    if c.sees in ("depth", "range") and c.encoding != "linear":
-        hole = number("hole", 0)
-        beyond = graph.node("Max", [x, number("nearest", NEAREST)], at("beyond_nearest"))
+    if view.measures:
+        far, measured = number("farthest", c.reach[1]), graph.node("Greater", [x, number("hole", 0)], at("measured"))
+        filled = graph.node("Where", [measured, x, far], at("filled"))
+        depth = graph.node("Max", [filled, number("nearest", NEAREST)], at("depth"))
         if c.encoding == "inverse":
-            near = graph.node("Div", [number("metre", 1), beyond], at("inverse"))
+            inverse = graph.node("Div", [number("metre", 1), depth], at("inverse"))
+            x = graph.node("Sub", [inverse, number("inverse_farthest", 1 / c.reach[1])], at("encoded"))
+        elif c.encoding == "log":
+            x = graph.node("Log", [graph.node("Div", [far, depth], at("ratio"))], at("encoded"))
         else:
-            share = graph.node("Div", [number("farthest", c.reach[1]), beyond], at("share"))
-            near = graph.node("Log", [share], at("log"))
-        x = graph.node("Where", [graph.node("Greater", [x, hole], at("measured")), near, hole], at("encoded"))
-    elif c.sees in ("depth", "range"):
-        x = graph.node("Div", [x, number("farthest", c.reach[1])], at("encoded"))
+            share = graph.node("Div", [depth, far], at("share"))
+            x = graph.node("Sub", [number("whole", 1), share], at("encoded"))
     cell = [c.height // view.rows, c.width // view.columns]
     if cell != [1, 1]:
         x = graph.node(
-            "MaxPool" if view.keeps_nearest else "AveragePool", [x], at("pooled"), kernel_shape=cell, strides=cell
+            "MaxPool" if view.measures else "AveragePool", [x], at("pooled"), kernel_shape=cell, strides=cell
         )
     if c.sees == "mask":
         norm = graph.node("ReduceL2", [x], at("norm"), axes=[1, 2, 3])

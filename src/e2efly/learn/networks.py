@@ -32,8 +32,8 @@ FAINTEST = 1e-2
 
 @dataclass(frozen=True)
 class View:
-    """One camera's part of the features: its image, averaged over the cells of a grid (of inverse or logarithmic depth
-    the nearest is kept); then its encoder.
+    """One camera's part of the features: its image, averaged over the cells of a grid (of depth the nearest is kept);
+    then its encoder.
 
     A mask is followed by itself divided by its mean: what is far is small, and seen as clearly as what is near.
     """
@@ -75,9 +75,9 @@ class View:
         return self.rows * self.columns * self.channels
 
     @property
-    def keeps_nearest(self) -> bool:
-        """Whether a cell shows the largest of its values, not their mean."""
-        return self.camera.sees in ("depth", "range") and self.camera.encoding != "linear"
+    def measures(self) -> bool:
+        """Whether it sees how far things are: a cell shows the nearest then, not the mean."""
+        return self.camera.sees in ("depth", "range")
 
     @property
     def contrast(self) -> float:
@@ -88,11 +88,11 @@ class View:
         """The features of an image."""
         c = self.camera
         channels = 3 if c.sees in ("rgb", "normal") else 1
-        if c.sees in ("depth", "range"):
+        if self.measures:
             image = _encoded(c, image)
         lead = image.shape[: image.ndim - (3 if channels == 3 else 2)]
         cells = image.reshape(*lead, self.rows, c.height // self.rows, self.columns, c.width // self.columns, channels)
-        x = (jnp.max if self.keeps_nearest else jnp.mean)(cells, axis=(-4, -2))
+        x = (jnp.max if self.measures else jnp.mean)(cells, axis=(-4, -2))
         if c.sees == "mask":
             norm = jnp.sqrt(jnp.sum(x**2, axis=(-3, -2, -1), keepdims=True))
             x = jnp.concatenate([x, self.contrast * x / (norm + FAINTEST)], axis=-1)
@@ -119,12 +119,12 @@ class View:
 
 
 def _encoded(camera: CameraConfig, image: Array) -> Array:
-    """Depth as the network takes it; a hole is 0."""
-    if camera.encoding == "linear":
-        return image / camera.reach[1]
-    near = jnp.maximum(image, NEAREST)
-    encoded = 1.0 / near if camera.encoding == "inverse" else jnp.log(camera.reach[1] / near)
-    return jnp.where(image > 0, encoded, 0.0)
+    """Depth as the network takes it: 0 for the farthest and for a hole, as most holes are farther than it measures."""
+    far = camera.reach[1]
+    depth = jnp.maximum(jnp.where(image > 0, image, far), NEAREST)
+    if camera.encoding == "inverse":
+        return 1.0 / depth - 1.0 / far
+    return jnp.log(far / depth) if camera.encoding == "log" else 1.0 - depth / far
 
 
 def _patches(camera: CameraConfig, convolution: tuple[int, ...]) -> tuple[int, ...]:
