@@ -17,10 +17,11 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import ABPTConfig
 from e2efly.env import Env, EnvState
-from e2efly.learn.algorithm import TrainState, annealed, ascended, at_rest, damped, descend, ends, episode_metrics
+from e2efly.learn.algorithm import TrainState, annealed, ascended, at_rest, descend, ends, episode_metrics
 from e2efly.learn.critic import known
 from e2efly.learn.networks import Actor, Layers, Weights, init_mlp, mlp
 from e2efly.learn.replay import Places, Ring
+from e2efly.learn.window import Flight, Worth, cut_off, flown
 
 QUIETEST = -5.0
 """The log standard deviation of the action noise falls no lower."""
@@ -250,41 +251,27 @@ class ABPT:
         key: PRNGKeyArray,
         progress: Float[Array, ""],
     ) -> tuple[dict[str, Array], dict[str, Array]]:
-        keep = jnp.exp(-config.gradient_decay * env.control_period)
-        n = start[1].shape[0]
-        noise = jax.random.normal(key, (config.horizon + 2, n, 4))
+        noise = jax.random.normal(key, (config.horizon + 2, start[1].shape[0], 4))
 
-        def step(carry: tuple[EnvState, Array, Array, Array], x: tuple[Array, Array]) -> tuple[Any, Any]:
+        def worth(policy: Stochastic, z: Array) -> Worth:
+            return lambda *there: self._worth(policy, targets, self._situation(env, *there), z)
+
+        def step(flight: Flight, x: tuple[Array, Array]) -> tuple[Flight, Any]:
             z, cut = x
-            late = jnp.float32(0.0)
-            if config.horizon_start:  # a piece ends like a window
-                late = cut * jnp.mean(carry[3] * self._worth(policy, targets, self._situation(env, *carry[:3]), z))
-                carry = (*damped(carry[:3], 1.0 - cut), jnp.where(cut, 1.0, carry[3]))
-            env_state, observation, memory, discount = carry
-            features = self.actor.features(observation, env_state.images)
-            mean, memory = self.actor(policy.mean, features, memory)
-            reached, out = env.advance(env_state, mean + jnp.exp(policy.log_std) * z)
-            reached = dataclasses.replace(reached, vehicle=damped(reached.vehicle, keep))
-            there = jax.lax.stop_gradient(self._situation(env, reached, out.final_observation, memory))
-            follows = self._worth(jax.lax.stop_gradient(policy), targets, there, jnp.zeros_like(z))
-            terms = out.terms if config.term_gradients else {"reward": out.reward}
-            gain = {name: jnp.mean(discount * x) for name, x in terms.items()}
-            gain["value"] = late + jnp.mean(discount * out.truncated * config.gamma * follows)
-            env_state, out = env.restart(reached, out)
-            env_state = env.look(env_state, out.done)
-            memory = jnp.where(out.done[:, None], 0.0, memory)
-            discount = jnp.where(out.done, 1.0, discount * config.gamma)
-            means = {name: jnp.mean(x) for name, x in out.terms.items()}
-            return (env_state, out.observation, memory, discount), (gain, means)
+            flight, late = cut_off(config, flight, cut, worth(policy, z))
+            here = self._situation(env, flight.env, flight.observation, flight.memory)
+            action, memory = self._act(policy, here, z)
+            quiet = worth(jax.lax.stop_gradient(policy), jnp.zeros_like(z))
+            flight, gain, _, out = flown(env, config, flight, action, memory, quiet)
+            gain["value"] += late
+            return flight, (gain, {name: jnp.mean(x) for name, x in out.terms.items()})
 
-        at_once = jnp.mean(self._worth(policy, targets, self._situation(env, *start), noise[-1]))
-        along = (noise[: config.horizon], ends(config, progress))
-        end, (gain, terms) = jax.lax.scan(step, (*start, jnp.ones(n)), along)
-        there, discount = self._situation(env, *end[:3]), end[3]
-        beyond = jnp.mean(discount * self._worth(policy, targets, there, noise[-2]))
+        first = Flight.of(*start)
+        at_once = first.worth(worth(policy, noise[-1]))
+        flight, (gain, terms) = jax.lax.scan(step, first, (noise[: config.horizon], ends(config, progress)))
         share, scale = config.at_once, 1.0 / config.horizon
         gain = {name: scale * (1 - share) * jnp.sum(x) for name, x in gain.items()}
-        gain["value"] += scale * (1 - share) * beyond
+        gain["value"] += scale * (1 - share) * flight.worth(worth(policy, noise[-2]))
         gain["at_once"] = scale * share * at_once
         gain["entropy"] = scale * config.entropy_weight * jnp.sum(policy.log_std)
         return gain, {"value": at_once, **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()}}

@@ -16,10 +16,11 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import FOPPOConfig
 from e2efly.env import Env, EnvState
-from e2efly.learn.algorithm import TrainState, annealed, ascended, at_rest, damped, descend, ends, episode_metrics
+from e2efly.learn.algorithm import TrainState, annealed, ascended, at_rest, descend, ends, episode_metrics
 from e2efly.learn.critic import gae, known, value
 from e2efly.learn.networks import Actor, Weights
 from e2efly.learn.ppo import PPO, Parameters, Samples, improve
+from e2efly.learn.window import Flight, cut_off, flown
 
 
 @dataclass(frozen=True)
@@ -59,9 +60,7 @@ class FOPPO:
         def gain(policy: Weights) -> tuple[dict[str, Array], Any]:
             return self._rollout(env, config, dataclasses.replace(learned, policy=policy), state, noise_key, progress)
 
-        grads, (env_state, observation, memory, samples, metrics), norms = ascended(
-            gain, learned.policy, config.term_gradients
-        )
+        grads, (flight, samples, metrics), norms = ascended(gain, learned.policy, config.term_gradients)
         found, epochs_adam, losses = improve(
             self.actor, config, rate, learned, state.optimizer["epochs"], samples, epoch_key
         )
@@ -73,9 +72,9 @@ class FOPPO:
             state,
             parameters=dataclasses.replace(found, policy=policy),
             optimizer={"epochs": epochs_adam, "exact": exact_adam},
-            env=env_state,
-            observation=observation,
-            memory=memory,
+            env=flight.env,
+            observation=flight.observation,
+            memory=flight.memory,
             key=key,
         ), metrics
 
@@ -89,47 +88,33 @@ class FOPPO:
         progress: Float[Array, ""],
     ) -> tuple[dict[str, Array], Any]:
         """What the window gains, with gradient; and where it ends, the samples and the metrics, without."""
-        keep, std = jnp.exp(-config.gradient_decay * env.control_period), jnp.exp(parameters.log_std)
         noise = jax.random.normal(key, (config.horizon, *state.observation.shape[:1], 4))
 
-        def worth(env_state: EnvState, observation: Array) -> tuple[Array, Array]:
-            fed = known(self.actor, env, env_state, observation)
-            return fed, value(self.actor, parameters.critic, fed)
+        def worth(env_state: EnvState, observation: Array, memory: Array) -> Array:
+            del memory
+            return value(self.actor, parameters.critic, known(self.actor, env, env_state, observation))
 
-        def step(carry: tuple[EnvState, Array, Array, Array], x: tuple[Array, Array]) -> tuple[Any, Any]:
+        def step(flight: Flight, x: tuple[Array, Array]) -> tuple[Flight, Any]:
             z, cut = x
-            late = jnp.float32(0.0)
-            if config.horizon_start:  # a piece ends like a window
-                late = cut * jnp.mean(carry[3] * worth(carry[0], carry[1])[1])
-                carry = (*damped(carry[:3], 1.0 - cut), jnp.where(cut, 1.0, carry[3]))
-            env_state, observation, memory, discount = carry
-            features = self.actor.features(observation, env_state.images)
-            mean, next_memory = self.actor(parameters.policy, features, memory)
-            action = mean + std * z
-            from_here, here = worth(env_state, observation)
-            reached, out = env.advance(env_state, action)
-            reached = dataclasses.replace(reached, vehicle=damped(reached.vehicle, keep))
-            _, follows = worth(*jax.lax.stop_gradient((reached, out.final_observation)))
-            terms = out.terms if config.term_gradients else {"reward": out.reward}
-            gain = {name: jnp.mean(discount * x) for name, x in terms.items()}
-            gain["value"] = late + jnp.mean(discount * out.truncated * config.gamma * follows)
-            env_state, out = env.restart(reached, out)
-            env_state = env.look(env_state, out.done)
-            next_memory = jnp.where(out.done[:, None], 0.0, next_memory)
-            discount = jnp.where(out.done, 1.0, discount * config.gamma)
+            flight, late = cut_off(config, flight, cut, worth)
+            features = self.actor.features(flight.observation, flight.env.images)
+            mean, memory = self.actor(parameters.policy, features, flight.memory)
+            action = mean + jnp.exp(parameters.log_std) * z
+            acted_on = (features, flight.memory, known(self.actor, env, flight.env, flight.observation), action)
+            flight, gain, follows, out = flown(env, config, flight, action, memory, worth)
+            gain["value"] += late
             gathered = (
-                (features, memory, from_here, action), (here, follows, out.reward), (out.terminated, out.done),
-                out.success, {name: jnp.mean(x) for name, x in out.terms.items()},
+                acted_on, (follows, out.reward), (out.terminated, out.done), out.success,
+                {name: jnp.mean(x) for name, x in out.terms.items()},
             )  # fmt: skip
-            return (env_state, out.observation, next_memory, discount), (gain, jax.lax.stop_gradient(gathered))
+            return flight, (gain, jax.lax.stop_gradient(gathered))
 
-        first = (state.env, state.observation, state.memory, jnp.ones(state.observation.shape[0]))
-        (env_state, observation, memory, discount), (gain, gathered) = jax.lax.scan(
-            step, first, (noise, ends(config, progress))
-        )
+        first = Flight.of(state.env, state.observation, state.memory)
+        flight, (gain, gathered) = jax.lax.scan(step, first, (noise, ends(config, progress)))
         gain = {name: jnp.sum(x) / config.horizon for name, x in gain.items()}
-        gain["value"] += jnp.mean(discount * worth(env_state, observation)[1]) / config.horizon
-        (features, memories, from_here, action), (here, follows, reward), ended, success, terms = gathered
+        gain["value"] += flight.worth(worth) / config.horizon
+        (features, memories, from_here, action), (follows, reward), ended, success, terms = gathered
+        here = value(self.actor, parameters.critic, from_here)
         terminated, done = (x.astype(jnp.float32) for x in ended)
         advantage = gae(reward, here, follows, terminated, done, config.gamma, config.gae_lambda)
         density = -jnp.sum(0.5 * noise**2 + parameters.log_std + 0.5 * jnp.log(2 * jnp.pi), axis=-1)
@@ -139,4 +124,4 @@ class FOPPO:
             **episode_metrics(done, success),
             **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()},
         }
-        return gain, jax.lax.stop_gradient((env_state, observation, memory, samples, metrics))
+        return gain, jax.lax.stop_gradient((flight, samples, metrics))

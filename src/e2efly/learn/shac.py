@@ -16,9 +16,10 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import SHACConfig
 from e2efly.env import Env, EnvState
-from e2efly.learn.algorithm import TrainState, annealed, ascended, at_rest, damped, descend, ends, episode_metrics
+from e2efly.learn.algorithm import TrainState, annealed, ascended, at_rest, descend, ends, episode_metrics
 from e2efly.learn.critic import gae, init_critic, known, value
 from e2efly.learn.networks import Actor, Layers, Weights
+from e2efly.learn.window import Flight, cut_off, flown
 
 
 @jax.tree_util.register_dataclass
@@ -81,9 +82,7 @@ class SHAC:
         def gain(policy: Weights) -> tuple[dict[str, Array], Any]:
             return self._window(env, config, policy, learned.target, state, noise_key, progress)
 
-        grads, (env_state, observation, memory, samples, metrics), norms = ascended(
-            gain, learned.policy, config.term_gradients
-        )
+        grads, (flight, samples, metrics), norms = ascended(gain, learned.policy, config.term_gradients)
         policy, policy_adam, norm = descend(config, rate, learned.policy, state.optimizer["policy"], grads)
         metrics |= {"loss/gradient_norm": norm, **norms}
         critic, critic_adam, metrics["loss/value"] = self._fit(
@@ -95,9 +94,9 @@ class SHAC:
             state,
             parameters=Parameters(policy, critic, target),
             optimizer={"policy": policy_adam, "critic": critic_adam},
-            env=env_state,
-            observation=observation,
-            memory=memory,
+            env=flight.env,
+            observation=flight.observation,
+            memory=flight.memory,
             key=key,
         ), metrics
 
@@ -111,47 +110,30 @@ class SHAC:
         key: PRNGKeyArray,
         progress: Float[Array, ""],
     ) -> tuple[dict[str, Array], Any]:
-        keep = jnp.exp(-config.gradient_decay * env.control_period)
         noise = config.noise * jax.random.normal(key, (config.horizon, *state.observation.shape[:1], 4))
 
-        def worth(env_state: EnvState, observation: Array) -> tuple[Array, Array]:
-            fed = known(self.actor, env, env_state, observation)
-            return fed, value(self.actor, target, fed)
+        def worth(env_state: EnvState, observation: Array, memory: Array) -> Array:
+            del memory
+            return value(self.actor, target, known(self.actor, env, env_state, observation))
 
-        def step(carry: tuple[EnvState, Array, Array, Array, Array], x: tuple[Array, Array]) -> tuple[Any, Any]:
+        def step(flight: Flight, x: tuple[Array, Array]) -> tuple[Flight, Any]:
             z, cut = x
-            late = jnp.float32(0.0)
-            if config.horizon_start:  # a piece ends like a window
-                late = cut * jnp.mean(carry[3] * worth(carry[0], carry[1])[1])
-                carry = (*damped(carry[:3], 1.0 - cut), jnp.where(cut, 1.0, carry[3]), carry[4])
-            env_state, observation, memory, discount, from_here = carry
-            features = self.actor.features(observation, env_state.images)
-            action, memory = self.actor(policy, features, memory)
-            reached, out = env.advance(env_state, action + z)
-            reached = dataclasses.replace(reached, vehicle=damped(reached.vehicle, keep))
-            to_there, follows = worth(*jax.lax.stop_gradient((reached, out.final_observation)))
-            terms = out.terms if config.term_gradients else {"reward": out.reward}
-            gain = {name: jnp.mean(discount * x) for name, x in terms.items()}
-            gain["value"] = late + jnp.mean(discount * out.truncated * config.gamma * follows)
-            env_state, out = env.restart(reached, out)
-            env_state = env.look(env_state, out.done)
-            anew = jax.lax.stop_gradient((env_state, out.observation))
-            from_there = jax.lax.cond(jnp.any(out.done), lambda: worth(*anew)[0], lambda: to_there)
-            memory = jnp.where(out.done[:, None], 0.0, memory)
-            discount = jnp.where(out.done, 1.0, discount * config.gamma)
+            flight, late = cut_off(config, flight, cut, worth)
+            from_here = known(self.actor, env, flight.env, flight.observation)
+            features = self.actor.features(flight.observation, flight.env.images)
+            action, memory = self.actor(policy, features, flight.memory)
+            flight, gain, follows, out = flown(env, config, flight, action + z, memory, worth)
+            gain["value"] += late
             gathered = (
                 from_here, follows, out.reward, out.terminated, out.done, out.success,
                 {name: jnp.mean(x) for name, x in out.terms.items()},
             )  # fmt: skip
-            carry = (env_state, out.observation, memory, discount, from_there)
-            return carry, (gain, jax.lax.stop_gradient(gathered))
+            return flight, (gain, jax.lax.stop_gradient(gathered))
 
-        n = state.observation.shape[0]
-        first = (state.env, state.observation, state.memory, jnp.ones(n), worth(state.env, state.observation)[0])
-        along = (noise, ends(config, progress))
-        (env_state, observation, memory, discount, _), (gain, gathered) = jax.lax.scan(step, first, along)
+        first = Flight.of(state.env, state.observation, state.memory)
+        flight, (gain, gathered) = jax.lax.scan(step, first, (noise, ends(config, progress)))
         gain = {name: jnp.sum(x) / config.horizon for name, x in gain.items()}
-        gain["value"] += jnp.mean(discount * worth(env_state, observation)[1]) / config.horizon
+        gain["value"] += flight.worth(worth) / config.horizon
         from_here, follows, reward, terminated, done, success, terms = gathered
         here = value(self.actor, target, from_here)
         ended = (terminated.astype(jnp.float32), done.astype(jnp.float32))
@@ -163,7 +145,7 @@ class SHAC:
             **episode_metrics(done, success),
             **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()},
         }
-        return gain, (env_state, observation, memory, samples, metrics)
+        return gain, (flight, samples, metrics)
 
     def _fit(
         self,
