@@ -3,8 +3,8 @@
     python benchmarks/zoo.py [--vehicles vis_r ...] [--tasks hover ...] [--seeds 3]
 
 The best of at most `seeds` runs by each algorithm is kept, if it succeeds more often than not; none more is made once
-one meets 99.5 %. Success is that of 1000 unseen starts
-of the ONNX file itself, as `e2efly eval` flies it.
+one meets 99.5 %. What is best the runs' own reports say. The success that is stated is that of the ONNX file itself, of
+the 1000 starts of `e2efly eval`, which nothing was chosen by.
 """
 
 import itertools
@@ -37,14 +37,15 @@ def algorithms(task: str) -> tuple[str, ...]:
     return ("bptt", "foppo") if task in ("hover", "land", "track", "race") else (presets.default_algorithm(task),)
 
 
-def trained(vehicle: str, task: str, algo: str, seed: int, folder: Path) -> dict[str, Any]:
-    """A run in `folder`, and what there is to say of its policy."""
+def trained(vehicle: str, task: str, algo: str, seed: int, folder: Path) -> tuple[float, dict[str, Any]]:
+    """A run in `folder`: its worst success by its own report, and what there is to say of its policy."""
     out, report = folder / f"{algo}{seed}", folder / "report.json"
     run("train", task, "--algo", algo, "--vehicle", vehicle, "--seed", str(seed), "--out", str(out), "--no-plots")
     run("eval", str(out / "policy.onnx"), "--json", str(report), "--plots", str(folder / "plots"))
     suites = json.loads(report.read_text())["criteria"]
     summary = json.loads((out / "summary.json").read_text())
-    return {
+    reported = min(suite["success"] for name, suite in summary["shipped"].items() if name != "update")
+    return reported, {
         "algorithm": algo,
         "seed": seed,
         "env_steps": summary["env_steps"],
@@ -62,14 +63,14 @@ def main() -> None:
             if task in BY_SIGHT and vehicle != USUAL:
                 continue
             with tempfile.TemporaryDirectory() as folder:
-                best: dict[str, Any] = {}
+                highest, best = -1.0, {}
                 for seed, algo in itertools.product(range(options.seeds), algorithms(task)):
-                    found = trained(vehicle, task, algo, seed, Path(folder))
-                    if not best or min(found["success"].values()) > min(best["success"].values()):
-                        best = found
-                    if min(best["success"].values()) >= ENOUGH:
+                    reported, found = trained(vehicle, task, algo, seed, Path(folder))
+                    if reported > highest:
+                        highest, best = reported, found
+                    if highest >= ENOUGH:
                         break
-                if min(best["success"].values()) < WORTH:
+                if highest < WORTH:
                     print(f"{vehicle} {task}: {best['success']}, not kept", flush=True)
                     continue
                 kept = FOLDER / vehicle / f"{task}.onnx"

@@ -10,7 +10,8 @@ import pytest
 
 from e2efly import presets
 from e2efly.config import EnvConfig, HoverConfig, ImuConfig, LandConfig, NoiseConfig, RewardConfig, TaskConfig
-from e2efly.env import Env, random_key
+from e2efly.env import Env, numbers_of, random_key
+from e2efly.env.environment import STARTS
 from e2efly.physics.rotation import yaw_pitch_roll
 from e2efly.sensors import imu
 from e2efly.sensors.latency import acting_commands, delayed_state
@@ -51,6 +52,28 @@ def test_starts_are_where_the_task_says(name: str) -> None:
         from_start = np.linalg.norm(v.position - np.array([0.0, 0.0, 1.5]), axis=-1)
         assert 0.98 < from_start.max() <= 1 + 1e-5
         assert speed.max() == 0
+    if name == "hover_aware":
+        assert 1.48 < np.abs(offset).max() <= 1.5
+        assert 0.49 < speed.max() <= 0.5
+        assert 0.25 < np.abs(angles[:, 1:]).max() <= np.pi / 12 + 1e-5
+    if name == "gap":
+        assert -4.0 - 1e-6 <= offset[:, 0].min() < -3.97
+        assert -2.53 < offset[:, 0].max() <= -2.5 + 1e-6
+        assert 0.49 < np.abs(offset[:, 1:]).max() <= 0.5 + 1e-6
+        assert speed.max() == 0
+    if name == "land_visual":
+        assert 0.98 < np.abs(offset[:, :2]).max() <= 1.0
+        assert 1.0 - 1e-6 <= offset[:, 2].min() < 1.02
+        assert 2.98 < offset[:, 2].max() <= 3.0 + 1e-6
+        assert 0.49 < speed.max() <= 0.5
+    if name == "avoid":
+        assert 2.97 < np.abs(v.position[:, 1]).max() <= 3.0
+        np.testing.assert_array_equal(v.position[:, 0], 0.0)
+        assert speed.max() == 0
+    if name == "race_clutter":
+        from_start = np.linalg.norm(v.position - np.asarray(env.task.gates.start), axis=-1)
+        assert 0.49 < from_start.max() <= 0.5 + 1e-5
+        assert speed.max() == 0
 
 
 def test_the_same_seed_gives_the_same_flight_and_another_one_another() -> None:
@@ -72,7 +95,7 @@ def test_new_starts_under_a_full_mask_are_a_reset() -> None:
     state, _ = env.reset(random_key(0), 16)
     state, out = jax.jit(env.advance)(state, jnp.zeros((16, 4)))
     again, over = env.restart(state, dataclasses.replace(out, terminated=jnp.ones(16, bool)))
-    fresh, observation = env.reset(jax.random.fold_in(state.key, state.tick), 16)
+    fresh, observation = env.reset(jax.random.fold_in(jax.random.fold_in(state.key, state.tick), STARTS), 16)
     np.testing.assert_allclose(
         over.observation, observation, rtol=2e-6, atol=1e-7
     )  # compiled apart: rounding may differ
@@ -245,3 +268,8 @@ def test_imu_noise_and_bias_grow_as_their_densities_say() -> None:
 def test_bad_configurations_are_named(config: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make(**config)
+
+
+def test_keys_of_different_seeds_differ_also_where_zeros_are_at_their_end() -> None:
+    seeds = [(), (0,), (1,), (0, 0), (1, 0), (0, 1), (0, 1, 0), (1, 1), (0, 1, 1)]
+    assert len({tuple(np.asarray(numbers_of(random_key(*seed))).tolist()) for seed in seeds}) == len(seeds)

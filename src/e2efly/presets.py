@@ -55,7 +55,7 @@ ALGORITHMS: dict[str, AlgorithmConfig] = {
 """Algorithms by name, with the defaults of their presets."""
 
 FIRST_ORDER = ("land_visual", "avoid", "race_clutter", "gap")
-"""Tasks that BPTT learns better than PPO does (docs/benchmarks.md)."""
+"""Tasks that BPTT learns better than PPO does (docs/training.md)."""
 
 D435I = CameraConfig(fov=(math.radians(87), math.radians(58)), reach=(0.28, 10.0))
 """Depth of an Intel RealSense D435i."""
@@ -244,8 +244,9 @@ _SMOOTH: dict[str, dict[str, float]] = {
     "track": {"near": 1.0, "prog2": 0.2, "anglev_sq": 0.002, "act2_sq": 0.02, "crash": 10.0},
     "race": {"prog1": 1.0, "anglev_sq": 0.0005, "act2_sq": 0.005, "goal": 1.0, "crash": 1.0},
 }  # fmt: skip
-"""Rewards of the methods that have both a gradient and a critic. To a critic nothing follows a crash: where every step
-costs, as in BPTT's rewards, an early crash would be the best end; these pay for living on, and charge for a crash."""
+"""Rewards of the methods that have both a gradient and a critic; where there is none, PPO's. To a critic nothing
+follows a crash: where every step costs, as in BPTT's rewards, an early crash would be the best end; these pay for
+living on, and charge for a crash."""
 
 
 def _ours(task: str, algo: str) -> TrainConfig:
@@ -263,7 +264,8 @@ def _with_critic(task: str, algo: str) -> TrainConfig:
         taken["horizon"] = 64
     if task == "race" and algo == "shac":
         taken |= {"learning_rate": 4e-3, "noise": 0.1}
-    reward = dataclasses.replace(config.reward, weights=_SMOOTH.get(task, config.reward.weights))
+    smooth = dataclasses.replace(config.reward, weights=_SMOOTH[task]) if task in _SMOOTH else None
+    reward = smooth or _ours(task, "ppo").reward
     return dataclasses.replace(config, algo=dataclasses.replace(ALGORITHMS[algo], **taken), reward=reward)
 
 
@@ -377,6 +379,15 @@ def suites(config: TaskConfig) -> dict[str, TaskConfig]:
     return {task_name(config): config}
 
 
+_ANY, _SHARE = (0.0, math.inf), (0.0, 1.0)
+_BOUNDS: dict[str, tuple[float, float]] = {
+    "gradient_decay": _ANY, "gae_lambda": _SHARE, "td_lambda": _SHARE, "clip": _ANY, "value_weight": _ANY,
+    "entropy_weight": _ANY, "log_std": (-10.0, 2.0), "critic_rate": _ANY, "exact_rate": _ANY, "target_share": _SHARE,
+    "noise": _ANY, "fresh_share": _SHARE, "at_once": _SHARE,
+}  # fmt: skip
+"""Of options of algorithms, smallest and largest."""
+
+
 def check(config: TrainConfig) -> None:
     """Check the numbers of a run.
 
@@ -401,6 +412,11 @@ def check(config: TrainConfig) -> None:
     for name, value in positive.items():
         if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} is {value}; accepted: more than 0")
+    for name, (low, high) in {**_BOUNDS, "horizon_start": (0, algo.horizon)}.items():
+        value = getattr(algo, name, low)
+        if not (math.isfinite(value) and low <= value <= high):
+            accepted = f"{low:g} to {high:g}" if math.isfinite(high) else f"{low:g} or more"
+            raise ValueError(f"algo.{name} is {value}; accepted: {accepted}")
     if not 0 < algo.gamma <= 1:
         raise ValueError(f"algo.gamma is {algo.gamma}; accepted: above 0, at most 1")
     if isinstance(algo, PPOConfig | SHACConfig | FOPPOConfig) and algo.steps % algo.minibatch:

@@ -1,5 +1,7 @@
 """Checkpoints are whole or refused."""
 
+import multiprocessing
+import os
 from pathlib import Path
 
 import jax
@@ -58,7 +60,24 @@ def test_a_missing_and_a_surplus_part_are_refused(path: Path) -> None:
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "file"
     write_atomically(path, b"old")
-    (tmp_path / "file.part").mkdir()
+    (tmp_path / f"file.{os.getpid()}.part").mkdir()
     with pytest.raises(OSError):
         write_atomically(path, b"new")
     assert path.read_bytes() == b"old"
+
+
+def write_often(path: Path, letter: bytes) -> None:
+    for _ in range(200):
+        write_atomically(path, 10_000 * letter)
+
+
+def test_processes_that_write_the_same_file_do_not_meet(tmp_path: Path) -> None:
+    path, context = tmp_path / "file", multiprocessing.get_context("spawn")
+    writers = [context.Process(target=write_often, args=(path, letter)) for letter in (b"a", b"b")]
+    for writer in writers:
+        writer.start()
+    for writer in writers:
+        writer.join()
+    assert [writer.exitcode for writer in writers] == [0, 0]
+    assert path.read_bytes() in (10_000 * b"a", 10_000 * b"b")
+    assert list(tmp_path.iterdir()) == [path]

@@ -93,13 +93,17 @@ def test_a_run_that_lost_a_process_says_so_and_resumes(tmp_path: Path) -> None:
     assert (tmp_path / "run/policy.onnx").exists()
 
 
-def test_processes_with_other_configurations_do_not_run(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("flags", "said"), [(["--seed", "1"], "seed: 0 and 1"), (["--resume"], "resume: False and True")]
+)
+def test_processes_with_other_configurations_do_not_run(flags: list[str], said: str, tmp_path: Path) -> None:
     hosts = ["--hosts.coordinator", address(), "--hosts.count", "2", "--devices", "2", "--hosts.index"]
     both = [
-        start(tmp_path, "run", *PPO, "--seed", str(i), *hosts, str(i), devices=1, told=f"{i}.txt") for i in range(2)
+        start(tmp_path, "run", *PPO, *(flags if i else []), *hosts, str(i), devices=1, told=f"{i}.txt")
+        for i in range(2)
     ]
     assert both[1].wait(timeout=60) == 2
-    assert "process 0 was started with another configuration: seed: 0 and 1" in (tmp_path / "1.txt").read_text()
+    assert f"process 0 was started with another configuration: {said}" in (tmp_path / "1.txt").read_text()
     assert both[0].wait(timeout=60) == 2
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 import os
 import signal
 import subprocess
@@ -16,6 +17,7 @@ from safetensors.numpy import load_file
 
 from e2efly import presets
 from e2efly.config import TrainConfig
+from e2efly.evaluate import Episodes
 from e2efly.learn import runner
 from e2efly.learn.rundir import RunDirectory, from_json, to_json
 from e2efly.learn.runner import NonFiniteError, train
@@ -78,7 +80,7 @@ def test_a_thrown_vehicle_is_caught(tmp_path: Path) -> None:
     assert setup.episode_steps == 300
     summary = train(config, tmp_path / "run", Silent())
     assert summary["reached_criterion"]
-    assert summary["shipped"]["hover"]["success"] >= 0.99
+    assert summary["shipped"]["hover"]["success"] >= 0.985  # of other starts than those that it was stopped by
 
 
 def test_what_met_the_criterion_is_shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -230,3 +232,57 @@ def test_the_algorithm_left_out_is_the_task_s_best(task: str, algo: str) -> None
 def test_bad_numbers_are_named(change: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         presets.check(dataclasses.replace(presets.preset("hover", "ppo"), **change))
+
+
+@pytest.mark.parametrize(
+    ("algo", "option", "value", "accepted"),
+    [
+        ("bptt", "horizon_start", -8, "0 to 64"),
+        ("bptt", "horizon_start", 65, "0 to 64"),
+        ("bptt", "gradient_decay", -5.0, "0 or more"),
+        ("ppo", "gae_lambda", math.nan, "0 to 1"),
+        ("ppo", "log_std", 9.0, "-10 to 2"),
+        ("shac", "target_share", 7.0, "0 to 1"),
+        ("shac", "noise", -1.0, "0 or more"),
+        ("abpt", "fresh_share", 1.5, "0 to 1"),
+        ("foppo", "exact_rate", math.inf, "0 or more"),
+    ],
+)
+def test_bad_options_of_algorithms_are_named(algo: str, option: str, value: float, accepted: str) -> None:
+    config = presets.preset("hover", algo)
+    changed = dataclasses.replace(config, algo=dataclasses.replace(config.algo, **{option: value}))
+    with pytest.raises(ValueError, match=f"^algo.{option} is {value}; accepted: {accepted}$"):
+        presets.check(changed)
+
+
+def flown(success: list[bool], error: float, seconds: float) -> dict[str, Episodes]:
+    n = np.ones(len(success))
+    values = dict.fromkeys((field.name for field in dataclasses.fields(Episodes)), n)
+    return {
+        "task": Episodes(**{**values, "success": np.array(success), "final_error": error * n, "duration": seconds * n})
+    }
+
+
+@pytest.mark.parametrize("task", ["hover", "race"])
+def test_the_best_policy_succeeds_most_often_and_among_equals_is_most_precise(task: str) -> None:
+    often, more = [True] * 97 + [False] * 3, [True] * 98 + [False] * 2
+    assert runner.score(task, flown(more, 9.0, 90.0)) > runner.score(task, flown(often, 0.0, 1.0))
+    assert runner.score(task, flown(more, 0.1, 5.0)) > runner.score(task, flown(more, 0.2, 6.0))
+    assert np.isfinite(runner.score(task, flown([False], 1.0, 1.0)))
+
+
+def test_a_full_disk_at_the_first_row_does_not_end_a_run_for_good(tmp_path: Path) -> None:
+    run = RunDirectory(tmp_path)
+    run.metrics.touch()
+    run.forget_after(0)
+    run.append([{"update": 1, "reward": 2.0}])
+    assert run.rows() == [{"update": 1, "reward": 2.0}]
+
+
+def test_a_folder_holds_a_run_once_all_that_resuming_reads_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[str] = []
+    monkeypatch.setattr(RunDirectory, "write_json", lambda self, name, content: written.append(name))
+    RunDirectory(tmp_path).create(small())
+    assert written == ["versions.json", "config.json"]

@@ -25,9 +25,10 @@ class _FirstOrder(_Batch):
     """What every algorithm has that differentiates the simulator."""
 
     gradient_decay: float = 0.0
-    """Decay of the gradient through the state, 1/s of backward time; 0: the exact gradient."""
+    """Decay of the gradient from step to step through the vehicle's state, 1/s of backward time; what goes through the
+    policy's observation of it does not decay. 0: the exact gradient."""
     horizon_start: int = 0
-    """Steps after which the gradient is cut at first; they grow to the window's over the run. 0: never cut."""
+    """Steps, of the horizon, after which the gradient is cut at first; they grow over the run. 0: never cut."""
     term_gradients: bool = False
     """Whether to log the norm of the gradient of each term of the reward; an update takes as many times as long."""
 

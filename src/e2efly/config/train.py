@@ -27,7 +27,8 @@ class NetworkConfig:
     activation: Literal["relu", "tanh", "elu"] = "relu"
     """Activation of the hidden layers (sets the program)."""
     pool: tuple[int, int] = (16, 16)
-    """Rows and columns that an image is averaged to; divide the camera's (sets shapes)."""
+    """Rows and columns that an image is brought to: the mean of each cell, of depth the nearest; divide the camera's
+    (sets shapes)."""
     convolution: tuple[int, ...] = ()
     """Channels of the convolutions that take an image in place of its averages; their stride is their size, 4 (2 where
     4 does not divide the image), so that they are products of matrices (sets shapes)."""

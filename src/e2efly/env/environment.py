@@ -35,6 +35,8 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 LEADS = (0.0, 0.25, 0.5, 1.0, 1.5)
 """How far ahead a critic is told the clearance, s."""
+STARTS, INERTIAL, SEEN, IMAGES = range(4)
+"""What is random in a control step: each has keys of its own."""
 DEFAULT = EnvConfig()
 """The VIS-R, nothing random but the starts."""
 
@@ -172,7 +174,7 @@ class Env:
                 if still.past is not None:
                     then = jnp.maximum(then - eye.latency, 0.0)
                     seen = latency.delayed_state(still.past, eye.latency, self.control_period)
-                key = jax.random.fold_in(jax.random.fold_in(still.key, 2 * still.tick + 1), index)
+                key = jax.random.fold_in(_key(still, IMAGES), index)
                 return see(camera, eye, scene.at(then), seen, key)
 
             if every == 1:
@@ -205,7 +207,7 @@ class Env:
         """Start anew where `out` says that the episode ended; all of it under a full mask is a reset."""
 
         def anew(_: None) -> tuple[EnvState, Array]:
-            fresh = self._start(jax.random.fold_in(state.key, state.tick), out.reward.shape[0], state.tick)
+            fresh = self._start(_key(state, STARTS), out.reward.shape[0], state.tick)
             chosen = _where(out.done, dataclasses.replace(fresh, key=state.key), state)
             return chosen, self._observe(chosen)
 
@@ -227,7 +229,7 @@ class Env:
         tick = state.tick + 1
         inertial = state.imu
         if self.imu is not None and inertial is not None:
-            inertial = imu.measure(self.imu, jax.random.fold_in(state.key, 2 * tick), inertial, before, after, period)
+            inertial = imu.measure(self.imu, _key(state, INERTIAL), inertial, before, after, period)
         reached = EnvState(
             vehicle=after,
             memory=memory,
@@ -278,7 +280,7 @@ class Env:
         )
 
     def _start(self, key: PRNGKeyArray, n: int, tick: Int[Array, ""]) -> EnvState:
-        task_key, plant_key, wind_key, action_key, observation_key = jax.random.split(key, 5)
+        task_key, plant_key, wind_key, action_key, observation_key, eyes_key, onward = jax.random.split(key, 7)
         nominal, dtype = self.physics.nominal, self.center.dtype
         vehicle, memory = self.task.start(task_key, n)
         rotor_speed = jnp.broadcast_to(hover_rotor_speed(nominal), (n, 4))
@@ -298,9 +300,9 @@ class Env:
             past=past,
             observation_latency=_between(observation_key, n, self.observation_latency_range),
             imu=None if self.imu is None else imu.ImuState.at(vehicle),
-            eyes=tuple(Eye.of(c, jax.random.fold_in(key, i), n) for i, c in enumerate(self.cameras)),
+            eyes=tuple(Eye.of(c, jax.random.fold_in(eyes_key, i), n) for i, c in enumerate(self.cameras)),
             images=tuple(jnp.zeros((n, *image_shape(camera))) for camera in self.cameras),
-            key=key,
+            key=onward,
             tick=tick,
         )
 
@@ -333,13 +335,18 @@ class Env:
         if state.past is not None:
             seen = latency.delayed_state(state.past, state.observation_latency, self.control_period)
         if self.noise is not None:
-            seen = add_noise(self.noise, jax.random.fold_in(state.key, 2 * state.tick + 1), seen)
+            seen = add_noise(self.noise, _key(state, SEEN), seen)
         n = seen.position.shape[0]
         parts = [self.task.observe(state.memory, state.time, seen), seen.quaternion, seen.velocity, seen.body_rate]
         if state.imu is not None:
             parts += [state.imu.gyroscope, state.imu.accelerometer]
         parts.append(state.actions[:, : self.seen_actions].reshape(n, -1))
         return jnp.concatenate(parts, axis=-1)
+
+
+def _key(state: EnvState, of: int) -> PRNGKeyArray:
+    """The key of one of the things that are random in a control step."""
+    return jax.random.fold_in(jax.random.fold_in(state.key, state.tick), of)
 
 
 def _where(mask: Bool[Array, " n"], a: Any, b: Any) -> Any:

@@ -13,7 +13,8 @@ GENERATOR = "rbg"
 
 def random_key(*seed: int) -> PRNGKeyArray:
     """The key of a seed, or of several numbers; made by NumPy: nothing to compile."""
-    return key_of(jnp.asarray(np.random.SeedSequence(seed).generate_state(4)))
+    ended = (*seed, 1)  # NumPy fills up with zeros: (1,) and (1, 0) would be the same
+    return key_of(jnp.asarray(np.random.SeedSequence(ended).generate_state(4)))
 
 
 def is_key(x: Any) -> bool:

@@ -3,7 +3,7 @@
 An update gathers transitions without gradients into a replay buffer, fits twin critics Q(s, a) to it, and then ascends
 the mean of two estimates of the return: the exact gradient of a window's reward with Q of where it ends, and Q of where
 it began. The first is sharp where rewards are smooth, the second knows of events that have no gradient. Windows begin
-at new starts and at visited states in turn, so that those far from a start are learned from, too.
+at new starts and at visited states, at random, so that those far from a start are learned from, too.
 """
 
 import dataclasses
@@ -228,9 +228,9 @@ class ABPT:
         """Where windows begin: new starts and visited states."""
         reset_key, which_key, draw_key = jax.random.split(key, 3)
         state, observation, memory = places.drawn(draw_key)
-        state = dataclasses.replace(state, key=now.key, tick=now.tick)
         n = observation.shape[0]
         anew, first = env.reset(reset_key, n)
+        state = dataclasses.replace(state, key=anew.key, tick=now.tick)
         fresh = jax.random.uniform(which_key, (n,)) < config.fresh_share
 
         def choose(new: Array, old: Array) -> Array:
@@ -238,7 +238,7 @@ class ABPT:
                 return old
             return jnp.where(fresh.reshape(-1, *[1] * (old.ndim - 1)), new, old)
 
-        anew = dataclasses.replace(anew, key=now.key, tick=now.tick)
+        anew = dataclasses.replace(anew, tick=now.tick)
         return jax.tree.map(choose, (anew, first, self.actor.memory(n)), (state, observation, memory))
 
     def _window(
@@ -261,8 +261,7 @@ class ABPT:
             flight, late = cut_off(config, flight, cut, worth(policy, z))
             here = self._situation(env, flight.env, flight.observation, flight.memory)
             action, memory = self._act(policy, here, z)
-            quiet = worth(jax.lax.stop_gradient(policy), jnp.zeros_like(z))
-            flight, gain, _, out = flown(env, config, flight, action, memory, quiet)
+            flight, gain, _, out = flown(env, config, flight, action, memory, worth(policy, jnp.zeros_like(z)))
             gain["value"] += late
             return flight, (gain, {name: jnp.mean(x) for name, x in out.terms.items()})
 

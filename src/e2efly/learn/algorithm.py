@@ -90,7 +90,7 @@ def begin(algorithm: Algorithm, env: Env, config: AlgorithmConfig, parameters: A
     """
     part = jax.lax.axis_index(AXIS), jax.lax.axis_size(AXIS)
     env_state, observation = part_of(*env.reset(jax.random.fold_in(key, 0), config.envs), part)
-    key = jax.random.fold_in(key, part[0])
+    key = jax.random.fold_in(key, 1 + part[0])
     optimizer, memory = algorithm.optimizer(config, parameters), algorithm.actor.memory(observation.shape[0])
     replay = algorithm.replay(env, config, env_state, observation)
     return TrainState(parameters, optimizer, env_state, observation, memory, key, replay)

@@ -23,7 +23,7 @@ def write_atomically(path: Path, data: bytes) -> None:
     Raises:
         OSError: naming the path, when the folder cannot be written or is full.
     """
-    part = path.with_name(path.name + ".part")
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")  # others may write the same file
     try:
         with part.open("wb") as file:
             file.write(data)

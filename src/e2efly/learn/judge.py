@@ -11,8 +11,8 @@ from e2efly.evaluate import Episodes
 from e2efly.learn.networks import Weights
 from e2efly.learn.setup import Setup
 
-WATCHED, REPORTED = 1, 2
-"""Streams of starts: those that training watches, and the unseen ones of the report."""
+WATCHED, REPORTED, CONFIRMED = 1, 2, 3
+"""Streams of starts: those that training watches, the unseen ones of the report, and those that a goal is met on."""
 
 
 def judge(
@@ -34,14 +34,17 @@ def success(flown: dict[str, Episodes]) -> float:
 
 
 def score(task: str, flown: dict[str, Episodes]) -> float:
-    """What the best policy is chosen by: success first, then precision (racing: lap time)."""
+    """What the best policy is chosen by: success of the worst criterion; among equals, precision (racing: lap time).
+
+    No precision counts as much as one more success among the episodes.
+    """
 
     def cost(e: Episodes) -> float:
         if task in ("race", "race_clutter"):
-            return float(np.mean(e.duration)) / 10
+            return float(np.mean(e.duration[e.success])) / 10 if np.any(e.success) else math.inf
         return float(np.mean(e.mean_error if task == "track" else e.final_error))
 
-    return min(float(np.mean(e.success)) - 0.1 * min(cost(e), 1.0) for e in flown.values())
+    return min(float(np.mean(e.success)) - 0.5 * math.tanh(cost(e)) / len(e.success) for e in flown.values())
 
 
 def digest(e: Episodes) -> dict[str, float]:

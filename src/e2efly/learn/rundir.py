@@ -67,8 +67,8 @@ class RunDirectory:
             self.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OSError(f"cannot make --out {self.path}: {error.strerror}") from error
-        self.write_json("config.json", to_json(config))
         self.write_json("versions.json", versions())
+        self.write_json("config.json", to_json(config))  # last: with it a folder holds a run
 
     def write_json(self, name: str, content: dict[str, Any]) -> None:
         """Write a JSON file atomically."""
@@ -119,6 +119,9 @@ class RunDirectory:
     def forget_after(self, update: int) -> None:
         """Drop metrics of updates that a resumed run will do again."""
         if not self.metrics.exists():
+            return
+        if not self.metrics.stat().st_size:  # a full disk
+            self.metrics.unlink()
             return
         header, *lines = self.metrics.read_text(encoding="utf-8").splitlines(keepends=True)
         whole = [line for line in lines if line.endswith("\n") and int(line.split(",", 1)[0]) <= update]

@@ -27,7 +27,7 @@ from e2efly.learn.algorithm import TrainState
 from e2efly.learn.checkpoint import load_checkpoint, read_about, save_checkpoint
 from e2efly.learn.clock import peak_memory, since_process_start
 from e2efly.learn.devices import placed
-from e2efly.learn.judge import REPORTED, WATCHED, digest, judge, score, success
+from e2efly.learn.judge import CONFIRMED, REPORTED, WATCHED, digest, judge, score, success
 from e2efly.learn.networks import Weights
 from e2efly.learn.programs import Programs, start_program
 from e2efly.learn.rundir import RunDirectory, differences, from_json, to_json, versions
@@ -97,13 +97,13 @@ def train(
     run = RunDirectory(out)
     setup = Setup.of(config)
     if hosts.first():
-        hosts.told(to_json(setup.config))
+        hosts.told({"resume": resume, "versions": _deciding(), "config": to_json(setup.config)})
         if resume:
             _check_resume(run, setup.config)
         else:
             run.create(setup.config)
     else:
-        _check_same(setup.config)
+        _check_same(setup.config, resume)
     parameters = setup.algorithm.init(setup.env, config.algo, config.seed)
     reporter.compiling()
     programs = Programs.compile(setup, parameters, traced if jax.process_count() == 1 else None)
@@ -139,7 +139,7 @@ def _loop(
             flown = judge(setup, programs.evaluate, weights, WATCHED, config.eval_episodes, stage=number)
             reached, last, now = progress.reached, success(flown), score(task, flown)
             if config.stop_at and final and not reached and last >= config.stop_at:
-                confirmed = judge(setup, programs.evaluate, weights, REPORTED, REPORT_EPISODES)
+                confirmed = judge(setup, programs.evaluate, weights, CONFIRMED, REPORT_EPISODES)
                 if success(confirmed) >= config.stop_at:
                     steps = (progress.update + config.chunk) * setup.steps_per_update
                     reached = {"seconds": before + since_process_start(), "steps": steps}
@@ -272,22 +272,30 @@ def _about(config: TrainConfig, progress: Progress) -> dict[str, Any]:
     return {**dataclasses.asdict(progress), "version": versions()["e2efly"], "seed": config.seed}
 
 
-def _check_same(config: TrainConfig) -> None:
-    """Refuse a configuration that is not process 0's."""
-    wanted = from_json(hosts.told(None), "process 0")
-    if different := list(differences(wanted, config)):
+def _deciding() -> dict[str, str]:
+    """Versions of what a run cannot go on with another of."""
+    return {name: version for name, version in versions().items() if name in ("e2efly", "jax", "jaxlib")}
+
+
+def _check_same(config: TrainConfig, resume: bool) -> None:
+    """Refuse what is not as process 0 has it."""
+    wanted = hosts.told(None)
+    different = list(differences(from_json(wanted["config"], "process 0"), config))
+    for name, theirs, ours in (
+        ("resume", wanted["resume"], resume),
+        *((name, wanted["versions"].get(name), version) for name, version in _deciding().items()),
+    ):
+        if theirs != ours:
+            different.append(f"{name}: {theirs} and {ours}")
+    if different:
         raise ValueError(f"process 0 was started with another configuration: {'; '.join(different)}")
 
 
 def _check_resume(run: RunDirectory, config: TrainConfig) -> None:
     if different := list(differences(run.config(), config)):
         raise ValueError(f"{run.path} was started with another configuration: {'; '.join(different)}")
-    started, now = run.read_json("versions.json"), versions()
-    changed = [
-        f"{name} {started.get(name)} and {now[name]}"
-        for name in ("e2efly", "jax", "jaxlib")
-        if started.get(name) != now[name]
-    ]
+    started, now = run.read_json("versions.json"), _deciding()
+    changed = [f"{name} {started.get(name)} and {now[name]}" for name in now if started.get(name) != now[name]]
     if changed:
         raise ValueError(f"{run.path} was started with another version: {', '.join(changed)}")
 

@@ -69,16 +69,16 @@ def flown(
 
     Returns:
         The flight after it; what it gained, discounted, by part: the reward (or, `term_gradients`, its terms), and
-        `value` where time ran out; the worth of where it led, without the state's gradient; what the environment said.
+        `value` where time ran out; the worth of where it led; and what the environment said.
     """
     reached, out = env.advance(flight.env, action)
-    keep = jnp.exp(-config.gradient_decay * env.control_period)
-    reached = dataclasses.replace(reached, vehicle=damped(reached.vehicle, keep))
-    follows = worth(*jax.lax.stop_gradient((reached, out.final_observation, memory)))
+    follows = worth(reached, out.final_observation, memory)
     terms = out.terms if config.term_gradients else {"reward": out.reward}
     gain = {name: jnp.mean(flight.discount * x) for name, x in terms.items()}
     gain["value"] = jnp.mean(flight.discount * out.truncated * config.gamma * follows)
     env_state, out = env.restart(reached, out)
+    keep = jnp.exp(-config.gradient_decay * env.control_period)
+    env_state = dataclasses.replace(env_state, vehicle=damped(env_state.vehicle, keep))
     env_state = env.look(env_state, out.done)
     memory = jnp.where(out.done[:, None], 0.0, memory)
     discount = jnp.where(out.done, 1.0, flight.discount * config.gamma)
