@@ -10,8 +10,9 @@ import pytest
 
 from e2efly import presets
 from e2efly.config import EnvConfig, HoverConfig, ImuConfig, LandConfig, NoiseConfig, RewardConfig, TaskConfig
-from e2efly.env import Env, numbers_of, random_key
+from e2efly.env import UNSEEN, Env, numbers_of, random_key
 from e2efly.env.environment import STARTS
+from e2efly.learn.judge import CONFIRMED, REPORTED, WATCHED
 from e2efly.physics.rotation import yaw_pitch_roll
 from e2efly.sensors import imu
 from e2efly.sensors.latency import acting_commands, delayed_state
@@ -116,7 +117,7 @@ def test_only_ended_episodes_start_anew() -> None:
 
 
 def test_time_out_is_told_apart_from_termination() -> None:
-    env = make(HoverConfig(episode_s=0.1, position=0.1))  # three steps, far from everything
+    env = make(HoverConfig(episode_s=0.1, hold_s=0.1, position=0.1))  # three steps, far from everything
     state, _ = env.reset(random_key(0), 4)
     step = jax.jit(env.step)
     for i in range(3):
@@ -270,6 +271,10 @@ def test_bad_configurations_are_named(config: dict[str, Any], message: str) -> N
         make(**config)
 
 
-def test_keys_of_different_seeds_differ_also_where_zeros_are_at_their_end() -> None:
-    seeds = [(), (0,), (1,), (0, 0), (1, 0), (0, 1), (0, 1, 0), (1, 1), (0, 1, 1)]
+def test_a_run_and_what_is_flown_for_a_purpose_draw_from_different_keys() -> None:
+    streams = (WATCHED, CONFIRMED, REPORTED, UNSEEN)
+    seeds = [(seed,) for seed in range(9)]
+    seeds += [(seed, stream, batch) for seed in range(9) for stream in streams for batch in range(9)]
     assert len({tuple(np.asarray(numbers_of(random_key(*seed))).tolist()) for seed in seeds}) == len(seeds)
+    with pytest.raises(ValueError, match="seed is -1; accepted: 0 or more"):
+        random_key(-1, 0)

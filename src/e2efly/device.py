@@ -118,6 +118,8 @@ class Hosts:
         host, _, port = self.coordinator.rpartition(":")
         if not host or not port.isdigit():
             raise ValueError(f"hosts.coordinator is {self.coordinator!r}; accepted: HOST:PORT of process 0")
+        if self.count < 1:
+            raise ValueError(f"hosts.count is {self.count}; accepted: 1 or more")
         if not 0 <= self.index < self.count:
             raise ValueError(f"hosts.index is {self.index}; accepted: 0 to hosts.count - 1 ({self.count - 1})")
         import jax
@@ -158,8 +160,8 @@ def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:
 
     try:
         found = jax.devices()[0].platform
-    except RuntimeError as error:
-        reason = str(error).splitlines()[0]
+    except (RuntimeError, AssertionError) as error:  # JAX 0.10 asserts where CUDA's plug-in sees no GPU
+        reason = (str(error) or "JAX finds none").splitlines()[0]
         raise ValueError(
             f"--device {device} is not to be had: {reason} (NVIDIA GPUs: pip install 'e2efly[cuda]')"
         ) from None

@@ -2,6 +2,8 @@
 
 import dataclasses
 import json
+import re
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,7 @@ import numpy as np
 import pytest
 
 from e2efly import presets
-from e2efly.commands.evaluate import callback, check_observation, config_from_contract
+from e2efly.commands.evaluate import callback, check_observation, config_from_contract, run_of
 from e2efly.config import CameraConfig, EnvConfig, ImuConfig, NetworkConfig, RewardConfig, TrainConfig
 from e2efly.deploy.policy import load_policy
 from e2efly.env import Env
@@ -18,6 +20,8 @@ from e2efly.evaluate import Act
 from e2efly.learn.export import contract_of, export_policy, parity, random_images, random_observations
 from e2efly.learn.networks import Actor, View, Weights
 from e2efly.learn.programs import acting
+from e2efly.learn.rundir import RunDirectory
+from e2efly.vehicles import load_vehicle
 
 DEPTH = CameraConfig("depth", width=16, height=12, reach=(0.3, 8.0), rate=15.0, latency=(0.0, 0.05))
 MASK, RGB = CameraConfig("mask", width=16, height=16), CameraConfig("rgb", width=8, height=8)
@@ -143,6 +147,28 @@ def test_a_lone_file_brings_its_cameras_and_acts_in_compiled_programs(tmp_path: 
         ValueError, match=r"^images: the policy wants \[\('mask', 'pad', 16, 16\).*the environment give"
     ):
         check_observation(policy, Env.of(task, config.reward, other))
+
+
+def test_a_lone_file_of_one_s_own_vehicle_is_flown_with_the_vehicle_s_file(tmp_path: Path) -> None:
+    shipped = (resources.files("e2efly.vehicles") / "vis_r.toml").read_text()
+    mine = tmp_path / "mine.toml"
+    mine.write_text(re.sub(r"(\[mass\]\nvalue = )[0-9.]+", r"\g<1>0.7", shipped))
+    assert load_vehicle(str(mine)).hash != load_vehicle("vis_r").hash
+    path, *_ = exported(tmp_path, (), NetworkConfig((8,)), vehicle=str(mine))
+    policy = load_policy(path)
+    with pytest.raises(ValueError, match=r"vehicle_hash is .* accepted: the file of that vehicle with --vehicle"):
+        config_from_contract(policy)
+    with pytest.raises(ValueError, match="vehicle_hash is"):
+        config_from_contract(policy, "vis_h")
+    assert config_from_contract(policy, str(mine))[1].vehicle == str(mine)
+
+
+def test_a_file_in_its_run_s_folder_is_that_run_s(tmp_path: Path) -> None:
+    run = RunDirectory(tmp_path / "run")
+    run.create(presets.preset("hover", "ppo"))
+    assert run_of(run.path) == run_of(run.policy) == run
+    assert run_of(tmp_path / "policy.onnx") is None
+    assert run_of(run.path / "other.onnx") is None
 
 
 def test_cameras_of_another_environment_are_refused(tmp_path: Path) -> None:

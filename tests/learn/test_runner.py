@@ -167,6 +167,12 @@ def test_resume_refuses_another_configuration_and_names_it(tmp_path: Path) -> No
         train(other, tmp_path / "run", Silent(), resume=True)
 
 
+def test_resume_with_another_task_says_that_alone(tmp_path: Path) -> None:
+    RunDirectory(tmp_path / "run").create(small())
+    with pytest.raises(ValueError, match=r"another configuration: task: hover and land; algo: ppo and bptt$"):
+        train(small("land", "bptt"), tmp_path / "run", Silent(), resume=True)
+
+
 def test_resume_refuses_another_version(tmp_path: Path) -> None:
     config = small()
     run = RunDirectory(tmp_path / "run")

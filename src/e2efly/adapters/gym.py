@@ -1,6 +1,6 @@
 """Gymnasium environments: one vehicle (`QuadrotorEnv`), or a batch that steps together (`QuadrotorVectorEnv`).
 
-`pip install e2efly[gym]`. Importing this module registers `e2efly/TASK-v0` for every task, for `gymnasium.make` and
+`pip install 'e2efly[gym]'`. Importing this module registers `e2efly/TASK-v0` for every task, for `gymnasium.make` and
 `gymnasium.make_vec(..., vectorization_mode="vector_entry_point")`.
 """
 

@@ -1,4 +1,4 @@
-"""Our batch of vehicles as a vectorised environment of Stable-Baselines3. `pip install e2efly[sb3]`."""
+"""Our batch of vehicles as a vectorised environment of Stable-Baselines3. `pip install 'e2efly[sb3]'`."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,6 +1,7 @@
 """Back-propagation from PyTorch through our steps: the state goes to and fro by DLPack, without a copy.
 
-`pip install e2efly[torch]`. The gradient is that of JAX, by its transposed program; as everywhere, a new start cuts it.
+`pip install 'e2efly[torch]'`. The gradient is that of JAX, by its transposed program; as everywhere, a new start cuts
+it.
 """
 
 from dataclasses import dataclass

@@ -42,6 +42,8 @@ def ablate_command(request: Request) -> int:
         ValueError: for unknown names, and numbers that cannot be used.
         OSError: when the folder cannot be written.
     """
+    if request.seeds < 1:
+        raise ValueError(f"--seeds is {request.seeds}; accepted: 1 or more")
     prepare(request.device)
     from e2efly.learn.checkpoint import write_atomically
     from e2efly.view.ablation import Panel, plot_ablation
@@ -81,15 +83,16 @@ def _curves(request: Request, config: TrainConfig, console: Console) -> tuple[An
     """The curves of a configuration, and whether they were there already."""
     from e2efly.learn.ablation import Curves, ablate
     from e2efly.learn.checkpoint import write_atomically
-    from e2efly.learn.rundir import to_json
+    from e2efly.learn.rundir import different_values, to_json
 
     task, algo = presets.task_name(config.task), presets.algorithm_name(config.algo)
     path, about = request.out / f"{task}_{algo}.json", {"seeds": request.seeds, "config": to_json(config)}
     if path.exists():
         found = json.loads(path.read_text(encoding="utf-8"))
-        if found["about"] == json.loads(json.dumps(about)):
-            parts = {part: {k: np.array(v) for k, v in found[part].items()} for part in ("success", "error")}
-            return Curves(tuple(found["variants"]), np.array(found["steps"]), **parts), True
+        if different := list(different_values(found["about"], json.loads(json.dumps(about)))):
+            raise ValueError(f"{path} is of another ablation: {'; '.join(different)}; accepted: another --out")
+        parts = {part: {k: np.array(v) for k, v in found[part].items()} for part in ("success", "error")}
+        return Curves(tuple(found["variants"]), np.array(found["steps"]), **parts), True
     steps = config.steps * request.seeds * (len(config.reward.weights) + 1)
     with TerminalProgress(console, f"{task} by {algo}") as progress:
         progress.compiling()

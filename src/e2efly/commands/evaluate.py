@@ -18,7 +18,7 @@ from e2efly.deploy.policy import Policy, load_policy
 from e2efly.device import prepare, wide_vectors
 from e2efly.learn.checkpoint import write_atomically
 from e2efly.learn.rundir import RunDirectory
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles import load_vehicle, vehicle_names
 from e2efly.zoo import beside, policy_path
 
 BATCH, DRAWN = 250, 12
@@ -40,13 +40,13 @@ def eval_command(
         raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
     path = policy_path(path, vehicle)
     prepare(device)
-    run = RunDirectory(path) if path.is_dir() else None
+    run = run_of(path)
     policy = load_policy(run.policy if run else path)
     if run:
         config = run.config()
         task, env_config = config.task, config.env
     else:
-        task, env_config = config_from_contract(policy)
+        task, env_config = config_from_contract(policy, vehicle)
     if vehicle is not None:
         env_config = dataclasses.replace(env_config, vehicle=vehicle)
     flown, starts = fly_suites(policy, task, env_config, episodes, seed)
@@ -63,18 +63,34 @@ def eval_command(
     return 0
 
 
-def config_from_contract(policy: Policy) -> tuple[TaskConfig, EnvConfig]:
-    """Task and environment as the contract of a lone policy.onnx says."""
+def run_of(path: Path) -> RunDirectory | None:
+    """The run that a path is the folder, or the policy.onnx, of."""
+    folder = path.parent if path.name == "policy.onnx" else path
+    return RunDirectory(folder) if path.is_dir() or (folder / "config.json").is_file() else None
+
+
+def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[TaskConfig, EnvConfig]:
+    """Task and environment as the contract of a lone policy.onnx says; the task's options are those of its preset.
+
+    Args:
+        policy: as loaded.
+        vehicle: what it is to fly; may be the file of the vehicle that it was trained on.
+
+    Raises:
+        ValueError: when the vehicle that it was trained on is not to be had.
+    """
     c = policy.contract
-    vehicle = load_vehicle(c.vehicle)
-    if vehicle.hash != c.vehicle_hash:
+    own = vehicle is not None and load_vehicle(vehicle).hash == c.vehicle_hash
+    name = vehicle if vehicle is not None and own else c.vehicle
+    known = load_vehicle(name).hash if own or name in vehicle_names() else "no vehicle that comes with the package"
+    if known != c.vehicle_hash:
         raise ValueError(
-            f"vehicle_hash is {c.vehicle_hash} in the contract, but vehicle {c.vehicle!r} is {vehicle.hash}: it was "
-            "trained on other parameters; accepted: the vehicle's file with --vehicle FILE.toml, or a policy of its own"
+            f"vehicle_hash is {c.vehicle_hash} in the contract, but vehicle {c.vehicle!r} is {known}: it was trained "
+            "on other parameters; accepted: the file of that vehicle with --vehicle FILE.toml, or its run's folder"
         )
     counts = {f.name: f.size for f in c.observation}
     config = EnvConfig(
-        vehicle=c.vehicle,
+        vehicle=name,
         command_mode=c.action.mode,
         control_rate=c.control_rate_hz,
         action_latency=(c.latency_range_s[0], c.latency_range_s[1]),
@@ -114,7 +130,7 @@ def fly_suites(
     """
     import jax
 
-    from e2efly.env import Env, random_key
+    from e2efly.env import UNSEEN, Env, random_key
     from e2efly.evaluate import run_episodes
 
     flown, starts = {}, {}
@@ -128,7 +144,7 @@ def fly_suites(
         env = Env.of(suite, RewardConfig({"prog2": 1.0}), env_config)
         check_observation(policy, env)
         steps, settle = episode_steps(suite, env), float(getattr(suite, "settle_s", 0.0))
-        keys = [random_key(seed, i) for i in range(-(-episodes // BATCH))]
+        keys = [random_key(seed, UNSEEN, i) for i in range(-(-episodes // BATCH))]
         parts = [jax.tree.map(np.asarray, program(env, key, steps, settle)) for key in keys]
         flown[name], starts[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
     return flown, starts
@@ -250,7 +266,7 @@ def _draw(
 ) -> None:
     import jax
 
-    from e2efly.env import Env, random_key
+    from e2efly.env import UNSEEN, Env, random_key
     from e2efly.view import plots
     from e2efly.view.worlds import plot_flights_in_worlds
 
@@ -261,10 +277,10 @@ def _draw(
     title = f"{policy.contract.task} on {policy.contract.vehicle}"
     for name, suite in presets.suites(task).items():
         env = Env.of(suite, RewardConfig({"prog2": 1.0}), env_config)
-        flights = plots.fly(env, callback(policy), random_key(seed), DRAWN, episode_steps(suite, env))
+        flights = plots.fly(env, callback(policy), random_key(seed, UNSEEN, 0), DRAWN, episode_steps(suite, env))
         tag = f"{title}: {name}" if len(flown) > 1 else title
         if env_config.cameras:  # every flight has a world of its own
-            begun = jax.jit(Env.reset, static_argnums=2)(env, random_key(seed), DRAWN)[0]
+            begun = jax.jit(Env.reset, static_argnums=2)(env, random_key(seed, UNSEEN, 0), DRAWN)[0]
             plot_flights_in_worlds(flights, env.task.scene(begun.memory), folder / f"flights_{name}.png", tag)
         else:
             plots.plot_flights(env.task, flights, folder / f"flights_{name}.png", tag)

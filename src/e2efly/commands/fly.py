@@ -45,6 +45,8 @@ CONNECT_S = 5.0
 """How long the controller may take to answer first, s."""
 LOOK_S = 1.5
 """How long `--check` watches poses and receiver, s."""
+SLOWEST = 0.5
+"""Largest `--latency`, s: behind more no gains hold a hover."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,8 @@ def fly_command(options: Fly) -> int:
     console = Console(highlight=False)
     settings, policy = options.flight, options.policy
     check_settings(settings)
+    if options.latency is not None and not 0 <= options.latency <= SLOWEST:
+        raise ValueError(f"--latency is {options.latency}; accepted: 0 to {SLOWEST:g} s")
     loaded = None
     if policy is not None:
         policy = policy_path(policy, options.vehicle)
@@ -104,7 +108,7 @@ def fly_command(options: Fly) -> int:
         where = goal_for(loaded.contract, options.goal, body)
         runtime = Runtime.of(loaded, where, body, envelope=options.envelope, imu=True)
     saved = options.throttle_map
-    known = throttle_map.from_json(saved.read_text(encoding="utf-8"), body) if saved else None
+    known = throttle_map.from_json(_read(saved, "--throttle-map"), body) if saved else None
     open_link(options.link).close()  # a wrong text is refused here rather than by the watchdog
     with ExitStack() as stack:
         source = open_source(options.pose)
@@ -153,6 +157,13 @@ def fly_command(options: Fly) -> int:
             console.print(f"log: {problem} ({count} times)", markup=False)
         console.print(f"Next: e2efly fly-report {path}; throttle map: {path.with_suffix('.throttle.json')}")
         return 0
+
+
+def _read(path: Path, option: str) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise OSError(f"{option} {path}: {error.strerror}") from None
 
 
 class _Stop:

@@ -67,7 +67,7 @@ class TrainConfig:
     seed: int = 0
     """Seed of everything random."""
     steps: int = 2_000_000
-    """Environment steps of the whole run."""
+    """Environment steps of the whole run, rounded up to whole chunks."""
     chunk: int = 20
     """Updates between two evaluations (sets shapes)."""
     eval_episodes: int = 250

@@ -1,12 +1,20 @@
 """Whether the numbers of an environment's configuration make sense."""
 
+import dataclasses
 import math
+from typing import Any
 
 from e2efly.config import EnvConfig, TaskConfig
 from e2efly.scenes.camera import check as check_camera
 from e2efly.sensors.image_noise import check as check_noise
 from e2efly.vehicles import load_vehicle, unknown
 from e2efly.vehicles.vehicle import quantities
+
+_ANYWHERE = ("target", "centre", "camera_position", "camera_pitch")
+"""Options of tasks that may be negative."""
+_MORE_THAN_0 = ("fence", "radius", "scale", "length", "width", "opening", "fov", "gyro_tau", "accel_tau")
+_RISING = ("distance", "height", "pad_size", "roll", "size", "speed")
+"""From the smallest to the largest, where they are two."""
 
 
 def check(config: EnvConfig, task: TaskConfig) -> None:
@@ -41,3 +49,32 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
             raise ValueError(f"camera.rate is {camera.rate}; accepted: the control rate, {rate:g} Hz, or a whole part")
     if not (math.isfinite(task.episode_s) and task.episode_s > 0):
         raise ValueError(f"task.episode_s is {task.episode_s}; accepted: a positive number of seconds")
+    longest, hold = max(task.episode_s, getattr(task, "judged_s", 0.0)), getattr(task, "hold_s", 0.0)
+    if not 0 <= hold <= longest:
+        raise ValueError(f"task.hold_s is {hold}; accepted: 0 to the length of an episode ({longest:g} s)")
+    if not (math.isfinite(config.position_range) and config.position_range > 0):
+        raise ValueError(f"env.position_range is {config.position_range}; accepted: more than 0, m")
+    for prefix, part in (("task", task), ("env.noise", config.noise), ("env.imu", config.imu)):
+        _check_numbers(prefix, part)
+
+
+def _check_numbers(prefix: str, part: Any) -> None:
+    """That every number is finite and not negative, but for places, and that ranges rise."""
+    for field in dataclasses.fields(part):
+        name, value = f"{prefix}.{field.name}", getattr(part, field.name)
+        if dataclasses.is_dataclass(value):
+            _check_numbers(name, value)
+            continue
+        numbers = value if isinstance(value, tuple) else (value,)
+        if any(isinstance(x, bool) or not isinstance(x, int | float) for x in numbers):
+            continue
+        if not all(map(math.isfinite, numbers)):
+            raise ValueError(f"{name} is {value}; accepted: finite numbers")
+        if field.name in _ANYWHERE:
+            continue
+        if min(numbers) < 0 or (field.name in _MORE_THAN_0 and min(numbers) == 0):
+            raise ValueError(
+                f"{name} is {value}; accepted: {'more than 0' if field.name in _MORE_THAN_0 else '0 or more'}"
+            )
+        if field.name in (*_RISING, "radius") and list(numbers) != sorted(numbers):
+            raise ValueError(f"{name} is {value}; accepted: two rising numbers")

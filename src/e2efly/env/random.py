@@ -7,14 +7,23 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, PRNGKeyArray
 
+UNSEEN = 4
+"""The stream of the starts of `e2efly eval` and `validate`; those before it are of training (`e2efly.learn.judge`)."""
 GENERATOR = "rbg"
 """XLA's own random generator: it compiles in a seventh of the time of JAX's default."""
 
 
 def random_key(*seed: int) -> PRNGKeyArray:
-    """The key of a seed, or of several numbers; made by NumPy: nothing to compile."""
-    ended = (*seed, 1)  # NumPy fills up with zeros: (1,) and (1, 0) would be the same
-    return key_of(jnp.asarray(np.random.SeedSequence(ended).generate_state(4)))
+    """The key of a seed, or of several numbers; made by NumPy: nothing to compile. Zeros at the end change nothing.
+
+    A run draws from (seed,), what is flown for a purpose from (seed, stream, batch), streams being 1 and more.
+
+    Raises:
+        ValueError: for a negative one.
+    """
+    if min(seed, default=0) < 0:
+        raise ValueError(f"seed is {min(seed)}; accepted: 0 or more")
+    return key_of(jnp.asarray(np.random.SeedSequence(seed).generate_state(4)))
 
 
 def is_key(x: Any) -> bool:

@@ -11,8 +11,8 @@ from e2efly.evaluate import Episodes
 from e2efly.learn.networks import Weights
 from e2efly.learn.setup import Setup
 
-WATCHED, REPORTED, CONFIRMED = 1, 2, 3
-"""Streams of starts: those that training watches, the unseen ones of the report, and those that a goal is met on."""
+WATCHED, CONFIRMED, REPORTED = 1, 2, 3
+"""Streams of starts: those that training watches, those that a goal is met on, and the unseen ones of the report."""
 
 
 def judge(

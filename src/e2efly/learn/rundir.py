@@ -187,13 +187,18 @@ def _value(like: Any, name: str, value: Any, where: str) -> Any:
 
 
 def differences(a: TrainConfig, b: TrainConfig) -> Iterator[str]:
-    """Where two configurations differ, as `field: this, that`."""
-    yield from _differences("", to_json(a), to_json(b))
+    """Where two configurations differ, as `field: this and that`; by another task or algorithm, nothing else counts."""
+    these, those = to_json(a), to_json(b)
+    kind = [name for name in ("task_name", "algo_name") if these[name] != those[name]]
+    yield from (f"{name.removesuffix('_name')}: {these[name]} and {those[name]}" for name in kind)
+    if not kind:
+        yield from different_values(these, those)
 
 
-def _differences(prefix: str, a: Any, b: Any) -> Iterator[str]:
+def different_values(a: Any, b: Any, prefix: str = "") -> Iterator[str]:
+    """Where two trees of JSON differ, as `field: this and that`."""
     if isinstance(a, dict) and isinstance(b, dict):
         for key in sorted({*a, *b}):
-            yield from _differences(f"{prefix}.{key}" if prefix else key, a.get(key), b.get(key))
+            yield from different_values(a.get(key), b.get(key), f"{prefix}.{key}" if prefix else key)
     elif a != b:
         yield f"{prefix}: {a} and {b}"

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array
 
 from e2efly.deploy.goals import GatesGoal, Goal, HoverGoal, LandGoal, ReferenceGoal
-from e2efly.env import Env, random_key
+from e2efly.env import UNSEEN, Env, random_key
 from e2efly.physics import State
 from e2efly.tasks import Hover, Land, Race, Task, Track
 from e2efly.validate.plant import RigidState
@@ -39,7 +39,7 @@ class Starts:
 
 def draw_starts(env: Env, n: int, seed: int) -> Starts:
     """The first `n` starts of a seed: those of `e2efly eval`."""
-    drawn = [_draw(env, random_key(seed, i)) for i in range(-(-n // BATCH))]
+    drawn = [_draw(env, random_key(seed, UNSEEN, i)) for i in range(-(-n // BATCH))]
     vehicle, memory = jax.tree.map(lambda *x: np.concatenate(x)[:n], *drawn)
     fields = (vehicle.position, vehicle.velocity, vehicle.quaternion, vehicle.body_rate)
     states = tuple(RigidState(*(x[i].astype(np.float64) for x in fields)) for i in range(n))
