@@ -66,7 +66,7 @@ class Ablate:
     algos: tuple[str, ...] = ("ppo", "bptt")
     """By which algorithms; a figure each."""
     preset: str = "ours"
-    """Where rewards and sizes come from: ours or paper."""
+    """Where rewards and sizes come from: ours, paper or thrown; their curricula are left out."""
     seeds: int = 3
     """Runs of each variant."""
     steps: int | None = None
@@ -238,7 +238,7 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
     ]
     options = dataclasses.make_dataclass("Train", every, frozen=True)
     weights = ", ".join(f"{name} {weight:g}" for name, weight in config.reward.weights.items())
-    options.__doc__ = f"Train a policy ({task}, {algo}). The defaults are the preset {preset!r}'s; reward: {weights}."
+    options.__doc__ = f"Train a policy ({task}, {algo}). The defaults are preset {preset}'s; reward: {weights}."
     top = {
         name: getattr(config, name)
         for name in ("seed", "steps", "chunk", "eval_episodes", "devices", "fast_compile", "stop_at")

@@ -185,7 +185,7 @@ def _race_clutter(algo: str) -> TrainConfig:
         "vel": 1.5, "near": 1.0, "avoid": 12.0, "fit": 20.0, "ori2": 0.3, "anglev_sq": 0.01, "act2_sq": 0.02,
     }  # fmt: skip
     parameters = {"fit_margin": 0.25, "fit_limit": 2.0}
-    settings: AlgorithmConfig = BPTTConfig(horizon=48, gradient_decay=1.5)
+    settings: AlgorithmConfig = BPTTConfig(horizon=48, gradient_decay=1.5, average=0.99)
     task, curriculum, network = TASKS["race_clutter"], (), NetworkConfig((128, 64), pool=(12, 48), recurrent=64)
     steps = 12_000_000
     if algo == "ppo":
@@ -383,7 +383,7 @@ _ANY, _SHARE = (0.0, math.inf), (0.0, 1.0)
 _BOUNDS: dict[str, tuple[float, float]] = {
     "gradient_decay": _ANY, "gae_lambda": _SHARE, "td_lambda": _SHARE, "clip": _ANY, "value_weight": _ANY,
     "entropy_weight": _ANY, "log_std": (-10.0, 2.0), "critic_rate": _ANY, "exact_rate": _ANY, "target_share": _SHARE,
-    "noise": _ANY, "fresh_share": _SHARE, "at_once": _SHARE,
+    "noise": _ANY, "fresh_share": _SHARE, "at_once": _SHARE, "average": _SHARE,
 }  # fmt: skip
 """Of options of algorithms, smallest and largest."""
 
@@ -413,8 +413,8 @@ def check(config: TrainConfig) -> None:
         if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} is {value}; accepted: more than 0")
     for name, (low, high) in {**_BOUNDS, "horizon_start": (0, algo.horizon)}.items():
-        value = getattr(algo, name, low)
-        if not (math.isfinite(value) and low <= value <= high):
+        value = getattr(algo, name, None)
+        if value is not None and not (math.isfinite(value) and low <= value <= high):
             accepted = f"{low:g} to {high:g}" if math.isfinite(high) else f"{low:g} or more"
             raise ValueError(f"algo.{name} is {value}; accepted: {accepted}")
     if not 0 < algo.gamma <= 1:

@@ -208,6 +208,17 @@ def test_gradient_decay_changes_the_gradient_and_not_the_flight() -> None:
     del exact, damped
 
 
+def test_what_is_shipped_is_the_running_mean_of_what_learns() -> None:
+    config = dataclasses.replace(BPTT_CONFIG, average=0.75)
+    first = make_algorithm(config, ACTOR).init(Probe(), config, 0)  # type: ignore[arg-type]
+    _, state, _ = learn(Probe(), config, 1)
+    _, plain, _ = learn(Probe(), BPTT_CONFIG, 1)
+    expected = jax.tree.map(lambda old, new: 0.75 * old + 0.25 * new, first.policy, state.parameters.learner)
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, atol=1e-6), state.parameters.policy, expected)
+    jax.tree.map(np.testing.assert_array_equal, state.parameters.learner, plain.parameters.learner)
+    jax.tree.map(np.testing.assert_array_equal, plain.parameters.policy, plain.parameters.learner)
+
+
 def test_learning_rate_falls_exponentially() -> None:
     config = PPOConfig(learning_rate=1e-2, learning_rate_end=1e-4)
     rates = [float(annealed(config, jnp.float32(p))) for p in (0.0, 0.5, 1.0)]

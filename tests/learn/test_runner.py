@@ -246,6 +246,7 @@ def test_bad_numbers_are_named(change: dict[str, Any], message: str) -> None:
         ("bptt", "horizon_start", -8, "0 to 64"),
         ("bptt", "horizon_start", 65, "0 to 64"),
         ("bptt", "gradient_decay", -5.0, "0 or more"),
+        ("bptt", "average", 1.5, "0 to 1"),
         ("ppo", "gae_lambda", math.nan, "0 to 1"),
         ("ppo", "log_std", 9.0, "-10 to 2"),
         ("shac", "target_share", 7.0, "0 to 1"),

@@ -75,6 +75,9 @@ class BPTTConfig(_FirstOrder):
     """Adam's step at the end; exponential in between."""
     gamma: float = 0.99
     """Discount a step within the window."""
+    average: float | None = None
+    """Share of the old in a running mean of the policy, an update; the mean is judged and shipped. None: the policy
+    itself (sets the program)."""
 
 
 @dataclass(frozen=True)

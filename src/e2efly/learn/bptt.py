@@ -26,6 +26,9 @@ class Parameters:
     """What BPTT learns."""
 
     policy: Weights
+    """What is judged and shipped: what learns, or its running mean (`BPTTConfig.average`)."""
+    learner: Weights
+    """What flies the windows and takes the steps."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +41,12 @@ class BPTT:
         """A fresh network, made by NumPy."""
         del config
         rng = np.random.default_rng(seed)
-        return Parameters(self.actor.init(rng, np.asarray(env.hover)))
+        policy = self.actor.init(rng, np.asarray(env.hover))
+        return Parameters(policy, jax.tree.map(np.copy, policy))
 
     def optimizer(self, config: BPTTConfig, parameters: Parameters) -> Any:
         """Adam at rest."""
-        return at_rest(config, parameters)
+        return at_rest(config, parameters.learner)
 
     def replay(self, env: Env, config: BPTTConfig, state: EnvState, observation: Float[Array, "n o"]) -> None:
         """Nothing: each update learns from its own steps."""
@@ -61,22 +65,26 @@ class BPTT:
         Returns:
             The new state and the metrics of this update.
         """
+        old, rate, share = state.parameters, annealed(config, progress), config.average
 
-        def gain(parameters: Parameters) -> tuple[dict[str, Array], Any]:
-            return self._window(env, config, parameters, state, progress)
+        def gain(learner: Weights) -> tuple[dict[str, Array], Any]:
+            return self._window(env, config, learner, state, progress)
 
-        grads, (env_state, observation, memory, metrics), norms = ascended(
-            gain, state.parameters, config.term_gradients
-        )
-        rate = annealed(config, progress)
-        parameters, optimizer, norm = descend(config, rate, state.parameters, state.optimizer, grads)
+        grads, (env_state, observation, memory, metrics), norms = ascended(gain, old.learner, config.term_gradients)
+        learner, optimizer, norm = descend(config, rate, old.learner, state.optimizer, grads)
         metrics |= {"loss/gradient_norm": norm, **norms}
+        policy = learner if share is None else jax.tree.map(lambda a, b: b + share * (a - b), old.policy, learner)
         return dataclasses.replace(
-            state, parameters=parameters, optimizer=optimizer, env=env_state, observation=observation, memory=memory
+            state,
+            parameters=Parameters(policy, learner),
+            optimizer=optimizer,
+            env=env_state,
+            observation=observation,
+            memory=memory,
         ), metrics
 
     def _window(
-        self, env: Env, config: BPTTConfig, parameters: Parameters, state: TrainState, progress: Float[Array, ""]
+        self, env: Env, config: BPTTConfig, learner: Weights, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[dict[str, Array], Any]:
         keep = jnp.exp(-config.gradient_decay * env.control_period)
 
@@ -85,7 +93,7 @@ class BPTT:
                 carry = (*damped(carry[:3], 1.0 - cut), jnp.where(cut, 1.0, carry[3]))
             env_state, observation, memory, discount = carry
             features = self.actor.features(observation, env_state.images)
-            action, memory = self.actor(parameters.policy, features, memory)
+            action, memory = self.actor(learner, features, memory)
             env_state, out = env.step(env_state, action)
             env_state = dataclasses.replace(env_state, vehicle=damped(env_state.vehicle, keep))
             gathered = (
