@@ -19,7 +19,7 @@ from e2efly.env import Env, random_key
 def short(seconds: float = 0.2) -> TrainConfig:
     """Hover in episodes that end by time-out."""
     config = presets.preset("hover", "ppo")
-    return dataclasses.replace(config, task=dataclasses.replace(config.task, episode_s=seconds))
+    return dataclasses.replace(config, task=dataclasses.replace(config.task, episode_s=seconds, hold_s=0.0))
 
 
 def vector(task: Any = "hover", n: int = 4, **given: Any) -> QuadrotorVectorEnv:

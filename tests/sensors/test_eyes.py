@@ -60,7 +60,7 @@ def test_a_slow_camera_holds_its_image() -> None:
 
 
 def test_a_new_episode_begins_with_an_image_of_its_own() -> None:
-    env = env_with(dataclasses.replace(DOWN, rate=10.0), task=dataclasses.replace(HIGH, episode_s=4 / 30))
+    env = env_with(dataclasses.replace(DOWN, rate=10.0), task=dataclasses.replace(HIGH, episode_s=4 / 30, hold_s=0.0))
     states = fly(env, 4)  # the episodes end at tick 4, between two images
     np.testing.assert_allclose(seen(states)[4], heights(states)[4], rtol=2e-3)
     assert np.all(np.abs(seen(states)[4] - seen(states)[3]) > 1e-3)

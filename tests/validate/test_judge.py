@@ -16,7 +16,7 @@ from e2efly.commands.evaluate import callback, episode_steps
 from e2efly.config import RewardConfig, TaskConfig
 from e2efly.deploy.policy import load_policy
 from e2efly.deploy.runtime import Runtime
-from e2efly.env import Env, random_key
+from e2efly.env import UNSEEN, Env, random_key
 from e2efly.evaluate import Episodes, run_episodes
 from e2efly.validate.flight import Trajectory, fly
 from e2efly.validate.judge import judge
@@ -63,7 +63,7 @@ def test_flights_of_the_runtime_are_judged_as_episodes(
     def episodes(env: Env, key: Any, steps: int) -> Episodes:
         return run_episodes(env, callback(load_policy(path)), key, EVAL_BATCH, steps, settle)
 
-    wanted = jax.tree.map(lambda x: np.asarray(x)[:N], episodes(env, random_key(SEED, 0), episode_steps(suite, env)))
+    wanted = jax.tree.map(lambda x: np.asarray(x)[:N], episodes(env, random_key(SEED, UNSEEN, 0), episode_steps(suite, env)))
     np.testing.assert_array_equal(verdicts.success, wanted.success)
     np.testing.assert_array_equal(verdicts.crashed, wanted.crashed)
     assert verdicts.success.sum() >= good
@@ -75,7 +75,7 @@ def test_starts_are_those_of_eval_and_do_not_depend_on_their_number() -> None:
     assert BATCH == EVAL_BATCH
     env = env_of(SUITES["circle"])
     few, many = draw_starts(env, 3, SEED), draw_starts(env, BATCH + 2, SEED)
-    state, _ = jax.jit(lambda key: env.reset(key, BATCH))(random_key(SEED, 0))
+    state, _ = jax.jit(lambda key: env.reset(key, BATCH))(random_key(SEED, UNSEEN, 0))
     for i in range(3):
         # to rounding: two compilations of the same draw
         np.testing.assert_allclose(few.states[i].position, np.asarray(state.vehicle.position)[i], atol=1e-6)
