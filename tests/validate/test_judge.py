@@ -63,7 +63,9 @@ def test_flights_of_the_runtime_are_judged_as_episodes(
     def episodes(env: Env, key: Any, steps: int) -> Episodes:
         return run_episodes(env, callback(load_policy(path)), key, EVAL_BATCH, steps, settle)
 
-    wanted = jax.tree.map(lambda x: np.asarray(x)[:N], episodes(env, random_key(SEED, UNSEEN, 0), episode_steps(suite, env)))
+    wanted = jax.tree.map(
+        lambda x: np.asarray(x)[:N], episodes(env, random_key(SEED, UNSEEN, 0), episode_steps(suite, env))
+    )
     np.testing.assert_array_equal(verdicts.success, wanted.success)
     np.testing.assert_array_equal(verdicts.crashed, wanted.crashed)
     assert verdicts.success.sum() >= good
