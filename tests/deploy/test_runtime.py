@@ -266,7 +266,7 @@ REFUSED: list[tuple[Callable[[Contract], Contract], str]] = [
         lambda c: dataclasses.replace(c, action=dataclasses.replace(c.action, mode="rotor_thrust")),
         "action.mode of the policy is 'rotor_thrust'; accepted: 'ctbr' or 'attitude' or",
     ),
-    (lambda c: _field(c, "velocity", name="air_speed"), "unknown observation field 'air_speed'"),
+    (lambda c: _field(c, "velocity", name="air_speed"), "observation field 'air_speed': nothing on board"),
     (lambda c: _field(c, "velocity", frame="body"), "observation field 'velocity' has size 3, frame 'body'"),
     (lambda c: _field(c, "body_rate", unit="deg/s"), "observation field 'body_rate' has .* unit 'deg/s'; accepted: 3"),
     (lambda c: _field(c, "position_error", unit="cm"), "observation field 'position_error' has .*accepted: 'world'"),

@@ -17,7 +17,7 @@ from e2efly.deploy.goals import GatesGoal, Goal
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.policy import Policy
 from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY
-from e2efly.vehicles import Vehicle, unknown
+from e2efly.vehicles import Vehicle
 
 MODES = tuple(mode for mode in COMMANDS if mode != "rotor_thrust")
 """Command modes that become collective thrust and body rates; a flight controller takes no rotor thrusts."""
@@ -190,7 +190,9 @@ def check(
     for field in contract.observation:
         same = _STATE_FIELDS.get(field.name)
         if field.name not in known:
-            reasons.append(unknown("observation field", field.name, known))
+            reasons.append(
+                f"observation field {field.name!r}: nothing on board says it; accepted: {', '.join(sorted(known))}"
+            )
         elif same and (field.size, field.frame, field.unit) != (same.size, same.frame, same.unit):
             reasons.append(
                 f"observation field {field.name!r} has size {field.size}, frame {field.frame!r} and unit "
