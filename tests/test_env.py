@@ -1,6 +1,7 @@
 """The environment: starts, new starts, latency, randomisation, gradients."""
 
 import dataclasses
+import math
 from typing import Any
 
 import jax
@@ -9,7 +10,18 @@ import numpy as np
 import pytest
 
 from e2efly import presets
-from e2efly.config import EnvConfig, HoverConfig, ImuConfig, LandConfig, NoiseConfig, RewardConfig, TaskConfig
+from e2efly.config import (
+    AvoidConfig,
+    EnvConfig,
+    ForestConfig,
+    HoverConfig,
+    ImuConfig,
+    LandConfig,
+    NoiseConfig,
+    RewardConfig,
+    TaskConfig,
+    TrackConfig,
+)
 from e2efly.env import UNSEEN, Env, numbers_of, random_key
 from e2efly.env.environment import STARTS
 from e2efly.learn.judge import CONFIRMED, REPORTED, WATCHED
@@ -278,3 +290,19 @@ def test_a_run_and_what_is_flown_for_a_purpose_draw_from_different_keys() -> Non
     assert len({tuple(np.asarray(numbers_of(random_key(*seed))).tolist()) for seed in seeds}) == len(seeds)
     with pytest.raises(ValueError, match="seed is -1; accepted: 0 or more"):
         random_key(-1, 0)
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        HoverConfig(fence=math.inf),
+        TrackConfig(reference="circle", circle_rate=-1.0),
+        AvoidConfig(ceiling=math.inf, forest=ForestConfig(density=0.2, room=128)),
+    ],
+)
+def test_what_makes_sense_is_accepted(task: TaskConfig) -> None:
+    """No fence, a clockwise circle, a dense forest with places for it, a bias that stays."""
+    env = Env.of(task, RewardConfig({"prog2": 1.0}), EnvConfig(imu=ImuConfig(gyro_bias=0.02, gyro_tau=math.inf)))
+    state, _ = jax.jit(Env.reset, static_argnums=2)(env, random_key(0), 2)
+    _, out = jax.jit(Env.step)(env, state, jnp.zeros((2, 4)))
+    assert np.all(np.isfinite(out.observation)) and np.all(np.isfinite(out.reward))

@@ -52,7 +52,8 @@ class Eval:
     seed: int = 1_000_000
     """Seed of the starts."""
     vehicle: str | None = None
-    """Fly another vehicle than the contract's: a name or a .toml file. The policy is not changed."""
+    """What flies: the file of the policy's own vehicle, or another vehicle than the contract's, a name or a .toml file.
+    The policy is not changed."""
     device: Literal["cpu", "gpu"] | None = None
     """Where to compute."""
 

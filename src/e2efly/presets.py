@@ -383,7 +383,7 @@ _ANY, _SHARE = (0.0, math.inf), (0.0, 1.0)
 _BOUNDS: dict[str, tuple[float, float]] = {
     "gradient_decay": _ANY, "gae_lambda": _SHARE, "td_lambda": _SHARE, "clip": _ANY, "value_weight": _ANY,
     "entropy_weight": _ANY, "log_std": (-10.0, 2.0), "critic_rate": _ANY, "exact_rate": _ANY, "target_share": _SHARE,
-    "noise": _ANY, "fresh_share": _SHARE, "at_once": _SHARE, "average": _SHARE,
+    "noise": _ANY, "fresh_share": _SHARE, "at_once": _SHARE, "average": (0.0, 0.9999),
 }  # fmt: skip
 """Of options of algorithms, smallest and largest."""
 

@@ -49,10 +49,26 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["train", "hover", "--task.fence", "nan"], "task.fence is nan; accepted: finite numbers"),
         (
             ["train", "hover", "--task.hold-s", "100"],
-            "task.hold_s is 100.0; accepted: 0 to the length of an episode (8 s)",
+            "task.hold_s is 100.0; accepted: 0 to the 8 s of task.episode_s",
         ),
         (["train", "land", "--task.height", "3", "1"], "task.height is (3.0, 1.0); accepted: two rising numbers"),
         (["train", "avoid", "--task.forest.density", "-1"], "task.forest.density is -1.0; accepted: 0 or more"),
+        (
+            ["train", "avoid", "--task.forest.density", "0.2"],
+            "task.forest.room is 64; accepted: 128 or more, the trees",
+        ),
+        (
+            ["train", "race_clutter", "--task.clutter.room", "18"],
+            "task.clutter.room is 18; accepted: a positive multiple",
+        ),
+        (
+            ["train", "race_clutter", "--task.clutter.obstacles", "20"],
+            "task.clutter.obstacles is 20.0; accepted: at most",
+        ),
+        (
+            ["train", "race_clutter", "--task.clutter.moving", "7"],
+            "task.clutter.moving is 7.0; accepted: a share, 0 to 1",
+        ),
         (["train", "hover", "--env.noise.position", "-1"], "env.noise.position is -1.0; accepted: 0 or more"),
         (["train", "hover", "--env.imu.gyro-tau", "0"], "env.imu.gyro_tau is 0.0; accepted: more than 0"),
         (["train", "hover", "--env.position-range", "-1"], "env.position_range is -1.0; accepted: more than 0"),

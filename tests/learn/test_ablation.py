@@ -70,11 +70,13 @@ def test_the_command_draws_and_takes_what_is_there_already(
     assert run(command) == 0
     assert "as found" in capsys.readouterr().out
     assert (tmp_path / "found" / "hover_ppo.json").read_bytes() == first
-    assert run([*command[:-2], "--steps", "81920", "--out", "found"]) == 2
+    # before anything is trained
+    assert run(["ablate", "land", "hover", "--algos", "ppo", "--seeds", "1", "--steps", "81920", "--out", "found"]) == 2
     assert "of another ablation: config.steps: 40960 and 81920; accepted: another --out" in " ".join(
         capsys.readouterr().err.split()
     )
     assert (tmp_path / "found" / "hover_ppo.json").read_bytes() == first
+    assert not (tmp_path / "found" / "land_ppo.json").exists()
 
 
 def test_an_unknown_task_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -209,14 +209,17 @@ def test_gradient_decay_changes_the_gradient_and_not_the_flight() -> None:
 
 
 def test_what_is_shipped_is_the_running_mean_of_what_learns() -> None:
-    config = dataclasses.replace(BPTT_CONFIG, average=0.75)
-    first = make_algorithm(config, ACTOR).init(Probe(), config, 0)  # type: ignore[arg-type]
-    _, state, _ = learn(Probe(), config, 1)
-    _, plain, _ = learn(Probe(), BPTT_CONFIG, 1)
-    expected = jax.tree.map(lambda old, new: 0.75 * old + 0.25 * new, first.policy, state.parameters.learner)
-    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, atol=1e-6), state.parameters.policy, expected)
-    jax.tree.map(np.testing.assert_array_equal, state.parameters.learner, plain.parameters.learner)
-    jax.tree.map(np.testing.assert_array_equal, plain.parameters.policy, plain.parameters.learner)
+    config = dataclasses.replace(BPTT_CONFIG, learning_rate_end=BPTT_CONFIG.learning_rate)
+    learners = []
+    for updates in (1, 2, 3):
+        plain = learn(Probe(), config, updates)[1].parameters
+        jax.tree.map(np.testing.assert_array_equal, plain.policy, plain.learner)
+        learners.append(plain.learner)
+    # two count the same, with the third the share of the old ends at a half
+    mean = jax.tree.map(lambda a, b, c: (a + b) / 4 + c / 2, *learners)
+    averaged = learn(Probe(), dataclasses.replace(config, average=0.5), 3)[1].parameters
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, atol=1e-6), averaged.policy, mean)
+    jax.tree.map(np.testing.assert_array_equal, averaged.learner, learners[-1])
 
 
 def test_learning_rate_falls_exponentially() -> None:

@@ -12,11 +12,11 @@ import pytest
 from safetensors.numpy import load_file
 
 from e2efly.learn.rundir import RunDirectory
-from tests.learn.test_runner import SMALL, timeless, wait_for_update
+from tests.learn.test_runner import MORE, SMALL, timeless, wait_for_update
 
 Process = subprocess.Popen[bytes]
-PPO = [*SMALL, "--algo", "ppo"]
-BPTT = [*SMALL[:10], *SMALL[12:], "--algo", "bptt"]
+PPO = [*SMALL, *MORE["ppo"], "--algo", "ppo"]
+BPTT = [*SMALL, "--algo", "bptt"]
 
 
 def start(cwd: Path, out: str, *flags: str, devices: int, told: str = "output.txt") -> Process:

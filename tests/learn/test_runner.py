@@ -24,9 +24,13 @@ from e2efly.learn.runner import NonFiniteError, train
 from e2efly.learn.setup import Setup
 
 SMALL = ["--steps", "6144", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16", "--algo.horizon", "16",
-         "--algo.minibatch", "128", "--network.hidden", "8", "--task.episode-s", "1", "--no-plots"]  # fmt: skip
+         "--network.hidden", "8", "--task.episode-s", "1", "--no-plots"]  # fmt: skip
 
-MORE = {"abpt": ["--algo.buffer", "1024", "--algo.places", "64"]}
+MORE = {
+    "ppo": ["--algo.minibatch", "128"],
+    "abpt": ["--algo.minibatch", "128", "--algo.buffer", "1024", "--algo.places", "64"],
+    "bptt": ["--algo.average", "0.8"],
+}
 
 
 class Silent:
@@ -117,9 +121,9 @@ def timeless(rows: list[dict[str, float]]) -> list[dict[str, float]]:
     return [{name: value for name, value in row.items() if name not in ("seconds", "rate")} for row in rows]
 
 
-@pytest.mark.parametrize("algo", ["ppo", "abpt"])
+@pytest.mark.parametrize("algo", ["ppo", "bptt", "abpt"])
 def test_a_killed_run_ends_bit_for_bit_like_one_that_was_not(algo: str, tmp_path: Path) -> None:
-    flags = ["train", "hover", "--algo", algo, *SMALL, "--devices", "2", *MORE.get(algo, ())]
+    flags = ["train", "hover", "--algo", algo, *SMALL, "--devices", "2", *MORE[algo]]
     whole = cli(*flags, "--out", "whole", cwd=tmp_path)
     assert whole.wait() == 0, output_of(tmp_path)
     process = cli(*flags, "--out", "cut", cwd=tmp_path)
@@ -138,7 +142,7 @@ def test_a_killed_run_ends_bit_for_bit_like_one_that_was_not(algo: str, tmp_path
 
 
 def test_ctrl_c_saves_and_stops(tmp_path: Path) -> None:
-    flags = ["train", "hover", *SMALL, "--steps", "100000000", "--out", "run"]
+    flags = ["train", "hover", *SMALL, *MORE["ppo"], "--steps", "100000000", "--out", "run"]
     process = cli(*flags, cwd=tmp_path)
     wait_for_update(tmp_path / "run", process, 4)
     os.kill(process.pid, signal.SIGINT)
@@ -186,6 +190,27 @@ def test_a_run_is_not_overwritten(tmp_path: Path) -> None:
     RunDirectory(tmp_path / "run").create(small())
     with pytest.raises(ValueError, match="already holds a run"):
         RunDirectory(tmp_path / "run").create(small())
+
+
+def test_the_next_process_of_a_run_clears_what_a_killed_one_had_not_finished(tmp_path: Path) -> None:
+    run = RunDirectory(tmp_path / "run")
+    run.create(small())
+    (run.path / "checkpoint.safetensors.123.part").write_bytes(b"half")
+    run.forget_after(0)
+    assert sorted(path.name for path in run.path.iterdir()) == ["config.json", "versions.json"]
+
+
+def test_a_run_of_a_version_that_did_not_know_an_option_is_read_without_it() -> None:
+    config = presets.preset("race_clutter", "bptt")
+    content = json.loads(json.dumps(to_json(config)))
+    assert content["algo"].pop("average") == 0.99
+    old = from_json(content, "config.json")
+    assert old == dataclasses.replace(config, algo=dataclasses.replace(config.algo, average=None))
+    with pytest.raises(ValueError, match=r"config.json: algo: unknown or missing key: \['avrage'\]; accepted: average"):
+        from_json({**content, "algo": {**content["algo"], "avrage": 0.9}}, "config.json")
+    del content["task"]
+    with pytest.raises(ValueError, match=r"config.json: unknown or missing key: \['task'\]"):
+        from_json(content, "config.json")
 
 
 NOT_IN_THE_PAPER = ("hover_aware", "gap")
@@ -246,7 +271,7 @@ def test_bad_numbers_are_named(change: dict[str, Any], message: str) -> None:
         ("bptt", "horizon_start", -8, "0 to 64"),
         ("bptt", "horizon_start", 65, "0 to 64"),
         ("bptt", "gradient_decay", -5.0, "0 or more"),
-        ("bptt", "average", 1.5, "0 to 1"),
+        ("bptt", "average", 1.0, "0 to 0.9999"),
         ("ppo", "gae_lambda", math.nan, "0 to 1"),
         ("ppo", "log_std", 9.0, "-10 to 2"),
         ("shac", "target_share", 7.0, "0 to 1"),

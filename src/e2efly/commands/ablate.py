@@ -51,15 +51,16 @@ def ablate_command(request: Request) -> int:
     console = Console(highlight=False)
     configs = {(algo, task): _config(request, task, algo) for algo in request.algos for task in request.tasks}
     request.out.mkdir(parents=True, exist_ok=True)
+    known = {pair: _known(request, config) for pair, config in configs.items()}
     lines: list[str] = []
     for algo in request.algos:
         panels = []
         for task in request.tasks:
             began = time.perf_counter()
-            curves, known = _curves(request, configs[algo, task], console)
+            curves = known[algo, task] or _curves(request, configs[algo, task], console)
             panels.append(Panel(task, curves, task in BY_ERROR))
             rows = _rows(curves)
-            took = "as found" if known else f"in {time.perf_counter() - began:.0f} s"
+            took = "as found" if known[algo, task] else f"in {time.perf_counter() - began:.0f} s"
             console.print(f"\n{task} by {algo.upper()}: {len(curves.variants)} rewards, {request.seeds} seeds, {took}")
             console.print(console_table(rows))
             lines += [f"## {task} by {algo.upper()}", "", *markdown(rows), ""]
@@ -79,20 +80,39 @@ def _config(request: Request, task: str, algo: str) -> TrainConfig:
     return config
 
 
-def _curves(request: Request, config: TrainConfig, console: Console) -> tuple[Any, bool]:
-    """The curves of a configuration, and whether they were there already."""
-    from e2efly.learn.ablation import Curves, ablate
+def _path(request: Request, config: TrainConfig) -> Path:
+    return request.out / f"{presets.task_name(config.task)}_{presets.algorithm_name(config.algo)}.json"
+
+
+def _about(request: Request, config: TrainConfig) -> dict[str, Any]:
+    """What decides the curves."""
+    from e2efly.learn.checkpoint import FORMAT
+    from e2efly.learn.rundir import to_json
+
+    return {"format": FORMAT, "seeds": request.seeds, "config": to_json(config)}
+
+
+def _known(request: Request, config: TrainConfig) -> Any:
+    """The curves that an earlier run wrote, or None."""
+    from e2efly.learn.ablation import Curves
+    from e2efly.learn.rundir import different_values
+
+    path = _path(request, config)
+    if not path.exists():
+        return None
+    found, about = json.loads(path.read_text(encoding="utf-8")), json.loads(json.dumps(_about(request, config)))
+    if different := list(different_values(found["about"], about)):
+        raise ValueError(f"{path} is of another ablation: {'; '.join(different)}; accepted: another --out")
+    parts = {part: {k: np.array(v) for k, v in found[part].items()} for part in ("success", "error")}
+    return Curves(tuple(found["variants"]), np.array(found["steps"]), **parts)
+
+
+def _curves(request: Request, config: TrainConfig, console: Console) -> Any:
+    """Train all variants of a configuration; keep their curves."""
+    from e2efly.learn.ablation import ablate
     from e2efly.learn.checkpoint import write_atomically
-    from e2efly.learn.rundir import different_values, to_json
 
     task, algo = presets.task_name(config.task), presets.algorithm_name(config.algo)
-    path, about = request.out / f"{task}_{algo}.json", {"seeds": request.seeds, "config": to_json(config)}
-    if path.exists():
-        found = json.loads(path.read_text(encoding="utf-8"))
-        if different := list(different_values(found["about"], json.loads(json.dumps(about)))):
-            raise ValueError(f"{path} is of another ablation: {'; '.join(different)}; accepted: another --out")
-        parts = {part: {k: np.array(v) for k, v in found[part].items()} for part in ("success", "error")}
-        return Curves(tuple(found["variants"]), np.array(found["steps"]), **parts), True
     steps = config.steps * request.seeds * (len(config.reward.weights) + 1)
     with TerminalProgress(console, f"{task} by {algo}") as progress:
         progress.compiling()
@@ -106,14 +126,14 @@ def _curves(request: Request, config: TrainConfig, console: Console) -> tuple[An
 
         curves = ablate(config, request.seeds, told)
     content = {
-        "about": about,
+        "about": _about(request, config),
         "variants": list(curves.variants),
         "steps": curves.steps.tolist(),
         "success": {name: x.tolist() for name, x in curves.success.items()},
         "error": {name: x.tolist() for name, x in curves.error.items()},
     }
-    write_atomically(path, (json.dumps(content) + "\n").encode())
-    return curves, False
+    write_atomically(_path(request, config), (json.dumps(content) + "\n").encode())
+    return curves
 
 
 def _rows(curves: Any) -> list[dict[str, str]]:

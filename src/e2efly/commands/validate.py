@@ -131,7 +131,7 @@ def _notes(policy: Policy, plant: str, env_config: EnvConfig, vehicle: str | Non
         )
     if (own := plant_kind(plant).latency) > policy.contract.latency_s:
         notes.append(f"The plant itself takes {own:g} s from command to rate loop, longer than that.")
-    if vehicle is not None:
+    if vehicle is not None and load_vehicle(vehicle).hash != policy.contract.vehicle_hash:
         notes.append(f"The plant is a {vehicle}, flown by the policy of a {policy.contract.vehicle}.")
     return notes
 

@@ -76,8 +76,8 @@ class BPTTConfig(_FirstOrder):
     gamma: float = 0.99
     """Discount a step within the window."""
     average: float | None = None
-    """Share of the old in a running mean of the policy, an update; the mean is judged and shipped. None: the policy
-    itself (sets the program)."""
+    """Share of the old in a running mean of the policy, an update, at most; as long as there are few, their plain mean.
+    The mean is judged and shipped. None: the policy itself (sets the program)."""
 
 
 @dataclass(frozen=True)

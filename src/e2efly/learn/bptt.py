@@ -12,6 +12,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+import optax
 from jaxtyping import Array, Float
 
 from e2efly.config import BPTTConfig
@@ -65,7 +66,7 @@ class BPTT:
         Returns:
             The new state and the metrics of this update.
         """
-        old, rate, share = state.parameters, annealed(config, progress), config.average
+        old, rate = state.parameters, annealed(config, progress)
 
         def gain(learner: Weights) -> tuple[dict[str, Array], Any]:
             return self._window(env, config, learner, state, progress)
@@ -73,7 +74,11 @@ class BPTT:
         grads, (env_state, observation, memory, metrics), norms = ascended(gain, old.learner, config.term_gradients)
         learner, optimizer, norm = descend(config, rate, old.learner, state.optimizer, grads)
         metrics |= {"loss/gradient_norm": norm, **norms}
-        policy = learner if share is None else jax.tree.map(lambda a, b: b + share * (a - b), old.policy, learner)
+        policy = learner
+        if config.average is not None:
+            count = optax.tree_utils.tree_get(optimizer, "count").astype(jnp.float32)
+            share = jnp.minimum(config.average, 1 - 1 / count)  # of few policies, their plain mean
+            policy = jax.tree.map(lambda a, b: b + share * (a - b), old.policy, learner)
         return dataclasses.replace(
             state,
             parameters=Parameters(policy, learner),

@@ -13,8 +13,8 @@ from safetensors.numpy import save
 
 from e2efly.env import is_key, key_of, numbers_of
 
-FORMAT = 1
-"""Version of the layout of a checkpoint."""
+FORMAT = 2
+"""Version of what a checkpoint holds and of how a run goes on from it."""
 
 
 def write_atomically(path: Path, data: bytes) -> None:

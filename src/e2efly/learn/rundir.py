@@ -18,6 +18,7 @@ from e2efly.config import CameraConfig, StageConfig, TrainConfig
 from e2efly.learn.checkpoint import write_atomically
 from e2efly.presets import algorithm_name, preset, task_name
 
+_NONE = dataclasses.MISSING
 _PACKAGES = ("e2efly", "jax", "jaxlib", "numpy", "optax", "onnx", "onnxruntime")
 
 
@@ -117,7 +118,9 @@ class RunDirectory:
             file.write(text.getvalue())
 
     def forget_after(self, update: int) -> None:
-        """Drop metrics of updates that a resumed run will do again."""
+        """Drop metrics of updates that a resumed run will do again, and files that a killed one had not finished."""
+        for part in self.path.glob("*.part"):
+            part.unlink()
         if not self.metrics.exists():
             return
         if not self.metrics.stat().st_size:  # a full disk
@@ -151,10 +154,10 @@ def to_json(config: TrainConfig) -> dict[str, Any]:
 
 
 def from_json(content: dict[str, Any], where: str) -> TrainConfig:
-    """The configuration that `to_json` wrote.
+    """The configuration that `to_json` wrote, of this version or an older one.
 
     Raises:
-        ValueError: for unknown or missing keys, naming them.
+        ValueError: for unknown keys and missing ones without a default, naming them.
     """
     content = dict(content)
     try:
@@ -166,8 +169,10 @@ def from_json(content: dict[str, Any], where: str) -> TrainConfig:
 
 def _read(like: Any, content: Any, where: str) -> Any:
     names = {f.name for f in dataclasses.fields(like)}
-    if not isinstance(content, dict) or set(content) != names:
-        found = sorted(set(content) ^ names) if isinstance(content, dict) else content
+    # what an older version did not know is as it was then: off, its field's default
+    needed = {f.name for f in dataclasses.fields(like) if (f.default, f.default_factory) == (_NONE, _NONE)}
+    if not isinstance(content, dict) or not needed <= set(content) <= names:
+        found = sorted(set(content) - names | needed - set(content)) if isinstance(content, dict) else content
         raise ValueError(f"{where}: unknown or missing key: {found}; accepted: {', '.join(sorted(names))}")
     values = {name: _value(like, name, value, where) for name, value in content.items()}
     return type(like)(**values)

@@ -30,7 +30,7 @@ from e2efly.learn.devices import placed
 from e2efly.learn.judge import CONFIRMED, REPORTED, WATCHED, digest, judge, score, success
 from e2efly.learn.networks import Weights
 from e2efly.learn.programs import Programs, start_program
-from e2efly.learn.rundir import RunDirectory, differences, from_json, to_json, versions
+from e2efly.learn.rundir import RunDirectory, differences, different_values, from_json, to_json, versions
 from e2efly.learn.setup import Setup
 
 REPORT_EPISODES = 1000
@@ -280,13 +280,11 @@ def _deciding() -> dict[str, str]:
 def _check_same(config: TrainConfig, resume: bool) -> None:
     """Refuse what is not as process 0 has it."""
     wanted = hosts.told(None)
-    different = list(differences(from_json(wanted["config"], "process 0"), config))
-    for name, theirs, ours in (
-        ("resume", wanted["resume"], resume),
-        *((name, wanted["versions"].get(name), version) for name, version in _deciding().items()),
-    ):
-        if theirs != ours:
-            different.append(f"{name}: {theirs} and {ours}")
+    different = list(different_values(wanted["versions"], _deciding()))
+    if not different:  # versions may differ in what can be configured
+        different = list(differences(from_json(wanted["config"], "process 0"), config))
+    if wanted["resume"] != resume:
+        different.append(f"resume: {wanted['resume']} and {resume}")
     if different:
         raise ValueError(f"process 0 was started with another configuration: {'; '.join(different)}")
 
