@@ -150,7 +150,7 @@ def _land_visual(algo: str) -> TrainConfig:
 def _avoid(algo: str) -> TrainConfig:
     weights = {"vel": 4.0, "avoid": 30.0, "ori2": 0.1, "anglev_sq": 0.01, "act2_sq": 0.02}
     parameters = {"avoid_reach": 0.5}
-    settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=1.2e-4, gradient_decay=1.5)
+    settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=3e-4, gradient_decay=1.5, average=0.99)
     task, network = TASKS["avoid"], NetworkConfig((128, 64), pool=(12, 32), recurrent=64)
     curriculum: tuple[StageConfig, ...] = ()
     if algo == "ppo":
