@@ -217,7 +217,7 @@ def _race(algo: str) -> TrainConfig:
         weights = {"prog1": 1.0, "anglev_sq": 0.0005, "act2_sq": 0.005, "goal": 1.0, "crash": 1.0}
         settings: AlgorithmConfig = PPOConfig(gamma=0.97, learning_rate=5e-3, learning_rate_end=5e-4)
         return TrainConfig(RaceConfig(laps=0), settings, RewardConfig(weights), steps=3_000_000)
-    weights = {"prog1": 1.0, "near": 0.1, "anglev_sq": 0.0005, "act2_sq": 0.005}
+    weights = {"prog1": 1.0, "near": 0.2, "anglev_sq": 0.0005, "act2_sq": 0.005}
     settings = BPTTConfig(learning_rate=8e-3, max_grad_norm=1.0, gradient_decay=1.0)
     return TrainConfig(RaceConfig(laps=0), settings, RewardConfig(weights), steps=2_500_000, chunk=15)
 
