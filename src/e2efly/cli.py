@@ -358,11 +358,11 @@ def _ablate(arguments: list[str]) -> int:
 
 
 def _eval(arguments: list[str]) -> int:
-    options = tyro.cli(Eval, args=arguments, prog="e2efly eval")
+    o = tyro.cli(Eval, args=arguments, prog="e2efly eval")
     from e2efly.commands.evaluate import eval_command
 
     return eval_command(
-        options.policy, options.episodes, options.json, options.plots, options.seed, options.vehicle, options.device
+        o.policy, o.episodes, report=o.json, plots=o.plots, seed=o.seed, vehicle=o.vehicle, device=o.device
     )
 
 
@@ -377,7 +377,7 @@ def _validate(arguments: list[str]) -> int:
     o = tyro.cli(Validate, args=arguments, prog="e2efly validate")
     from e2efly.commands.validate import validate_command
 
-    return validate_command(o.policy, o.plant, o.episodes, o.out, o.max_drop, o.json, o.seed, o.vehicle, o.flights)
+    return validate_command(**vars(o))
 
 
 def _fly(arguments: list[str]) -> int:

@@ -264,8 +264,7 @@ def _with_critic(task: str, algo: str) -> TrainConfig:
         taken["horizon"] = 64
     if task == "race" and algo == "shac":
         taken |= {"learning_rate": 4e-3, "noise": 0.1}
-    smooth = dataclasses.replace(config.reward, weights=_SMOOTH[task]) if task in _SMOOTH else None
-    reward = smooth or _ours(task, "ppo").reward
+    reward = RewardConfig(_SMOOTH[task], config.reward.parameters) if task in _SMOOTH else _ours(task, "ppo").reward
     return dataclasses.replace(config, algo=dataclasses.replace(ALGORITHMS[algo], **taken), reward=reward)
 
 

@@ -27,12 +27,12 @@ BATCH, DRAWN = 250, 12
 
 def eval_command(
     path: Path,
-    episodes: int,
-    report: Path | None,
-    plots: Path | None,
-    seed: int,
-    vehicle: str | None,
-    device: str | None,
+    episodes: int = 1000,
+    report: Path | None = None,
+    plots: Path | None = None,
+    seed: int = 1_000_000,
+    vehicle: str | None = None,
+    device: str | None = None,
     quiet: bool = False,
 ) -> int:
     """Fly the ONNX file itself from unseen starts; print a table, write the report and the plots."""
@@ -80,9 +80,11 @@ def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[Ta
         ValueError: when the vehicle that it was trained on is not to be had.
     """
     c = policy.contract
-    own = vehicle is not None and load_vehicle(vehicle).hash == c.vehicle_hash
-    name = vehicle if vehicle is not None and own else c.vehicle
-    known = load_vehicle(name).hash if own or name in vehicle_names() else "no vehicle that comes with the package"
+    name = c.vehicle
+    if vehicle is not None and load_vehicle(vehicle).hash == c.vehicle_hash:
+        name = vehicle
+    findable = name == vehicle or name in vehicle_names()
+    known = load_vehicle(name).hash if findable else "no vehicle that comes with the package"
     if known != c.vehicle_hash:
         raise ValueError(
             f"vehicle_hash is {c.vehicle_hash} in the contract, but vehicle {c.vehicle!r} is {known}: it was trained "
@@ -274,13 +276,13 @@ def _draw(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OSError(f"cannot make the folder of the plots {folder}: {error.strerror}") from error
-    title = f"{policy.contract.task} on {policy.contract.vehicle}"
+    title, key = f"{policy.contract.task} on {policy.contract.vehicle}", random_key(seed, UNSEEN, 0)
     for name, suite in presets.suites(task).items():
         env = Env.of(suite, RewardConfig({"prog2": 1.0}), env_config)
-        flights = plots.fly(env, callback(policy), random_key(seed, UNSEEN, 0), DRAWN, episode_steps(suite, env))
+        flights = plots.fly(env, callback(policy), key, DRAWN, episode_steps(suite, env))
         tag = f"{title}: {name}" if len(flown) > 1 else title
         if env_config.cameras:  # every flight has a world of its own
-            begun = jax.jit(Env.reset, static_argnums=2)(env, random_key(seed, UNSEEN, 0), DRAWN)[0]
+            begun = jax.jit(Env.reset, static_argnums=2)(env, key, DRAWN)[0]
             plot_flights_in_worlds(flights, env.task.scene(begun.memory), folder / f"flights_{name}.png", tag)
         else:
             plots.plot_flights(env.task, flights, folder / f"flights_{name}.png", tag)

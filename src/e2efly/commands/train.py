@@ -50,7 +50,7 @@ def _train(config: TrainConfig, out: Path, resume: bool, plots: bool, console: C
     if plots and not console.quiet:
         from e2efly.commands.evaluate import eval_command
 
-        eval_command(out, 1000, None, None, 1_000_000, None, None, quiet=True)
+        eval_command(out, quiet=True)
         console.print(f"Plots: {out / 'plots'}")
     console.print(f"Policy: {out / 'policy.onnx'} (its contract is inside; `e2efly eval {out}` flies it again)")
     return 0

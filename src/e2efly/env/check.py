@@ -14,7 +14,7 @@ from e2efly.vehicles.vehicle import quantities
 _ANYWHERE = ("target", "centre", "camera_position", "camera_pitch", "circle_rate")
 """Options of tasks that may be negative."""
 _MORE_THAN_0 = ("fence", "radius", "scale", "length", "width", "opening", "fov", "gyro_tau", "accel_tau")
-_RISING = ("distance", "height", "pad_size", "roll", "size", "speed")
+_RISING = ("distance", "height", "pad_size", "radius", "roll", "size", "speed")
 """From the smallest to the largest, where they are two."""
 _ENDLESS = ("fence", "ceiling", "gyro_tau", "accel_tau")
 """Options that may be infinite."""
@@ -78,11 +78,11 @@ def _check_numbers(prefix: str, part: Any) -> None:
             raise ValueError(f"{name} is {value}; accepted: finite numbers")
         if field.name in _ANYWHERE:
             continue
-        if min(numbers) < 0 or (field.name in _MORE_THAN_0 and min(numbers) == 0):
-            raise ValueError(
-                f"{name} is {value}; accepted: {'more than 0' if field.name in _MORE_THAN_0 else '0 or more'}"
-            )
-        if field.name in (*_RISING, "radius") and list(numbers) != sorted(numbers):
+        if field.name in _MORE_THAN_0 and min(numbers) <= 0:
+            raise ValueError(f"{name} is {value}; accepted: more than 0")
+        if min(numbers) < 0:
+            raise ValueError(f"{name} is {value}; accepted: 0 or more")
+        if field.name in _RISING and list(numbers) != sorted(numbers):
             raise ValueError(f"{name} is {value}; accepted: two rising numbers")
 
 

@@ -18,7 +18,6 @@ from e2efly.config import CameraConfig, StageConfig, TrainConfig
 from e2efly.learn.checkpoint import write_atomically
 from e2efly.presets import algorithm_name, preset, task_name
 
-_NONE = dataclasses.MISSING
 _PACKAGES = ("e2efly", "jax", "jaxlib", "numpy", "optax", "onnx", "onnxruntime")
 
 
@@ -170,7 +169,7 @@ def from_json(content: dict[str, Any], where: str) -> TrainConfig:
 def _read(like: Any, content: Any, where: str) -> Any:
     names = {f.name for f in dataclasses.fields(like)}
     # what an older version did not know is as it was then: off, its field's default
-    needed = {f.name for f in dataclasses.fields(like) if (f.default, f.default_factory) == (_NONE, _NONE)}
+    needed = {f.name for f in dataclasses.fields(like) if f.default is f.default_factory is dataclasses.MISSING}
     if not isinstance(content, dict) or not needed <= set(content) <= names:
         found = sorted(set(content) - names | needed - set(content)) if isinstance(content, dict) else content
         raise ValueError(f"{where}: unknown or missing key: {found}; accepted: {', '.join(sorted(names))}")

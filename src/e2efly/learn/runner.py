@@ -97,7 +97,7 @@ def train(
     run = RunDirectory(out)
     setup = Setup.of(config)
     if hosts.first():
-        hosts.told({"resume": resume, "versions": _deciding(), "config": to_json(setup.config)})
+        hosts.told({"resume": resume, "versions": _deciding(versions()), "config": to_json(setup.config)})
         if resume:
             _check_resume(run, setup.config)
         else:
@@ -272,15 +272,15 @@ def _about(config: TrainConfig, progress: Progress) -> dict[str, Any]:
     return {**dataclasses.asdict(progress), "version": versions()["e2efly"], "seed": config.seed}
 
 
-def _deciding() -> dict[str, str]:
-    """Versions of what a run cannot go on with another of."""
-    return {name: version for name, version in versions().items() if name in ("e2efly", "jax", "jaxlib")}
+def _deciding(versions: dict[str, str]) -> dict[str, str | None]:
+    """Of versions, those of what a run cannot go on with another of."""
+    return {name: versions.get(name) for name in ("e2efly", "jax", "jaxlib")}
 
 
 def _check_same(config: TrainConfig, resume: bool) -> None:
     """Refuse what is not as process 0 has it."""
     wanted = hosts.told(None)
-    different = list(different_values(wanted["versions"], _deciding()))
+    different = list(different_values(wanted["versions"], _deciding(versions())))
     if not different:  # versions may differ in what can be configured
         different = list(differences(from_json(wanted["config"], "process 0"), config))
     if wanted["resume"] != resume:
@@ -292,10 +292,8 @@ def _check_same(config: TrainConfig, resume: bool) -> None:
 def _check_resume(run: RunDirectory, config: TrainConfig) -> None:
     if different := list(differences(run.config(), config)):
         raise ValueError(f"{run.path} was started with another configuration: {'; '.join(different)}")
-    started, now = run.read_json("versions.json"), _deciding()
-    changed = [f"{name} {started.get(name)} and {now[name]}" for name in now if started.get(name) != now[name]]
-    if changed:
-        raise ValueError(f"{run.path} was started with another version: {', '.join(changed)}")
+    if different := list(different_values(_deciding(run.read_json("versions.json")), _deciding(versions()))):
+        raise ValueError(f"{run.path} was started with another version: {'; '.join(different)}")
 
 
 @contextmanager
