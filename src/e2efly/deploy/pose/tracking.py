@@ -16,6 +16,8 @@ from e2efly.deploy.pose.slope import Slope, follow_slope, settled, slope, start_
 
 LARGEST = 1e6
 """Numbers beyond this are nonsense, and their squares may overflow."""
+TRAVEL_S = 0.5
+"""Over which the way that a source's velocities add up to is compared with that of its positions, s."""
 LARGEST_STAMP = 1e11
 """Stamps beyond this, s, are too coarse: a float is then known to 15 microseconds."""
 
@@ -34,6 +36,10 @@ class Track:
     """Fit of the position, m."""
     body_rate: Slope | None = None
     """Fit of `angle`."""
+    strayed: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    """(3,) way by the source's velocities minus that of its positions, fading with `TRAVEL_S`, m."""
+    travelled: float = 0.0
+    """Length of that way, fading, m."""
     angle: np.ndarray = field(default_factory=lambda: np.zeros(3))
     """(3,) sum of the small rotations about the body's axes so far, rad."""
     same_since: float = 0.0
@@ -196,7 +202,7 @@ def _motion(
 ) -> tuple[Track, Odometry | None, str | None]:
     """Odometry of a good sample: velocities as the source gives them, or else estimated."""
     velocity_rate, body_rate_rate = (2 * math.pi * f for f in (checks.velocity_cutoff, checks.rate_cutoff))
-    shift, turn = track.velocity, track.body_rate
+    shift, turn, before = track.velocity, track.body_rate, track.pose
     if track.pose is None or shift is None or turn is None or time - track.pose[0] > checks.gap:
         shift, turn = start_slope(time, position), start_slope(time, np.zeros(3))
         angle = np.zeros(3)
@@ -220,9 +226,34 @@ def _motion(
         if off > limit:
             text = f"velocity: {velocity.tolist()} m/s is {off:.3g} from how the position changes"
             return track, None, f"{text}, {seen.round(3).tolist()}; accepted: at most {limit:.3g}, in the world's axes"
+    if sample.velocity is not None and before is not None:
+        seen = slope(shift) if settled(shift, velocity_rate) else velocity
+        track, reason = _strayed(checks, track, before, velocity, seen)
+        if reason is not None:
+            return track, None, reason
     body_rate = slope(turn) if sample.body_rate is None else np.array(sample.body_rate, np.float64)
     odometry = Odometry(time, position, velocity, quaternion, body_rate)
     return replace(track, odometry=odometry), odometry, None
+
+
+def _strayed(
+    checks: Checks, track: Track, before: tuple[float, np.ndarray, np.ndarray], velocity: np.ndarray, seen: np.ndarray
+) -> tuple[Track, str | None]:
+    """Refuse a velocity that is slow, zero, negated or of other axes: its way is not the one that the positions go."""
+    assert track.pose is not None
+    dt = track.pose[0] - before[0]
+    if not 0 < dt <= checks.gap:
+        return replace(track, strayed=np.zeros(3), travelled=0.0), None
+    kept = math.exp(-dt / TRAVEL_S)
+    strayed = kept * track.strayed + velocity * dt - (track.pose[1] - before[1])
+    speed = max(float(np.linalg.norm(velocity)), float(np.linalg.norm(seen)))
+    travelled = kept * track.travelled + speed * dt
+    off, limit = float(np.linalg.norm(strayed)), checks.velocity_drift + checks.velocity_share * travelled
+    after = replace(track, strayed=strayed, travelled=travelled)
+    if off <= limit:
+        return after, None
+    text = f"velocity: {velocity.round(3).tolist()} m/s and the last ones lead {off:.2g} m away from the positions"
+    return after, f"{text}; accepted: {limit:.2g} m, in the world's axes"
 
 
 def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
