@@ -16,6 +16,7 @@ import os
 import sys
 import tempfile
 import time
+import traceback
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -40,8 +41,8 @@ def flown(scenario: Scenario) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         try:
             outcome = asdict(fly(scenario, policy, vehicle, firmware.build(), Path(folder)))
-        except RuntimeError as error:
-            outcome = {"problem": str(error)}
+        except Exception:  # whatever it is, it is a finding, and the campaign goes on
+            outcome = {"problem": traceback.format_exc()}
     return {"scenario": asdict(scenario), **outcome, "took_s": time.perf_counter() - began}
 
 
@@ -63,7 +64,7 @@ def told(row: dict[str, Any]) -> str:
     """One line a flight."""
     scenario = row["scenario"]
     if "problem" in row:
-        return f"{scenario['name']}: could not be flown: {row['problem']}"
+        return f"{scenario['name']}: could not be flown: {row['problem'].splitlines()[-1]}"
     broken = [f"{v['rule']} {v['value']:.2f}" + (" (beyond)" if v["beyond"] else "") for v in row["violations"]]
     last = row["changes"][-1] if row["changes"] else (0.0, row["mode"], ())
     return (

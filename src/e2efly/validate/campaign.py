@@ -145,7 +145,10 @@ def _flown(scenario: Scenario, stage: Stage, look: Callable[[Stage], None]) -> F
 
     each()
     if ground:
-        stage.open()
+        try:
+            stage.open()
+        except (ValueError, OSError) as error:
+            return _refused(str(error))
         stage.trace = Trace()
     known = len(stage.session.flown.changes)
     stage.each = each
@@ -175,6 +178,15 @@ def _flown(scenario: Scenario, stage: Stage, look: Callable[[Stage], None]) -> F
         changes=tuple(changes),
         violations=violations,
     )
+
+
+def _refused(problem: str) -> Flown:
+    """The bridge does not start with this controller."""
+    nothing, never = 0.0, math.nan
+    return Flown(
+        nothing, nothing, never, never, never, nothing, nothing, True, nothing, "refused",
+        ((nothing, "refused", (problem,)),), (),
+    )  # fmt: skip
 
 
 def beyond(scenario: Scenario, began: float) -> list[Span]:
