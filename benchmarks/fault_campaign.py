@@ -43,7 +43,8 @@ def flown(scenario: Scenario) -> dict[str, Any]:
             outcome = asdict(fly(scenario, policy, vehicle, firmware.build(), Path(folder)))
         except Exception:  # whatever it is, it is a finding, and the campaign goes on
             outcome = {"problem": traceback.format_exc()}
-    return {"scenario": asdict(scenario), **outcome, "took_s": time.perf_counter() - began}
+    known = {key: None if value != value else value for key, value in outcome.items()}  # JSON has no NaN
+    return {"scenario": asdict(scenario), **known, "took_s": time.perf_counter() - began}
 
 
 def kept_flight(task: tuple[Scenario, Path]) -> dict[str, Any]:
@@ -67,10 +68,11 @@ def told(row: dict[str, Any]) -> str:
         return f"{scenario['name']}: could not be flown: {row['problem'].splitlines()[-1]}"
     broken = [f"{v['rule']} {v['value']:.2f}" + (" (beyond)" if v["beyond"] else "") for v in row["violations"]]
     last = row["changes"][-1] if row["changes"] else (0.0, row["mode"], ())
+    touch = "" if row["touch_speed"] is None else f"touch {row['touch_speed']:.2f} m/s, tilt {row['touch_tilt']:.2f}, "
     return (
         f"{scenario['name']} [{scenario['mode']}, {scenario['height']:g} m]: off {row['off_height']:.2f} m, "
-        f"climb {row['climb']:.2f} m, touch {row['touch_speed']:.2f} m/s, tilt {row['touch_tilt']:.2f}, "
-        f"armed {row['armed_s']:.1f} s, drift {row['drift']:.1f} m; {'; '.join(broken) or 'ok'}; "
+        f"climb {row['climb']:.2f} m, {touch}armed {row['armed_s']:.1f} s, drift {row['drift']:.1f} m; "
+        f"{'; '.join(broken) or 'ok'}; "
         f"{last[1]} after {last[0]:.2f} s: {'; '.join(last[2])}"
     )
 
@@ -93,7 +95,7 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         fair = [row for row in mine if "problem" not in row and not excused(row)]
 
         def worst(key: str, rows: list[dict[str, Any]] = fair) -> str:
-            known = [row[key] for row in rows if row[key] == row[key]]
+            known = [row[key] for row in rows if row[key] is not None]
             return f"{max(known):.2f}" if known else ""
 
         lines.append(
@@ -153,7 +155,8 @@ def main() -> None:
     took = [row["took_s"] for row in rows]
     print(f"\n{sum(took) / len(took):.1f} s a flight")
     if options.cases is None:
-        write("fault_campaign", options.json, {"table": lines, "flights": rows, "s_a_flight": sum(took) / len(took)})
+        flights = [{"seed": row["scenario"]["seed"], "flight": told(row)} for row in rows]
+        write("fault_campaign", options.json, {"table": lines, "flights": flights, "took_s": sum(took)})
     sys.exit(any(map(blamed, rows)))
 
 
