@@ -67,13 +67,13 @@ def told(row: dict[str, Any]) -> str:
     if "problem" in row:
         return f"{scenario['name']}: could not be flown: {row['problem'].splitlines()[-1]}"
     broken = [f"{v['rule']} {v['value']:.2f}" + (" (beyond)" if v["beyond"] else "") for v in row["violations"]]
-    last = row["changes"][-1] if row["changes"] else (0.0, row["mode"], ())
+    since = f" from {row['changes'][-1][0]:.2f} s on" if row["changes"] else ""
     touch = "" if row["touch_speed"] is None else f"touch {row['touch_speed']:.2f} m/s, tilt {row['touch_tilt']:.2f}, "
     return (
         f"{scenario['name']} [{scenario['mode']}, {scenario['height']:g} m]: off {row['off_height']:.2f} m, "
         f"climb {row['climb']:.2f} m, {touch}armed {row['armed_s']:.1f} s, drift {row['drift']:.1f} m; "
         f"{'; '.join(broken) or 'ok'}; "
-        f"{last[1]} after {last[0]:.2f} s: {'; '.join(last[2])}"
+        f"{row['mode']}{since}: {', '.join(row['reasons'])}"
     )
 
 

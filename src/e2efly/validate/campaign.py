@@ -87,6 +87,8 @@ class Flown:
     """From the first fault to the end, s."""
     mode: str
     """The bridge's at the end."""
+    reasons: tuple[str, ...]
+    """What it says of it."""
     changes: tuple[tuple[float, str, tuple[str, ...]], ...]
     """The changes of mode after the first fault: s after it, mode, reasons."""
     violations: tuple[Violation, ...]
@@ -175,6 +177,7 @@ def _flown(scenario: Scenario, stage: Stage, look: Callable[[Stage], None]) -> F
         ended=ended,
         duration=rig.now() - began,
         mode=str(stage.mode),
+        reasons=tuple(map(str, stage.session.bridge.flight.reasons)),
         changes=tuple(changes),
         violations=violations,
     )
@@ -185,7 +188,7 @@ def _refused(problem: str) -> Flown:
     nothing, never = 0.0, math.nan
     return Flown(
         nothing, nothing, never, never, never, nothing, nothing, True, nothing, "refused",
-        ((nothing, "refused", (problem,)),), (),
+        (problem,), (), (),
     )  # fmt: skip
 
 
