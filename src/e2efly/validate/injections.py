@@ -134,9 +134,9 @@ KINDS = POSES | {
     "receiver: silent": Kind(_receiver, excuse=UNHEARD, limited=(0.1, 5.0)),
     "receiver: failsafe": Kind(_failsafe, limited=(0.1, 5.0)),
     "battery: sag": Kind(_sag, lambda random: {
-        "share": round(float(random.uniform(0.75, 0.95)), 3), "within": round(float(random.uniform(0.1, 5.0)), 2)}),
+        "share": round(float(random.uniform(0.8, 0.95)), 3), "within": round(float(random.uniform(0.1, 5.0)), 2)}),
     "motor: weak": Kind(_weak_motor, lambda random: {
-        "motor": int(random.integers(4)), "share": round(float(random.uniform(0.8, 0.97)), 3)}),
+        "motor": int(random.integers(4)), "share": round(float(random.uniform(0.85, 0.97)), 3)}),
     "controller: reboots": Kind(_reboot, excuse=NO_POWER, limited=(0.5, 2.0)),
 }  # fmt: skip
 """All kinds, by name."""
