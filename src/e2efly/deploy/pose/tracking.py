@@ -105,7 +105,7 @@ def _content(checks: Checks, sample: Sample) -> str | None:
     if sample.stamp is not None and not abs(sample.stamp) <= LARGEST_STAMP:
         return f"not_finite: stamp is {sample.stamp!r}; accepted: a finite number of seconds up to {LARGEST_STAMP:g}"
     if checks.frame and sample.frame != checks.frame:
-        return f"frame: frame is {sample.frame!r}; accepted: {checks.frame!r}"
+        return f"frame: frame is {sample.frame[:80]!r}; accepted: {checks.frame!r}"
     length = math.sqrt(float(np.square(sample.quaternion, dtype=np.float64).sum()))
     if not abs(length - 1) <= checks.quaternion_tolerance:
         tolerance = checks.quaternion_tolerance
