@@ -125,6 +125,7 @@ def fly_command(options: Fly) -> int:
             client, info, sticks_of(info), source, body, settings, worker=worker, latency=options.latency,
             settings_problems=problems(rows), throttle_map=known, checks=Checks(max_age=settings.odometry_timeout),
         )  # fmt: skip
+        source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:
             return _look(bridge, source, console, rows)
         stop = Stop()
@@ -216,8 +217,9 @@ def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row,
     else:
         roll, pitch = roll_pitch(o.quaternion)
         age = sum(s.received - (s.stamp or s.received) for s in poses) / max(len(poses), 1)
-        said = f"{len(poses) / LOOK_S:.0f} Hz from {source.describe()}, refused {source.refused}"
-        table.add_row("poses", _cell(said))
+        pace = bridge.pace
+        said = f"{pace.rate:.0f} Hz from {source.describe()}, refused {source.refused}"
+        table.add_row("poses", _cell(f"{said}; the newest was up to {1e3 * pace.oldest:.0f} ms old"))
         table.add_row("", _cell(f"position {o.position.round(3).tolist()} m, roll {roll:+.2f}, pitch {pitch:+.2f} rad"))
         if poses and poses[-1].stamp is not None:
             table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")

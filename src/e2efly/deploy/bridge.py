@@ -19,6 +19,7 @@ from e2efly.deploy.msp.messages import Attitude, RawImu, set_raw_rc
 from e2efly.deploy.odometry import Odometry, Sample
 from e2efly.deploy.policy_worker import PolicyWorker
 from e2efly.deploy.pose.checks import Checks
+from e2efly.deploy.pose.pace import Pace, pace_problem, paced
 from e2efly.deploy.pose.source import PoseSource
 from e2efly.deploy.pose.tracking import Track, age, track
 from e2efly.deploy.record import (
@@ -99,6 +100,7 @@ class Bridge:
         self.probe = ChannelProbe()
         self.instruments = Instruments(client, settings)
         self.sent = Sent("closed", None, 0.0, self._closed())
+        self.pace = Pace()
         self._track = Track()
         self._pose_problem: str | None = None
         self._good_pose = -math.inf
@@ -159,6 +161,7 @@ class Bridge:
             self._pose_problem = problem
             if odometry is not None:
                 self.odometry, self._good_pose = odometry, now
+                self.pace = paced(self.pace, odometry.time, sample.received)
                 if self._track.same_since == odometry.time:  # or it may be frozen, and the motion has gone on
                     self._reckoned = reckoning.seen(odometry, now, self.flight.turned or 0.0)
                 self._watch_heading(odometry, now)
@@ -184,6 +187,7 @@ class Bridge:
         grounded = self.flight.mode is Mode.INIT
         probed = self.probe.look(now, reading, self.sticks.centre, grounded=grounded)
         good = self._pose_problem is None and self._stale is None
+        slow = pace_problem(self.pace, self.settings.odometry_timeout)
         self.inputs = Inputs(
             odometry=self.odometry,
             odometry_problem=None if good else self._pose_problem or self._stale,
@@ -192,7 +196,7 @@ class Bridge:
             override=reading.override,
             pilot=reading.pilot,
             voltage=reading.voltage,
-            settings_problems=self.settings_problems + probed + reading.meddling,
+            settings_problems=self.settings_problems + probed + reading.meddling + ((slow,) if slow else ()),
             policy_problem=reading.meddling[0] if reading.meddling else None,
             attitude_error=self._attitude_error(reading.attitude),
             heading_error=self._heading.error if good else None,

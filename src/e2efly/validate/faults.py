@@ -78,6 +78,11 @@ def _freeze(stage: Stage) -> None:
     stage.poses.alter = lambda sample: dataclasses.replace(kept, received=sample.received, stamp=sample.stamp)
 
 
+def _gaps(stage: Stage) -> None:
+    """Twice a second."""
+    stage.poses.alter = lambda sample: None if sample.received % 0.5 < 0.12 else sample
+
+
 def _nan(sample: Sample) -> Sample:
     return dataclasses.replace(sample, position=np.array([np.nan, 0.0, 1.0]))
 
@@ -269,6 +274,7 @@ FAULTS = (
     Fault("wrong firmware", Mode.INIT, _rewrite(FcVariant.CODE, lambda payload: b"INAV"), End.REFUSED),
     Fault("wrong rates", Mode.INIT, _rewrite(RcTuning.CODE, _slow_rates), End.REFUSED, Reason.SETTINGS),
     Fault("wrong channel map", Mode.INIT, _rewrite(RxMap.CODE, _other_map), End.REFUSED, Reason.SETTINGS),
+    Fault("poses: gaps of 0.12 s before take-off", Mode.INIT, _gaps, End.REFUSED, Reason.SETTINGS),
     Fault("battery low before take-off", Mode.INIT, _rewrite(BatteryState.CODE, _low_battery), End.REFUSED,
           Reason.BATTERY_LOW),
 )  # fmt: skip
