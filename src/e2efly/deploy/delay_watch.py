@@ -141,8 +141,8 @@ def delay_problem(delay: Delay | None, accepted: float) -> str | None:
     if delay is None or delay.seconds - 2 * delay.deviation <= accepted:
         return None
     return (
-        f"poses are {delay.seconds:.3f} s late by the controller's gyro (within {2 * delay.deviation:.3f} s); accepted: "
-        f"{accepted:.3f} s; tell the source's delay by --latency, or mend it"
+        f"poses are {delay.seconds:.3f} s late by the controller's gyro (within {2 * delay.deviation:.3f} s); "
+        f"accepted: {accepted:.3f} s; tell the source's delay by --latency, or mend it"
     )
 
 
