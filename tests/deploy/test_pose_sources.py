@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 
 from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pose.json_source import DRAIN, LONGEST, Lines, TcpSource, UdpSource, parse_pose
+from e2efly.deploy.pose.relay import RelaySource
 from e2efly.deploy.pose.source import LARGEST_BATCH, PlantSource, PoseSource, open_source
 
 POSE = {"position": [1, 2.5, -3], "quaternion": [0.5, 0.5, -0.5, 0.5]}
@@ -343,6 +345,20 @@ def test_a_server_that_is_not_there_is_tried_again_in_time(server: socket.socket
 def test_a_host_without_an_address_is_refused() -> None:
     with pytest.raises(ValueError, match=r"tcp:no\.such\.host\.invalid:5000: 'no\.such\.host\.invalid' has no address"):
         open_source("tcp:no.such.host.invalid:5000")
+
+
+# Relays
+
+
+def test_what_a_relay_says_is_shown_by_its_escapes(tmp_path: Path) -> None:
+    relay = tmp_path / "relay"
+    relay.write_text("#!/bin/sh\nprintf 'ready \\033[1mfake\\nproblem \\033[2K\\rall is well\\n'\ncat\n")
+    relay.chmod(0o755)
+    source = RelaySource("mocap", str(relay))
+    until(lambda: source.read(time.monotonic()) == [] and source.problem is not None, source)
+    source.close()
+    assert source.describe() == r"mocap (\x1b[1mfake)"
+    assert source.problem is not None and source.problem.isprintable()
 
 
 # Plant
