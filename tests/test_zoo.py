@@ -14,6 +14,7 @@ from e2efly.commands.evaluate import config_from_contract, fly_suites
 from e2efly.deploy.policy import load_policy
 from e2efly.vehicles import vehicle_names
 from e2efly.zoo import FOLDER, USUAL, beside, contents, policy_path
+from tests.conftest import QUICK, NetworkTrace
 
 POLICIES = [(vehicle, task) for vehicle, tasks in contents().items() for task in tasks]
 
@@ -47,9 +48,13 @@ def test_a_task_is_the_name_of_its_policy(tmp_path: Path) -> None:
     assert beside(FOLDER / USUAL / "hover.onnx") == Path("runs/zoo-hover-vis_r")
 
 
-def test_eval_by_name_works_at_once_and_writes_nothing_into_the_package(tmp_path: Path) -> None:
+def test_eval_by_name_works_at_once_writes_nothing_into_the_package_and_reaches_nobody(
+    tmp_path: Path, network: NetworkTrace
+) -> None:
     command = [sys.executable, "-m", "e2efly", "eval", "hover", "--episodes", "20", "--json", "report.json"]
-    subprocess.run(command, cwd=tmp_path, env=os.environ, check=True, stdout=subprocess.DEVNULL)
+    environment = os.environ | {"XLA_FLAGS": QUICK}
+    subprocess.run(command, cwd=tmp_path, env=environment, check=True, stdout=subprocess.DEVNULL)
     assert json.loads((tmp_path / "report.json").read_text())["criteria"]["hover"]["mean"]["success"] == 1.0
     assert (tmp_path / "runs/zoo-hover-vis_r/plots/errors.png").exists()
     assert not (FOLDER / USUAL / "plots").exists()
+    assert network.left() == []
