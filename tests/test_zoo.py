@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -58,3 +59,17 @@ def test_eval_by_name_works_at_once_writes_nothing_into_the_package_and_reaches_
     assert (tmp_path / "runs/zoo-hover-vis_r/plots/errors.png").exists()
     assert not (FOLDER / USUAL / "plots").exists()
     assert network.left() == []
+
+
+def test_a_damaged_file_of_the_zoo_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(FOLDER, tmp_path / "zoo")
+    monkeypatch.setattr("e2efly.zoo.FOLDER", tmp_path / "zoo")
+    hover, index = tmp_path / "zoo" / USUAL / "hover.onnx", tmp_path / "zoo" / "zoo.json"
+    assert policy_path(Path("hover")) == hover
+    shutil.copy(hover.with_name("land.onnx"), hover)
+    with pytest.raises(ValueError, match=r"hover\.onnx: SHA-256 is \w+, another than zoo\.json says; install"):
+        policy_path(Path("hover"))
+    for text in ("", "{", "[1]", '{"vis_r": 1}', '{"vis_r": {"hover": []}}', "[" * 100_000):
+        index.write_text(text)
+        with pytest.raises(ValueError, match=r"zoo\.json: damaged .*; install e2efly again"):
+            policy_path(Path("hover"))
