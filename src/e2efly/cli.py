@@ -107,9 +107,9 @@ class Export:
     """Write policy.onnx from the checkpoint of a run."""
 
     run: tyro.conf.Positional[Path]
-    """A run directory."""
+    """A run directory; or a policy.onnx of an older e2efly, to give it the digest that is checked when it is loaded."""
     out: Path | None = None
-    """The file to write; RUN/policy.onnx when left out."""
+    """The file to write; RUN/policy.onnx, or the older file itself, when left out."""
     which: Literal["best", "last"] = "best"
     """The best policy by evaluation, or the last."""
 

@@ -167,6 +167,12 @@ def test_train_eval_export_and_plots_end_to_end(tmp_path: Path, capsys: pytest.C
     before = (folder / "policy.onnx").read_bytes()
     assert run(["export", str(folder)]) == 0
     assert (folder / "policy.onnx").read_bytes() == before
+    older = tmp_path / "older.onnx"
+    older.write_bytes(before[: before.rindex(b"\x72\x4a\x0a\x06sha256")])
+    assert "of an older e2efly" in error_of(["eval", str(older)], capsys)
+    assert run(["export", str(older)]) == 0
+    assert older.read_bytes() == before
+    assert "has a digest already" in error_of(["export", str(older)], capsys)
     (folder / "policy.onnx").write_bytes(before[:100])
     assert "policy.onnx" in error_of(["eval", str(folder)], capsys)
     assert "already holds a run" in error_of(["train", "hover", "--out", str(folder)], capsys)

@@ -28,6 +28,13 @@ from e2efly.device import cores
 
 _GIVEN = ("seed", "out", "resume", "algo", "preset", "device", "devices", "plots", "no-plots")
 """Options of `e2efly train` that a sweep gives itself."""
+_ALONE = {
+    "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",  # otherwise Ray replaces 127.0.0.1 by the machine's outward address
+    # Ray asks a cloud's metadata service which cloud this is, even with its usage statistics off: close the way there
+    "http_proxy": "http://127.0.0.1:9",
+    "no_proxy": "127.0.0.1,localhost",
+}
+"""Environment variables that keep a Ray of this machine alone on this machine."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +164,8 @@ def _check(trial: Trial, config: TrainConfig) -> None:
 
 def _run(trials: list[Trial], request: Request) -> Iterator[tuple[Trial, str]]:
     """The trials as they end, and how each did."""
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # before the import: nothing is told to anybody
+    if request.address is None:
+        os.environ.update(_ALONE)  # before the import, which reads it
     try:
         import ray
         from ray.exceptions import RayError
