@@ -45,7 +45,7 @@ def ablate_command(request: Request) -> int:
     if request.seeds < 1:
         raise ValueError(f"--seeds is {request.seeds}; accepted: 1 or more")
     prepare(request.device)
-    from e2efly.learn.checkpoint import write_atomically
+    from e2efly.storage import write_atomically
     from e2efly.view.ablation import Panel, plot_ablation
 
     console = Console(highlight=False)
@@ -110,7 +110,7 @@ def _known(request: Request, config: TrainConfig) -> Any:
 def _curves(request: Request, config: TrainConfig, console: Console) -> Any:
     """Train all variants of a configuration; keep their curves."""
     from e2efly.learn.ablation import ablate
-    from e2efly.learn.checkpoint import write_atomically
+    from e2efly.storage import write_atomically
 
     task, algo = presets.task_name(config.task), presets.algorithm_name(config.algo)
     steps = config.steps * request.seeds * (len(config.reward.weights) + 1)

@@ -27,7 +27,7 @@ from e2efly.deploy.hover import roll_pitch
 from e2efly.deploy.msp.client import SCHEDULE, Client
 from e2efly.deploy.msp.controller import ControllerInfo, identify
 from e2efly.deploy.msp.link import Link, open_link
-from e2efly.deploy.policy import load_policy
+from e2efly.deploy.policy import Policy, load_policy
 from e2efly.deploy.policy_worker import PolicyWorker
 from e2efly.deploy.pose.checks import Checks
 from e2efly.deploy.pose.source import PoseSource, open_source
@@ -38,6 +38,7 @@ from e2efly.deploy.state_machine import take_off_refusals
 from e2efly.deploy.sticks import sticks_of
 from e2efly.deploy.telemetry import Telemetry
 from e2efly.deploy.watchdog import WatchedLink
+from e2efly.learn.rundir import run_of
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.zoo import policy_path
 
@@ -100,7 +101,7 @@ def fly_command(options: Fly) -> int:
         loaded = load_policy(policy / "policy.onnx" if policy.is_dir() else policy)
     if loaded is None and options.vehicle is None:
         raise ValueError("--vehicle is left out; accepted: a vehicle's name or .toml file, as no policy names one")
-    body = load_vehicle(options.vehicle or (loaded.contract.vehicle if loaded else ""))
+    body = load_vehicle(options.vehicle or _own_vehicle(policy, loaded))
     runtime = None
     if loaded is not None:
         if reasons := check(loaded.contract, body, imu=True):
@@ -157,6 +158,14 @@ def fly_command(options: Fly) -> int:
             console.print(f"log: {problem} ({count} times)", markup=False)
         console.print(f"Next: e2efly fly-report {path}; throttle map: {path.with_suffix('.throttle.json')}")
         return 0
+
+
+def _own_vehicle(policy: Path | None, loaded: Policy | None) -> str:
+    """The vehicle of a policy: its run's copy, where it is a run's, else the one that its contract names."""
+    run = run_of(policy) if policy is not None else None
+    if run is not None and (run.path / "config.json").is_file():
+        return run.config().env.vehicle
+    return loaded.contract.vehicle if loaded else ""
 
 
 def _read(path: Path, option: str) -> str:

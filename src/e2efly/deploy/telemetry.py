@@ -6,7 +6,6 @@ whole chunks, which `e2efly.deploy.flight_log` and every MCAP reader that reads 
 """
 
 import json
-import math
 import os
 import threading
 import time
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.channels import CHANNELS, json_schema
+from e2efly.storage import finite
 
 FLUSH_PERIOD = 0.1
 """Seconds between two chunks: the most that dies with the process, plus the time to write one."""
@@ -294,22 +294,11 @@ def _encode(values: Mapping[str, Any]) -> bytes:
     try:
         return json.dumps(values, allow_nan=False, default=_plain, separators=(",", ":")).encode()
     except ValueError:  # a number that is not finite, which is rare: the fast way is tried first
-        return json.dumps(_finite(values), allow_nan=False, default=_plain, separators=(",", ":")).encode()
+        return json.dumps(finite(values), allow_nan=False, default=_plain, separators=(",", ":")).encode()
 
 
 def _plain(value: Any) -> Any:
     """NumPy's arrays and numbers as Python's."""
     if isinstance(value, np.ndarray | np.generic):
-        return _finite(value.tolist())
+        return finite(value.tolist())
     raise TypeError(f"{type(value).__name__} is no JSON")
-
-
-def _finite(value: Any) -> Any:
-    """The same with null for every number that is not finite."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    return value
