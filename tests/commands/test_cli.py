@@ -31,9 +31,7 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
             ["train", "hoover"],
             "unknown task 'hoover'; did you mean 'hover'? (there are: avoid, gap, hover, hover_aware, land, ",
         ),
-        (["train", "--resume"], "--resume names no run; accepted: the run's folder, as in `e2efly train --resume DIR`"),
         (["train"], "train needs a task first: hover, land, track, race, hover_aware, gap"),
-        (["train", "--resume", "nowhere"], "nowhere holds no run: there is no config.json"),
         (["train", "hover", "--algo", "bppt"], "unknown algorithm 'bppt'; did you mean 'bptt'?"),
         (["train", "hover", "--preset", "papr"], "unknown preset 'papr'; did you mean 'paper'?"),
         (["train", "hover", "--vehicle", "vis_x"], "unknown vehicle 'vis_x'; did you mean 'vis_r'?"),
@@ -100,6 +98,15 @@ def test_bad_input_is_named_with_what_exists(
     if arguments[0] == "train" and len(arguments) > 1:
         arguments = [*arguments, "--out", str(tmp_path / "run")]
     assert said in error_of(arguments, capsys)
+
+
+def test_resume_needs_a_run(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "--resume names no run; accepted: the run's folder, as in `e2efly train --resume DIR`" in error_of(
+        ["train", "--resume"], capsys
+    )
+    for arguments in (["--resume", "nowhere"], ["--resume=nowhere"], ["--out", "nowhere", "--resume"]):
+        assert "nowhere holds no run: there is no config.json" in error_of(["train", *arguments], capsys)
+    assert not Path("nowhere").exists()
 
 
 def test_a_folder_that_cannot_be_made_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -52,14 +52,14 @@ def watched(command: list[str], lost: Callable[[str], str]) -> int:
     before = {s: signal.signal(s, hand_on) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     kept: list[bytes] = []
     try:
-        assert process.stderr is not None
-        for line in process.stderr:
-            if kept or _FATAL.match(line):
-                kept.append(line)
-            else:
-                sys.stderr.buffer.write(line)
-                sys.stderr.buffer.flush()
-        status = process.wait()
+        with process:
+            for line in process.stderr or ():
+                if kept or _FATAL.match(line):
+                    kept.append(line)
+                else:
+                    sys.stderr.buffer.write(line)
+                    sys.stderr.buffer.flush()
+        status = process.returncode
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
