@@ -150,12 +150,14 @@ def fly_command(options: Fly) -> int:
         finally:
             stop.restore()
         telemetry.close()
-        path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map), encoding="utf-8")
         late = sorted(timing.lateness)
         p99 = 1e3 * late[int(0.99 * (len(late) - 1))] if late else 0.0
         console.print(f"{timing.rounds} control steps, late by {p99:.1f} ms (p99), {timing.missed} missed.")
         for problem, count in telemetry.problems.items():
             console.print(f"log: {problem} ({count} times)", markup=False)
+        if telemetry.missing:
+            console.print(f"log: {telemetry.missing}", markup=False)
+        path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map), encoding="utf-8")
         console.print(f"Next: e2efly fly-report {path}; throttle map: {path.with_suffix('.throttle.json')}")
         return 0
 
