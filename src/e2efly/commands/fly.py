@@ -25,7 +25,7 @@ from e2efly.deploy.hover import roll_pitch
 from e2efly.deploy.msp.client import SCHEDULE, Client
 from e2efly.deploy.msp.controller import ControllerInfo, identify
 from e2efly.deploy.msp.link import Link, open_link
-from e2efly.deploy.policy import load_policy
+from e2efly.deploy.policy import Policy, load_policy
 from e2efly.deploy.policy_worker import PolicyWorker
 from e2efly.deploy.pose.checks import Checks
 from e2efly.deploy.pose.source import PoseSource, open_source
@@ -37,6 +37,7 @@ from e2efly.deploy.sticks import sticks_of
 from e2efly.deploy.telemetry import Telemetry
 from e2efly.deploy.terminal import Speaker, Stop, printable
 from e2efly.deploy.watchdog import WatchedLink
+from e2efly.learn.rundir import run_of
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.zoo import policy_path
 
@@ -99,7 +100,7 @@ def fly_command(options: Fly) -> int:
         loaded = load_policy(policy / "policy.onnx" if policy.is_dir() else policy)
     if loaded is None and options.vehicle is None:
         raise ValueError("--vehicle is left out; accepted: a vehicle's name or .toml file, as no policy names one")
-    body = load_vehicle(options.vehicle or (loaded.contract.vehicle if loaded else ""))
+    body = load_vehicle(options.vehicle or _own_vehicle(policy, loaded))
     runtime = None
     if loaded is not None:
         if reasons := check(loaded.contract, body, imu=True):
@@ -147,14 +148,24 @@ def fly_command(options: Fly) -> int:
             stop=stop, identify_again=again,
         )  # fmt: skip
         telemetry.close()
-        path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map), encoding="utf-8")
         late = sorted(timing.lateness)
         p99 = 1e3 * late[int(0.99 * (len(late) - 1))] if late else 0.0
         say(f"{timing.rounds} control steps, late by {p99:.1f} ms (p99), {timing.missed} missed.")
         for problem, count in telemetry.problems.items():
             say(f"log: {problem} ({count} times)")
+        if telemetry.missing:
+            say(f"log: {telemetry.missing}")
+        path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map), encoding="utf-8")
         say(f"Next: e2efly fly-report {path}; throttle map: {path.with_suffix('.throttle.json')}")
         return 0
+
+
+def _own_vehicle(policy: Path | None, loaded: Policy | None) -> str:
+    """The vehicle of a policy: its run's copy, where it is a run's, else the one that its contract names."""
+    run = run_of(policy) if policy is not None else None
+    if run is not None and (run.path / "config.json").is_file():
+        return run.config().env.vehicle
+    return loaded.contract.vehicle if loaded else ""
 
 
 def _read(path: Path, option: str) -> str:

@@ -15,11 +15,11 @@ from e2efly.deploy.images import NONE, Image
 from e2efly.deploy.onnx_file import sealed
 from e2efly.deploy.policy import load_policy
 from e2efly.env import Env
-from e2efly.learn.checkpoint import write_atomically
 from e2efly.learn.graph import OPERATORS, policy_graph
 from e2efly.learn.networks import FAINTEST, NEAREST, Actor, View, Weights
 from e2efly.observation import Field
 from e2efly.physics import COMMAND_MODES, command_limits
+from e2efly.storage import write_atomically
 from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.vehicle import quantities
 

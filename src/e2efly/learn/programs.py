@@ -27,10 +27,10 @@ from e2efly.device import wide_vectors
 from e2efly.env import Env, random_key
 from e2efly.evaluate import Act, Episodes, run_episodes
 from e2efly.learn.algorithm import TrainState, begin
-from e2efly.learn.checkpoint import write_atomically
 from e2efly.learn.devices import AXIS, OWN, SAME, on_each, own, shardings, stacked
 from e2efly.learn.networks import Actor, Weights
 from e2efly.learn.setup import Setup
+from e2efly.storage import write_atomically
 
 FAST_COMPILE: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
 """XLA options for programs that run for seconds only."""
