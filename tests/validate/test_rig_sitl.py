@@ -64,7 +64,7 @@ class Bench:
 
 @pytest.fixture(scope="module")
 def standing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    with Rig(firmware.build(), tmp_path_factory.mktemp("firmware"), VEHICLE) as rig:
+    with Rig(firmware.chosen(), tmp_path_factory.mktemp("firmware"), VEHICLE) as rig:
         bench = Bench(rig)
         yield bench
         bench.client.link.close()
@@ -185,7 +185,7 @@ def test_under_override_the_last_sticks_are_held_though_msp_is_silent(
     chosen = (*rig_module.SETTINGS, f"set msp_override_failsafe={'ON' if override_failsafe else 'OFF'}")
     prepare = rig_module.prepare
     monkeypatch.setattr(rig_module, "prepare", lambda sitl: prepare(sitl, chosen))
-    with Rig(firmware.build(), tmp_path, VEHICLE) as rig:
+    with Rig(firmware.chosen(), tmp_path, VEHICLE) as rig:
         bench = Bench(rig)
         bench.arm()
         idle = rig.sitl.motors().mean()
@@ -214,8 +214,8 @@ def test_under_override_the_last_sticks_are_held_though_msp_is_silent(
 
 def test_two_at_once_have_ports_of_their_own_and_move_alike(tmp_path: Path) -> None:
     with (
-        Rig(firmware.build(), tmp_path / "a", VEHICLE, seed=1) as a,
-        Rig(firmware.build(), tmp_path / "b", VEHICLE, seed=1) as b,
+        Rig(firmware.chosen(), tmp_path / "a", VEHICLE, seed=1) as a,
+        Rig(firmware.chosen(), tmp_path / "b", VEHICLE, seed=1) as b,
     ):
         assert abs(a.sitl.base - b.sitl.base) >= 12
         for rig in (a, b):
@@ -233,7 +233,7 @@ def test_two_at_once_have_ports_of_their_own_and_move_alike(tmp_path: Path) -> N
 
 
 def test_without_power_the_motors_stop_and_time_goes_on(tmp_path: Path) -> None:
-    with Rig(firmware.build(), tmp_path, VEHICLE) as rig:
+    with Rig(firmware.chosen(), tmp_path, VEHICLE) as rig:
         bench = Bench(rig)
         bench.arm()
         assert bench.armed

@@ -6,6 +6,7 @@ from math import degrees
 from e2efly.deploy.contract import Contract
 from e2efly.deploy.msp.controller import ControllerInfo
 from e2efly.deploy.msp.names import BOXES
+from e2efly.deploy.msp.versions import RELEASES
 from e2efly.deploy.settings import FlightSettings
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -48,9 +49,10 @@ def examine(
         contract: of the policy; its body rates count where it commands them.
     """
     api = ".".join(map(str, info.api))
-    firmware = f"{info.variant} {'.'.join(map(str, info.version))}"
+    known = f"BTFL, {RELEASES[0].name} to {RELEASES[-1].name}"
     rows = [
-        Row("firmware", f"{firmware}, MSP {api}, built {info.built.strip()}", "BTFL, MSP 1.44 to 1.47", True),
+        Row("firmware", f"{info.variant} {info.firmware}, MSP {api}, built {info.built.strip()}", known, True),
+        Row("override without MSP", info.release.hand_back, "any: docs/hardware.md says what it means", True),
         Row("craft_name", info.craft or "(none)", "any", True),
         Row("map", info.rx_map.letters, "any: it is read", True),
         *_rates(info, vehicle, contract),

@@ -17,8 +17,8 @@ import numpy as np
 
 from e2efly.deploy.odometry import Sample
 from e2efly.device import compute_at_once, one_core
-from e2efly.validate.firmware import Firmware, firmware_folder
-from e2efly.validate.sitl import FirmwareState, Sitl
+from e2efly.validate.firmware import Firmware
+from e2efly.validate.sitl import Sitl
 from e2efly.validate.world import Body, World
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -228,8 +228,10 @@ class Rig:
 
 def prepare(sitl: Sitl, settings: tuple[str, ...] = SETTINGS) -> None:
     """Put settings into the folder of a firmware that is not running; they are kept, as typing them takes a while."""
+    firmware = sitl.firmware
+    settings = (*settings, *firmware.layout.settings)
     name = hashlib.sha256("\n".join(settings).encode()).hexdigest()[:12]
-    kept = firmware_folder() / f"settings-{name}.bin"
+    kept = firmware.program.parent / f"settings-{name}.bin"
     mine = sitl.folder / "eeprom.bin"
     if kept.is_file():
         shutil.copy(kept, mine)
@@ -251,27 +253,17 @@ def _type(sitl: Sitl, settings: tuple[str, ...]) -> None:
     Raises:
         ValueError: when it refuses a line, with its words.
     """
-
-    def run(seconds: float) -> None:
-        for _ in range(round(seconds / STEP_S)):
-            sitl.send_state(_RESTING)
-            sitl.advance(STEP_S)
-        sitl.exchange()
-
-    run(1.0)
+    sitl.idle(1.0)
     with socket.create_connection(("127.0.0.1", sitl.base + 4), timeout=5.0) as line:
         line.setblocking(False)
-        run(0.2)
+        sitl.idle(0.2)
         for text in ("#", *(f"{setting}\n" for setting in settings)):
             line.sendall(text.encode())
-            run(0.3)
+            sitl.idle(0.3)
             answer = line.recv(65536).decode(errors="replace")
             if "#" not in answer or "ERROR" in answer.upper() or "INVALID" in answer.upper():
                 raise ValueError(f"the firmware refuses {text!r}: {answer!r}")
         line.sendall(b"save\n")
         end = time.monotonic() + 20
         while sitl.alive and time.monotonic() < end:
-            run(0.1)
-
-
-_RESTING = FirmwareState(np.zeros(3), np.array([0, 0, 9.81]), np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3))
+            sitl.idle(0.1)

@@ -253,7 +253,7 @@ class MotorConfig:
 
     CODE: ClassVar[int] = 131
     min_throttle: int | None
-    """Output at zero throttle, µs; None: firmware of MSP 1.47, which has `AdvancedConfig.motor_idle` alone."""
+    """Output at zero throttle, µs; None: firmware since MSP 1.47, which has `AdvancedConfig.motor_idle` alone."""
     max_throttle: int
     """Output at full throttle, µs."""
     min_command: int
