@@ -182,7 +182,7 @@ class Bridge:
         """What the controller has said, and all of it as inputs of the state machine."""
         reading = self.instruments.read(now, self.info, land=self.land_now)
         grounded = self.flight.mode is Mode.INIT
-        probed = self.probe.look(now, reading, self.sticks.centre, grounded=grounded)
+        probed = self.probe.look(now, reading, self.sticks, grounded=grounded)
         good = self._pose_problem is None and self._stale is None
         self.inputs = Inputs(
             odometry=self.odometry,

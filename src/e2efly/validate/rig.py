@@ -32,11 +32,18 @@ CALIBRATION_S = 6.0
 """The firmware stands still for so long before it can be armed, s."""
 POSE_NOISE = (0.0005, 0.01, 0.02, 0.001)
 """Of position, m; velocity, m/s; body rate, rad/s; attitude, rad: a motion capture system's, standard deviations."""
+LANDING_S = 10
+"""After so long a failsafe landing stops the motors, s."""
 SETTINGS = (
     "aux 0 0 0 1700 2100 0 0",  # arm: AUX1
     "aux 1 50 1 1700 2100 0 0",  # MSP override: AUX2
-    "aux 2 1 2 1700 2100 0 0",  # angle: AUX3
-    "set msp_override_channels_mask=15",
+    "aux 2 1 2 925 2100 0 0",  # angle: AUX3, wherever the pilot leaves it; the bridge sends 900 there
+    "set msp_override_channels_mask=79",
+    "rxfail 3 s 1550",  # without the receiver: a throttle that just sinks ...
+    "rxfail 6 s 2000",  # ... and angle
+    "set failsafe_procedure=AUTO-LAND",
+    "set failsafe_throttle=1550",
+    "set failsafe_delay=5",
     "set max_aux_channels=14",  # or the copies of throttle and yaw on channels 11 and 12 are not read
     "set rates_type=ACTUAL",
     *(f"set {axis}_rc_rate=67" for axis in ("roll", "pitch", "yaw")),
@@ -64,24 +71,23 @@ class Transmitter:
 
     armed: bool = False
     override: bool = False
-    angle: bool = False
     mission: str = "land"
     """land, hover or policy."""
     roll: float = 0.0
     pitch: float = 0.0
     throttle: float = -1.0
-    """What the controller gets while override is off; its copy to the bridge is centred unless `lift` says other."""
+    """What the controller gets without override: it rests in the middle in flight. Its copy to the bridge is `lift`."""
     yaw: float = 0.0
     lift: float = 0.0
     """The copy of the throttle stick."""
 
     def channels(self) -> np.ndarray:
-        """The receiver's 16 channels, us: roll, pitch, throttle, yaw; arm, override, angle, mission; copies; rest."""
+        """The receiver's 16 channels, us: roll, pitch, throttle, yaw; arm, override, none, mission; copies; rest."""
         sticks = [self.roll, self.pitch, self.throttle, self.yaw]
-        switches = [1.0 if on else -1.0 for on in (self.armed, self.override, self.angle)]
+        switches = [1.0 if on else -1.0 for on in (self.armed, self.override)]
         mission = {"land": -1.0, "hover": 0.0, "policy": 1.0}[self.mission]
         copies = [self.roll, self.pitch, self.lift, self.yaw]
-        return np.round(1500 + 500 * np.array([*sticks, *switches, mission, *copies, 0, 0, 0, 0])).astype(int)
+        return np.round(1500 + 500 * np.array([*sticks, *switches, -1.0, mission, *copies, 0, 0, 0, 0])).astype(int)
 
 
 class Rig:
@@ -229,7 +235,8 @@ class Rig:
 def prepare(sitl: Sitl, settings: tuple[str, ...] = SETTINGS) -> None:
     """Put settings into the folder of a firmware that is not running; they are kept, as typing them takes a while."""
     firmware = sitl.firmware
-    settings = (*settings, *firmware.layout.settings)
+    stops, steps = firmware.release.landing_time
+    settings = (*settings, f"set {stops}={LANDING_S * steps}", *firmware.layout.settings)
     name = hashlib.sha256("\n".join(settings).encode()).hexdigest()[:12]
     kept = firmware.program.parent / f"settings-{name}.bin"
     mine = sitl.folder / "eeprom.bin"

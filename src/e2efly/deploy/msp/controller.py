@@ -45,6 +45,8 @@ class ControllerInfo:
     """Deadbands of the sticks."""
     failsafe: settings.FailsafeConfig
     """What it does when the receiver falls silent."""
+    rx_fail: settings.RxFailConfig
+    """What each channel becomes then."""
     modes: tuple[settings.ModeRange, ...]
     """Which switches make which modes active."""
     box_ids: tuple[int, ...]
@@ -105,6 +107,7 @@ def identify(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -
         rx_map=get(settings.RxMap),
         deadband=get(settings.RcDeadband),
         failsafe=get(settings.FailsafeConfig),
+        rx_fail=get(settings.RxFailConfig),
         modes=get(settings.ModeRanges).ranges,
         box_ids=get(settings.BoxIds).ids,
         motor=get(settings.MotorConfig),

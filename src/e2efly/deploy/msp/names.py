@@ -38,6 +38,8 @@ BATTERY_STATES = ("OK", "WARNING", "CRITICAL", "NOT PRESENT", "INIT")
 """Battery states by number."""
 FAILSAFE_PROCEDURES = ("AUTO-LAND", "DROP", "GPS-RESCUE")
 """What failsafe does, by number."""
+RXFAIL_MODES = ("AUTO", "HOLD", "SET")
+"""What a channel becomes without the receiver, by number: centred or closed, as it was last, a pulse."""
 FAILSAFE_SWITCHES = ("STAGE1", "KILL", "STAGE2")
 """What the failsafe switch does, by number."""
 QUADX = 3

@@ -1,5 +1,6 @@
 """MSP messages that tell how a controller is set: payloads to frozen dataclasses in SI units. Pure; see `messages`."""
 
+import struct
 from dataclasses import dataclass
 from math import radians
 from typing import ClassVar
@@ -10,6 +11,7 @@ from e2efly.deploy.msp.names import (
     FAILSAFE_SWITCHES,
     FEATURES,
     MOTOR_PROTOCOLS,
+    RXFAIL_MODES,
     bits,
     named,
 )
@@ -169,6 +171,21 @@ class FailsafeConfig:
         delay, _, throttle, switch, low, procedure = unpack("FAILSAFE_CONFIG", "BBHBHB", payload)
         names = named(switch, FAILSAFE_SWITCHES), named(procedure, FAILSAFE_PROCEDURES)
         return FailsafeConfig(delay / 10, throttle, names[0], low / 10, names[1])
+
+
+@dataclass(frozen=True)
+class RxFailConfig:
+    """What each channel becomes when the receiver falls silent."""
+
+    CODE: ClassVar[int] = 77
+    channels: tuple[tuple[str, int], ...]
+    """One of `RXFAIL_MODES` and, for SET, the pulse, µs: roll, pitch, yaw, throttle, AUX1, ..."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "RxFailConfig":
+        """Read a reply."""
+        entries = struct.iter_unpack("<BH", payload[: len(payload) // 3 * 3])
+        return RxFailConfig(tuple((named(mode, RXFAIL_MODES), pulse) for mode, pulse in entries))
 
 
 @dataclass(frozen=True)

@@ -51,8 +51,8 @@ class Release:
     override_timeout: float | None
     """Age, s, from which on the sticks of MSP override count no more and the receiver's do; None: they are held for as
     long as the pilot's override switch is on."""
-    landing_time: str
-    """Setting after which failsafe stops the motors: its name and what it counts."""
+    landing_time: tuple[str, int]
+    """Setting after which failsafe stops the motors: its name, and how many of its steps make a second."""
     sitl: SitlLayout | None = None
     """Packets of its SITL; None: not known."""
 
@@ -69,7 +69,7 @@ _SINCE_2026 = SitlLayout(
     motors=(0, 1, 2, 3), yaw_sign=1, hears_silence=True,
     settings=("feature -GPS",),  # it would take metres for degrees of latitude
 )  # fmt: skip
-_TENTHS, _SECONDS = "failsafe_off_delay, in tenths of a second", "failsafe_landing_time, in seconds"
+_TENTHS, _SECONDS = ("failsafe_off_delay", 10), ("failsafe_landing_time", 1)
 
 RELEASES = (
     Release("4.3", (1, 44), (4, 3), None, _TENTHS),
