@@ -1,5 +1,6 @@
 """Parts that misbehave on demand: a link, a pose source, a policy's network. Between bridge and real firmware."""
 
+import dataclasses
 import time
 from collections import deque
 from collections.abc import Callable
@@ -129,7 +130,10 @@ class FaultyPoses:
         self.alter: Callable[[Sample], Sample | None] | None = None
         self.newest: Sample | None = None
         """The last one that was let through as it was."""
+        self.delay = 0.0
+        """By how much samples come late, s; their stamps stay."""
         self._inner = inner
+        self._held: deque[tuple[float, Sample]] = deque()
 
     @property
     def refused(self) -> int:
@@ -142,8 +146,12 @@ class FaultyPoses:
         return self._inner.problem
 
     def read(self, now: float) -> list[Sample]:
-        """What the inner source has, altered."""
-        samples = self._inner.read(now)
+        """What the inner source has, late and altered."""
+        self._held += [(now + self.delay, sample) for sample in self._inner.read(now)]
+        samples = []
+        while self._held and self._held[0][0] <= now:
+            due, sample = self._held.popleft()
+            samples.append(dataclasses.replace(sample, received=max(sample.received, due)))
         if self.alter is None:
             self.newest = samples[-1] if samples else self.newest
             return samples

@@ -9,6 +9,7 @@ import shutil
 import socket
 import time
 from collections import deque
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -118,6 +119,12 @@ class Rig:
         self.wind = np.zeros(3)
         self.held = False
         """The body is held where it is; the rotors turn nothing."""
+        self.shares = np.ones(4)
+        """Share of each motor's output that its rotor follows: below 1 for a flat battery or a weak motor."""
+        self.felt: Callable[[FirmwareState], FirmwareState] | None = None
+        """What the firmware's sensors make of the truth; None: the truth."""
+        self.heard = True
+        """Whether the pilot's receiver hears the transmitter."""
         self._pose_period = 1 / pose_rate
         self._poses: deque[Sample] = deque()
         self._next_pose = self._next_rc = 0.0
@@ -188,15 +195,17 @@ class Rig:
     def step(self, dt: float) -> None:
         """One step of the world and of the firmware."""
         motors = self.sitl.motors() if self._on else np.zeros(4)
-        after = self.state if self.held else self.world.advance(self.state, motors, dt, self.wind)
+        after = self.state if self.held else self.world.advance(self.state, motors * self.shares, dt, self.wind)
         if self._on:
-            self.sitl.send_state(self.world.sensed(self.state, after, dt))
+            sensed = self.world.sensed(self.state, after, dt)
+            self.sitl.send_state(sensed if self.felt is None else self.felt(sensed))
         self.sitl.advance(dt)
         self.state = after
         now = self.now()
         if now >= self._next_rc:
             self._next_rc += RC_PERIOD_S
-            self.sitl.send_rc(self.transmitter.channels())
+            if self.heard:
+                self.sitl.send_rc(self.transmitter.channels())
         if now >= self._next_pose:
             self._next_pose += self._pose_period
             self._poses.append(self._sample(now))

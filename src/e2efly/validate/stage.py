@@ -48,12 +48,18 @@ class Trace:
     tilt: list[float] = field(default_factory=list)
     armed: list[bool] = field(default_factory=list)
     throttle: list[float] = field(default_factory=list)
+    """The bridge's."""
+    motor: list[float] = field(default_factory=list)
+    """Mean output of the firmware's motors, 0 to 1."""
 
 
 class Stage:
     """A rig that has been started, and the bridge on it. Close it with `close`."""
 
-    def __init__(self, rig: Rig, policy: Policy, goal: Goal, seed: int = 0) -> None:
+    def __init__(
+        self, rig: Rig, policy: Policy, goal: Goal, seed: int = 0, settings: FlightSettings = SETTINGS
+    ) -> None:
+        self.settings = settings
         self.rig, self.random = rig, np.random.default_rng(seed)
         self.network = FaultyNetwork(policy.session)
         self.link: FaultyLink
@@ -83,13 +89,13 @@ class Stage:
         """
         try:
             session = Session(
-                self.rig, SETTINGS, policy=self._policy, goal=self._goal, link=self.link, source=self.poses
+                self.rig, self.settings, policy=self._policy, goal=self._goal, link=self.link, source=self.poses
             )
         except ValueError:
             self.link.close()
             raise
         vehicle, contract = self.rig.world.vehicle, self._policy.contract
-        session.bridge.settings_problems = problems(examine(session.info, vehicle, SETTINGS, contract))
+        session.bridge.settings_problems = problems(examine(session.info, vehicle, self.settings, contract))
         self.session = session
         self.patience(PATIENCE_S)
 
@@ -132,6 +138,7 @@ class Stage:
         trace.tilt.append(tilt_of(state.quaternion))
         trace.armed.append(self.session.bridge.inputs.armed)
         trace.throttle.append(self.session.bridge.sent.throttle)
+        trace.motor.append(float(self.rig.sitl.motors().mean()))
 
     def fly(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
         """Control steps for so long, or until something holds; whether it did."""
@@ -164,9 +171,9 @@ class Stage:
         """End every fault, and put the pilot's hands back."""
         self.undo.close()
         self.pilot = self.each = None
-        self.poses.alter, self.network.fault = None, ""
+        self.poses.alter, self.poses.delay, self.network.fault = None, 0.0, ""
         self.link.heal()
-        self.rig.wind = np.zeros(3)
+        self.rig.wind, self.rig.shares, self.rig.felt, self.rig.heard = np.zeros(3), np.ones(4), None, True
         self.rig.power(True)
         self.patience(PATIENCE_S)
         mission = "hover" if self.mode in (Mode.HOVER, Mode.POLICY, Mode.PILOT) else "land"
@@ -204,7 +211,7 @@ class Stage:
         self.rig.set(armed=True)
         self.fly(0.2)
         self.rig.set(mission="hover")
-        self._expect(HEIGHT / SETTINGS.takeoff_speed + 6.0, Mode.HOVER)
+        self._expect(self.settings.takeoff_height / self.settings.takeoff_speed + 6.0, Mode.HOVER)
 
     def _ground(self) -> None:
         self.rig.set(mission="land")

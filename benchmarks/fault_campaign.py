@@ -1,0 +1,161 @@
+"""Pairs and triples of faults by chance, injected into flights through the real firmware; virtual time.
+
+python benchmarks/fault_campaign.py [--count 240] [--first 0] [--only SEED ...] [--cases] [--processes 2]
+    [--keep FOLDER] [--json FILE]
+
+Each seed is one flight, which is always the same: `--only` flies some again and tells them in full. `--cases` flies the
+named ones instead. Every flight is kept in `--keep` as it ends: a campaign that was killed goes on where it was, as
+long as the package's files are the same. Exit status 1 when a rule is broken that the bridge could have kept.
+"""
+
+import argparse
+import hashlib
+import json
+import multiprocessing
+import os
+import sys
+import tempfile
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from common import table, write
+
+import e2efly
+from e2efly.deploy.policy import load_policy
+from e2efly.validate import firmware
+from e2efly.validate.campaign import Scenario, fly
+from e2efly.validate.scenarios import CASES, drawn
+from e2efly.vehicles import load_vehicle
+from e2efly.zoo import policy_path
+
+KEPT = Path(tempfile.gettempdir()) / "e2efly-fault-campaign"
+
+
+def flown(scenario: Scenario) -> dict[str, Any]:
+    """One flight, and how long it took; one that cannot be brought to its faults says why."""
+    began = time.perf_counter()
+    policy, vehicle = load_policy(policy_path(Path("hover"))), load_vehicle("vis_r")
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            outcome = asdict(fly(scenario, policy, vehicle, firmware.build(), Path(folder)))
+        except RuntimeError as error:
+            outcome = {"problem": str(error)}
+    return {"scenario": asdict(scenario), **outcome, "took_s": time.perf_counter() - began}
+
+
+def kept_flight(task: tuple[Scenario, Path]) -> dict[str, Any]:
+    """The flight, from its file where there is one."""
+    scenario, folder = task
+    digest = hashlib.sha256(json.dumps(asdict(scenario)).encode()).hexdigest()[:16]
+    file = folder / f"{digest}.json"
+    if not file.exists():
+        draft = file.with_suffix(f".{os.getpid()}")
+        draft.write_text(json.dumps(flown(scenario)))
+        draft.replace(file)
+    row = json.loads(file.read_text())
+    print(told(row), flush=True)
+    return row
+
+
+def told(row: dict[str, Any]) -> str:
+    """One line a flight."""
+    scenario = row["scenario"]
+    if "problem" in row:
+        return f"{scenario['name']}: could not be flown: {row['problem']}"
+    broken = [f"{v['rule']} {v['value']:.2f}" + (" (beyond)" if v["beyond"] else "") for v in row["violations"]]
+    last = row["changes"][-1] if row["changes"] else (0.0, row["mode"], ())
+    end = "" if row["ended"] else " NOT ENDED"
+    return (
+        f"{scenario['name']} [{scenario['mode']}, {scenario['height']:g} m]: off {row['off_height']:.2f} m, "
+        f"climb {row['climb']:.2f} m, touch {row['touch_speed']:.2f} m/s, tilt {row['touch_tilt']:.2f}, "
+        f"armed {row['armed_s']:.1f} s, drift {row['drift']:.1f} m{end}; {'; '.join(broken) or 'ok'}; "
+        f"{last[1]} after {last[0]:.2f} s: {'; '.join(last[2])}"
+    )
+
+
+def blamed(row: dict[str, Any]) -> bool:
+    """Whether a rule was broken that the bridge could have kept."""
+    return "problem" in row or not row["ended"] or any(not v["beyond"] for v in row["violations"])
+
+
+def excused(row: dict[str, Any]) -> bool:
+    """Whether all that was broken is beyond the bridge."""
+    return not blamed(row) and bool(row["violations"])
+
+
+def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One line a mode, and one for all."""
+    lines = []
+    for mode in [*dict.fromkeys(row["scenario"]["mode"] for row in rows), "all"]:
+        mine = [row for row in rows if mode in ("all", row["scenario"]["mode"])]
+        fair = [row for row in mine if "problem" not in row and not excused(row)]
+
+        def worst(key: str, rows: list[dict[str, Any]] = fair) -> str:
+            known = [row[key] for row in rows if row[key] == row[key]]
+            return f"{max(known):.2f}" if known else ""
+
+        lines.append(
+            {
+                "struck in": mode,
+                "flights": len(mine),
+                "motors off at, m": worst("off_height"),
+                "climb, m": worst("climb"),
+                "touch, m/s": worst("touch_speed"),
+                "armed on the ground": sum(
+                    any(v["rule"] == "armed on the ground" for v in row["violations"]) for row in fair
+                ),
+                "rules broken": sum(map(blamed, mine)),
+                "beyond the bridge": sum(map(excused, mine)),
+            }
+        )
+    return lines
+
+
+def state_of_package() -> str:
+    """A digest of the code that flies: what was flown with other code is not taken for this."""
+    root = Path(e2efly.__file__).parent
+    digest = hashlib.sha256()
+    for file in sorted(root.glob("deploy/**/*.py")) + sorted(root.glob("validate/*.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def main() -> None:
+    """Fly, print a table, write JSON."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, default=None, help="where to write the figures")
+    parser.add_argument("--count", type=int, default=240, help="flights")
+    parser.add_argument("--first", type=int, default=0, help="first seed")
+    parser.add_argument("--only", type=int, nargs="*", help="these seeds alone, each in full; nothing is written")
+    parser.add_argument("--cases", nargs="?", const="", help="the named flights alone, or those with this text")
+    parser.add_argument("--processes", type=int, choices=(1, 2), default=2)
+    parser.add_argument("--keep", type=Path, default=KEPT, help="where finished flights are kept")
+    options = parser.parse_args()
+    if options.only:
+        rows = [flown(drawn(seed)) for seed in options.only]
+        print(json.dumps(rows, indent=1))
+        sys.exit(any(map(blamed, rows)))
+    if options.cases is not None:
+        scenarios = [case for case in CASES if options.cases in case.name]
+    else:
+        scenarios = [drawn(seed) for seed in range(options.first, options.first + options.count)]
+    folder = options.keep / state_of_package()
+    folder.mkdir(parents=True, exist_ok=True)
+    firmware.build()
+    with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
+        rows = list(pool.imap(kept_flight, [(scenario, folder) for scenario in scenarios]))
+    lines = summary(rows)
+    print(table(lines))
+    for title, some in (("Rules broken", blamed), ("Beyond the bridge", excused)):
+        print(f"\n{title}:", *(told(row) for row in rows if some(row)), sep="\n")
+    took = [row["took_s"] for row in rows]
+    print(f"\n{sum(took) / len(took):.1f} s a flight")
+    if options.cases is None:
+        write("fault_campaign", options.json, {"table": lines, "flights": rows, "s_a_flight": sum(took) / len(took)})
+    sys.exit(any(map(blamed, rows)))
+
+
+if __name__ == "__main__":
+    main()
