@@ -33,6 +33,8 @@ CALIBRATION_S = 6.0
 """The firmware stands still for so long before it can be armed, s."""
 POSE_NOISE = (0.0005, 0.01, 0.02, 0.001)
 """Of position, m; velocity, m/s; body rate, rad/s; attitude, rad: a motion capture system's, standard deviations."""
+LOST_CHANNEL = 13
+"""AUX9: the receiver's own, by which firmware that does not hear its silence is told of it."""
 LANDING_S = 10
 """After so long a failsafe landing stops the motors, s."""
 SETTINGS = (
@@ -40,10 +42,11 @@ SETTINGS = (
     "aux 1 50 1 1700 2100 0 0",  # MSP override: AUX2
     "aux 2 1 2 925 2100 0 0",  # angle: AUX3, wherever the pilot leaves it; the bridge sends 900 there
     "set msp_override_channels_mask=79",
-    "rxfail 3 s 1550",  # without the receiver: a throttle that just sinks ...
+    "rxfail 3 s 1575",  # without the receiver: a throttle that just sinks ...
     "rxfail 6 s 2000",  # ... and angle
+    "aux 3 27 8 1700 2100 0 0",  # FAILSAFE: AUX9, where the firmware takes silence for the last frame
     "set failsafe_procedure=AUTO-LAND",
-    "set failsafe_throttle=1550",
+    "set failsafe_throttle=1575",
     "set failsafe_delay=5",
     "set max_aux_channels=14",  # or the copies of throttle and yaw on channels 11 and 12 are not read
     "set rates_type=ACTUAL",
@@ -204,11 +207,19 @@ class Rig:
         now = self.now()
         if now >= self._next_rc:
             self._next_rc += RC_PERIOD_S
-            if self.heard:
-                self.sitl.send_rc(self.transmitter.channels())
+            self._receive()
         if now >= self._next_pose:
             self._next_pose += self._pose_period
             self._poses.append(self._sample(now))
+
+    def _receive(self) -> None:
+        """A frame of the pilot's receiver; one that hears nothing sends none, or the switch that stands for it."""
+        channels = self.transmitter.channels()
+        if not self.heard:
+            if self.sitl.firmware.layout.hears_silence:
+                return
+            channels[LOST_CHANNEL - 1] = 2000
+        self.sitl.send_rc(channels)
 
     def poses(self, now: float) -> list[Sample]:
         """The poses that have come since the last call, `latency` s old."""

@@ -67,7 +67,10 @@ class Release:
 _BEFORE = SitlLayout(motors=(3, 0, 1, 2), yaw_sign=-1, hears_silence=False)
 _SINCE_2026 = SitlLayout(
     motors=(0, 1, 2, 3), yaw_sign=1, hears_silence=True,
-    settings=("feature -GPS",),  # it would take metres for degrees of latitude
+    settings=(
+        "feature -GPS",  # it would take metres for degrees of latitude
+        "set ap_hover_throttle=1600", "set alt_hold_climb_rate=8",  # its barometer flies the failsafe landing
+    ),
 )  # fmt: skip
 _TENTHS, _SECONDS = ("failsafe_off_delay", 10), ("failsafe_landing_time", 1)
 
