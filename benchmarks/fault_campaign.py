@@ -40,7 +40,7 @@ def flown(scenario: Scenario) -> dict[str, Any]:
     policy, vehicle = load_policy(policy_path(Path("hover"))), load_vehicle("vis_r")
     with tempfile.TemporaryDirectory() as folder:
         try:
-            outcome = asdict(fly(scenario, policy, vehicle, firmware.build(), Path(folder)))
+            outcome = asdict(fly(scenario, policy, vehicle, firmware.chosen(), Path(folder)))
         except Exception:  # whatever it is, it is a finding, and the campaign goes on
             outcome = {"problem": traceback.format_exc()}
     known = {key: None if value != value else value for key, value in outcome.items()}  # JSON has no NaN
@@ -145,7 +145,7 @@ def main() -> None:
         scenarios = [drawn(seed) for seed in range(options.first, options.first + options.count)]
     folder = options.keep / state_of_package()
     folder.mkdir(parents=True, exist_ok=True)
-    firmware.build()
+    firmware.chosen()
     with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
         rows = list(pool.imap(kept_flight, [(scenario, folder) for scenario in scenarios]))
     lines = summary(rows)

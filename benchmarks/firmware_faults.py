@@ -31,7 +31,7 @@ def virtual(policy_file: Path, folder: Path, seed: int, only: list[str]) -> list
     rows: list[dict[str, Any]] = []
     while left:
         with Rig(
-            firmware.build(), folder / f"firmware-{seed}-{len(left)}", vehicle, latency=LATENCY_S, seed=seed
+            firmware.chosen(), folder / f"firmware-{seed}-{len(left)}", vehicle, latency=LATENCY_S, seed=seed
         ) as rig:
             stage = Stage(rig, policy, goal, seed + len(left))
             stage.fly(0.3)

@@ -188,6 +188,8 @@ class FirmwareOptions:
 
     archive: Path | None = None
     """The package's source archive, where it is already here."""
+    binary: Path | None = None
+    """A SITL that you have built yourself, of 4.5 to 2026.12, to be flown instead from now on."""
 
 
 @dataclass(frozen=True)
@@ -442,7 +444,7 @@ def _firmware(arguments: list[str]) -> int:
     o = tyro.cli(FirmwareOptions, args=arguments, prog="e2efly firmware")
     from e2efly.commands.firmware import firmware_command
 
-    return firmware_command(o.archive)
+    return firmware_command(o.archive, o.binary)
 
 
 def _bench(arguments: list[str]) -> int:

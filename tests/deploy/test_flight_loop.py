@@ -1,12 +1,15 @@
-"""The control loop's word to the operator: whatever hears it, the loop goes on."""
+"""The control loop: its word to the operator, its end, and what the watchdog is told on the ground."""
 
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from e2efly.deploy.flight_loop import fly
+from e2efly.deploy.flight_loop import fly, plan_of
 from e2efly.deploy.flight_state import Flight, Mode
+from e2efly.deploy.throttle_map import ThrottleMap
+from e2efly.vehicles import load_vehicle
+from tests.deploy.test_sticks import STICKS
 
 
 class Clock:
@@ -23,18 +26,25 @@ class Clock:
 
 
 class Grounded:
-    """A bridge on the ground, which counts its control steps."""
+    """A bridge on the ground, armed for the first steps, which counts them."""
 
-    worker = None
-    odometry = None
+    worker = odometry = None
+    land_now = flying = False
+    height = 0.0
     client = SimpleNamespace(link=SimpleNamespace(connections=1))
-    land_now = False
+    sent = SimpleNamespace(throttle=0.0)
+    sticks = STICKS
 
-    def __init__(self, *reasons: str) -> None:
-        self.flight, self.steps = Flight(Mode.INIT, reasons=reasons), 0
+    def __init__(self, *reasons: str, mode: Mode = Mode.INIT, armed_steps: int = 0) -> None:
+        self.flight, self.armed_steps, self.steps = Flight(mode, reasons=reasons), armed_steps, 0
+        self.map = ThrottleMap.of(load_vehicle("vis_r"))
+
+    @property
+    def inputs(self) -> Any:
+        return SimpleNamespace(armed=self.steps < self.armed_steps, voltage=None)
 
     def tick(self, now: float, lateness: float, slack: float) -> None:
-        del lateness, slack
+        del now, lateness, slack
         self.steps += 1
 
 
@@ -62,3 +72,24 @@ def test_reasons_from_outside_forge_no_line() -> None:
     assert said[1].split("\n") == [
         "INIT:", r"  - no good odometry: key '\x1b[2K\nPOLICY: all is well\ud800'", "  - not armed",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("mode", [Mode.INIT, Mode.DONE])
+def test_it_ends_on_the_ground_only_when_the_pilot_has_disarmed(mode: Mode) -> None:
+    """A bridge that left an armed vehicle would leave its motors to the throttle stick, which rests in its middle."""
+    said: list[str] = []
+    bridge = Grounded(mode=mode, armed_steps=250)
+    looped(bridge, said.append, -1.0)
+    assert bridge.steps == 250
+    assert any("disarm, then this ends" in line for line in said)
+    disarmed = Grounded(mode=mode)
+    looped(disarmed, said.append, -1.0)
+    assert disarmed.steps == 0
+
+
+def test_on_the_ground_the_watchdog_keeps_the_throttle_of_an_armed_vehicle_closed() -> None:
+    armed: Any = Grounded(armed_steps=1)
+    plan = plan_of(armed)
+    assert plan.flying and plan.throttle == ((0.0, 1000),)
+    disarmed: Any = Grounded()
+    assert not plan_of(disarmed).flying

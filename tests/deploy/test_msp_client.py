@@ -389,9 +389,9 @@ def test_identify_the_recorded_controller() -> None:
     ("code", "data", "words"),
     [
         (2, b"INAV", "the firmware is 'INAV'; accepted: 'BTFL'"),
-        (1, b"\0\1\x2b", r"MSP 1\.43 .*accepted: MSP 1\.44 to 1\.47"),
-        (1, b"\0\1\x30", r"MSP 1\.48 .*accepted: MSP 1\.44 to 1\.47"),
-        (1, b"\0\2\x2d", r"MSP 2\.45 "),
+        (1, b"\0\1\x2b", r"Betaflight 4\.6\.0, MSP 1\.43; accepted: 4\.3 \(MSP 1\.44\), "),
+        (1, b"\0\1\x32", r"Betaflight 4\.6\.0, MSP 1\.50; accepted: .* 2026\.12 \(MSP 1\.49\)"),
+        (3, b"\x1a\6\0\x0e2026.6.0-alpha", r"Betaflight 2026\.6\.0-alpha, MSP 1\.47; accepted"),
         (64, b"\0\0\0\0\0\0\0\0", "RX_MAP"),
         (111, b"\0", "RC_TUNING"),
     ],

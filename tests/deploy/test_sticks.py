@@ -31,7 +31,7 @@ def recorded() -> ControllerInfo:
         variant="BTFL", version=(4, 6, 0), api=(1, 47), built=read(BuildInfo).built, craft=read(Name).name,
         features=read(settings.FeatureConfig).features, rate_profile=0, rates=tuning.rates,
         throttle=replace(tuning.throttle, min_check=rx.min_check), rx=rx, rx_map=read(settings.RxMap),
-        deadband=read(settings.RcDeadband), failsafe=read(settings.FailsafeConfig),
+        deadband=read(settings.RcDeadband), failsafe=read(settings.FailsafeConfig), rx_fail=read(settings.RxFailConfig),
         modes=read(settings.ModeRanges).ranges, box_ids=read(settings.BoxIds).ids, motor=read(settings.MotorConfig),
         advanced=read(settings.AdvancedConfig), mixer=read(settings.MixerConfig),
         alignment=read(settings.BoardAlignment),

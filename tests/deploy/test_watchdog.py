@@ -21,8 +21,9 @@ from pathlib import Path
 
 import pytest
 
+from e2efly.deploy import watchdog
 from e2efly.deploy.msp.codec import REPLY, Decoder, Frame, encode
-from e2efly.deploy.msp.messages import SET_RAW_RC, Attitude, set_raw_rc
+from e2efly.deploy.msp.messages import SET_RAW_RC, Attitude, StatusEx, set_raw_rc
 from e2efly.deploy.watchdog import LEVEL_GAIN, LEVEL_RATE, STALE_S, Plan, WatchedLink, descent
 
 RATES = tuple(0.5 * i for i in range(-8, 9))
@@ -425,6 +426,54 @@ def test_a_plan_that_cannot_be_read_leaves_the_last_one(controller: Controller) 
     until(lambda: controller.count() and controller.sticks[-1][1][2] == 1400)
     os.kill(link._process.pid, signal.SIGKILL)
     link.close()
+
+
+class Told:
+    """A link to a controller that says whether it is armed, and the time that passes with each round."""
+
+    def __init__(self, armed: Callable[[float], bool | None]) -> None:
+        self.armed, self.now, self.sticks, self.pending = armed, 0.0, [], b""
+        self.closed = False
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+    def poll(self, now: float) -> None:
+        pass
+
+    def send(self, data: bytes) -> None:
+        for frame in Decoder().feed(data):
+            if frame.code == SET_RAW_RC:
+                self.sticks.append(struct.unpack(f"<{len(frame.payload) // 2}H", frame.payload))
+            elif frame.code == StatusEx.CODE and (armed := self.armed(self.now)) is not None:
+                payload = struct.pack("<HHHIBHBBBBIB", 250, 0, 0, int(armed), 0, 0, 4, 0, 0, 29, 0, 0)
+                self.pending += encode(Frame(StatusEx.CODE, payload, REPLY))
+
+    def receive(self) -> bytes:
+        data, self.pending = self.pending, b""
+        return data
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def test_the_throttle_stays_closed_until_the_pilot_has_disarmed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where an old override is handed back, the throttle stick in its middle would have the motors."""
+    link = Told(lambda now: now < 60.0 and not 5.0 < now < 5.015)  # one answer in error does not end it
+    monkeypatch.setattr(watchdog, "time", link)
+    watchdog.land(link, PLAN)  # type: ignore[arg-type]
+    assert 60.0 < link.now < 60.1 and link.closed
+    assert {row[2] for row in link.sticks[100:]} == {1000}
+
+
+def test_a_controller_that_says_nothing_any_more_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    link = Told(lambda now: True if now < 2.0 else None)
+    monkeypatch.setattr(watchdog, "time", link)
+    watchdog.land(link, PLAN)  # type: ignore[arg-type]
+    assert 2.0 + watchdog.DEAF_S - 0.1 < link.now < 2.0 + watchdog.DEAF_S + 0.1 and link.closed
 
 
 def test_it_starts_without_numpy_and_onnx_runtime() -> None:

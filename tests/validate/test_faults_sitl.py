@@ -40,7 +40,7 @@ class Hangar:
         vehicle = load_vehicle("vis_r")
         goal = goal_for(self.policy.contract, GoalOptions(target=TARGET), vehicle)
         folder = self.folder / f"firmware{self._count}"
-        rig = self._open.enter_context(Rig(firmware.build(), folder, vehicle, latency=LATENCY_S))
+        rig = self._open.enter_context(Rig(firmware.chosen(), folder, vehicle, latency=LATENCY_S))
         stage = Stage(rig, self.policy, goal)
         self._open.callback(stage.close)
         stage.fly(0.3)

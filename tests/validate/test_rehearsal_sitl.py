@@ -18,7 +18,7 @@ def test_take_off_hover_policy_hover_land_by_switches_alone(policy_of: Callable[
     vehicle, policy = load_vehicle("vis_r"), load_policy(policy_of("hover"))
     goal = goal_for(policy.contract, GoalOptions(), vehicle)
     with Telemetry(tmp_path / "flight.mcap") as log:
-        flight = rehearse(firmware.build(), policy, goal, vehicle, seed=3, log=log)
+        flight = rehearse(firmware.chosen(), policy, goal, vehicle, seed=3, log=log)
     assert flight.modes == ("init", "takeoff", "hover", "policy", "hover", "land", "done", "init")
     assert flight.complete
     assert flight.hover_error < 0.10

@@ -19,7 +19,7 @@ from e2efly.validate.world import Body
 from e2efly.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
-ARM = 0
+ARM, ANGLE = 0, 1
 REAR_RIGHT, FRONT_RIGHT, REAR_LEFT, FRONT_LEFT = range(4)
 
 
@@ -43,6 +43,12 @@ class Bench:
             self.client.poll(self.rig.now())
             self.client.set_raw_rc(set_raw_rc(channels), self.rig.now())
 
+    def listen(self, seconds: float) -> None:
+        """Ask and send no sticks."""
+        for _ in range(round(seconds / 0.01)):
+            self.rig.sleep(0.01)
+            self.client.poll(self.rig.now())
+
     def arm(self) -> None:
         """Hand over, and arm."""
         self.rig.set(override=True)
@@ -57,14 +63,22 @@ class Bench:
 
     @property
     def armed(self) -> bool:
+        return ARM in self.modes
+
+    @property
+    def angle(self) -> bool:
+        return ANGLE in self.modes
+
+    @property
+    def modes(self) -> frozenset[int]:
         status = self.said(StatusEx)
         assert isinstance(status, StatusEx)
-        return ARM in status.active(self.info.box_ids)
+        return status.active(self.info.box_ids)
 
 
 @pytest.fixture(scope="module")
 def standing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    with Rig(firmware.build(), tmp_path_factory.mktemp("firmware"), VEHICLE) as rig:
+    with Rig(firmware.chosen(), tmp_path_factory.mktemp("firmware"), VEHICLE) as rig:
         bench = Bench(rig)
         yield bench
         bench.client.link.close()
@@ -176,50 +190,67 @@ def test_it_hovers_where_thrust_equals_weight(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("override_failsafe", [False, True])
-def test_under_override_the_last_sticks_are_held_though_msp_is_silent(
+def test_a_silent_msp_is_held_or_handed_back_as_the_version_is_said_to(
     tmp_path: Path, override_failsafe: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Why the bridge has a watchdog: nobody but the pilot's override switch ends them."""
+    """Why the bridge has a watchdog: where the last sticks are held, only the override switch ends them."""
     from e2efly.validate import rig as rig_module
 
     chosen = (*rig_module.SETTINGS, f"set msp_override_failsafe={'ON' if override_failsafe else 'OFF'}")
     prepare = rig_module.prepare
     monkeypatch.setattr(rig_module, "prepare", lambda sitl: prepare(sitl, chosen))
-    with Rig(firmware.build(), tmp_path, VEHICLE) as rig:
+    with Rig(firmware.chosen(), tmp_path, VEHICLE) as rig:
         bench = Bench(rig)
+        timeout = bench.info.release.override_timeout
         bench.arm()
         idle = rig.sitl.motors().mean()
         bench.send(0.5, 0.15, (0.0, 0.0, 0.3))
         sent = bench.said(Rc)
+        assert isinstance(sent, Rc) and not bench.angle
         bench.client.link.close()
-        lowest = 1.0
+        rig.sleep(0.25 if timeout is None else timeout - 0.05)
+        lowest = float(rig.sitl.motors().mean())
+        assert lowest > idle + 0.05
         for _ in range(50):
             rig.sleep(0.1)
             lowest = min(lowest, float(rig.sitl.motors().mean()))
-        assert lowest > idle + 0.05
+        assert (lowest > idle + 0.05) == (timeout is None)
         bench = Bench(rig)
-        bench.client.poll(rig.now())
-        for _ in range(20):
-            rig.sleep(0.01)
-            bench.client.poll(rig.now())
-        assert bench.armed
+        bench.listen(0.2)
         held = bench.said(Rc)
-        assert isinstance(sent, Rc) and isinstance(held, Rc)
-        assert held.channels[:4] == sent.channels[:4]
+        assert bench.armed and isinstance(held, Rc)
+        assert (held.channels[:4] == sent.channels[:4], bench.angle) == (timeout is None, timeout is not None)
         rig.set(override=False)
-        rig.sleep(0.5)
-        assert rig.sitl.motors().mean() < idle + 0.02
+        bench.listen(0.5)
+        assert rig.sitl.motors().mean() < idle + 0.02 and bench.angle
         bench.client.link.close()
+
+
+def test_a_dead_link_leaves_a_vehicle_that_levels_itself(bench: Bench) -> None:
+    """At once where the sticks are handed back; elsewhere with the pilot's override switch."""
+    rig = bench.rig
+    rig.state = replace(rig.state, position=np.array([0.0, 0.0, 6.0]))
+    rig.held = True
+    bench.send(0.3, 0.5)
+    rig.held = False
+    rig.set(throttle=0.0)
+    bench.send(0.4, 0.5, (2.0, 0.0, 0.0))
+    tilted = math.acos(1 - 2 * float(rig.state.quaternion[1] ** 2 + rig.state.quaternion[2] ** 2))
+    assert tilted > 0.4 and not bench.angle
+    rig.sleep(0.4)
+    if bench.info.release.override_timeout is None:
+        rig.set(override=False)
+    rig.sleep(0.6)
+    assert math.acos(1 - 2 * float(rig.state.quaternion[1] ** 2 + rig.state.quaternion[2] ** 2)) < 0.12
+    rig.set(throttle=-1.0, override=True)
 
 
 def test_two_at_once_have_ports_of_their_own_and_move_alike(tmp_path: Path) -> None:
     with (
-        Rig(firmware.build(), tmp_path / "a", VEHICLE, seed=1) as a,
-        Rig(firmware.build(), tmp_path / "b", VEHICLE, seed=1) as b,
+        Rig(firmware.chosen(), tmp_path / "a", VEHICLE, seed=1) as a,
+        Rig(firmware.chosen(), tmp_path / "b", VEHICLE, seed=1) as b,
     ):
         assert abs(a.sitl.base - b.sitl.base) >= 12
-        for rig in (a, b):
-            rig.set(angle=True)
         for changes, seconds in (({"armed": True}, 0.4), ({"throttle": 0.4, "roll": 0.3}, 0.8)):
             for rig in (a, b):
                 rig.set(**changes)
@@ -233,7 +264,7 @@ def test_two_at_once_have_ports_of_their_own_and_move_alike(tmp_path: Path) -> N
 
 
 def test_without_power_the_motors_stop_and_time_goes_on(tmp_path: Path) -> None:
-    with Rig(firmware.build(), tmp_path, VEHICLE) as rig:
+    with Rig(firmware.chosen(), tmp_path, VEHICLE) as rig:
         bench = Bench(rig)
         bench.arm()
         assert bench.armed

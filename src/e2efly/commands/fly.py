@@ -259,7 +259,7 @@ def _record_meta(log: Telemetry, bridge: Bridge, body: Vehicle, contract: str, r
     }
     versions = {
         "e2efly": __version__, "python": sys.version.split()[0], "machine": platform.platform(),
-        "firmware": ".".join(map(str, bridge.info.version)), "msp": ".".join(map(str, bridge.info.api)),
+        "firmware": bridge.info.firmware, "msp": ".".join(map(str, bridge.info.api)),
     }  # fmt: skip
     log.record("meta", time.monotonic(), {
         "contract": contract, "vehicle": f"{body.name} {body.hash}", "settings": json.dumps(settings),

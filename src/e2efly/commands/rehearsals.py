@@ -26,7 +26,7 @@ def fly_whole(policy: Policy, vehicle: Vehicle, count: int, console: Console, se
     race = policy.contract.task == "race"
     options = dataclasses.replace(GoalOptions(), laps=LAPS) if race else GoalOptions()
     goal = goal_for(policy.contract, options, vehicle)
-    built, flights = firmware.build(), []
+    built, flights = firmware.chosen(), []
     with console.status("whole flights through the firmware") as status:
         for i in range(count):
             status.update(f"whole flight {i + 1} of {count} through the firmware")

@@ -207,7 +207,7 @@ class Bridge:
         self._heard = max((reply.time for reply in self.client.latest.values()), default=self._heard)
         reading = self.instruments.read(now, self.info, land=self.land_now)
         grounded = self.flight.mode is Mode.INIT
-        probed = self.probe.look(now, reading, self.sticks.centre, grounded=grounded)
+        probed = self.probe.look(now, reading, self.sticks, grounded=grounded)
         good = self._pose_problem is None and self._stale is None
         slow = pace_problem(self.pace, self.settings.odometry_timeout)
         self.inputs = Inputs(

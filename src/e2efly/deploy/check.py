@@ -6,11 +6,17 @@ from math import degrees
 from e2efly.deploy.contract import Contract
 from e2efly.deploy.msp.controller import ControllerInfo
 from e2efly.deploy.msp.names import BOXES
+from e2efly.deploy.msp.settings import ModeRange
+from e2efly.deploy.msp.versions import RELEASES
 from e2efly.deploy.settings import FlightSettings
-from e2efly.vehicles.vehicle import Vehicle
+from e2efly.deploy.sticks import RATES_PULSE, angle_range
+from e2efly.deploy.throttle_map import ThrottleMap
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 QUADX = 3
 """Betaflight's number of the mixer of a quadrotor in X."""
+ANGLE_AUX = 2
+"""AUX channel, from 0, that the guide gives to ANGLE."""
 LARGEST_DEADBAND = 10
 """Deadband that is still jumped over without harm, us."""
 
@@ -48,14 +54,15 @@ def examine(
         contract: of the policy; its body rates count where it commands them.
     """
     api = ".".join(map(str, info.api))
-    firmware = f"{info.variant} {'.'.join(map(str, info.version))}"
+    known = f"BTFL, {RELEASES[0].name} to {RELEASES[-1].name}"
     rows = [
-        Row("firmware", f"{firmware}, MSP {api}, built {info.built.strip()}", "BTFL, MSP 1.44 to 1.47", True),
+        Row("firmware", f"{info.variant} {info.firmware}, MSP {api}, built {info.built.strip()}", known, True),
         Row("craft_name", info.craft or "(none)", "any", True),
         Row("map", info.rx_map.letters, "any: it is read", True),
         *_rates(info, vehicle, contract),
         *_throttle(info),
         *_modes(info),
+        *_hand_back(info, vehicle),
         *_channels(info, settings),
     ]
     for axis, band in (("deadband", info.deadband.deadband), ("yaw_deadband", info.deadband.yaw_deadband)):
@@ -117,15 +124,50 @@ def _modes(info: ControllerInfo) -> list[Row]:
     rows = []
     for mode, hint in (("ARM", "aux 0 0 0 1700 2100 0 0"), ("MSP OVERRIDE", "aux 1 50 1 1700 2100 0 0")):
         ranges = info.ranges(mode)
-        where = ", ".join(f"AUX{r.aux + 1} {r.low} to {r.high}" for r in ranges) or "none"
         switched = bool(ranges) and all(r.low > 1000 or r.high < 2000 for r in ranges)
-        rows.append(Row(f"switch of {mode}", where, "a switch of the pilot's, not always on", switched, hint))
-    known = next(number for number, name in BOXES.items() if name == "MSP OVERRIDE") in info.box_ids
+        needed = "a switch of the pilot's, not always on"
+        rows.append(Row(f"switch of {mode}", _where(ranges), needed, switched, hint))
+    angle = angle_range(info)
+    place = ANGLE_AUX if angle is None else angle.aux
+    channel = info.rx_map.channel[4 + place] if 4 + place < len(info.rx_map.channel) else 4 + place
+    needed = f"925 to 2100 on a channel of its own: on, but for the {RATES_PULSE} us that the bridge sends there"
     rows.append(
-        Row("msp_override_channels_mask", "set" if known else "0", "15: the four sticks (tried before arming)", known,
-            "set msp_override_channels_mask=15")
+        Row("range of ANGLE", _where(info.ranges("ANGLE")), needed, angle is not None,
+            f"aux 2 1 {ANGLE_AUX} 925 2100 0 0")
+    )  # fmt: skip
+    known = next(number for number, name in BOXES.items() if name == "MSP OVERRIDE") in info.box_ids
+    mask = 15 | 1 << channel
+    rows.append(
+        Row("msp_override_channels_mask", "set" if known else "0", f"{mask}: the sticks and AUX{place + 1} of ANGLE "
+            "(tried before arming)", known, f"set msp_override_channels_mask={mask}")
+    )  # fmt: skip
+    fail = info.rx_fail.channels[4 + place : 5 + place]
+    levels = not fail or (fail[0][0] == "SET" and angle is not None and angle.low <= fail[0][1] < angle.high)
+    value = f"{fail[0][0]} {fail[0][1]} us" if fail else "not told"
+    rows.append(
+        Row(f"rxfail of AUX{place + 1}", value, "SET within ANGLE's range: level without the receiver", levels,
+            f"rxfail {4 + place} s 2000")
     )  # fmt: skip
     return rows
+
+
+def _where(ranges: tuple[ModeRange, ...]) -> str:
+    return ", ".join(f"AUX{r.aux + 1} {r.low} to {r.high}" for r in ranges) or "none"
+
+
+def _hand_back(info: ControllerInfo, vehicle: Vehicle) -> list[Row]:
+    """What a dead link leaves: the receiver's sticks, level, and a throttle stick that rests in the middle."""
+    middle = info.throttle.throttle_of(info.rx.mid)
+    share = ThrottleMap.of(vehicle).nominal(middle) / GRAVITY
+    verb = "climbs" if share > 1 else "sinks"
+    taken = info.release.override_timeout is not None
+    mend = "set thr_hover=... (thr_mid before 2025.12) to just under hovering, or weigh the vehicle with its battery"
+    return [
+        Row("override without MSP", info.release.hand_back, "any: docs/hardware.md says what follows", True),
+        Row("throttle stick in its middle", f"{share:.2f} of the weight: {verb}",
+            "at most 1, where it is handed back by itself" if taken else "any: only the pilot's switch hands it back",
+            share <= 1 or not taken, mend),
+    ]  # fmt: skip
 
 
 def _channels(info: ControllerInfo, settings: FlightSettings) -> list[Row]:

@@ -61,7 +61,7 @@ def fly(
     identify_again: Callable[[], ControllerInfo | None] | None = None,
     clock: Clock = MONOTONIC,
 ) -> Timing:
-    """Run the bridge until `stop` says so and the vehicle is on the ground.
+    """Run the bridge until `stop` says so and the vehicle is on the ground and disarmed.
 
     Args:
         bridge: what to run.
@@ -85,7 +85,8 @@ def fly(
             late = max(now - due, 0.0)
             if stop():
                 bridge.land_now = True
-                if bridge.flight.mode in (Mode.INIT, Mode.DONE):  # not while the pilot flies: the sticks would stay
+                ended = bridge.flight.mode in (Mode.INIT, Mode.DONE)  # not while the pilot flies: the sticks would stay
+                if ended and not bridge.inputs.armed:  # or the throttle stick, in its middle, would have the motors
                     return timing
             if bridge.client.link.connections != connection and bridge.flight.mode in (Mode.INIT, Mode.DONE):
                 if identify_again is not None and identify_again() is not None:
@@ -134,13 +135,13 @@ def plan_of(bridge: Bridge) -> Plan:
     climb = float(bridge.odometry.velocity[2]) if bridge.odometry is not None else 0.0
     begin = sink_time(climb)
     end = max(blind_time(bridge.height, climb), 2 * begin)
-    steps = (
+    steps = ((0.0, CLOSED),) if bridge.flight.mode in (Mode.INIT, Mode.DONE) else (
         (0.0, throttle(blind(None, 0.0, climb))), (begin, throttle(blind(None, 2 * begin + 1.0, climb))), (end, CLOSED),
     )  # fmt: skip
     a, b, c, d = sticks.channel[:4]
     mid = sticks.centre
     idle = sticks.arrange((mid, mid, mid, CLOSED), ())
-    flying = bridge.flying or bridge.flight.mode is Mode.PILOT
+    flying = bridge.flying or bridge.flight.mode is Mode.PILOT or bridge.inputs.armed
     return Plan(flying, PLAN_RATES, (roll, pitch, yaw), (a, b, c, d), steps, idle)
 
 
@@ -157,6 +158,8 @@ def _told(bridge: Bridge) -> str:
 
 def _status(bridge: Bridge) -> str:
     o, flight = bridge.odometry, bridge.flight
+    if bridge.land_now and bridge.inputs.armed and flight.mode in (Mode.INIT, Mode.DONE):
+        return f"{flight.mode.upper()}: disarm, then this ends: without it the throttle stick may have the motors"
     if flight.mode is Mode.INIT:
         return "\n".join([f"{flight.mode.upper()}:", *(f"  - {printable(reason)}" for reason in flight.reasons)])
     where = "unknown" if o is None else f"{o.position.round(2).tolist()} m, {o.velocity.round(2).tolist()} m/s"

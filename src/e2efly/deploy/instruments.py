@@ -14,10 +14,14 @@ from e2efly.deploy.msp.client import Client
 from e2efly.deploy.msp.controller import ControllerInfo
 from e2efly.deploy.msp.messages import Attitude, BatteryState, Rc, StatusEx
 from e2efly.deploy.settings import FlightSettings, PilotChannels
+from e2efly.deploy.sticks import RATES_PULSE, Sticks
 
 ARM, FAILSAFE, OVERRIDE = 0, 27, 50
 """Permanent ids of Betaflight's modes."""
-MEDDLING = {1: "ANGLE", 2: "HORIZON", 3: "ALTHOLD", 6: "HEADFREE", 11: "POS HOLD", 46: "GPS RESCUE", 47: "ACRO TRAINER"}
+MEDDLING = {
+    1: "ANGLE", 2: "HORIZON", 3: "ALTHOLD", 6: "HEADFREE", 11: "POS HOLD", 46: "GPS RESCUE", 47: "ACRO TRAINER",
+    56: "AUTOPILOT",
+}  # fmt: skip
 """Modes in which sticks do not mean body rates, by permanent id."""
 RECEIVER_LOST = frozenset({"RXLOSS", "FAILSAFE"})
 """Reasons against arming by which the controller tells that it does not hear the pilot."""
@@ -197,13 +201,13 @@ class ChannelProbe:
     _since: float | None = None
     """When they were first looked for."""
 
-    def look(self, now: float, reading: Reading, centre: int, *, grounded: bool) -> tuple[str, ...]:
+    def look(self, now: float, reading: Reading, sticks: Sticks, *, grounded: bool) -> tuple[str, ...]:
         """What is wrong with the channels, in words.
 
         Args:
             now: s.
             reading: of this control step.
-            centre: of the sticks, us.
+            sticks: that were sent.
             grounded: no flight has begun; the override going off then asks for a new look.
         """
         if self.seen or not reading.override:
@@ -211,12 +215,17 @@ class ChannelProbe:
             self._since = None
             return ()
         self._since = now if self._since is None else self._since
-        sent = [centre + offset for offset in PROBE] + [CLOSED]
-        got = list(reading.channels.channels[:4]) if reading.channels is not None else None
-        self.seen = got is not None and all(abs(a - b) <= 1 for a, b in zip(sent, got, strict=True))
+        sent, names = [sticks.centre + offset for offset in PROBE] + [CLOSED], "roll, pitch, yaw, throttle"
+        places = [0, 1, 2, 3]
+        if sticks.angle is not None:
+            sent, names = [*sent, RATES_PULSE], f"{names} and AUX{sticks.angle + 1}"
+            places.append(4 + sticks.angle)
+        heard = reading.channels.channels if reading.channels is not None else ()
+        got = [heard[place] for place in places if place < len(heard)]
+        self.seen = [abs(a - b) <= 1 for a, b in zip(sent, got, strict=False)] == [True] * len(sent)
         if self.seen or now - self._since < PROBE_S:
             return ()
         return (
-            f"roll, pitch, yaw, throttle were sent as {sent} us and taken as {got}; needed: the same "
-            "(msp_override_channels_mask 15, rxrange as it comes; switch override on before arming)",
+            f"{names} were sent as {sent} us and taken as {got}; needed: the same "
+            "(msp_override_channels_mask, rxrange as it comes; switch override on before arming)",
         )

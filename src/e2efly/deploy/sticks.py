@@ -9,11 +9,17 @@ from dataclasses import dataclass
 from math import isfinite
 
 from e2efly.deploy.msp.controller import ControllerInfo
+from e2efly.deploy.msp.names import BOXES
+from e2efly.deploy.msp.settings import ModeRange
 from e2efly.deploy.rates import AXES, RateProfile, channel_to_stick, rate_to_stick, stick_to_channel, stick_to_rate
 from e2efly.deploy.throttle_curve import ThrottleCurve
 
 CHANNELS = (1000, 2000)
 """Sticks stay within these, µs."""
+RATES_PULSE = 900
+"""What is sent on the AUX channel of ANGLE, µs: sticks are body rates only while the controller takes this."""
+TRANSMITTER = (988, 2012)
+"""Pulses between which the channels of a transmitter stay, µs."""
 _SIGNS = (1, 1, -1)
 _THROTTLE = 3
 _MAPPED = 8
@@ -43,6 +49,8 @@ class Sticks:
     """Centre of the sticks, µs."""
     deadband: tuple[int, int, int] = (0, 0, 0)
     """Of roll, pitch and yaw, µs each side."""
+    angle: int | None = None
+    """AUX channel, from 0, on which `RATES_PULSE` keeps ANGLE off; None: no channel does."""
 
     def channels_of(self, throttle: float, body_rate: Sequence[float], aux: Sequence[int]) -> StickCommand:
         """The channels that command a throttle and body rates.
@@ -50,7 +58,7 @@ class Sticks:
         Args:
             throttle: what the controller's mixer shall get, 0 to 1.
             body_rate: about body x, y, z, FLU, rad/s.
-            aux: AUX1, AUX2, ..., µs; those left out of AUX1 to AUX4 are centred.
+            aux: AUX1, AUX2, ..., µs; of AUX1 to AUX4 those left out are centred, but that `angle` is `RATES_PULSE`.
 
         Raises:
             ValueError: naming the value, for one that is not finite or an AUX channel outside 1000 to 2000.
@@ -80,11 +88,14 @@ class Sticks:
         for i, value in enumerate(aux):
             if not CHANNELS[0] <= value <= CHANNELS[1] or value != int(value):
                 raise ValueError(f"AUX{i + 1} is {value!r}; accepted: whole µs, {CHANNELS[0]} to {CHANNELS[1]}")
-        mapped = [*pulses, *aux[:4], *[self.centre] * (4 - len(aux))]
+        values = [*aux, *[self.centre] * (max(4, (self.angle or 0) + 1) - len(aux))]
+        if self.angle is not None and self.angle >= len(aux):
+            values[self.angle] = RATES_PULSE
+        mapped = [*pulses, *values[:4]]
         channels = [0] * _MAPPED
         for function, index in enumerate(self.channel):
             channels[index] = int(mapped[function])
-        return (*channels, *map(int, aux[4:]))
+        return (*channels, *map(int, values[4:]))
 
     def received(self, channels: Sequence[int]) -> tuple[int, ...]:
         """What `messages.Rc` reports when the controller has got these channels and the map is right, µs."""
@@ -110,4 +121,18 @@ def sticks_of(info: ControllerInfo) -> Sticks:
     if "3D" in info.features:
         raise ValueError("controller: feature 3D is on; accepted: off, as the throttle stick would also reverse motors")
     bands = info.deadband.deadband, info.deadband.deadband, info.deadband.yaw_deadband
-    return Sticks(info.rates, info.throttle, info.rx_map.channel, info.rx.mid, bands)
+    angle = angle_range(info)
+    aux = None if angle is None else angle.aux
+    return Sticks(info.rates, info.throttle, info.rx_map.channel, info.rx.mid, bands, aux)
+
+
+def angle_range(info: ControllerInfo) -> ModeRange | None:
+    """The range by which ANGLE is on wherever the transmitter leaves its channel, and off for `RATES_PULSE`.
+
+    With such a channel among the overridden ones, ANGLE is off only while the override counts: whoever takes the
+    sticks back, the pilot or a controller that hears no MSP any more, has a vehicle that levels itself.
+    """
+    others = {entry.aux for entry in info.modes if BOXES.get(entry.box) != "ANGLE"}
+    low, high = TRANSMITTER
+    fit = (r for r in info.ranges("ANGLE") if RATES_PULSE < r.low <= low and r.high > high and r.aux not in others)
+    return next(fit, None)

@@ -1,9 +1,10 @@
 """A process of its own between bridge and flight controller, which lands the vehicle when the bridge dies or hangs.
 
-Under MSP override, Betaflight goes on with the last sticks it was sent, for ever. So the link belongs to this small
-process. It hands bytes through; when the bridge is gone, or silent for `TIMEOUT_S` in flight, it takes over for good:
-level by the controller's own attitude, a gentle descent by the throttle that the bridge had learned, then the throttle
-closed. It imports neither NumPy nor ONNX Runtime, and ends only with the bridge: no signal but SIGKILL stops it.
+Under MSP override, Betaflight goes on with the last sticks it was sent: for ever, or for 0.3 s, after which the pilot's
+own count, which he may not hold. So the link belongs to this small process. It hands bytes through; when the bridge is
+gone, or silent for `TIMEOUT_S` in flight, it takes over for good: level by the controller's own attitude, a gentle
+descent by the throttle that the bridge had learned, then the throttle closed until the pilot disarms. It imports
+neither NumPy nor ONNX Runtime, and ends only with the bridge: no signal but SIGKILL stops it.
 """
 
 import json
@@ -23,7 +24,7 @@ from math import inf
 from e2efly.deploy.lifeline import Lifeline, watch
 from e2efly.deploy.msp.codec import REPLY, Decoder, Frame, encode
 from e2efly.deploy.msp.link import MOST, Link, open_link
-from e2efly.deploy.msp.messages import CHANNEL_RANGE, MAX_CHANNELS, Attitude, set_raw_rc
+from e2efly.deploy.msp.messages import CHANNEL_RANGE, MAX_CHANNELS, Attitude, StatusEx, set_raw_rc
 
 TIMEOUT_S = 0.1
 """Silence of the bridge in flight after which this process takes over, s."""
@@ -33,6 +34,10 @@ STALL_S = 0.05
 """A round of this process counts for no longer: if the whole machine stood still, the bridge may speak first, s."""
 STALE_S = 0.2
 """A controller's attitude older than this is not levelled by, s."""
+DEAF_S = 10.0
+"""A controller that has not said for so long whether it is armed is given up after the descent, s."""
+ARM = 1
+"""Bit of the mode ARM in `StatusEx.boxes`: it is always the first."""
 LEVEL_GAIN = 4.0
 """Body rate over tilt, 1/s."""
 LEVEL_RATE = 3.0
@@ -267,19 +272,31 @@ def _packets(bridge: socket.socket) -> tuple[list[bytes], bool]:
 
 
 def land(link: Link, plan: Plan) -> None:
-    """Level, descend, close the throttle, and keep it closed for a while."""
-    decoder, attitude, heard = Decoder(), None, 0.0
-    began = time.monotonic()
-    end = plan.throttle[-1][0] + 10.0
-    while (elapsed := time.monotonic() - began) < end:
+    """Level, descend, close the throttle, and keep it closed until the pilot has disarmed or nobody answers.
+
+    Where the controller hands an override back that it hears nothing of, the stick, which rests in the middle, would
+    have the motors.
+    """
+    decoder, attitude, heard, disarmed = Decoder(), None, 0.0, 0
+    began, down = time.monotonic(), plan.throttle[-1][0]
+    end = down + DEAF_S
+    while (elapsed := time.monotonic() - began) < end and (elapsed < down or disarmed < 2):
         link.poll(time.monotonic())
         for frame in decoder.feed(link.receive()[-MOST:]):
             if frame.direction == REPLY and frame.code == Attitude.CODE:
                 with suppress(ValueError):  # one that cannot be read is not heard
                     attitude, heard = Attitude.parse(frame.payload), elapsed
+            if frame.direction == REPLY and frame.code == StatusEx.CODE:
+                with suppress(ValueError):
+                    disarmed = 0 if StatusEx.parse(frame.payload).boxes & ARM else disarmed + 1
+                    end = max(down, elapsed) + DEAF_S
         if elapsed - heard > STALE_S:
             attitude = None
-        link.send(encode(set_raw_rc(descent(plan, elapsed, attitude))) + encode(Frame(Attitude.CODE)))
+        link.send(
+            encode(set_raw_rc(descent(plan, elapsed, attitude)))
+            + encode(Frame(Attitude.CODE))
+            + encode(Frame(StatusEx.CODE))
+        )
         time.sleep(PERIOD_S)
     link.close()
 

@@ -45,7 +45,7 @@ class BetaflightPlant:
             raise ValueError("plant 'betaflight' takes no 'rotor_thrust' commands; accepted: policies of other modes")
         self.vehicle, self.mode = vehicle, mode
         self._folder = tempfile.TemporaryDirectory(prefix="e2efly-")
-        self._rig = Rig(firmware.build(), Path(self._folder.name), vehicle)
+        self._rig = Rig(firmware.chosen(), Path(self._folder.name), vehicle)
         try:
             self._rig.start()
             self._session = Session(self._rig, rehearsal_settings(HEIGHT_M))

@@ -11,6 +11,8 @@ from e2efly.deploy.telemetry import Telemetry
 from e2efly.validate.faults import End, Fault
 from e2efly.validate.stage import FENCE, Stage, Trace
 
+DOWN = (End.LANDED, End.OFF, End.FAILSAFE, End.FALLS)
+"""Ends on the ground, motors stopped, the bridge in DONE or already in INIT."""
 TOUCH_SPEED = 2.5
 """Fastest touch of the ground that legs and propellers survive, m/s."""
 TOUCH_TILT = 0.35
@@ -93,15 +95,15 @@ def _arrived(stage: Stage, fault: Fault) -> bool:
     """Whether the flight is where it is to stay."""
     if fault.end is End.GOES_ON:
         return True
-    if fault.end in (End.LANDED, End.OFF):
+    if fault.end in DOWN:
         return stage.mode in (Mode.DONE, Mode.INIT)
     if fault.end is End.PILOT and fault.reason is Reason.LINK:
         return stage.standing
     return stage.mode is {End.HOVER: Mode.HOVER, End.PILOT: Mode.PILOT}[fault.end]
 
 
-_FIRST = {End.HOVER: Mode.HOVER, End.LANDED: Mode.LAND, End.OFF: Mode.LAND}
-_LAST = {End.HOVER: (Mode.HOVER,), End.LANDED: (Mode.DONE,), End.OFF: (Mode.DONE, Mode.INIT)}
+_FIRST = {End.HOVER: Mode.HOVER} | dict.fromkeys(DOWN, Mode.LAND)
+_LAST = {End.HOVER: (Mode.HOVER,)} | dict.fromkeys(DOWN, (Mode.DONE, Mode.INIT)) | {End.LANDED: (Mode.DONE,)}
 
 
 def _change_problems(
@@ -126,9 +128,9 @@ def _change_problems(
 
 def _world_problems(fault: Fault, trace: Trace, speed: float, tilt: float) -> list[str]:
     problems = []
-    if max(trace.tilt) > math.pi / 2:
+    if max(trace.tilt) > math.pi / 2 and fault.end is not End.FALLS:
         problems.append(f"tilted by {max(trace.tilt):.2f} rad")
-    if fault.end is End.LANDED or (fault.end is End.PILOT and fault.reason is Reason.LINK):
+    if fault.end in (End.LANDED, End.FAILSAFE) or (fault.end is End.PILOT and fault.reason is Reason.LINK):
         if not speed <= TOUCH_SPEED:
             problems.append(f"touched the ground at {speed:.2f} m/s; accepted: {TOUCH_SPEED}")
         if not tilt <= TOUCH_TILT:
@@ -136,7 +138,7 @@ def _world_problems(fault: Fault, trace: Trace, speed: float, tilt: float) -> li
         x, y, _ = trace.position[-1]
         if not (FENCE.low[0] < x < FENCE.high[0] and FENCE.low[1] < y < FENCE.high[1]):
             problems.append(f"landed outside the fence, at {x:.2f}, {y:.2f} m")
-    if fault.end in (End.LANDED, End.OFF) and trace.throttle[-1] > 0:
+    if fault.end in DOWN and trace.throttle[-1] > 0:
         problems.append(f"the throttle is {trace.throttle[-1]:.2f} at the end")
     if fault.end is End.OFF and trace.armed[-1]:
         problems.append("armed again")

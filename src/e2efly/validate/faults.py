@@ -25,6 +25,14 @@ GUST, WALL = 50.0, 0.6
 """Wind of a gust, m/s, until the policy has lost the vehicle; distance of the fence, m."""
 DRIFT_RATE, ASTRAY, HEADING_S = 0.7, 0.3, 0.6
 """How fast a heading drifts, rad/s; the speed, m/s, from which on the vehicle shows it, and how soon, s."""
+SAGGED = 0.85
+"""Share of their speed that the rotors still reach on a sagging battery: 0.72 of the thrust."""
+SILENCE_S = 0.3
+"""Of MSP, both ways, s."""
+LOST_S = 0.8
+"""Until the controller says that it does not hear the receiver, s: `failsafe_delay`, and the frames before."""
+SPIN_S = 1.0
+"""Until a vehicle that lost a motor is known to be lost, s."""
 BATTERY_S = 0.55
 """The battery is asked for at 2 Hz; the question and its answer take their time."""
 
@@ -37,6 +45,8 @@ class End(StrEnum):
     LANDED = "landed"
     PILOT = "the pilot flies"
     OFF = "motors off"
+    FAILSAFE = "the controller lands it"
+    FALLS = "it falls"
     REFUSED = "no take-off"
 
 
@@ -228,6 +238,25 @@ def _past_fence(stage: Stage) -> bool:
     return fence_problem(stage.session.bridge.settings.fence, truth) is not None
 
 
+def _motor(stage: Stage) -> None:
+    stage.rig.shares = np.array([1.0, 1.0, 1.0, 1.0])
+    stage.rig.shares[int(stage.random.integers(4))] = 0.0
+
+
+def _sag(stage: Stage) -> None:
+    stage.rig.shares = np.full(4, SAGGED)
+
+
+def _short_silence(stage: Stage) -> None:
+    end = stage.rig.now() + SILENCE_S
+    stage.link.silent = True
+    stage.each = lambda: setattr(stage.link, "silent", stage.rig.now() < end)
+
+
+def _unheard(stage: Stage) -> None:
+    stage.rig.heard = False
+
+
 def _late_step(stage: Stage) -> None:
     stage.session.lateness = 0.05
 
@@ -266,6 +295,10 @@ FAULTS = (
     Fault("link: slow, 60 ms each way", Mode.POLICY, _link(delay=0.06), End.LANDED, Reason.LINK, 0.25),
     Fault("battery low", Mode.HOVER, _rewrite(BatteryState.CODE, _low_battery), End.LANDED, Reason.BATTERY_LOW,
           BATTERY_S),
+    Fault("battery: sag", Mode.HOVER, _sag, End.GOES_ON, watch=3.0),
+    Fault("link: silent for 0.3 s", Mode.HOVER, _short_silence, End.LANDED, Reason.LINK, 0.25),
+    Fault("receiver: silent", Mode.HOVER, _unheard, End.FAILSAFE, Reason.NO_PILOT, LOST_S),
+    Fault("motor: one stops", Mode.HOVER, _motor, End.FALLS, within=SPIN_S),
     # nobody but the pilot can help
     Fault("link: cut", Mode.HOVER, _link(silent=True), End.PILOT, Reason.LINK, 0.25),
     Fault("link: unplugged", Mode.HOVER, _link(gone=True), End.PILOT, Reason.LINK, 0.25),

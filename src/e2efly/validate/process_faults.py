@@ -244,7 +244,7 @@ def _flight(fault: str, rig: RigClient, bridge: BridgeProcess, tap: Tap, log: Pa
 def take_off(rig: RigClient, bridge: BridgeProcess) -> None:
     """Hand over, arm, and hover; what a busy machine makes fail, the pilot tries again."""
     bridge.wait_for("INIT", START_S)
-    rig.set(override=True)
+    rig.set(override=True, throttle=0.0)
     end = time.monotonic() + START_S
     while True:
         time.sleep(0.5)

@@ -18,7 +18,7 @@ import numpy as np
 
 from e2efly.deploy.odometry import Sample
 from e2efly.device import compute_at_once, one_core
-from e2efly.validate.firmware import Firmware, firmware_folder
+from e2efly.validate.firmware import Firmware
 from e2efly.validate.sitl import FirmwareState, Sitl
 from e2efly.validate.world import Body, World
 from e2efly.vehicles.vehicle import Vehicle
@@ -33,11 +33,21 @@ CALIBRATION_S = 6.0
 """The firmware stands still for so long before it can be armed, s."""
 POSE_NOISE = (0.0005, 0.01, 0.02, 0.001)
 """Of position, m; velocity, m/s; body rate, rad/s; attitude, rad: a motion capture system's, standard deviations."""
+LOST_CHANNEL = 13
+"""AUX9: the receiver's own, by which firmware that does not hear its silence is told of it."""
+LANDING_S = 10
+"""After so long a failsafe landing stops the motors, s."""
 SETTINGS = (
     "aux 0 0 0 1700 2100 0 0",  # arm: AUX1
     "aux 1 50 1 1700 2100 0 0",  # MSP override: AUX2
-    "aux 2 1 2 1700 2100 0 0",  # angle: AUX3
-    "set msp_override_channels_mask=15",
+    "aux 2 1 2 925 2100 0 0",  # angle: AUX3, wherever the pilot leaves it; the bridge sends 900 there
+    "set msp_override_channels_mask=79",
+    "rxfail 3 s 1575",  # without the receiver: a throttle that just sinks ...
+    "rxfail 6 s 2000",  # ... and angle
+    "aux 3 27 8 1700 2100 0 0",  # FAILSAFE: AUX9, where the firmware takes silence for the last frame
+    "set failsafe_procedure=AUTO-LAND",
+    "set failsafe_throttle=1575",
+    "set failsafe_delay=5",
     "set max_aux_channels=14",  # or the copies of throttle and yaw on channels 11 and 12 are not read
     "set rates_type=ACTUAL",
     *(f"set {axis}_rc_rate=67" for axis in ("roll", "pitch", "yaw")),
@@ -65,24 +75,23 @@ class Transmitter:
 
     armed: bool = False
     override: bool = False
-    angle: bool = False
     mission: str = "land"
     """land, hover or policy."""
     roll: float = 0.0
     pitch: float = 0.0
     throttle: float = -1.0
-    """What the controller gets while override is off; its copy to the bridge is centred unless `lift` says other."""
+    """What the controller gets without override: it rests in the middle in flight. Its copy to the bridge is `lift`."""
     yaw: float = 0.0
     lift: float = 0.0
     """The copy of the throttle stick."""
 
     def channels(self) -> np.ndarray:
-        """The receiver's 16 channels, us: roll, pitch, throttle, yaw; arm, override, angle, mission; copies; rest."""
+        """The receiver's 16 channels, us: roll, pitch, throttle, yaw; arm, override, none, mission; copies; rest."""
         sticks = [self.roll, self.pitch, self.throttle, self.yaw]
-        switches = [1.0 if on else -1.0 for on in (self.armed, self.override, self.angle)]
+        switches = [1.0 if on else -1.0 for on in (self.armed, self.override)]
         mission = {"land": -1.0, "hover": 0.0, "policy": 1.0}[self.mission]
         copies = [self.roll, self.pitch, self.lift, self.yaw]
-        return np.round(1500 + 500 * np.array([*sticks, *switches, mission, *copies, 0, 0, 0, 0])).astype(int)
+        return np.round(1500 + 500 * np.array([*sticks, *switches, -1.0, mission, *copies, 0, 0, 0, 0])).astype(int)
 
 
 class Rig:
@@ -198,11 +207,19 @@ class Rig:
         now = self.now()
         if now >= self._next_rc:
             self._next_rc += RC_PERIOD_S
-            if self.heard:
-                self.sitl.send_rc(self.transmitter.channels())
+            self._receive()
         if now >= self._next_pose:
             self._next_pose += self._pose_period
             self._poses.append(self._sample(now))
+
+    def _receive(self) -> None:
+        """A frame of the pilot's receiver; one that hears nothing sends none, or the switch that stands for it."""
+        channels = self.transmitter.channels()
+        if not self.heard:
+            if self.sitl.firmware.layout.hears_silence:
+                return
+            channels[LOST_CHANNEL - 1] = 2000
+        self.sitl.send_rc(channels)
 
     def poses(self, now: float) -> list[Sample]:
         """The poses that have come since the last call, `latency` s old."""
@@ -237,8 +254,11 @@ class Rig:
 
 def prepare(sitl: Sitl, settings: tuple[str, ...] = SETTINGS) -> None:
     """Put settings into the folder of a firmware that is not running; they are kept, as typing them takes a while."""
+    firmware = sitl.firmware
+    stops, steps = firmware.release.landing_time
+    settings = (*settings, f"set {stops}={LANDING_S * steps}", *firmware.layout.settings)
     name = hashlib.sha256("\n".join(settings).encode()).hexdigest()[:12]
-    kept = firmware_folder() / f"settings-{name}.bin"
+    kept = firmware.program.parent / f"settings-{name}.bin"
     mine = sitl.folder / "eeprom.bin"
     if kept.is_file():
         shutil.copy(kept, mine)
@@ -260,27 +280,17 @@ def _type(sitl: Sitl, settings: tuple[str, ...]) -> None:
     Raises:
         ValueError: when it refuses a line, with its words.
     """
-
-    def run(seconds: float) -> None:
-        for _ in range(round(seconds / STEP_S)):
-            sitl.send_state(_RESTING)
-            sitl.advance(STEP_S)
-        sitl.exchange()
-
-    run(1.0)
+    sitl.idle(1.0)
     with socket.create_connection(("127.0.0.1", sitl.base + 4), timeout=5.0) as line:
         line.setblocking(False)
-        run(0.2)
+        sitl.idle(0.2)
         for text in ("#", *(f"{setting}\n" for setting in settings)):
             line.sendall(text.encode())
-            run(0.3)
+            sitl.idle(0.3)
             answer = line.recv(65536).decode(errors="replace")
             if "#" not in answer or "ERROR" in answer.upper() or "INVALID" in answer.upper():
                 raise ValueError(f"the firmware refuses {text!r}: {answer!r}")
         line.sendall(b"save\n")
         end = time.monotonic() + 20
         while sitl.alive and time.monotonic() < end:
-            run(0.1)
-
-
-_RESTING = FirmwareState(np.zeros(3), np.array([0, 0, 9.81]), np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3))
+            sitl.idle(0.1)

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.fence import tilt_of
-from e2efly.validate.firmware import build
+from e2efly.validate.firmware import chosen
 from e2efly.validate.rig import Rig, Transmitter
 from e2efly.vehicles import load_vehicle
 
@@ -144,7 +144,7 @@ def main() -> None:
     with (
         tempfile.TemporaryDirectory(prefix="e2efly-") as temporary,
         socket.create_server(("127.0.0.1", 0)) as listener,
-        Rig(build(), options.folder or Path(temporary), load_vehicle(options.vehicle), real_time=True,
+        Rig(chosen(), options.folder or Path(temporary), load_vehicle(options.vehicle), real_time=True,
             seed=options.seed) as rig,
     ):  # fmt: skip
         print(json.dumps({"link": rig.sitl.msp, "control": listener.getsockname()[1]}), flush=True)

@@ -134,7 +134,7 @@ class Session:
     def take_off(self, settle: float = 2.0) -> bool:
         """The pilot hands over, arms, and asks for a hover; whether it is reached."""
         self.fly(0.3)
-        self.rig.set(override=True)
+        self.rig.set(override=True, throttle=0.0)
         self.fly(0.3)
         self.rig.set(armed=True)
         self.fly(0.5)

@@ -17,8 +17,6 @@ import numpy as np
 
 from e2efly.validate.firmware import Firmware
 
-MOTOR_ORDER = np.array([3, 0, 1, 2])
-"""Where motors 1 to 4 stand in the firmware's packet, which begins with the second."""
 _STATE = struct.Struct("<18d")
 _RC = struct.Struct("<d16H")
 _MOTORS = struct.Struct("<4f")
@@ -26,10 +24,14 @@ _TRIES = 5
 """Starts with other ports, before it is given up."""
 _PORTS = 12
 """UDP 9001 to 9004 and TCP 5761 to 5768, moved."""
-_CLOCK = struct.Struct("<5Q")
+_CLOCK = struct.Struct("<6Q")
+_NOW, _WAITING, _STATES, _FRAMES, _ROUNDS = range(1, 6)
+"""What stands there, after the horizon; see `sitl_shim.c`."""
 _TAKEN = re.compile(rb"bind port .* failed|UDP server .*\.\.\.-")
 """What the firmware says where somebody else has one of its ports."""
 _RANDOM = random.SystemRandom()
+IDLE_S = 0.002
+"""Between two states while nothing moves, s."""
 BOOT_S = 20.0
 """Real time that the firmware may take to open its ports, or to answer, s."""
 
@@ -69,6 +71,10 @@ class FirmwareState:
     """(3,) world, m."""
 
 
+RESTING = FirmwareState(np.zeros(3), np.array([0, 0, 9.81]), np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3))
+"""Level and still."""
+
+
 class Sitl:
     """One firmware process, in a folder of its own that holds its settings.
 
@@ -77,6 +83,7 @@ class Sitl:
 
     def __init__(self, firmware: Firmware, folder: Path) -> None:
         self.firmware, self.folder = firmware, folder
+        self._layout = firmware.layout
         self.base = free_ports()
         self.now = 0.0
         """The firmware's time: seconds since its first start; it goes on while the firmware is off."""
@@ -102,7 +109,11 @@ class Sitl:
         return f"tcp:127.0.0.1:{self.base + 4}"
 
     def __enter__(self) -> "Sitl":
-        self.start()
+        try:
+            self.start()
+        except BaseException:
+            self.close()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -145,7 +156,7 @@ class Sitl:
         try:
             with output.open("wb") as log:
                 self._process = subprocess.Popen(
-                    [str(self.firmware.program), "127.0.0.1"],
+                    [str(self.firmware.program)],
                     cwd=self.folder,
                     env=environment,
                     stdin=subprocess.DEVNULL,
@@ -190,22 +201,33 @@ class Sitl:
         """Hand the sensors a new state, and wait until the firmware has taken it in."""
         packet = _STATE.pack(
             self.now - self._booted,
-            # the firmware turns signs itself: it expects rates of a z-down y-right body, and the pull, not the push
-            *(state.body_rate * (1, -1, -1)),
+            # the firmware turns signs itself: it expects rates of a y-right body, and the pull, not the push
+            *(state.body_rate * (1, -1, self._layout.yaw_sign)),
             *(-state.specific_force),
             *(state.quaternion * (1, 1, -1, -1)),
             *state.velocity,
             *state.position,
             101325.0 - 12.0 * state.position[2],
         )
-        seen = self._shared()[3]
-        self._out.sendto(packet, ("127.0.0.1", self.base + 2))
-        while self._shared()[3] == seen and self._told():
-            pass
+        self._hand(packet, 2, _STATES)
 
     def send_rc(self, channels: np.ndarray) -> None:
-        """What the pilot's receiver says: 16 channels in us."""
-        self._out.sendto(_RC.pack(self.now - self._booted, *np.asarray(channels, int)), ("127.0.0.1", self.base + 3))
+        """What the pilot's receiver says, 16 channels in us; wait until the firmware has taken it in."""
+        if self._process is not None:
+            self._hand(_RC.pack(self.now - self._booted, *np.asarray(channels, int)), 3, _FRAMES)
+
+    def _hand(self, packet: bytes, port: int, counted: int) -> None:
+        seen = self._shared()[counted]
+        self._out.sendto(packet, ("127.0.0.1", self.base + port))
+        while self._shared()[counted] == seen and self._told():
+            pass
+
+    def idle(self, seconds: float, state: FirmwareState = RESTING) -> None:
+        """Let it run for so long in one state."""
+        for _ in range(round(seconds / IDLE_S)):
+            self.send_state(state)
+            self.advance(IDLE_S)
+        self.exchange()
 
     def advance(self, dt: float) -> None:
         """Let the firmware run for `dt` s of its time; where it is off, time alone passes."""
@@ -216,7 +238,7 @@ class Sitl:
         horizon = round((self.now - self._booted) * 1e9)
         struct.pack_into("<Q", self._clock, 0, horizon)
         self._write(self._go)
-        while self._shared()[2] <= horizon and self._told():
+        while self._shared()[_WAITING] <= horizon and self._told():
             pass
 
     def _write(self, pipe: int) -> None:
@@ -238,9 +260,9 @@ class Sitl:
         if self._process is None:
             return
         for _ in range(2):  # it reads in the first round and writes in the second
-            seen = self._shared()[4]
+            seen = self._shared()[_ROUNDS]
             self._write(self._poke)
-            while self._shared()[4] == seen and self._told():
+            while self._shared()[_ROUNDS] == seen and self._told():
                 pass
 
     def motors(self) -> np.ndarray:
@@ -251,8 +273,8 @@ class Sitl:
             except BlockingIOError:
                 return self._motors
             if len(packet) == _MOTORS.size:
-                self._motors = np.array(_MOTORS.unpack(packet))[MOTOR_ORDER]
+                self._motors = np.array(_MOTORS.unpack(packet))[list(self._layout.motors)]
 
-    def _shared(self) -> tuple[int, int, int, int, int]:
+    def _shared(self) -> tuple[int, ...]:
         assert self._clock is not None
-        return _CLOCK.unpack_from(self._clock, 0)  # type: ignore[return-value]
+        return _CLOCK.unpack_from(self._clock, 0)

@@ -6,8 +6,8 @@
  *                        that a flight does not depend on how fast or busy the machine is.
  * E2EFLY_SITL_GO=FD      where the simulator writes a byte when it has moved the horizon.
  * E2EFLY_SITL_POKE=FD    where it writes a byte to have the network thread come round.
- * E2EFLY_SITL_DONE=FD    where a byte is written when the horizon is reached, when a vehicle state was taken in, and
- *                        when the network thread has come round.
+ * E2EFLY_SITL_DONE=FD    where a byte is written when the horizon is reached, when a vehicle state or a receiver's frame
+ *                        was taken in, and when the network thread has come round.
  *
  * Each waits for the other in read(2): one flight keeps one core busy, and an idle one none.
  */
@@ -30,7 +30,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { CALL_NS = 200, SELECT_US = 1000, STATE_BYTES = 144 };
+enum { CALL_NS = 200, SELECT_US = 1000, STATE_BYTES = 144, FRAME_BYTES = 40 };
 
 /* Shared with the simulator; all in ns or counts. */
 struct shared {
@@ -38,13 +38,15 @@ struct shared {
     _Atomic uint64_t now;     /* the firmware's time */
     _Atomic uint64_t waiting; /* the time beyond the horizon that its main thread waits for; 0 while it runs */
     _Atomic uint64_t states;  /* vehicle states that the firmware has taken in */
+    _Atomic uint64_t frames;  /* frames of the pilot's receiver that it has taken in */
     _Atomic uint64_t rounds;  /* of its network thread since it was poked: it has read what was sent before */
 };
 
 static struct shared *shared;
 static int base, go, poke, done;
 static _Atomic int listening;
-static _Thread_local int took_state, network, poked;
+static _Thread_local int network, poked;
+static _Thread_local _Atomic uint64_t *taken; /* what this thread has received counts here once it has dealt with it */
 
 static ssize_t (*next_sendto)(int, const void *, size_t, int, const struct sockaddr *, socklen_t);
 static ssize_t (*next_recvfrom)(int, void *, size_t, int, struct sockaddr *, socklen_t *);
@@ -120,7 +122,8 @@ ssize_t sendto(int fd, const void *data, size_t size, int flags, const struct so
 ssize_t recvfrom(int fd, void *data, size_t size, int flags, struct sockaddr *address, socklen_t *length)
 {
     ssize_t got = next_recvfrom(fd, data, size, flags, address, length);
-    if (got == STATE_BYTES) took_state = 1;
+    if (shared && got == STATE_BYTES) taken = &shared->states;
+    if (shared && got == FRAME_BYTES) taken = &shared->frames;
     return got;
 }
 
@@ -135,9 +138,9 @@ int listen(int fd, int backlog)
 int select(int count, fd_set *readable, fd_set *writable, fd_set *odd, struct timeval *timeout)
 {
     struct timeval brief = {0, SELECT_US};
-    if (shared && took_state) {
-        took_state = 0;
-        atomic_fetch_add(&shared->states, 1);
+    if (taken) {
+        atomic_fetch_add(taken, 1);
+        taken = NULL;
         tell();
     }
     if (writable) network = 1; /* it alone asks where it may write; a slow one comes here first when a port is open */

@@ -178,7 +178,7 @@ class Stage:
         self.patience(PATIENCE_S)
         mission = "hover" if self.mode in (Mode.HOVER, Mode.POLICY, Mode.PILOT) else "land"
         armed = self.mode not in (Mode.DONE, Mode.INIT) and not self.standing
-        self.rig.set(roll=0.0, pitch=0.0, mission=mission, override=True, angle=False, armed=armed)
+        self.rig.set(roll=0.0, pitch=0.0, mission=mission, override=True, throttle=0.0, armed=armed)
         self.fly(0.3)
 
     @property
@@ -202,11 +202,11 @@ class Stage:
         thrust = GRAVITY + 2.0 * (climb - float(self.rig.state.velocity[2]))
         curve = bridge.sticks.throttle
         pulse = curve.channel_for(min(bridge.map.throttle(thrust, None), curve.largest))
-        self.rig.set(override=False, angle=True, roll=0.0, pitch=0.0, throttle=(pulse - 1500) / 500)
+        self.rig.set(override=False, roll=0.0, pitch=0.0, throttle=(pulse - 1500) / 500)
 
     def _take_off(self) -> None:
         self._ground()
-        self.rig.set(override=True, angle=False, throttle=-1.0)
+        self.rig.set(override=True, throttle=0.0)
         self.fly(0.2)
         self.rig.set(armed=True)
         self.fly(0.2)

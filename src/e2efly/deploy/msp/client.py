@@ -19,8 +19,8 @@ MESSAGES: dict[int, Any] = {
         messages.ApiVersion, messages.FcVariant, messages.FcVersion, messages.BuildInfo, messages.Name,
         messages.StatusEx, messages.RawImu, messages.Motor, messages.Rc, messages.Attitude, messages.Analog,
         messages.BatteryState, messages.Debug, settings.ModeRanges, settings.FeatureConfig, settings.BoardAlignment,
-        settings.MixerConfig, settings.RxConfig, settings.RxMap, settings.FailsafeConfig, settings.AdvancedConfig,
-        settings.RcTuning, settings.BoxIds, settings.RcDeadband, settings.MotorConfig,
+        settings.MixerConfig, settings.RxConfig, settings.RxMap, settings.FailsafeConfig, settings.RxFailConfig,
+        settings.AdvancedConfig, settings.RcTuning, settings.BoxIds, settings.RcDeadband, settings.MotorConfig,
     )
 }  # fmt: skip
 """The messages that are understood, by code."""

@@ -7,13 +7,12 @@ from e2efly.deploy.clock import MONOTONIC, Clock
 from e2efly.deploy.msp import messages, settings
 from e2efly.deploy.msp.client import Client, ask
 from e2efly.deploy.msp.names import BOXES
+from e2efly.deploy.msp.versions import Release, release_of, version_text
 from e2efly.deploy.rates import RateProfile
 from e2efly.deploy.throttle_curve import ThrottleCurve
 
 VARIANT = "BTFL"
 """The firmware that is known: Betaflight."""
-API_RANGE = ((1, 44), (1, 47))
-"""The first and last MSP versions that are known: Betaflight 4.3 to 4.6."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +22,7 @@ class ControllerInfo:
     variant: str
     """`BTFL`."""
     version: tuple[int, int, int]
-    """Of the firmware."""
+    """Of the firmware: the bytes of FC_VERSION."""
     api: tuple[int, int]
     """MSP version."""
     built: str
@@ -46,6 +45,8 @@ class ControllerInfo:
     """Deadbands of the sticks."""
     failsafe: settings.FailsafeConfig
     """What it does when the receiver falls silent."""
+    rx_fail: settings.RxFailConfig
+    """What each channel becomes then."""
     modes: tuple[settings.ModeRange, ...]
     """Which switches make which modes active."""
     box_ids: tuple[int, ...]
@@ -58,6 +59,16 @@ class ControllerInfo:
     """Kind of vehicle."""
     alignment: settings.BoardAlignment
     """How it is turned in the airframe."""
+
+    @property
+    def release(self) -> Release:
+        """What is known of its firmware; raises `ValueError` where nothing is."""
+        return release_of(self.api, self.version)
+
+    @property
+    def firmware(self) -> str:
+        """Its firmware's version as people write it: 2026.6.1."""
+        return version_text(self.version)
 
     def ranges(self, mode: str) -> tuple[settings.ModeRange, ...]:
         """The switch ranges that make a mode of `BOXES` active, by name."""
@@ -79,17 +90,12 @@ def identify(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -
     if variant != VARIANT:
         raise ValueError(f"controller: the firmware is {variant!r}; accepted: {VARIANT!r} (Betaflight)")
     api = get(messages.ApiVersion).version
-    version = get(messages.FcVersion).version
-    if not API_RANGE[0] <= api <= API_RANGE[1]:
-        first, last = (".".join(map(str, end)) for end in API_RANGE)
-        raise ValueError(
-            f"controller: it speaks MSP {api[0]}.{api[1]} (firmware {'.'.join(map(str, version))}); accepted: MSP "
-            f"{first} to {last} (Betaflight 4.3 to 4.6): what other versions mean by their numbers is not known"
-        )
+    version = get(messages.FcVersion)
+    release_of(api, version.version, version.text)
     build, tuning, rx = get(messages.BuildInfo), get(settings.RcTuning), get(settings.RxConfig)
     return ControllerInfo(
         variant=variant,
-        version=version,
+        version=version.version,
         api=api,
         built=f"{build.built} {build.revision}",
         craft=get(messages.Name).name,
@@ -101,6 +107,7 @@ def identify(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -
         rx_map=get(settings.RxMap),
         deadband=get(settings.RcDeadband),
         failsafe=get(settings.FailsafeConfig),
+        rx_fail=get(settings.RxFailConfig),
         modes=get(settings.ModeRanges).ranges,
         box_ids=get(settings.BoxIds).ids,
         motor=get(settings.MotorConfig),

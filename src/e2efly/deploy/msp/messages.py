@@ -1,7 +1,8 @@
 """MSP messages that tell what a controller is and what it does now: payloads to frozen dataclasses in SI units. Pure.
 
 Each `parse` takes the payload of a reply, accepts the longer ones of later firmware, and raises a `ValueError` that
-names the message for a shorter one. The layouts are Betaflight's, MSP 1.44 to 1.47.
+names the message for a shorter one. The layouts are Betaflight's, MSP 1.44 to 1.49; `versions` tells where they
+differ.
 """
 
 import struct
@@ -74,12 +75,15 @@ class FcVersion:
 
     CODE: ClassVar[int] = 3
     version: tuple[int, int, int]
-    """Major, minor, patch; (25, 12, 0) for the calendar version 2025.12.0."""
+    """Major, minor, patch; years since 2000, month, patch from 2025.12 on."""
+    text: str = ""
+    """As it writes it, with what marks an early build: 2026.6.0-rc1. Empty up to 4.6."""
 
     @staticmethod
     def parse(payload: bytes) -> "FcVersion":
         """Read a reply."""
-        return FcVersion(unpack("FC_VERSION", "3B", payload))
+        version, size = unpack("FC_VERSION", "3B", payload), payload[3] if len(payload) > 3 else 0
+        return FcVersion(version, text(payload[4 : 4 + size]))
 
 
 @dataclass(frozen=True)

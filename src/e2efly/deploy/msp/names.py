@@ -1,4 +1,4 @@
-"""What the numbers in MSP messages mean: mode boxes, features, arming-disable flags. Betaflight 4.3 to 4.6."""
+"""What the numbers in MSP messages mean: mode boxes, features, arming-disable flags. See `versions`."""
 
 BOXES = {
     0: "ARM", 1: "ANGLE", 2: "HORIZON", 3: "ALTHOLD", 4: "ANTI GRAVITY", 5: "MAG", 6: "HEADFREE", 7: "HEADADJ",
@@ -9,33 +9,37 @@ BOXES = {
     39: "VTX PIT MODE", 40: "USER1", 41: "USER2", 42: "USER3", 43: "USER4", 44: "PID AUDIO", 45: "PARALYZE",
     46: "GPS RESCUE", 47: "ACRO TRAINER", 48: "VTX CONTROL DISABLE", 49: "LAUNCH CONTROL", 50: "MSP OVERRIDE",
     51: "STICK COMMANDS DISABLE", 52: "BEEPER MUTE", 53: "READY", 54: "LAP TIMER RESET", 55: "CHIRP",
+    56: "AUTOPILOT", 57: "WP CAPTURE",
 }  # fmt: skip
 """Modes by permanent id."""
 FEATURES = {
-    0: "RX_PPM", 2: "INFLIGHT_ACC_CAL", 3: "RX_SERIAL", 4: "MOTOR_STOP", 5: "SERVO_TILT", 6: "SOFTSERIAL", 7: "GPS",
-    8: "OPTICALFLOW", 9: "RANGEFINDER", 10: "TELEMETRY", 12: "3D", 13: "RX_PARALLEL_PWM", 14: "RX_MSP", 15: "RSSI_ADC",
-    16: "LED_STRIP", 17: "DISPLAY", 18: "OSD", 20: "CHANNEL_FORWARDING", 21: "TRANSPONDER", 22: "AIRMODE",
-    25: "RX_SPI", 27: "ESC_SENSOR", 28: "ANTI_GRAVITY", 29: "DYNAMIC_FILTER",
+    0: "RX_PPM", 1: "RX_UDP", 2: "INFLIGHT_ACC_CAL", 3: "RX_SERIAL", 4: "MOTOR_STOP", 5: "SERVO_TILT", 6: "SOFTSERIAL",
+    7: "GPS", 8: "OPTICALFLOW", 9: "RANGEFINDER", 10: "TELEMETRY", 12: "3D", 13: "RX_PARALLEL_PWM", 14: "RX_MSP",
+    15: "RSSI_ADC", 16: "LED_STRIP", 17: "DISPLAY", 18: "OSD", 20: "CHANNEL_FORWARDING", 21: "TRANSPONDER",
+    22: "AIRMODE", 25: "RX_SPI", 27: "ESC_SENSOR", 28: "ANTI_GRAVITY", 29: "DYNAMIC_FILTER",
 }  # fmt: skip
 """Features by bit."""
 ARMING_DISABLED = (
     "NOGYRO", "FAILSAFE", "RXLOSS", "NOT_DISARMED", "BOXFAILSAFE", "RUNAWAY", "CRASH", "THROTTLE", "ANGLE", "BOOTGRACE",
     "NOPREARM", "LOAD", "CALIB", "CLI", "CMS", "BST", "MSP", "PARALYZE", "GPS", "RESCUE_SW", "DSHOT_TELEM",
     "REBOOT_REQD", "DSHOT_BBANG", "NO_ACC_CAL", "MOTOR_PROTO", "FLIP_SWITCH", "ALT_HOLD_SW", "POS_HOLD_SW",
+    "AUTOPILOT_SW",
 )  # fmt: skip
 """Reasons against arming by bit, as the controller's `status` prints them. The last bit, wherever it is (25 up to MSP
-1.46, 28 in 1.47), is always ARM_SWITCH."""
+1.46, 28 in 1.47, 29 since 1.48), is always ARM_SWITCH."""
 SENSORS = ("ACC", "BARO", "MAG", "GPS", "RANGEFINDER", "GYRO", "OPTICALFLOW")
 """Sensors by bit."""
 MOTOR_PROTOCOLS = (
     "PWM", "ONESHOT125", "ONESHOT42", "MULTISHOT", "BRUSHED", "DSHOT150", "DSHOT300", "DSHOT600", "PROSHOT1000",
-    "DISABLED",
+    "DISABLED", "DRONECAN",
 )  # fmt: skip
 """Motor protocols by number."""
 BATTERY_STATES = ("OK", "WARNING", "CRITICAL", "NOT PRESENT", "INIT")
 """Battery states by number."""
 FAILSAFE_PROCEDURES = ("AUTO-LAND", "DROP", "GPS-RESCUE")
 """What failsafe does, by number."""
+RXFAIL_MODES = ("AUTO", "HOLD", "SET")
+"""What a channel becomes without the receiver, by number: centred or closed, as it was last, a pulse."""
 FAILSAFE_SWITCHES = ("STAGE1", "KILL", "STAGE2")
 """What the failsafe switch does, by number."""
 QUADX = 3

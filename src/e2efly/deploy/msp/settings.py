@@ -1,5 +1,6 @@
 """MSP messages that tell how a controller is set: payloads to frozen dataclasses in SI units. Pure; see `messages`."""
 
+import struct
 from dataclasses import dataclass
 from math import radians
 from typing import ClassVar
@@ -10,6 +11,7 @@ from e2efly.deploy.msp.names import (
     FAILSAFE_SWITCHES,
     FEATURES,
     MOTOR_PROTOCOLS,
+    RXFAIL_MODES,
     bits,
     named,
 )
@@ -172,6 +174,21 @@ class FailsafeConfig:
 
 
 @dataclass(frozen=True)
+class RxFailConfig:
+    """What each channel becomes when the receiver falls silent."""
+
+    CODE: ClassVar[int] = 77
+    channels: tuple[tuple[str, int], ...]
+    """One of `RXFAIL_MODES` and, for SET, the pulse, µs: roll, pitch, yaw, throttle, AUX1, ..."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "RxFailConfig":
+        """Read a reply."""
+        entries = struct.iter_unpack("<BH", payload[: len(payload) // 3 * 3])
+        return RxFailConfig(tuple((named(mode, RXFAIL_MODES), pulse) for mode, pulse in entries))
+
+
+@dataclass(frozen=True)
 class AdvancedConfig:
     """Loop and motor outputs."""
 
@@ -253,7 +270,7 @@ class MotorConfig:
 
     CODE: ClassVar[int] = 131
     min_throttle: int | None
-    """Output at zero throttle, µs; None: firmware of MSP 1.47, which has `AdvancedConfig.motor_idle` alone."""
+    """Output at zero throttle, µs; None: firmware since MSP 1.47, which has `AdvancedConfig.motor_idle` alone."""
     max_throttle: int
     """Output at full throttle, µs."""
     min_command: int
