@@ -4,6 +4,7 @@ import dataclasses
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -12,7 +13,7 @@ import pytest
 
 from e2efly.courses.gates import Gates
 from e2efly.courses.origin import Origin
-from e2efly.courses.references import Lissajous, Polynomials, Spline
+from e2efly.courses.references import Lissajous, Polynomials, Spline, read_csv
 from e2efly.courses.tracks import load_track, track_names
 from e2efly.env import random_key
 from e2efly.tasks.references import polynomial
@@ -101,6 +102,48 @@ def test_a_placed_track_is_flown_by_the_placed_flight(name: str) -> None:
         track, start=0, position=0, yaw=0, start_yaw=0.0
     )
     assert placed.start_yaw == pytest.approx(track.start_yaw - 2.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (("[0.0, 0.0", "[1e30, 0.0"), "start.position is .*at most 10000 in size"),
+        (("closed = true", "closed = [true]"), r"closed is \[True\]; accepted: true or false"),
+        (("yaw = 45.0", "yaw = 1e308"), "yaw is 1e.308; accepted: a finite number, at most 10000 in size"),
+        (("yaw = 45.0", "yaw = 1" + "0" * 400), r"yaw is 1000.*\.\.\.; accepted: a finite number"),
+    ],
+)
+def test_numbers_of_a_track_that_cannot_be_are_named(change: tuple[str, str], told: str, tmp_path: Path) -> None:
+    text = """
+closed = true
+start = {position = [0.0, 0.0, 1.0], yaw = 45.0}
+gates = [
+  {position = [2.0, 0.0, 1.5], yaw = 0.0, opening = [1.0, 1.0]},
+  {position = [4.0, 0.0, 1.5], yaw = 0.0, opening = [1.0, 1.0]},
+]
+"""
+    (tmp_path / "track.toml").write_text(text)
+    assert load_track(str(tmp_path / "track.toml")).start_yaw == pytest.approx(np.pi / 4)
+    assert change[0] in text
+    (tmp_path / "track.toml").write_text(text.replace(*change))
+    with pytest.raises(ValueError, match=f"track.toml: .*{told}"):
+        load_track(str(tmp_path / "track.toml"))
+
+
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        ("0,0,0,1\n1,0,0,1\n1e12,0,0,1", "line 4: .*over at most 3600 s"),
+        ("0,0,0,1\n1,1e30,0,1\n2,0,0,1", "line 3: .*at most 10000 in size"),
+        ("0,0,0,1\n1e-300,1,0,1\n2e-300,1,0,1", "line 3: .*by at least 0.001 s"),
+        ("0,0,0," + "1" * 200_000, "cannot be read: field larger than field limit"),
+        ("0,0,0,nan\n1,0,0,1\n2,0,0,1", "line 2: "),
+    ],
+)
+def test_a_reference_that_cannot_be_flown_is_refused(rows: str, told: str, tmp_path: Path) -> None:
+    (tmp_path / "way.csv").write_text(f"t,x,y,z\n{rows}\n")
+    with pytest.raises(ValueError, match=rf"way.csv.*{told}"):
+        read_csv(tmp_path / "way.csv")
 
 
 def test_courses_need_no_jax() -> None:

@@ -119,7 +119,7 @@ IMAGE: dict[str, Any] = json.loads(json.dumps(EXAMPLE))["images"][0]
         ("width", 64.5, "a whole number"),
         ("fov_rad", [3.2, 1.0], "two angles in (0, 3.142)"),
         ("reach_m", [2.0, 1.0], "two rising numbers of metres"),
-        ("rate_hz", 0.0, "a positive number of Hz"),
+        ("rate_hz", 0.0, "0.01 Hz or more"),
         ("latency_range_s", [0.2, 0.1], "two rising numbers of seconds"),
         ("projection", "fisheye", "'pinhole' or 'spherical'"),
     ],

@@ -157,6 +157,13 @@ class TestScene:
             ({"faces": np.array([[0, 1, 8]])}, "object 'thing': faces name vertices that are not there.*3 of 8"),
             ({"texture": np.zeros((2, 2, 3), np.uint8)}, "object 'thing': has a texture, but no texture coordinates"),
             ({"uv": np.full((8, 2), np.inf)}, "object 'thing': texture coordinates are not all finite"),
+            (
+                {"vertices": np.full((8, 3), 1e39)},
+                "object 'thing': vertices are not all finite .*at most 10000",
+            ),
+            ({"uv": np.full((8, 2), 1e308)}, "object 'thing': texture coordinates .*at most 10000 in size"),
+            ({"colour": np.full(3, np.inf)}, "object 'thing': colours have shape"),
+            ({"colour": np.ones((1, 3))}, r"object 'thing': colours have shape \(1, 3\).*accepted: 3 numbers in"),
             ({"label": 6}, "object 'thing': label is 6; accepted: 1 to 5"),
         ],
     )
@@ -308,6 +315,50 @@ class TestLoad:
             load_mesh_scene(tmp_path / "none.glb")
         with pytest.raises(ValueError, match=r"unit is 0; accepted: a positive number"):
             load_mesh_scene(tmp_path / "points.ply", unit=0)
+
+    @pytest.mark.parametrize(
+        ("header", "told"),
+        [
+            ([], r"its JSON is \[\]; accepted: an object"),
+            ({"meshes": 3}, "meshes is 3; accepted: a list"),
+            ({"meshes": [None]}, r"meshes\[0\] is None; accepted: an object"),
+            ({"meshes": [{"primitives": {}}]}, r"meshes\[0\].primitives is \{\}; accepted: a list"),
+            (
+                {"meshes": [{"primitives": [{"mode": [4]}]}]},
+                r"meshes\[0\].primitives\[0\].mode is \[4\]; acc",
+            ),
+            ({"images": [{"uri": 5}]}, r"images\[0\].uri is 5; accepted: a text"),
+            ({"buffers": ["a"]}, r"buffers\[0\] is 'a'; accepted: an object"),
+            ({"materials": [{"name": ["a"]}]}, r"materials\[0\].name is \['a'\]; accepted: a text"),
+            (
+                {"materials": [{"pbrMetallicRoughness": 1}]},
+                r"materials\[0\].pbrMetallicRoughness is 1; accepted: ",
+            ),
+            ({"extensionsRequired": [None]}, r"extensionsRequired\[0\] is None; accepted: a text"),
+        ],
+    )
+    def test_json_of_the_wrong_types_is_named(self, tmp_path: Path, header: Any, told: str) -> None:
+        (tmp_path / "model.gltf").write_text(json.dumps(header))
+        with pytest.raises(ValueError, match=f"model.gltf: {told}"):
+            load_mesh_scene(tmp_path / "model.gltf")
+
+    @pytest.mark.parametrize("text", ["[" * 100_000, '{"asset": ' + "9" * 5000 + "}", "{"])
+    def test_json_that_cannot_be_read_is_told(self, tmp_path: Path, text: str) -> None:
+        (tmp_path / "model.gltf").write_text(text)
+        with pytest.raises(ValueError, match=r"model.gltf: not a .gltf file: "):
+            load_mesh_scene(tmp_path / "model.gltf")
+
+    def test_numbers_that_overflow_are_told(self, tmp_path: Path) -> None:
+        (tmp_path / "far.obj").write_text("o hall\nv 0 0 0\nv 1e39 0 0\nv 0 1 0\nf 1 2 3\n")
+        with pytest.raises(ValueError, match=r"far.obj: object 'hall': vertices are not all finite"):
+            load_mesh_scene(tmp_path / "far.obj")
+
+    def test_distances_without_the_extra_name_the_package(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """What `e2efly render garage` asks for first."""
+        monkeypatch.delitem(sys.modules, "e2efly.scenes.meshes.embree", raising=False)
+        monkeypatch.setitem(sys.modules, "embreex.mesh_construction", None)
+        with pytest.raises(ValueError, match=r"mesh scenes need the package embreex\S*: pip install 'e2efly\[mesh\]'"):
+            DistanceGrid.of(MeshScene.of([box()]), 0.5)
 
     def test_without_the_extra_the_package_is_named(self) -> None:
         program = (

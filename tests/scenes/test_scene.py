@@ -178,7 +178,14 @@ class TestFile:
     @pytest.mark.parametrize(
         ("before", "after", "told"),
         [
-            ("ground = 0.5", 'ground = "low"', r"ground is 'low'; accepted: a height in m, or false"),
+            ("ground = 0.5", 'ground = "low"', r"ground is 'low'; accepted: a finite number of metres, or"),
+            ("ground = 0.5", "ground = 1e308", r"ground is 1e\+308; accepted: .*at most 10000 in size"),
+            ('kind = "pad"', 'kind = ["pad"]', r"solids\[2\].kind is \['pad'\]; accepted: a text"),
+            ('kind = "pad"', "kind = {pad = 1}", r"solids\[2\].kind is \{'pad': 1\}; accepted: a text"),
+            ('class = "wall"', 'class = ["wall"]', r"solids\[0\].class is \['wall'\]; accepted: a text"),
+            ("centre = [5, 2, 3]", "centre = [5, 1e39, 3]", r"\[1\].centre is \[5, 1e\+39, 3\]; .*at most 10000"),
+            ("size = [0.2, 1.0]", "size = [0.2, 1" + "0" * 400 + "]", r"\[0\].size is \[0.2, 1000.*\.\.\.; .*most"),
+            (", rate = 2.0", ", rate = 1e308", r"solids\[0\].path.rate is 1e\+308; accepted: .*at most 10000 in size"),
             ("ground = 0.5", "floor = 0.5", r"has \['floor'\]; accepted: ground"),
             ('kind = "pad"', 'kind = "ped"', r"solids\[2\].kind: .*'ped'.*pad"),
             ("size = [0.2, 1.0]", "size = [0.2]", r"\[0\].size is .*accepted: 2 finite numbers \(radius, half"),

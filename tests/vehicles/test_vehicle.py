@@ -157,6 +157,8 @@ BROKEN: dict[str, tuple[Callable[[dict], Any], tuple[str, ...]]] = {
     "falling thrust map": (lambda t: t["thrust_map"].update(value=[-1e-7, 1e-3, 0.0]), ("thrust_map.value", "k2 > 0")),
     "three spins alike": (lambda t: t["rotor_spin"].update(value=[1, 1, 1, -1]), ("rotor_spin.value", "two of +1")),
     "no yaw": (lambda t: t["rotor_spin"].update(value=[1, 1, -1, -1]), ("rotor_spin", "without control")),
+    "too large": (lambda t: t["mass"].update(value=1e300), ("mass.value is 1e+300", "at most 1e+06 in size")),
+    "rate of an age": (lambda t: t["control_rate"].update(value=1e-9), ("control_rate.value is 1e-09", ">= 0.1 Hz")),
     "no torque ratio": (lambda t: t["torque_ratio"].update(value=0), ("torque_ratio", "without control")),
     "rotors in a line": (
         lambda t: t["rotor_position"].update(value=[[-0.1, 0.0], [0.1, 0.0], [-0.2, 0.0], [0.2, 0.0]]),
@@ -174,6 +176,14 @@ def test_a_broken_file_says_what_is_wrong(kind: str, load: Callable[[dict], Vehi
         load(table)
     for word in words:
         assert word in str(caught.value)
+
+
+def test_true_is_no_number(tmp_path: Path) -> None:
+    text = (Path(module.__file__).parent / "vis_r.toml").read_text()
+    path = tmp_path / "my_quad.toml"
+    path.write_text(re.sub(r"(\[position_gain\]\s+value = \[)[^,]+", r"\1true", text))
+    with pytest.raises(ValueError, match=r"position_gain\.value is \[True, .*; accepted: numbers of shape"):
+        load_vehicle(path)
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-inf"])

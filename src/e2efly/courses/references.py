@@ -13,12 +13,18 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.vehicles.tables import LARGEST, shown
+
 KNOT_PERIOD = 0.5
 """Seconds between the knots of all references but a user's."""
 POINTS = 10
 """Reference points that the policy sees."""
 SPACING = 0.1
 """Seconds between them; the first is the point to be at now."""
+LONGEST = 3600.0
+"""Longest reference, s: its knots are made beforehand."""
+_CLOSEST = 1e-3
+"""Shortest time between the rows of a file, s."""
 _POWERS = np.arange(6)
 
 
@@ -140,22 +146,28 @@ def read_csv(path: str | Path) -> np.ndarray:
     Raises:
         ValueError: naming the file, the line and what is accepted.
     """
-    accepted = "accepted: a header 't,x,y,z', then at least 3 rows of finite numbers, t rising (s, m)"
+    accepted = (
+        "accepted: a header 't,x,y,z', then at least 3 rows of finite numbers (s, m), t rising by at least "
+        f"{_CLOSEST:g} s and over at most {LONGEST:g} s, x, y, z at most {LARGEST:g} in size"
+    )
     try:
         with Path(path).open(newline="", encoding="utf-8") as file:
             lines = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError, csv.Error) as error:
         raise ValueError(f"reference {str(path)!r} cannot be read: {error}") from None
     if not lines or [cell.strip().lower() for cell in lines[0]] != ["t", "x", "y", "z"]:
-        raise ValueError(f"reference {path}, line 1: {lines[0] if lines else 'empty'}; {accepted}")
+        raise ValueError(f"reference {path}, line 1: {shown(lines[0]) if lines else 'empty'}; {accepted}")
     rows = []
     for number, cells in enumerate(lines[1:], start=2):
         try:
             row = [float(cell) for cell in cells]
         except ValueError:
             row = []
-        if len(row) != 4 or not all(map(math.isfinite, row)) or (rows and row[0] <= rows[-1][0]):
-            raise ValueError(f"reference {path}, line {number}: {cells}; {accepted}")
+        good = len(row) == 4 and math.isfinite(row[0]) and all(abs(x) <= LARGEST for x in row[1:])  # false for NaN
+        if good and rows:
+            good = row[0] - rows[-1][0] >= _CLOSEST and row[0] - rows[0][0] <= LONGEST
+        if not good:
+            raise ValueError(f"reference {path}, line {number}: {shown(cells)}; {accepted}")
         rows.append(row)
     if len(rows) < 3:
         raise ValueError(f"reference {path}: {len(rows)} rows; {accepted}")

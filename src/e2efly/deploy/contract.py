@@ -24,6 +24,8 @@ ACTION_LIMITS = (-1.0, 1.0)
 """Smallest and largest entry of an action; what lies outside is clipped before it is mapped."""
 ACTION_MAPPING = "command = low + (action + 1) / 2 * (high - low)"
 """From action to physical command, entry by entry."""
+RATES = (0.1, 10_000.0)
+"""Smallest and largest control rate, Hz."""
 FRAMES = ("world", "body", "world_body", "none")
 """Frames of an observation field."""
 COMMANDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -140,8 +142,8 @@ def _contract(x: dict[str, Any]) -> Contract:
     if not latency[0] <= latency_s <= latency[1]:
         raise read.refusal("latency_s", latency_s, f"a number of seconds within latency_range_s, {list(latency)}")
     rate = read.number(x["control_rate_hz"], "control_rate_hz")
-    if rate <= 0:
-        raise read.refusal("control_rate_hz", rate, "a positive number of Hz")
+    if not RATES[0] <= rate <= RATES[1]:
+        raise read.refusal("control_rate_hz", rate, f"{RATES[0]:g} to {RATES[1]:g} Hz")
     vehicle_hash = read.text(x["vehicle_hash"], "vehicle_hash")
     if len(vehicle_hash) != 16 or set(vehicle_hash) - set("0123456789abcdef"):
         raise read.refusal("vehicle_hash", vehicle_hash, "16 hex digits in lower case")

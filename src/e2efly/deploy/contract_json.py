@@ -1,11 +1,14 @@
 """A contract's JSON, read strictly: every value is checked, and what is wrong is named."""
 
 import dataclasses
-import math
 from collections.abc import Collection
 from typing import Any
 
 from e2efly.vehicles.names import nearest
+from e2efly.vehicles.tables import shown
+
+LARGEST = 1e6
+"""Largest size of a number, in whatever unit."""
 
 
 def table(value: Any, where: str, kind: type) -> dict[str, Any]:
@@ -39,21 +42,16 @@ def one_of(value: Any, where: str, known: Collection[str]) -> str:
 
 
 def number(value: Any, where: str) -> float:
-    """A finite number."""
-    if type(value) in (int, float):  # not bool, which is an int to Python
-        try:
-            finite = float(value)
-        except OverflowError:
-            finite = math.inf
-        if math.isfinite(finite):
-            return finite
-    raise refusal(where, value, "a finite number")
+    """A finite number of a size that physics has."""
+    if type(value) in (int, float) and abs(value) <= LARGEST:  # false for NaN; not bool, which is an int to Python
+        return float(value)
+    raise refusal(where, value, f"a finite number, at most {LARGEST:g} in size")
 
 
 def whole(value: Any, where: str, least: int) -> int:
-    """A whole number, not less than `least`."""
-    if type(value) is not int or value < least:
-        raise refusal(where, value, f"a whole number, {least} or more")
+    """A whole number, not less than `least` and not more than `LARGEST`."""
+    if type(value) is not int or not least <= value <= LARGEST:
+        raise refusal(where, value, f"a whole number, {least} or more, at most {LARGEST:g}")
     return value
 
 
@@ -89,4 +87,4 @@ def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def refusal(where: str, value: Any, accepted: str) -> ValueError:
     """The error that names the place, the value and what is accepted."""
-    return ValueError(f"contract: {where} is {value!r}; accepted: {accepted}")
+    return ValueError(f"contract: {where} is {shown(value)}; accepted: {accepted}")

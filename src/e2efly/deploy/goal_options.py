@@ -9,11 +9,12 @@ import numpy as np
 from e2efly.courses import defaults
 from e2efly.courses.gates import Gates
 from e2efly.courses.origin import Origin
-from e2efly.courses.references import Lissajous, Spline, knot_count, read_csv, through_points
+from e2efly.courses.references import LONGEST, Lissajous, Spline, knot_count, read_csv, through_points
 from e2efly.courses.tracks import load_track
 from e2efly.deploy.contract import Contract
 from e2efly.deploy.goals import GatesGoal, Goal, HoverGoal, LandGoal, ReferenceGoal
 from e2efly.vehicles import Vehicle, unknown
+from e2efly.vehicles.tables import LARGEST
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,8 @@ class GoalOptions:
     """By how much their x axis is turned from the room's about up, rad."""
 
 
-LONGEST = 3600.0
-"""Longest circle or lemniscate, s; its knots are made beforehand."""
+SMALLEST = 1e-3
+"""Smallest radius, speed and duration of circle and lemniscate, in their units."""
 _CURVE = ("centre", "radius", "phase", "duration")
 _OPTIONS: dict[str, tuple[str, ...]] = {
     "hover": ("target",),
@@ -145,19 +146,20 @@ def _above(name: str, height: float, least: float, what: str = "its lowest centr
 
 
 def _check_numbers(options: GoalOptions) -> None:
+    if not SMALLEST <= options.duration <= LONGEST:
+        raise ValueError(f"goal.duration is {options.duration}; accepted: {SMALLEST:g} to {LONGEST:g} s")
     for name, value in dataclasses.asdict(options).items():
-        if not isinstance(value, str) and not np.isfinite(value).all():
-            raise ValueError(f"goal.{name} is {value}; accepted: finite numbers")
+        numbers = () if isinstance(value, str) else np.ravel(np.asarray(value, object))
+        if not all(abs(x) <= LARGEST for x in numbers):  # false for NaN
+            raise ValueError(f"goal.{name} is {value}; accepted: finite numbers, at most {LARGEST:g} in size")
     for name in ("target", "pad", "centre", "origin"):
         if len(getattr(options, name)) != 3:
             raise ValueError(f"goal.{name} is {getattr(options, name)}; accepted: three numbers, m")
-    for name in ("radius", "lemniscate_speed", "duration"):
-        if getattr(options, name) <= 0:
-            raise ValueError(f"goal.{name} is {getattr(options, name)}; accepted: more than 0")
+    for name in ("radius", "lemniscate_speed"):
+        if getattr(options, name) < SMALLEST:
+            raise ValueError(f"goal.{name} is {getattr(options, name)}; accepted: {SMALLEST:g} or more")
     if options.circle_rate == 0:
         raise ValueError("goal.circle_rate is 0.0; accepted: any rate but 0, rad/s")
-    if options.duration > LONGEST:
-        raise ValueError(f"goal.duration is {options.duration}; accepted: at most {LONGEST:g} s")
     if options.laps < 0:
         raise ValueError(f"goal.laps is {options.laps}; accepted: 0 or more")
 

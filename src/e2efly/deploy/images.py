@@ -14,6 +14,8 @@ PROJECTIONS = ("pinhole", "spherical")
 """A camera, or equal angles between columns and rows."""
 ENCODINGS = ("inverse", "log", "linear")
 """How the graph takes depth and range."""
+SLOWEST = 0.01
+"""Smallest rate of images, Hz."""
 NONE = "none"
 """In place of what an image does not have: a class but of a mask, an encoding but of depth and range."""
 _COLOURS = ("rgb", "normal")
@@ -124,8 +126,8 @@ class Image:
         if not 0 <= reach[0] < reach[1]:
             raise read.refusal(f"{where}.reach_m", list(reach), "two rising numbers of metres, 0 or more")
         rate = read.number(x["rate_hz"], f"{where}.rate_hz")
-        if rate <= 0:
-            raise read.refusal(f"{where}.rate_hz", rate, "a positive number of Hz")
+        if rate < SLOWEST:
+            raise read.refusal(f"{where}.rate_hz", rate, f"{SLOWEST:g} Hz or more")
         name, description, preprocessing = (
             read.text(x[key], f"{where}.{key}") for key in ("name", "description", "preprocessing")
         )

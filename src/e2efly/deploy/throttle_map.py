@@ -16,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.deploy.contract_json import unique
+from e2efly.vehicles.tables import shown
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 SCALE_RANGE = (0.5, 2.0)
@@ -171,7 +173,7 @@ def from_json(text: str, vehicle: Vehicle) -> ThrottleMap:
         ValueError: naming the field, the value and what is accepted; for the map of another vehicle.
     """
     try:
-        values = json.loads(text)
+        values = json.loads(text, object_pairs_hook=unique)
     except (ValueError, RecursionError) as error:
         raise ValueError(f"throttle map: not JSON: {error}") from None
     if not isinstance(values, dict) or set(values) != set(_FIELDS):
@@ -194,7 +196,7 @@ def from_json(text: str, vehicle: Vehicle) -> ThrottleMap:
 
 
 def _refusal(name: str, value: Any, accepted: str) -> ValueError:
-    return ValueError(f"throttle map: {name} is {value!r}; accepted: {accepted}")
+    return ValueError(f"throttle map: {name} is {shown(value)}; accepted: {accepted}")
 
 
 class ThrottleHistory:

@@ -1,7 +1,6 @@
 """Scene files: one world as TOML, for people to write. docs/vision.md describes the format."""
 
 import dataclasses
-import math
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from e2efly.physics.rotation import from_euler
 from e2efly.scenes.scene import CLASSES, USUAL_CLASS, Scene, Solids, join
 from e2efly.scenes.shapes import SHAPES
 from e2efly.vehicles.names import unknown
-from e2efly.vehicles.tables import number, numbers, read_table
+from e2efly.vehicles.tables import number, numbers, read_table, shown, text
 
 _NEEDED = {"kind", "centre", "size"}
 _MORE = {"roll", "pitch", "yaw", "class", "colour", "path"}
@@ -30,35 +29,34 @@ def load_scene(path: Path, n: int = 1) -> Scene:
     if extra := set(table) - {"ground", "solids"}:
         raise ValueError(f"{path}: has {sorted(extra)}; accepted: ground (m, or false for none) and solids")
     ground = table.get("ground", 0.0)
-    if ground is True or not isinstance(ground, bool | int | float) or not math.isfinite(ground):
-        raise ValueError(f"{path}: ground is {ground!r}; accepted: a height in m, or false for none")
+    height = None if ground is False else number(f"{path}: ground", ground, " of metres, or false for none")
     solids: dict[str, list[Solids]] = {}
     listed = table.get("solids", [])
     if not isinstance(listed, list):
-        raise ValueError(f"{path}: solids is {listed!r}; accepted: a list of tables, each begun by [[solids]]")
+        raise ValueError(f"{path}: solids is {shown(listed)}; accepted: a list of tables, each begun by [[solids]]")
     for i, entry in enumerate(listed):
         kind, one = _solid(f"{path}: solids[{i}]", entry)
         solids.setdefault(kind, []).append(one)
     joined = {kind: join(*each) for kind, each in solids.items()}
-    scene = Scene.of(joined, 1, None if ground is False else float(ground))
+    scene = Scene.of(joined, 1, height)
     return jax.tree.map(lambda x: jnp.repeat(x, n, axis=0), scene)
 
 
 def _solid(where: str, entry: Any) -> tuple[str, Solids]:
     if not isinstance(entry, dict) or not _NEEDED <= set(entry) <= _NEEDED | _MORE:
-        found = sorted(entry) if isinstance(entry, dict) else entry
+        found = sorted(entry) if isinstance(entry, dict) else shown(entry)
         raise ValueError(f"{where} has {found}; accepted: kind, centre, size, and perhaps {', '.join(sorted(_MORE))}")
-    kind = entry["kind"]
+    kind = text(f"{where}.kind", entry["kind"])
     if kind not in SHAPES:
-        raise ValueError(f"{where}.kind: {unknown('kind', str(kind), SHAPES)}")
+        raise ValueError(f"{where}.kind: {unknown('kind', kind, SHAPES)}")
     names = SHAPES[kind].names
     size = numbers(f"{where}.size", entry["size"], len(names), f" ({', '.join(names)})")
     lengths = size[:2] if kind == "pad" else size
     if np.any(lengths <= 0) or (kind == "pad" and size[2] not in (0, 1, 2)):
         raise ValueError(f"{where}.size is {entry['size']}; accepted: positive numbers ({', '.join(names)})")
-    label = entry.get("class", CLASSES[USUAL_CLASS[kind]])
+    label = text(f"{where}.class", entry.get("class", CLASSES[USUAL_CLASS[kind]]))
     if label not in CLASSES:
-        raise ValueError(f"{where}.class: {unknown('class', str(label), CLASSES)}")
+        raise ValueError(f"{where}.class: {unknown('class', label, CLASSES)}")
     colour = entry.get("colour")
     if colour is not None:
         colour = numbers(f"{where}.colour", colour, 3, " in [0, 1]")
@@ -76,7 +74,7 @@ def _solid(where: str, entry: Any) -> tuple[str, Solids]:
 
 def _on_path(where: str, one: Solids, path: Any) -> Solids:
     if not isinstance(path, dict) or "rate" not in path or not set(path) <= _PATH:
-        raise ValueError(f"{where}.path is {path!r}; accepted: rate (rad/s), and cosine and sine ([x, y, z], m)")
+        raise ValueError(f"{where}.path is {shown(path)}; accepted: rate (rad/s), and cosine and sine ([x, y, z], m)")
     ways = [numbers(f"{where}.path.{name}", path.get(name, [0.0] * 3), 3, " of metres") for name in ("cosine", "sine")]
     rate = number(f"{where}.path.rate", path["rate"], " of rad/s")
     cosine, sine = (jnp.asarray(way, jnp.float32)[None, None] for way in ways)

@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 
 from e2efly.vehicles.names import nearest, unknown
-from e2efly.vehicles.tables import read_table
+from e2efly.vehicles.tables import read_table, shown
 
+_LARGEST = 1e6
+"""Largest size of a value, in its unit."""
 GRAVITY = 9.81
 """Standard gravity of the paper, m/s^2."""
 
@@ -75,7 +77,7 @@ class Vehicle:
     """Largest acceleration commanded, world axes."""
     speed_max: Any = _quantity("m/s", (3,), above=0.0)
     """Largest velocity commanded, world axes."""
-    control_rate: Any = _quantity("Hz", above=0.0)
+    control_rate: Any = _quantity("Hz", at_least=0.1)
     """Rate at which the policy is asked."""
     latency: Any = _quantity("s", at_least=0.0)
     """Time from the policy's observation to its command reaching the rate loop."""
@@ -167,28 +169,32 @@ def _read(where: str, f: dataclasses.Field, entry: Any) -> Any:
     """One value of the file, with its unit, shape and bounds checked."""
     key, unit, shape = f.name, f.metadata["unit"], f.metadata["shape"]
     if not isinstance(entry, dict) or set(entry) != {"value", "unit", "source"}:
-        raise ValueError(f"{where}: [{key}] is {entry!r}; accepted: a table with value, unit and source")
+        raise ValueError(f"{where}: [{key}] is {shown(entry)}; accepted: a table with value, unit and source")
     if entry["unit"] != unit:
-        raise ValueError(f"{where}: {key}.unit is {entry['unit']!r}; accepted: {unit!r}")
-    if not isinstance(entry["source"], str) or not entry["source"].strip():
-        raise ValueError(f"{where}: {key}.source is {entry['source']!r}; accepted: a text that says where it is from")
+        raise ValueError(f"{where}: {key}.unit is {shown(entry['unit'])}; accepted: {unit!r}")
+    source, given = entry["source"], entry["value"]
+    if not isinstance(source, str) or not source.strip():
+        raise ValueError(f"{where}: {key}.source is {shown(source)}; accepted: a text that says where it is from")
     try:
-        value = np.asarray(entry["value"])
+        value = np.asarray(given)
     except ValueError:
         value = np.asarray("ragged")
-    if value.dtype.kind not in "fi" or value.shape != shape:
+    numbers = value.dtype.kind in "fi" and not any(isinstance(x, bool) for x in np.asarray(given, object).flat)
+    if not numbers or value.shape != shape:
         expected = "a number" if shape == () else f"numbers of shape {shape}"
-        raise ValueError(f"{where}: {key}.value is {entry['value']!r}; accepted: {expected}")
+        raise ValueError(f"{where}: {key}.value is {shown(given)}; accepted: {expected}")
     value = value.astype(np.float64)
     at_least, above = f.metadata["at_least"], f.metadata["above"]
     accepted = f">= {at_least:g}" if at_least is not None else f"> {above:g}" if above is not None else "finite"
-    good = np.isfinite(value)
+    good = np.abs(value) <= _LARGEST  # false for NaN
     if at_least is not None:
         good &= value >= at_least
     if above is not None:
         good &= value > above
     if not np.all(good):
-        raise ValueError(f"{where}: {key}.value is {entry['value']!r}; accepted: {accepted} {unit}, finite")
+        raise ValueError(
+            f"{where}: {key}.value is {shown(given)}; accepted: {accepted} {unit}, finite, at most {_LARGEST:g} in size"
+        )
     return value if shape else float(value)
 
 

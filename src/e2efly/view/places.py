@@ -1,6 +1,5 @@
 """Worlds by name, to be looked at: what stands there, and where a flight through it leads."""
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from e2efly.scenes.meshes.load import FORMATS, load_mesh_scene, mesh_scene_names
 from e2efly.scenes.meshes.scene import MeshScene
 from e2efly.scenes.scene import Scene, Solids, clearance, join
 from e2efly.vehicles.names import unknown
+from e2efly.vehicles.tables import read_table
 
 BAR, DEPTH = 0.1, 0.05
 """Width and half depth of a track's gates, m."""
@@ -118,8 +118,8 @@ def _place(solids: dict[str, Solids], route: np.ndarray) -> Place:
 def _has_gates(path: Path) -> bool:
     """Whether a file is a track's; what is wrong in one its loader says."""
     try:
-        return "gates" in tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return "gates" in read_table(path)
+    except ValueError:
         return False
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.vehicles.names import unknown
-from e2efly.vehicles.tables import number, numbers, read_table
+from e2efly.vehicles.tables import number, numbers, read_table, shown
 
 _HERE = Path(__file__).parent
 _ACCEPTED = "accepted: closed (true or false), start {position [x, y, z], yaw}, gates [{position, yaw, opening [w, h]}]"
@@ -60,10 +60,10 @@ def load_track(name_or_path: str) -> RaceTrack:
     table = read_table(path)
     _keys(path, "the file", table, {"closed", "start", "gates"})
     if not isinstance(table["closed"], bool):
-        raise ValueError(f"{path}: closed is {table['closed']!r}; accepted: true or false")
+        raise ValueError(f"{path}: closed is {shown(table['closed'])}; accepted: true or false")
     gates = table["gates"]
     if not isinstance(gates, list) or len(gates) < 2:
-        raise ValueError(f"{path}: gates is {gates!r}; accepted: a list of at least 2")
+        raise ValueError(f"{path}: gates is {shown(gates)}; accepted: a list of at least 2")
     _keys(path, "start", table["start"], {"position", "yaw"})
     for i, gate in enumerate(gates):
         _keys(path, f"gates[{i}]", gate, {"position", "yaw", "opening"})
@@ -87,5 +87,5 @@ def load_track(name_or_path: str) -> RaceTrack:
 
 def _keys(path: Path, where: str, table: Any, wanted: set[str]) -> None:
     if not isinstance(table, dict) or set(table) != wanted:
-        found = sorted(table) if isinstance(table, dict) else table
+        found = sorted(table) if isinstance(table, dict) else shown(table)
         raise ValueError(f"{path}: {where} has {found}; {_ACCEPTED}")

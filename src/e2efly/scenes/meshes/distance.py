@@ -25,6 +25,7 @@ from scipy.spatial.transform import Rotation
 
 from e2efly.control.vectors import safe_sqrt
 from e2efly.device import cores
+from e2efly.scenes.meshes.engine import needed
 from e2efly.scenes.meshes.scene import MeshScene
 
 MOST = 50_000_000
@@ -208,7 +209,8 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def _solid(scene: MeshScene, points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
     """Whether points are in something."""
-    from e2efly.scenes.meshes.embree import Embree
+    with needed("mesh"):
+        from e2efly.scenes.meshes.embree import Embree
 
     embree = Embree(scene.triangles, watertight=True)
 

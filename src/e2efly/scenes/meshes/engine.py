@@ -1,5 +1,7 @@
 """What follows rays through triangles: Embree on a CPU, Warp on CUDA."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import NamedTuple, Protocol
 from weakref import WeakKeyDictionary
 
@@ -49,6 +51,19 @@ class Engine(Protocol):
 _READY: WeakKeyDictionary[MeshScene, Engine] = WeakKeyDictionary()
 
 
+@contextmanager
+def needed(extra: str) -> Iterator[None]:
+    """Around the imports of what an extra installs.
+
+    Raises:
+        ValueError: naming the package that is missing, and how to install it.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise ValueError(f"mesh scenes need the package {error.name}: pip install 'e2efly[{extra}]'") from None
+
+
 def engine(scene: MeshScene) -> Engine:
     """The engine of where JAX computes; made once for a scene.
 
@@ -57,13 +72,10 @@ def engine(scene: MeshScene) -> Engine:
     """
     if scene not in _READY:
         cuda = jax.default_backend() == "gpu"
-        try:
+        with needed("mesh-cuda" if cuda else "mesh"):
             if cuda:
                 from e2efly.scenes.meshes.warp import Warp as Kind
             else:
                 from e2efly.scenes.meshes.embree import Embree as Kind
-        except ModuleNotFoundError as error:
-            extra = "mesh-cuda" if cuda else "mesh"
-            raise ValueError(f"mesh scenes need the package {error.name}: pip install 'e2efly[{extra}]'") from None
         _READY[scene] = Kind(scene.triangles)
     return _READY[scene]

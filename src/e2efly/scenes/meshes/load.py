@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from e2efly.scenes.meshes.engine import needed
 from e2efly.scenes.meshes.procedural import SCENES
 from e2efly.scenes.meshes.references import textured_materials
 from e2efly.scenes.meshes.scene import MeshScene, Part
@@ -77,11 +78,9 @@ def _parts(path: Path, turn: np.ndarray, textured: set[str]) -> Iterator[Part]:
 
 
 def _opened(path: Path) -> Any:
-    try:
+    with needed("mesh"):
         import PIL.Image  # noqa: F401 - without it, trimesh leaves textures out
         import trimesh
-    except ModuleNotFoundError as error:
-        raise ValueError(f"mesh scenes need the package {error.name}: pip install 'e2efly[mesh]'") from None
     options: dict[str, Any] = {"split_objects": True} if path.suffix.lower() == ".obj" else {}
     try:
         return trimesh.load_scene(path, process=False, **options)

@@ -7,8 +7,13 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
+from e2efly.vehicles.tables import shown
+
 _PLAIN = ("KHR_materials_", "KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "EXT_texture_webp")
 """Beginnings of the glTF extensions that a file may require: triangles are right without them."""
+
+_KINDS = {dict: "an object", list: "a list", str: "a text", int: "a whole number"}
+"""What JSON calls them."""
 
 
 def textured_materials(path: Path) -> set[str]:
@@ -79,24 +84,43 @@ def _ply(path: Path) -> set[str]:
 
 def _gltf(path: Path) -> set[str]:
     header = _header(path)
-    required = [name for name in header.get("extensionsRequired", []) if not name.startswith(_PLAIN)]
-    if required:
+    names = _listed(path, header, "extensionsRequired", str)
+    if required := [name for name in names if not name.startswith(_PLAIN)]:
         raise ValueError(f"{path}: requires {', '.join(required)}; accepted: files without compression of that kind")
     for kind in ("buffers", "images"):
-        for entry in header.get(kind, []):
-            uri = entry.get("uri", "data:")
+        for i, entry in enumerate(_listed(path, header, kind)):
+            uri = _of_kind(path, f"{kind}[{i}].uri", entry.get("uri", "data:"), str)
             if not uri.startswith("data:"):
                 _there(path, f"the {kind[:-1]}", unquote(uri))
-    for mesh in header.get("meshes", []):
-        modes = {primitive.get("mode", 4) for primitive in mesh["primitives"]}
+    for i, mesh in enumerate(_listed(path, header, "meshes")):
+        modes = {
+            _of_kind(path, f"meshes[{i}].primitives[{k}].mode", primitive.get("mode", 4), int)
+            for k, primitive in enumerate(_listed(path, mesh, "primitives", at=f"meshes[{i}]."))
+        }
         if other := modes - {4, 5}:
             name = mesh.get("name", "")
             raise ValueError(
                 f"{path}: mesh {name!r} has primitives of mode {sorted(other)}; accepted: 4 (triangles) and 5"
             )
-    materials = header.get("materials", [])
-    textured = [m for m in materials if "baseColorTexture" in m.get("pbrMetallicRoughness", {})]
-    return {material.get("name", "") for material in textured}
+    textured = set()
+    for i, material in enumerate(_listed(path, header, "materials")):
+        name = _of_kind(path, f"materials[{i}].name", material.get("name", ""), str)
+        look = material.get("pbrMetallicRoughness", {})
+        if "baseColorTexture" in _of_kind(path, f"materials[{i}].pbrMetallicRoughness", look, dict):
+            textured.add(name)
+    return textured
+
+
+def _listed(path: Path, table: dict[str, Any], key: str, kind: type = dict, at: str = "") -> list[Any]:
+    """The entries of a list of the JSON, all of one kind; empty where there is none."""
+    entries = _of_kind(path, at + key, table.get(key, []), list)
+    return [_of_kind(path, f"{at}{key}[{i}]", entry, kind) for i, entry in enumerate(entries)]
+
+
+def _of_kind(path: Path, where: str, value: Any, kind: type) -> Any:
+    if type(value) is not kind:
+        raise ValueError(f"{path}: {where} is {shown(value)}; accepted: {_KINDS[kind]}")
+    return value
 
 
 def _header(path: Path) -> dict[str, Any]:
@@ -107,6 +131,7 @@ def _header(path: Path) -> dict[str, Any]:
             if magic != b"glTF" or kind != b"JSON":
                 raise ValueError("its first bytes are not those of glTF")
             raw = raw[20 : 20 + length]
-        return json.loads(raw)
-    except (struct.error, ValueError) as error:
+        header = json.loads(raw)
+    except (struct.error, ValueError, RecursionError) as error:
         raise ValueError(f"{path}: not a {path.suffix} file: {error}") from None
+    return _of_kind(path, "its JSON", header, dict)

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from e2efly.scenes.scene import CLASSES, COLOURS, GROUND, OBSTACLE, SKY
+from e2efly.vehicles.tables import LARGEST
 
 _FLAT = 1e-7
 """A triangle is degenerate whose height is at most this share of its longest side."""
@@ -143,8 +144,11 @@ class MeshScene:
 
 def _check(part: Part) -> None:
     where = f"object {part.name!r}"
-    if part.vertices.ndim != 2 or part.vertices.shape[1] != 3 or not np.all(np.isfinite(part.vertices)):
-        raise ValueError(f"{where}: vertices are not all finite; accepted: (v, 3) finite numbers of metres")
+    if part.vertices.ndim != 2 or part.vertices.shape[1] != 3 or not _usual(part.vertices):
+        raise ValueError(
+            f"{where}: vertices are not all finite numbers of metres, at most {LARGEST:g} in size; accepted: (v, 3) of "
+            "those (another unit of the file? far from its origin?)"
+        )
     faces = part.faces
     if (
         faces.ndim != 2
@@ -154,10 +158,24 @@ def _check(part: Part) -> None:
         raise ValueError(f"{where}: faces name vertices that are not there; accepted: 3 of {len(part.vertices)} each")
     if part.texture is not None and part.uv is None:
         raise ValueError(f"{where}: has a texture, but no texture coordinates; accepted: both or none")
-    if part.uv is not None and not (part.uv.shape == (len(part.vertices), 2) and np.all(np.isfinite(part.uv))):
-        raise ValueError(f"{where}: texture coordinates are not all finite; accepted: 2 finite numbers a vertex")
+    if part.uv is not None and not (part.uv.shape == (len(part.vertices), 2) and _usual(part.uv)):
+        raise ValueError(
+            f"{where}: texture coordinates are not all finite; accepted: 2 finite numbers per vertex, at most "
+            f"{LARGEST:g} in size"
+        )
+    shapes = ((3,), (len(part.vertices), 3), (len(faces), 1, 3))
+    if part.colour is not None and not (np.shape(part.colour) in shapes and _usual(part.colour)):
+        raise ValueError(
+            f"{where}: colours have shape {np.shape(part.colour)}, or are not all finite; accepted: 3 numbers in "
+            "[0, 1], for all of it or for each vertex or triangle"
+        )
     if part.label is not None and not SKY < part.label < len(CLASSES):
         raise ValueError(f"{where}: label is {part.label}; accepted: 1 to {len(CLASSES) - 1}")
+
+
+def _usual(numbers: Any) -> bool:
+    """Whether all are finite, and no larger than what float32 holds well."""
+    return bool(np.all(np.abs(numbers) <= LARGEST))  # false for NaN
 
 
 def _corner_colours(part: Part, label: int) -> Float[np.ndarray, "f 3 3"]:
