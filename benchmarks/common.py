@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from e2efly.commands.tables import markdown
+from e2efly.storage import write_json
 
 RESULTS = Path(__file__).parent / "results"
 """Where the published figures are kept."""
@@ -48,7 +49,7 @@ def write(name: str, path: Path | None, content: dict[str, Any]) -> None:
     path = path or RESULTS / f"{name}.json"
     path.parent.mkdir(parents=True, exist_ok=True)
     day = datetime.now(UTC).strftime("%Y-%m-%d")
-    path.write_text(json.dumps({"machine": machine(), "date": day, **content}, indent=1) + "\n")
+    write_json(path, {"machine": machine(), "date": day, **content})
 
 
 def with_earlier(name: str, path: Path | None, part: str, keys: tuple[str, ...], rows: list[Any]) -> list[Any]:

@@ -1,5 +1,6 @@
 """Checkpoints are whole or refused."""
 
+import math
 import multiprocessing
 import os
 from pathlib import Path
@@ -56,6 +57,12 @@ def test_a_missing_and_a_surplus_part_are_refused(path: Path) -> None:
         load_checkpoint(path, {**TREE, "c": np.zeros(1)})
     with pytest.raises(ValueError, match="belong to no part"):
         load_checkpoint(path, {"a": TREE["a"]})
+
+
+def test_what_it_says_is_json_though_a_score_is_infinite(tmp_path: Path) -> None:
+    save_checkpoint(tmp_path / "file", TREE, {"best_score": -math.inf})
+    assert b"Infinity" not in (tmp_path / "file").read_bytes()
+    assert read_about(tmp_path / "file")["best_score"] is None
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:

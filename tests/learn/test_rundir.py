@@ -8,11 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from e2efly.cli import run as cli
 from e2efly.config import TrainConfig
 from e2efly.learn.inputs import input_files
+from e2efly.learn.judge import digest
 from e2efly.learn.rundir import RunDirectory
+from e2efly.storage import held
 from e2efly.vehicles import load_vehicle
-from tests.learn.test_runner import small
+from tests.learn.test_runner import flown, small
 
 PACKAGE = Path(str(resources.files("e2efly")))
 
@@ -177,3 +180,20 @@ def test_metrics_cut_anywhere_go_on_with_what_is_whole(tmp_path: Path) -> None:
         assert run.rows() == whole[:lines]
         run.append([row(update) for update in range(lines + 1, 4)])
         assert [r["update"] for r in run.rows()] == [1, 2, 3]
+
+
+def test_a_policy_that_never_succeeds_has_no_time_of_success(tmp_path: Path) -> None:
+    found = digest(flown([False, False], 1.0, 8.0)["task"])
+    assert found["seconds_of_success"] is None
+    run = RunDirectory(tmp_path)
+    run.write_json("summary.json", {"shipped": found})
+    assert run.read_json("summary.json") == {"shipped": found}
+
+
+@pytest.mark.parametrize("command", ["ablate", "sweep"])
+def test_the_folder_of_many_runs_is_one_process_s_too(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with held(tmp_path):
+        assert cli([command, "hover", "--out", str(tmp_path)]) == 2
+    assert f"--out {tmp_path} is in use by process " in " ".join(capsys.readouterr().err.split())

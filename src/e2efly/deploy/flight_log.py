@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.channels import CHANNELS
-from e2efly.deploy.telemetry import PROFILE
+from e2efly.deploy.mcap_file import PROFILE
 
 
 @dataclass(frozen=True)

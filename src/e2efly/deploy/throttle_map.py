@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.contract_json import unique
+from e2efly.storage import finite
 from e2efly.vehicles.tables import shown
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
@@ -163,7 +164,7 @@ def _towards(value: float, goal: float, reach: float) -> float:
 def as_json(m: ThrottleMap) -> str:
     """What was learned, to be saved with the flight and offered to the next."""
     values = (m.vehicle_hash, m.voltage, *m.learned, m.updates, m.residual)
-    return json.dumps(dict(zip(_FIELDS, values, strict=True)), indent=2)
+    return json.dumps(finite(dict(zip(_FIELDS, values, strict=True))), indent=2)
 
 
 def from_json(text: str, vehicle: Vehicle) -> ThrottleMap:

@@ -35,7 +35,7 @@ def by_content(config: TrainConfig) -> TrainConfig:
         ValueError: when a file cannot be read.
     """
     for field, path in input_files(config).items():
-        config = replaced(config, field, f"{path.name} (SHA-256 {sha256(read(path))})")
+        config = replaced(config, field, f"{path.name} (SHA-256 {sha256(content_of(path))})")
     return config
 
 
@@ -54,7 +54,7 @@ def replaced(tree: Any, field: str, value: str) -> Any:
     return dataclasses.replace(tree, **{name: replaced(getattr(tree, name), rest, value) if rest else value})
 
 
-def read(path: Path) -> bytes:
+def content_of(path: Path) -> bytes:
     """The content of a file.
 
     Raises:
@@ -97,7 +97,7 @@ class Kept:
         """
         if not self.own and self._now() == self.sha256:
             return self.named
-        if (found := sha256(read(self.copy))) != self.sha256:
+        if (found := sha256(content_of(self.copy))) != self.sha256:
             raise ValueError(f"{self.copy}: SHA-256 is {found}; accepted: {self.sha256}, what the run was made with")
         return str(self.copy)
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from e2efly.config import CameraConfig, StageConfig, TrainConfig
-from e2efly.learn.inputs import Kept, by_content, input_files, read, replaced, sha256, value_at
+from e2efly.learn.inputs import Kept, by_content, content_of, input_files, replaced, sha256, value_at
 from e2efly.presets import algorithm_name, preset, task_name
 from e2efly.storage import held, write_atomically, write_json
 
@@ -98,7 +98,7 @@ class RunDirectory:
         """Copy the files that a configuration names."""
         about = {}
         for field, path in input_files(config).items():
-            data = read(path)
+            data = content_of(path)
             copy = self.path / "inputs" / field / path.name
             copy.parent.mkdir(parents=True, exist_ok=True)
             write_atomically(copy, data)
