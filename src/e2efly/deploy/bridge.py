@@ -8,6 +8,7 @@ import numpy as np
 
 from e2efly.control import Ctbr, Vec3
 from e2efly.deploy import inertial, reckoning, state_machine
+from e2efly.deploy.delay_watch import Delay, DelayWatch, delay_of, delay_problem, felt, turned
 from e2efly.deploy.flight_state import AIRBORNE, Flight, Inputs, Mode, Target
 from e2efly.deploy.goals import LandGoal
 from e2efly.deploy.heading_watch import HeadingWatch, watched
@@ -20,6 +21,7 @@ from e2efly.deploy.msp.messages import Attitude, RawImu, set_raw_rc
 from e2efly.deploy.odometry import Odometry, Sample
 from e2efly.deploy.policy_worker import PolicyWorker
 from e2efly.deploy.pose.checks import Checks
+from e2efly.deploy.pose.pace import Pace, pace_problem, paced
 from e2efly.deploy.pose.source import PoseSource
 from e2efly.deploy.pose.tracking import Track, age, track
 from e2efly.deploy.record import (
@@ -59,6 +61,8 @@ TRIM_FADE = 1.0
 """Time constant with which it fades as the map learns, s."""
 STEADY = 0.03
 """Body rates of a hover below this are sent as none, rad/s: should the link fall silent now, they are held for long."""
+DELAY_TICKS = 50
+"""How often, on the ground, the delay of the poses is looked for in how it was carried, control steps."""
 SILENT_S = 0.1
 """A controller that has said nothing for so long may hold the next command for as long as it is silent, s."""
 LATE_S = 0.05
@@ -109,12 +113,15 @@ class Bridge:
         self.probe = ChannelProbe()
         self.instruments = Instruments(client, settings)
         self.sent = Sent("closed", None, 0.0, self._closed())
+        self.pace = Pace()
         self._track = Track()
         self._pose_problem: str | None = None
         self._good_pose = -math.inf
         self._heading = HeadingWatch()
         self._inertial = Inertial()
         self._opposed: str | None = None
+        self._delays = DelayWatch()
+        self._delay: Delay | None = None
         self._history = ThrottleHistory()
         self._trim = 0.0
         self._imu: Imu | None = None
@@ -170,6 +177,7 @@ class Bridge:
             self._pose_problem = problem
             if odometry is not None:
                 self.odometry, self._good_pose = odometry, now
+                self.pace = paced(self.pace, odometry.time, sample.received)
                 self._inertial = inertial.see(
                     self._inertial, odometry, now,
                     moved=self._track.same_since == odometry.time,  # or it may be frozen, and the motion has gone on
@@ -177,6 +185,7 @@ class Bridge:
                     latest=self.latency + LATE_S,
                 )  # fmt: skip
                 self._watch_heading(odometry, now)
+                self._delays = turned(self._delays, odometry)
         said_frozen = (self._pose_problem or "").startswith("frozen")  # which lasts already
         if self._pose_problem and not self._track.fault and now - self._good_pose < OUTLIERS_S and not said_frozen:
             self._pose_problem = None
@@ -200,6 +209,7 @@ class Bridge:
         grounded = self.flight.mode is Mode.INIT
         probed = self.probe.look(now, reading, self.sticks.centre, grounded=grounded)
         good = self._pose_problem is None and self._stale is None
+        slow = pace_problem(self.pace, self.settings.odometry_timeout)
         self.inputs = Inputs(
             odometry=self.odometry,
             odometry_problem=None if good else self._pose_problem or self._stale,
@@ -208,7 +218,7 @@ class Bridge:
             override=reading.override,
             pilot=reading.pilot,
             voltage=reading.voltage,
-            settings_problems=self.settings_problems + probed + reading.meddling,
+            settings_problems=self.settings_problems + probed + reading.meddling + ((slow,) if slow else ()),
             policy_problem=reading.meddling[0] if reading.meddling else None,
             attitude_error=self._attitude_error(reading.attitude),
             heading_error=self._heading.error if good else None,
@@ -234,7 +244,9 @@ class Bridge:
             self._opposed = f"{watch.opposed}, when it was carried; carry it again, once frames and axes are right"
         elif watch.agrees:
             self._opposed = None
-        return self._opposed
+        if self.ticks % DELAY_TICKS == 0:
+            self._delay = delay_of(self._delays) or self._delay
+        return self._opposed or delay_problem(self._delay, self.latency + LATE_S)
 
     def _attitude_error(self, attitude: Attitude | None) -> float | None:
         if attitude is None or self.odometry is None:
@@ -249,6 +261,7 @@ class Bridge:
         attitude = self.client.message(Attitude.CODE, now, ATTITUDE_S)
         if (reply := reading.fresh.get(RawImu.CODE)) is not None:
             at = reply.time - reply.latency / 2
+            self._delays = felt(self._delays, at, reply.message.body_rate)
             sent = self._history.between(at - THRUST_DELAY[1], at - THRUST_DELAY[0])
             self._inertial = inertial.measure(self._inertial, Measurement(
                 np.array(reply.message.acceleration, float), np.array(reply.message.body_rate), attitude,

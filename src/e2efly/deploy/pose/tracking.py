@@ -46,8 +46,8 @@ class Track:
     """Time since which the pose repeats bit for bit, s."""
     same_pose: bytes = b""
     """Bits of the last pose as it came."""
-    suspect: tuple[np.ndarray, np.ndarray] | None = None
-    """Position (3,) and quaternion (4,) that were jumped to last."""
+    suspect: tuple[float, np.ndarray, np.ndarray] | None = None
+    """Time, s, position (3,), m, and quaternion (4,) that were jumped to last."""
     suspect_count: int = 0
     """Successive samples there."""
     fault: str | None = None
@@ -111,7 +111,7 @@ def _content(checks: Checks, sample: Sample) -> str | None:
     if sample.stamp is not None and not abs(sample.stamp) <= LARGEST_STAMP:
         return f"not_finite: stamp is {sample.stamp!r}; accepted: a finite number of seconds up to {LARGEST_STAMP:g}"
     if checks.frame and sample.frame != checks.frame:
-        return f"frame: frame is {sample.frame!r}; accepted: {checks.frame!r}"
+        return f"frame: frame is {sample.frame[:80]!r}; accepted: {checks.frame!r}"
     length = math.sqrt(float(np.square(sample.quaternion, dtype=np.float64).sum()))
     if not abs(length - 1) <= checks.quaternion_tolerance:
         tolerance = checks.quaternion_tolerance
@@ -167,34 +167,68 @@ def _frozen(checks: Checks, track: Track, sample: Sample, time: float) -> tuple[
 def _jump(
     checks: Checks, track: Track, time: float, position: np.ndarray, quaternion: np.ndarray
 ) -> tuple[Track, str | None]:
-    """Refuse what the vehicle cannot have flown to; a jump that lasts becomes a fault."""
+    """Refuse what the vehicle cannot have flown to; a jump that lasts becomes a fault.
+
+    The allowance grows with time, so that a lasting jump would pass by itself after some samples. A sample that is
+    nearer to where the jump has led on to than to where the track leads on to is therefore refused with it. Both are
+    led on by the last velocity and body rate: a vehicle that turns fast is soon far from where it was seen last.
+    """
     if track.pose is None:
         return track, None
-    last_time, *last = track.pose
-    interval = min(time - last_time, checks.gap)
+    interval = min(time - track.pose[0], checks.gap)
     reach = checks.jump_position + checks.jump_speed * interval
     turn = checks.jump_attitude + checks.jump_rate * interval
-
-    def distance(pose: tuple[np.ndarray, ...] | list[np.ndarray]) -> float:
-        step, angle = np.linalg.norm(position - pose[0]), np.linalg.norm(rotation_between(pose[1], quaternion))
-        return max(float(step) / reach, float(angle) / turn)
-
-    from_track = distance(last)
-    # The allowance grows with time: without this, a lasting jump would pass by itself after some samples.
-    with_suspect = track.suspect is not None and distance(track.suspect) < from_track
-    if from_track <= 1 and not with_suspect:
+    step, angle = _apart(track.pose, position, quaternion)
+    reason = None
+    if not (step <= reach and angle <= turn):
+        reason = (
+            f"jump: by {step:.4g} m and {angle:.4g} rad within {interval:.4g} s; accepted: at most {reach:.4g} m and "
+            f"{turn:.4g} rad"
+        )
+    count = 1
+    if track.suspect is not None:
+        near, on = (_apart(_led_on(track, pose, time), position, quaternion) for pose in (track.suspect, track.pose))
+        if max(near[0] / reach, near[1] / turn) < max(on[0] / reach, on[1] / turn):
+            count = track.suspect_count + 1
+            reason = reason or (
+                f"jump: {near[0]:.4g} m and {near[1]:.4g} rad from where an earlier jump led; accepted: nearer to "
+                f"where the motion before it leads, now {on[0]:.4g} m and {on[1]:.4g} rad away"
+            )
+    if reason is None:
         return replace(track, suspect=None, suspect_count=0), None
-    count = track.suspect_count + 1 if with_suspect else 1
-    step, angle = np.linalg.norm(position - last[0]), np.linalg.norm(rotation_between(last[1], quaternion))
-    reason = (
-        f"jump: by {step:.4g} m and {angle:.4g} rad within {interval:.4g} s; accepted: at most {reach:.4g} m and "
-        f"{turn:.4g} rad"
+    lasting = f"{reason}; seen {count} times, a fault until the track starts anew"
+    fault = lasting if count >= checks.jump_count else None
+    return replace(track, suspect=(time, position, quaternion), suspect_count=count, fault=fault), fault or reason
+
+
+def _apart(pose: tuple[float, np.ndarray, np.ndarray], position: np.ndarray, quaternion: np.ndarray) -> tuple:
+    """How far from a pose, m and rad."""
+    return (
+        float(np.linalg.norm(position - pose[1])), float(np.linalg.norm(rotation_between(pose[2], quaternion))),
+    )  # fmt: skip
+
+
+def _led_on(
+    track: Track, pose: tuple[float, np.ndarray, np.ndarray], time: float
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Where a pose has come to by `time` s, should the motion go on as the last odometry had it."""
+    if track.odometry is None:
+        return pose
+    since = time - pose[0]
+    half = 0.5 * since * track.odometry.body_rate
+    angle = float(np.linalg.norm(half))
+    vector = half * float(np.sinc(angle / math.pi))
+    w, (bx, by, bz) = math.cos(angle), vector.tolist()
+    aw, ax, ay, az = pose[2].tolist()
+    quaternion = np.array(
+        [
+            aw * w - ax * bx - ay * by - az * bz,
+            aw * bx + ax * w + ay * bz - az * by,
+            aw * by - ax * bz + ay * w + az * bx,
+            aw * bz + ax * by - ay * bx + az * w,
+        ]
     )
-    lasting = (
-        f"{reason}; seen {count} times, a fault until the track starts anew" if count >= checks.jump_count else None
-    )
-    track = replace(track, suspect=(position, quaternion), suspect_count=count, fault=lasting)
-    return track, lasting or reason
+    return time, pose[1] + since * track.odometry.velocity, quaternion
 
 
 def _motion(
