@@ -117,7 +117,9 @@ def _reboot(stage: Stage) -> Injection:
 
 
 HELD = Excuse("the firmware holds the last command while the link is silent")
-NO_POWER = Excuse("the controller has no power, and starts disarmed", (Rule.OFF, Rule.TOUCH), for_good=True)
+NO_POWER = Excuse(
+    "the controller has no power, and starts disarmed", (Rule.OFF, Rule.TOUCH, Rule.ENDLESS), for_good=True
+)
 UNHEARD = Excuse("the firmware holds the last switches while its receiver is silent, and tells nobody", (Rule.ENDLESS,))
 KINDS = POSES | {
     "accelerometer as told: z scaled": Kind(
