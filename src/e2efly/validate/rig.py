@@ -19,7 +19,7 @@ import numpy as np
 from e2efly.deploy.odometry import Sample
 from e2efly.device import compute_at_once, one_core
 from e2efly.validate.firmware import Firmware
-from e2efly.validate.sitl import Sitl
+from e2efly.validate.sitl import FirmwareState, Sitl
 from e2efly.validate.world import Body, World
 from e2efly.vehicles.vehicle import Vehicle
 
