@@ -42,7 +42,7 @@ docs: $(READY)
 	$(BIN)/python docs/figures.py
 
 clean:
-	rm -rf $(VENV) runs build dist src/*.egg-info
+	rm -rf $(VENV) build dist src/*.egg-info
 
 $(READY): pyproject.toml constraints.txt
 	@echo "setting up $(VENV) (once)"

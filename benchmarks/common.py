@@ -34,6 +34,9 @@ def arguments(about: str, **extra: Any) -> argparse.Namespace:
     parser.add_argument("--json", type=Path, default=None, help="where to write the figures")
     for name, default in extra.items():
         flag = "--" + name.replace("_", "-")
+        if default is False:
+            parser.add_argument(flag, action="store_true")
+            continue
         many = isinstance(default, list)
         kind = type(default[0]) if many else type(default) if default is not None else str
         parser.add_argument(flag, type=kind, nargs="*" if many else None, default=default)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 for name in (
     "rates", "time_to_criterion", "success", "runtime_speed", "msp_fuzz", "sim_to_sim", "firmware_flights",
-    "firmware_faults", "process_faults", "bridge_loop", "rendering", "mesh_rendering", "visual_tasks", "ablation",
-    "stable_baselines3_ppo", "thrown_starts", "thrown",
+    "firmware_faults", "fault_campaign", "process_faults", "bridge_loop", "rendering",
+    "mesh_rendering", "visual_tasks", "ablation", "stable_baselines3_ppo", "thrown_starts", "thrown",
 ):  # fmt: skip
     print(f"== {name}", flush=True)
     subprocess.run([sys.executable, str(Path(__file__).parent / f"{name}.py")], check=True)

@@ -1,12 +1,17 @@
 """Train the policy zoo: the default preset of each task for each vehicle, kept as package data with its success.
 
     python benchmarks/zoo.py [--vehicles vis_r ...] [--tasks hover ...] [--seeds 3]
+    python benchmarks/zoo.py --digests
 
 The best of at most `seeds` runs by each algorithm is kept, if it succeeds more often than not; none more is made once
 one meets 99.5 %. What is best the runs' own reports say. The success that is stated is that of the ONNX file itself, of
 the 1000 starts of `e2efly eval`, which nothing was chosen by.
+
+`--digests` trains nothing: it gives the files that are there their digests, where they have none, and writes the digest
+of each file into zoo.json.
 """
 
+import hashlib
 import itertools
 import json
 import shutil
@@ -19,6 +24,7 @@ from typing import Any
 from common import arguments, table
 
 from e2efly import presets
+from e2efly.deploy.onnx_file import is_sealed
 from e2efly.vehicles import vehicle_names
 from e2efly.zoo import FOLDER, USUAL, contents
 
@@ -54,9 +60,23 @@ def trained(vehicle: str, task: str, algo: str, seed: int, folder: Path) -> tupl
     }
 
 
+def write(zoo: dict[str, dict[str, dict[str, Any]]]) -> None:
+    """zoo.json, with the digest of each file."""
+    for vehicle, tasks in zoo.items():
+        for task, about in tasks.items():
+            about["sha256"] = hashlib.sha256((FOLDER / vehicle / f"{task}.onnx").read_bytes()).hexdigest()
+    (FOLDER / "zoo.json").write_text(json.dumps(zoo, indent=1, sort_keys=True) + "\n")
+
+
 def main() -> None:
     """Train, keep the policies and zoo.json, print a table."""
-    options = arguments(__doc__ or "", vehicles=vehicle_names(), tasks=list(presets.TASKS), seeds=3)
+    options = arguments(__doc__ or "", vehicles=vehicle_names(), tasks=list(presets.TASKS), seeds=3, digests=False)
+    if options.digests:
+        for file in FOLDER.glob("*/*.onnx"):
+            if not is_sealed(file.read_bytes()):
+                run("export", str(file))
+        write(contents())
+        return
     rows = []
     for vehicle in options.vehicles:
         for task in options.tasks:
@@ -78,7 +98,7 @@ def main() -> None:
                 shutil.copy(Path(folder) / f"{best['algorithm']}{best['seed']}" / "policy.onnx", kept)
             zoo = contents() if (FOLDER / "zoo.json").exists() else {}
             zoo.setdefault(vehicle, {})[task] = best
-            (FOLDER / "zoo.json").write_text(json.dumps(zoo, indent=1, sort_keys=True) + "\n")
+            write(zoo)
             success = " ".join(f"{100 * share:.1f}" for share in best["success"].values())
             rows.append({"vehicle": vehicle, "task": task, "success, %": success, "kB": kept.stat().st_size // 1000})
             print(rows[-1], flush=True)

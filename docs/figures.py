@@ -25,6 +25,7 @@ TITLES = {
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
     "firmware_faults": "Faults injected into flights of the real firmware",
+    "fault_campaign": "Pairs and triples of faults by chance, injected into flights of the real firmware",
     "process_faults": "The bridge's process killed, stopped, its disk full, in flight",
     "bridge_loop": "The bridge's control loop, flying the firmware in real time",
     "runtime_speed": "The runtime on a companion computer",

@@ -1,7 +1,11 @@
 """Fixtures of the whole suite. The package computes in float32; a test that needs float64 asks for `x64`."""
 
 import os
+import shutil
+import subprocess
 from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
 
 from e2efly.device import set_xla_options
 
@@ -40,6 +44,44 @@ def _programs_go() -> Iterator[None]:
 def x64() -> Iterator[None]:
     with jax.enable_x64(True):
         yield
+
+
+@dataclass(frozen=True)
+class NetworkTrace:
+    """What the processes that a test starts tried to send off this machine; it is refused, too.
+
+    A library loaded into them does it, rather than strace: it needs no tool but gcc, which the firmware needs as well,
+    no permission to trace, and it sees ONNX Runtime's own client, which Python's audit hooks do not.
+    """
+
+    file: Path
+
+    def left(self) -> list[str]:
+        """A line for each try."""
+        return self.file.read_text().splitlines() if self.file.exists() else []
+
+
+@pytest.fixture(scope="session")
+def network_library(tmp_path_factory: pytest.TempPathFactory) -> Path | None:
+    """The built library; None where the tests that need a compiler are left out."""
+    if "sitl" in WITHOUT:
+        return None
+    if not shutil.which("gcc"):
+        pytest.fail("needs gcc (Debian: apt-get install gcc); or E2EFLY_WITHOUT=sitl to go without")
+    built = tmp_path_factory.mktemp("network") / "network_trace.so"
+    source = Path(__file__).with_name("network_trace.c")
+    subprocess.run(["gcc", "-O2", "-Wall", "-Werror", "-shared", "-fPIC", "-o", built, source, "-ldl"], check=True)
+    return built
+
+
+@pytest.fixture
+def network(network_library: Path | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> NetworkTrace:
+    """Watches what is started from here on."""
+    trace = NetworkTrace(tmp_path / "network.txt")
+    if network_library is not None:
+        monkeypatch.setenv("LD_PRELOAD", str(network_library))
+        monkeypatch.setenv("E2EFLY_NETWORK_TRACE", str(trace.file))
+    return trace
 
 
 def pytest_configure(config: pytest.Config) -> None:

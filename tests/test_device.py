@@ -5,8 +5,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from jax._src import compilation_cache
 
-from e2efly.device import wide_vectors
+from e2efly.compiled import check_programs
+from e2efly.device import programs_folder, wide_vectors
 
 GRADIENT = """
 import dataclasses, resource
@@ -29,6 +31,51 @@ def test_the_gradient_of_a_few_vehicles_compiles_in_little_memory(tmp_path: Path
     file.write_text(GRADIENT)
     done = subprocess.run([sys.executable, str(file)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+DAMAGED = """
+import sys
+from pathlib import Path
+from e2efly.device import prepare
+prepare("cpu")
+import jax, jax.numpy as jnp
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+def computed():
+    jax.clear_caches()
+    return float(jax.jit(lambda x: jnp.sum(jnp.sin(x) * 3))(jnp.arange(5.0)))
+first = computed()
+(file,) = Path(sys.argv[1]).glob("e2efly/programs/jit__lambda*-cache")
+whole = file.read_bytes()
+assert computed() == first
+for damaged in (whole[:1000] + bytes([whole[1000] ^ 16]) + whole[1001:], whole[:-20], b""):
+    file.write_bytes(damaged)
+    assert computed() == first
+    print(file)
+    assert len(file.read_bytes()) > 1000
+"""
+
+
+def test_a_damaged_compiled_program_is_told_of_and_compiled_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without its digest, one flipped bit crashes the process, or computes something else."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    done = subprocess.run([sys.executable, "-c", DAMAGED, str(tmp_path)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    files = done.stdout.splitlines()
+    assert len(files) == 3
+    assert done.stderr.splitlines() == [f"{file} is damaged: its program is compiled anew" for file in files]
+
+
+def test_a_cache_that_the_user_names_stays_in_jaxs_own_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compilation_cache, "get_file_cache", compilation_cache.get_file_cache)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    check_programs()
+    for folder, checked in ((programs_folder(), True), (tmp_path / "shared", False)):
+        cache, _ = compilation_cache.get_file_cache(str(folder))
+        cache.put("key", b"program")
+        assert cache.get("key") == b"program"
+        assert ((folder / "key-cache").read_bytes() == b"program") is not checked
 
 
 def test_many_vehicles_have_wide_vectors() -> None:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ from e2efly.commands.evaluate import config_from_contract, fly_suites
 from e2efly.deploy.policy import load_policy
 from e2efly.vehicles import vehicle_names
 from e2efly.zoo import FOLDER, USUAL, beside, contents, policy_path
+from tests.conftest import QUICK, NetworkTrace
 
 POLICIES = [(vehicle, task) for vehicle, tasks in contents().items() for task in tasks]
 
@@ -47,9 +49,27 @@ def test_a_task_is_the_name_of_its_policy(tmp_path: Path) -> None:
     assert beside(FOLDER / USUAL / "hover.onnx") == Path("runs/zoo-hover-vis_r")
 
 
-def test_eval_by_name_works_at_once_and_writes_nothing_into_the_package(tmp_path: Path) -> None:
+def test_eval_by_name_works_at_once_writes_nothing_into_the_package_and_reaches_nobody(
+    tmp_path: Path, network: NetworkTrace
+) -> None:
     command = [sys.executable, "-m", "e2efly", "eval", "hover", "--episodes", "20", "--json", "report.json"]
-    subprocess.run(command, cwd=tmp_path, env=os.environ, check=True, stdout=subprocess.DEVNULL)
+    environment = os.environ | {"XLA_FLAGS": QUICK}
+    subprocess.run(command, cwd=tmp_path, env=environment, check=True, stdout=subprocess.DEVNULL)
     assert json.loads((tmp_path / "report.json").read_text())["criteria"]["hover"]["mean"]["success"] == 1.0
     assert (tmp_path / "runs/zoo-hover-vis_r/plots/errors.png").exists()
     assert not (FOLDER / USUAL / "plots").exists()
+    assert network.left() == []
+
+
+def test_a_damaged_file_of_the_zoo_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(FOLDER, tmp_path / "zoo")
+    monkeypatch.setattr("e2efly.zoo.FOLDER", tmp_path / "zoo")
+    hover, index = tmp_path / "zoo" / USUAL / "hover.onnx", tmp_path / "zoo" / "zoo.json"
+    assert policy_path(Path("hover")) == hover
+    shutil.copy(hover.with_name("land.onnx"), hover)
+    with pytest.raises(ValueError, match=r"hover\.onnx: SHA-256 is \w+, another than zoo\.json says; install"):
+        policy_path(Path("hover"))
+    for text in ("", "{", "[1]", '{"vis_r": 1}', '{"vis_r": {"hover": []}}', "[" * 100_000):
+        index.write_text(text)
+        with pytest.raises(ValueError, match=r"zoo\.json: damaged .*; install e2efly again"):
+            policy_path(Path("hover"))

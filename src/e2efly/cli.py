@@ -107,9 +107,9 @@ class Export:
     """Write policy.onnx from the checkpoint of a run."""
 
     run: tyro.conf.Positional[Path]
-    """A run directory."""
+    """A run directory; or a policy.onnx of an older e2efly, to give it the digest that is checked when it is loaded."""
     out: Path | None = None
-    """The file to write; RUN/policy.onnx when left out."""
+    """The file to write; RUN/policy.onnx, or the older file itself, when left out."""
     which: Literal["best", "last"] = "best"
     """The best policy by evaluation, or the last."""
 
@@ -207,13 +207,9 @@ class List:
     """What there is: tasks, algorithms, presets, vehicles, tracks, references, command modes, reward terms."""
 
 
-def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
-    """The options of `train` for a task, algorithm and preset: a dataclass and its defaults.
-
-    Raises:
-        ValueError: for an unknown name.
-    """
-    config = presets.preset(task, algo, preset)
+def train_options(config: TrainConfig, preset: str) -> tuple[type, Any]:
+    """The options of `train`: a dataclass and its defaults, which are those of a configuration."""
+    task, algo = presets.task_name(config.task), presets.algorithm_name(config.algo)
     arg = tyro.conf.arg
     every = [
         ("task_name", tyro.conf.Positional[Annotated[str, arg(metavar="TASK", help=_tasks())]]),
@@ -222,7 +218,10 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
         ("vehicle", Annotated[str, arg(help="A shipped vehicle, or the path of a .toml file.")]),
         ("seed", Annotated[int, arg(help="Seed of everything random.")]),
         ("out", Annotated[Path | None, arg(help="Run directory; runs/TASK-ALGO-SEED when left out.")]),
-        ("resume", Annotated[bool, arg(help="Go on with the unfinished run in --out.")]),
+        (
+            "resume",
+            Annotated[bool, arg(help="Go on with the run in --out. `e2efly train --resume DIR` is enough.")],
+        ),
         ("device", Annotated[Literal["cpu", "gpu"] | None, arg(help="Where to compute.")]),
         ("plots", Annotated[bool, arg(help="Evaluate and draw plots at the end.")]),
         ("steps", Annotated[int, arg(help="Environment steps of the whole run.")]),
@@ -255,9 +254,8 @@ def train_options(task: str, algo: str, preset: str) -> tuple[type, Any]:
     return options, defaults
 
 
-def train_config(options: Any) -> TrainConfig:
-    """The `TrainConfig` of parsed options."""
-    config = presets.preset(options.task_name, options.algo_name, options.preset)
+def train_config(options: Any, config: TrainConfig) -> TrainConfig:
+    """The `TrainConfig` of parsed options, whose defaults were those of a configuration."""
     shared = {f.name: getattr(options, f.name) for f in dataclasses.fields(config)}
     shared["curriculum"] = config.curriculum if options.curriculum else ()
     changes = options.reward
@@ -325,21 +323,61 @@ def _train(arguments: list[str]) -> int:
     from e2efly.commands.train import train_command
 
     return train_command(
-        config, out, resume=parsed.resume, device=parsed.device, plots=parsed.plots, hosts=parsed.hosts
-    )
+        config, out, resume=parsed.resume, device=parsed.device, plots=parsed.plots, hosts=parsed.hosts,
+        arguments=arguments,
+    )  # fmt: skip
 
 
 def _parsed(arguments: list[str]) -> tuple[Any, TrainConfig]:
     """The options of `train` and the configuration that they make."""
+    arguments = _with_folder(arguments)
+    if "--resume" in arguments and (not arguments or arguments[0].startswith("-")) and "--help" not in arguments:
+        return _parsed_of_run(arguments)
     task = next((a for a in arguments[:1] if not a.startswith("-")), "hover")
     algo = _peek(arguments, "--algo", presets.default_algorithm(task))
-    options, defaults = train_options(task, algo, _peek(arguments, "--preset", "ours"))
+    preset = _peek(arguments, "--preset", "ours")
+    config = presets.preset(task, algo, preset)
+    options, defaults = train_options(config, preset)
     if arguments[:1] != [task] and not {"-h", "--help"} & set(arguments):
         raise ValueError(f"train needs a task first: {_join(presets.TASKS)}")
     parsed = tyro.cli(
         options, default=defaults, args=arguments, prog="e2efly train", config=(tyro.conf.AvoidSubcommands,)
     )
-    return parsed, train_config(parsed)
+    return parsed, train_config(parsed, config)
+
+
+def _with_folder(arguments: list[str]) -> list[str]:
+    """`--resume DIR` as `--out DIR --resume`."""
+    for i, argument in enumerate(arguments):
+        if argument.startswith("--resume="):
+            return [*arguments[:i], "--out", argument.removeprefix("--resume="), "--resume", *arguments[i + 1 :]]
+        if argument == "--resume" and i + 1 < len(arguments) and not arguments[i + 1].startswith("-"):
+            return [*arguments[:i], "--out", arguments[i + 1], "--resume", *arguments[i + 2 :]]
+    return arguments
+
+
+def _parsed_of_run(arguments: list[str]) -> tuple[Any, TrainConfig]:
+    """As `_parsed`, of a run that goes on, where no task is named: everything comes from the run.
+
+    Raises:
+        ValueError: when there is no such run, or an option says otherwise.
+    """
+    from e2efly.learn.rundir import RunDirectory
+
+    out = _peek(arguments, "--out", "")
+    if not out:
+        raise ValueError("--resume names no run; accepted: the run's folder, as in `e2efly train --resume DIR`")
+    config = RunDirectory(Path(out)).config()
+    options, defaults = train_options(config, "the run")
+    parsed = tyro.cli(
+        options, default=defaults, args=[presets.task_name(config.task), *arguments], prog="e2efly train",
+        config=(tyro.conf.AvoidSubcommands,),
+    )  # fmt: skip
+    for name in ("algo_name", "preset"):
+        if (said := getattr(parsed, name)) != (known := getattr(defaults, name)):
+            option = f"--{name.removesuffix('_name')}"
+            raise ValueError(f"{option} is {said}, but {out} goes on as it began ({known}); accepted: to leave it out")
+    return parsed, train_config(parsed, config)
 
 
 def _sweep(arguments: list[str]) -> int:

@@ -14,6 +14,11 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "e2efly"
 
 
+def programs_folder() -> Path:
+    """Where compiled programs are kept."""
+    return cache_folder() / "programs"
+
+
 XLA_OPTIONS = {
     # a loop over small arrays runs as one machine function instead of a task for each of its operations
     "xla_backend_extra_options": "xla_cpu_small_while_loop_byte_threshold=1000000",
@@ -135,7 +140,7 @@ class Hosts:
 
 
 def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:
-    """Choose the device, set `XLA_OPTIONS` and turn on the persistent compilation cache.
+    """Choose the device, set `XLA_OPTIONS` and turn on the persistent compilation cache, with digests.
 
     What JAX's own variables and XLA_FLAGS say stays. Call it before anything computes with JAX.
 
@@ -151,8 +156,11 @@ def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:
         raise ValueError(f"--device is {device!r}; accepted: cpu, gpu")
     if device and "jax" not in sys.modules:
         os.environ["JAX_PLATFORMS"] = {"cpu": "cpu", "gpu": "cuda"}[device]
+    from e2efly.compiled import check_programs
+
     set_xla_options()
-    _configure("jax_compilation_cache_dir", str(cache_folder() / "jax"))
+    _configure("jax_compilation_cache_dir", str(programs_folder()))
+    check_programs()
     _configure("jax_persistent_cache_min_compile_time_secs", 0.05)
     _configure("jax_persistent_cache_min_entry_size_bytes", -1)
     hosts.join()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import e2efly
 from e2efly.cli import run
 
 
@@ -99,6 +100,15 @@ def test_bad_input_is_named_with_what_exists(
     assert said in error_of(arguments, capsys)
 
 
+def test_resume_needs_a_run(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "--resume names no run; accepted: the run's folder, as in `e2efly train --resume DIR`" in error_of(
+        ["train", "--resume"], capsys
+    )
+    for arguments in (["--resume", "nowhere"], ["--resume=nowhere"], ["--out", "nowhere", "--resume"]):
+        assert "nowhere holds no run: there is no config.json" in error_of(["train", *arguments], capsys)
+    assert not Path("nowhere").exists()
+
+
 def test_a_folder_that_cannot_be_made_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     assert "cannot make --out" in error_of(["train", "hover", "--out", str(tmp_path / "file/run")], capsys)
@@ -151,6 +161,9 @@ def test_train_eval_export_and_plots_end_to_end(tmp_path: Path, capsys: pytest.C
     folder = tmp_path / "run"
     flags = ["--steps", "2048", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16", "--algo.horizon", "16",
              "--algo.minibatch", "128", "--task.episode-s", "1"]  # fmt: skip
+    mine = tmp_path / "mine.toml"
+    mine.write_text((Path(e2efly.__file__).parent / "vehicles/vis_r.toml").read_text())
+    flags += ["--vehicle", str(mine)]
     assert run(["train", "hover", "--out", str(folder), *flags]) == 0
     files = ("config.json", "versions.json", "metrics.csv", "summary.json", "policy.onnx", "checkpoint.safetensors")
     for name in (*files, *(f"plots/{plot}.png" for plot in ("learning", "errors", "flights_hover", "time_hover"))):
@@ -167,9 +180,33 @@ def test_train_eval_export_and_plots_end_to_end(tmp_path: Path, capsys: pytest.C
     before = (folder / "policy.onnx").read_bytes()
     assert run(["export", str(folder)]) == 0
     assert (folder / "policy.onnx").read_bytes() == before
+    older = tmp_path / "older.onnx"
+    older.write_bytes(before[: before.rindex(b"\x72\x4a\x0a\x06sha256")])
+    assert "of an older e2efly" in error_of(["eval", str(older)], capsys)
+    assert run(["export", str(older)]) == 0
+    assert older.read_bytes() == before
+    assert "has a digest already" in error_of(["export", str(older)], capsys)
     (folder / "policy.onnx").write_bytes(before[:100])
     assert "policy.onnx" in error_of(["eval", str(folder)], capsys)
     assert "already holds a run" in error_of(["train", "hover", "--out", str(folder)], capsys)
     assert "seed: 0 and 3" in error_of(
         ["train", "hover", "--out", str(folder), *flags, "--seed", "3", "--resume"], capsys
     )
+    (folder / "policy.onnx").write_bytes(before)
+    for options, said in (
+        (["--seed", "3"], "another configuration: seed: 0 and 3"),
+        (["--algo", "bptt"], f"--algo is bptt, but {folder} goes on as it began (ppo); accepted: to leave it out"),
+        (["--preset", "paper"], "--preset is paper, but"),
+        (["--task.target", "0", "0", "4"], "another configuration: task.target: (0.0, 0.0, 3.0) and (0.0, 0.0, 4.0)"),
+    ):
+        assert said in error_of(["train", "--resume", str(folder), *options], capsys)
+    mine.write_text(mine.read_text().replace("value = 0.75\n", "value = 0.9\n", 1))  # the mass
+    for command in (["eval"], ["export"], ["validate"], ["fly"], ["train", "--resume"]):
+        said = error_of([*command, str(folder)], capsys)
+        assert f"{mine} has changed: its SHA-256 is" in said, command
+        assert f"but the run was made with {folder}/inputs/env.vehicle/mine.toml, SHA-256" in said, command
+    assert (folder / "policy.onnx").read_bytes() == before
+    mine.unlink()  # what is moved or deleted does not matter
+    assert run(["export", str(folder)]) == 0
+    assert (folder / "policy.onnx").read_bytes() == before
+    assert "--link tcp:127.0.0.1:1: " in error_of(["fly", str(folder), "--link", "tcp:127.0.0.1:1"], capsys)

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from e2efly.commands.sweep import Request, trials_of
+from tests.conftest import NetworkTrace
 
 SMALL = ["steps=6144", "chunk=2", "eval-episodes=20", "algo.envs=16", "algo.horizon=16", "algo.minibatch=128",
          "task.episode-s=1"]  # fmt: skip
@@ -67,7 +68,7 @@ def test_too_little_is_refused(name: str, value: int) -> None:
         list(trials_of(dataclasses.replace(request(), **{name: value})))
 
 
-def test_a_sweep_trains_on_ray_and_nothing_twice(tmp_path: Path) -> None:
+def test_a_sweep_trains_on_ray_on_this_machine_alone_and_nothing_twice(tmp_path: Path, network: NetworkTrace) -> None:
     flags = ["--seeds", "1", "--vary", *SMALL, "network.hidden=8,8 8"]
     first = sweep(tmp_path, *flags)
     told, _ = first.communicate()
@@ -87,6 +88,7 @@ def test_a_sweep_trains_on_ray_and_nothing_twice(tmp_path: Path) -> None:
     told, _ = other.communicate()
     assert other.returncode == 2
     assert "another configuration: algo.gamma: 0.96 and 0.9" in " ".join(told.split())
+    assert network.left() == []  # neither Ray's processes nor the trainings
 
 
 def test_a_run_that_was_cut_goes_on_and_a_lost_worker_is_replaced(tmp_path: Path) -> None:

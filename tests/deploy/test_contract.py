@@ -209,7 +209,7 @@ def test_what_is_no_contract_is_refused(text: str) -> None:
 
 
 def test_a_key_that_is_there_twice_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"a key is there twice among .*task"):
+    with pytest.raises(ValueError, match="key 'task' is there twice"):
         Contract.from_json(json.dumps(EXAMPLE).replace('"task": "hover"', '"task": "race", "task": "hover"'))
 
 

@@ -11,7 +11,7 @@ from e2efly.deploy.msp import messages, settings
 from e2efly.deploy.msp.client import FORGOTTEN, MAX_BACKLOG, MAX_IN_FLIGHT, SCHEDULE, TIMEOUT, Client, ask
 from e2efly.deploy.msp.codec import ERROR, REPLY, Decoder, Frame, encode
 from e2efly.deploy.msp.controller import identify
-from e2efly.deploy.msp.link import open_link
+from e2efly.deploy.msp.link import MOST, open_link
 from tests.deploy.msp_golden import REPLIES, payload
 
 STICKS = messages.set_raw_rc([1500] * 8)
@@ -74,6 +74,24 @@ def test_half_a_reply_that_runs_together_with_the_next_is_not_believed_though_it
     client.poll(0.1)
     assert client.run_together == 1
     assert set(client.latest) == {108}
+
+
+@pytest.mark.parametrize("junk", [bytes(100_000), b"$M>\xfe\x01" * 20_000, encode(Frame(254, bytes(8), REPLY)) * 6000])
+def test_of_a_flood_the_newest_bytes_are_read_and_the_answer_at_its_end_is_found(
+    junk: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wire, fed = Wire(), []
+    client = Client(wire)
+    client.poll(0.0)
+    client.request(108, 1.0)
+    feed = client.decoder.feed
+    monkeypatch.setattr(client.decoder, "feed", lambda data: fed.append(len(data)) or feed(data))
+    wire.inbox = junk
+    wire.answer()
+    client.poll(1.01)
+    assert client.message(108, 1.01, 0.1) == messages.Attitude(0.0, 0.0, 0.0)
+    assert fed == [MOST]
+    assert client.link.inbox == b""  # nothing old waits: what comes next is read at once
 
 
 def test_a_request_without_answer_is_given_up_and_can_be_asked_again() -> None:

@@ -18,7 +18,8 @@ import e2efly.deploy
 from e2efly import presets
 from e2efly.config import NetworkConfig
 from e2efly.deploy.contract import METADATA_KEY
-from e2efly.deploy.policy import Policy, load_policy
+from e2efly.deploy.onnx_file import sealed
+from e2efly.deploy.policy import Policy, load_policy, sealed_policy
 from e2efly.env import Env
 from e2efly.learn.export import contract_of, export_policy, random_observations
 from e2efly.learn.networks import Actor, Weights, init_mlp
@@ -56,7 +57,7 @@ def edited(path: Path, tmp_path: Path) -> Callable[[Change], Path]:
         model = onnx.load(str(path))
         change(model)
         out = tmp_path / "edited.onnx"
-        out.write_bytes(model.SerializeToString())
+        out.write_bytes(sealed(model.SerializeToString()))
         return out
 
     return edit
@@ -200,8 +201,87 @@ def test_a_truncated_file_is_refused(path: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["nowhere.onnx", ".", "text.onnx"])
 def test_what_is_no_policy_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "text.onnx").write_text("policy")
-    with pytest.raises(ValueError, match=r"cannot be read: .*accepted: the path|not an ONNX file"):
+    with pytest.raises(ValueError, match=r"cannot be read: .*accepted: the path|no digest at its end: it is cut short"):
         load_policy(tmp_path / name)
+
+
+def test_every_flipped_bit_is_found(path: Path, tmp_path: Path) -> None:
+    content, out = path.read_bytes(), tmp_path / "flipped.onnx"
+    bits = [
+        *np.random.default_rng(0).integers(0, 8 * len(content), 200),
+        *range(8 * len(content) - 640, 8 * len(content)),
+    ]
+    for bit in bits:
+        flipped = bytearray(content)
+        flipped[bit // 8] ^= 1 << bit % 8
+        out.write_bytes(flipped)
+        with pytest.raises(
+            ValueError, match=rf"^{re.escape(str(out))}: (damaged: its SHA-256 is|no digest at its end)"
+        ):
+            load_policy(out)
+
+
+def test_a_file_of_an_older_version_is_refused_until_it_has_its_digest(path: Path, tmp_path: Path) -> None:
+    model = onnx.load(str(path))
+    helper.set_model_props(model, {METADATA_KEY: model.metadata_props[0].value})
+    older = tmp_path / "older.onnx"
+    older.write_bytes(model.SerializeToString())
+    with pytest.raises(ValueError, match=r"older e2efly; accepted: .*or an older one behind `e2efly export FILE"):
+        load_policy(older)
+    content = sealed_policy(older)
+    assert content == path.read_bytes()
+    with pytest.raises(ValueError, match="has a digest already"):
+        sealed_policy(path)
+    older.write_text("policy")
+    with pytest.raises(ValueError, match=f"^{re.escape(str(older))}: not an ONNX file"):
+        sealed_policy(older)
+
+
+def _endless(model: onnx.ModelProto) -> None:
+    """The action comes out of a loop of 2^62 rounds."""
+    model.graph.node[-1].output[0] = "squashed"
+    names = ("round", "go_on", "carried", "still", "next")
+    number, truth, action = (
+        helper.make_tensor_value_info(name, kind, shape)
+        for name, kind, shape in ((names[0], TensorProto.INT64, []), (names[1], TensorProto.BOOL, []),
+                                  (names[2], TensorProto.FLOAT, ["n", 4]))
+    )  # fmt: skip
+    ends = [helper.make_tensor_value_info("still", TensorProto.BOOL, []),
+            helper.make_tensor_value_info("next", TensorProto.FLOAT, ["n", 4])]  # fmt: skip
+    nodes = [helper.make_node("Identity", ["go_on"], ["still"]), helper.make_node("Identity", ["carried"], ["next"])]
+    body = helper.make_graph(nodes, "body", [number, truth, action], ends)
+    model.graph.initializer.append(numpy_helper.from_array(np.array(2**62), "rounds"))
+    model.graph.initializer.append(numpy_helper.from_array(np.array(True), "begin"))
+    model.graph.node.append(helper.make_node("Loop", ["rounds", "begin", "squashed"], ["action"], body=body))
+
+
+def _elsewhere(model: onnx.ModelProto) -> None:
+    """The first weights lie in another file."""
+    tensor = next(tensor for tensor in model.graph.initializer if tensor.name == "weight_0")
+    tensor.ClearField("raw_data")
+    tensor.data_location = TensorProto.EXTERNAL
+    tensor.external_data.add(key="location", value="weights.bin")
+
+
+def _functions(model: onnx.ModelProto) -> None:
+    node = helper.make_node("Tanh", ["x"], ["y"])
+    model.functions.append(helper.make_function("own", "Squash", ["x"], ["y"], [node], model.opset_import))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (_endless, "has a graph inside of a node, as If, Loop and Scan have: it may never end; accepted: a graph as"),
+        (_elsewhere, "has numbers in another file; accepted: a graph as"),
+        (_functions, "has functions of its own; accepted: a graph as"),
+    ],
+)
+def test_a_graph_that_may_never_end_or_reads_other_files_is_refused(
+    edited: Callable[[Change], Path], change: Change, message: str
+) -> None:
+    out = edited(change)
+    with pytest.raises(ValueError, match=re.escape(f"{out}: {message}")):
+        load_policy(out)
 
 
 def _metadata(text: str) -> Change:
@@ -284,7 +364,7 @@ def test_a_file_that_contradicts_its_contract_is_refused(
 def test_metadata_that_is_no_text_is_refused(path: Path, tmp_path: Path) -> None:
     content, out = path.read_bytes(), tmp_path / "bytes.onnx"
     assert content.count(b'"task"') == 1
-    out.write_bytes(content.replace(b'"task"', b'"t\xff\xfek"'))
+    out.write_bytes(sealed(content.replace(b'"task"', b'"t\xff\xfek"')))
     with pytest.raises(ValueError, match=re.escape(str(out))):
         load_policy(out)
 

@@ -19,6 +19,7 @@ from e2efly.config import NetworkConfig
 from e2efly.deploy import policy_worker, runtime
 from e2efly.deploy.goal_options import GoalOptions, goal_for
 from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.onnx_file import sealed
 from e2efly.deploy.policy import load_policy
 from e2efly.deploy.policy_worker import PolicyWorker
 from e2efly.deploy.runtime import Runtime
@@ -121,7 +122,7 @@ def test_a_policy_of_nan_is_a_problem_and_decides_nothing(policy_file: Path, tmp
     for name, value in (("one", 1.0), ("zero", 0.0)):
         model.graph.initializer.append(onnx.numpy_helper.from_array(np.array(value, np.float32), name))
     path = tmp_path / "policy.onnx"
-    onnx.save(model, str(path))
+    path.write_bytes(sealed(model.SerializeToString()))
     worker = workers(of=flight(path))
     at_goal = np.asarray(worker.runtime.goal.position(None, START))
     worker.start(dataclasses.replace(STILL, position=at_goal), START)

@@ -142,7 +142,7 @@ def test_a_body_of_another_name_is_named(server: Server) -> None:
     source = opened(f"mocap:optitrack:{server.host}:drone")
     until(lambda: source.read(time.monotonic()) == [] and source.problem is not None, source)
     assert source.problem is not None
-    assert "rigid body 'drone' is not tracked; there are: quad" in source.problem
+    assert "rigid body 'drone' is not tracked; there are: 'quad'" in source.problem
     source.close()
 
 

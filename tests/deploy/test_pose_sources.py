@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from e2efly.deploy.odometry import Sample
-from e2efly.deploy.pose.json_source import LONGEST, Lines, TcpSource, UdpSource, parse_pose
+from e2efly.deploy.pose.json_source import DRAIN, LONGEST, Lines, TcpSource, UdpSource, parse_pose
+from e2efly.deploy.pose.relay import RelaySource
 from e2efly.deploy.pose.source import LARGEST_BATCH, PlantSource, PoseSource, open_source
 
 POSE = {"position": [1, 2.5, -3], "quaternion": [0.5, 0.5, -0.5, 0.5]}
@@ -76,7 +78,10 @@ def test_a_short_message_says_nothing_of_the_rest() -> None:
         (encode(position=[10**400, 0, 0]), "pose: position is 1000"),
         (encode(stamp="now"), "pose: stamp is 'now'; accepted: a finite number of seconds"),
         (encode(frame=3), "pose: frame is 3; accepted: a text"),
-        (b'{"position": [0, 0, 0], "position": [1, 1, 1], "quaternion": [1, 0, 0, 0]}', "a key is there twice"),
+        (
+            b'{"position": [0, 0, 0], "position": [1, 1, 1], "quaternion": [1, 0, 0, 0]}',
+            "key 'position' is there twice",
+        ),
         (encode(frame="x" * LONGEST), f"accepted: at most {LONGEST}"),
     ],
 )
@@ -104,8 +109,8 @@ def test_lines_are_the_same_however_the_stream_is_cut(lines: list[bytes], cuts: 
     lines = [line.replace(b"\n", b"") for line in lines]
     stream, out, cutter = b"".join(line + b"\n" for line in lines), [], Lines()
     for cut in [*cuts, len(stream) + 1]:
-        got, overlong = cutter.feed(stream[:cut])
-        assert overlong == 0
+        got, overlong, dropped = cutter.feed(stream[:cut])
+        assert (overlong, dropped) == (0, 0)
         out, stream = out + got, stream[cut:]
     assert out == [line for line in lines if line.strip()]
 
@@ -113,10 +118,10 @@ def test_lines_are_the_same_however_the_stream_is_cut(lines: list[bytes], cuts: 
 def test_an_overlong_line_is_dropped_once_and_the_next_is_whole() -> None:
     cutter, dropped = Lines(), 0
     for _ in range(10):
-        lines, overlong = cutter.feed(b"x" * LONGEST)
+        lines, overlong, _ = cutter.feed(b"x" * LONGEST)
         assert lines == []
         dropped += overlong
-    lines, overlong = cutter.feed(b"xxx\ngood\n")
+    lines, overlong, _ = cutter.feed(b"xxx\ngood\n")
     assert (lines, dropped + overlong) == ([b"good"], 1)
 
 
@@ -162,6 +167,55 @@ def test_of_a_flood_the_newest_are_kept(udp: tuple) -> None:
     assert [sample.stamp for sample in samples] == list(range(LARGEST_BATCH, 2 * LARGEST_BATCH))
     assert source.refused == LARGEST_BATCH
     assert "the oldest were dropped" in source.problem
+
+
+@pytest.mark.parametrize("message", [encode(), encode(colour=1), b"x" * 4000])
+def test_the_work_of_a_read_is_bounded_whatever_comes(
+    udp: tuple, message: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, _ = udp
+    source.close()
+    taken, parsed = count_endless(source, message, monkeypatch)
+    assert taken == DRAIN
+    assert parsed == LARGEST_BATCH <= 20  # some 0.1 ms each, of the 10 ms of a control step
+    assert source.refused >= DRAIN - LARGEST_BATCH
+
+
+def count_endless(source: UdpSource, message: bytes, monkeypatch: pytest.MonkeyPatch) -> tuple[int, int]:
+    """Datagrams that one read takes of a socket that never runs dry, and those that it parses."""
+    counts = {"taken": 0, "parsed": 0}
+
+    class Endless:
+        def recvmsg(self, *_: int) -> tuple:
+            counts["taken"] += 1
+            return message, [], 0, None
+
+    def parse(content: bytes, received: float) -> Sample:
+        counts["parsed"] += 1
+        return parse_pose(content, received)
+
+    monkeypatch.setattr(source, "_socket", Endless())
+    monkeypatch.setattr(source._inbox, "_parse", parse)
+    source.read(0.0)
+    return counts["taken"], counts["parsed"]
+
+
+def test_in_a_flood_that_goes_on_the_newest_pose_is_as_new_as_the_read(udp: tuple) -> None:
+    """The kernel keeps the oldest datagrams: its buffer must be small enough to be emptied by one read."""
+    source, send = udp
+    for k in range(2000):
+        send(encode(stamp=k))
+    source.read(time.monotonic())
+    send(encode(stamp=2000))
+    assert [sample.stamp for sample in source.read(time.monotonic())] == [2000]
+
+
+@pytest.mark.parametrize("key", [r"\ud800", r"\u001b[2K\rPOLICY: all is well", r"\u202e"])
+@pytest.mark.parametrize("form", ['{"%s": 1}', '{"%s": 1, "%s": 2}', '{"frame": {"%s": 1}}'])
+def test_keys_from_outside_are_shown_by_their_escapes(key: str, form: str) -> None:
+    with pytest.raises(ValueError, match="pose: ") as caught:
+        parse_pose(form.replace("%s", key).encode(), 0.0)
+    assert str(caught.value).isprintable()
 
 
 def test_reading_a_closed_source_gives_nothing(udp: tuple) -> None:
@@ -240,6 +294,29 @@ def test_of_lines_without_stamps_read_at_once_the_newest_counts(server: socket.s
     source.close()
 
 
+def test_of_many_lines_the_newest_are_cut_out_and_the_others_counted() -> None:
+    cutter = Lines()
+    assert cutter.feed(b"half", 3) == ([], 0, 0)
+    assert cutter.feed(b" a line\n" + b"".join(b"%d\n" % k for k in range(9)) + b"re", 3) == ([b"6", b"7", b"8"], 0, 7)
+    assert cutter.feed(b"st\n", 3) == ([b"rest"], 0, 0)
+    assert cutter.feed(b"x" * 5000, 3) == ([], 1, 0)
+    assert cutter.feed(b"x\n1\n2\n3\n4\n", 3) == ([b"2", b"3", b"4"], 0, 2)
+    assert cutter.feed(b"5\n", 3) == ([b"5"], 0, 0)
+
+
+def test_of_a_flood_over_tcp_the_newest_lines_are_kept(server: socket.socket) -> None:
+    source = open_source(f"tcp:127.0.0.1:{server.getsockname()[1]}")
+    source.read(time.monotonic())
+    link, _ = server.accept()
+    link.sendall(b"".join(encode(stamp=k) + b"\n" for k in range(500)))
+    time.sleep(0.05)
+    samples = gather(source, 1)
+    assert [sample.stamp for sample in samples] == list(range(500 - LARGEST_BATCH, 500))
+    assert source.refused == 500 - LARGEST_BATCH
+    link.close()
+    source.close()
+
+
 def test_a_server_that_is_not_there_is_tried_again_in_time(server: socket.socket) -> None:
     port = server.getsockname()[1]
     server.close()
@@ -268,6 +345,20 @@ def test_a_server_that_is_not_there_is_tried_again_in_time(server: socket.socket
 def test_a_host_without_an_address_is_refused() -> None:
     with pytest.raises(ValueError, match=r"tcp:no\.such\.host\.invalid:5000: 'no\.such\.host\.invalid' has no address"):
         open_source("tcp:no.such.host.invalid:5000")
+
+
+# Relays
+
+
+def test_what_a_relay_says_is_shown_by_its_escapes(tmp_path: Path) -> None:
+    relay = tmp_path / "relay"
+    relay.write_text("#!/bin/sh\nprintf 'ready \\033[1mfake\\nproblem \\033[2K\\rall is well\\n'\ncat\n")
+    relay.chmod(0o755)
+    source = RelaySource("mocap", str(relay))
+    until(lambda: source.read(time.monotonic()) == [] and source.problem is not None, source)
+    source.close()
+    assert source.describe() == r"mocap (\x1b[1mfake)"
+    assert source.problem is not None and source.problem.isprintable()
 
 
 # Plant

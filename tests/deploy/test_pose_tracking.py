@@ -126,6 +126,50 @@ def test_outliers_pass_by() -> None:
     assert [reason is None for _, reason in out] == [k % 7 != 3 for k in range(70)]
 
 
+def spinning(time: float, rate: float = 25.0) -> Sample:
+    """A vehicle that flies at 8 m/s and turns fast about its z axis."""
+    return sample(time, x=8 * time, quaternion=turned(rate * time), velocity=np.array([8.0, 0, 0]),
+                  body_rate=np.array([0, 0, rate]))  # fmt: skip
+
+
+@pytest.mark.parametrize("ahead", [0.4, 0.6, 1.5, 3.0, -0.9, -1.5])
+def test_the_true_pose_after_an_outlier_passes_however_fast_the_vehicle_turns(ahead: float) -> None:
+    """An outlier on the side that the vehicle turns to is nearer to the next true pose than the last good one is."""
+    state, _ = fly(Checks(), [spinning(k * T) for k in range(50)])
+    outlier = replace(spinning(0.5), quaternion=turned(25 * 0.5 + ahead))
+    _, out = fly(Checks(), [outlier, *(spinning(0.51 + k * T) for k in range(20))], state)
+    assert out[0][1].startswith("jump: by")
+    assert [reason for _, reason in out[1:]] == [None] * 20
+
+
+@pytest.mark.parametrize("ahead", [0.4, 1.5, -0.9])
+def test_a_lasting_turn_of_the_pose_never_passes_however_fast_the_vehicle_turns(ahead: float) -> None:
+    state, _ = fly(Checks(), [spinning(k * T) for k in range(50)])
+    lasting = [replace(spinning(0.5 + k * T), quaternion=turned(25 * (0.5 + k * T) + ahead)) for k in range(100)]
+    _, out = fly(Checks(), lasting, state)
+    assert all(odometry is None for odometry, _ in out)
+    assert "a fault until" in out[-1][1]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_jump_is_refused_that_its_own_text_accepts(seed: int) -> None:
+    """Outliers of all sizes among fast motion: what is refused by its size is beyond what the text accepts."""
+    random, state, said = np.random.default_rng(seed), Track(), []
+    for k in range(300):
+        one = spinning(k * 0.007)
+        if random.random() < 0.3:
+            off, angle = random.uniform(-0.4, 0.4, 3), random.uniform(-1.5, 1.5)
+            one = replace(one, position=one.position + off, quaternion=turned(25 * k * 0.007 + angle))
+        state, _, reason = track(Checks(jump_count=1000), state, one)
+        said.append(reason or "")
+    by = [re.match(r"jump: by (\S+) m and (\S+) rad within .* at most (\S+) m and (\S+) rad", text) for text in said]
+    numbers = [tuple(map(float, match.groups())) for match in by if match]
+    assert len(numbers) > 20
+    assert all(step >= reach or angle >= turn for step, angle, reach, turn in numbers)
+    near = [re.match(r"jump: (\S+) m and (\S+) rad from .* now (\S+) m and (\S+) rad away", text) for text in said]
+    assert all(match for match, text in zip(near, said, strict=True) if text.startswith("jump") and "by" not in text)
+
+
 def test_flight_at_the_limits_of_the_vehicle_is_no_jump() -> None:
     s = np.arange(0, 4, T)
     x, angle = 3 * np.sin(14 / 3 * s), 25 * s  # up to 14 m/s and 65 m/s^2; 25 rad/s

@@ -1,13 +1,15 @@
 """Braking without odometry: by the velocity seen last, carried on by accelerometer and attitude."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
+from e2efly.deploy.hover import blind_time
 from e2efly.deploy.msp.messages import Attitude
 from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.reckoning import BRAKE_S, LONGEST_STEP, Reckoning, reckon, seen, settle, trimmed
+from e2efly.deploy.reckoning import BRAKE_S, DOUBT, LONGEST_STEP, Reckoning, reckon, seen, settle, trimmed
 from e2efly.vehicles.vehicle import GRAVITY
 
 DT = 0.02
@@ -37,44 +39,80 @@ def test_it_brakes_whatever_the_error_of_the_heading_once_that_is_known(yaw: flo
         lifted = GRAVITY / (math.cos(roll) * math.cos(pitch))
         velocity += lifted * complex(math.cos(roll) * math.sin(pitch), -math.sin(roll)) * np.exp(1j * yaw) * DT
         now = (k + 1) * DT
-        known = reckon(known, attitude, (0.0, 0.0, lifted), now)
+        known = reckon(known, attitude, (0.0, 0.0, lifted), (lifted, 0.0), now)
         if sees:
             known = seen(moving(velocity, yaw + error), now, error)
         assert known is not None
-        wanted = settle(attitude, now, known.velocity).rate
+        wanted = settle(attitude, dataclasses.replace(known, since=0.0)).rate
         roll, pitch = roll + float(wanted.x) * DT, pitch + float(wanted.y) * DT
         assert abs(velocity) < 1.75
     assert abs(velocity) < 0.35
 
 
-@pytest.mark.parametrize("wrong", [0.75, 1.0, 1.3])
-@pytest.mark.parametrize("climb", [-1.0, 0.0, 2.0])
-def test_it_sinks_though_the_throttle_map_is_wrong(wrong: float, climb: float) -> None:
-    """The thrust that comes is another than the one that is asked for; the height is reckoned, too."""
-    level, trim, up, height = Attitude(0.0, 0.0, 0.0), 0.0, climb, 1.0
-    odometry = Odometry(
-        0.0, np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, climb]), np.array([1.0, 0, 0, 0]), np.zeros(3)
-    )
+LEVEL = Attitude(0.0, 0.0, 0.0)
+
+
+def descent(
+    height: float, climb: float, *, scale: float = 1.0, wrong: float = 1.0, doubt: float = 0.01
+) -> list[tuple[float, float, float]]:
+    """Time, s, height, m, and vertical speed, m/s, until it touches.
+
+    Args:
+        height: in which the odometry is lost, m.
+        climb: then, m/s.
+        scale: of the accelerometer; 1: right.
+        wrong: thrust that comes, over the one that the map promises.
+        doubt: of the map.
+    """
+    odometry = Odometry(0.0, np.array([0, 0, height]), np.array([0, 0, climb]), np.array([1.0, 0, 0, 0]), np.zeros(3))
     known: Reckoning | None = seen(odometry, 0.0)
-    top = height
-    for k in range(round(4.0 / DT)):
+    trim, rows = 0.0, []
+    for k in range(round(20.0 / DT)):
         assert known is not None
-        trim = trimmed(trim, k * DT, known.velocity[2], DT)
-        thrust = wrong * float(settle(level, k * DT, known.velocity, trim).thrust)
-        height, up = height + up * DT, up + (thrust - GRAVITY) * DT
-        known, top = reckon(known, level, (0.0, 0.0, thrust), (k + 1) * DT), max(top, height)
-        assert up < max(climb, 0.0) + 0.4
-        if k * DT > 2.5:
-            assert -1.4 < up < -0.5
-    assert known is not None
-    assert known.height == pytest.approx(height, abs=1e-6) and known.top == pytest.approx(top, abs=1e-6)
+        rows.append((k * DT, height, climb))
+        if height <= 0:
+            return rows
+        trim = trimmed(trim, k * DT, known.climb, DT)
+        promised = float(settle(LEVEL, known, trim).thrust)
+        thrust = wrong * promised
+        height, climb = height + climb * DT, climb + (thrust - GRAVITY) * DT
+        known = reckon(known, LEVEL, (0.0, 0.0, scale * thrust), (promised, doubt * promised), (k + 1) * DT)
+    raise AssertionError(f"still {height:.2f} m high")
 
 
-def test_after_a_pause_nothing_is_known() -> None:
-    level, force = Attitude(0.0, 0.0, 0.0), (0.0, 0.0, GRAVITY)
+@pytest.mark.parametrize("scale", [0.9, 0.93, 0.95, 0.97, 0.98, 1.0, 1.02, 1.05, 1.1, 1.15, 0.0, -1.0])
+@pytest.mark.parametrize("wrong", [0.99, 1.0, 1.01])
+def test_however_wrong_the_accelerometer_it_sinks_by_a_throttle_map_that_is_known(scale: float, wrong: float) -> None:
+    time, height, climb = np.array(descent(2.5, 0.0, scale=scale, wrong=wrong)).T
+    assert height.max() <= 2.5 and climb[time > 1.0].max() < -0.3
+    assert abs(climb[-1]) < 1.5
+    assert time[-1] < blind_time(2.5)  # the throttle is not cut before
+
+
+@pytest.mark.parametrize("wrong", [0.8, 1.2])
+@pytest.mark.parametrize("climb", [-1.0, 0.0, 2.0])
+def test_a_map_that_was_never_learned_leaves_the_word_to_the_accelerometer(wrong: float, climb: float) -> None:
+    time, height, speed = np.array(descent(1.5, climb, wrong=wrong, doubt=0.45)).T
+    assert speed.max() < max(climb, 0.0) + 0.4 and height.max() < 1.5 + max(climb, 0.0) ** 2 / 4 + 0.1
+    assert abs(speed[-1]) < 2.0 and time[-1] < blind_time(1.5, climb)
+
+
+def test_the_speed_is_the_accelerometers_as_far_as_the_throttles_allows() -> None:
+    known = seen(moving(0j, 0.0), 0.0)
+    after = reckon(known, LEVEL, (0.0, 0.0, GRAVITY + 1.0), (GRAVITY - 1.0, 0.5), 0.1)
+    assert after is not None
+    assert after.velocity[2] == pytest.approx(-0.1) and after.lifted == pytest.approx(-0.3)
+    assert after.doubt == pytest.approx(DOUBT + 0.05) and after.climb == pytest.approx(-0.3 + (DOUBT + 0.05) / 2)
+    assert after.height == pytest.approx(after.climb * 0.1)
+
+
+def test_what_is_not_known_is_taken_from_the_other() -> None:
     known = seen(moving(1 + 0j, 0.0), 5.0)
-    assert reckon(known, level, force, 5.0 + LONGEST_STEP + 0.01) is None
-    assert reckon(known, None, force, 5.01) is None
-    assert reckon(None, level, force, 5.01) is None
-    still = reckon(known, level, force, 5.05)
-    assert still is not None and still.velocity == pytest.approx((1.0, 0.0, -0.2))
+    by_force = reckon(known, LEVEL, (0.0, 0.0, GRAVITY - 1.0), None, 5.05)
+    by_thrust = reckon(known, LEVEL, None, (GRAVITY - 1.0, 0.3), 5.05)
+    assert by_force is not None and by_thrust is not None
+    assert by_force.climb == by_force.lifted == by_thrust.climb == by_thrust.lifted == pytest.approx(-0.25)
+    level = reckon(known, None, (0.0, 0.0, GRAVITY), None, 5.05)
+    assert level is not None and level.velocity == pytest.approx((1.0, 0.0, -0.2))
+    assert reckon(known, LEVEL, (0.0, 0.0, GRAVITY), None, 5.0 + LONGEST_STEP + 0.01) is None
+    assert reckon(known, LEVEL, None, None, 5.05) is None

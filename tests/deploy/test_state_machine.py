@@ -17,7 +17,7 @@ from e2efly.deploy.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, 
 from e2efly.deploy.hover import blind_time
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.settings import Fence, FlightSettings
-from e2efly.deploy.state_machine import FALLEN_S, LONGEST_STEP, SLOWED_S, step
+from e2efly.deploy.state_machine import FALLEN_S, FOUND_S, LONGEST_STEP, NEAR_GROUND, SLOWED_S, step
 
 SETTINGS = FlightSettings()
 DT = 0.01
@@ -176,6 +176,12 @@ CASES: dict[Reason, list[Callable[[], Flight]]] = {
         *(landed_from(begin, link_problem="cut") for begin in (taking_off, hovering, policy_flying)),
     ],
     Reason.ATTITUDE: [refused(attitude_error=0.3), refused(attitude_error=None), refused(attitude_error=math.nan)],
+    Reason.ACCELEROMETER: [
+        refused(accelerometer_problem="it shows [0, 0, -512]"),
+        *(landed_from(begin, accelerometer_problem="z") for begin in (taking_off, hovering)),
+        lambda: flown(policy_flying(), having(AWAY, accelerometer_problem="z")),
+    ],
+    Reason.MOTION: [refused(motion_problem="they move otherwise")],
     Reason.OUTSIDE_FENCE: [
         refused(odometry=at(x=5.0)),
         refused(odometry=at(y=-5.0)),
@@ -212,6 +218,7 @@ CASES: dict[Reason, list[Callable[[], Flight]]] = {
         kept_out(odometry=at(1.0, velocity=(0, 0, -3.0))),
     ],
     Reason.LANDED: [done, lambda: flown(sinking(), BLIND, blind_time(1.0) + 0.1)],
+    Reason.TOUCHED: [lambda: flown(sinking(), having(BLIND, touched=True))],
     Reason.DISARMED: [
         *(
             lambda begin=begin: flown(begin(), having(UP, armed=False, pilot=POLICY))
@@ -353,8 +360,8 @@ def test_a_landing_begins_where_the_vehicle_can_stop_and_no_higher_than_it_is() 
     assert waiting.target is not None and waiting.target.position[2] == 1.0 and waiting.target.climb == 0.0
     touched = flown(policy_flying(), having(AWAY, policy_done=True, policy_lands=True, odometry=at(0.1)))
     assert touched.target is not None and touched.target.position[2] == 0.1
-    found = flown(flown(touched, BLIND), having(UP, odometry=at(0.15)))
-    assert found.target is not None and found.target.position[2] == 0.15
+    found = flown(flown(touched, BLIND), having(UP, odometry=at(0.15)), FOUND_S + 2 * DT)
+    assert found.target is not None and found.target.position[2] == pytest.approx(0.15, abs=0.01)
 
 
 def test_a_landing_in_a_gust_does_not_wait_for_ever() -> None:
@@ -434,9 +441,56 @@ def test_odometry_lost_sinks_blind_and_found_lands_from_there() -> None:
     assert lost.blind and lost.target is None
     assert lost.since == lost.now  # the blind descent begins here, however long the landing has been under way
     assert flown(lost, BLIND, blind_time(1.0) - 0.1).mode is Mode.LAND
-    found = flown(lost, having(UP, odometry=at(0.8)))
-    assert not found.blind and found.target == Target((0.0, 0.0, 0.8), 0.0)
+    assert flown(lost, having(UP, odometry=at(0.8)), FOUND_S - DT).blind
+    found = flown(lost, having(UP, odometry=at(0.8)), FOUND_S + 2 * DT)
+    assert not found.blind and found.target is not None
+    assert found.target.position == pytest.approx((0.0, 0.0, 0.8), abs=0.01)
     assert flown(found, having(odometry=at()), 6.0).mode is Mode.DONE
+
+
+@pytest.mark.parametrize("gone", [0.12, 0.4])
+def test_odometry_that_comes_and_goes_lets_a_landing_end_and_no_throttle_be_cut_in_the_air(gone: float) -> None:
+    def flickering(flight: Flight, height: float, seconds: float) -> Flight:
+        odometry = at(height)
+        for k in range(round(seconds / DT)):
+            lost = k * DT % 0.5 < gone
+            odometry = odometry if lost else dataclasses.replace(odometry, time=flight.now)
+            flight = flown(flight, having(UP, odometry=odometry, odometry_problem="too old" if lost else None))
+        return flight
+
+    assert flickering(sinking(), 1.0, 20.0).mode is Mode.LAND
+    assert flickering(sinking(), 0.05, 3.0).mode is Mode.DONE
+    assert flickering(flown(taking_off(), BLIND), 0.05, 3.0).mode is Mode.DONE
+
+
+def test_nothing_has_landed_while_the_link_is_down() -> None:
+    silent = having(UP, link_problem="no answer", odometry=at(0.79))
+    flight = flown(hovering(), silent, 20.0)
+    assert flight.mode is Mode.LAND and not flight.blind and flight.target is not None
+    assert flight.target.position[2] == 0.79  # it will go on from where it is
+    again = flown(flight, having(silent, link_problem=None), 0.5)
+    assert again.target is not None and again.target.position[2] < 0.7
+    assert flown(sinking(), having(BLIND, link_problem="no answer"), 60.0).mode is Mode.LAND
+    assert flown(sinking(), having(BLIND, link_problem="no answer", touched=True), 1.0).mode is Mode.LAND
+
+
+def test_over_home_it_has_landed_only_where_something_is_felt_to_carry_it() -> None:
+    still = having(UP, pilot=LAND, odometry=at(0.6))
+    held = flown(landing(), still, 20.0)
+    assert held.mode is Mode.LAND and held.target is not None
+    assert held.target.position[2] < -5.0  # it is pressed down until it is felt
+    assert flown(held, having(still, supported=True)).mode is Mode.DONE
+
+
+def test_poses_that_contradict_the_sensors_count_as_lost() -> None:
+    wrong = having(UP, motion_problem="they move otherwise than the accelerometer feels, by 0.9 m/s")
+    for begin in (taking_off, hovering, policy_flying):
+        flight = flown(begin(), having(wrong, pilot=POLICY if begin is policy_flying else HOVER))
+        assert flight.mode is Mode.LAND and flight.blind and "by 0.9 m/s" in flight.reasons[0]
+        assert flown(flight, UP, 2.0).blind  # until it has landed
+    low = having(wrong, pilot=LAND, odometry=at(0.05 + NEAR_GROUND / 2))
+    assert not flown(landing(), low).blind  # that is the shock of the ground
+    assert flown(flown(with_pilot(), having(wrong, override=False)), UP).blind
 
 
 def test_a_blind_landing_ends_for_good() -> None:
@@ -629,6 +683,10 @@ NEWS = st.fixed_dictionaries(
         | st.builds(Pilot, st.sampled_from(Mission), *[st.sampled_from([0.0, 0.0, 0.3, -1.0])] * 4),
         "voltage": st.sampled_from([4.0, 4.0, 3.0, None, math.nan]),
         "attitude_error": st.sampled_from([0.0, 0.0, 0.5, None, math.nan]),
+        "accelerometer_problem": st.sampled_from([None, None, None, "zero"]),
+        "motion_problem": st.sampled_from([None, None, None, "mirrored"]),
+        "touched": st.sampled_from([False, False, False, True]),
+        "supported": st.booleans(),
         "heading_error": st.sampled_from([None, None, None, 0.2, -1.5, 3.1]),
         "policy_problem": st.sampled_from([None, None, "late"]),
         "policy_done": st.booleans(),
@@ -685,14 +743,22 @@ def check_rules(before: Flight, flight: Flight, inputs: Inputs, inputs_before: I
         assert inputs_before.pilot is not None and inputs_before.pilot.mission is Mission.LAND
         assert heard and inputs.armed and inputs.override and seen
         assert inputs.voltage == 4.0 and inputs.attitude_error == 0.0
+        assert not inputs.accelerometer_problem and not inputs.motion_problem
     # what flies on good odometry flies on good odometry only
     if flight.mode in (Mode.TAKEOFF, Mode.HOVER, Mode.POLICY):
         assert seen and heard and (inputs.pilot is not None or before.mode is Mode.PILOT)
     if flight.mode is Mode.LAND:
-        assert flight.blind is not seen
-    assert (flight.target is not None) is (
-        flight.mode in (Mode.TAKEOFF, Mode.HOVER) or (flight.mode in (Mode.LAND, Mode.PILOT) and seen)
-    )
+        waiting = before.mode is Mode.LAND and before.blind and flight.found_since is not None
+        assert flight.blind is not seen or (seen and flight.blind and waiting)
+        assert flight.blind is (flight.target is None)
+        assert flight.lost is not None or not flight.blind
+    else:
+        assert (flight.target is not None) is (
+            flight.mode in (Mode.TAKEOFF, Mode.HOVER) or (flight.mode is Mode.PILOT and seen)
+        )
+    # nothing ends in the air for the sake of a link that is silent
+    if before.mode in AIRBORNE and flight.mode is Mode.DONE and not heard:
+        assert said(flight, Reason.CRASHED)
     if flight.target is not None:
         assert np.isfinite((*flight.target.position, flight.target.yaw)).all()
     if flight.mode is Mode.POLICY:

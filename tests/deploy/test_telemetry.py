@@ -6,6 +6,7 @@ import signal
 import statistics
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -236,6 +237,7 @@ with Telemetry(sys.argv[1]) as log:
         log.record("policy", time.monotonic(), {"step": step, "observation": [step / 7 ** i for i in range(40)]})
         time.sleep(0.001)
         if log.failed:
+            step_before = step
             break
     else:
         sys.exit("never told")
@@ -243,6 +245,8 @@ with Telemetry(sys.argv[1]) as log:
         log.record("policy", time.monotonic(), {"step": step})
 assert sum(v for k, v in log.problems.items() if k.startswith("not written")) >= 100, log.problems
 print(list(log.problems)[0])
+print(step_lost := step_before + 101)
+print(log.missing)
 """
 
 
@@ -255,6 +259,45 @@ def test_a_full_disk_ends_the_log_and_not_the_flight(tmp_path: Path) -> None:
     log = read_log(path)
     assert len(log["policy"]) > 20 and "not closed" in log.cut_off
     assert log["policy"].numbers("step").tolist() == list(range(len(log["policy"])))
+    _, recorded, told = done.stdout.splitlines()
+    missing = int(recorded) - len(log["policy"])
+    assert told.startswith(f"{missing} messages from ") and "s after the start of the log are missing" in told
+    (event,) = log["event"].values  # the report prints it, among the errors
+    assert event == {"level": "error", "text": f"flight log: {told}: File too large"}
+    since = float(told.split(" from ")[1].split(" s ")[0])
+    assert log["policy"].time[-1] == pytest.approx(since, abs=0.2)
+
+
+def test_the_word_of_what_is_missing_takes_the_place_of_what_was_written_last(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a disk without a free byte nothing can be appended, but what is there can be written over."""
+    path, write, pwrite, full = tmp_path / "flight.mcap", os.write, os.pwrite, threading.Event()
+
+    def taken(file: int, data: bytes) -> int:
+        if full.is_set():
+            raise OSError(28, "No space left on device")
+        return write(file, data)
+
+    def over(file: int, data: bytes, offset: int) -> int:
+        if offset + len(data) > path.stat().st_size:
+            raise OSError(28, "No space left on device")
+        return pwrite(file, data, offset)
+
+    monkeypatch.setattr(os, "write", taken)
+    monkeypatch.setattr(os, "pwrite", over)
+    with Telemetry(path) as log:
+        for step in range(300):
+            log.record("policy", time.monotonic(), {"step": step, "observation": [step / 7**i for i in range(40)]})
+            time.sleep(0.001)
+        full.set()
+        log.record("policy", time.monotonic(), {"step": 300})
+    found = read_log(path)
+    kept = len(found["policy"])
+    assert 0 < kept < 300
+    assert found["policy"].numbers("step").tolist() == list(range(kept))
+    assert log.missing.startswith(f"{301 - kept} messages from ")
+    assert found["event"].texts("text") == [f"flight log: {log.missing}: No space left on device"]
 
 
 def test_a_disk_that_fails_at_once_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

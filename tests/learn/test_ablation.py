@@ -1,6 +1,7 @@
 """Rewards without each of their terms, learned side by side."""
 
 import dataclasses
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from e2efly import presets
 from e2efly.cli import run
 from e2efly.config import TrainConfig
-from e2efly.learn.ablation import FULL, ablate
+from e2efly.learn.ablation import FULL, Kept, ablate
 from e2efly.learn.rundir import RunDirectory
 from e2efly.learn.runner import train
 from tests.learn.test_runner import Silent
@@ -46,6 +47,28 @@ def test_a_member_learns_as_a_run_alone_does(algo: str, tmp_path: Path) -> None:
 def test_members_differ_by_their_terms_and_seeds() -> None:
     error = ablate(small("bptt"), 2).error["hover"][..., -1]
     assert len(np.unique(np.round(error, 5))) == error.size
+
+
+def test_an_ablation_that_was_stopped_ends_bit_for_bit_like_one_that_was_not(tmp_path: Path) -> None:
+    config = small("bptt", steps=3 * 1024)
+    path, shares = tmp_path / "kept.safetensors", []
+    kept = Kept(path, {"seeds": 1, "steps": config.steps}, period=0.0)
+
+    def told(share: float, success: float) -> None:
+        shares.append(share)
+        if len(shares) == 2:  # as if it were stopped here
+            shutil.copy(path, tmp_path / "copy")
+
+    whole = ablate(config, 1, told, kept)
+    shutil.copy(tmp_path / "copy", path)
+    said = r"kept\.safetensors is of another ablation: seeds: 1 and 2; accepted: another --out"
+    with pytest.raises(ValueError, match=said):
+        dataclasses.replace(kept, about={**kept.about, "seeds": 2}).done()
+    resumed = ablate(config, 1, told, kept)
+    assert shares == [pytest.approx(x) for x in (1 / 3, 2 / 3, 1.0, 1.0)]
+    for name in whole.error:
+        np.testing.assert_array_equal(resumed.error[name], whole.error[name])
+        np.testing.assert_array_equal(resumed.success[name], whole.success[name])
 
 
 def test_what_cannot_be_compared_is_refused() -> None:

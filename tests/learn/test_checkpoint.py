@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from e2efly.env import random_key
-from e2efly.learn.checkpoint import load_checkpoint, read_about, save_checkpoint, write_atomically
+from e2efly.learn.checkpoint import load_checkpoint, read_about, save_checkpoint
+from e2efly.storage import write_atomically
 
 TREE = {"a": np.arange(6, dtype=np.float32).reshape(2, 3), "b": [jnp.int32(4), random_key(7)]}
 

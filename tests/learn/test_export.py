@@ -152,7 +152,7 @@ def test_the_file(tmp_path: Path) -> None:
         for v in (*model.graph.input, *model.graph.output)
     ]
     assert shapes == [("observation", 1, ["n", env.observation_size]), ("action", 1, ["n", 4])]
-    assert [p.key for p in model.metadata_props] == [METADATA_KEY]
+    assert [p.key for p in model.metadata_props] == [METADATA_KEY, "sha256"]
     assert Contract.from_json(model.metadata_props[0].value) == contract == load_policy(path).contract
     assert [file.name for file in tmp_path.iterdir()] == ["policy.onnx"]
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from e2efly import presets
-from e2efly.commands.evaluate import callback, check_observation, config_from_contract, run_of
+from e2efly.commands.evaluate import callback, check_observation, config_from_contract
 from e2efly.config import CameraConfig, EnvConfig, ImuConfig, NetworkConfig, RewardConfig, TrainConfig
 from e2efly.deploy.policy import load_policy
 from e2efly.env import Env
@@ -20,7 +20,7 @@ from e2efly.evaluate import Act
 from e2efly.learn.export import contract_of, export_policy, parity, random_images, random_observations
 from e2efly.learn.networks import Actor, View, Weights
 from e2efly.learn.programs import acting
-from e2efly.learn.rundir import RunDirectory
+from e2efly.learn.rundir import RunDirectory, run_of
 from e2efly.vehicles import load_vehicle
 
 DEPTH = CameraConfig("depth", width=16, height=12, reach=(0.3, 8.0), rate=15.0, latency=(0.0, 0.05))

@@ -16,6 +16,7 @@ import pytest
 from safetensors.numpy import load_file
 
 from e2efly import presets
+from e2efly.cli import run as command
 from e2efly.config import TrainConfig
 from e2efly.evaluate import Episodes
 from e2efly.learn import runner
@@ -130,7 +131,8 @@ def test_a_killed_run_ends_bit_for_bit_like_one_that_was_not(algo: str, tmp_path
     wait_for_update(tmp_path / "cut", process, 6)
     process.send_signal(signal.SIGKILL)
     process.wait()
-    resumed = cli(*flags, "--out", "cut", "--resume", cwd=tmp_path)
+    alone = ["train", "--resume", "cut", "--no-plots"]  # the run says all the rest
+    resumed = cli(*(alone if algo == "bptt" else [*flags, "--out", "cut", "--resume"]), cwd=tmp_path)
     assert resumed.wait() == 0, output_of(tmp_path)
     a, b = (load_file(tmp_path / run / "checkpoint.safetensors") for run in ("whole", "cut"))
     assert a.keys() == b.keys()
@@ -141,17 +143,25 @@ def test_a_killed_run_ends_bit_for_bit_like_one_that_was_not(algo: str, tmp_path
     assert timeless(rows_a) == timeless(rows_b)
 
 
-def test_ctrl_c_saves_and_stops(tmp_path: Path) -> None:
-    flags = ["train", "hover", *SMALL, *MORE["ppo"], "--steps", "100000000", "--out", "run"]
-    process = cli(*flags, cwd=tmp_path)
-    wait_for_update(tmp_path / "run", process, 4)
+def test_a_run_is_one_process_s_and_ctrl_c_saves_and_stops_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tmp_path / "my run"
+    flags = ["train", "hover", *SMALL, *MORE["ppo"], "--steps", "100000000"]
+    process = cli(*flags, "--out", "my run", cwd=tmp_path)
+    wait_for_update(run, process, 4)
+    for again in ([*flags, "--out", str(run)], ["train", "--resume", str(run)]):
+        assert command(again) == 2
+        assert f"--out {run} is in use by process {process.pid} on " in " ".join(capsys.readouterr().err.split())
     os.kill(process.pid, signal.SIGINT)
     assert process.wait() == 130
-    assert "--resume" in output_of(tmp_path)
-    summary = json.loads((tmp_path / "run/summary.json").read_text())
+    assert "Stopped; go on with: e2efly train --resume 'my run' --no-plots\n" in output_of(tmp_path)
+    summary = json.loads((run / "summary.json").read_text())
     assert summary["stopped_by_user"]
     assert not summary["finished"]
-    assert (tmp_path / "run/policy.onnx").exists()
+    assert (run / "policy.onnx").exists()
+    updates = [row["update"] for row in RunDirectory(run).rows()]
+    assert updates == list(range(1, len(updates) + 1))
 
 
 def test_a_loss_that_is_not_finite_stops_the_run_and_keeps_the_checkpoint(tmp_path: Path) -> None:
@@ -186,18 +196,12 @@ def test_resume_refuses_another_version(tmp_path: Path) -> None:
         train(config, tmp_path / "run", Silent(), resume=True)
 
 
-def test_a_run_is_not_overwritten(tmp_path: Path) -> None:
-    RunDirectory(tmp_path / "run").create(small())
-    with pytest.raises(ValueError, match="already holds a run"):
-        RunDirectory(tmp_path / "run").create(small())
-
-
 def test_the_next_process_of_a_run_clears_what_a_killed_one_had_not_finished(tmp_path: Path) -> None:
     run = RunDirectory(tmp_path / "run")
     run.create(small())
     (run.path / "checkpoint.safetensors.123.part").write_bytes(b"half")
     run.forget_after(0)
-    assert sorted(path.name for path in run.path.iterdir()) == ["config.json", "versions.json"]
+    assert sorted(path.name for path in run.path.iterdir()) == ["config.json", "inputs", "inputs.json", "versions.json"]
 
 
 def test_a_run_of_a_version_that_did_not_know_an_option_is_read_without_it() -> None:
@@ -317,4 +321,4 @@ def test_a_folder_holds_a_run_once_all_that_resuming_reads_is_there(
     written: list[str] = []
     monkeypatch.setattr(RunDirectory, "write_json", lambda self, name, content: written.append(name))
     RunDirectory(tmp_path).create(small())
-    assert written == ["versions.json", "config.json"]
+    assert written == ["inputs.json", "versions.json", "config.json"]

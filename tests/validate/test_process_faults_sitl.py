@@ -6,10 +6,13 @@ from pathlib import Path
 import pytest
 
 from e2efly.validate import process_faults
+from tests.conftest import NetworkTrace
 
 
 @pytest.mark.parametrize("fault", process_faults.FAULTS)
-def test_the_bridges_process_fails(fault: str, policy_of: Callable[..., Path], tmp_path: Path) -> None:
+def test_the_bridges_process_fails(
+    fault: str, policy_of: Callable[..., Path], tmp_path: Path, network: NetworkTrace
+) -> None:
     outcome = process_faults.strike(fault, policy_of("hover"), tmp_path)
     assert outcome.problems == ()
     assert outcome.touch_speed < 2.5
@@ -17,3 +20,4 @@ def test_the_bridges_process_fails(fault: str, policy_of: Callable[..., Path], t
     assert outcome.largest_tilt < 1.5
     if fault != "disk full":
         assert outcome.reaction < 2.0  # stated is a tenth of a second: a busy machine measures more
+    assert network.left() == []  # in all of a flight, watchdog included

@@ -15,6 +15,7 @@ from e2efly.commands.progress import TerminalProgress
 from e2efly.commands.tables import console_table, markdown
 from e2efly.config import TrainConfig
 from e2efly.device import prepare
+from e2efly.storage import held, write_atomically, write_json
 
 BY_ERROR = ("hover", "track")
 """Tasks whose curves are errors, as in the paper; of the others they are success."""
@@ -36,7 +37,7 @@ class Request:
 def ablate_command(request: Request) -> int:
     """Train every variant of every task by every algorithm; write JSON, a table and a figure an algorithm.
 
-    What an earlier run with the same configuration wrote is taken, not trained again.
+    What an earlier run with the same configuration wrote is taken, not trained again, and what it was at goes on.
 
     Raises:
         ValueError: for unknown names, and numbers that cannot be used.
@@ -45,12 +46,20 @@ def ablate_command(request: Request) -> int:
     if request.seeds < 1:
         raise ValueError(f"--seeds is {request.seeds}; accepted: 1 or more")
     prepare(request.device)
-    from e2efly.learn.checkpoint import write_atomically
-    from e2efly.view.ablation import Panel, plot_ablation
-
     console = Console(highlight=False)
     configs = {(algo, task): _config(request, task, algo) for algo in request.algos for task in request.tasks}
-    request.out.mkdir(parents=True, exist_ok=True)
+    with held(request.out):
+        try:
+            return _ablate(request, configs, console)
+        except KeyboardInterrupt:
+            console.print("Stopped; the same command goes on where it was, at most some seconds back.")
+            return 130
+
+
+def _ablate(request: Request, configs: dict[tuple[str, str], TrainConfig], console: Console) -> int:
+    """In a folder that is this ablation's alone."""
+    from e2efly.view.ablation import Panel, plot_ablation
+
     known = {pair: _known(request, config) for pair, config in configs.items()}
     lines: list[str] = []
     for algo in request.algos:
@@ -103,14 +112,13 @@ def _known(request: Request, config: TrainConfig) -> Any:
     found, about = json.loads(path.read_text(encoding="utf-8")), json.loads(json.dumps(_about(request, config)))
     if different := list(different_values(found["about"], about)):
         raise ValueError(f"{path} is of another ablation: {'; '.join(different)}; accepted: another --out")
-    parts = {part: {k: np.array(v) for k, v in found[part].items()} for part in ("success", "error")}
+    parts = {part: {k: np.array(v, np.float64) for k, v in found[part].items()} for part in ("success", "error")}
     return Curves(tuple(found["variants"]), np.array(found["steps"]), **parts)
 
 
 def _curves(request: Request, config: TrainConfig, console: Console) -> Any:
     """Train all variants of a configuration; keep their curves."""
-    from e2efly.learn.ablation import ablate
-    from e2efly.learn.checkpoint import write_atomically
+    from e2efly.learn.ablation import Kept, ablate
 
     task, algo = presets.task_name(config.task), presets.algorithm_name(config.algo)
     steps = config.steps * request.seeds * (len(config.reward.weights) + 1)
@@ -124,7 +132,8 @@ def _curves(request: Request, config: TrainConfig, console: Console) -> Any:
             done = share * steps
             progress.progress(int(done), steps, done / (time.perf_counter() - began), success, best, "")
 
-        curves = ablate(config, request.seeds, told)
+        kept = Kept(_path(request, config).with_suffix(".safetensors"), _about(request, config))
+        curves = ablate(config, request.seeds, told, kept)
     content = {
         "about": _about(request, config),
         "variants": list(curves.variants),
@@ -132,7 +141,8 @@ def _curves(request: Request, config: TrainConfig, console: Console) -> Any:
         "success": {name: x.tolist() for name, x in curves.success.items()},
         "error": {name: x.tolist() for name, x in curves.error.items()},
     }
-    write_atomically(_path(request, config), (json.dumps(content) + "\n").encode())
+    write_json(_path(request, config), content, indent=None)
+    kept.path.unlink(missing_ok=True)
     return curves
 
 

@@ -1,6 +1,5 @@
 """`e2efly bench`: what this machine does in a few seconds. The published figures are made by benchmarks/."""
 
-import json
 import os
 from pathlib import Path
 
@@ -8,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from e2efly.device import prepare
-from e2efly.learn.checkpoint import write_atomically
+from e2efly.storage import write_json
 
 
 def bench_command(report: Path | None, device: str | None) -> int:
@@ -21,9 +20,7 @@ def bench_command(report: Path | None, device: str | None) -> int:
         table.add_row(name, f"{value / 1e6:.2f} M" if value >= 1e6 else f"{value / 1e3:.0f} k")
     console.print(table)
     if report:
-        write_atomically(
-            report, (json.dumps({"cores": os.cpu_count(), "per_second": figures}, indent=1) + "\n").encode()
-        )
+        write_json(report, {"cores": os.cpu_count(), "per_second": figures})
     return 0
 
 

@@ -1,7 +1,6 @@
 """`e2efly eval`."""
 
 import dataclasses
-import json
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -16,8 +15,8 @@ from e2efly.config import CameraConfig, EnvConfig, ImuConfig, RewardConfig, Task
 from e2efly.deploy.images import NONE, Image
 from e2efly.deploy.policy import Policy, load_policy
 from e2efly.device import prepare, wide_vectors
-from e2efly.learn.checkpoint import write_atomically
-from e2efly.learn.rundir import RunDirectory
+from e2efly.learn.rundir import RunDirectory, run_of
+from e2efly.storage import write_json
 from e2efly.vehicles import load_vehicle, vehicle_names
 from e2efly.zoo import beside, policy_path
 
@@ -43,30 +42,27 @@ def eval_command(
     run = run_of(path)
     policy = load_policy(run.policy if run else path)
     if run:
-        config = run.config()
+        config = run.config(names_vehicle=vehicle is not None)
         task, env_config = config.task, config.env
     else:
         task, env_config = config_from_contract(policy, vehicle)
     if vehicle is not None:
         env_config = dataclasses.replace(env_config, vehicle=vehicle)
+    elif (known := load_vehicle(env_config.vehicle)).hash != policy.contract.vehicle_hash:
+        raise ValueError(
+            f"vehicle_hash is {policy.contract.vehicle_hash} in {run.policy if run else path}, but vehicle "
+            f"{env_config.vehicle} is {known.hash}; accepted: the vehicle that the policy was trained on, or --vehicle"
+        )
     flown, starts = fly_suites(policy, task, env_config, episodes, seed)
     console = Console(highlight=False, quiet=quiet)
     console.print(_table(flown, episodes))
     if report:
-        write_atomically(
-            report, (json.dumps(_report(policy, path, env_config, flown, starts, seed), indent=1) + "\n").encode()
-        )
+        write_json(report, _report(policy, path, env_config, flown, starts, seed))
         console.print(f"Report: {report}")
     folder = plots or (run.plots if run else beside(path) / "plots")
     _draw(policy, task, env_config, flown, seed, folder, run)
     console.print(f"Plots: {folder}")
     return 0
-
-
-def run_of(path: Path) -> RunDirectory | None:
-    """The run that a path is the folder, or the policy.onnx, of."""
-    folder = path.parent if path.name == "policy.onnx" else path
-    return RunDirectory(folder) if path.is_dir() or (folder / "config.json").is_file() else None
 
 
 def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[TaskConfig, EnvConfig]:

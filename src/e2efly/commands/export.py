@@ -4,11 +4,19 @@ from pathlib import Path
 
 from rich.console import Console
 
+from e2efly.deploy.policy import sealed_policy
 from e2efly.device import prepare
 
 
 def export_command(run_path: Path, out: Path | None, which: str) -> int:
-    """Write policy.onnx from the checkpoint of a run."""
+    """Write policy.onnx from the checkpoint of a run, or anew from a file of an older e2efly, with its digest."""
+    console = Console(highlight=False)
+    if run_path.is_file():
+        from e2efly.learn.checkpoint import write_atomically
+
+        write_atomically(out or run_path, sealed_policy(run_path))
+        console.print(f"Wrote {run_path} with its digest to {out or run_path}")
+        return 0
     prepare("cpu")
     from e2efly.learn.export import contract_of, export_policy
     from e2efly.learn.rundir import RunDirectory
@@ -20,5 +28,5 @@ def export_command(run_path: Path, out: Path | None, which: str) -> int:
     weights = load_policy_weights(setup, run, which)
     path = out or run.policy
     export_policy(path, weights, setup.actor, contract_of(setup.env, setup.config))
-    Console(highlight=False).print(f"Wrote the {which} policy of {run_path} to {path}")
+    console.print(f"Wrote the {which} policy of {run_path} to {path}")
     return 0

@@ -3,10 +3,7 @@
 import dataclasses
 import json
 import platform
-import queue
-import signal
 import sys
-import threading
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -16,6 +13,7 @@ from typing import Any
 import tyro
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from e2efly import __version__
 from e2efly.deploy import throttle_map
@@ -27,7 +25,7 @@ from e2efly.deploy.hover import roll_pitch
 from e2efly.deploy.msp.client import SCHEDULE, Client
 from e2efly.deploy.msp.controller import ControllerInfo, identify
 from e2efly.deploy.msp.link import Link, open_link
-from e2efly.deploy.policy import load_policy
+from e2efly.deploy.policy import Policy, load_policy
 from e2efly.deploy.policy_worker import PolicyWorker
 from e2efly.deploy.pose.checks import Checks
 from e2efly.deploy.pose.source import PoseSource, open_source
@@ -37,7 +35,9 @@ from e2efly.deploy.settings import check as check_settings
 from e2efly.deploy.state_machine import take_off_refusals
 from e2efly.deploy.sticks import sticks_of
 from e2efly.deploy.telemetry import Telemetry
+from e2efly.deploy.terminal import Speaker, Stop, printable
 from e2efly.deploy.watchdog import WatchedLink
+from e2efly.learn.rundir import run_of
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.zoo import policy_path
 
@@ -100,7 +100,7 @@ def fly_command(options: Fly) -> int:
         loaded = load_policy(policy / "policy.onnx" if policy.is_dir() else policy)
     if loaded is None and options.vehicle is None:
         raise ValueError("--vehicle is left out; accepted: a vehicle's name or .toml file, as no policy names one")
-    body = load_vehicle(options.vehicle or (loaded.contract.vehicle if loaded else ""))
+    body = load_vehicle(options.vehicle or _own_vehicle(policy, loaded))
     runtime = None
     if loaded is not None:
         if reasons := check(loaded.contract, body, imu=True):
@@ -126,37 +126,46 @@ def fly_command(options: Fly) -> int:
             client, info, sticks_of(info), source, body, settings, worker=worker, latency=options.latency,
             settings_problems=problems(rows), throttle_map=known, checks=Checks(max_age=settings.odometry_timeout),
         )  # fmt: skip
+        source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:
             return _look(bridge, source, console, rows)
+        stop = Stop()
+        stack.callback(stop.restore)
         path = options.log or Path("flights") / time.strftime("%Y-%m-%d_%H-%M-%S.mcap")
         telemetry = stack.enter_context(Telemetry(path))
         bridge.log = telemetry
         _record_meta(telemetry, bridge, body, loaded.contract.to_json() if loaded else "", rows)
         rate = loop_rate(loaded.contract.control_rate_hz) if loaded else LOWEST_RATE
-        stop = _Stop()
-        say = _Speaker(console)
+        say = Speaker(sys.stdout)
         stack.callback(say.close)
 
         def again() -> ControllerInfo | None:
             return _identify_again(bridge, body, settings, loaded.contract if loaded else None, say)
 
-        console.print(f"{rate:g} Hz, log {path}. Ctrl-C lands.")
-        try:
-            timing = fly(
-                bridge, rate, log=telemetry, watchdog=held if isinstance(held, WatchedLink) else None, say=say,
-                stop=stop, identify_again=again,
-            )  # fmt: skip
-        finally:
-            stop.restore()
+        say(f"{rate:g} Hz, log {path}. Ctrl-C lands.")
+        timing = fly(
+            bridge, rate, log=telemetry, watchdog=held if isinstance(held, WatchedLink) else None, say=say,
+            stop=stop, identify_again=again,
+        )  # fmt: skip
         telemetry.close()
-        path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map), encoding="utf-8")
         late = sorted(timing.lateness)
         p99 = 1e3 * late[int(0.99 * (len(late) - 1))] if late else 0.0
-        console.print(f"{timing.rounds} control steps, late by {p99:.1f} ms (p99), {timing.missed} missed.")
+        say(f"{timing.rounds} control steps, late by {p99:.1f} ms (p99), {timing.missed} missed.")
         for problem, count in telemetry.problems.items():
-            console.print(f"log: {problem} ({count} times)", markup=False)
-        console.print(f"Next: e2efly fly-report {path}; throttle map: {path.with_suffix('.throttle.json')}")
+            say(f"log: {problem} ({count} times)")
+        if telemetry.missing:
+            say(f"log: {telemetry.missing}")
+        path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map), encoding="utf-8")
+        say(f"Next: e2efly fly-report {path}; throttle map: {path.with_suffix('.throttle.json')}")
         return 0
+
+
+def _own_vehicle(policy: Path | None, loaded: Policy | None) -> str:
+    """The vehicle of a policy: its run's copy, where it is a run's, else the one that its contract names."""
+    run = run_of(policy) if policy is not None else None
+    if run is not None and (run.path / "config.json").is_file():
+        return run.config().env.vehicle
+    return loaded.contract.vehicle if loaded else ""
 
 
 def _read(path: Path, option: str) -> str:
@@ -164,46 +173,6 @@ def _read(path: Path, option: str) -> str:
         return path.read_text(encoding="utf-8")
     except OSError as error:
         raise OSError(f"{option} {path}: {error.strerror}") from None
-
-
-class _Stop:
-    """Ctrl-C asks for a landing, and for the end on the ground."""
-
-    def __init__(self) -> None:
-        self.asked = False
-        self._before = {s: signal.signal(s, self._ask) for s in (signal.SIGINT, signal.SIGTERM)}
-
-    def _ask(self, *_: Any) -> None:
-        self.asked = True
-
-    def __call__(self) -> bool:
-        return self.asked
-
-    def restore(self) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
-
-
-class _Speaker:
-    """Prints from a thread of its own: a terminal that stalls must not stall the control loop."""
-
-    def __init__(self, console: Console) -> None:
-        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._print, args=(console,), daemon=True, name="speaker")
-        self._thread.start()
-
-    def __call__(self, line: str) -> None:
-        if self._lines.qsize() < 100:
-            self._lines.put(line)
-
-    def close(self) -> None:
-        self._lines.put(None)
-        self._thread.join(1.0)
-
-    def _print(self, console: Console) -> None:
-        start = time.monotonic()
-        while (line := self._lines.get()) is not None:
-            console.print(f"{time.monotonic() - start:7.2f}  {line}", markup=False)
 
 
 def _connect(client: Client, link: str) -> ControllerInfo:
@@ -217,7 +186,7 @@ def _connect(client: Client, link: str) -> ControllerInfo:
 
 
 def _identify_again(
-    bridge: Bridge, body: Vehicle, settings: FlightSettings, contract: Any, say: "_Speaker"
+    bridge: Bridge, body: Vehicle, settings: FlightSettings, contract: Any, say: Speaker
 ) -> ControllerInfo | None:
     """After a new connection nothing that was read before holds."""
     try:
@@ -236,8 +205,13 @@ def _table(rows: tuple[Row, ...]) -> Table:
         table.add_column(heading, overflow="fold")
     for row in rows:
         mark = "[green]ok[/]" if row.good else "[bold red]no[/]"
-        table.add_row(mark, row.setting, row.value, row.needed, "" if row.good else row.mend)
+        table.add_row(mark, *map(_cell, (row.setting, row.value, row.needed, "" if row.good else row.mend)))
     return table
+
+
+def _cell(text: str) -> Text:
+    """What may come from outside, such as a craft's name: neither markup nor escape sequences."""
+    return Text(printable(text))
 
 
 def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row, ...]) -> int:
@@ -249,12 +223,14 @@ def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row,
     table = Table(box=None, show_header=False, pad_edge=False)
     o = bridge.odometry
     if o is None:
-        table.add_row("poses", f"none good from {source.describe()}: {bridge.inputs.odometry_problem}")
+        table.add_row("poses", _cell(f"none good from {source.describe()}: {bridge.inputs.odometry_problem}"))
     else:
         roll, pitch = roll_pitch(o.quaternion)
         age = sum(s.received - (s.stamp or s.received) for s in poses) / max(len(poses), 1)
-        table.add_row("poses", f"{len(poses) / LOOK_S:.0f} Hz from {source.describe()}, refused {source.refused}")
-        table.add_row("", f"position {o.position.round(3).tolist()} m, roll {roll:+.2f}, pitch {pitch:+.2f} rad")
+        pace = bridge.pace
+        said = f"{pace.rate:.0f} Hz from {source.describe()}, refused {source.refused}"
+        table.add_row("poses", _cell(f"{said}; the newest was up to {1e3 * pace.oldest:.0f} ms old"))
+        table.add_row("", _cell(f"position {o.position.round(3).tolist()} m, roll {roll:+.2f}, pitch {pitch:+.2f} rad"))
         if poses and poses[-1].stamp is not None:
             table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")
     pilot = bridge.inputs.pilot
@@ -270,7 +246,7 @@ def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row,
     refusals = take_off_refusals(bridge.settings, bridge.flight, bridge.inputs)
     console.print("What stands against a take-off now:" if refusals else "Nothing stands against a take-off.")
     for refusal in refusals:
-        console.print(f"  - {refusal}", markup=False)
+        console.print(f"  - {printable(refusal)}", markup=False)
     return 1 if problems(rows) or o is None else 0
 
 

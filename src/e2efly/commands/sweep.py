@@ -25,9 +25,18 @@ from e2efly import presets
 from e2efly.commands.tables import console_table, markdown
 from e2efly.config import TrainConfig
 from e2efly.device import cores
+from e2efly.learn.rundir import RunDirectory
+from e2efly.storage import held, write_atomically, write_json
 
 _GIVEN = ("seed", "out", "resume", "algo", "preset", "device", "devices", "plots", "no-plots")
 """Options of `e2efly train` that a sweep gives itself."""
+_ALONE = {
+    "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",  # otherwise Ray replaces 127.0.0.1 by the machine's outward address
+    # Ray asks a cloud's metadata service which cloud this is, even with its usage statistics off: close the way there
+    "http_proxy": "http://127.0.0.1:9",
+    "no_proxy": "127.0.0.1,localhost",
+}
+"""Environment variables that keep a Ray of this machine alone on this machine."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +88,12 @@ def sweep_command(request: Request, config_of: Callable[[list[str]], TrainConfig
         raise ValueError(f"--vary {' '.join(request.vary)}: two variants share a folder; accepted: values that differ")
     for trial in trials:
         _check(trial, config_of(list(trial.arguments)))
-    request.out.mkdir(parents=True, exist_ok=True)
+    with held(request.out):
+        return _sweep(request, trials, console)
+
+
+def _sweep(request: Request, trials: list[Trial], console: Console) -> int:
+    """In a folder that is this sweep's alone."""
     found = {trial.out: summary for trial in trials if (summary := trial.ended())}
     console.print(f"{len(trials)} runs of {request.task} by {request.algo.upper()}, {len(found)} of them there already")
     left, failed = [trial for trial in trials if trial.out not in found], 0
@@ -139,7 +153,7 @@ def train_trial(trial: Trial) -> int:
         fcntl.flock(log, fcntl.LOCK_EX)  # the process holds it, too: one that outlives its worker is waited for
         if trial.ended():
             return 0
-        again = ["--resume"] if (trial.out / "config.json").exists() else []
+        again = ["--resume"] if RunDirectory(trial.out).began else []
         command = [sys.executable, "-m", "e2efly", "train", *trial.arguments, "--out", str(trial.out), *again]
         return subprocess.run(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, check=False).returncode
 
@@ -147,17 +161,14 @@ def train_trial(trial: Trial) -> int:
 def _check(trial: Trial, config: TrainConfig) -> None:
     """Refuse numbers that cannot be used, and a folder that holds a run of another configuration."""
     presets.check(config)
-    if not (trial.out / "config.json").exists():
-        return
-    from e2efly.learn.rundir import RunDirectory, differences
-
-    if different := list(differences(RunDirectory(trial.out).config(), config)):
-        raise ValueError(f"{trial.out} holds a run of another configuration: {'; '.join(different)}")
+    if (run := RunDirectory(trial.out)).began:
+        run.check_same(config)
 
 
 def _run(trials: list[Trial], request: Request) -> Iterator[tuple[Trial, str]]:
     """The trials as they end, and how each did."""
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # before the import: nothing is told to anybody
+    if request.address is None:
+        os.environ.update(_ALONE)  # before the import, which reads it
     try:
         import ray
         from ray.exceptions import RayError
@@ -202,8 +213,6 @@ def _last_line(trial: Trial) -> str:
 
 def _report(request: Request, trials: list[Trial], found: dict[Path, dict[str, Any]], console: Console) -> None:
     """A row a variant, and a file with every run."""
-    from e2efly.learn.checkpoint import write_atomically
-
     rows = []
     for variant in dict.fromkeys(trial.variant for trial in trials):
         of = [found[trial.out] for trial in trials if trial.variant == variant and trial.out in found]
@@ -219,7 +228,7 @@ def _report(request: Request, trials: list[Trial], found: dict[Path, dict[str, A
             }
         )
     runs = [{**dataclasses.asdict(trial), "out": trial.out.name, "summary": found.get(trial.out)} for trial in trials]
-    write_atomically(request.out / "sweep.json", (json.dumps(runs, indent=1) + "\n").encode())
+    write_json(request.out / "sweep.json", runs)
     write_atomically(request.out / "sweep.md", ("\n".join(markdown(rows)) + "\n").encode())
     console.print(console_table(rows))
     console.print(f"Table: {request.out / 'sweep.md'}   every run: {request.out / 'sweep.json'}")

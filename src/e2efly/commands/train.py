@@ -1,6 +1,7 @@
 """`e2efly train`."""
 
 import os
+import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ from typing import Any
 from rich.console import Console
 
 from e2efly.commands.progress import TerminalProgress
+from e2efly.commands.supervised import is_watched, watched
 from e2efly.commands.tables import console_table
 from e2efly.config import TrainConfig
 from e2efly.device import Hosts, cache_folder, prepare
@@ -21,31 +23,55 @@ def train_command(
     device: str | None,
     plots: bool,
     hosts: Hosts,
+    arguments: list[str],
 ) -> int:
-    """Train, ship the best policy, evaluate it and draw plots; exit status 0, or 130 when the user stopped it."""
+    """Train, ship the best policy, evaluate it and draw plots; exit status 0, or 130 when the user stopped it.
+
+    Args:
+        config: everything that decides the outcome.
+        out: the run directory.
+        resume: go on with the run in it.
+        device: where to compute.
+        plots: evaluate and draw at the end.
+        hosts: the processes of the run.
+        arguments: of `e2efly train`, for the process that a run on several hosts is.
+    """
+    again = _again(out, device, plots, hosts)
+    if hosts.count > 1 and not is_watched():
+        return watched([sys.executable, "-m", "e2efly", "train", *arguments], lambda reason: f"{reason}; {again}")
     prepare(device, hosts)
     from e2efly.learn.hosts import LostHostError
 
     try:
-        return _train(config, out, resume, plots, Console(highlight=False, quiet=hosts.index > 0))
+        return _train(config, out, resume, plots, again, Console(highlight=False, quiet=hosts.index > 0))
     except (LostHostError, ValueError, OSError, FloatingPointError) as error:
         if hosts.count == 1:
             raise
-        lost = isinstance(error, LostHostError)
-        again = f"; start all {hosts.count} again with --out {out} --resume" if lost else ""
-        print(f"error: {error}{again}", file=sys.stderr, flush=True)
+        print(f"error: {error}{f'; {again}' if isinstance(error, LostHostError) else ''}", file=sys.stderr, flush=True)
         os._exit(2)  # JAX would wait for the others, and abort
 
 
-def _train(config: TrainConfig, out: Path, resume: bool, plots: bool, console: Console) -> int:
+def _again(out: Path, device: str | None, plots: bool, hosts: Hosts) -> str:
+    """How to go on with a run that was stopped."""
+    command = ["e2efly", "train", "--resume", str(out)]
+    command += ["--device", device] if device else []
+    command += [] if plots else ["--no-plots"]
+    every = f", in all {hosts.count} processes and with their --hosts options" if hosts.count > 1 else ""
+    return f"go on with: {shlex.join(command)}{every}"
+
+
+def _train(config: TrainConfig, out: Path, resume: bool, plots: bool, again: str, console: Console) -> int:
+    from e2efly.learn.rundir import RunDirectory
     from e2efly.learn.runner import train
 
     task, algo = task_name(config.task), algorithm_name(config.algo)
+    if resume and not RunDirectory(out).checkpoint.exists():
+        console.print("There is no checkpoint yet: the run begins at its beginning.")
     with TerminalProgress(console, f"{task} by {algo}") as progress:
         summary = train(config, out, progress, resume, traced=cache_folder() / "traced")
     _report(console, summary)
     if summary["stopped_by_user"]:
-        console.print(f"Stopped. Go on with: e2efly train {task} --algo {algo} --out {out} --resume")
+        console.print(f"Stopped; {again}", markup=False, soft_wrap=True)
         return 130
     if plots and not console.quiet:
         from e2efly.commands.evaluate import eval_command
@@ -64,7 +90,7 @@ def _report(console: Console, summary: dict[str, Any]) -> None:
             "success": f"{d['success']:.1%}",
             "final error": f"{100 * d['final_error_m']:.1f} cm",
             "mean error": f"{100 * d['mean_error_m']:.1f} cm",
-            "time": f"{d['seconds_of_success']:.2f} s",
+            "time": "none" if d["seconds_of_success"] is None else f"{d['seconds_of_success']:.2f} s",
             "top speed": f"{d['top_speed_m_s']:.1f} m/s",
         }
         for which, called in (("shipped", "best"), ("last", "last"))

@@ -10,12 +10,13 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from e2efly import presets
-from e2efly.commands.evaluate import check_observation, config_from_contract, fly_suites, run_of
+from e2efly.commands.evaluate import check_observation, config_from_contract, fly_suites
 from e2efly.commands.validation_report import Validation, write_report
 from e2efly.config import EnvConfig, RewardConfig, TaskConfig
 from e2efly.deploy.policy import Policy, load_policy
 from e2efly.deploy.runtime import check
 from e2efly.device import compute_at_once, prepare
+from e2efly.learn.rundir import run_of
 from e2efly.validate.plant import plant_kind
 from e2efly.vehicles import load_vehicle
 from e2efly.zoo import beside, policy_path
@@ -71,7 +72,7 @@ def validate_command(
     loaded = load_policy(run.policy if run else policy)
     compute_at_once()
     prepare("cpu")  # the plants compute there, one vehicle at a time
-    config = run.config() if run else None
+    config = run.config(names_vehicle=vehicle is not None) if run else None
     task, env_config = (config.task, config.env) if config else config_from_contract(loaded, vehicle)
     if reasons := check(loaded.contract, load_vehicle(env_config.vehicle)):
         raise ValueError("\n".join(reasons))

@@ -1,7 +1,6 @@
 """What a validation came to, and its report as JSON."""
 
 import dataclasses
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.policy import Policy
-from e2efly.learn.checkpoint import write_atomically
+from e2efly.storage import write_json
 
 UNITS = {
     "duration": "s", "final_error": "m", "mean_error": "m", "top_speed": "m/s", "top_rate": "rad/s",
@@ -73,7 +72,7 @@ def write_report(
             for name, v in found.items()
         },
     }
-    write_atomically(file, (json.dumps(report, indent=1) + "\n").encode())
+    write_json(file, report)
 
 
 def _summary(e: Any) -> dict[str, Any]:

@@ -7,11 +7,13 @@ from collections import deque
 import numpy as np
 
 from e2efly.control import Ctbr, Vec3
-from e2efly.deploy import reckoning, state_machine
+from e2efly.deploy import inertial, reckoning, state_machine
+from e2efly.deploy.delay_watch import Delay, DelayWatch, delay_of, delay_problem, felt, turned
 from e2efly.deploy.flight_state import AIRBORNE, Flight, Inputs, Mode, Target
 from e2efly.deploy.goals import LandGoal
 from e2efly.deploy.heading_watch import HeadingWatch, watched
-from e2efly.deploy.hover import blind, blind_time, controlled, flight_gains, roll_pitch
+from e2efly.deploy.hover import blind, controlled, flight_gains, held, roll_pitch
+from e2efly.deploy.inertial import Inertial, Measurement
 from e2efly.deploy.instruments import CLOSED, PROBE, ChannelProbe, Instruments, Reading
 from e2efly.deploy.msp.client import Client
 from e2efly.deploy.msp.controller import ControllerInfo
@@ -19,6 +21,7 @@ from e2efly.deploy.msp.messages import Attitude, RawImu, set_raw_rc
 from e2efly.deploy.odometry import Odometry, Sample
 from e2efly.deploy.policy_worker import PolicyWorker
 from e2efly.deploy.pose.checks import Checks
+from e2efly.deploy.pose.pace import Pace, pace_problem, paced
 from e2efly.deploy.pose.source import PoseSource
 from e2efly.deploy.pose.tracking import Track, age, track
 from e2efly.deploy.record import (
@@ -37,6 +40,7 @@ from e2efly.deploy.runtime import Imu
 from e2efly.deploy.settings import FlightSettings
 from e2efly.deploy.sticks import Sticks
 from e2efly.deploy.throttle_map import ThrottleHistory, ThrottleMap, update
+from e2efly.deploy.touch import Touch
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 AFRESH_S = 1.0
@@ -47,8 +51,6 @@ ATTITUDE_S = 0.1
 """The controller's attitude, by which heading and velocity are reckoned, may be so old, s."""
 THRUST_DELAY = (0.015, 0.075)
 """How long before a measured force its throttle was sent, s: the link, the rate loop and the motors' lag."""
-HIGHER = 2.0
-"""A blind descent is believed to have begun so much higher at most than it was seen last, m."""
 BLOWN = 3.0
 """Beyond this force across the body, m/s^2, the air pushes so hard that the force along it tells little of thrust."""
 TRIM = (-3.0, 5.0)
@@ -57,6 +59,16 @@ TRIM_GAIN = 3.0
 """Of the climb's speed error, 1/s."""
 TRIM_FADE = 1.0
 """Time constant with which it fades as the map learns, s."""
+STEADY = 0.03
+"""Body rates of a hover below this are sent as none, rad/s: should the link fall silent now, they are held for long."""
+DELAY_TICKS = 50
+"""How often, on the ground, the delay of the poses is looked for in how it was carried, control steps."""
+SILENT_S = 0.1
+"""A controller that has said nothing for so long may hold the next command for as long as it is silent, s."""
+LATE_S = 0.05
+"""Poses may be so much later than the latency for which the gains are, s."""
+OVERDUE = 0.3
+"""A blind descent whose height is reckoned so far under the ground does not rise, and feels for the ground, m."""
 LIFTED = 0.12
 """So high over the ground the vehicle flies, m: below, nothing is learned and no tilt is asked."""
 
@@ -85,7 +97,9 @@ class Bridge:
     ) -> None:
         self.client, self.info, self.sticks, self.source, self.settings = client, info, sticks, source, settings
         self.vehicle = vehicle
-        self.gentle = flight_gains(vehicle, vehicle.latency if latency is None else latency)
+        self.latency = vehicle.latency if latency is None else latency
+        """From the vehicle's motion to its rate loop, s."""
+        self.gentle = flight_gains(vehicle, self.latency)
         """The vehicle with the gains of take-off, hover and landing."""
         self.worker, self.log, self.settings_problems = worker, log, settings_problems
         self.checks = checks or Checks(max_age=settings.odometry_timeout)
@@ -99,17 +113,21 @@ class Bridge:
         self.probe = ChannelProbe()
         self.instruments = Instruments(client, settings)
         self.sent = Sent("closed", None, 0.0, self._closed())
+        self.pace = Pace()
         self._track = Track()
         self._pose_problem: str | None = None
         self._good_pose = -math.inf
         self._heading = HeadingWatch()
-        self._reckoned: reckoning.Reckoning | None = None
+        self._inertial = Inertial()
+        self._opposed: str | None = None
+        self._delays = DelayWatch()
+        self._delay: Delay | None = None
         self._history = ThrottleHistory()
         self._trim = 0.0
-        self._gravity_counts = 0.0
         self._imu: Imu | None = None
         self._missed: deque[float] = deque()
         self._last = 0.0
+        self._heard = -math.inf
         self._stale: str | None = None
 
     def tick(self, now: float, lateness: float = 0.0, slack: float = 0.004) -> Sent:
@@ -120,7 +138,7 @@ class Bridge:
         self.client.poll(now)
         self._read_poses(now)
         reading = self._read_controller(now)
-        self._learn(now, reading)
+        self._feel(now, reading)
         self._count_deadlines(now, lateness)
         self._decide(now, slack)
         self.sent = self._send(now, self._command(now, dt))
@@ -131,7 +149,7 @@ class Bridge:
         """Take in poses and the controller's answers, decide and send nothing; returns the poses."""
         self.client.poll(now)
         poses = self._read_poses(now)
-        self._learn(now, self._read_controller(now, sends=False))
+        self._feel(now, self._read_controller(now, sends=False))
         return poses
 
     def adopt(self, info: ControllerInfo, sticks: Sticks, settings_problems: tuple[str, ...]) -> None:
@@ -159,9 +177,15 @@ class Bridge:
             self._pose_problem = problem
             if odometry is not None:
                 self.odometry, self._good_pose = odometry, now
-                if self._track.same_since == odometry.time:  # or it may be frozen, and the motion has gone on
-                    self._reckoned = reckoning.seen(odometry, now, self.flight.turned or 0.0)
+                self.pace = paced(self.pace, odometry.time, sample.received)
+                self._inertial = inertial.see(
+                    self._inertial, odometry, now,
+                    moved=self._track.same_since == odometry.time,  # or it may be frozen, and the motion has gone on
+                    trusted=not self.flight.misled or self.flight.turned is not None, turned=self.flight.turned or 0.0,
+                    latest=self.latency + LATE_S,
+                )  # fmt: skip
                 self._watch_heading(odometry, now)
+                self._delays = turned(self._delays, odometry)
         said_frozen = (self._pose_problem or "").startswith("frozen")  # which lasts already
         if self._pose_problem and not self._track.fault and now - self._good_pose < OUTLIERS_S and not said_frozen:
             self._pose_problem = None
@@ -180,10 +204,12 @@ class Bridge:
 
     def _read_controller(self, now: float, *, sends: bool = True) -> Reading:
         """What the controller has said, and all of it as inputs of the state machine."""
+        self._heard = max((reply.time for reply in self.client.latest.values()), default=self._heard)
         reading = self.instruments.read(now, self.info, land=self.land_now, sends=sends)
         grounded = self.flight.mode is Mode.INIT
         probed = self.probe.look(now, reading, self.sticks, grounded=grounded) if sends else ()
         good = self._pose_problem is None and self._stale is None
+        slow = pace_problem(self.pace, self.settings.odometry_timeout)
         self.inputs = Inputs(
             odometry=self.odometry,
             odometry_problem=None if good else self._pose_problem or self._stale,
@@ -192,13 +218,35 @@ class Bridge:
             override=reading.override,
             pilot=reading.pilot,
             voltage=reading.voltage,
-            settings_problems=self.settings_problems + probed + reading.meddling,
+            settings_problems=self.settings_problems + probed + reading.meddling + ((slow,) if slow else ()),
             policy_problem=reading.meddling[0] if reading.meddling else None,
             attitude_error=self._attitude_error(reading.attitude),
             heading_error=self._heading.error if good else None,
             missed_deadlines=len(self._missed),
+            accelerometer_problem=self._accelerometer_problem(),
+            motion_problem=self._motion_problem(),
+            touched=self._inertial.touch.carried,
+            supported=self._inertial.touch.rests and now - self._inertial.time < inertial.FRESH_S,
         )
         return reading
+
+    def _accelerometer_problem(self) -> str | None:
+        """What stands against a take-off, or was found in flight: that stays until the vehicle has landed."""
+        grounded = self.flight.mode in (Mode.INIT, Mode.DONE)
+        return self._inertial.rest_problem if grounded else self._inertial.watch.accelerometer_problem
+
+    def _motion_problem(self) -> str | None:
+        """On the ground: what was found while it was carried, until it was carried again and agreed."""
+        watch = self._inertial.watch
+        if self.flight.mode not in (Mode.INIT, Mode.DONE):
+            return watch.problem
+        if watch.opposed is not None:
+            self._opposed = f"{watch.opposed}, when it was carried; carry it again, once frames and axes are right"
+        elif watch.agrees:
+            self._opposed = None
+        if self.ticks % DELAY_TICKS == 0:
+            self._delay = delay_of(self._delays) or self._delay
+        return self._opposed or delay_problem(self._delay, self.latency + LATE_S)
 
     def _attitude_error(self, attitude: Attitude | None) -> float | None:
         if attitude is None or self.odometry is None:
@@ -206,26 +254,41 @@ class Bridge:
         roll, pitch = roll_pitch(self.odometry.quaternion)
         return max(abs(math.remainder(attitude.roll - roll, math.tau)), abs(attitude.pitch - pitch))
 
-    def _learn(self, now: float, reading: Reading) -> None:
-        """The scale of the accelerometer on the ground, and the throttle map in the air."""
-        if (reply := reading.fresh.get(RawImu.CODE)) is None:
-            return
-        counts = np.array(reply.message.acceleration, float)
-        if self.flight.mode is Mode.INIT and not self.inputs.armed:
-            rest = float(np.linalg.norm(counts))
-            self._gravity_counts += (rest - self._gravity_counts) * (0.05 if self._gravity_counts else 1.0)
-        if self._gravity_counts <= 0:
-            return
-        force = counts * (GRAVITY / self._gravity_counts)
-        self._imu = Imu(np.array(reply.message.body_rate), force)
+    def _feel(self, now: float, reading: Reading) -> None:
+        """What the inertial sensors say, and from it the throttle map, in the air."""
+        flying = self.flying and abs(self.height) > LIFTED and self.inputs.armed
+        seen = self.inputs.seen if not self.flight.misled else None
         attitude = self.client.message(Attitude.CODE, now, ATTITUDE_S)
-        self._reckoned = reckoning.reckon(self._reckoned, attitude, tuple(force.tolist()), now)
-        blown = math.hypot(force[0], force[1]) > BLOWN
-        if self.flying and self.height > LIFTED and not self.flight.blind and not blown and self.inputs.armed:
+        if (reply := reading.fresh.get(RawImu.CODE)) is not None:
             at = reply.time - reply.latency / 2
-            throttle = self._history.between(at - THRUST_DELAY[1], at - THRUST_DELAY[0])
-            if throttle is not None:
-                self.map = update(self.map, throttle, float(force[2]), self.inputs.voltage, 0.02)
+            self._delays = felt(self._delays, at, reply.message.body_rate)
+            sent = self._history.between(at - THRUST_DELAY[1], at - THRUST_DELAY[0])
+            self._inertial = inertial.measure(self._inertial, Measurement(
+                np.array(reply.message.acceleration, float), np.array(reply.message.body_rate), attitude,
+                None if sent is None else self._thrust(sent),
+                standing=self.flight.mode is Mode.INIT and not self.inputs.armed,
+                climb=float(seen.velocity[2]) if flying and seen is not None else None,
+            ), now)  # fmt: skip
+            self._learn(sent, flying)
+        throttle = self._history.between(now - THRUST_DELAY[1], now - THRUST_DELAY[0])
+        lifts = self.flight.mode in (Mode.HOVER, Mode.POLICY, Mode.LAND)  # or the ground may carry it
+        thrust = self._thrust(throttle) if lifts and throttle is not None else None
+        self._inertial = inertial.carry(self._inertial, attitude, thrust, now)
+
+    def _thrust(self, throttle: float) -> tuple[float, float]:
+        """Specific force of a throttle, and how far it may be off, m/s^2."""
+        force = self.map.force(throttle, self.inputs.voltage)
+        return force, force * self.map.doubt
+
+    def _learn(self, throttle: float | None, flying: bool) -> None:
+        """The throttle map."""
+        force = self._inertial.force
+        if force is None:
+            return
+        self._imu = Imu(self._inertial.gyro if self._inertial.gyro is not None else np.zeros(3), force)
+        blown = math.hypot(force[0], force[1]) > BLOWN
+        if throttle is not None and flying and not self.flight.blind and not blown:
+            self.map = update(self.map, throttle, float(force[2]), self.inputs.voltage, 0.02)
 
     def _count_deadlines(self, now: float, lateness: float) -> None:
         if lateness > self.settings.lateness:
@@ -268,7 +331,11 @@ class Bridge:
     def _step(self, now: float) -> None:
         before = self.flight
         self.flight = state_machine.step(self.settings, before, self.inputs, now)
+        wrong = self.flight.misled or (self._pose_problem or "").startswith("velocity")
+        if wrong and self.flight.blind and not before.blind and self.flight.turned is None:
+            self._inertial = inertial.distrust(self._inertial)
         if self.flight.mode is not before.mode:
+            self._inertial = dataclasses.replace(self._inertial, touch=Touch())
             self._trim = 0.0 if self.flight.mode in (Mode.TAKEOFF, Mode.LAND) else self._trim
             if self.log is not None:
                 record_mode(self.log, now, before, self.flight)
@@ -284,23 +351,23 @@ class Bridge:
             return "policy", controlled(self.vehicle, decision.mode, odometry, decision.command)
         if flight.target is None or odometry is None or flight.blind:
             return self._blind(now, dt)
+        if self.inputs.link_problem and now - self._heard > SILENT_S:
+            return "held", held(odometry)
         return "hover", self._hover(flight.target, odometry, dt)
 
     def _blind(self, now: float, dt: float) -> tuple[str, Ctbr | None]:
         """The descent without odometry."""
-        flight, odometry, reckoned = self.flight, self.odometry, self._reckoned
-        elapsed, higher = now - flight.since, 0.0
-        climb = float(odometry.velocity[2]) if odometry is not None else 0.0
-        if reckoned is not None and odometry is not None:  # it went on climbing
-            higher = min(reckoned.top - float(odometry.position[2]), HIGHER)
-        if elapsed > blind_time(self.height + higher, climb):
-            return "closed", None
         attitude = self.client.message(Attitude.CODE, now, 0.5)
-        known = reckoned is not None and now - reckoned.time < reckoning.LONGEST_STEP
-        if attitude is None or reckoned is None or not known or (flight.misled and flight.turned is None):
-            return "blind", blind(attitude, elapsed, climb)
-        self._trim = reckoning.trimmed(self._trim, elapsed, reckoned.velocity[2], dt)
-        return "blind", reckoning.settle(attitude, elapsed, reckoned.velocity, self._trim)
+        reckoned = self._inertial.reckoned
+        if reckoned is None:
+            climb = 0.0 if self.flight.lost is None else self.flight.lost[2]
+            return "blind", blind(attitude, now - self.flight.since, climb)
+        self._trim = reckoning.trimmed(self._trim, now - reckoned.since, reckoned.climb, dt)
+        command = reckoning.settle(attitude, reckoned, self._trim)
+        overdue = reckoned.height < self.flight.home - OVERDUE
+        thrust = min(float(command.thrust), GRAVITY) if overdue else float(command.thrust)
+        self._inertial = inertial.feel_for_ground(self._inertial, thrust, now, overdue=overdue)
+        return "blind", Ctbr(thrust * self._inertial.touch.factor(now), command.rate)
 
     def _hover(self, target: Target, odometry: Odometry, dt: float) -> Ctbr:
         x, y, z = target.position
@@ -317,7 +384,8 @@ class Bridge:
         if on_ground:
             zero = np.float64(0.0)
             return Ctbr(wanted.thrust + self._trim, Vec3(zero, zero, zero))
-        return Ctbr(wanted.thrust + self._trim, wanted.rate)
+        x, y, z = (0.0 if abs(r) < STEADY else r for r in rates_of(wanted))
+        return Ctbr(wanted.thrust + self._trim, Vec3(x, y, z))
 
     def _approach(self, point: tuple[float, float, float], target: Target, odometry: Odometry) -> tuple[float, ...]:
         """The velocity towards a point, and with it where it moves, world, m/s; and the yaw, rad."""

@@ -18,7 +18,7 @@ def table(value: Any, where: str, kind: type) -> dict[str, Any]:
         if key not in known:
             guess = nearest(key, known)
             hint = f"; did you mean {guess!r}?" if guess else ""
-            raise ValueError(f"contract: unknown key '{prefix}{key}'{hint} (accepted: {', '.join(known)})")
+            raise ValueError(f"contract: unknown key {prefix + key!r}{hint} (accepted: {', '.join(known)})")
     if missing := [key for key in known if key not in value]:
         raise ValueError(f"contract: missing key {', '.join(repr(prefix + key) for key in missing)}")
     return value
@@ -79,10 +79,12 @@ def seconds_range(value: Any, where: str) -> tuple[float, ...]:
 
 def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """A JSON object whose keys are there once."""
-    keys = [key for key, _ in pairs]
-    if len(set(keys)) != len(keys):
-        raise ValueError(f"a key is there twice among {', '.join(keys)}")
-    return dict(pairs)
+    content: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in content:
+            raise ValueError(f"key {key[:80]!r} is there twice")
+        content[key] = value
+    return content
 
 
 def refusal(where: str, value: Any, accepted: str) -> ValueError:

@@ -17,6 +17,7 @@ from e2efly.deploy.hover import blind, blind_time, sink_time
 from e2efly.deploy.instruments import CLOSED
 from e2efly.deploy.msp.controller import ControllerInfo
 from e2efly.deploy.record import Log
+from e2efly.deploy.terminal import printable
 from e2efly.deploy.watchdog import Plan, WatchedLink
 
 LOWEST_RATE = 100.0
@@ -67,7 +68,7 @@ def fly(
         rate: control steps a second, Hz.
         log: the flight's record.
         watchdog: told what to do should this process fall silent.
-        say: takes lines for people; it must not block.
+        say: takes lines for people; it must not block. What it raises is lost with its line.
         stop: whether to end; a vehicle in the air is landed first.
         identify_again: reads the controller's settings anew after it was connected again, on the ground.
         clock: the time.
@@ -98,10 +99,10 @@ def fly(
                 watchdog.plan(plan_of(bridge))
             if (line := _told(bridge)) != told:
                 told = line
-                say(line)
+                _say(say, line)
             elif now - last_status >= STATUS_PERIOD:
                 last_status = now
-                say(_status(bridge))
+                _say(say, _status(bridge))
             done = clock.now()
             timing.rounds += 1
             timing.lateness.append(late)
@@ -144,10 +145,15 @@ def plan_of(bridge: Bridge) -> Plan:
     return Plan(flying, PLAN_RATES, (roll, pitch, yaw), (a, b, c, d), steps, idle)
 
 
+def _say(say: Callable[[str], None], line: str) -> None:
+    with suppress(Exception):  # a terminal that is gone ends no flight
+        say(line)
+
+
 def _told(bridge: Bridge) -> str:
     """The mode and its reasons without their numbers, which change all the time."""
     flight = bridge.flight
-    return f"{flight.mode.upper()}: " + "; ".join(str(reason).split(": ")[0] for reason in flight.reasons)
+    return f"{flight.mode.upper()}: " + "; ".join(printable(str(reason).split(": ")[0]) for reason in flight.reasons)
 
 
 def _status(bridge: Bridge) -> str:
@@ -155,7 +161,7 @@ def _status(bridge: Bridge) -> str:
     if bridge.land_now and bridge.inputs.armed and flight.mode in (Mode.INIT, Mode.DONE):
         return f"{flight.mode.upper()}: disarm, then this ends: without it the throttle stick may have the motors"
     if flight.mode is Mode.INIT:
-        return "\n".join([f"{flight.mode.upper()}:", *(f"  - {reason}" for reason in flight.reasons)])
+        return "\n".join([f"{flight.mode.upper()}:", *(f"  - {printable(reason)}" for reason in flight.reasons)])
     where = "unknown" if o is None else f"{o.position.round(2).tolist()} m, {o.velocity.round(2).tolist()} m/s"
     return f"{flight.mode.upper()}: {where}, throttle {bridge.sent.throttle:.2f}"
 

@@ -58,6 +58,8 @@ class Reason(StrEnum):
     SETTINGS = "settings"
     LINK = "no link to the flight controller"
     ATTITUDE = "the controller's attitude is unlike the odometry's"
+    ACCELEROMETER = "the accelerometer is wrong"
+    MOTION = "poses and sensors contradict each other"
     OUTSIDE_FENCE = "outside the fence"
     WAITING = "ready: waiting for the mission switch"
     MISSION = "mission switch"
@@ -70,6 +72,7 @@ class Reason(StrEnum):
     DEADLINES = "missed deadlines"
     GUARD = "would leave the fence"
     LANDED = "landed"
+    TOUCHED = "landed: the ground was felt"
     DISARMED = "disarmed"
     OVERRIDE_OFF = "the pilot took over"
     OVERRIDE_ON = "the pilot handed over"
@@ -117,6 +120,14 @@ class Inputs:
     """How the controller's settings are unlike what the policy needs."""
     attitude_error: float | None = None
     """Between the controller's roll and pitch and the odometry's, rad; None: the controller's are not heard."""
+    accelerometer_problem: str | None = None
+    """Why the controller's accelerometer cannot be flown by."""
+    motion_problem: str | None = None
+    """How the poses contradict what the controller's sensors feel."""
+    touched: bool = False
+    """In a landing without odometry the ground was felt."""
+    supported: bool = False
+    """Something carries the vehicle: it feels more force than its rotors give."""
     heading_error: float | None = None
     """The odometry's heading minus the one that the flight shows, rad; None: it shows none now."""
     policy_problem: str | None = None
@@ -163,6 +174,12 @@ class Flight:
     mode: Mode = Mode.INIT
     since: float = 0.0
     """When the mode began, or in it the flight without odometry, s; moved along when the clock jumps."""
+    lost: tuple[float, float, float] | None = None
+    """Landing without odometry: when it was good last, s, and the height over home, m, and climb, m/s, of that time."""
+    found_since: float | None = None
+    """Landing without odometry: since when it has been good again, s."""
+    standing_since: float | None = None
+    """Landing: since when the newest odometry, good or just lost, has said that it stands at home, s."""
     now: float = 0.0
     """Of the last step, s."""
     reasons: tuple[str, ...] = ()
@@ -185,5 +202,5 @@ class Flight:
     """How near the vehicle has come to the target, horizontally, m; infinite until it was slow there once."""
     turned: float | None = None
     """The error of the odometry's heading for which it counts as lost, rad."""
-    misled: bool = False
-    """It went away from its target: until it stands, its odometry counts as lost."""
+    misled: str | None = None
+    """Why the odometry is not the vehicle's own: until it stands, it counts as lost; None: it is."""

@@ -21,8 +21,16 @@ SINK_TIME = SINK_SPEED / SINK_ACCELERATION
 """... which takes so long from rest, s ..."""
 SINK_THRUST = 0.95
 """... and goes on with this share of the weight: it must sink, whatever the throttle map's last error."""
-SLOWEST_SINK = 0.5
-"""By which the time to the ground is estimated, m/s."""
+SINK_FASTER = 0.17
+"""By which the speed of sinking grows, m/s^2: more than what a throttle map is wrong by, so that it always sinks."""
+SLOWEST_SINK, SLOWEST_FASTER = 0.5, 0.07
+"""The slowest that it sinks, m/s, and by which that grows, m/s^2: by them the time to the ground is estimated."""
+
+HELD_SINK, HELD_GAIN, HELD_ACCELERATION = 0.35, 1.0, 0.4
+"""What is sent while the link is silent sinks at this speed, m/s, by acceleration over the speed's error, 1/s, and no
+more than this acceleration, m/s^2 ..."""
+HELD_RATE = 0.5
+"""... and turns to level no faster than this, rad/s."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +89,15 @@ def blind(attitude: Attitude | None, elapsed: float, climb: float = 0.0) -> Ctbr
     return Ctbr(thrust / tilt, Vec3(_levelling(attitude.roll), _levelling(attitude.pitch), 0.0))
 
 
+def held(odometry: Odometry) -> Ctbr:
+    """What is sent while the controller is not heard, and may be held by it for long: level, and sinking slowly."""
+    roll, pitch = roll_pitch(odometry.quaternion)
+    up = float(odometry.velocity[2])
+    thrust = GRAVITY + min(max(-HELD_GAIN * (up + HELD_SINK), -HELD_ACCELERATION), 0.0)
+    x, y = (min(max(_levelling(angle), -HELD_RATE), HELD_RATE) for angle in (roll, pitch))
+    return Ctbr(thrust / max(math.cos(roll) * math.cos(pitch), 0.5), Vec3(x, y, 0.0))
+
+
 def _levelling(angle: float) -> float:
     return max(-LEVEL_RATE, min(LEVEL_RATE, -LEVEL_GAIN * angle))
 
@@ -94,7 +111,8 @@ def blind_time(height: float, climb: float = 0.0) -> float:
     """After how long a blind descent from a height, m, has surely ended, s; the throttle is closed then."""
     up = max(climb, 0.0)
     top = max(height, 0.0) + up**2 / (2 * SINK_ACCELERATION)
-    return 2.0 + up / SINK_ACCELERATION + top / SLOWEST_SINK
+    sinking = (math.sqrt(SLOWEST_SINK**2 + 2 * SLOWEST_FASTER * top) - SLOWEST_SINK) / SLOWEST_FASTER
+    return 2.0 + up / SINK_ACCELERATION + sinking
 
 
 def roll_pitch(quaternion: np.ndarray) -> tuple[float, float]:

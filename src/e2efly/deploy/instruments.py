@@ -1,7 +1,13 @@
-"""What the flight controller says of itself, its pilot and its battery, read at each control step."""
+"""What the flight controller says of itself, its pilot and its battery, read at each control step.
+
+A checksum of 8 bits passes one damaged message in 256, so one message alone must not end or begin a flight. Two in a
+row must agree before the controller counts as armed or disarmed, before the receiver counts as lost, and before the
+mission switch counts as moved. What only takes the vehicle out of the policy's hands or the bridge's is believed at
+once: the override switch, a stick, and the mission switch's leaving of its policy position.
+"""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from e2efly.deploy.flight_state import Mission, Pilot
 from e2efly.deploy.msp.client import Client
@@ -52,12 +58,34 @@ class Reading:
     """The replies that came since the reading before, by code."""
 
 
+T = TypeVar("T")
+
+
+@dataclass
+class Twice(Generic[T]):
+    """A value that changes when two messages in a row say so."""
+
+    held: T
+    """What counts."""
+    _last: T | None = None
+
+    def hear(self, value: T) -> None:
+        """The next message says `value`."""
+        if value == self._last:
+            self.held = value
+        self._last = value
+
+
 @dataclass
 class Instruments:
     """Reads one flight controller."""
 
     client: Client
     settings: FlightSettings
+    _armed: Twice[bool] = field(default_factory=lambda: Twice(False))
+    _heard: Twice[bool] = field(default_factory=lambda: Twice(False))
+    """Whether the controller hears the pilot's receiver."""
+    _mission: Twice[Mission | None] = field(default_factory=lambda: Twice(None))
     _seen: dict[int, float] = field(default_factory=dict)
     _voltage: float | None = None
 
@@ -79,19 +107,34 @@ class Instruments:
         channels: Rc | None = self.client.message(Rc.CODE, now, RC_PATIENCE * patience)
         on = MEDDLING.keys() & active if sends else MEDDLING.keys() & active - {ANGLE}
         meddling = tuple(f"{MEDDLING[box]} is on: sticks are no body rates" for box in on)
-        heard = FAILSAFE not in active and not (status is not None and RECEIVER_LOST & set(status.arming_disabled))
+        if status is not None and StatusEx.CODE in fresh:
+            self._armed.hear(ARM in active)
+            self._heard.hear(FAILSAFE not in active and not RECEIVER_LOST & set(status.arming_disabled))
         battery_known = self.client.message(BatteryState.CODE, now, BATTERY_PATIENCE_S) is not None
         return Reading(
             link_problem=self._link_problem(status),
-            armed=ARM in active,
+            armed=self._armed.held and status is not None,
             override=OVERRIDE in active,
-            pilot=pilot_of(channels, self.settings.channels, land=land) if heard and channels is not None else None,
+            pilot=self._pilot(channels, fresh=Rc.CODE in fresh, land=land),
             voltage=self._voltage if battery_known else None,
             meddling=meddling if OVERRIDE in active else (),
             channels=channels,
             attitude=self.client.message(Attitude.CODE, now, patience),
             fresh=fresh,
         )
+
+    def _pilot(self, channels: Rc | None, *, fresh: bool, land: bool) -> Pilot | None:
+        if channels is None:
+            return None
+        at = mission_of(channels, self.settings.channels)
+        if fresh:
+            self._mission.hear(at)
+        mission = self._mission.held
+        if mission is None or not self._heard.held:
+            return None
+        if mission is Mission.POLICY and at is not Mission.POLICY:
+            mission = Mission.HOVER  # the policy stops at once; whether to land is told by the next message
+        return pilot_of(channels, self.settings.channels, Mission.LAND if land else mission)
 
     def _fresh(self) -> dict[int, Any]:
         fresh = {}
@@ -118,25 +161,28 @@ class Instruments:
         self._voltage = cell if self._voltage is None else self._voltage + VOLTAGE_SHARE * (cell - self._voltage)
 
 
-def pilot_of(rc: Rc, places: PilotChannels, *, land: bool) -> Pilot | None:
-    """What the pilot wants; None where the mission switch is not there: nobody's will is known.
+def mission_of(rc: Rc, places: PilotChannels) -> Mission | None:
+    """Where the mission switch is; None where the receiver has no such channel: nobody's will is known."""
+    if places.mission > len(rc.channels):
+        return None
+    at = rc.channels[places.mission - 1]
+    return Mission.LAND if at < 1300 else Mission.POLICY if at > 1700 else Mission.HOVER
+
+
+def pilot_of(rc: Rc, places: PilotChannels, mission: Mission) -> Pilot:
+    """What the pilot wants.
 
     Args:
         rc: the receiver's channels.
-        places: where the copies of the sticks and the mission switch are.
-        land: a landing is asked for, whatever the switch says.
+        places: where the copies of the sticks are.
+        mission: what the mission switch asks for.
     """
-    if places.mission > len(rc.channels):
-        return None
-
-    def pulse(channel: int) -> int:
-        return rc.channels[channel - 1] if channel <= len(rc.channels) else 1500
 
     def stick(channel: int | None) -> float:
-        return 0.0 if channel is None else max(-1.0, min(1.0, (pulse(channel) - 1500) / 500))
+        if channel is None or channel > len(rc.channels):
+            return 0.0
+        return max(-1.0, min(1.0, (rc.channels[channel - 1] - 1500) / 500))
 
-    at = pulse(places.mission)
-    mission = Mission.LAND if at < 1300 or land else Mission.POLICY if at > 1700 else Mission.HOVER
     return Pilot(mission, stick(places.roll), stick(places.pitch), stick(places.throttle), stick(places.yaw))
 
 

@@ -1,6 +1,7 @@
 """Load `policy.onnx` and act with it. Imports no JAX and no simulator, so that it starts fast on a companion computer.
 
-The file is refused when it does not agree with its own contract, or with what the caller is about to fly.
+The file is refused when it is damaged, when it does not agree with its own contract, or with what the caller is about
+to fly.
 """
 
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ import numpy as np
 import onnxruntime as ort
 
 from e2efly.deploy.contract import ACTION_LIMITS, ACTION_SIZE, METADATA_KEY, Contract
+from e2efly.deploy.onnx_file import check_file, is_sealed, sealed
 from e2efly.vehicles import Vehicle
 
 INPUT, OUTPUT = "observation", "action"
@@ -145,8 +147,35 @@ def load_policy(
         ValueError: naming the file and the field, what it is, what was wanted, and what to do. What is left out is
             not compared.
     """
-    where = str(path)
-    session = _session(where)
+    policy = _policy(str(path), _read(path))
+    _check_use(str(path), policy.contract, task, vehicle, control_rate_hz, command_mode)
+    return policy
+
+
+def sealed_policy(path: str | Path) -> bytes:
+    """The content of a policy's file with its digest, for the file of an older e2efly, which has none.
+
+    Raises:
+        ValueError: naming the file, where it cannot be loaded with a digest either, or has one already.
+    """
+    content = _read(path)
+    if is_sealed(content):
+        raise ValueError(f"{path}: has a digest already; accepted: a policy.onnx of an older e2efly, without one")
+    content = sealed(content)
+    _policy(str(path), content)
+    return content
+
+
+def _read(path: str | Path) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read: {error.strerror}; accepted: the path of a policy.onnx") from None
+
+
+def _policy(where: str, content: bytes) -> Policy:
+    """The policy of a file, checked against its own contract."""
+    session = _session(where, content)
     try:
         stored = session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
     except UnicodeDecodeError as error:
@@ -161,7 +190,6 @@ def load_policy(
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from None
     _check_graph(where, session, contract)
-    _check_use(where, contract, task, vehicle, control_rate_hz, command_mode)
     policy = Policy(contract, session)
     try:  # also warms the session up
         policy.act(_level_and_still(contract), [np.zeros(image.shape, np.float32) for image in contract.images])
@@ -177,11 +205,11 @@ def _level_and_still(contract: Contract) -> np.ndarray:
     return observation
 
 
-def _session(where: str) -> ort.InferenceSession:
+def _session(where: str, content: bytes) -> ort.InferenceSession:
     try:
-        content = Path(where).read_bytes()
-    except OSError as error:
-        raise ValueError(f"{where}: cannot be read: {error.strerror}; accepted: the path of a policy.onnx") from None
+        check_file(content)
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from None
     options = ort.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4
@@ -189,8 +217,7 @@ def _session(where: str) -> ort.InferenceSession:
         return ort.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # ONNX Runtime's errors share no other base
         raise ValueError(
-            f"{where}: not an ONNX file that ONNX Runtime {ort.__version__} can load (truncated or damaged? copy or "
-            f"export it again): {error}"
+            f"{where}: not an ONNX file that ONNX Runtime {ort.__version__} can load (export it again): {error}"
         ) from None
 
 

@@ -1,15 +1,18 @@
-"""Without odometry: the velocity seen last, carried on by the flight controller's accelerometer and attitude.
+"""Without odometry: the velocity seen last, carried on by the accelerometer and by the throttle.
 
-It serves to end the motion under way and to sink, not to know where the vehicle is: an accelerometer that is wrong by
-1 % of gravity is off by 0.1 m/s after a second, by half a metre a second after five.
+Neither is good for long: an accelerometer that is wrong by 1 % of gravity is off by half a metre a second after five,
+and so is a throttle map. But the map was learned while poses were good, and knows how well. The vertical speed is the
+accelerometer's, no farther from the throttle's than the map may be wrong: an accelerometer that is calibrated badly, or
+broken, then makes the vehicle sink a little slower or faster, and never climb.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from e2efly.control import Ctbr, Vec3
+from e2efly.deploy.accelerometer import level
 from e2efly.deploy.fence import heading
-from e2efly.deploy.hover import LEVEL_GAIN, LEVEL_RATE, SINK_ACCELERATION, SINK_SPEED
+from e2efly.deploy.hover import LEVEL_GAIN, LEVEL_RATE, SINK_ACCELERATION, SINK_FASTER, SINK_SPEED
 from e2efly.deploy.msp.messages import Attitude
 from e2efly.deploy.odometry import Odometry
 from e2efly.vehicles.vehicle import GRAVITY
@@ -22,8 +25,10 @@ BRAKE_S = 2.0
 """Horizontal motion is braked for so long, s: then its reckoning is too old, and the vehicle is held level."""
 SINK_GAIN = 3.0
 """Acceleration over the error of the vertical speed, 1/s."""
-SINK_FASTER = 0.1
-"""By which the speed of sinking grows, m/s^2: more than what an accelerometer is wrong by, so that it always sinks."""
+FASTEST_SINK = 2.0
+"""The speed of sinking grows up to this, m/s."""
+DOUBT = 0.05
+"""Error of the vertical speed that the poses show, m/s."""
 TRIM_GAIN, TRIM_ERROR, LARGEST_TRIM = 3.0, 0.6, 4.0
 """Growth of the trim over the error of the vertical speed, 1/s^2; the largest error that counts, m/s, as a motion that
 is being ended is none of the map's; and its bound, m/s^2: a map that is wrong by 30 %."""
@@ -34,13 +39,24 @@ class Reckoning:
     """The velocity without odometry."""
 
     velocity: tuple[float, float, float]
-    """Forward, left and up along the heading, m/s."""
+    """Forward, left and up along the heading, by the accelerometer, m/s."""
+    lifted: float
+    """Vertical speed by the throttle, m/s."""
+    doubt: float
+    """How far that one may be off, m/s."""
     time: float
     """Up to when it is reckoned, s."""
+    since: float
+    """When the odometry was seen last, s."""
     height: float
     """Reckoned from the odometry's last, world, m."""
     top: float
     """The highest since then, m."""
+
+    @property
+    def climb(self) -> float:
+        """Vertical speed, m/s: the accelerometer's, as far as the throttle's allows; to sink faster, half as far."""
+        return max(self.lifted - self.doubt, min(self.lifted + self.doubt / 2, self.velocity[2]))
 
 
 def seen(odometry: Odometry, now: float, error: float = 0.0) -> Reckoning:
@@ -49,36 +65,43 @@ def seen(odometry: Odometry, now: float, error: float = 0.0) -> Reckoning:
     yaw = heading(odometry.quaternion) - error
     c, s = math.cos(yaw), math.sin(yaw)
     height = float(odometry.position[2])
-    return Reckoning((c * x + s * y, c * y - s * x, z), now, height, height)
+    return Reckoning((c * x + s * y, c * y - s * x, z), z, DOUBT, now, now, height, height)
 
 
 def reckon(
-    before: Reckoning | None, attitude: Attitude | None, force: tuple[float, ...], now: float
+    before: Reckoning,
+    attitude: Attitude | None,
+    force: tuple[float, ...] | None,
+    thrust: tuple[float, float] | None,
+    now: float,
 ) -> Reckoning | None:
-    """Carry the velocity on by one measurement; the heading is taken to stay.
+    """Carry the velocity on by one control step; the heading is taken to stay.
 
     Args:
         before: what was reckoned so far.
-        attitude: the flight controller's.
-        force: specific force by its accelerometer, body FLU, m/s^2.
+        attitude: the flight controller's; None: it is not known, and taken to be level.
+        force: specific force by its accelerometer, body FLU, m/s^2; None: it is not known, and taken to be the thrust.
+        thrust: specific force by the throttle, and how far that may be off, m/s^2; None: it is not known, and taken to
+            be the force.
         now: s.
 
     Returns:
-        The velocity now; None where it cannot be known: no attitude, or too long a pause.
+        The velocity now; None where it cannot be known: neither force nor thrust, or too long a pause.
     """
-    if before is None or attitude is None or not 0 <= now - before.time <= LONGEST_STEP:
+    dt = now - before.time
+    if not 0 <= dt <= LONGEST_STEP or (force is None and thrust is None):
         return None
-    dt, (fx, fy, fz) = now - before.time, force
-    cr, sr = math.cos(attitude.roll), math.sin(attitude.roll)
-    cp, sp = math.cos(attitude.pitch), math.sin(attitude.pitch)
-    lifted = sr * fy + cr * fz
+    attitude = attitude or Attitude(0.0, 0.0, 0.0)
+    upright = math.cos(attitude.roll) * math.cos(attitude.pitch)
+    ahead, aside, above = (float(a) for a in level(attitude, force or (0.0, 0.0, thrust[0] if thrust else GRAVITY)))
+    lift, doubt = (above, 0.0) if thrust is None else (thrust[0] * upright, thrust[1])
     forward, left, up = before.velocity
-    height = before.height + up * dt
-    return Reckoning(
-        (forward + (cp * fx + sp * lifted) * dt, left + (cr * fy - sr * fz) * dt,
-         up + (cp * lifted - sp * fx - GRAVITY) * dt),
-        now, height, max(height, before.top),
+    after = replace(
+        before, velocity=(forward + ahead * dt, left + aside * dt, up + (above - GRAVITY) * dt),
+        lifted=before.lifted + (lift - GRAVITY) * dt, doubt=before.doubt + doubt * dt, time=now,
     )  # fmt: skip
+    height = before.height + after.climb * dt
+    return replace(after, height=height, top=max(height, before.top))
 
 
 def trimmed(trim: float, elapsed: float, up: float, dt: float) -> float:
@@ -94,18 +117,20 @@ def trimmed(trim: float, elapsed: float, up: float, dt: float) -> float:
     return max(-LARGEST_TRIM, min(LARGEST_TRIM, trim + TRIM_GAIN * behind * dt))
 
 
-def settle(attitude: Attitude, elapsed: float, velocity: tuple[float, float, float], trim: float = 0.0) -> Ctbr:
-    """End the motion, level, and sink.
+def settle(attitude: Attitude | None, reckoned: Reckoning, trim: float = 0.0) -> Ctbr:
+    """End the motion, level, and sink; without an attitude the body rates are held at zero.
 
     Args:
         attitude: the flight controller's.
-        elapsed: since the odometry was lost, s.
-        velocity: forward, left and up along the heading, m/s.
+        reckoned: the velocity now.
         trim: added to the thrust, m/s^2; see `trimmed`.
     """
-    forward, left, up = velocity
-    wanted = SINK_GAIN * (_climb(elapsed) - up)
+    elapsed = reckoned.time - reckoned.since
+    wanted = SINK_GAIN * (_climb(elapsed) - reckoned.climb)
     thrust = GRAVITY + trim + max(-SINK_ACCELERATION, min(SINK_ACCELERATION, wanted))
+    if attitude is None:
+        return Ctbr(thrust, Vec3(0.0, 0.0, 0.0))
+    forward, left, _ = reckoned.velocity
     speed = math.hypot(forward, left)
     share = min(BRAKE_GAIN, BRAKE_ACCELERATION / speed) if speed > 0 and elapsed < BRAKE_S else 0.0
     roll, pitch = math.atan(share * left / GRAVITY), -math.atan(share * forward / GRAVITY)
@@ -114,7 +139,7 @@ def settle(attitude: Attitude, elapsed: float, velocity: tuple[float, float, flo
 
 
 def _climb(elapsed: float) -> float:
-    return -SINK_SPEED - SINK_FASTER * elapsed
+    return max(-SINK_SPEED - SINK_FASTER * elapsed, -FASTEST_SINK)
 
 
 def _turn(angle: float) -> float:

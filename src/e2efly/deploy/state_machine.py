@@ -46,6 +46,15 @@ LEAD = 0.6
 """How far the target of a landing may be under the vehicle, m: farther shows no more than that there is ground."""
 PRESSED = 0.5
 """A still vehicle with its target so far under it stands on something, m."""
+PRESSING = 0.5
+"""One that is still in the air, by its height, is pressed down ever harder until it is felt that it stands, m/s."""
+FOUND_S = 0.5
+"""Odometry that was lost in a landing must be good for so long, s, to be flown by again: one that comes and goes must
+not begin the landing anew each time."""
+RECENT_S = 0.5
+"""An odometry as old as this still tells that the vehicle stands, s."""
+NEAR_GROUND = 0.3
+"""In a landing below this height the shock of the ground is not taken for a contradiction of poses and sensors, m."""
 
 
 def step(settings: FlightSettings, flight: Flight, inputs: Inputs, now: float) -> Flight:
@@ -65,19 +74,27 @@ def step(settings: FlightSettings, flight: Flight, inputs: Inputs, now: float) -
         flight,
         now=now,
         since=flight.since + jump,
-        still_since=None if flight.still_since is None else flight.still_since + jump,
-        fallen_since=None if flight.fallen_since is None else flight.fallen_since + jump,
+        still_since=_moved(flight.still_since, jump),
+        fallen_since=_moved(flight.fallen_since, jump),
+        found_since=_moved(flight.found_since, jump),
+        standing_since=_moved(flight.standing_since, jump),
+        lost=None if flight.lost is None else (flight.lost[0] + jump, *flight.lost[1:]),
         rearm=flight.rearm and not _mission_low(inputs),
         lock=flight.lock and policy,
     )
     flight = _watched(settings, flight, inputs)
     if flight.misled:
-        problem = MISLED if flight.turned is None else f"{TURNED} by {math.degrees(flight.turned):.0f} deg"
+        turned = flight.turned
+        problem = flight.misled if turned is None else f"{TURNED} by {math.degrees(turned):.0f} deg"
         inputs = dataclasses.replace(inputs, odometry_problem=problem)
     following = _common(flight, inputs) or _STEPS[flight.mode](settings, flight, inputs, dt)
     if (following.mode, following.blind) == (flight.mode, flight.blind):
         return following
     return dataclasses.replace(following, since=now, still_since=None, fallen_since=None, nearest=math.inf)
+
+
+def _moved(moment: float | None, jump: float) -> float | None:
+    return None if moment is None else moment + jump
 
 
 def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
@@ -88,7 +105,7 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
     does not, the distance from the target.
     """
     if flight.mode in (Mode.INIT, Mode.DONE):
-        return dataclasses.replace(flight, misled=False, turned=None, fallen_since=None)
+        return dataclasses.replace(flight, misled=None, turned=None, fallen_since=None)
     odometry, target = inputs.seen, flight.target
     if odometry is None:
         return dataclasses.replace(flight, fallen_since=None)
@@ -98,16 +115,22 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
     error = inputs.heading_error
     if flight.misled and flight.turned is not None and error is not None:
         flight = dataclasses.replace(flight, turned=error)
+    if inputs.motion_problem and not flight.misled and not _nearly_landed(flight, odometry):
+        return dataclasses.replace(flight, misled=f"{Reason.MOTION}: {inputs.motion_problem}")
     if target is None or flight.mode is Mode.PILOT:
-        misled = flight.misled and not _stands(settings, flight, odometry)
+        misled = None if _stands(settings, flight, odometry) else flight.misled
         return dataclasses.replace(flight, misled=misled, turned=flight.turned if misled else None)
     if error is not None and abs(error) > settings.heading_agreement:
-        return dataclasses.replace(flight, misled=True, turned=error)
+        return dataclasses.replace(flight, misled=TURNED, turned=error)
     off = math.hypot(*np.subtract(target.position[:2], odometry.position[:2]).tolist())
     rests = math.isfinite(flight.nearest) or float(np.linalg.norm(odometry.velocity)) < SLOW
     nearest = min(flight.nearest, off) if rests else math.inf
-    misled = flight.misled or off > nearest + settings.follow_distance
+    misled = flight.misled or (MISLED if off > nearest + settings.follow_distance else None)
     return dataclasses.replace(flight, nearest=nearest, misled=misled)
+
+
+def _nearly_landed(flight: Flight, odometry: Odometry) -> bool:
+    return flight.mode is Mode.LAND and abs(float(odometry.position[2]) - flight.home) < NEAR_GROUND
 
 
 def _mission_low(inputs: Inputs) -> bool:
@@ -168,6 +191,10 @@ def take_off_refusals(settings: FlightSettings, flight: Flight, inputs: Inputs) 
         reasons.append(f"{Reason.ATTITUDE}: the controller's is not known")
     elif not error <= settings.attitude_agreement:
         reasons.append(f"{Reason.ATTITUDE}: by {math.degrees(error):.0f} deg")
+    if inputs.accelerometer_problem:
+        reasons.append(f"{Reason.ACCELEROMETER}: {inputs.accelerometer_problem}")
+    if inputs.motion_problem:
+        reasons.append(f"{Reason.MOTION}: {inputs.motion_problem}")
     reasons += _battery(settings, inputs)
     reasons += _sticks(settings, inputs.pilot, Reason.STICKS)
     if inputs.pilot is None:
@@ -227,13 +254,21 @@ def _must_land(settings: FlightSettings, inputs: Inputs) -> tuple[str, ...]:
         return reasons
     if _mission_low(inputs):
         return (Reason.MISSION,)
+    if inputs.accelerometer_problem:
+        return (f"{Reason.ACCELEROMETER}: {inputs.accelerometer_problem}",)
     return tuple(_battery(settings, inputs)) if inputs.voltage is not None else ()
 
 
 def _land(settings: FlightSettings, flight: Flight, inputs: Inputs, *reasons: str) -> Flight:
     if inputs.seen is None:
-        return _to(flight, Mode.LAND, *reasons, blind=True)
+        return _blindly(settings, flight, inputs, *reasons)
     return _to(flight, Mode.LAND, *reasons, target=_down_from(settings, inputs.seen))
+
+
+def _blindly(settings: FlightSettings, flight: Flight, inputs: Inputs, *reasons: str) -> Flight:
+    lost = _last_seen(settings, flight, inputs)
+    begun = dataclasses.replace(flight, lost=lost, found_since=None, standing_since=None)
+    return _to(begun, Mode.LAND, *reasons, blind=True)
 
 
 def _down_from(settings: FlightSettings, odometry: Odometry) -> Target:
@@ -293,6 +328,8 @@ def policy_refusals(settings: FlightSettings, flight: Flight, inputs: Inputs, od
         reasons.append(problem)
     if inputs.missed_deadlines >= settings.missed_deadlines:
         reasons.append(f"{Reason.DEADLINES}: {inputs.missed_deadlines} in a second")
+    if inputs.accelerometer_problem:
+        reasons.append(f"{Reason.ACCELEROMETER}: {inputs.accelerometer_problem}")
     return (*reasons, *_battery(settings, inputs))
 
 
@@ -317,35 +354,81 @@ def _policy(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
 
 
 def _landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
+    flight = _looked(settings, flight, inputs)
+    if inputs.link_problem:  # what the controller does meanwhile is not known: nothing counts as landed
+        return _unheard(settings, flight, inputs)
+    if flight.standing_since is not None and flight.now - flight.standing_since >= settings.land_settle:
+        assert inputs.odometry is not None
+        return dataclasses.replace(_to(flight, Mode.DONE, Reason.LANDED), home=float(inputs.odometry.position[2]))
     odometry = inputs.seen
     if odometry is None:
         return _sinking(settings, flight, inputs)
-    if flight.target is None:
-        return dataclasses.replace(flight, blind=False, target=_down_from(settings, odometry))
+    if flight.blind:
+        found = flight.now if flight.found_since is None else flight.found_since
+        flight = dataclasses.replace(flight, found_since=found, lost=_last_seen(settings, flight, inputs))
+        return _sinking(settings, flight, inputs) if flight.now - found < FOUND_S else _see(settings, flight, odometry)
+    assert flight.target is not None
     x, y, z = flight.target.position
     height = float(odometry.position[2])
     stopped = float(np.linalg.norm(odometry.velocity[:2])) < SLOW or flight.now - flight.since > SLOWED_S
     sink = settings.land_speed if stopped else 0.0
-    down = max(z - sink * dt, height - LEAD)
+    still_for = 0.0 if flight.still_since is None else flight.now - flight.still_since
+    down = max(z - sink * dt, height - LEAD - PRESSING * max(still_for - settings.land_settle, 0.0))
     still = float(np.linalg.norm(odometry.velocity)) < settings.still_speed and height - down > PRESSED
     since = (flight.now if flight.still_since is None else flight.still_since) if still else None
-    if since is not None and flight.now - since >= settings.land_settle:
+    low = height < flight.home + STANDING
+    if since is not None and flight.now - since >= settings.land_settle and (low or inputs.supported):
         return dataclasses.replace(_to(flight, Mode.DONE, Reason.LANDED), home=height)
     target = Target((x, y, down), flight.target.yaw, -sink)
     return dataclasses.replace(flight, target=target, still_since=since)
 
 
-def _sinking(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
-    """Landing without odometry ends by the clock: what has landed, or lies on its side, must not start up again."""
-    if not flight.blind:
-        return _to(flight, Mode.LAND, inputs.blindness, blind=True)
-    last = inputs.odometry
-    height, climb = (float(last.position[2]) - flight.home, float(last.velocity[2])) if last else (math.nan, math.nan)
+def _see(settings: FlightSettings, flight: Flight, odometry: Odometry) -> Flight:
+    """Land by odometry from where it is."""
+    return dataclasses.replace(
+        flight, blind=False, found_since=None, lost=None, target=_down_from(settings, odometry), still_since=None,
+        nearest=math.inf,
+    )  # fmt: skip
+
+
+def _unheard(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
+    """While the link is down: no clock of the landing runs, and it will begin where the vehicle is."""
+    flight = dataclasses.replace(flight, still_since=None, standing_since=None)
+    if inputs.seen is not None:
+        return _see(settings, flight, inputs.seen)
+    if not flight.blind or flight.lost is None:
+        return _blindly(settings, flight, inputs, *flight.reasons)
+    return dataclasses.replace(flight, lost=(flight.now, *flight.lost[1:]))
+
+
+def _looked(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
+    """In a landing whose odometry comes and goes: whether the newest says that the vehicle stands at home."""
+    odometry, since = inputs.odometry, flight.standing_since
+    known = flight.blind and odometry is not None and not flight.misled and flight.now - odometry.time <= RECENT_S
+    stands = known and odometry is not None and _stands(settings, flight, odometry)
+    return dataclasses.replace(flight, standing_since=(flight.now if since is None else since) if stands else None)
+
+
+def _last_seen(settings: FlightSettings, flight: Flight, inputs: Inputs) -> tuple[float, float, float]:
+    """Now, and the height over home, m, and the climb, m/s, that the newest odometry tells; mirrored, it is as high."""
+    o = inputs.odometry
+    height, climb = (math.nan, math.nan) if o is None else (float(o.position[2]) - flight.home, float(o.velocity[2]))
     if not math.isfinite(height):
         height = settings.fence.high[2] - flight.home
-    elapsed = flight.now - flight.since
-    if elapsed > blind_time(height, climb if math.isfinite(climb) else 0.0):
-        return _to(flight, Mode.DONE, f"{Reason.LANDED}: without odometry, after {elapsed:.0f} s")
+    return flight.now, abs(height), abs(climb) if math.isfinite(climb) else 0.0
+
+
+def _sinking(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
+    """Landing without odometry ends with the ground felt, or by the clock: what has landed must not start up again."""
+    if not flight.blind:
+        return _blindly(settings, flight, inputs, inputs.blindness)
+    if inputs.touched:
+        return _to(flight, Mode.DONE, Reason.TOUCHED)
+    if inputs.seen is None:
+        flight = dataclasses.replace(flight, found_since=None)
+    at, height, climb = flight.lost or _last_seen(settings, flight, inputs)
+    if flight.now - at > blind_time(height, climb):
+        return _to(flight, Mode.DONE, f"{Reason.LANDED}: without odometry, after {flight.now - at:.0f} s")
     return flight
 
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.channels import CHANNELS, json_schema
+from e2efly.storage import finite
 
 FLUSH_PERIOD = 0.1
 """Seconds between two chunks: the most that dies with the process, plus the time to write one."""
@@ -29,6 +30,7 @@ QUEUE_SIZE = 20_000
 PROFILE = "e2efly"
 """Profile in the header of the file."""
 _SLICE = 8  # messages encoded without a pause: the control loop waits for the interpreter no longer than these take
+_BLOCKS_KEPT = 64  # so many of the last blocks of the file may give way to the word of what is missing
 _KINDS_OF_PROBLEMS = 64  # more than these are counted together, so that nothing grows without end in flight
 
 
@@ -62,6 +64,7 @@ class Telemetry:
         self._queue_size = queue_size
         self._count = 0
         self._problems: Counter[str] = Counter()
+        self._missing, self._missing_from, self._missing_to = 0, math.inf, -math.inf
         self._closing, self._synced = threading.Event(), threading.Event()
         self._unsynced = False
         self._writer = threading.Thread(target=self._write, name="telemetry", daemon=True)
@@ -100,6 +103,14 @@ class Telemetry:
         """Whether writing has ended early, as on a full disk: nothing recorded since is in the file."""
         return any(problem.startswith("disk") for problem in self.problems)
 
+    @property
+    def missing(self) -> str:
+        """What a disk that failed did not take, for people; empty where it took everything."""
+        if not self._missing:
+            return ""
+        first, last = (max(moment - self._monotonic, 0.0) for moment in (self._missing_from, self._missing_to))
+        return f"{self._missing} messages from {first:.1f} s to {last:.1f} s after the start of the log are missing"
+
     def close(self, timeout: float = 5.0) -> None:
         """Write what waits, the index and the end of the file; give up on a disk that hangs after `timeout` s."""
         self._closing.set()
@@ -131,6 +142,7 @@ class Telemetry:
 
     def _write(self) -> None:
         """The writer's thread."""
+        log = None
         try:
             log = _Mcap(self._file)
             while True:
@@ -142,11 +154,13 @@ class Telemetry:
                 log.flush()
                 self._unsynced = True
         except OSError as error:
-            self._problem(f"disk: {error.strerror or error}; the flight goes on without a log")
-            self._swallow()
+            reason = error.strerror or str(error)
+            self._problem(f"disk: {reason}; the flight goes on without a log")
+            self._swallow(log)
+            self._say_what_is_missing(log, reason)
         except Exception as error:  # a fault of ours must end up here rather than end the flight
             self._problem(f"disk: writer stopped by {type(error).__name__}: {error}")
-            self._swallow()
+            self._swallow(log)
         finally:
             self._synced.set()
 
@@ -162,6 +176,7 @@ class Telemetry:
             try:
                 self._check(channel, values)
                 log.add(channel, self._log_time(when), number, values)
+                log.pending.append(when)
             except Exception as error:  # whatever it was given, the log goes on
                 self._problem(f"{str(channel)[:40]}: not written: {type(error).__name__}: {str(error)[:80]}")
 
@@ -173,15 +188,34 @@ class Telemetry:
             if name not in known and channel != "meta":
                 self._problem(f"{channel}: field {str(name)[:40]!r} is not in its schema")
 
-    def _swallow(self) -> None:
+    def _swallow(self, log: "_Mcap | None") -> None:
         """Without a disk: empty the queue and count what is lost, so that memory does not grow in flight."""
+        for when in log.pending if log else ():
+            self._lose(when)
         while True:
             last = self._closing.wait(FLUSH_PERIOD)
             while self._queue:
-                self._queue.popleft()
+                self._lose(self._queue.popleft()[1])
                 self._problem("not written: the disk had failed before")
             if last:
                 return
+
+    def _lose(self, when: float) -> None:
+        self._missing += 1
+        self._missing_from, self._missing_to = min(self._missing_from, when), max(self._missing_to, when)
+
+    def _say_what_is_missing(self, log: "_Mcap | None", reason: str) -> None:
+        """Put an event with what is missing at the end of the file, in the place of its last blocks if need be."""
+        try:
+            while log is not None:
+                now = time.monotonic()
+                text = f"flight log: {self.missing}: {reason}"
+                if log.end_with(self._log_time(now), self._count + 1, {"level": "error", "text": text}):
+                    return
+                for when in log.give_up_block():
+                    self._lose(when)
+        except Exception as error:  # there is nothing left to be done
+            self._problem(f"disk: {type(error).__name__}: the log does not say what is missing")
 
     def _sync(self) -> None:
         """The thread that waits for the disk, so that the writer need not."""
@@ -204,6 +238,12 @@ class _Mcap:
 
     def __init__(self, file: int) -> None:
         self._file, self._size, self._block = file, 0, _Block()
+        self.pending: list[float] = []
+        """When the messages were that are in no block of the file yet, s."""
+        self._blocks: deque[tuple[int, list[float]]] = deque(maxlen=_BLOCKS_KEPT)
+        """Where the last blocks of the file begin, and when their messages were."""
+        self._room = 0
+        """Bytes of the blocks that were given up, which the file still has on the disk."""
         self._writer = _mcap_writer()(self._block, chunk_size=1 << 30)
         self._channels: dict[str, int] = {}
         self._writer.start(profile=PROFILE, library="e2efly")
@@ -214,7 +254,7 @@ class _Mcap:
         if not 0 <= when < 1 << 63:
             raise ValueError(f"log time {when} ns; accepted: 0 or more, below 2^63")
         if channel not in self._channels:
-            self._channels[channel] = self._register(channel)
+            self._channels[channel] = _register(self._writer, channel)
         self._writer.add_message(self._channels[channel], when, data, when, number & 0xFFFFFFFF)
         if channel == "meta":
             self._writer.add_metadata("meta", {_text(key): _text(value) for key, value in values.items()})
@@ -227,11 +267,40 @@ class _Mcap:
         self._writer.finish()
         self._commit()
 
-    def _register(self, channel: str) -> int:
-        schema = json.dumps(json_schema(CHANNELS[channel])).encode()
-        return self._writer.register_channel(
-            channel, "json", self._writer.register_schema(f"e2efly.{channel}", "jsonschema", schema)
-        )
+    def end_with(self, when: int, number: int, event: Mapping[str, Any]) -> bool:
+        """Write one last event, over what was given up of the file; False where there is no room for it yet.
+
+        Raises:
+            OSError: when there is no block left to give up.
+        """
+        block = _Block()
+        writer = _mcap_writer()(block, chunk_size=1 << 30)
+        writer.start(profile=PROFILE, library="e2efly")
+        writer.flush()
+        block.take()  # the file begins with it already
+        known = dict.fromkeys((*self._channels, "event"))  # in their order, so that each has the number that it had
+        numbers = {channel: _register(writer, channel) for channel in known}
+        writer.add_message(numbers["event"], when, _encode(event), when, number & 0xFFFFFFFF)
+        writer.flush()
+        data = block.take()
+        try:
+            written = 0
+            while written < len(data):  # over what is there, it takes no room on the disk
+                written += os.pwrite(self._file, data[written:], self._size + written)
+        except OSError:
+            os.ftruncate(self._file, self._size + self._room)
+            if not self._blocks:
+                raise
+            return False
+        os.ftruncate(self._file, self._size + len(data))
+        return True
+
+    def give_up_block(self) -> list[float]:
+        """Leave the last block to `end_with`; when its messages were."""
+        begin, moments = self._blocks.pop()
+        self._room += self._size - begin
+        self._size = begin
+        return moments
 
     def _commit(self) -> None:
         """Give the block to the operating system whole, or cut the file back to where it was."""
@@ -243,7 +312,15 @@ class _Mcap:
         except OSError:
             os.ftruncate(self._file, self._size)
             raise
+        if self.pending:
+            self._blocks.append((self._size, self.pending))
+        self.pending = []
         self._size += len(data)
+
+
+def _register(writer: Any, channel: str) -> int:
+    schema = json.dumps(json_schema(CHANNELS[channel])).encode()
+    return writer.register_channel(channel, "json", writer.register_schema(f"e2efly.{channel}", "jsonschema", schema))
 
 
 class _Block:
@@ -294,22 +371,11 @@ def _encode(values: Mapping[str, Any]) -> bytes:
     try:
         return json.dumps(values, allow_nan=False, default=_plain, separators=(",", ":")).encode()
     except ValueError:  # a number that is not finite, which is rare: the fast way is tried first
-        return json.dumps(_finite(values), allow_nan=False, default=_plain, separators=(",", ":")).encode()
+        return json.dumps(finite(values), allow_nan=False, default=_plain, separators=(",", ":")).encode()
 
 
 def _plain(value: Any) -> Any:
     """NumPy's arrays and numbers as Python's."""
     if isinstance(value, np.ndarray | np.generic):
-        return _finite(value.tolist())
+        return finite(value.tolist())
     raise TypeError(f"{type(value).__name__} is no JSON")
-
-
-def _finite(value: Any) -> Any:
-    """The same with null for every number that is not finite."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    return value

@@ -77,6 +77,12 @@ class ThrottleMap:
         idle = float(vehicle.rotor_speed_min)
         return ThrottleMap(vehicle.hash, float(vehicle.mass), (k2, k1, k0), (idle, full), voltage)
 
+    @property
+    def doubt(self) -> float:
+        """Share of the force by which the map may be wrong: two standard deviations, and what is not yet in use."""
+        scale, learned = self.scale, self.learned[0]
+        return (2 * math.sqrt(self.covariance[0][0]) + abs(learned - scale)) / scale
+
     def nominal(self, throttle: float) -> float:
         """Specific force, m/s^2, of a throttle by the vehicle file alone."""
         k2, k1, k0 = self.thrust_map

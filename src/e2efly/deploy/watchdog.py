@@ -23,7 +23,7 @@ from math import inf
 
 from e2efly.deploy.lifeline import Lifeline, watch
 from e2efly.deploy.msp.codec import REPLY, Decoder, Frame, encode
-from e2efly.deploy.msp.link import Link, open_link
+from e2efly.deploy.msp.link import MOST, Link, open_link
 from e2efly.deploy.msp.messages import CHANNEL_RANGE, MAX_CHANNELS, Attitude, StatusEx, set_raw_rc
 
 TIMEOUT_S = 0.1
@@ -44,6 +44,8 @@ LEVEL_RATE = 3.0
 """Largest body rate of levelling, rad/s."""
 BYTES, PLAN, STATUS, TAKEN = b"B", b"P", b"S", b"T"
 """First byte of a packet: bytes of the link; bridge's plan; state of the link; this process has taken over."""
+PACKETS = 64
+"""Packets that the bridge takes of this process at a time."""
 _PACKET = 1 << 17
 """Longest packet: what a link hands over at a time, and more."""
 
@@ -157,7 +159,7 @@ class WatchedLink:
     def poll(self, now: float) -> None:
         """Take in what the watchdog says; it connects by itself."""
         del now
-        while True:
+        for _ in range(PACKETS):
             try:
                 packet = self._socket.recv(_PACKET)
             except BlockingIOError:
@@ -280,7 +282,7 @@ def land(link: Link, plan: Plan) -> None:
     end = down + DEAF_S
     while (elapsed := time.monotonic() - began) < end and (elapsed < down or disarmed < 2):
         link.poll(time.monotonic())
-        for frame in decoder.feed(link.receive()):
+        for frame in decoder.feed(link.receive()[-MOST:]):
             if frame.direction == REPLY and frame.code == Attitude.CODE:
                 with suppress(ValueError):  # one that cannot be read is not heard
                     attitude, heard = Attitude.parse(frame.payload), elapsed

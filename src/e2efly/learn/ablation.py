@@ -5,8 +5,11 @@ members, where a single run shares its environments; each member is a run on one
 """
 
 import dataclasses
+import json
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -18,10 +21,12 @@ from e2efly.config import TrainConfig
 from e2efly.env import Env, random_key
 from e2efly.evaluate import Episodes, run_episodes
 from e2efly.learn.algorithm import TrainState, begin
+from e2efly.learn.checkpoint import load_checkpoint, read_about, save_checkpoint
 from e2efly.learn.devices import AXIS, OWN, SAME, on_each
 from e2efly.learn.judge import WATCHED
 from e2efly.learn.networks import Weights
 from e2efly.learn.programs import acting
+from e2efly.learn.rundir import different_values
 from e2efly.learn.setup import Setup
 
 FULL = "full"
@@ -42,16 +47,49 @@ class Curves:
     """The task's error, m: over a flight where the task follows something, else at its end."""
 
 
-def ablate(config: TrainConfig, seeds: int, told: Callable[[float, float], None] = lambda share, best: None) -> Curves:
+@dataclass(frozen=True)
+class Kept:
+    """Where an ablation keeps how far it got, to go on from there after it was stopped."""
+
+    path: Path
+    """The checkpoint's file."""
+    about: dict[str, Any]
+    """What decides the curves, as JSON."""
+    period: float = 10.0
+    """Seconds between two checkpoints, at least."""
+
+    def done(self) -> int:
+        """Evaluations that an earlier process got to.
+
+        Raises:
+            ValueError: for a checkpoint that is damaged, or of another ablation.
+        """
+        if not self.path.exists():
+            return 0
+        found = read_about(self.path)
+        wanted = json.loads(json.dumps(self.about))
+        if different := list(different_values(found.get("ablation"), wanted)):
+            raise ValueError(f"{self.path} is of another ablation: {'; '.join(different)}; accepted: another --out")
+        return int(found["done"])
+
+
+def ablate(
+    config: TrainConfig,
+    seeds: int,
+    told: Callable[[float, float], None] = lambda share, best: None,
+    kept: Kept | None = None,
+) -> Curves:
     """Train all variants.
 
     Args:
         config: of the full reward; its seed is the first.
         seeds: runs of each variant.
         told: (share of the work done, mean success of the full reward) after each evaluation.
+        kept: where to keep how far it got, and to go on from.
 
     Raises:
-        ValueError: for a configuration that cannot be used: with a curriculum, a reward of one term.
+        ValueError: for a configuration that cannot be used: with a curriculum, a reward of one term; for a checkpoint
+            that is damaged, or of another ablation.
     """
     terms = tuple(config.reward.weights)
     if len(terms) < 2 or seeds < 1 or config.curriculum:
@@ -74,14 +112,27 @@ def ablate(config: TrainConfig, seeds: int, told: Callable[[float, float], None]
     parameters = jax.tree.map(lambda *x: np.stack([np.asarray(x[i]) for i in of_seed]), *each)
     keys = jnp.stack([random_key(config.seed + int(i)) for i in of_seed])
     start, chunk, evaluate = _programs(setup, devices)
-    state, points = start(setup.env, weights, parameters, keys), setup.updates // config.chunk
-    found: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {name: [] for name in setup.judges}
-    for point in range(points):
+    points = setup.updates // config.chunk
+    found: dict[str, list[tuple[np.ndarray, ...]]] = {name: [] for name in setup.judges}
+    if done := kept.done() if kept else 0:
+        begun = jax.eval_shape(start, setup.env, weights, parameters, keys)
+        one = np.zeros((members, done), np.float32)
+        loaded = load_checkpoint(kept.path, {"state": begun, "found": dict.fromkeys(found, (one, one))})  # pyright: ignore
+        state = loaded["state"]
+        found = {name: list(zip(*(x.T for x in both), strict=True)) for name, both in loaded["found"].items()}
+    else:
+        state = start(setup.env, weights, parameters, keys)
+    saved = time.monotonic()
+    for point in range(done, points):
         state = chunk(setup.env, weights, state, point * config.chunk)
         for name, env in setup.judges.items():
             flown = evaluate(env, state.parameters.policy)
             measured = (flown.success, flown.mean_error if setup.settle else flown.final_error)
-            found[name].append(tuple(np.asarray(jnp.mean(x, axis=1))[:members] for x in measured))  # pyright: ignore
+            found[name].append(tuple(np.asarray(jnp.mean(x, axis=1), np.float32)[:members] for x in measured))
+        if kept and time.monotonic() - saved >= kept.period:
+            both = {name: tuple(np.stack(x, axis=-1) for x in zip(*rows, strict=True)) for name, rows in found.items()}
+            save_checkpoint(kept.path, {"state": state, "found": both}, {"ablation": kept.about, "done": point + 1})
+            saved = time.monotonic()
         told((point + 1) / points, min(float(np.mean(x[-1][0][:seeds])) for x in found.values()))
 
     def shaped(which: int) -> dict[str, np.ndarray]:

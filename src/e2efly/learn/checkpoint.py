@@ -1,7 +1,6 @@
 """Checkpoints: one safetensors file, written atomically, checked when read. No pickle."""
 
 import json
-import os
 import zlib
 from pathlib import Path
 from typing import Any
@@ -12,34 +11,17 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from e2efly.env import is_key, key_of, numbers_of
+from e2efly.storage import finite, write_atomically
 
 FORMAT = 2
 """Version of what a checkpoint holds and of how a run goes on from it."""
-
-
-def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file so that at any moment it is whole: the old one or the new one.
-
-    Raises:
-        OSError: naming the path, when the folder cannot be written or is full.
-    """
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")  # others may write the same file
-    try:
-        with part.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise OSError(f"cannot write {path}: {error.strerror}") from error
 
 
 def save_checkpoint(path: Path, tree: Any, about: dict[str, Any]) -> None:
     """Write the leaves of a tree, and what `about` says of them, as JSON."""
     arrays = _arrays(tree)
     header = {**about, "format": FORMAT, "crc32": _checksum(arrays)}
-    write_atomically(path, save(arrays, {"about": json.dumps(header)}))
+    write_atomically(path, save(arrays, {"about": json.dumps(finite(header), allow_nan=False)}))
 
 
 def read_about(path: Path) -> dict[str, Any]:

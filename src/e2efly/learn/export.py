@@ -12,13 +12,14 @@ from e2efly import __version__
 from e2efly.config import TrainConfig
 from e2efly.deploy.contract import CONTRACT_VERSION, METADATA_KEY, Action, Contract
 from e2efly.deploy.images import NONE, Image
+from e2efly.deploy.onnx_file import sealed
 from e2efly.deploy.policy import load_policy
 from e2efly.env import Env
-from e2efly.learn.checkpoint import write_atomically
 from e2efly.learn.graph import OPERATORS, policy_graph
 from e2efly.learn.networks import FAINTEST, NEAREST, Actor, View, Weights
 from e2efly.observation import Field
 from e2efly.physics import COMMAND_MODES, command_limits
+from e2efly.storage import write_atomically
 from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.vehicle import quantities
 
@@ -120,7 +121,7 @@ def _image(name: str, view: View, control_rate: float) -> Image:
 
 
 def export_policy(path: Path, weights: Weights, actor: Actor, contract: Contract) -> None:
-    """Write a policy as ONNX, atomically: float32 `observation` (n, o) -> `action` (n, 4) in [-1, 1].
+    """Write a policy as ONNX with its digest, atomically: float32 `observation` (n, o) -> `action` (n, 4) in [-1, 1].
 
     A policy with cameras has an input `image_0`, ... for each, (n, h, w) or (n, h, w, 3): what the camera measures. One
     with a GRU has `memory` (n, k) -> `next_memory` (n, k).
@@ -155,7 +156,7 @@ def export_policy(path: Path, weights: Weights, actor: Actor, contract: Contract
     )
     helper.set_model_props(model, {METADATA_KEY: about})
     onnx.checker.check_model(model, full_check=True)
-    write_atomically(Path(path), model.SerializeToString())
+    write_atomically(Path(path), sealed(model.SerializeToString()))
 
 
 def parity(path: Path, weights: Weights, actor: Actor, count: int = 10_000, seed: int = 0) -> float:

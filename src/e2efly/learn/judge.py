@@ -47,14 +47,14 @@ def score(task: str, flown: dict[str, Episodes]) -> float:
     return min(float(np.mean(e.success)) - 0.5 * math.tanh(cost(e)) / len(e.success) for e in flown.values())
 
 
-def digest(e: Episodes) -> dict[str, float]:
-    """Means over episodes, and over the successful ones for the time."""
+def digest(e: Episodes) -> dict[str, float | None]:
+    """Means over episodes, and over the successful ones for the time: None without any."""
     ok = np.asarray(e.success)
     return {
         "success": round(float(np.mean(ok)), 4),
         "final_error_m": round(float(np.mean(e.final_error)), 5),
         "mean_error_m": round(float(np.mean(e.mean_error)), 5),
-        "seconds_of_success": round(float(np.mean(e.duration[ok])), 4) if ok.any() else math.nan,
+        "seconds_of_success": round(float(np.mean(e.duration[ok])), 4) if ok.any() else None,
         "top_speed_m_s": round(float(np.max(e.top_speed)), 3),
         "roughness": round(float(np.mean(e.roughness)), 5),
     }

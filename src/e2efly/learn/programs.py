@@ -22,14 +22,15 @@ import jax.numpy as jnp
 import numpy as np
 from jax import export
 
+from e2efly.compiled import opened, sealed
 from e2efly.device import wide_vectors
 from e2efly.env import Env, random_key
 from e2efly.evaluate import Act, Episodes, run_episodes
 from e2efly.learn.algorithm import TrainState, begin
-from e2efly.learn.checkpoint import write_atomically
 from e2efly.learn.devices import AXIS, OWN, SAME, on_each, own, shardings, stacked
 from e2efly.learn.networks import Actor, Weights
 from e2efly.learn.setup import Setup
+from e2efly.storage import write_atomically
 
 FAST_COMPILE: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
 """XLA options for programs that run for seconds only."""
@@ -150,7 +151,7 @@ def _lower(
         found = bytes(export.export(program)(*leaves).serialize())
         with suppress(OSError):  # a cache that cannot be written costs time, not the run
             traced.mkdir(parents=True, exist_ok=True)
-            write_atomically(file, hashlib.sha256(found).digest() + found)
+            write_atomically(file, sealed(found))
     call = export.deserialize(bytearray(found)).call
     inside, outside = shardings(places, setup.devices), shardings(returns, setup.devices)
     return jax.jit(call, in_shardings=inside, out_shardings=outside, donate_argnums=donated).lower(*leaves)
@@ -160,8 +161,7 @@ def _read(file: Path) -> bytes | None:
     """The content of a cache file; None where it is missing or damaged: it is made again."""
     if not file.is_file():
         return None
-    data = file.read_bytes()
-    return data[32:] if hashlib.sha256(data[32:]).digest() == data[:32] else None
+    return opened(file.read_bytes(), file)
 
 
 def _fingerprint(setup: Setup, args: tuple) -> str:

@@ -1,6 +1,7 @@
 """The run directory: everything needed to reproduce a run and to fly its policy.
 
-config.json  versions.json  metrics.csv  events/  checkpoint.safetensors  plots/  policy.onnx  summary.json
+config.json  versions.json  inputs.json  inputs/  metrics.csv  events/  checkpoint.safetensors  plots/  policy.onnx
+summary.json
 """
 
 import csv
@@ -8,15 +9,17 @@ import dataclasses
 import io
 import json
 import platform
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from e2efly.config import CameraConfig, StageConfig, TrainConfig
-from e2efly.learn.checkpoint import write_atomically
+from e2efly.learn.inputs import Kept, by_content, input_files, read, replaced, sha256, value_at
 from e2efly.presets import algorithm_name, preset, task_name
+from e2efly.storage import held, write_atomically, write_json
 
 _PACKAGES = ("e2efly", "jax", "jaxlib", "numpy", "optax", "onnx", "onnxruntime")
 
@@ -52,27 +55,86 @@ class RunDirectory:
         """TensorBoard event files."""
         return self.path / "events"
 
+    @property
+    def began(self) -> bool:
+        """Whether a run in this folder ever got to a checkpoint: one that did not is worth nothing, and gives way."""
+        if any(path.exists() for path in (self.checkpoint, self.policy, self.path / "summary.json")):
+            return True
+        return sum("seconds" in row for row in self.rows()) > 1  # the first evaluation comes before the checkpoint
+
+    def held(self) -> AbstractContextManager[None]:
+        """Keep other processes from writing to the run; see `e2efly.storage.held`."""
+        return held(self.path)
+
+    def check_new(self) -> None:
+        """Refuse a folder that holds a run.
+
+        Raises:
+            ValueError: when it does.
+        """
+        if self.began:
+            raise ValueError(
+                f"--out {self.path} already holds a run; accepted: a new folder, or --resume to go on with this one"
+            )
+
     def create(self, config: TrainConfig) -> None:
-        """Make the folder and write the configuration and the versions.
+        """Make the folder; write the configuration, the versions and copies of the files that it is made from.
 
         Raises:
             OSError: when it cannot be written.
             ValueError: when it already holds a run.
         """
-        if (self.path / "config.json").exists():
-            raise ValueError(
-                f"--out {self.path} already holds a run; accepted: a new folder, or --resume to go on with this one"
-            )
+        self.check_new()
         try:
             self.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OSError(f"cannot make --out {self.path}: {error.strerror}") from error
+        self.metrics.unlink(missing_ok=True)  # of a run that never got to a checkpoint
+        self._keep(config)
         self.write_json("versions.json", versions())
         self.write_json("config.json", to_json(config))  # last: with it a folder holds a run
 
+    def _keep(self, config: TrainConfig) -> None:
+        """Copy the files that a configuration names."""
+        about = {}
+        for field, path in input_files(config).items():
+            data = read(path)
+            copy = self.path / "inputs" / field / path.name
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            write_atomically(copy, data)
+            about[field] = {"named": value_at(config, field), "original": str(path.absolute()), "sha256": sha256(data)}
+        self.write_json("inputs.json", about)
+
+    def inputs(self) -> dict[str, Kept]:
+        """The files that the run is made from, by the dotted path of the field; none in runs of older versions.
+
+        Raises:
+            ValueError: when inputs.json is damaged.
+        """
+        if not (self.path / "inputs.json").exists():
+            return {}
+        content, found = self.read_json("inputs.json"), {}
+        if not isinstance(content, dict):
+            raise ValueError(f"{self.path / 'inputs.json'} is {content!r}; accepted: an object")
+        for field, about in content.items():
+            try:
+                named, original, digest = (str(about[name]) for name in ("named", "original", "sha256"))
+            except (TypeError, KeyError):
+                accepted = "accepted: named, original and sha256"
+                raise ValueError(f"{self.path / 'inputs.json'}: {field} is {about!r}; {accepted}") from None
+            copy = self.path / "inputs" / field / Path(original).name
+            found[field] = Kept(copy, Path(original), named, digest)
+        return found
+
+    def with_copies(self, config: TrainConfig) -> TrainConfig:
+        """A configuration of the run with the run's own copies of the files that it names."""
+        for field, kept in self.inputs().items():
+            config = replaced(config, field, kept.usable())
+        return config
+
     def write_json(self, name: str, content: dict[str, Any]) -> None:
         """Write a JSON file atomically."""
-        write_atomically(self.path / name, (json.dumps(content, indent=2) + "\n").encode())
+        write_json(self.path / name, content, indent=2)
 
     def read_json(self, name: str) -> dict[str, Any]:
         """Read a JSON file.
@@ -85,24 +147,64 @@ class RunDirectory:
         except (OSError, ValueError) as error:
             raise ValueError(f"{self.path / name} cannot be read: {error}") from None
 
-    def config(self) -> TrainConfig:
-        """The configuration of the run.
+    def config(self, names_vehicle: bool = False) -> TrainConfig:
+        """The configuration of the run, with its own copies of the files that it is made from.
+
+        Args:
+            names_vehicle: whether the caller names what flies; then it does not matter if the run's vehicle changed.
 
         Raises:
-            ValueError: when the folder holds no run, or one that this version does not understand.
+            ValueError: when the folder holds no run, or one that this version does not understand; when a file that
+                the run is made from has changed, naming both.
         """
         if not (self.path / "config.json").is_file():
             raise ValueError(f"{self.path} holds no run: there is no config.json")
-        return from_json(self.read_json("config.json"), str(self.path / "config.json"))
+        config = from_json(self.read_json("config.json"), str(self.path / "config.json"))
+        for field, kept in self.inputs().items():
+            if not (names_vehicle and field == "env.vehicle"):
+                kept.check_original()
+        return self.with_copies(config)
+
+    def check_same(self, config: TrainConfig) -> None:
+        """Refuse another configuration than the run's; the files that they name are compared by content.
+
+        Raises:
+            ValueError: naming every field that differs.
+        """
+        wanted = self.config()
+        if type(config.task) is not type(wanted.task):  # nothing else counts, and other files are named
+            raise self._another(differences(wanted, config))
+        for field, kept in self.inputs().items():
+            if value_at(config, field) == kept.named and not kept.original.exists():
+                config = replaced(config, field, kept.usable())
+        if different := list(differences(by_content(wanted), by_content(config))):
+            raise self._another(different)
+
+    def _another(self, different: Iterable[str]) -> ValueError:
+        return ValueError(f"{self.path} holds a run of another configuration: {'; '.join(different)}")
+
+    def check_resumable(self) -> None:
+        """Refuse to begin again where a run has lost its checkpoint.
+
+        Raises:
+            ValueError: when it has.
+        """
+        if self.began and not self.checkpoint.exists():
+            raise ValueError(
+                f"{self.checkpoint} is missing, but {self.path} holds a run that had one: it cannot go on; accepted: "
+                "that file in its place, or another --out, without --resume"
+            )
 
     def rows(self) -> list[dict[str, float]]:
-        """The metrics, a row for every update."""
+        """The metrics, a row for every update; without a line that was not finished."""
+        return [{k: float(v) for k, v in row.items() if v} for row in csv.DictReader(self._whole_lines())]
+
+    def _whole_lines(self) -> list[str]:
+        """The lines of the metrics that were written to their ends: the header, and a line for every update."""
         if not self.metrics.is_file():
             return []
         with self.metrics.open(newline="", encoding="utf-8") as file:
-            return [
-                {k: float(v) for k, v in row.items() if v} for row in csv.DictReader(file) if None not in row.values()
-            ]
+            return [line for line in file if line.endswith("\n")]
 
     def append(self, rows: list[dict[str, float]]) -> None:
         """Append metrics."""
@@ -120,14 +222,18 @@ class RunDirectory:
         """Drop metrics of updates that a resumed run will do again, and files that a killed one had not finished."""
         for part in self.path.glob("*.part"):
             part.unlink()
-        if not self.metrics.exists():
-            return
-        if not self.metrics.stat().st_size:  # a full disk
-            self.metrics.unlink()
-            return
-        header, *lines = self.metrics.read_text(encoding="utf-8").splitlines(keepends=True)
-        whole = [line for line in lines if line.endswith("\n") and int(line.split(",", 1)[0]) <= update]
-        write_atomically(self.metrics, "".join([header, *whole]).encode())
+        header, *lines = self._whole_lines() or [""]
+        if header:
+            kept = [line for line in lines if int(line.split(",", 1)[0]) <= update]
+            write_atomically(self.metrics, "".join([header, *kept]).encode())
+        else:  # a full disk, or cut in the header
+            self.metrics.unlink(missing_ok=True)
+
+
+def run_of(path: Path) -> RunDirectory | None:
+    """The run that a path is the folder, or the policy.onnx, of."""
+    folder = path.parent if path.name == "policy.onnx" else path
+    return RunDirectory(folder) if path.is_dir() or (folder / "config.json").is_file() else None
 
 
 def versions() -> dict[str, str]:

@@ -10,7 +10,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -27,6 +27,7 @@ from e2efly.learn.algorithm import TrainState
 from e2efly.learn.checkpoint import load_checkpoint, read_about, save_checkpoint
 from e2efly.learn.clock import peak_memory, since_process_start
 from e2efly.learn.devices import placed
+from e2efly.learn.inputs import by_content
 from e2efly.learn.judge import CONFIRMED, REPORTED, WATCHED, digest, judge, score, success
 from e2efly.learn.networks import Weights
 from e2efly.learn.programs import Programs, start_program
@@ -96,14 +97,21 @@ def train(
     """
     run = RunDirectory(out)
     setup = Setup.of(config)
+    with run.held() if hosts.first() else nullcontext():
+        return _train(setup, run, reporter, resume, traced)
+
+
+def _train(setup: Setup, run: RunDirectory, reporter: Reporter, resume: bool, traced: Path | None) -> dict[str, Any]:
+    """In a folder that is this run's alone."""
+    config, content = setup.config, by_content(setup.config)
     if hosts.first():
-        hosts.told({"resume": resume, "versions": _deciding(versions()), "config": to_json(setup.config)})
+        hosts.told({"resume": resume, "versions": _deciding(versions()), "config": to_json(content)})
         if resume:
-            _check_resume(run, setup.config)
+            _check_resume(run, config)
         else:
-            run.create(setup.config)
+            run.check_new()
     else:
-        _check_same(setup.config, resume)
+        _check_same(content, resume)
     parameters = setup.algorithm.init(setup.env, config.algo, config.seed)
     reporter.compiling()
     programs = Programs.compile(setup, parameters, traced if jax.process_count() == 1 else None)
@@ -113,7 +121,12 @@ def train(
         state, best = programs.begin(setup.env, parameters, random_key(config.seed)), parameters.policy
         progress = Progress()
     if hosts.first():
+        if not resume:
+            run.create(config)  # once all that a configuration can spoil has gone well
         run.forget_after(progress.update)
+        setup = dataclasses.replace(setup, config=run.with_copies(config))
+        if different := list(differences(content, by_content(setup.config))):
+            raise ValueError(f"a file changed while the run began: {'; '.join(different)}; start it again")
     state, best, progress, stopped = _loop(setup, programs, run, reporter, state, best, progress)
     return _finish(setup, programs, run, state, best, progress, stopped)
 
@@ -127,6 +140,8 @@ def _loop(
     with _writing(run, progress.update) as write, _interruptible() as stop:
         while progress.update < setup.updates and not progress.reached:
             if stopped := hosts.any_of(stop.is_set()):
+                if not progress.update:  # there is none yet to go on from
+                    _save(run, config, state, best, progress)
                 break
             began = time.perf_counter()
             number, stages = progress.stage, len(setup.stages)
@@ -161,9 +176,7 @@ def _loop(
             if better:
                 best = weights
             write(_rows(setup, metrics, progress, rate, flown, number))
-            whole = hosts.whole({"state": state, "best": best})
-            if hosts.first():
-                save_checkpoint(run.checkpoint, whole, _about(config, progress))
+            _save(run, config, state, best, progress)
             reporter.progress(
                 progress.update * setup.steps_per_update,
                 setup.updates * setup.steps_per_update,
@@ -173,6 +186,13 @@ def _loop(
                 f"stage {progress.stage + 1} of {stages}" if stages > 1 else "",
             )
         return state, best, progress, stopped
+
+
+def _save(run: RunDirectory, config: TrainConfig, state: Any, best: Any, progress: Progress) -> None:
+    """Write a checkpoint, in process 0; all processes take part."""
+    whole = hosts.whole({"state": state, "best": best})
+    if hosts.first():
+        save_checkpoint(run.checkpoint, whole, _about(config, progress))
 
 
 def _finish(
@@ -188,7 +208,7 @@ def _finish(
     summary = {
         "task": presets.task_name(config.task),
         "algorithm": presets.algorithm_name(config.algo),
-        "vehicle": config.env.vehicle,
+        "vehicle": setup.env.physics.nominal.name,
         "seed": config.seed,
         "finished": progress.update >= setup.updates or bool(progress.reached),
         "stopped_by_user": stopped,
@@ -262,9 +282,10 @@ def _check_finite(metrics: dict[str, np.ndarray], update: int) -> None:
     for i in range(len(next(iter(metrics.values())))):
         for name in sorted(metrics, key=lambda n: (not n.startswith("reward/"), n)):
             if not np.isfinite(metrics[name][i]):
+                kept = f"the checkpoint of update {update} is kept" if update else "there is no checkpoint yet"
                 raise NonFiniteError(
-                    f"{name} became {metrics[name][i]} in update {update + i + 1}; the checkpoint of update {update} "
-                    "is kept (lower algo.learning-rate or algo.max-grad-norm, or look at that term)"
+                    f"{name} became {metrics[name][i]} in update {update + i + 1}; {kept} "
+                    "(lower algo.learning-rate or algo.max-grad-norm, or look at that term)"
                 )
 
 
@@ -278,7 +299,7 @@ def _deciding(versions: dict[str, str]) -> dict[str, str | None]:
 
 
 def _check_same(config: TrainConfig, resume: bool) -> None:
-    """Refuse what is not as process 0 has it."""
+    """Refuse what is not as process 0 has it; files by their content."""
     wanted = hosts.told(None)
     different = list(different_values(wanted["versions"], _deciding(versions())))
     if not different:  # versions may differ in what can be configured
@@ -290,8 +311,8 @@ def _check_same(config: TrainConfig, resume: bool) -> None:
 
 
 def _check_resume(run: RunDirectory, config: TrainConfig) -> None:
-    if different := list(differences(run.config(), config)):
-        raise ValueError(f"{run.path} was started with another configuration: {'; '.join(different)}")
+    run.check_same(config)
+    run.check_resumable()
     if different := list(different_values(_deciding(run.read_json("versions.json")), _deciding(versions()))):
         raise ValueError(f"{run.path} was started with another version: {'; '.join(different)}")
 
@@ -333,7 +354,10 @@ def _resumed(setup: Setup, run: RunDirectory, parameters: Any) -> tuple[TrainSta
     if hosts.first():
         loaded, about = load_checkpoint(run.checkpoint, like), read_about(run.checkpoint)
     loaded, about = hosts.of_first(loaded, like), hosts.told(about)
-    progress = Progress(**{field.name: about[field.name] for field in dataclasses.fields(Progress)})
+    known = {field.name: about[field.name] for field in dataclasses.fields(Progress)}
+    if known["best_score"] is None:  # as JSON has no infinities
+        known["best_score"] = -math.inf
+    progress = Progress(**known)
     return placed(loaded["state"], setup.devices), loaded["best"], progress
 
 

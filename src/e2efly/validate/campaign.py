@@ -10,27 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from e2efly.deploy.flight_state import Mode
 from e2efly.deploy.goal_options import GoalOptions, goal_for
 from e2efly.deploy.policy import Policy
+from e2efly.validate.campaign_rules import IDLE, LONGEST_ARMED, ON_GROUND, Span, Violation, judge
 from e2efly.validate.firmware import Firmware
 from e2efly.validate.injections import KINDS, Faults, Strike
 from e2efly.validate.rig import Rig
 from e2efly.validate.stage import LATENCY_S, SETTINGS, TARGET, Stage, Trace
 from e2efly.vehicles.vehicle import Vehicle
 
-HIGHEST_OFF, HIGHEST_CLIMB, FASTEST_TOUCH, FALL, LONGEST_ARMED = 0.5, 2.0, 1.5, 3.0, 3.0
-"""The rules: motors off at most so high, m; a climb of at most so much, m; a touch at most so fast, m/s, from under so
-high, m; armed with open throttle on the ground for at most so long, s."""
-OFF, IDLE = 0.2, 0.1
-"""Mean motor output below which the vehicle falls, and above which the motors do more than idle, at 0.055; with closed
-throttle they may, too: the firmware then still holds the attitude."""
-ON_GROUND = 1e-3
-"""Height of the feet at which it stands, m."""
-RECOVERY_S = 0.3
-"""So long after the end of what nobody on board can help a touch is still owed to it, s."""
 STRUCK_IN = (Mode.INIT, Mode.TAKEOFF, Mode.HOVER, Mode.POLICY, Mode.LAND)
 WATCH_S = 4.0
 """After the last change among the faults the pilot watches for so long, s, then asks for a landing."""
@@ -75,33 +64,6 @@ class Scenario:
 
 
 @dataclass(frozen=True)
-class Span:
-    """A time in which nothing on the companion computer can help."""
-
-    begin: float
-    """s."""
-    end: float
-    """s."""
-    why: str
-
-
-NEVER = Span(math.inf, math.inf, "")
-
-
-@dataclass(frozen=True)
-class Violation:
-    """A rule that was broken."""
-
-    rule: str
-    value: float
-    """What was measured."""
-    after: float
-    """When, after the first fault, s."""
-    beyond: str = ""
-    """Why nothing on the companion computer could help; empty: the bridge is to blame."""
-
-
-@dataclass(frozen=True)
 class Flown:
     """What came of a scenario."""
 
@@ -125,6 +87,8 @@ class Flown:
     """From the first fault to the end, s."""
     mode: str
     """The bridge's at the end."""
+    reasons: tuple[str, ...]
+    """What it says of it."""
     changes: tuple[tuple[float, str, tuple[str, ...]], ...]
     """The changes of mode after the first fault: s after it, mode, reasons."""
     violations: tuple[Violation, ...]
@@ -183,7 +147,10 @@ def _flown(scenario: Scenario, stage: Stage, look: Callable[[Stage], None]) -> F
 
     each()
     if ground:
-        stage.open()
+        try:
+            stage.open()
+        except (ValueError, OSError) as error:
+            return _refused(str(error))
         stage.trace = Trace()
     known = len(stage.session.flown.changes)
     stage.each = each
@@ -202,21 +169,37 @@ def _flown(scenario: Scenario, stage: Stage, look: Callable[[Stage], None]) -> F
     rig.set(mission="land")
     stage.fly(LONGEST_S, lambda: not waiting and _over(stage))
     changes = [(t - began, mode, why) for t, mode, why in stage.session.flown.changes[known:]]
-    spans = [
-        Span(began + s.at, math.inf if s.lasts is None else began + s.at + s.lasts, KINDS[s.kind].beyond)
-        for s in scenario.strikes
-        if KINDS[s.kind].beyond
-    ]
-    feet = rig.world.vehicle.feet_height
-    measured, violations = judge(stage.trace, feet, planned, began, spans)
+    ended = stage.standing and _closed(stage)
+    feet, spans = rig.world.vehicle.feet_height, beyond(scenario, began)
+    measured, violations = judge(stage.trace, feet, planned, began, spans, ended)
     return Flown(
         **measured,
-        ended=stage.standing and _closed(stage),
+        ended=ended,
         duration=rig.now() - began,
         mode=str(stage.mode),
+        reasons=tuple(map(str, stage.session.bridge.flight.reasons)),
         changes=tuple(changes),
         violations=violations,
     )
+
+
+def _refused(problem: str) -> Flown:
+    """The bridge does not start with this controller."""
+    nothing, never = 0.0, math.nan
+    return Flown(
+        nothing, nothing, never, never, never, nothing, nothing, True, nothing, "refused",
+        (problem,), (), (),
+    )  # fmt: skip
+
+
+def beyond(scenario: Scenario, began: float) -> list[Span]:
+    """When nothing on the companion computer can help, of a scenario whose first fault could begin at `began`, s."""
+    spans = []
+    for strike in scenario.strikes:
+        if (excuse := KINDS[strike.kind].excuse) is not None:
+            lasts = math.inf if strike.lasts is None or excuse.for_good else strike.lasts
+            spans.append(Span(began + strike.at, began + strike.at + lasts, excuse))
+    return spans
 
 
 def _ask(stage: Stage) -> None:
@@ -256,69 +239,3 @@ def _closed(stage: Stage, count: int = 1) -> bool:
     trace = stage.trace
     known = not stage.link.silent or max(trace.motor[-count:]) < IDLE
     return stage.mode in (Mode.DONE, Mode.INIT) and max(trace.throttle[-count:]) <= 0 and known
-
-
-def judge(
-    trace: Trace, feet: float, planned: float, began: float, beyond: list[Span]
-) -> tuple[dict[str, float], tuple[Violation, ...]]:
-    """Measure a flight and hold it against the rules.
-
-    Args:
-        trace: from the first fault on.
-        feet: height of the centre of mass of what stands, m.
-        planned: height that it was to climb to, m; 0 where it was there.
-        began: when the first fault did, s.
-        beyond: when nothing on the companion computer could help.
-
-    Returns:
-        The figures of `Flown` that the world alone decides, and the broken rules.
-    """
-    time, motor = np.array(trace.time), np.array(trace.motor)
-    obeyed = ~np.any([(span.begin <= time) & (time <= span.end) for span in [*beyond, NEVER]], axis=0)
-    closed = obeyed & (np.array(trace.throttle) <= 0)
-    position, velocity = np.array(trace.position), np.array(trace.velocity)
-    height = position[:, 2] - feet
-    stands = height <= ON_GROUND
-    start = max(float(height[0]), planned)
-    broken: list[Violation] = []
-
-    def breaks(rule: str, value: float, index: int, late: float = 0.0) -> None:
-        t = float(time[index])
-        why = next((s.why for s in beyond if s.begin <= t <= s.end + late), "")
-        broken.append(Violation(rule, value, t - began, why))
-
-    climb = height - start
-    if climb.max() > HIGHEST_CLIMB:
-        breaks("climb", float(climb.max()), int(np.argmax(climb > HIGHEST_CLIMB)))
-    off_height, touch = 0.0, (math.nan, math.nan, math.nan)
-    for first, end in _runs(~stands):
-        running = np.flatnonzero((motor > OFF)[first:end] & ~closed[first:end])
-        cut = first + (int(running[-1]) + 1 if len(running) else 0)
-        if cut < end:
-            off_height = max(off_height, float(height[cut]))
-            if height[cut] > HIGHEST_OFF:
-                breaks("motors off", float(height[cut]), cut)
-        if end < len(time):
-            speed, top = float(np.linalg.norm(velocity[end - 1])), float(height[:end].max())
-            if not speed <= touch[0]:
-                touch = (speed, trace.tilt[end - 1], top)
-            if speed > FASTEST_TOUCH and top < FALL:
-                breaks("touch", speed, end, RECOVERY_S)
-    armed_s = 0.0
-    for first, end in _runs(stands & (motor > IDLE) & ~closed):
-        lasted = float(time[end - 1] - time[first])
-        armed_s = max(armed_s, lasted)
-        if lasted > LONGEST_ARMED:
-            breaks("armed on the ground", lasted, int(np.searchsorted(time, time[first] + LONGEST_ARMED)))
-    figures = {
-        "off_height": off_height, "climb": max(float(climb.max()), 0.0), "touch_speed": touch[0],
-        "touch_tilt": touch[1], "fell_from": touch[2], "armed_s": armed_s,
-        "drift": float(np.linalg.norm(position[-1, :2] - position[0, :2])),
-    }  # fmt: skip
-    return figures, tuple(broken)
-
-
-def _runs(true: np.ndarray) -> list[tuple[int, int]]:
-    """Begin and end of each run of True."""
-    edges = np.diff(np.concatenate([[0], true.astype(int), [0]]))
-    return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))

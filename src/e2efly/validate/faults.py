@@ -13,7 +13,7 @@ from e2efly.control.vectors import Quat
 from e2efly.deploy.bridge import OUTLIERS_S
 from e2efly.deploy.fence import fence_problem, heading
 from e2efly.deploy.flight_state import Mode, Reason
-from e2efly.deploy.msp.messages import BatteryState, FcVariant
+from e2efly.deploy.msp.messages import BatteryState, FcVariant, StatusEx
 from e2efly.deploy.msp.settings import RcTuning, RxMap
 from e2efly.deploy.odometry import Odometry, Sample
 from e2efly.validate.stage import FENCE, LATENCY_S, POSE_S, SETTINGS, Stage
@@ -86,6 +86,11 @@ def _freeze(stage: Stage) -> None:
     kept = stage.poses.newest
     assert kept is not None
     stage.poses.alter = lambda sample: dataclasses.replace(kept, received=sample.received, stamp=sample.stamp)
+
+
+def _gaps(stage: Stage) -> None:
+    """Twice a second."""
+    stage.poses.alter = lambda sample: None if sample.received % 0.5 < 0.12 else sample
 
 
 def _nan(sample: Sample) -> Sample:
@@ -166,6 +171,24 @@ def _rewrite(code: int, change: Callable[[bytes], bytes]) -> Callable[[Stage], N
         stage.link.rewrites[code] = change
 
     return inject
+
+
+def _once(code: int, change: Callable[[bytes], bytes]) -> Callable[[Stage], None]:
+    """Alter the next answer alone."""
+
+    def inject(stage: Stage) -> None:
+        def altered(payload: bytes) -> bytes:
+            del stage.link.rewrites[code]
+            return change(payload)
+
+        stage.link.rewrites[code] = altered
+
+    return inject
+
+
+def _disarmed(payload: bytes) -> bytes:
+    """STATUS_EX without the first mode, which is ARM."""
+    return payload[:6] + bytes([payload[6] & ~1]) + payload[7:]
 
 
 def _low_battery(payload: bytes) -> bytes:
@@ -249,6 +272,7 @@ FAULTS = (
     Fault("clock: the wall clock jumps to and fro", Mode.POLICY, _wall_clock, End.GOES_ON),
     Fault("link: garbage between frames", Mode.POLICY, _link(garbage=0.5), End.GOES_ON),
     Fault("link: one frame of five halved", Mode.POLICY, _link(halved=0.2), End.GOES_ON),
+    Fault("controller: one message says disarmed", Mode.POLICY, _once(StatusEx.CODE, _disarmed), End.GOES_ON),
     # the policy loses the vehicle to the hover controller
     Fault("policy: NaN", Mode.POLICY, _network("nan"), End.HOVER, Reason.POLICY, asked=True),
     Fault("policy: exception", Mode.POLICY, _network("raise"), End.HOVER, Reason.POLICY, asked=True),
@@ -283,6 +307,7 @@ FAULTS = (
     Fault("wrong firmware", Mode.INIT, _rewrite(FcVariant.CODE, lambda payload: b"INAV"), End.REFUSED),
     Fault("wrong rates", Mode.INIT, _rewrite(RcTuning.CODE, _slow_rates), End.REFUSED, Reason.SETTINGS),
     Fault("wrong channel map", Mode.INIT, _rewrite(RxMap.CODE, _other_map), End.REFUSED, Reason.SETTINGS),
+    Fault("poses: gaps of 0.12 s before take-off", Mode.INIT, _gaps, End.REFUSED, Reason.SETTINGS),
     Fault("battery low before take-off", Mode.INIT, _rewrite(BatteryState.CODE, _low_battery), End.REFUSED,
           Reason.BATTERY_LOW),
 )  # fmt: skip

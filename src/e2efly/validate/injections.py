@@ -1,210 +1,46 @@
-"""Faults with parameters that may strike together: each alters poses, accelerometer, link, receiver or body."""
+"""Faults with parameters that may strike together: of poses, accelerometer, link, receiver and body."""
 
 import dataclasses
 import math
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
 
-from e2efly.control.vectors import Quat
-from e2efly.deploy.msp.messages import RawImu
+from e2efly.deploy.instruments import FAILSAFE
+from e2efly.deploy.msp.messages import RawImu, StatusEx
 from e2efly.deploy.odometry import Sample
+from e2efly.validate.injected_poses import POSES
+from e2efly.validate.injection import Excuse, Injection, Kind, Parameters, Rule, one_of, uniform, vector
 from e2efly.validate.sitl import FirmwareState
 from e2efly.validate.stage import Stage
 
-HALF = math.sqrt(0.5)
-_NED = Quat(0.0, HALF, HALF, 0.0)
-"""From east north up to north east down."""
-_FRD = Quat(0.0, 1.0, 0.0, 0.0)
-"""From forward left up to forward right down."""
-AXES = {"x": 0, "y": 1, "z": 2}
 COUNTS = 256
 """Of the firmware's accelerometer for one gravity."""
-
-Parameters = dict[str, Any]
-
-
-def _nothing() -> None:
-    """What an injection does that is done by its alterations alone."""
+FLAGS = 6
+"""Where a STATUS_EX has its flags of the modes that are on."""
 
 
-@dataclass(frozen=True)
-class Injection:
-    """One fault at work. What it alters goes through those that began before it first."""
+def _told(change: Callable[[np.ndarray], np.ndarray]) -> Injection:
+    """The accelerometer as the controller reports it: (3,) specific force, gravities, and what becomes of it."""
 
-    pose: Callable[[Sample], Sample | None] | None = None
-    """A sample of the pose source, or none."""
-    told: Callable[[np.ndarray], np.ndarray] | None = None
-    """(3,) specific force that the controller reports, gravities."""
-    felt: Callable[[FirmwareState], FirmwareState] | None = None
-    """What the controller's own sensors feel."""
-    each: Callable[[], None] = _nothing
-    """Done before each control step."""
-    end: Callable[[], None] = _nothing
-    """Done when it is over."""
+    def rewritten(payload: bytes) -> bytes:
+        force = change(np.array(struct.unpack("<3h", payload[:6])) / COUNTS)
+        return struct.pack("<3h", *np.clip(np.round(force * COUNTS), -32768, 32767).astype(int).tolist()) + payload[6:]
 
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of fault."""
-
-    begin: Callable[..., Injection]
-    """(stage, **parameters) -> what is at work from now on."""
-    draw: Callable[[np.random.Generator], Parameters] = lambda random: {}
-    """Parameters by chance."""
-    beyond: str = ""
-    """Why nothing on the companion computer can help while it lasts; empty: the bridge is to cope with it."""
-    limited: tuple[float, float] | None = None
-    """Shortest and longest time that it lasts, s; None: it stays."""
-
-
-def _poses(factory: Callable[..., Callable[[Sample], Sample | None]]) -> Callable[..., Injection]:
-    """A kind's beginning, of a function of parameters that needs nothing of the stage."""
-    return lambda stage, **parameters: Injection(pose=factory(**parameters))
-
-
-def _slow(rate: float) -> Callable[[Sample], Sample | None]:
-    passed = -math.inf
-
-    def thinned(sample: Sample) -> Sample | None:
-        nonlocal passed
-        if sample.received < passed + 1 / rate - 1e-6:
-            return None
-        passed = sample.received
-        return sample
-
-    return thinned
-
-
-def _gaps(gap: float, period: float) -> Callable[[Sample], Sample | None]:
-    return lambda sample: None if sample.received % period < gap else sample
-
-
-def _none() -> Callable[[Sample], Sample | None]:
-    return lambda sample: None
-
-
-def _moved(sample: Sample, turn: Callable[[np.ndarray], np.ndarray], **changes: Any) -> Sample:
-    """Position and velocity turned alike."""
-    velocity = None if sample.velocity is None else turn(sample.velocity)
-    return dataclasses.replace(sample, position=turn(sample.position), velocity=velocity, **changes)
-
-
-def _array(q: Quat) -> np.ndarray:
-    return np.array([q.w, q.x, q.y, q.z], float)
-
-
-def mirrored(axis: str) -> Callable[[Sample], Sample]:
-    """One axis of position and velocity, or the heading, with the wrong sign; attitude and the rest as they are."""
-    if axis == "yaw":
-
-        def turned_back(sample: Sample) -> Sample:
-            w, x, y, z = sample.quaternion
-            yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-            back = Quat(math.cos(yaw), 0.0, 0.0, -math.sin(yaw))
-            return dataclasses.replace(sample, quaternion=_array(back.compose(Quat(w, x, y, z))))
-
-        return turned_back
-    signs = np.where(np.arange(3) == AXES[axis], -1.0, 1.0)
-    return lambda sample: _moved(sample, lambda v: v * signs)
-
-
-def north_east_down() -> Callable[[Sample], Sample]:
-    """World north east down, body forward right down."""
-
-    def turned(sample: Sample) -> Sample:
-        quaternion = _array(_NED.compose(Quat(*sample.quaternion)).compose(_FRD))
-        rate = None if sample.body_rate is None else sample.body_rate * (1, -1, -1)
-        return _moved(sample, lambda v: np.array([v[1], v[0], -v[2]]), quaternion=quaternion, body_rate=rate)
-
-    return turned
-
-
-def scalar_last() -> Callable[[Sample], Sample]:
-    """The quaternion's numbers as x, y, z, w."""
-    return lambda sample: dataclasses.replace(sample, quaternion=np.roll(sample.quaternion, -1))
-
-
-def conjugated() -> Callable[[Sample], Sample]:
-    """The attitude from world to body."""
-    return lambda sample: dataclasses.replace(sample, quaternion=sample.quaternion * (1, -1, -1, -1))
-
-
-def _scaled(factor: float) -> Callable[[Sample], Sample]:
-    return lambda sample: _moved(sample, lambda v: v * factor)
-
-
-def velocity_as(how: str) -> Callable[[Sample], Sample]:
-    """Velocity negated or zero; absent: neither velocity nor body rate."""
-
-    def changed(sample: Sample) -> Sample:
-        if how == "absent" or sample.velocity is None:
-            return dataclasses.replace(sample, velocity=None, body_rate=None)
-        return dataclasses.replace(sample, velocity=sample.velocity * {"negated": -1.0, "zero": 0.0}[how])
-
-    return changed
-
-
-def _drifting(stage: Stage, speed: list[float], told: bool) -> Injection:
-    """The position runs away, m/s; `told`: the velocity says so, too."""
-    began, v = stage.rig.now(), np.array(speed)
-
-    def run_away(sample: Sample) -> Sample:
-        velocity = sample.velocity + v if told and sample.velocity is not None else sample.velocity
-        position = sample.position + v * (sample.received - began)
-        return dataclasses.replace(sample, position=position, velocity=velocity)
-
-    return Injection(pose=run_away)
-
-
-def _elsewhere(offset: list[float], yaw: float) -> Callable[[Sample], Sample]:
-    """The source starts again: another origin, other axes, its clock at zero."""
-    turn, c, s, first = Quat(math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)), math.cos(yaw), math.sin(yaw), math.nan
-
-    def restarted(sample: Sample) -> Sample:
-        nonlocal first
-        stamp = sample.stamp if sample.stamp is not None else sample.received
-        first = stamp if math.isnan(first) else first
-        quaternion = _array(turn.compose(Quat(*sample.quaternion)))
-        turned = _moved(sample, lambda v: np.array([c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]]))
-        position = turned.position + np.array(offset)
-        return dataclasses.replace(turned, position=position, quaternion=quaternion, stamp=stamp - first)
-
-    return restarted
-
-
-def _noisy(stage: Stage, position: float, velocity: float, attitude: float) -> Injection:
-    """Standard deviations, m, m/s, rad."""
-    random = stage.random
-
-    def shaken(sample: Sample) -> Sample:
-        quaternion = sample.quaternion + attitude / 2 * random.normal(size=4)
-        v = None if sample.velocity is None else sample.velocity + velocity * random.normal(size=3)
-        return dataclasses.replace(
-            sample, position=sample.position + position * random.normal(size=3), velocity=v,
-            quaternion=quaternion / np.linalg.norm(quaternion),
-        )  # fmt: skip
-
-    return Injection(pose=shaken)
-
-
-def _pose_delay(stage: Stage, delay: float) -> Injection:
-    poses = stage.poses
-    poses.delay = delay
-    return Injection(end=lambda: setattr(poses, "delay", 0.0))
+    return Injection(reply=(RawImu.CODE, rewritten))
 
 
 def _told_scaled(stage: Stage, factor: float) -> Injection:
     del stage
-    return Injection(told=lambda force: force * (1.0, 1.0, factor))
+    return _told(lambda force: force * (1.0, 1.0, factor))
 
 
 def _told_biased(stage: Stage, bias: list[float]) -> Injection:
     del stage
-    return Injection(told=lambda force: force + np.array(bias))
+    return _told(lambda force: force + np.array(bias))
 
 
 def _told_frozen(stage: Stage) -> Injection:
@@ -216,7 +52,7 @@ def _told_frozen(stage: Stage) -> Injection:
         del kept[1:]
         return kept[0]
 
-    return Injection(told=same)
+    return _told(same)
 
 
 def _felt_scaled(stage: Stage, factor: float) -> Injection:
@@ -247,6 +83,17 @@ def _receiver(stage: Stage) -> Injection:
     return Injection(end=lambda: setattr(rig, "heard", True))
 
 
+def _failsafe(stage: Stage) -> Injection:
+    """The controller says that its receiver has failed, and goes on by the companion's sticks."""
+
+    def failed(payload: bytes) -> bytes:
+        bit = 1 << stage.session.info.box_ids.index(FAILSAFE)
+        flags = int.from_bytes(payload[FLAGS : FLAGS + 4], "little") | bit
+        return payload[:FLAGS] + flags.to_bytes(4, "little") + payload[FLAGS + 4 :]
+
+    return Injection(reply=(StatusEx.CODE, failed))
+
+
 def _sag(stage: Stage, share: float, within: float) -> Injection:
     """All motors fall to a share of their output, s."""
     rig, began = stage.rig, stage.rig.now()
@@ -269,58 +116,28 @@ def _reboot(stage: Stage) -> Injection:
     return Injection(end=lambda: stage.rig.power(True))
 
 
-def _uniform(low: float, high: float, name: str, digits: int = 3) -> Callable[[np.random.Generator], Parameters]:
-    return lambda random: {name: round(float(random.uniform(low, high)), digits)}
-
-
-def _one_of(name: str, *values: Any) -> Callable[[np.random.Generator], Parameters]:
-    return lambda random: {name: values[int(random.integers(len(values)))]}
-
-
-def _vector(random: np.random.Generator, length: float, digits: int = 3) -> list[float]:
-    way = random.normal(size=3)
-    return [round(float(x), digits) for x in length * way / np.linalg.norm(way)]
-
-
-HELD = "the firmware holds the last command while the link is silent"
-NO_POWER = "the controller has no power, and starts disarmed"
-KINDS = {
-    "poses: slow": Kind(_poses(_slow), _one_of("rate", 3, 5, 8, 10, 15, 20, 30)),
-    "poses: gaps": Kind(_poses(_gaps), lambda random: {
-        "gap": round(float(random.uniform(0.05, 0.3)), 3), "period": round(float(random.uniform(0.35, 2.0)), 3)}),
-    "poses: none": Kind(_poses(_none)),
-    "poses: late": Kind(_pose_delay, _uniform(0.05, 0.3, "delay")),
-    "poses: mirrored": Kind(_poses(mirrored), _one_of("axis", "x", "y", "z", "yaw")),
-    "poses: NED and FRD": Kind(_poses(north_east_down)),
-    "poses: quaternion xyzw": Kind(_poses(scalar_last)),
-    "poses: quaternion conjugated": Kind(_poses(conjugated)),
-    "poses: scaled": Kind(_poses(_scaled), _one_of("factor", 0.01, 0.3, 0.5, 0.8, 0.9, 1.1, 1.25, 2.0, 3.28)),
-    "poses: drifting": Kind(_drifting, lambda random: {
-        "speed": _vector(random, random.uniform(0.05, 1.0)), "told": bool(random.random() < 0.5)}),
-    "poses: another origin": Kind(_poses(_elsewhere), lambda random: {
-        "offset": _vector(random, random.uniform(0.1, 3.0)), "yaw": round(float(random.uniform(-3.1, 3.1)), 3)}),
-    "poses: velocity": Kind(_poses(velocity_as), _one_of("how", "negated", "zero", "absent")),
-    "poses: noisy": Kind(_noisy, lambda random: {
-        "position": round(float(random.uniform(0.002, 0.03)), 4),
-        "velocity": round(float(random.uniform(0.02, 0.3)), 3),
-        "attitude": round(float(random.uniform(0.005, 0.06)), 4)}),
+HELD = Excuse("the firmware holds the last command while the link is silent")
+NO_POWER = Excuse("the controller has no power, and starts disarmed", (Rule.OFF, Rule.TOUCH), for_good=True)
+UNHEARD = Excuse("the firmware holds the last switches while its receiver is silent, and tells nobody", (Rule.ENDLESS,))
+KINDS = POSES | {
     "accelerometer as told: z scaled": Kind(
-        _told_scaled, _one_of("factor", -1.0, 0.0, 0.9, 0.93, 0.95, 0.97, 0.98, 1.03, 1.05, 1.1, 1.15)),
+        _told_scaled, one_of("factor", -1.0, 0.0, 0.9, 0.93, 0.95, 0.97, 0.98, 1.03, 1.05, 1.1, 1.15)),
     "accelerometer as told: biased": Kind(
-        _told_biased, lambda random: {"bias": _vector(random, random.uniform(0.01, 0.1))}),
+        _told_biased, lambda random: {"bias": vector(random, random.uniform(0.01, 0.1))}),
     "accelerometer as told: frozen": Kind(_told_frozen),
-    "accelerometer: z scaled": Kind(_felt_scaled, _uniform(0.9, 1.1, "factor")),
-    "accelerometer: biased": Kind(_felt_biased, lambda random: {"bias": _vector(random, random.uniform(0.01, 0.08))}),
-    "link: silent": Kind(_link("silent", False), beyond=HELD, limited=(0.1, 5.0)),
-    "link: garbage": Kind(_link("garbage", 0.0), _uniform(0.1, 0.9, "value"), limited=(0.5, 10.0)),
-    "link: spoilt": Kind(_link("spoilt", 0.0), _uniform(0.1, 1.0, "value"), limited=(0.5, 10.0)),
-    "link: late": Kind(_link("delay", 0.0), _uniform(0.01, 0.1, "value"), limited=(0.5, 10.0)),
-    "receiver: silent": Kind(_receiver, limited=(0.1, 5.0)),
+    "accelerometer: z scaled": Kind(_felt_scaled, uniform("factor", 0.9, 1.1)),
+    "accelerometer: biased": Kind(_felt_biased, lambda random: {"bias": vector(random, random.uniform(0.01, 0.08))}),
+    "link: silent": Kind(_link("silent", False), excuse=HELD, limited=(0.1, 5.0)),
+    "link: garbage": Kind(_link("garbage", 0.0), uniform("value", 0.1, 0.9), limited=(0.5, 10.0)),
+    "link: spoilt": Kind(_link("spoilt", 0.0), uniform("value", 0.1, 1.0), limited=(0.5, 10.0)),
+    "link: late": Kind(_link("delay", 0.0), uniform("value", 0.01, 0.1), limited=(0.5, 10.0)),
+    "receiver: silent": Kind(_receiver, excuse=UNHEARD, limited=(0.1, 5.0)),
+    "receiver: failsafe": Kind(_failsafe, limited=(0.1, 5.0)),
     "battery: sag": Kind(_sag, lambda random: {
-        "share": round(float(random.uniform(0.75, 0.95)), 3), "within": round(float(random.uniform(0.1, 5.0)), 2)}),
+        "share": round(float(random.uniform(0.8, 0.95)), 3), "within": round(float(random.uniform(0.1, 5.0)), 2)}),
     "motor: weak": Kind(_weak_motor, lambda random: {
-        "motor": int(random.integers(4)), "share": round(float(random.uniform(0.8, 0.97)), 3)}),
-    "controller: reboots": Kind(_reboot, beyond=NO_POWER, limited=(0.5, 2.0)),
+        "motor": int(random.integers(4)), "share": round(float(random.uniform(0.85, 0.97)), 3)}),
+    "controller: reboots": Kind(_reboot, excuse=NO_POWER, limited=(0.5, 2.0)),
 }  # fmt: skip
 """All kinds, by name."""
 
@@ -353,7 +170,8 @@ class Faults:
     def attach(self) -> None:
         """To the stage's present link, poses and rig."""
         self._stage.poses.alter = self._pose
-        self._stage.link.rewrites[RawImu.CODE] = self._imu
+        for code in (RawImu.CODE, StatusEx.CODE):
+            self._stage.link.rewrites[code] = partial(self._reply, code)
         self._stage.rig.felt = self._felt
 
     def begin(self, strike: Strike) -> None:
@@ -375,13 +193,11 @@ class Faults:
                 altered = injection.pose(altered)
         return altered
 
-    def _imu(self, payload: bytes) -> bytes:
-        *counts, gx, gy, gz = struct.unpack("<6h", payload[:12])
-        force = np.array(counts) / COUNTS
+    def _reply(self, code: int, payload: bytes) -> bytes:
         for _, injection in self._active:
-            force = force if injection.told is None else injection.told(force)
-        counts = np.clip(np.round(force * COUNTS), -32768, 32767).astype(int).tolist()
-        return struct.pack("<6h", *counts, gx, gy, gz) + payload[12:]
+            if injection.reply is not None and injection.reply[0] == code:
+                payload = injection.reply[1](payload)
+        return payload
 
     def _felt(self, state: FirmwareState) -> FirmwareState:
         for _, injection in self._active:

@@ -4,7 +4,8 @@ import numpy as np
 
 from e2efly.deploy.flight_state import Mode
 from e2efly.validate.campaign import STRUCK_IN, Scenario
-from e2efly.validate.injections import KINDS, Parameters, Strike
+from e2efly.validate.injection import Parameters
+from e2efly.validate.injections import KINDS, Strike
 
 HEIGHTS = (0.7, 2.5)
 """Of drawn hovers, m."""
@@ -82,7 +83,8 @@ CASES = (
         for seconds in (1.0, 2.2, 3.0, 4.0, 5.0)
     ),
     *(
-        _case(f"poses: {delay:g} s late from the ground", Mode.INIT, 1.0, _pose("late", delay=delay), seed=seed)
+        _case(f"poses: {delay:g} s late from the ground{', again' * seed}", Mode.INIT, 1.0, _pose("late", delay=delay),
+              seed=seed)
         for delay in (0.05, 0.1, 0.15, 0.2, 0.3)
         for seed in range(2 if delay == 0.15 else 1)
     ),

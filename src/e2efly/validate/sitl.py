@@ -2,6 +2,8 @@
 
 import mmap
 import os
+import random
+import re
 import select
 import socket
 import struct
@@ -18,6 +20,8 @@ from e2efly.validate.firmware import Firmware
 _STATE = struct.Struct("<18d")
 _RC = struct.Struct("<d16H")
 _MOTORS = struct.Struct("<4f")
+_TRIES = 5
+"""Starts with other ports, before it is given up."""
 _PORTS = 12
 """UDP 9001 to 9004 and TCP 5761 to 5768, moved."""
 _CLOCK = struct.Struct("<6Q")
@@ -25,17 +29,18 @@ _NOW, _WAITING, _STATES, _FRAMES, _ROUNDS = range(1, 6)
 """What stands there, after the horizon; see `sitl_shim.c`."""
 IDLE_S = 0.002
 """Between two states while nothing moves, s."""
+_TAKEN = re.compile(rb"bind port .* failed|UDP server .*\.\.\.-")
+"""What the firmware says where somebody else has one of its ports."""
+_RANDOM = random.SystemRandom()
 BOOT_S = 20.0
 """Real time that the firmware may take to open its ports, or to answer, s."""
 
 
 def free_ports() -> int:
-    """The first of `_PORTS` ports in a row that are free on loopback."""
+    """The first of `_PORTS` ports in a row that are free on loopback, below those that systems give to anybody."""
     for _ in range(100):
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            base = probe.getsockname()[1]
-        if base + _PORTS < 65536 and all(_free(base + i) for i in range(_PORTS)):
+        base = _RANDOM.randrange(10_000, 32_000)
+        if all(_free(base + i) for i in range(_PORTS)):
             return base
     raise OSError("no free ports on the loopback interface")
 
@@ -89,9 +94,14 @@ class Sitl:
         self._go = self._poke = self._done = -1
         folder.mkdir(parents=True, exist_ok=True)
         self._out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._in = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._in.bind(("127.0.0.1", self.base + 1))
-        self._in.setblocking(False)
+        self._in = self._listening()
+
+    def _listening(self) -> socket.socket:
+        """Where the firmware sends what its motors get."""
+        found = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        found.bind(("127.0.0.1", self.base + 1))
+        found.setblocking(False)
+        return found
 
     @property
     def msp(self) -> str:
@@ -115,11 +125,23 @@ class Sitl:
         return self._process is not None and self._process.poll() is None
 
     def start(self) -> None:
-        """Start the process and wait for its MSP port.
+        """Start the process and wait for its MSP port. At its first start it takes other ports where one is not free.
 
         Raises:
-            OSError: when it ends or does not listen within `BOOT_S`.
+            OSError: when it ends or does not listen within `BOOT_S`; later, when somebody has taken one of its ports.
         """
+        for _ in range(_TRIES if self.now == 0.0 else 1):
+            if self._launch():
+                return
+            self.stop()
+            self.now = 0.0
+            self._in.close()
+            self.base = free_ports()
+            self._in = self._listening()
+        raise OSError(f"the Betaflight SITL in {self.folder} does not start: its ports are taken by others")
+
+    def _launch(self) -> bool:
+        """Start the process and wait for its ports; False where one of them is not free."""
         clock = self.folder / "clock"
         clock.write_bytes(bytes(4096))
         with clock.open("r+b") as file:
@@ -152,6 +174,7 @@ class Sitl:
                     f"the Betaflight SITL in {self.folder} does not start:\n{text[-500:].decode(errors='replace')}"
                 )
             self.advance(0.01)
+        return not _TAKEN.search(text)
 
     def stop(self) -> None:
         """Kill the process, as a cut battery would."""

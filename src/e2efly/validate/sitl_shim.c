@@ -143,7 +143,7 @@ int select(int count, fd_set *readable, fd_set *writable, fd_set *odd, struct ti
         taken = NULL;
         tell();
     }
-    if (count <= 1) network = 1;
+    if (writable) network = 1; /* it alone asks where it may write; a slow one comes here first when a port is open */
     if (poked) {
         poked = 0;
         atomic_fetch_add(&shared->rounds, 1);

@@ -123,11 +123,11 @@ def vehicle_names() -> list[str]:
     return sorted(path.stem for path in _HERE.glob("*.toml"))
 
 
-def load_vehicle(name_or_path: str | Path) -> Vehicle:
-    """Load a shipped vehicle by name, or any vehicle by the path of its TOML file.
+def vehicle_file(name_or_path: str | Path) -> Path:
+    """The TOML file of a shipped vehicle, by its name, or of any vehicle, by its path.
 
     Raises:
-        ValueError: naming the file, the key, the value and what is accepted.
+        ValueError: when there is none.
     """
     text = str(name_or_path)
     path = Path(text) if text.endswith(".toml") else _HERE / f"{text.lower().replace('-', '_')}.toml"
@@ -135,6 +135,16 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
         if text.endswith(".toml"):
             raise ValueError(f"vehicle file {text!r} does not exist")
         raise ValueError(unknown("vehicle", text, vehicle_names()) + ", or the path of a .toml file")
+    return path
+
+
+def load_vehicle(name_or_path: str | Path) -> Vehicle:
+    """Load a shipped vehicle by name, or any vehicle by the path of its TOML file.
+
+    Raises:
+        ValueError: naming the file, the key, the value and what is accepted.
+    """
+    path = vehicle_file(name_or_path)
     return _from_table(path.stem, read_table(path), str(path))
 
 

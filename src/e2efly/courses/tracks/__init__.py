@@ -38,15 +38,25 @@ def track_names() -> list[str]:
     return sorted(path.stem for path in _HERE.glob("*.toml"))
 
 
+def track_file(name_or_path: str) -> Path:
+    """The file of a shipped track, by its name, or of any track, by its path.
+
+    Raises:
+        ValueError: when there is none.
+    """
+    path = Path(name_or_path) if name_or_path.endswith(".toml") else _HERE / f"{name_or_path}.toml"
+    if not path.is_file():
+        raise ValueError(unknown("track", name_or_path, track_names()) + ", or the path of a .toml file")
+    return path
+
+
 def load_track(name_or_path: str) -> RaceTrack:
     """Load a shipped track by name, or any by the path of its .toml file.
 
     Raises:
         ValueError: naming the file, the key, the value and what is accepted.
     """
-    path = Path(name_or_path) if name_or_path.endswith(".toml") else _HERE / f"{name_or_path}.toml"
-    if not path.is_file():
-        raise ValueError(unknown("track", name_or_path, track_names()) + ", or the path of a .toml file")
+    path = track_file(name_or_path)
     table = read_table(path)
     _keys(path, "the file", table, {"closed", "start", "gates"})
     if not isinstance(table["closed"], bool):

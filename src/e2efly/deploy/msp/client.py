@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from e2efly.deploy.clock import MONOTONIC, Clock
 from e2efly.deploy.msp import messages, settings
 from e2efly.deploy.msp.codec import ERROR, REQUEST, Decoder, Frame, encode
-from e2efly.deploy.msp.link import Link
+from e2efly.deploy.msp.link import MOST, Link
 
 MESSAGES: dict[int, Any] = {
     kind.CODE: kind
@@ -100,7 +100,7 @@ class Client:
         self.link.poll(now)
         if self.link.connections != self._connection:
             self._forget()
-        for frame in self.decoder.feed(self.link.receive()):
+        for frame in self.decoder.feed(self.link.receive()[-MOST:]):
             self._take(frame, now)
         self._expire(now)
         if self.link.alive:

@@ -21,6 +21,8 @@ CONNECT_TIMEOUT = 2.0
 """How long an attempt may take, s."""
 MAX_UNSENT = 4096
 """Bytes that may wait to be taken before the link counts as broken."""
+MOST = 4096
+"""Bytes of what has come that are decoded in a control step, the newest: of a flood no more than there is time for."""
 _CHUNK = 65536
 _ACCEPTED = "serial:/dev/ttyACM0?baud=115200, /dev/ttyACM0 or tcp:HOST:PORT"
 

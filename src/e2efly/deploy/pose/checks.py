@@ -55,6 +55,10 @@ class Checks:
     velocity_mismatch: float = 2.0
     """Largest difference between the velocity that the source gives and the one estimated from its positions, m/s,
     added to 0.3 times the speed: larger when a source leaves its velocity at zero or gives it in another frame."""
+    velocity_drift: float = 0.08
+    """How far, within half a second, the velocity that the source gives may lead away from its positions, m ..."""
+    velocity_share: float = 0.3
+    """... and share of the way that is added to it."""
     gap: float = 0.5
     """After a pause longer than this the estimates of velocity and body rate start anew, s."""
 

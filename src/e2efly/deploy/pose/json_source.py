@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.deploy.contract_json import unique
 from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pose.source import LARGEST_BATCH, Inbox
 from e2efly.vehicles.names import nearest
@@ -20,10 +21,18 @@ KEYS = (*ARRAYS, "stamp", "frame")
 """All keys of a message."""
 LONGEST = 4096
 """Most bytes of a message."""
+LONGEST_GUESS = 20
+"""Characters of an unknown key for which a known one is looked for: the comparison takes long for long ones."""
 RETRY = 0.5
 """Time between attempts to connect, s."""
 SILENCE = 2.0
 """A TCP link that brings nothing for so long is opened anew, s."""
+BUFFER = 32 << 10
+"""Bytes that the kernel is asked to keep between two reads, some 80 poses. It keeps the oldest: the less, the newer."""
+DRAIN = 128
+"""Most datagrams that one `read` takes, which is more than the buffer holds; most are thrown away unread."""
+CHUNK, CHUNKS = 64 << 10, 8
+"""Bytes of a TCP link that are taken at a time, and most such times of one `read`."""
 _TIMESTAMP = 35  # SO_TIMESTAMPNS of Linux, which Python's socket module does not name
 
 
@@ -40,14 +49,14 @@ def parse_pose(message: bytes, received: float) -> Sample:
     if len(message) > LONGEST:
         raise ValueError(f"pose: {len(message)} bytes; accepted: at most {LONGEST}")
     try:
-        content = json.loads(message.decode(), object_pairs_hook=_unique, parse_constant=_no_constant)
+        content = json.loads(message.decode(), object_pairs_hook=unique, parse_constant=_no_constant)
     except (ValueError, RecursionError) as error:
         raise ValueError(f"pose: not JSON: {error}") from None
     if not isinstance(content, dict):
         raise ValueError(f"pose: {_short(content)}; accepted: an object with {', '.join(KEYS)}")
     for key in content:
         if key not in KEYS:
-            guess = nearest(key, KEYS)
+            guess = nearest(key[:LONGEST_GUESS], KEYS)
             hint = f"; did you mean {guess!r}?" if guess else ""
             raise ValueError(f"pose: unknown key {_short(key)}{hint} (accepted: {', '.join(KEYS)})")
     if missing := [key for key in ("position", "quaternion") if key not in content]:
@@ -76,13 +85,6 @@ def _number(key: str, value: Any, accepted: str) -> float:
     raise ValueError(f"pose: {key} is {_short(value)}; accepted: {accepted}")
 
 
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    keys = [key for key, _ in pairs]
-    if len(set(keys)) != len(keys):
-        raise ValueError(f"a key is there twice among {', '.join(keys)}")
-    return dict(pairs)
-
-
 def _no_constant(name: str) -> float:
     raise ValueError(f"{name} is no number; accepted: finite numbers")
 
@@ -108,6 +110,7 @@ class UdpSource:
         self._inbox = Inbox(parse_pose)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
         with contextlib.suppress(OSError):  # elsewhere than on Linux `now` has to do
             self._socket.setsockopt(socket.SOL_SOCKET, _TIMESTAMP, 1)
         try:
@@ -133,7 +136,7 @@ class UdpSource:
     def read(self, now: float) -> list[Sample]:
         """Datagrams since the last call; `received` is when the kernel took them, not when they were read."""
         del now
-        for _ in range(4 * LARGEST_BATCH):  # an end even under a flood
+        for _ in range(DRAIN):
             try:
                 message, extra, flags, _ = self._socket.recvmsg(LONGEST, 64)
             except BlockingIOError:
@@ -234,17 +237,17 @@ class TcpSource:
 
     def _receive(self, link: socket.socket, now: float) -> None:
         try:
-            for _ in range(8):  # an end even under a flood
-                data = link.recv(65536)
+            for _ in range(CHUNKS):
+                data = link.recv(CHUNK)
                 if not data:
                     self._lose("the server has closed the link")
                     return
                 self._heard, self._link_problem = now, None
-                lines, overlong = self._lines.feed(data)
-                for line in lines:
-                    self._inbox.put(line, now)
-                for _ in range(overlong):
-                    self._inbox.refuse(f"pose: a line of more than {LONGEST} bytes; accepted: at most {LONGEST}")
+                lines, overlong, dropped = self._lines.feed(data, LARGEST_BATCH)
+                self._inbox.extend(lines, now, dropped)
+                if overlong:
+                    text = f"pose: a line of more than {LONGEST} bytes; accepted: at most {LONGEST}"
+                    self._inbox.refuse(text, overlong)
         except BlockingIOError:
             if now - self._heard > SILENCE:
                 self._lose(f"silent for {SILENCE:g} s")
@@ -264,9 +267,18 @@ class Lines:
         self._rest = b""
         self._skip = False
 
-    def feed(self, data: bytes) -> tuple[list[bytes], int]:
-        """The complete lines that are not empty, and how many overlong ones were dropped."""
-        *lines, rest = (self._rest + data).split(b"\n")
+    def feed(self, data: bytes, most: int | None = None) -> tuple[list[bytes], int, int]:
+        """The complete lines that are not empty, how many overlong ones were dropped, and how many for their number.
+
+        Args:
+            data: the next bytes of the stream.
+            most: of more complete lines than this the newest are cut out, and the others only counted; None: any.
+        """
+        *lines, rest = (self._rest + data).rsplit(b"\n", -1 if most is None else most + 1)
+        dropped = 0
+        if most is not None and len(lines) > most:  # the first may be many that were not cut
+            older, *lines = lines
+            dropped, self._skip = older.count(b"\n") + 1, False
         if lines and self._skip:  # the end of a line that was dropped already
             lines, self._skip = lines[1:], False
         overlong = sum(len(line) > LONGEST for line in lines)
@@ -274,4 +286,4 @@ class Lines:
             overlong += not self._skip
             rest, self._skip = b"", True
         self._rest = b"" if self._skip else rest
-        return [line for line in lines if line.strip() and len(line) <= LONGEST], overlong
+        return [line for line in lines if line.strip() and len(line) <= LONGEST], overlong, dropped

@@ -10,11 +10,14 @@ from pathlib import Path
 from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pose.json_source import Lines, parse_pose
 from e2efly.deploy.pose.source import Inbox
+from e2efly.deploy.terminal import printable
 
 SCRIPT = Path(__file__).parent / "process" / "pose_relay.py"
 """What runs in the process."""
 OPENING = 15.0
 """Longest time until a relay is ready, s."""
+READS = 2
+"""Most reads of one look, of 64 KiB each: what a pipe holds, and more."""
 SYSTEM_PYTHON = "/usr/bin/python3"
 """The system's interpreter, where Debian and Ubuntu install ROS."""
 
@@ -102,30 +105,30 @@ class RelaySource:
     def _pump(self, now: float) -> None:
         """Take what the relay has written."""
         self._said = (self._said + (_available(self._err) or b""))[-2000:]
-        for _ in range(8):  # an end even under a flood
+        for _ in range(READS):
             data = _available(self._out)
             if data is None:
                 return
             if not data:
-                tail = self._said.decode(errors="replace").strip().splitlines()
-                self._ended = self._ended or f"its process has ended{': ' + tail[-1] if tail else ''}"
+                tail = self._said.strip().split(b"\n")[-1]
+                self._ended = self._ended or f"its process has ended{': ' + _text(tail) if tail else ''}"
                 return
-            lines, overlong = self._lines.feed(data)
+            lines, overlong, _ = self._lines.feed(data)
             for line in lines:
                 self._take(line, now)
-            for _ in range(overlong):
-                self._inbox.refuse(f"{self._name}: an overlong message")
+            if overlong:
+                self._inbox.refuse(f"{self._name}: an overlong message", overlong)
 
     def _take(self, line: bytes, now: float) -> None:
         kind, _, rest = line.partition(b" ")
         if kind == b"pose":
             self._inbox.put(rest, now)
         elif kind == b"ready":
-            self._detail = rest.decode(errors="replace")
+            self._detail = _text(rest)
         elif kind == b"failed":
-            self._ended = rest.decode(errors="replace")
+            self._ended = _text(rest)
         else:
-            self._inbox.refuse(f"{self._name}: {rest.decode(errors='replace')}")
+            self._inbox.refuse(f"{self._name}: {_text(rest)}")
 
 
 def _parse(message: bytes, now: float) -> Sample:
@@ -133,6 +136,11 @@ def _parse(message: bytes, now: float) -> Sample:
     received, _, content = message.partition(b" ")
     waited = time.monotonic() - float(received)
     return parse_pose(content, now - max(waited, 0.0))
+
+
+def _text(said: bytes) -> str:
+    """What another process says, which may have come from farther away."""
+    return printable(said.decode(errors="replace"))
 
 
 def _available(descriptor: int) -> bytes | None:

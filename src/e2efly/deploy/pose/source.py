@@ -14,8 +14,8 @@ FORMS = {
     "ros2": "ros2:/topic",
 }
 """The sources that `open_source` knows, and how each is written."""
-LARGEST_BATCH = 64
-"""Most samples that one `read` returns: of a flood the newest are kept, so that the control loop stays in time."""
+LARGEST_BATCH = 16
+"""Most messages that one `read` parses: of a flood the newest, so that the control loop stays in time."""
 
 
 class PoseSource(Protocol):
@@ -86,22 +86,28 @@ class Inbox:
         self.refused = 0
         self.problem: str | None = None
         self._parse = parse
-        self._messages: deque[tuple[bytes, float]] = deque()
+        self._messages: deque[tuple[bytes, float]] = deque(maxlen=LARGEST_BATCH)
+        self._come = 0
 
     def put(self, message: bytes, received: float) -> None:
         """Keep a message; of too many the oldest go."""
+        self._come += 1
         self._messages.append((message, received))
-        if len(self._messages) > LARGEST_BATCH:
-            self._messages.popleft()
-            self.refuse(f"more than {LARGEST_BATCH} messages at once; the oldest were dropped")
 
-    def refuse(self, problem: str) -> None:
-        """Count a message that is no sample."""
-        self.refused, self.problem = self.refused + 1, problem
+    def extend(self, messages: list[bytes], received: float, dropped: int) -> None:
+        """Keep messages that were read together, before which others were dropped; of too many the oldest go."""
+        self._come += len(messages) + dropped
+        self._messages.extend((message, received) for message in messages)
+
+    def refuse(self, problem: str, count: int = 1) -> None:
+        """Count messages that are no samples."""
+        self.refused, self.problem = self.refused + count, problem
 
     def take(self) -> list[Sample]:
         """The samples of all messages, oldest first."""
-        samples = []
+        if dropped := self._come - len(self._messages):
+            self.refuse(f"more than {LARGEST_BATCH} messages at once; the oldest were dropped", dropped)
+        self._come, samples = 0, []
         while self._messages:
             message, received = self._messages.popleft()
             try:

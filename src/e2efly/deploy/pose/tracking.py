@@ -16,6 +16,8 @@ from e2efly.deploy.pose.slope import Slope, follow_slope, settled, slope, start_
 
 LARGEST = 1e6
 """Numbers beyond this are nonsense, and their squares may overflow."""
+TRAVEL_S = 0.5
+"""Over which the way that a source's velocities add up to is compared with that of its positions, s."""
 LARGEST_STAMP = 1e11
 """Stamps beyond this, s, are too coarse: a float is then known to 15 microseconds."""
 
@@ -34,14 +36,18 @@ class Track:
     """Fit of the position, m."""
     body_rate: Slope | None = None
     """Fit of `angle`."""
+    strayed: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    """(3,) way by the source's velocities minus that of its positions, fading with `TRAVEL_S`, m."""
+    travelled: float = 0.0
+    """Length of that way, fading, m."""
     angle: np.ndarray = field(default_factory=lambda: np.zeros(3))
     """(3,) sum of the small rotations about the body's axes so far, rad."""
     same_since: float = 0.0
     """Time since which the pose repeats bit for bit, s."""
     same_pose: bytes = b""
     """Bits of the last pose as it came."""
-    suspect: tuple[np.ndarray, np.ndarray] | None = None
-    """Position (3,) and quaternion (4,) that were jumped to last."""
+    suspect: tuple[float, np.ndarray, np.ndarray] | None = None
+    """Time, s, position (3,), m, and quaternion (4,) that were jumped to last."""
     suspect_count: int = 0
     """Successive samples there."""
     fault: str | None = None
@@ -105,7 +111,7 @@ def _content(checks: Checks, sample: Sample) -> str | None:
     if sample.stamp is not None and not abs(sample.stamp) <= LARGEST_STAMP:
         return f"not_finite: stamp is {sample.stamp!r}; accepted: a finite number of seconds up to {LARGEST_STAMP:g}"
     if checks.frame and sample.frame != checks.frame:
-        return f"frame: frame is {sample.frame!r}; accepted: {checks.frame!r}"
+        return f"frame: frame is {sample.frame[:80]!r}; accepted: {checks.frame!r}"
     length = math.sqrt(float(np.square(sample.quaternion, dtype=np.float64).sum()))
     if not abs(length - 1) <= checks.quaternion_tolerance:
         tolerance = checks.quaternion_tolerance
@@ -161,34 +167,68 @@ def _frozen(checks: Checks, track: Track, sample: Sample, time: float) -> tuple[
 def _jump(
     checks: Checks, track: Track, time: float, position: np.ndarray, quaternion: np.ndarray
 ) -> tuple[Track, str | None]:
-    """Refuse what the vehicle cannot have flown to; a jump that lasts becomes a fault."""
+    """Refuse what the vehicle cannot have flown to; a jump that lasts becomes a fault.
+
+    The allowance grows with time, so that a lasting jump would pass by itself after some samples. A sample that is
+    nearer to where the jump has led on to than to where the track leads on to is therefore refused with it. Both are
+    led on by the last velocity and body rate: a vehicle that turns fast is soon far from where it was seen last.
+    """
     if track.pose is None:
         return track, None
-    last_time, *last = track.pose
-    interval = min(time - last_time, checks.gap)
+    interval = min(time - track.pose[0], checks.gap)
     reach = checks.jump_position + checks.jump_speed * interval
     turn = checks.jump_attitude + checks.jump_rate * interval
-
-    def distance(pose: tuple[np.ndarray, ...] | list[np.ndarray]) -> float:
-        step, angle = np.linalg.norm(position - pose[0]), np.linalg.norm(rotation_between(pose[1], quaternion))
-        return max(float(step) / reach, float(angle) / turn)
-
-    from_track = distance(last)
-    # The allowance grows with time: without this, a lasting jump would pass by itself after some samples.
-    with_suspect = track.suspect is not None and distance(track.suspect) < from_track
-    if from_track <= 1 and not with_suspect:
+    step, angle = _apart(track.pose, position, quaternion)
+    reason = None
+    if not (step <= reach and angle <= turn):
+        reason = (
+            f"jump: by {step:.4g} m and {angle:.4g} rad within {interval:.4g} s; accepted: at most {reach:.4g} m and "
+            f"{turn:.4g} rad"
+        )
+    count = 1
+    if track.suspect is not None:
+        near, on = (_apart(_led_on(track, pose, time), position, quaternion) for pose in (track.suspect, track.pose))
+        if max(near[0] / reach, near[1] / turn) < max(on[0] / reach, on[1] / turn):
+            count = track.suspect_count + 1
+            reason = reason or (
+                f"jump: {near[0]:.4g} m and {near[1]:.4g} rad from where an earlier jump led; accepted: nearer to "
+                f"where the motion before it leads, now {on[0]:.4g} m and {on[1]:.4g} rad away"
+            )
+    if reason is None:
         return replace(track, suspect=None, suspect_count=0), None
-    count = track.suspect_count + 1 if with_suspect else 1
-    step, angle = np.linalg.norm(position - last[0]), np.linalg.norm(rotation_between(last[1], quaternion))
-    reason = (
-        f"jump: by {step:.4g} m and {angle:.4g} rad within {interval:.4g} s; accepted: at most {reach:.4g} m and "
-        f"{turn:.4g} rad"
+    lasting = f"{reason}; seen {count} times, a fault until the track starts anew"
+    fault = lasting if count >= checks.jump_count else None
+    return replace(track, suspect=(time, position, quaternion), suspect_count=count, fault=fault), fault or reason
+
+
+def _apart(pose: tuple[float, np.ndarray, np.ndarray], position: np.ndarray, quaternion: np.ndarray) -> tuple:
+    """How far from a pose, m and rad."""
+    return (
+        float(np.linalg.norm(position - pose[1])), float(np.linalg.norm(rotation_between(pose[2], quaternion))),
+    )  # fmt: skip
+
+
+def _led_on(
+    track: Track, pose: tuple[float, np.ndarray, np.ndarray], time: float
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Where a pose has come to by `time` s, should the motion go on as the last odometry had it."""
+    if track.odometry is None:
+        return pose
+    since = time - pose[0]
+    half = 0.5 * since * track.odometry.body_rate
+    angle = float(np.linalg.norm(half))
+    vector = half * float(np.sinc(angle / math.pi))
+    w, (bx, by, bz) = math.cos(angle), vector.tolist()
+    aw, ax, ay, az = pose[2].tolist()
+    quaternion = np.array(
+        [
+            aw * w - ax * bx - ay * by - az * bz,
+            aw * bx + ax * w + ay * bz - az * by,
+            aw * by - ax * bz + ay * w + az * bx,
+            aw * bz + ax * by - ay * bx + az * w,
+        ]
     )
-    lasting = (
-        f"{reason}; seen {count} times, a fault until the track starts anew" if count >= checks.jump_count else None
-    )
-    track = replace(track, suspect=(position, quaternion), suspect_count=count, fault=lasting)
-    return track, lasting or reason
+    return time, pose[1] + since * track.odometry.velocity, quaternion
 
 
 def _motion(
@@ -196,7 +236,7 @@ def _motion(
 ) -> tuple[Track, Odometry | None, str | None]:
     """Odometry of a good sample: velocities as the source gives them, or else estimated."""
     velocity_rate, body_rate_rate = (2 * math.pi * f for f in (checks.velocity_cutoff, checks.rate_cutoff))
-    shift, turn = track.velocity, track.body_rate
+    shift, turn, before = track.velocity, track.body_rate, track.pose
     if track.pose is None or shift is None or turn is None or time - track.pose[0] > checks.gap:
         shift, turn = start_slope(time, position), start_slope(time, np.zeros(3))
         angle = np.zeros(3)
@@ -220,9 +260,34 @@ def _motion(
         if off > limit:
             text = f"velocity: {velocity.tolist()} m/s is {off:.3g} from how the position changes"
             return track, None, f"{text}, {seen.round(3).tolist()}; accepted: at most {limit:.3g}, in the world's axes"
+    if sample.velocity is not None and before is not None:
+        seen = slope(shift) if settled(shift, velocity_rate) else velocity
+        track, reason = _strayed(checks, track, before, velocity, seen)
+        if reason is not None:
+            return track, None, reason
     body_rate = slope(turn) if sample.body_rate is None else np.array(sample.body_rate, np.float64)
     odometry = Odometry(time, position, velocity, quaternion, body_rate)
     return replace(track, odometry=odometry), odometry, None
+
+
+def _strayed(
+    checks: Checks, track: Track, before: tuple[float, np.ndarray, np.ndarray], velocity: np.ndarray, seen: np.ndarray
+) -> tuple[Track, str | None]:
+    """Refuse a velocity that is slow, zero, negated or of other axes: its way is not the one that the positions go."""
+    assert track.pose is not None
+    dt = track.pose[0] - before[0]
+    if not 0 < dt <= checks.gap:
+        return replace(track, strayed=np.zeros(3), travelled=0.0), None
+    kept = math.exp(-dt / TRAVEL_S)
+    strayed = kept * track.strayed + velocity * dt - (track.pose[1] - before[1])
+    speed = max(float(np.linalg.norm(velocity)), float(np.linalg.norm(seen)))
+    travelled = kept * track.travelled + speed * dt
+    off, limit = float(np.linalg.norm(strayed)), checks.velocity_drift + checks.velocity_share * travelled
+    after = replace(track, strayed=strayed, travelled=travelled)
+    if off <= limit:
+        return after, None
+    text = f"velocity: {velocity.round(3).tolist()} m/s and the last ones lead {off:.2g} m away from the positions"
+    return after, f"{text}; accepted: {limit:.2g} m, in the world's axes"
 
 
 def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -69,7 +69,7 @@ def relay_ros1(say: Callable[..., None], topic: str) -> None:
     def receive(raw: Any) -> None:
         received, kind = time.monotonic(), raw._connection_header["type"]
         if kind not in classes:
-            say("problem", f"{topic} is {kind}; accepted: {', '.join(TYPES)}")
+            say("problem", f"{topic} is {kind!r}; accepted: {', '.join(TYPES)}")
             return
         say("pose", repr(received), json.dumps(pose_of(classes[kind]().deserialize(raw._buff))))
 
@@ -106,7 +106,7 @@ def relay_ros2(say: Callable[..., None], topic: str) -> None:
                 subscribed = True
             elif kinds and kinds != said:
                 said = kinds
-                say("problem", f"{topic} is {', '.join(kinds)}; accepted: {', '.join(classes)}")
+                say("problem", f"{topic} is {', '.join(map(repr, kinds))}; accepted: {', '.join(classes)}")
         executor.spin_once(timeout_sec=0.05)
     executor.shutdown()
     node.destroy_node()
@@ -132,12 +132,15 @@ def relay_mocap(say: Callable[..., None], system: str, host: str, body: str) -> 
             say("pose", repr(received), json.dumps({"position": p, "quaternion": [q.w, q.x, q.y, q.z]}))
         elif received - warned > 1:  # once a second is enough
             warned = received
-            say("problem", f"rigid body {body!r} is not tracked; there are: {', '.join(sorted(bodies)) or 'none'}")
+            say(
+                "problem",
+                f"rigid body {body!r} is not tracked; there are: {', '.join(map(repr, sorted(bodies))) or 'none'}",
+            )
 
 
 def main(kind: str, *arguments: str) -> None:
     """Run one relay until the standard input ends."""
-    lines = os.fdopen(os.dup(1), "w")
+    lines = os.fdopen(os.dup(1), "w", errors="backslashreplace")
     os.dup2(2, 1)  # the packages print there, too
     lock = threading.Lock()
 

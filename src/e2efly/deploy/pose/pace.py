@@ -1,0 +1,82 @@
+"""How often a pose source delivers, and how old the newest pose becomes before the next one. Pure.
+
+A source that is slow, or that has a gap twice a second, is good for a moment between two gaps. A take-off in such a
+moment would be given up at the next gap. So the last seconds are judged before it.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+WINDOW_S = 3.0
+"""What is judged: at most the last so many seconds, at least half of them."""
+SHARE = 0.75
+"""Of `odometry_timeout` that the newest pose may become old: what was watched for seconds is no upper bound."""
+
+
+@dataclass(frozen=True)
+class Half:
+    """One half of the window."""
+
+    began: float = math.inf
+    """When, s."""
+    count: int = 0
+    """Good poses in it."""
+    oldest: float = 0.0
+    """How old the newest pose has become in it, s."""
+
+
+@dataclass(frozen=True)
+class Pace:
+    """What has been seen of a source so far."""
+
+    time: float | None = None
+    """When the newest good pose was true, s; None before the first."""
+    received: float = 0.0
+    """When it arrived, s."""
+    before: Half = Half()
+    """The half window before the present one."""
+    present: Half = Half()
+
+    @property
+    def rate(self) -> float:
+        """Good poses per second within the window, Hz."""
+        span = self.received - min(self.before.began, self.present.began)
+        return (self.before.count + self.present.count) / span if span > 0 else 0.0
+
+    @property
+    def oldest(self) -> float:
+        """How old the newest pose has become within the window, s."""
+        return max(self.before.oldest, self.present.oldest)
+
+
+def paced(pace: Pace, time: float, received: float) -> Pace:
+    """The pace with one more good pose.
+
+    Args:
+        pace: so far.
+        time: when the pose was true, s on the local monotonic clock.
+        received: when it arrived, s on the same clock.
+    """
+    if pace.time is None:  # the first begins the watch, and is no part of its rate
+        return Pace(time, received, present=Half(began=received))
+    before, present = pace.before, pace.present
+    if received - present.began > WINDOW_S / 2:
+        before, present = present, Half(began=pace.received)
+    present = replace(present, count=present.count + 1, oldest=max(present.oldest, received - pace.time))
+    return Pace(time, received, before, present)
+
+
+def pace_problem(pace: Pace, timeout: float) -> str | None:
+    """Why nobody should take off by this source, in words; None: it delivers often enough.
+
+    Args:
+        pace: of the source, in which the age of the newest pose at this moment is not counted.
+        timeout: `odometry_timeout` of the flight, s.
+    """
+    accepted = SHARE * timeout
+    if pace.time is None or pace.oldest <= accepted:
+        return None
+    return (
+        f"poses come at {pace.rate:.3g} Hz, and the newest was up to {pace.oldest:.3g} s old within the last "
+        f"{WINDOW_S:g} s; accepted: {accepted:.3g} s, {SHARE:g} of odometry_timeout"
+    )

@@ -1,0 +1,123 @@
+"""The files that a run is made from (vehicle, track, reference, table of a noise): named, kept, compared by content."""
+
+import dataclasses
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from e2efly.config import TrainConfig
+from e2efly.courses.tracks import track_file
+from e2efly.vehicles import vehicle_file
+
+OWN_FILES = (".toml", ".csv", ".npy")
+"""Endings of names that are a user's files; other names are of files that come with the package."""
+
+
+def input_files(config: TrainConfig) -> dict[str, Path]:
+    """The files that a configuration names, by the dotted path of the field.
+
+    Raises:
+        ValueError: for a vehicle or track that does not exist.
+    """
+    found = {"env.vehicle": vehicle_file(config.env.vehicle)}
+    if track := getattr(config.task, "track", ""):
+        found["task.track"] = track_file(track)
+    named = {"task.reference": getattr(config.task, "reference", "")}
+    named |= {f"env.cameras.{i}.noise.redwood": c.noise.redwood or "" for i, c in enumerate(config.env.cameras)}
+    return found | {field: Path(name) for field, name in named.items() if name.endswith(OWN_FILES)}
+
+
+def by_content(config: TrainConfig) -> TrainConfig:
+    """A configuration with the content of each file in place of its path, so that two can be compared.
+
+    Raises:
+        ValueError: when a file cannot be read.
+    """
+    for field, path in input_files(config).items():
+        config = replaced(config, field, f"{path.name} (SHA-256 {sha256(read(path))})")
+    return config
+
+
+def value_at(tree: Any, field: str) -> Any:
+    """The value at a dotted path through nested dataclasses and tuples; None where there is no such field."""
+    name, _, rest = field.partition(".")
+    value = {str(i): x for i, x in enumerate(tree)}.get(name) if isinstance(tree, tuple) else getattr(tree, name, None)
+    return value_at(value, rest) if rest else value
+
+
+def replaced(tree: Any, field: str, value: str) -> Any:
+    """Nested dataclasses and tuples with another value at a dotted path."""
+    name, _, rest = field.partition(".")
+    if isinstance(tree, tuple):
+        return tuple(replaced(x, rest, value) if str(i) == name else x for i, x in enumerate(tree))
+    return dataclasses.replace(tree, **{name: replaced(getattr(tree, name), rest, value) if rest else value})
+
+
+def read(path: Path) -> bytes:
+    """The content of a file.
+
+    Raises:
+        ValueError: naming it, when it cannot be read.
+    """
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path} cannot be read: {error.strerror}") from None
+
+
+def sha256(data: bytes) -> str:
+    """As hexadecimal digits."""
+    return hashlib.sha256(data).hexdigest()
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A copy of a file, kept in a run."""
+
+    copy: Path
+    """Where it is."""
+    original: Path
+    """Where the file was when the run began."""
+    named: str
+    """What the configuration names it: a path, or what comes with the package."""
+    sha256: str
+    """Of the content."""
+
+    @property
+    def own(self) -> bool:
+        """Whether it is the user's file."""
+        return self.named.endswith(OWN_FILES)
+
+    def usable(self) -> str:
+        """What to load: the copy; or the name of what comes with the package, where that is as it was.
+
+        Raises:
+            ValueError: when the copy is missing or not as it was.
+        """
+        if not self.own and self._now() == self.sha256:
+            return self.named
+        if (found := sha256(read(self.copy))) != self.sha256:
+            raise ValueError(f"{self.copy}: SHA-256 is {found}; accepted: {self.sha256}, what the run was made with")
+        return str(self.copy)
+
+    def check_original(self) -> None:
+        """Refuse a user's file that is another one now. One that was moved or deleted does not matter.
+
+        Raises:
+            ValueError: naming both files and both hashes.
+        """
+        now = self._now() if self.own else None
+        if now not in (None, self.sha256):
+            raise ValueError(
+                f"{self.original} has changed: its SHA-256 is {now}, but the run was made with {self.copy}, "
+                f"SHA-256 {self.sha256}; accepted: the file as it was (copy the kept one back), or the changed file "
+                "under another name, for a new run"
+            )
+
+    def _now(self) -> str | None:
+        """Hash of what stands in the original's place; None where nothing does."""
+        try:
+            return sha256(self.original.read_bytes())
+        except OSError:
+            return None

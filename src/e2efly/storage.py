@@ -1,0 +1,124 @@
+"""Files that a crash cannot spoil: written whole, JSON without NaN, folders that one process at a time writes to."""
+
+import fcntl
+import json
+import math
+import os
+import socket
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+LOCK = ".lock"
+"""Name of the file in a folder that says who writes to it. Only the lock that the kernel keeps on it counts."""
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Write a file so that at any moment it is whole: the old one or the new one.
+
+    Raises:
+        OSError: naming the path, when the folder cannot be written or is full.
+    """
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")  # others may write the same file
+    try:
+        with part.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise OSError(f"cannot write {path}: {error.strerror}") from error
+
+
+def write_json(path: Path, content: Any, indent: int | None = 1) -> None:
+    """Write a JSON file atomically, with null for numbers that JSON has not (NaN and infinities).
+
+    Raises:
+        OSError: naming the path, when the folder cannot be written or is full.
+    """
+    write_atomically(path, (json.dumps(finite(content), indent=indent, allow_nan=False) + "\n").encode())
+
+
+def finite(value: Any) -> Any:
+    """A tree of JSON with None for every number that is not finite."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(entry) for entry in value]
+    return value
+
+
+@contextmanager
+def held(folder: Path, option: str = "--out") -> Iterator[None]:
+    """Keep other processes from writing to a folder, which is made where there is none.
+
+    The kernel lets go when the process ends, however it ends, so that no lock outlives its process.
+
+    Args:
+        folder: to hold.
+        option: that names the folder, for the error.
+
+    Raises:
+        ValueError: when another process holds it, naming process, host and since when.
+        OSError: when the folder cannot be made, or its file system has no locks.
+    """
+    anew = not folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"cannot make {option} {folder}: {error.strerror}") from error
+    path = folder / LOCK
+    try:
+        file = _locked(path)
+    except BlockingIOError:
+        raise ValueError(
+            f"{option} {folder} is in use by {_holder(path)}; accepted: another folder, or this one when that process "
+            "has ended"
+        ) from None
+    except OSError as error:
+        raise OSError(f"cannot lock {option} {folder}: {error.strerror}") from error
+    now = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
+    about = json.dumps({"process": os.getpid(), "host": socket.gethostname(), "since": now})
+    try:
+        with suppress(OSError):  # on a full disk it says nothing, and the lock holds as well
+            os.ftruncate(file, 0)
+            os.pwrite(file, about.encode(), 0)
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        os.close(file)
+        if anew:
+            with suppress(OSError):  # it holds something
+                folder.rmdir()
+
+
+def _locked(path: Path) -> int:
+    """A descriptor of the file with the lock on it.
+
+    Raises:
+        BlockingIOError: when another process has it.
+    """
+    while True:
+        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if path.exists() and os.path.samestat(os.fstat(file), path.stat()):
+                return file
+        except OSError:
+            os.close(file)
+            raise
+        os.close(file)  # of a file that its last holder has removed in the meantime
+
+
+def _holder(path: Path) -> str:
+    """Who holds a lock, as far as its file says."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return f"process {content['process']} on {content['host']} since {content['since']}"
+    except (OSError, ValueError, TypeError, KeyError):
+        return "another process"

@@ -1,0 +1,95 @@
+"""`e2efly fly` as a process beside a recorded controller: what comes from outside, and a terminal that goes away."""
+
+import json
+import os
+import pty
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from e2efly.commands.fly import Fly, fly_command
+from e2efly.deploy.flight_log import read_log
+from e2efly.deploy.msp.codec import REPLY, Frame, encode
+from e2efly.deploy.msp.messages import Name
+from tests.deploy.test_msp_client import controller, recorded
+
+FORGED = "\x1b[2K\rPOLICY: all is well"
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Terminal:
+    """What a process writes to a terminal."""
+
+    def __init__(self) -> None:
+        self._ours, self.theirs = pty.openpty()
+        self.text = b""
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def wait_for(self, found: Callable[[bytes], bool]) -> None:
+        end = time.monotonic() + 60
+        while not found(self.text):
+            assert time.monotonic() < end, self.text
+            time.sleep(0.02)
+
+    def hang_up(self) -> None:
+        os.close(self._ours)
+
+    def _read(self) -> None:
+        while True:
+            try:
+                self.text += os.read(self._ours, 4096)
+            except OSError:
+                return
+
+
+def test_hostile_datagrams_forge_no_line_and_a_hang_up_ends_it_with_a_closed_log(tmp_path: Path) -> None:
+    port, terminal, log = free_port(), Terminal(), tmp_path / "flight.mcap"
+    with controller(recorded) as client, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        command = [sys.executable, "-m", "e2efly", "fly", "--vehicle", "vis_r", "--link", client.link.name]  # type: ignore
+        process = subprocess.Popen(
+            [*command, "--pose", f"udp:{port}", "--log", str(log)], stdout=terminal.theirs, stderr=terminal.theirs
+        )
+        os.close(terminal.theirs)
+        try:
+            terminal.wait_for(lambda text: b"INIT:" in text)
+            for content in ({FORGED: 1}, {"\ud800": 1}):
+                sender.sendto(json.dumps(content).encode(), ("127.0.0.1", port))
+            twice = json.dumps(FORGED)
+            sender.sendto(f"{{{twice}: 1, {twice}: 2}}".encode(), ("127.0.0.1", port))
+            before = len(terminal.text)
+            terminal.wait_for(lambda text: text[before:].count(b"INIT:") >= 2)
+            terminal.wait_for(lambda text: rb"\x1b[2K\rPOLICY" in text[before:])
+            assert b"\x1b" not in terminal.text[before:]
+            terminal.hang_up()
+            process.send_signal(signal.SIGHUP)
+            assert process.wait(30) == 0
+        finally:
+            process.kill()
+            process.wait()
+    read = read_log(log)
+    assert read.cut_off == ""
+    assert len(read["command"]) > 20
+
+
+def test_a_craft_s_name_is_neither_markup_nor_an_escape_sequence(capsys: pytest.CaptureFixture) -> None:
+    def named(code: int) -> bytes:
+        return encode(Frame(code, f"[/]{FORGED}".encode(), REPLY)) if code == Name.CODE else recorded(code)
+
+    with controller(named) as client:
+        fly_command(Fly(vehicle="vis_r", link=client.link.name, pose=f"udp:{free_port()}", check=True))  # type: ignore
+    said = capsys.readouterr().out
+    assert "\x1b" not in said
+    assert "[/]" in said

@@ -1,0 +1,46 @@
+"""A flight of the campaign through the real firmware, and each of its faults at work."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from e2efly.deploy.goal_options import GoalOptions, goal_for
+from e2efly.deploy.msp.messages import RawImu
+from e2efly.deploy.policy import load_policy
+from e2efly.validate import firmware
+from e2efly.validate.campaign import Scenario, fly
+from e2efly.validate.injections import COUNTS, KINDS, Faults, Strike
+from e2efly.validate.rig import Rig
+from e2efly.validate.stage import LATENCY_S, TARGET, Stage
+from e2efly.vehicles import load_vehicle
+
+
+def test_poses_that_end_in_a_take_off_break_no_rule(policy_of: Callable[..., Path], tmp_path: Path) -> None:
+    scenario = Scenario("", "takeoff", (Strike("poses: none", 0.6),), 0.7)
+    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware.chosen(), tmp_path)
+    assert flown.violations == ()
+    assert flown.ended
+    assert 0.2 < flown.touch_speed < 1.5
+    assert flown.climb == 0.0  # it never came to its hover
+    assert flown.changes[0][1] == "land"
+
+
+def test_every_kind_can_strike_and_end(policy_of: Callable[..., Path], tmp_path: Path) -> None:
+    policy, vehicle = load_policy(policy_of("hover")), load_vehicle("vis_r")
+    goal = goal_for(policy.contract, GoalOptions(target=TARGET), vehicle)
+    with Rig(firmware.chosen(), tmp_path, vehicle, latency=LATENCY_S) as rig:
+        stage = Stage(rig, policy, goal)
+        stage.fly(0.2)
+        gravity = stage.session.client.latest[RawImu.CODE].message.acceleration
+        np.testing.assert_allclose(gravity, (0, 0, COUNTS), atol=1)
+        faults, random = Faults(stage), np.random.default_rng(0)
+        faults.attach()
+        stage.each = faults.each
+        for name, kind in KINDS.items():
+            faults.begin(Strike(name, 0.0, 0.05, kind.draw(random)))
+            stage.fly(0.02)
+        stage.fly(0.1)
+        assert not stage.link.silent
+        assert rig.heard
+        stage.close()
