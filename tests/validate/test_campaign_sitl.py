@@ -18,7 +18,7 @@ from e2efly.vehicles import load_vehicle
 
 def test_poses_that_end_in_a_take_off_break_no_rule(policy_of: Callable[..., Path], tmp_path: Path) -> None:
     scenario = Scenario("", "takeoff", (Strike("poses: none", 0.6),), 0.7)
-    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware.build(), tmp_path)
+    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware.chosen(), tmp_path)
     assert flown.violations == ()
     assert flown.ended
     assert 0.2 < flown.touch_speed < 1.5
@@ -29,7 +29,7 @@ def test_poses_that_end_in_a_take_off_break_no_rule(policy_of: Callable[..., Pat
 def test_every_kind_can_strike_and_end(policy_of: Callable[..., Path], tmp_path: Path) -> None:
     policy, vehicle = load_policy(policy_of("hover")), load_vehicle("vis_r")
     goal = goal_for(policy.contract, GoalOptions(target=TARGET), vehicle)
-    with Rig(firmware.build(), tmp_path, vehicle, latency=LATENCY_S) as rig:
+    with Rig(firmware.chosen(), tmp_path, vehicle, latency=LATENCY_S) as rig:
         stage = Stage(rig, policy, goal)
         stage.fly(0.2)
         gravity = stage.session.client.latest[RawImu.CODE].message.acceleration

@@ -2,12 +2,12 @@
 
 import socket
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from e2efly.validate import firmware, sitl
-from e2efly.validate.firmware import Firmware
 from e2efly.validate.sitl import Sitl
 
 LATE = """
@@ -51,7 +51,7 @@ def test_a_network_thread_that_comes_late_is_reached(tmp_path: Path, monkeypatch
     program = tmp_path / "late"
     subprocess.run(["gcc", "-pthread", "-o", str(program), str(tmp_path / "late.c")], check=True)
     monkeypatch.setattr(sitl, "BOOT_S", 3.0)
-    with Sitl(Firmware(program, firmware.build().shim), tmp_path / "run") as started:
+    with Sitl(replace(firmware.build(), program=program), tmp_path / "run") as started:
         started.advance(0.01)
         started.exchange()
 

@@ -216,7 +216,6 @@ def _cell(text: str) -> Text:
 
 def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row, ...]) -> int:
     """Watch poses, receiver and attitude for a while, and say what forbids a take-off. Sends no sticks."""
-    bridge.probe.seen = True  # nothing is sent, so nothing can be seen of it
     end, poses = time.monotonic() + LOOK_S, []
     while (now := time.monotonic()) < end:
         poses += bridge.look(now)

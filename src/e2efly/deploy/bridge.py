@@ -149,7 +149,7 @@ class Bridge:
         """Take in poses and the controller's answers, decide and send nothing; returns the poses."""
         self.client.poll(now)
         poses = self._read_poses(now)
-        self._feel(now, self._read_controller(now))
+        self._feel(now, self._read_controller(now, sends=False))
         return poses
 
     def adopt(self, info: ControllerInfo, sticks: Sticks, settings_problems: tuple[str, ...]) -> None:
@@ -202,12 +202,12 @@ class Bridge:
         if attitude is not None:
             self._heading = watched(self._heading, odometry, attitude) if self.height > LIFTED else HeadingWatch()
 
-    def _read_controller(self, now: float) -> Reading:
+    def _read_controller(self, now: float, *, sends: bool = True) -> Reading:
         """What the controller has said, and all of it as inputs of the state machine."""
         self._heard = max((reply.time for reply in self.client.latest.values()), default=self._heard)
-        reading = self.instruments.read(now, self.info, land=self.land_now)
+        reading = self.instruments.read(now, self.info, land=self.land_now, sends=sends)
         grounded = self.flight.mode is Mode.INIT
-        probed = self.probe.look(now, reading, self.sticks, grounded=grounded)
+        probed = self.probe.look(now, reading, self.sticks, grounded=grounded) if sends else ()
         good = self._pose_problem is None and self._stale is None
         slow = pace_problem(self.pace, self.settings.odometry_timeout)
         self.inputs = Inputs(

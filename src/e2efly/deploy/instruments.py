@@ -16,10 +16,10 @@ from e2efly.deploy.msp.messages import Attitude, BatteryState, Rc, StatusEx
 from e2efly.deploy.settings import FlightSettings, PilotChannels
 from e2efly.deploy.sticks import RATES_PULSE, Sticks
 
-ARM, FAILSAFE, OVERRIDE = 0, 27, 50
+ARM, ANGLE, FAILSAFE, OVERRIDE = 0, 1, 27, 50
 """Permanent ids of Betaflight's modes."""
 MEDDLING = {
-    1: "ANGLE", 2: "HORIZON", 3: "ALTHOLD", 6: "HEADFREE", 11: "POS HOLD", 46: "GPS RESCUE", 47: "ACRO TRAINER",
+    ANGLE: "ANGLE", 2: "HORIZON", 3: "ALTHOLD", 6: "HEADFREE", 11: "POS HOLD", 46: "GPS RESCUE", 47: "ACRO TRAINER",
     56: "AUTOPILOT",
 }  # fmt: skip
 """Modes in which sticks do not mean body rates, by permanent id."""
@@ -89,13 +89,14 @@ class Instruments:
     _seen: dict[int, float] = field(default_factory=dict)
     _voltage: float | None = None
 
-    def read(self, now: float, info: ControllerInfo, *, land: bool) -> Reading:
+    def read(self, now: float, info: ControllerInfo, *, land: bool, sends: bool = True) -> Reading:
         """What the answers say that have come until `now` s.
 
         Args:
             now: on the client's clock, s.
             info: of the controller: it tells which modes are on.
             land: the operator asks for a landing, as the pilot does by the mission switch.
+            sends: sticks are sent; without them ANGLE is on, as it is to be.
         """
         fresh = self._fresh()
         if (battery := fresh.get(BatteryState.CODE)) is not None:
@@ -104,7 +105,8 @@ class Instruments:
         status: StatusEx | None = self.client.message(StatusEx.CODE, now, patience)
         active = status.active(info.box_ids) if status is not None else frozenset()
         channels: Rc | None = self.client.message(Rc.CODE, now, RC_PATIENCE * patience)
-        meddling = tuple(f"{MEDDLING[box]} is on: sticks are no body rates" for box in MEDDLING.keys() & active)
+        on = MEDDLING.keys() & active if sends else MEDDLING.keys() & active - {ANGLE}
+        meddling = tuple(f"{MEDDLING[box]} is on: sticks are no body rates" for box in on)
         if status is not None and StatusEx.CODE in fresh:
             self._armed.hear(ARM in active)
             self._heard.hear(FAILSAFE not in active and not RECEIVER_LOST & set(status.arming_disabled))

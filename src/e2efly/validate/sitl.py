@@ -27,11 +27,11 @@ _PORTS = 12
 _CLOCK = struct.Struct("<6Q")
 _NOW, _WAITING, _STATES, _FRAMES, _ROUNDS = range(1, 6)
 """What stands there, after the horizon; see `sitl_shim.c`."""
+IDLE_S = 0.002
+"""Between two states while nothing moves, s."""
 _TAKEN = re.compile(rb"bind port .* failed|UDP server .*\.\.\.-")
 """What the firmware says where somebody else has one of its ports."""
 _RANDOM = random.SystemRandom()
-IDLE_S = 0.002
-"""Between two states while nothing moves, s."""
 BOOT_S = 20.0
 """Real time that the firmware may take to open its ports, or to answer, s."""
 
