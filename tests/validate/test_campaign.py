@@ -161,3 +161,9 @@ def test_velocity_negated_zero_or_absent() -> None:
         changed = velocity_as(how)(SAMPLE)
         assert changed.velocity is not None
         np.testing.assert_allclose(changed.velocity, share * np.array([0.1, 0.2, 0.3]))
+
+
+def test_standing_with_the_throttle_that_a_silent_link_left_open_counts_from_its_return() -> None:
+    silent = Scenario("", "hover", (Strike("link: silent", 0.0, 2.0),))
+    assert broken(trace([0.0] * 450), tuple(beyond(silent, 0.0))) == []
+    assert broken(trace([0.0] * 550), tuple(beyond(silent, 0.0))) == ["armed on the ground"]

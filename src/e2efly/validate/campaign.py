@@ -165,9 +165,10 @@ def _flown(scenario: Scenario, stage: Stage, look: Callable[[Stage], None]) -> F
             stage.fly(TRY_S / 2)
             rig.set(mission="hover")
     ends = [strike.at + (strike.lasts or 0.0) for strike in scenario.strikes]
-    stage.fly(began + max(ends) + WATCH_S - rig.now(), lambda: not waiting and _over(stage))
+    quiet = began + max(ends)
+    stage.fly(quiet + WATCH_S - rig.now(), lambda: not waiting and _over(stage, quiet))
     rig.set(mission="land")
-    stage.fly(LONGEST_S, lambda: not waiting and _over(stage))
+    stage.fly(LONGEST_S, lambda: not waiting and _over(stage, quiet))
     changes = [(t - began, mode, why) for t, mode, why in stage.session.flown.changes[known:]]
     ended = stage.standing and _closed(stage)
     feet, spans = rig.world.vehicle.feet_height, beyond(scenario, began)
@@ -224,13 +225,14 @@ def _come_to(stage: Stage, mode: Mode) -> None:
         stage.fly(1.0, lambda: stage.mode is Mode.LAND)
 
 
-def _over(stage: Stage) -> bool:
-    """Whether it has stood with closed throttle, or shown that it stands with an open one, for long enough."""
+def _over(stage: Stage, quiet: float) -> bool:
+    """Whether it has stood with closed throttle, or since the last change among the faults, s, with an open one."""
     trace, period = stage.trace, stage.session.period
     count, longest = 1 + round(STOOD_S / period), 1 + round((LONGEST_ARMED + STOOD_S) / period)
     standing = [p[2] <= stage.rig.world.vehicle.feet_height + ON_GROUND for p in trace.position[-longest:]]
     running = [m > IDLE for m in trace.motor[-longest:]]
-    stuck = len(standing) >= longest and all(standing) and all(running) and not _closed(stage)
+    watched = stage.rig.now() - quiet > LONGEST_ARMED + STOOD_S
+    stuck = watched and len(standing) >= longest and all(standing) and all(running) and not _closed(stage)
     return stuck or (len(standing) >= count and all(standing[-count:]) and _closed(stage, count))
 
 

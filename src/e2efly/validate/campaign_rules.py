@@ -67,10 +67,11 @@ def judge(
         The figures of `Flown` that the world alone decides, and the broken rules.
     """
     time, motor = np.array(trace.time), np.array(trace.motor)
-    closed = np.array(trace.throttle) <= 0
+    followed = np.ones(len(time), bool)  # the motors follow the bridge
     for span in beyond:
-        if Rule.OFF in span.excuse.rules:  # the motors do not follow the bridge
-            closed &= (time < span.begin) | (time > span.end)
+        if Rule.OFF in span.excuse.rules:
+            followed &= (time < span.begin) | (time > span.end)
+    closed = followed & (np.array(trace.throttle) <= 0)
     position, velocity = np.array(trace.position), np.array(trace.velocity)
     height = position[:, 2] - feet
     stands = height <= ON_GROUND
@@ -100,7 +101,8 @@ def judge(
             if speed > FASTEST_TOUCH and top < FALL:
                 breaks(Rule.TOUCH, speed, end)
     armed_s = 0.0
-    for first, end in _runs(stands & (motor > IDLE) & ~closed):
+    open_on_ground = stands & (motor > IDLE) & ~closed
+    for first, end in (*_runs(open_on_ground & followed), *_runs(open_on_ground & ~followed)):
         lasted = float(time[end - 1] - time[first])
         armed_s = max(armed_s, lasted)
         if lasted > LONGEST_ARMED:
