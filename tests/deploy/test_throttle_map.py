@@ -223,7 +223,7 @@ class TestSaved:
             from_json(text, VEHICLE)
 
     def test_a_key_that_is_there_twice_is_refused(self) -> None:
-        with pytest.raises(ValueError, match=r"throttle map: not JSON: a key is there twice"):
+        with pytest.raises(ValueError, match=r"throttle map: not JSON: key .scale. is there twice"):
             from_json(as_json(NEW).replace('"scale": 1.0', '"scale": 1.0, "scale": 1.5'), VEHICLE)
 
     def test_an_unknown_key_is_refused(self) -> None:

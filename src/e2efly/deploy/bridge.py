@@ -68,7 +68,9 @@ SILENT_S = 0.1
 LATE_S = 0.05
 """Poses may be so much later than the latency for which the gains are, s."""
 OVERDUE = 0.3
-"""A blind descent whose height is reckoned so far under the ground does not rise, and feels for the ground, m."""
+"""A blind descent whose height is reckoned so far under the ground feels for the ground, m, ..."""
+WEIGHT, LIGHTER, LIGHTEST = 0.97, 0.1, 0.6
+"""... and gives no more than this share of its weight, less with each metre, and the last at least."""
 LIFTED = 0.12
 """So high over the ground the vehicle flies, m: below, nothing is learned and no tilt is asked."""
 
@@ -214,6 +216,7 @@ class Bridge:
             odometry=self.odometry,
             odometry_problem=None if good else self._pose_problem or self._stale,
             link_problem=reading.link_problem,
+            silent=now - self._heard > SILENT_S,
             armed=reading.armed,
             override=reading.override,
             pilot=reading.pilot,
@@ -233,13 +236,16 @@ class Bridge:
     def _accelerometer_problem(self) -> str | None:
         """What stands against a take-off, or was found in flight: that stays until the vehicle has landed."""
         grounded = self.flight.mode in (Mode.INIT, Mode.DONE)
-        return self._inertial.rest_problem if grounded else self._inertial.watch.accelerometer_problem
+        if grounded:
+            return self._inertial.rest_problem
+        return "its numbers do not change" if self._inertial.frozen else self._inertial.watch.accelerometer_problem
 
     def _motion_problem(self) -> str | None:
         """On the ground: what was found while it was carried, until it was carried again and agreed."""
         watch = self._inertial.watch
         if self.flight.mode not in (Mode.INIT, Mode.DONE):
-            return watch.problem
+            velocity = self._pose_problem if (self._pose_problem or "").startswith("velocity") else None
+            return watch.problem or velocity
         if watch.opposed is not None:
             self._opposed = f"{watch.opposed}, when it was carried; carry it again, once frames and axes are right"
         elif watch.agrees:
@@ -267,10 +273,12 @@ class Bridge:
                 np.array(reply.message.acceleration, float), np.array(reply.message.body_rate), attitude,
                 None if sent is None else self._thrust(sent),
                 standing=self.flight.mode is Mode.INIT and not self.inputs.armed,
+                flying=flying and self.flight.mode is not Mode.TAKEOFF,
                 climb=float(seen.velocity[2]) if flying and seen is not None else None,
             ), now)  # fmt: skip
             self._learn(sent, flying)
-        throttle = self._history.between(now - THRUST_DELAY[1], now - THRUST_DELAY[0])
+        told = min(now, self._heard + SILENT_S)  # what is sent into the silence does not come
+        throttle = self._history.between(told - THRUST_DELAY[1], told - THRUST_DELAY[0])
         lifts = self.flight.mode in (Mode.HOVER, Mode.POLICY, Mode.LAND)  # or the ground may carry it
         thrust = self._thrust(throttle) if lifts and throttle is not None else None
         self._inertial = inertial.carry(self._inertial, attitude, thrust, now)
@@ -331,9 +339,8 @@ class Bridge:
     def _step(self, now: float) -> None:
         before = self.flight
         self.flight = state_machine.step(self.settings, before, self.inputs, now)
-        wrong = self.flight.misled or (self._pose_problem or "").startswith("velocity")
-        if wrong and self.flight.blind and not before.blind and self.flight.turned is None:
-            self._inertial = inertial.distrust(self._inertial)
+        if self.flight.blind and not before.blind and self.flight.turned is None:
+            self._inertial = inertial.alone(self._inertial, wrong=self.flight.misled is not None)
         if self.flight.mode is not before.mode:
             self._inertial = dataclasses.replace(self._inertial, touch=Touch())
             self._trim = 0.0 if self.flight.mode in (Mode.TAKEOFF, Mode.LAND) else self._trim
@@ -351,8 +358,9 @@ class Bridge:
             return "policy", controlled(self.vehicle, decision.mode, odometry, decision.command)
         if flight.target is None or odometry is None or flight.blind:
             return self._blind(now, dt)
-        if self.inputs.link_problem and now - self._heard > SILENT_S:
-            return "held", held(odometry)
+        if self.inputs.link_problem and self.inputs.silent:
+            stands = flight.standing_since is not None and now - flight.standing_since > self.settings.land_settle
+            return ("closed", None) if stands else ("held", held(odometry))
         return "hover", self._hover(flight.target, odometry, dt)
 
     def _blind(self, now: float, dt: float) -> tuple[str, Ctbr | None]:
@@ -362,10 +370,13 @@ class Bridge:
         if reckoned is None:
             climb = 0.0 if self.flight.lost is None else self.flight.lost[2]
             return "blind", blind(attitude, now - self.flight.since, climb)
-        self._trim = reckoning.trimmed(self._trim, now - reckoned.since, reckoned.climb, dt)
-        command = reckoning.settle(attitude, reckoned, self._trim)
-        overdue = reckoned.height < self.flight.home - OVERDUE
-        thrust = min(float(command.thrust), GRAVITY) if overdue else float(command.thrust)
+        ground = self.flight.home
+        self._trim = reckoning.trimmed(self._trim, reckoned, ground, dt)
+        command = reckoning.settle(attitude, reckoned, ground, self._trim)
+        under = ground - reckoned.height
+        overdue = under > OVERDUE
+        weight = GRAVITY * max(WEIGHT - LIGHTER * under, LIGHTEST)
+        thrust = min(float(command.thrust), weight) if overdue else float(command.thrust)
         self._inertial = inertial.feel_for_ground(self._inertial, thrust, now, overdue=overdue)
         return "blind", Ctbr(thrust * self._inertial.touch.factor(now), command.rate)
 

@@ -109,6 +109,8 @@ class Inputs:
     """Why there is none that is fresh and good."""
     link_problem: str | None = None
     """Why the flight controller is not heard."""
+    silent: bool = False
+    """It says nothing at all: it may hold the last command, and hear nothing."""
     armed: bool = False
     override: bool = False
     """The controller takes its sticks from here."""
@@ -179,7 +181,9 @@ class Flight:
     found_since: float | None = None
     """Landing without odometry: since when it has been good again, s."""
     standing_since: float | None = None
-    """Landing: since when the newest odometry, good or just lost, has said that it stands at home, s."""
+    """Landing: since when the newest odometry, good or just lost, has stayed at one place, s ..."""
+    stood_at: tuple[float, float, float] | None = None
+    """... which is this, m."""
     now: float = 0.0
     """Of the last step, s."""
     reasons: tuple[str, ...] = ()

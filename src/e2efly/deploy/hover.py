@@ -21,7 +21,7 @@ SINK_TIME = SINK_SPEED / SINK_ACCELERATION
 """... which takes so long from rest, s ..."""
 SINK_THRUST = 0.95
 """... and goes on with this share of the weight: it must sink, whatever the throttle map's last error."""
-SINK_FASTER = 0.17
+SINK_FASTER = 0.2
 """By which the speed of sinking grows, m/s^2: more than what a throttle map is wrong by, so that it always sinks."""
 SLOWEST_SINK, SLOWEST_FASTER = 0.5, 0.07
 """The slowest that it sinks, m/s, and by which that grows, m/s^2: by them the time to the ground is estimated."""

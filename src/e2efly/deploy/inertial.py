@@ -19,9 +19,11 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 FRESH_S = 0.1
 """The force is taken for so long, s."""
-ANCHOR_S, OLDEST_S = 0.5, 1.2
-"""Between two poses from which the velocity is reckoned on, and their age at most, s: those of the last moments may
-have been wrong already when that is found out."""
+ANCHOR_S, ANCHORS = 0.2, 6
+"""Between two poses from which the velocity is reckoned on, s, and how many there are: those of the last moments may
+have been wrong already when that is found out, and one alone is noisy."""
+SHARE_RATE, SHARE_S, SHARE_RANGE = 0.05, 0.3, (0.7, 1.3)
+"""How fast the share of the map's force is followed, 1/s and s, and its bounds."""
 QUIET = 1.0
 """The accelerometer's scale is learned while less is felt than this, m/s within `motion_watch.MEMORY_S`: in a fast
 flight the poses come too late to be compared with it."""
@@ -45,6 +47,8 @@ class Measurement:
     """Specific force by the throttle, and how far that may be off, m/s^2; None: not known."""
     standing: bool = False
     """It stands on the ground, disarmed."""
+    flying: bool = False
+    """It is in the air."""
     climb: float | None = None
     """Vertical velocity by good poses in flight, m/s; None: there are none, or it does not fly."""
 
@@ -71,6 +75,10 @@ class Inertial:
     """(3,) newest body rate, FLU, rad/s."""
     time: float = -math.inf
     """Of the newest measurement, s."""
+    share: float = 1.0
+    """Of the throttle map's force that is felt, while poses are good."""
+    frozen: bool = False
+    """In flight the accelerometer repeats itself."""
 
     @property
     def rest_problem(self) -> str | None:
@@ -89,6 +97,10 @@ def measure(before: Inertial, m: Measurement, now: float) -> Inertial:
     dt = min(max(now - before.time, 0.0), FRESH_S)
     plain = m.counts * (GRAVITY / gravity)
     scale, watch, felt = before.scale, before.watch, before.touch
+    if m.thrust is not None:
+        felt = touch.seen(felt, tuple(m.counts.tolist()), m.thrust[0], now)
+    if m.flying and felt.frozen(now):
+        return replace(before, rest=rest, touch=felt, force=None, gyro=m.gyro, time=now, frozen=True)
     if m.climb is not None and m.attitude is not None and watch.moved < QUIET:
         scale = learn(scale, m.attitude, plain, m.climb, dt)
     force = scale.value * plain
@@ -96,8 +108,16 @@ def measure(before: Inertial, m: Measurement, now: float) -> Inertial:
     if m.attitude is not None:
         watch = motion_watch.feel(watch, m.attitude, force, m.gyro, thrust, now)
     if m.thrust is not None:
-        felt = touch.feel(felt, tuple(m.counts.tolist()), float(force[2]), m.thrust[0], now, dt)
-    return replace(before, rest=rest, scale=scale, watch=watch, touch=felt, force=force, gyro=m.gyro, time=now)
+        felt = touch.feel(felt, float(force[2]), m.thrust[0], now, dt)
+    share = before.share
+    if m.climb is not None and m.thrust is not None and m.thrust[0] > 0 and watch.moved < QUIET:
+        off = (float(force[2]) / m.thrust[0] - share) * dt / SHARE_S
+        share += min(max(off, -SHARE_RATE * dt), SHARE_RATE * dt)
+        share = min(max(share, SHARE_RANGE[0]), SHARE_RANGE[1])
+    return replace(
+        before, rest=rest, scale=scale, watch=watch, touch=felt, force=force, gyro=m.gyro, time=now, share=share,
+        frozen=False,
+    )  # fmt: skip
 
 
 def see(
@@ -117,10 +137,10 @@ def see(
     watch = motion_watch.see(before.watch, odometry, latest)
     if not (moved and trusted):
         return replace(before, watch=watch)
-    newest = reckoning.seen(odometry, now, turned)
+    newest = reckoning.seen(odometry, now, turned, before.share)
     anchors = before.anchors
     if not anchors or now - anchors[-1].since >= ANCHOR_S:
-        anchors = (*(a for a in anchors if now - a.since < OLDEST_S), newest)
+        anchors = (*anchors[-ANCHORS + 1 :], newest)
     return replace(before, watch=watch, reckoned=newest, anchors=anchors)
 
 
@@ -137,9 +157,25 @@ def carry(before: Inertial, attitude: Attitude | None, thrust: tuple[float, floa
     return replace(before, reckoned=on(before.reckoned), anchors=anchors)
 
 
-def distrust(before: Inertial) -> Inertial:
-    """Go back to a pose of before the last moments: the newest were wrong."""
-    return replace(before, reckoned=before.anchors[0], anchors=()) if before.anchors else before
+def alone(before: Inertial, *, wrong: bool) -> Inertial:
+    """From here on without poses: the velocity is the median of what was reckoned on from the last ones.
+
+    Args:
+        before: so far.
+        wrong: the poses were wrong, perhaps for a while: only the older half counts.
+    """
+    every = (*before.anchors, *([before.reckoned] if before.reckoned else []))
+    if not every:
+        return before
+    believed = every[: (len(every) + 1) // 2] if wrong else every
+    ahead, left, up, lifted, height = (
+        float(np.median(values))
+        for values in zip(*((*r.velocity, r.lifted, r.height) for r in believed), strict=True)
+    )  # fmt: skip
+    begun = replace(
+        every[-1], velocity=(ahead, left, up), lifted=lifted, height=height, doubt=reckoning.DOUBT, share=before.share
+    )
+    return replace(before, reckoned=begun, anchors=())
 
 
 def feel_for_ground(before: Inertial, thrust: float, now: float, *, overdue: bool) -> Inertial:
@@ -154,4 +190,4 @@ def feel_for_ground(before: Inertial, thrust: float, now: float, *, overdue: boo
     if before.force is None or now - before.time > FRESH_S:
         return before
     beyond = float(before.force[2]) - thrust
-    return replace(before, touch=touch.dip(before.touch, thrust, now, overdue=overdue, beyond=beyond))
+    return replace(before, touch=touch.dip(before.touch, now, overdue=overdue, beyond=beyond))

@@ -108,7 +108,7 @@ class MotionWatch:
     @property
     def problem(self) -> str | None:
         """How the poses contradict the sensors in flight; None: they do not."""
-        if self.late_for >= LASTING_S:
+        if self.late_for >= LASTING_S and not self._accelerometer:
             return f"poses are {self.late:.2f} s late or more, and the controller's gains are for less (--latency)"
         return self._text if self.lasting >= LASTING_S and not self._accelerometer else None
 
@@ -221,7 +221,8 @@ def see(before: MotionWatch, odometry: Odometry, latest: float = math.inf) -> Mo
     if float(np.linalg.norm(newest.speed - before.felt[0].speed)) > TELLING:
         late = newest.time - like.time
         in_time = [d for d, felt in zip(off, before.felt, strict=True) if newest.time - felt.time <= latest]
-        late_for = late_for + dt if min(in_time) - min(off) > BETTER else 0.0
+        explained = min(in_time) - min(off) > BETTER and min(off) < min(in_time) / 2
+        late_for = late_for + dt if explained else 0.0
     differs = Differs(
         speed - like.speed,
         min((float(speed[2]) - felt.lift for felt in before.felt), key=abs),

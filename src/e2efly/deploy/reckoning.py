@@ -25,8 +25,11 @@ BRAKE_S = 2.0
 """Horizontal motion is braked for so long, s: then its reckoning is too old, and the vehicle is held level."""
 SINK_GAIN = 3.0
 """Acceleration over the error of the vertical speed, 1/s."""
-FASTEST_SINK = 2.0
-"""The speed of sinking grows up to this, m/s."""
+FASTEST_SINK, LOW_SINK, LOW = 2.0, 1.3, 3.0
+"""The speed of sinking grows up to the first, m/s, and below the height in the last, m, up to the second."""
+SAG, SAG_RATE, SAG_S = 0.02, 0.05, 0.3
+"""The thrust follows the force that is felt, as a battery sags: while they are no farther apart than this share, by so
+much in a second, within so long, s. What is farther off at once is no battery: it is the accelerometer."""
 DOUBT = 0.05
 """Error of the vertical speed that the poses show, m/s."""
 TRIM_GAIN, TRIM_ERROR, LARGEST_TRIM = 3.0, 0.6, 4.0
@@ -44,6 +47,8 @@ class Reckoning:
     """Vertical speed by the throttle, m/s."""
     doubt: float
     """How far that one may be off, m/s."""
+    share: float
+    """Of the throttle's thrust that comes, as a battery sags."""
     time: float
     """Up to when it is reckoned, s."""
     since: float
@@ -59,13 +64,13 @@ class Reckoning:
         return max(self.lifted - self.doubt, min(self.lifted + self.doubt / 2, self.velocity[2]))
 
 
-def seen(odometry: Odometry, now: float, error: float = 0.0) -> Reckoning:
-    """Begin from an odometry at `now`, s, whose heading is wrong by `error`, rad."""
+def seen(odometry: Odometry, now: float, error: float = 0.0, share: float = 1.0) -> Reckoning:
+    """Begin from an odometry at `now`, s, whose heading is wrong by `error`, rad, with a share of the thrust."""
     x, y, z = (float(v) for v in odometry.velocity)
     yaw = heading(odometry.quaternion) - error
     c, s = math.cos(yaw), math.sin(yaw)
     height = float(odometry.position[2])
-    return Reckoning((c * x + s * y, c * y - s * x, z), z, DOUBT, now, now, height, height)
+    return Reckoning((c * x + s * y, c * y - s * x, z), z, DOUBT, share, now, now, height, height)
 
 
 def reckon(
@@ -94,39 +99,45 @@ def reckon(
     attitude = attitude or Attitude(0.0, 0.0, 0.0)
     upright = math.cos(attitude.roll) * math.cos(attitude.pitch)
     ahead, aside, above = (float(a) for a in level(attitude, force or (0.0, 0.0, thrust[0] if thrust else GRAVITY)))
-    lift, doubt = (above, 0.0) if thrust is None else (thrust[0] * upright, thrust[1])
+    share = before.share
+    if thrust is not None and force is not None and thrust[0] > 0:
+        off = force[2] / thrust[0] - share
+        follow = max(-SAG_RATE * dt, min(SAG_RATE * dt, off * dt / SAG_S))
+        share += follow if abs(off) < SAG else 0.0
+    lift, doubt = (above, 0.0) if thrust is None else (share * thrust[0] * upright, thrust[1])
     forward, left, up = before.velocity
     after = replace(
         before, velocity=(forward + ahead * dt, left + aside * dt, up + (above - GRAVITY) * dt),
-        lifted=before.lifted + (lift - GRAVITY) * dt, doubt=before.doubt + doubt * dt, time=now,
+        lifted=before.lifted + (lift - GRAVITY) * dt, doubt=before.doubt + doubt * dt, share=share, time=now,
     )  # fmt: skip
     height = before.height + after.climb * dt
     return replace(after, height=height, top=max(height, before.top))
 
 
-def trimmed(trim: float, elapsed: float, up: float, dt: float) -> float:
+def trimmed(trim: float, reckoned: Reckoning, ground: float, dt: float) -> float:
     """The trim that makes up for a wrong throttle map, m/s^2, carried on by `dt` s.
 
     Args:
         trim: so far, m/s^2.
-        elapsed: since the odometry was lost, s.
-        up: vertical speed, m/s.
+        reckoned: the velocity now.
+        ground: its height, world, m.
         dt: s.
     """
-    behind = max(-TRIM_ERROR, min(TRIM_ERROR, _climb(elapsed) - up))
+    behind = max(-TRIM_ERROR, min(TRIM_ERROR, _climb(reckoned, ground) - reckoned.climb))
     return max(-LARGEST_TRIM, min(LARGEST_TRIM, trim + TRIM_GAIN * behind * dt))
 
 
-def settle(attitude: Attitude | None, reckoned: Reckoning, trim: float = 0.0) -> Ctbr:
+def settle(attitude: Attitude | None, reckoned: Reckoning, ground: float, trim: float = 0.0) -> Ctbr:
     """End the motion, level, and sink; without an attitude the body rates are held at zero.
 
     Args:
         attitude: the flight controller's.
         reckoned: the velocity now.
+        ground: its height, world, m.
         trim: added to the thrust, m/s^2; see `trimmed`.
     """
     elapsed = reckoned.time - reckoned.since
-    wanted = SINK_GAIN * (_climb(elapsed) - reckoned.climb)
+    wanted = SINK_GAIN * (_climb(reckoned, ground) - reckoned.climb)
     thrust = GRAVITY + trim + max(-SINK_ACCELERATION, min(SINK_ACCELERATION, wanted))
     if attitude is None:
         return Ctbr(thrust, Vec3(0.0, 0.0, 0.0))
@@ -138,8 +149,9 @@ def settle(attitude: Attitude | None, reckoned: Reckoning, trim: float = 0.0) ->
     return Ctbr(thrust / tilt, Vec3(_turn(roll - attitude.roll), _turn(pitch - attitude.pitch), 0.0))
 
 
-def _climb(elapsed: float) -> float:
-    return max(-SINK_SPEED - SINK_FASTER * elapsed, -FASTEST_SINK)
+def _climb(reckoned: Reckoning, ground: float) -> float:
+    fastest = LOW_SINK if reckoned.height - ground < LOW else FASTEST_SINK
+    return max(-SINK_SPEED - SINK_FASTER * (reckoned.time - reckoned.since), -fastest)
 
 
 def _turn(angle: float) -> float:

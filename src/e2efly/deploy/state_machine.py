@@ -51,6 +51,8 @@ PRESSING = 0.5
 FOUND_S = 0.5
 """Odometry that was lost in a landing must be good for so long, s, to be flown by again: one that comes and goes must
 not begin the landing anew each time."""
+STAYS_S, AWAY_S = 1.0, 3.0
+"""A landing that stays at one place for so long has ended at home, s, and, sent down blindly, elsewhere, s."""
 RECENT_S = 0.5
 """An odometry as old as this still tells that the vehicle stands, s."""
 NEAR_GROUND = 0.3
@@ -267,7 +269,7 @@ def _land(settings: FlightSettings, flight: Flight, inputs: Inputs, *reasons: st
 
 def _blindly(settings: FlightSettings, flight: Flight, inputs: Inputs, *reasons: str) -> Flight:
     lost = _last_seen(settings, flight, inputs)
-    begun = dataclasses.replace(flight, lost=lost, found_since=None, standing_since=None)
+    begun = dataclasses.replace(flight, lost=lost, found_since=None)
     return _to(begun, Mode.LAND, *reasons, blind=True)
 
 
@@ -354,10 +356,10 @@ def _policy(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
 
 
 def _landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
-    flight = _looked(settings, flight, inputs)
-    if inputs.link_problem:  # what the controller does meanwhile is not known: nothing counts as landed
+    flight = _looked(flight, inputs)
+    if inputs.link_problem and inputs.silent:  # what it does meanwhile is not known: nothing counts as landed
         return _unheard(settings, flight, inputs)
-    if flight.standing_since is not None and flight.now - flight.standing_since >= settings.land_settle:
+    if flight.standing_since is not None and flight.now - flight.standing_since >= _settled(settings, flight, inputs):
         assert inputs.odometry is not None
         return dataclasses.replace(_to(flight, Mode.DONE, Reason.LANDED), home=float(inputs.odometry.position[2]))
     odometry = inputs.seen
@@ -393,7 +395,7 @@ def _see(settings: FlightSettings, flight: Flight, odometry: Odometry) -> Flight
 
 def _unheard(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
     """While the link is down: no clock of the landing runs, and it will begin where the vehicle is."""
-    flight = dataclasses.replace(flight, still_since=None, standing_since=None)
+    flight = dataclasses.replace(flight, still_since=None)
     if inputs.seen is not None:
         return _see(settings, flight, inputs.seen)
     if not flight.blind or flight.lost is None:
@@ -401,12 +403,25 @@ def _unheard(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
     return dataclasses.replace(flight, lost=(flight.now, *flight.lost[1:]))
 
 
-def _looked(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
-    """In a landing whose odometry comes and goes: whether the newest says that the vehicle stands at home."""
-    odometry, since = inputs.odometry, flight.standing_since
-    known = flight.blind and odometry is not None and not flight.misled and flight.now - odometry.time <= RECENT_S
-    stands = known and odometry is not None and _stands(settings, flight, odometry)
-    return dataclasses.replace(flight, standing_since=(flight.now if since is None else since) if stands else None)
+def _looked(flight: Flight, inputs: Inputs) -> Flight:
+    """In a landing: since when the newest odometry, good or lost just now, has stayed at one place."""
+    odometry = inputs.odometry
+    if odometry is None or flight.misled or flight.now - odometry.time > RECENT_S:
+        return dataclasses.replace(flight, standing_since=None, stood_at=None)
+    x, y, z = (float(p) for p in odometry.position)
+    if not math.isfinite(x + y + z):
+        return flight
+    if flight.stood_at is None or math.dist(flight.stood_at, (x, y, z)) > STANDING:
+        return dataclasses.replace(flight, standing_since=flight.now, stood_at=(x, y, z))
+    return flight
+
+
+def _settled(settings: FlightSettings, flight: Flight, inputs: Inputs) -> float:
+    """For how long it must have stayed at one place to have landed, s."""
+    assert inputs.odometry is not None
+    if abs(float(inputs.odometry.position[2]) - flight.home) < STANDING:
+        return max(settings.land_settle, STAYS_S)
+    return AWAY_S if flight.blind else math.inf
 
 
 def _last_seen(settings: FlightSettings, flight: Flight, inputs: Inputs) -> tuple[float, float, float]:

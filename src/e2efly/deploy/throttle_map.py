@@ -203,7 +203,7 @@ def _refusal(name: str, value: Any, accepted: str) -> ValueError:
 class ThrottleHistory:
     """The throttles that were sent, to be met with what they caused."""
 
-    def __init__(self, seconds: float = 0.5) -> None:
+    def __init__(self, seconds: float = 5.0) -> None:
         self._sent: deque[tuple[float, float]] = deque()
         self._seconds = seconds
 

@@ -15,14 +15,19 @@ DIP, DIP_S = 0.15, 0.32
 """Share of the thrust that is left out for so long, s, to feel whether the ground carries."""
 DELAY_S = 0.12
 """Until the force shows it, s."""
-CARRIED = (0.5, 1.5)
-"""Share of the missing thrust that the ground takes over: all of it, as the force stays."""
+LASTS_S = DIP_S + DELAY_S + 0.16
+"""A dip is judged by the time after it, when the thrust is back, s."""
+FOLLOWS = 0.5
+"""Share of the thrust's change that the force shows in the air; on the ground it shows none."""
 WEIGHT = (0.75, 1.3)
 """Force of what stands, gravities, by an accelerometer that is calibrated badly."""
 AGAIN_S = 1.0
 """Between two dips, s."""
 USUAL_S, UNUSUAL = 0.5, 1.5
 """Over which the difference of force and thrust is smoothed, s; beyond this difference, m/s^2, it is a shock's."""
+FROZEN_S, IGNORED = 0.15, 0.4
+"""An accelerometer whose numbers repeat bit for bit for so long, s, while the thrust changes by so much, m/s^2, is
+frozen. In a quiet hover they may repeat."""
 ALIVE_S, BELIEVED = 0.2, 3.0
 """An accelerometer whose numbers repeat for so long, s, is frozen; one that is so unlike the thrust as a rule, m/s^2,
 is broken: neither can feel the ground."""
@@ -40,12 +45,16 @@ class Touch:
     """The accelerometer's newest numbers ..."""
     changed: float = -math.inf
     """... and when they last changed, s."""
+    then: float = 0.0
+    """Thrust at that time, m/s^2."""
+    ignored: float = 0.0
+    """By how much the thrust has changed since, and the numbers not, m/s^2."""
     dip: float = -math.inf
     """When the newest dip began, s."""
-    before: float = 0.0
-    """Thrust when it began, m/s^2."""
-    sums: tuple[float, float, int] = (0.0, 0.0, 0)
-    """Of force minus thrust and of thrust, and of how many measurements, in the dip so far."""
+    low: tuple[float, float, int] = (0.0, 0.0, 0)
+    """Sums of force and thrust, m/s^2, and of how many measurements, in the dip ..."""
+    high: tuple[float, float, int] = (0.0, 0.0, 0)
+    """... and after it."""
     carried: bool = False
     """The ground was felt in a dip."""
     supported: float = 0.0
@@ -55,42 +64,48 @@ class Touch:
         """By which the thrust is multiplied at `now`, s."""
         return 1 - DIP if now - self.dip < DIP_S else 1.0
 
+    def frozen(self, now: float) -> bool:
+        """Whether the accelerometer repeats itself bit for bit though the thrust has changed."""
+        return now - self.changed > FROZEN_S and self.ignored > IGNORED
+
     @property
     def rests(self) -> bool:
         """Something has carried the vehicle for a while, by an accelerometer that is right."""
         return self.supported >= SUPPORT_S
 
 
-def feel(before: Touch, raw: tuple[float, ...], force: float, thrust: float, now: float, dt: float) -> Touch:
+def seen(before: Touch, raw: tuple[float, ...], thrust: float, now: float) -> Touch:
+    """Take in the accelerometer's numbers as they came at `now`, s, and the thrust by the throttle, m/s^2."""
+    if raw == before.raw:
+        return replace(before, ignored=max(before.ignored, abs(thrust - before.then)))
+    return replace(before, raw=raw, changed=now, then=thrust, ignored=0.0)
+
+
+def feel(before: Touch, force: float, thrust: float, now: float, dt: float) -> Touch:
     """Take in a measurement.
 
     Args:
         before: so far.
-        raw: the accelerometer's numbers as they came.
         force: specific force along the body's z axis, m/s^2.
         thrust: the one that the throttle sent a moment before gives by the map, m/s^2.
         now: s.
         dt: since the measurement before, s.
     """
     beyond = force - thrust
-    after = replace(
-        before, raw=raw, changed=before.changed if raw == before.raw else now,
-        supported=before.supported + dt if beyond > SUPPORT else 0.0,
-    )  # fmt: skip
-    if now - after.dip < DIP_S + DELAY_S:
-        return _dipping(after, beyond, thrust, now)
+    after = replace(before, supported=before.supported + dt if beyond > SUPPORT else 0.0)
+    if now - after.dip < LASTS_S:
+        return _dipping(after, force, thrust, now)
     usual = beyond if after.usual is None else after.usual
     if abs(beyond - usual) < UNUSUAL:
         usual += (beyond - usual) * -math.expm1(-dt / USUAL_S)
     return replace(after, usual=usual)
 
 
-def dip(before: Touch, thrust: float, now: float, *, overdue: bool, beyond: float) -> Touch:
+def dip(before: Touch, now: float, *, overdue: bool, beyond: float) -> Touch:
     """Begin to feel for the ground, where there is a reason and the last time is long enough ago.
 
     Args:
         before: so far.
-        thrust: now, by the map, m/s^2.
         now: s.
         overdue: by its height the vehicle ought to stand.
         beyond: force minus thrust of the newest measurement, m/s^2.
@@ -99,20 +114,24 @@ def dip(before: Touch, thrust: float, now: float, *, overdue: bool, beyond: floa
     alive = now - before.changed < ALIVE_S and before.usual is not None and abs(before.usual) < BELIEVED
     if not (shock or overdue) or not alive or now - before.dip < AGAIN_S:
         return before
-    return replace(before, dip=now, before=thrust, sums=(0.0, 0.0, 0))
+    return replace(before, dip=now, low=(0.0, 0.0, 0), high=(0.0, 0.0, 0))
 
 
-def _dipping(before: Touch, beyond: float, thrust: float, now: float) -> Touch:
-    """The measurements of a dip, from when the force must show it; judged once enough of them have come."""
-    if now - before.dip < DELAY_S:
+def _dipping(before: Touch, force: float, thrust: float, now: float) -> Touch:
+    """The measurements of a dip and of the time after it, judged once enough of both have come."""
+    since = now - before.dip
+    in_dip, after_dip = DELAY_S <= since < DIP_S, since >= DIP_S + DELAY_S
+    if not (in_dip or after_dip):
         return before
-    total, thrusts, count = before.sums
-    total, thrusts, count = total + beyond, thrusts + thrust, count + 1
-    after = replace(before, sums=(total, thrusts, count))
-    if now - before.dip < DIP_S or count < 4 or before.usual is None:
+    low, high = before.low, before.high
+    if in_dip:
+        return replace(before, low=(low[0] + force, low[1] + thrust, low[2] + 1))
+    after = replace(before, high=(high[0] + force, high[1] + thrust, high[2] + 1))
+    if since < LASTS_S - 0.02 or min(low[2], after.high[2]) < 4:
         return after
-    missing = before.before - thrusts / count
-    gained, force = total / count - before.usual, (total + thrusts) / count
-    carried = missing > 0 and CARRIED[0] < gained / missing < CARRIED[1]
-    stands = WEIGHT[0] * GRAVITY < force < WEIGHT[1] * GRAVITY
-    return replace(after, carried=before.carried or (carried and stands))
+    (force_low, thrust_low), (force_high, thrust_high) = (
+        (force / count, thrust / count) for force, thrust, count in (low, after.high)
+    )
+    follows = force_high - force_low > FOLLOWS * (thrust_high - thrust_low)
+    stands = WEIGHT[0] * GRAVITY < force_low < WEIGHT[1] * GRAVITY and thrust_high > thrust_low
+    return replace(after, carried=before.carried or (stands and not follows))

@@ -120,7 +120,7 @@ HELD = Excuse("the firmware holds the last command while the link is silent")
 NO_POWER = Excuse(
     "the controller has no power, and starts disarmed", (Rule.OFF, Rule.TOUCH, Rule.ENDLESS), for_good=True
 )
-UNHEARD = Excuse("the firmware holds the last switches while its receiver is silent, and tells nobody", (Rule.ENDLESS,))
+UNHEARD = Excuse("while its receiver is silent the firmware flies its failsafe, whatever the bridge sends")
 KINDS = POSES | {
     "accelerometer as told: z scaled": Kind(
         _told_scaled, one_of("factor", -1.0, 0.0, 0.9, 0.93, 0.95, 0.97, 0.98, 1.03, 1.05, 1.1, 1.15)),

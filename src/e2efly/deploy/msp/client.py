@@ -39,7 +39,7 @@ FORGOTTEN = 1.0
 """After so long, s, no answer is expected any more: earlier, a late one would be taken for that to a later request."""
 MAX_IN_FLIGHT = 256
 """Bytes of scheduled replies that may be awaited at a time."""
-MAX_BACKLOG = 2
+MAX_BACKLOG = 6
 """With more stick frames without answer the controller is behind, or answers were lost: it is asked for one message
 at a time, whose answer tells which."""
 _UNKNOWN_REPLY = 64
