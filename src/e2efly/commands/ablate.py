@@ -13,6 +13,7 @@ from rich.console import Console
 from e2efly import presets
 from e2efly.commands.progress import TerminalProgress
 from e2efly.commands.tables import console_table, markdown
+from e2efly.commands.terminal import Terminal
 from e2efly.config import TrainConfig
 from e2efly.device import prepare
 
@@ -48,7 +49,7 @@ def ablate_command(request: Request) -> int:
     from e2efly.learn.checkpoint import write_atomically
     from e2efly.view.ablation import Panel, plot_ablation
 
-    console = Console(highlight=False)
+    console = Terminal()
     configs = {(algo, task): _config(request, task, algo) for algo in request.algos for task in request.tasks}
     request.out.mkdir(parents=True, exist_ok=True)
     known = {pair: _known(request, config) for pair, config in configs.items()}

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from e2efly import presets
+from e2efly.commands.terminal import Terminal
 from e2efly.config import CameraConfig, EnvConfig, ImuConfig, RewardConfig, TaskConfig
 from e2efly.deploy.images import NONE, Image
 from e2efly.deploy.policy import Policy, load_policy
@@ -50,7 +50,7 @@ def eval_command(
     if vehicle is not None:
         env_config = dataclasses.replace(env_config, vehicle=vehicle)
     flown, starts = fly_suites(policy, task, env_config, episodes, seed)
-    console = Console(highlight=False, quiet=quiet)
+    console = Terminal(quiet=quiet)
     console.print(_table(flown, episodes))
     if report:
         write_atomically(

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from rich.console import Console
-
+from e2efly.commands.terminal import Terminal
 from e2efly.device import prepare
 
 
@@ -20,5 +19,5 @@ def export_command(run_path: Path, out: Path | None, which: str) -> int:
     weights = load_policy_weights(setup, run, which)
     path = out or run.policy
     export_policy(path, weights, setup.actor, contract_of(setup.env, setup.config))
-    Console(highlight=False).print(f"Wrote the {which} policy of {run_path} to {path}")
+    Terminal().print(f"Wrote the {which} policy of {run_path} to {path}")
     return 0

@@ -3,8 +3,7 @@
 import time
 from pathlib import Path
 
-from rich.console import Console
-
+from e2efly.commands.terminal import Terminal
 from e2efly.validate import firmware
 
 
@@ -15,7 +14,7 @@ def firmware_command(archive: Path | None) -> int:
         OSError: when it cannot be fetched or built.
         ValueError: when the archive is not the known one.
     """
-    console = Console(highlight=False, soft_wrap=True)
+    console = Terminal()
     if found := firmware.built():
         console.print(f"Built before: {found.program}")
         return 0

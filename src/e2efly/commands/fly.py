@@ -16,8 +16,10 @@ from typing import Any
 import tyro
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from e2efly import __version__
+from e2efly.commands.terminal import Terminal
 from e2efly.deploy import throttle_map
 from e2efly.deploy.bridge import Bridge
 from e2efly.deploy.check import Row, examine, problems
@@ -89,7 +91,7 @@ def fly_command(options: Fly) -> int:
         ValueError: naming the option or setting, what it is and what is accepted.
         OSError: when link, pose source or log cannot be opened.
     """
-    console = Console(highlight=False)
+    console = Terminal()
     settings, policy = options.flight, options.policy
     check_settings(settings)
     if options.latency is not None and not 0 <= options.latency <= SLOWEST:
@@ -154,7 +156,7 @@ def fly_command(options: Fly) -> int:
         p99 = 1e3 * late[int(0.99 * (len(late) - 1))] if late else 0.0
         console.print(f"{timing.rounds} control steps, late by {p99:.1f} ms (p99), {timing.missed} missed.")
         for problem, count in telemetry.problems.items():
-            console.print(f"log: {problem} ({count} times)", markup=False)
+            console.print(f"log: {problem} ({count} times)")
         console.print(f"Next: e2efly fly-report {path}; throttle map: {path.with_suffix('.throttle.json')}")
         return 0
 
@@ -203,7 +205,7 @@ class _Speaker:
     def _print(self, console: Console) -> None:
         start = time.monotonic()
         while (line := self._lines.get()) is not None:
-            console.print(f"{time.monotonic() - start:7.2f}  {line}", markup=False)
+            console.print(f"{time.monotonic() - start:7.2f}  {line}")
 
 
 def _connect(client: Client, link: str) -> ControllerInfo:
@@ -235,7 +237,7 @@ def _table(rows: tuple[Row, ...]) -> Table:
     for heading in ("", "setting", "is", "needed", "mend with"):
         table.add_column(heading, overflow="fold")
     for row in rows:
-        mark = "[green]ok[/]" if row.good else "[bold red]no[/]"
+        mark = Text("ok", "green") if row.good else Text("no", "bold red")
         table.add_row(mark, row.setting, row.value, row.needed, "" if row.good else row.mend)
     return table
 
@@ -271,7 +273,7 @@ def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row,
     refusals = take_off_refusals(bridge.settings, bridge.flight, bridge.inputs)
     console.print("What stands against a take-off now:" if refusals else "Nothing stands against a take-off.")
     for refusal in refusals:
-        console.print(f"  - {refusal}", markup=False)
+        console.print(f"  - {refusal}")
     return 1 if problems(rows) or o is None else 0
 
 

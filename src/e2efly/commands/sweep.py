@@ -23,6 +23,7 @@ from rich.console import Console
 
 from e2efly import presets
 from e2efly.commands.tables import console_table, markdown
+from e2efly.commands.terminal import Terminal
 from e2efly.config import TrainConfig
 from e2efly.device import cores
 
@@ -74,7 +75,7 @@ def sweep_command(request: Request, config_of: Callable[[list[str]], TrainConfig
         ValueError: for options that cannot be varied so, and for a folder with runs of another configuration.
         OSError: when the folder cannot be written or the cluster not reached.
     """
-    console, trials = Console(highlight=False), list(trials_of(request))
+    console, trials = Terminal(), list(trials_of(request))
     if len({trial.out for trial in trials}) < len(trials):
         raise ValueError(f"--vary {' '.join(request.vary)}: two variants share a folder; accepted: values that differ")
     for trial in trials:
@@ -87,8 +88,8 @@ def sweep_command(request: Request, config_of: Callable[[list[str]], TrainConfig
         summary = trial.ended()
         if summary is None:
             failed += 1
-            console.print(f"[bold red]failed:[/] {trial.out.name}: ", end="")
-            console.print(how, markup=False)
+            console.print("failed:", style="bold red", end=" ")
+            console.print(f"{trial.out.name}: {how}")
             continue
         found[trial.out] = summary
         seconds = summary["seconds_trained_from_process_start"]

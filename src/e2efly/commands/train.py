@@ -9,6 +9,7 @@ from rich.console import Console
 
 from e2efly.commands.progress import TerminalProgress
 from e2efly.commands.tables import console_table
+from e2efly.commands.terminal import Terminal
 from e2efly.config import TrainConfig
 from e2efly.device import Hosts, cache_folder, prepare
 from e2efly.presets import algorithm_name, task_name
@@ -27,7 +28,7 @@ def train_command(
     from e2efly.learn.hosts import LostHostError
 
     try:
-        return _train(config, out, resume, plots, Console(highlight=False, quiet=hosts.index > 0))
+        return _train(config, out, resume, plots, Terminal(quiet=hosts.index > 0))
     except (LostHostError, ValueError, OSError, FloatingPointError) as error:
         if hosts.count == 1:
             raise

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from e2efly import presets
 from e2efly.commands.evaluate import check_observation, config_from_contract, fly_suites, run_of
+from e2efly.commands.terminal import Terminal
 from e2efly.commands.validation_report import Validation, write_report
 from e2efly.config import EnvConfig, RewardConfig, TaskConfig
 from e2efly.deploy.policy import Policy, load_policy
@@ -75,9 +76,9 @@ def validate_command(
     task, env_config = (config.task, config.env) if config else config_from_contract(loaded, vehicle)
     if reasons := check(loaded.contract, load_vehicle(env_config.vehicle)):
         raise ValueError("\n".join(reasons))
-    console = Console(highlight=False, quiet=quiet)
+    console = Terminal(quiet=quiet)
     for note in _notes(loaded, plant, env_config, vehicle):
-        console.print(f"[dim]{note}[/]")
+        console.print(note, style="dim")
     path = run.policy if run else policy
     found = _validate(path, loaded, plant, task, env_config, vehicle, episodes, seed, console)
     console.print(_table(found, plant))
@@ -90,9 +91,8 @@ def validate_command(
     whole = _whole_flights(loaded, plant, vehicle or env_config.vehicle, flights, console)
     worst = max(found, key=lambda name: found[name].drop)
     if found[worst].drop > max_drop + 1e-9:
-        console.print(
-            f"[bold red]{worst}: success drops by {found[worst].drop:.1f} points[/], {max_drop:g} are allowed"
-        )
+        console.print(f"{worst}: success drops by {found[worst].drop:.1f} points", style="bold red", end=", ")
+        console.print(f"{max_drop:g} are allowed")
         return 1
     return 0 if whole else 1
 

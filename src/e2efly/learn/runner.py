@@ -307,7 +307,7 @@ def _interruptible() -> Iterator[threading.Event]:
     def ask(signum: int, frame: Any) -> None:
         del signum, frame
         stop.set()
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGINT, old)
 
     old = signal.signal(signal.SIGINT, ask)
     try:
