@@ -299,9 +299,12 @@ def run(arguments: list[str]) -> int:
         return _command(arguments[0])(arguments[1:])
     except BrokenPipeError:
         raise
-    except (ValueError, OSError, FloatingPointError) as error:
+    except (ValueError, OSError, FloatingPointError, MemoryError, RuntimeError) as error:
+        full = isinstance(error, MemoryError) or "RESOURCE_EXHAUSTED" in str(error)  # NumPy's word, and XLA's
+        if isinstance(error, RuntimeError) and not full:
+            raise
         console.print("error:", style="bold red", end=" ")
-        console.print(str(error))
+        console.print(f"{'out of memory: ' if full else ''}{error}")
         return 2
     except KeyboardInterrupt:
         console.print("interrupted")
@@ -336,6 +339,9 @@ def _parsed(arguments: list[str]) -> tuple[Any, TrainConfig]:
     options, defaults = train_options(task, algo, _peek(arguments, "--preset", "ours"))
     if arguments[:1] != [task] and not {"-h", "--help"} & set(arguments):
         raise ValueError(f"train needs a task first: {_join(presets.TASKS)}")
+    given = [vehicle for flag in ("--vehicle", "--env.vehicle") if (vehicle := _peek(arguments, flag, ""))]
+    if len(set(given)) > 1:
+        raise ValueError(f"--vehicle is {given[0]} and --env.vehicle is {given[1]}; accepted: one of them alone")
     parsed = _options(options, "train", arguments, default=defaults)
     return parsed, train_config(parsed)
 

@@ -1,10 +1,12 @@
 """Where JAX computes, and how it compiles. Call `prepare` before anything computes with JAX."""
 
 import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,10 @@ XLA_OPTIONS = {
     "xla_cpu_prefer_vector_width": "128",
 }
 """What makes XLA fast on small batches on a CPU; docs/architecture.md says why."""
+
+
+_USUAL = {"jax_enable_x64": False}
+"""Settings of JAX that the programs rely on."""
 
 
 def wide_vectors(vehicles: int) -> dict[str, Any]:
@@ -45,10 +51,29 @@ def set_xla_options() -> None:
     It has no effect once JAX has begun to compute.
     """
     flags = os.environ.get("XLA_FLAGS", "")
+    ours = {f"--{name}={value}" for name, value in XLA_OPTIONS.items()}
+    if not ours >= set(flags.split()):
+        _check_flags(flags)
     wanted = [f"--{name}={value}" for name, value in XLA_OPTIONS.items() if name not in flags]
     os.environ["XLA_FLAGS"] = " ".join([*flags.split(), *wanted])
     if "xla_force_host_platform_device_count" not in flags:
         _configure("jax_num_cpu_devices", cores())
+
+
+@cache
+def _check_flags(flags: str) -> None:
+    """Refuse what XLA would abort the process for, by trying it in another one.
+
+    Raises:
+        ValueError: naming the variable, its value and what XLA says of it.
+    """
+    code = "from jaxlib import xla_client; xla_client.CompileOptions()"  # reads them, and takes no device
+    tried = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    if tried.returncode:
+        told = (line.rpartition("] ")[2] for line in tried.stderr.splitlines())
+        lines = [line for line in told if "XLA_FLAGS" in line or "flag" in line]
+        said = f" ({lines[0]})" if lines else ""
+        raise ValueError(f"XLA_FLAGS is {flags!r}; accepted: flags and values that XLA knows{said}")
 
 
 def cores() -> int:
@@ -134,6 +159,19 @@ class Hosts:
             raise OSError(f"not all {self.count} processes met at {self.coordinator}: {reason}") from None
 
 
+def _check_configuration() -> None:
+    """Refuse settings of JAX under which nothing here computes.
+
+    Raises:
+        ValueError: naming the variable, its value and what is accepted.
+    """
+    import jax
+
+    for name, wanted in _USUAL.items():
+        if (value := getattr(jax.config, name)) != wanted:
+            raise ValueError(f"{name.upper()} is {value}; accepted: {wanted}, as all computes in float32")
+
+
 def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:
     """Choose the device, set `XLA_OPTIONS` and turn on the persistent compilation cache.
 
@@ -152,6 +190,7 @@ def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:
     if device and "jax" not in sys.modules:
         os.environ["JAX_PLATFORMS"] = {"cpu": "cpu", "gpu": "cuda"}[device]
     set_xla_options()
+    _check_configuration()
     _configure("jax_compilation_cache_dir", str(cache_folder() / "jax"))
     _configure("jax_persistent_cache_min_compile_time_secs", 0.05)
     _configure("jax_persistent_cache_min_entry_size_bytes", -1)

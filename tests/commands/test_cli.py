@@ -5,10 +5,12 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from e2efly.cli import run
+from e2efly.commands.train import verdict
 
 
 def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
@@ -43,6 +45,20 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["train", "hover", "--algo.envs", "0"], "algo.envs is 0; accepted: more than 0"),
         (["train", "hover", "--algo.minibatch", "1000"], "algo.minibatch is 1000; accepted: a divisor"),
         (["train", "hover", "--env.randomize", "mas", "0.1"], "unknown vehicle parameter 'mas'; did you mean 'mass'?"),
+        (
+            ["train", "hover", "--vehicle", "vis_r", "--env.vehicle", "crazyflie"],
+            "--vehicle is vis_r and --env.vehicle is crazyflie; accepted: one of them alone",
+        ),
+        (
+            ["train", "hover", "--env.vehicle=vis_r", "--vehicle=crazyflie"],
+            "--vehicle is crazyflie and --env.vehicle is vis_r; accepted: one of them alone",
+        ),
+        (
+            ["train", "hover", "--task.target", "0", "0", "-3"],
+            "task.target is (0.0, 0.0, -3.0); accepted: a place more than 0.05 m over the ground",
+        ),
+        (["train", "hover_aware", "--task.target", "0", "0", "0"], "task.target is (0.0, 0.0, 0.0); accepted: a place"),
+        (["train", "track", "--task.centre", "0", "0", "-1"], "task.centre is (0.0, 0.0, -1.0); accepted: a place"),
         (["train", "hover", "--device", "gpu"], "--device gpu is not to be had"),
         (["train", "hover", "--hosts.count", "0", "--hosts.coordinator", "a:1"], "hosts.count is 0; accepted: 1 or"),
         (["train", "hover", "--task.radius", "-1"], "task.radius is -1.0; accepted: more than 0"),
@@ -147,11 +163,38 @@ def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
         assert name in out
 
 
+def a_summary(success: float, reached: dict[str, float]) -> dict[str, Any]:
+    """Of a run whose shipped policy succeeds so often by its worse criterion."""
+    shipped = {"update": 20, "circle": {"success": success}, "lemniscate": {"success": 1.0}}
+    return {"task": "track", "algorithm": "ppo", "shipped": shipped, "reached_criterion": reached}
+
+
+@pytest.mark.parametrize(
+    ("success", "stop_at", "reached", "said"),
+    [
+        (0.0, None, {}, "Did not learn track by PPO: no success"),
+        (0.4, None, {}, "Did not learn track by PPO reliably: 40.0% success"),
+        (0.94, None, {}, "Did not learn track by PPO reliably: 94.0% success"),
+        (0.95, None, {}, "Learned track by PPO: 95.0% success"),
+        (0.97, 0.99, {}, "Did not learn track by PPO reliably: 97.0% success"),
+        (0.985, 0.99, {"seconds": 3.0, "steps": 1e6}, "Learned track by PPO: 98.5% success"),
+        (0.8, 0.8, {}, "Learned track by PPO: 80.0% success"),
+    ],
+)
+def test_what_was_not_learned_is_not_called_learned(
+    success: float, stop_at: float | None, reached: dict[str, float], said: str
+) -> None:
+    assert verdict(a_summary(success, reached), stop_at) == said
+
+
 def test_train_eval_export_and_plots_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "run"
     flags = ["--steps", "2048", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16", "--algo.horizon", "16",
              "--algo.minibatch", "128", "--task.episode-s", "1"]  # fmt: skip
     assert run(["train", "hover", "--out", str(folder), *flags]) == 0
+    told = capsys.readouterr().out
+    assert "Did not learn hover by PPO: no success" in told
+    assert "nan" not in told
     files = ("config.json", "versions.json", "metrics.csv", "summary.json", "policy.onnx", "checkpoint.safetensors")
     for name in (*files, *(f"plots/{plot}.png" for plot in ("learning", "errors", "flights_hover", "time_hover"))):
         assert (folder / name).stat().st_size > 0

@@ -70,6 +70,22 @@ def test_a_device_is_neither_read_nor_replaced(
     assert Path(arguments[-1]).is_char_device()
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("XLA_FLAGS", "--nonsense", "XLA_FLAGS is '--nonsense'; accepted: flags and values that XLA knows (Unknown fl"),
+        ("XLA_FLAGS", "--xla_cpu_prefer_vector_width=wide", "Couldn't interpret value wide for flag xla_cpu_prefer"),
+        ("XLA_FLAGS", "no/file", "XLA_FLAGS is 'no/file'; accepted: flags and values that XLA knows (Could not open"),
+        ("JAX_ENABLE_X64", "1", "JAX_ENABLE_X64 is True; accepted: False, as all computes in float32"),
+    ],
+)
+def test_an_environment_that_nothing_computes_in_is_named(name: str, value: str, said: str) -> None:
+    done = e2efly("list", env=os.environ | {name: value}, stdout=subprocess.PIPE)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 def test_an_interrupt_ends_the_process_in_the_middle_of_native_code() -> None:
     code = (
         "import os, signal, threading, zlib\n"

@@ -9,6 +9,7 @@ import fcntl
 import itertools
 import json
 import logging
+import math
 import os
 import re
 import subprocess
@@ -22,11 +23,14 @@ import numpy as np
 from rich.console import Console
 
 from e2efly import presets
+from e2efly.budget import check_time
 from e2efly.commands.tables import console_table, markdown
 from e2efly.commands.terminal import Terminal
 from e2efly.config import TrainConfig
 from e2efly.device import cores
 
+RUN_S = 5.0
+"""The least that a run takes, s; on one core alone."""
 _GIVEN = ("seed", "out", "resume", "algo", "preset", "device", "devices", "plots", "no-plots")
 """Options of `e2efly train` that a sweep gives itself."""
 
@@ -59,8 +63,11 @@ class Trial:
 
     def ended(self) -> dict[str, Any] | None:
         """The summary of the run, where it has come to its end."""
-        summary = self.out / "summary.json"
-        found = json.loads(summary.read_text(encoding="utf-8")) if summary.exists() else {}
+        if not (self.out / "summary.json").exists():
+            return None
+        from e2efly.learn.rundir import RunDirectory
+
+        found = RunDirectory(self.out).read_json("summary.json")
         return found if found.get("finished") else None
 
 
@@ -78,8 +85,9 @@ def sweep_command(request: Request, config_of: Callable[[list[str]], TrainConfig
     console, trials = Terminal(), list(trials_of(request))
     if len({trial.out for trial in trials}) < len(trials):
         raise ValueError(f"--vary {' '.join(request.vary)}: two variants share a folder; accepted: values that differ")
+    configs = {trial.variant: config_of(list(trial.arguments)) for trial in trials if not trial.seed}
     for trial in trials:
-        _check(trial, config_of(list(trial.arguments)))
+        _check(trial, dataclasses.replace(configs[trial.variant], seed=trial.seed))
     request.out.mkdir(parents=True, exist_ok=True)
     found = {trial.out: summary for trial in trials if (summary := trial.ended())}
     console.print(f"{len(trials)} runs of {request.task} by {request.algo.upper()}, {len(found)} of them there already")
@@ -119,6 +127,8 @@ def trials_of(request: Request) -> Iterator[Trial]:
         if option in varied:
             raise ValueError(f"--vary {option} twice; accepted: all of its values behind one")
         varied[option] = values.split(",")
+    runs = float(request.seeds) * math.prod(map(len, varied.values()))
+    check_time({f"--seeds is {request.seeds}, {runs:g} runs": runs * RUN_S}, f"at {RUN_S:g} s each")
     for values in itertools.product(*varied.values()):
         chosen = dict(zip(varied, values, strict=True))
         told = [f"{option} {value}" for option, value in chosen.items() if len(varied[option]) > 1]

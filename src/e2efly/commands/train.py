@@ -14,6 +14,9 @@ from e2efly.config import TrainConfig
 from e2efly.device import Hosts, cache_folder, prepare
 from e2efly.presets import algorithm_name, task_name
 
+LEARNED = 0.95
+"""Success by the worst criterion from which on a task counts as learned, where the user asks for no other."""
+
 
 def train_command(
     config: TrainConfig,
@@ -44,7 +47,7 @@ def _train(config: TrainConfig, out: Path, resume: bool, plots: bool, console: C
     task, algo = task_name(config.task), algorithm_name(config.algo)
     with TerminalProgress(console, f"{task} by {algo}") as progress:
         summary = train(config, out, progress, resume, traced=cache_folder() / "traced")
-    _report(console, summary)
+    _report(console, summary, config.stop_at)
     if summary["stopped_by_user"]:
         console.print(f"Stopped. Go on with: e2efly train {task} --algo {algo} --out {out} --resume")
         return 130
@@ -57,7 +60,7 @@ def _train(config: TrainConfig, out: Path, resume: bool, plots: bool, console: C
     return 0
 
 
-def _report(console: Console, summary: dict[str, Any]) -> None:
+def _report(console: Console, summary: dict[str, Any], stop_at: float | None) -> None:
     rows = [
         {
             "policy": f"{name}, {called}",
@@ -65,17 +68,27 @@ def _report(console: Console, summary: dict[str, Any]) -> None:
             "success": f"{d['success']:.1%}",
             "final error": f"{100 * d['final_error_m']:.1f} cm",
             "mean error": f"{100 * d['mean_error_m']:.1f} cm",
-            "time": f"{d['seconds_of_success']:.2f} s",
+            "time": f"{d['seconds_of_success']:.2f} s" if d["success"] else "none",
             "top speed": f"{d['top_speed_m_s']:.1f} m/s",
         }
         for which, called in (("shipped", "best"), ("last", "last"))
         for name, d in summary[which].items()
         if name != "update"
     ]
-    seconds = summary["seconds_trained_from_process_start"]
+    seconds, steps = summary["seconds_trained_from_process_start"], summary["env_steps"] / 1e6
     console.print(
-        f"\nLearned to {summary['task']} by {summary['algorithm'].upper()} in {seconds:.1f} s from the start of the "
-        f"process ({summary['env_steps'] / 1e6:.2f} M environment steps). "
-        f"Flown from {summary['episodes']} starts that it never saw:"
+        f"\n{verdict(summary, stop_at)}, after {seconds:.1f} s from the start of the process ({steps:.2f} M "
+        f"environment steps). Flown from {summary['episodes']} starts that it never saw:"
     )
     console.print(console_table(rows))
+
+
+def verdict(summary: dict[str, Any], stop_at: float | None) -> str:
+    """Whether a run learned its task: what `--stop-at` asks for, or most of the starts of its worst criterion."""
+    what = f"{summary['task']} by {summary['algorithm'].upper()}"
+    success = min(found["success"] for name, found in summary["shipped"].items() if name != "update")
+    if summary["reached_criterion"] or success >= (stop_at or LEARNED):
+        return f"Learned {what}: {success:.1%} success"
+    if success == 0:
+        return f"Did not learn {what}: no success"
+    return f"Did not learn {what} reliably: {success:.1%} success"

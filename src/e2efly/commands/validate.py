@@ -10,7 +10,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from e2efly import presets
-from e2efly.commands.evaluate import check_observation, config_from_contract, fly_suites, run_of
+from e2efly.budget import check_time
+from e2efly.commands.evaluate import ROW, check_observation, config_from_contract, fly_suites, run_of
 from e2efly.commands.terminal import Terminal
 from e2efly.commands.validation_report import Validation, write_report
 from e2efly.config import EnvConfig, RewardConfig, TaskConfig
@@ -23,6 +24,10 @@ from e2efly.zoo import beside, policy_path
 
 EPISODES = {"betaflight": 20}
 """Starts of each criterion unless told, where they are not 200: the firmware takes seconds for each."""
+SAMPLE = 136
+"""Bytes of a control step of a flight on a plant, of which all are kept."""
+WHOLE_S = 1.0
+"""The least that a whole flight through the firmware takes, s."""
 DRAWN = 6
 """Starts of the overlay."""
 
@@ -63,6 +68,7 @@ def validate_command(
     episodes = EPISODES.get(plant, 200) if episodes is None else episodes
     if flights < 0:
         raise ValueError(f"--flights is {flights}; accepted: 0 or more")
+    check_time({f"--flights is {flights}": flights * WHOLE_S}, f"at {WHOLE_S:g} s each")
     if episodes <= 0:
         raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
     if not (math.isfinite(max_drop) and max_drop >= 0):
@@ -153,7 +159,9 @@ def _validate(
     from e2efly.validate.starts import draw_starts
 
     nominal, simulated = load_vehicle(env_config.vehicle), load_vehicle(vehicle or env_config.vehicle)
-    trained, _ = fly_suites(policy, task, env_config, episodes, seed)
+    longest = max(float(suite.episode_s) for suite in presets.suites(task).values())
+    kept = ROW + SAMPLE * int(longest * policy.contract.control_rate_hz)
+    trained, _ = fly_suites(policy, task, env_config, episodes, seed, kept)
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     found = {}
     with Progress(*columns, console=console, transient=True) as progress:
