@@ -27,8 +27,11 @@ XLA_OPTIONS = {
 """What makes XLA fast on small batches on a CPU; docs/architecture.md says why."""
 
 
-_USUAL = {"jax_enable_x64": False}
-"""Settings of JAX that the programs rely on."""
+_USUAL = {
+    "jax_enable_x64": False, "jax_disable_jit": False, "jax_numpy_dtype_promotion": "standard",
+    "jax_numpy_rank_promotion": "allow",
+}  # fmt: skip
+"""Settings of JAX without which nothing here computes, or not to its end."""
 
 
 def wide_vectors(vehicles: int) -> dict[str, Any]:
@@ -169,7 +172,7 @@ def _check_configuration() -> None:
 
     for name, wanted in _USUAL.items():
         if (value := getattr(jax.config, name)) != wanted:
-            raise ValueError(f"{name.upper()} is {value}; accepted: {wanted}, as all computes in float32")
+            raise ValueError(f"{name.upper()} is {value}; accepted: {wanted}, which the programs here need")
 
 
 def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:

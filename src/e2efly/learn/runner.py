@@ -217,17 +217,16 @@ def policy_of(state: TrainState) -> Weights:
 @contextmanager
 def _writing(run: RunDirectory, update: int) -> Iterator[Callable[[list[dict[str, float]]], None]]:
     """Writes rows to metrics.csv, and the last of them to TensorBoard's events; in process 0."""
-    from tensorboardX import SummaryWriter
+    from e2efly.learn.events import event_file
 
     if not hosts.first():
         yield lambda rows: None
         return
-    with SummaryWriter(str(run.events), purge_step=update) as events:
+    with event_file(run.events, update) as log:
 
         def write(rows: list[dict[str, float]]) -> None:
             run.append(rows)
-            for name, value in rows[-1].items():
-                events.add_scalar(name, value, int(rows[-1]["update"]))
+            log(rows[-1], int(rows[-1]["update"]))
 
         yield write
 
