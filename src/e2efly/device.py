@@ -204,8 +204,7 @@ def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:
         found = jax.devices()[0].platform
     except (RuntimeError, AssertionError) as error:  # JAX 0.10 asserts where CUDA's plug-in sees no GPU
         reason = (str(error) or "JAX finds none").splitlines()[0]
-        raise ValueError(
-            f"--device {device} is not to be had: {reason} (NVIDIA GPUs: pip install 'e2efly[cuda]')"
-        ) from None
+        asked = f"--device {device}" if device else f"JAX_PLATFORMS={os.environ.get('JAX_PLATFORMS', '')}"
+        raise ValueError(f"{asked} is not to be had: {reason} (NVIDIA GPUs: pip install 'e2efly[cuda]')") from None
     if device and found != device:
         raise ValueError(f"--device {device} is not to be had: JAX computes on {found}")

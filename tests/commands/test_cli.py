@@ -105,6 +105,12 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["render", "nowhere.toml"], "nowhere.toml: No such file or directory; accepted: the path of a .toml file"),
         (["render", "forest", "--width", "4"], "--width is 4; accepted: 8 to 4096 pixels"),
         (["render", "forest", "--camera", "fvp"], "--camera"),
+        (["render", "forest", "--yaw", "nan"], "--yaw is nan; accepted: finite numbers"),
+        (["render", "forest", "--time", "inf"], "--time is inf; accepted: finite numbers"),
+        (
+            ["render", "forest", "--position", "0", "nan", "1"],
+            "--position is (0.0, nan, 1.0); accepted: finite numbers",
+        ),
     ],
 )
 def test_bad_input_is_named_with_what_exists(

@@ -77,6 +77,7 @@ def test_a_device_is_neither_read_nor_replaced(
         ("XLA_FLAGS", "--xla_cpu_prefer_vector_width=wide", "Couldn't interpret value wide for flag xla_cpu_prefer"),
         ("XLA_FLAGS", "no/file", "XLA_FLAGS is 'no/file'; accepted: flags and values that XLA knows (Could not open"),
         ("JAX_ENABLE_X64", "1", "JAX_ENABLE_X64 is True; accepted: False, which the programs here need"),
+        ("JAX_NUM_CPU_DEVICES", "0", "--device cpu is not to be had: Unable to initialize backend 'cpu'"),
         ("JAX_DISABLE_JIT", "1", "JAX_DISABLE_JIT is True; accepted: False, which the programs here need"),
         ("JAX_NUMPY_RANK_PROMOTION", "raise", "JAX_NUMPY_RANK_PROMOTION is raise; accepted: allow, which"),
     ],

@@ -44,6 +44,10 @@ def render_command(request: Request) -> int:
     for name, value in (("width", request.width), ("height", request.height)):
         if value is not None and not 8 <= value <= 4096:
             raise ValueError(f"--{name} is {value}; accepted: 8 to 4096 pixels")
+    for name in ("position", "yaw", "pitch", "time"):
+        value = getattr(request, name)
+        if value is not None and not np.all(np.isfinite(value)):
+            raise ValueError(f"--{name} is {value}; accepted: finite numbers")
     prepare()
     from e2efly.env import random_key
     from e2efly.scenes.camera import PRESETS
