@@ -308,11 +308,13 @@ def _interruptible() -> Iterator[threading.Event]:
         stop.set()
         signal.signal(signal.SIGINT, old)
 
+    watched = signal.set_wakeup_fd(-1)  # or the command line's watcher would end what is to stop in order
     old = signal.signal(signal.SIGINT, ask)
     try:
         yield stop
     finally:
         signal.signal(signal.SIGINT, old)
+        signal.set_wakeup_fd(watched, warn_on_full_buffer=False)
 
 
 def load_policy_weights(setup: Setup, run: RunDirectory, which: str) -> Weights:
