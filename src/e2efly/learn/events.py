@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tensorboardX.event_file_writer import EventsWriter
-from tensorboardX.proto.event_pb2 import Event, SessionLog
+from tensorboardX.proto.event_pb2 import Event, SessionLog  # pyright: ignore[reportAttributeAccessIssue]
 from tensorboardX.summary import scalar
 
 
@@ -34,7 +34,7 @@ def event_file(folder: Path, first: int) -> Iterator[Callable[[Mapping[str, floa
         with _named(folder):
             folder.mkdir(parents=True, exist_ok=True)
             writer = EventsWriter(str(folder / "events"))
-            begun = SessionLog(status=SessionLog.START)  # pyright: ignore
+            begun = SessionLog(status=SessionLog.START)
             writer.write_event(Event(wall_time=time.time(), step=first, session_log=begun))
 
         def write(numbers: Mapping[str, float], step: int) -> None:
