@@ -25,6 +25,7 @@ from common import arguments, table
 
 from e2efly import presets
 from e2efly.deploy.onnx_file import is_sealed
+from e2efly.storage import write_json
 from e2efly.vehicles import vehicle_names
 from e2efly.zoo import FOLDER, USUAL, contents
 
@@ -65,7 +66,7 @@ def write(zoo: dict[str, dict[str, dict[str, Any]]]) -> None:
     for vehicle, tasks in zoo.items():
         for task, about in tasks.items():
             about["sha256"] = hashlib.sha256((FOLDER / vehicle / f"{task}.onnx").read_bytes()).hexdigest()
-    (FOLDER / "zoo.json").write_text(json.dumps(zoo, indent=1, sort_keys=True) + "\n")
+    write_json(FOLDER / "zoo.json", json.loads(json.dumps(zoo, sort_keys=True)))
 
 
 def main() -> None:

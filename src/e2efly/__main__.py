@@ -1,5 +1,16 @@
-"""`python -m e2efly`."""
+"""`e2efly`, and `python -m e2efly`."""
 
-from e2efly.cli import main
+from e2efly.process import end_at_interrupt, open_streams
 
-main()
+
+def main() -> None:
+    """Run the command line; Ctrl-C ends it from here on, also while it is being imported."""
+    open_streams()
+    end_at_interrupt()
+    from e2efly.cli import main
+
+    main()
+
+
+if __name__ == "__main__":
+    main()

@@ -2,7 +2,6 @@
 
 import dataclasses
 import gc
-import os
 import signal
 import sys
 from collections.abc import Callable
@@ -11,11 +10,12 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
 
 import tyro
-from rich.console import Console
 
 from e2efly import __version__, presets
+from e2efly.commands.terminal import Terminal
 from e2efly.config import EnvConfig, NetworkConfig, RewardConfig, TrainConfig
 from e2efly.device import Hosts
+from e2efly.process import raise_at_interrupt, write_nowhere
 from e2efly.vehicles import unknown
 
 _ABOUT = f"""e2efly {__version__}: train an end-to-end quadrotor policy in seconds, check it, and fly it.
@@ -271,7 +271,7 @@ def train_config(options: Any, config: TrainConfig) -> TrainConfig:
 def main() -> NoReturn:
     """Run the command line and exit: 0 when it did what was asked, 2 for bad input, 130 after Ctrl-C.
 
-    When nobody reads its output any more it ends without a word, with 141 or, where rich prints, 1.
+    When nobody reads its output any more it ends without a word, with 141.
     """
     # importing and tracing make many objects and no garbage: looking for it costs a third of a second
     gc.set_threshold(100_000)
@@ -279,14 +279,14 @@ def main() -> NoReturn:
         status = run(sys.argv[1:])
         sys.stdout.flush()
     except BrokenPipeError:  # whoever reads, as `head`, has enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        write_nowhere()
         status = 128 + signal.SIGPIPE
     sys.exit(status)
 
 
 def run(arguments: list[str]) -> int:
     """Run one command; returns the exit status."""
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    console = Terminal(stderr=True)
     if not arguments or arguments[0] in ("-h", "--help"):
         print(_ABOUT)
         return 0
@@ -297,9 +297,12 @@ def run(arguments: list[str]) -> int:
         return _command(arguments[0])(arguments[1:])
     except BrokenPipeError:
         raise
-    except (ValueError, OSError, FloatingPointError) as error:
-        console.print("[bold red]error:[/]", end=" ")
-        console.print(str(error), markup=False)
+    except (ValueError, OSError, FloatingPointError, MemoryError, RuntimeError) as error:
+        full = isinstance(error, MemoryError) or "RESOURCE_EXHAUSTED" in str(error)  # NumPy's word, and XLA's
+        if isinstance(error, RuntimeError) and not full:
+            raise
+        console.print("error:", style="bold red", end=" ")
+        console.print(f"{'out of memory: ' if full else ''}{error}")
         return 2
     except KeyboardInterrupt:
         console.print("interrupted")
@@ -337,12 +340,18 @@ def _parsed(arguments: list[str]) -> tuple[Any, TrainConfig]:
     algo = _peek(arguments, "--algo", presets.default_algorithm(task))
     preset = _peek(arguments, "--preset", "ours")
     config = presets.preset(task, algo, preset)
-    options, defaults = train_options(config, preset)
     if arguments[:1] != [task] and not {"-h", "--help"} & set(arguments):
         raise ValueError(f"train needs a task first: {_join(presets.TASKS)}")
-    parsed = tyro.cli(
-        options, default=defaults, args=arguments, prog="e2efly train", config=(tyro.conf.AvoidSubcommands,)
-    )
+    return _parsed_as(config, preset, arguments)
+
+
+def _parsed_as(config: TrainConfig, preset: str, arguments: list[str]) -> tuple[Any, TrainConfig]:
+    """As `_parsed`, where the defaults are those of a configuration."""
+    options, defaults = train_options(config, preset)
+    given = [vehicle for flag in ("--vehicle", "--env.vehicle") if (vehicle := _peek(arguments, flag, ""))]
+    if len(set(given)) > 1:
+        raise ValueError(f"--vehicle is {given[0]} and --env.vehicle is {given[1]}; accepted: one of them alone")
+    parsed = _options(options, "train", arguments, default=defaults)
     return parsed, train_config(parsed, config)
 
 
@@ -368,20 +377,16 @@ def _parsed_of_run(arguments: list[str]) -> tuple[Any, TrainConfig]:
     if not out:
         raise ValueError("--resume names no run; accepted: the run's folder, as in `e2efly train --resume DIR`")
     config = RunDirectory(Path(out)).config()
-    options, defaults = train_options(config, "the run")
-    parsed = tyro.cli(
-        options, default=defaults, args=[presets.task_name(config.task), *arguments], prog="e2efly train",
-        config=(tyro.conf.AvoidSubcommands,),
-    )  # fmt: skip
-    for name in ("algo_name", "preset"):
-        if (said := getattr(parsed, name)) != (known := getattr(defaults, name)):
-            option = f"--{name.removesuffix('_name')}"
+    task, algo, preset = presets.task_name(config.task), presets.algorithm_name(config.algo), "the run"
+    parsed, told = _parsed_as(config, preset, [task, *arguments])
+    for option, said, known in (("--algo", parsed.algo_name, algo), ("--preset", parsed.preset, preset)):
+        if said != known:
             raise ValueError(f"{option} is {said}, but {out} goes on as it began ({known}); accepted: to leave it out")
-    return parsed, train_config(parsed, config)
+    return parsed, told
 
 
 def _sweep(arguments: list[str]) -> int:
-    o = tyro.cli(Sweep, args=arguments, prog="e2efly sweep")
+    o = _options(Sweep, "sweep", arguments)
     from e2efly.commands.sweep import Request, sweep_command
 
     algo = o.algo or presets.default_algorithm(o.task)
@@ -391,14 +396,14 @@ def _sweep(arguments: list[str]) -> int:
 
 
 def _ablate(arguments: list[str]) -> int:
-    o = tyro.cli(Ablate, args=arguments, prog="e2efly ablate")
+    o = _options(Ablate, "ablate", arguments)
     from e2efly.commands.ablate import Request, ablate_command
 
     return ablate_command(Request(**vars(o)))
 
 
 def _eval(arguments: list[str]) -> int:
-    o = tyro.cli(Eval, args=arguments, prog="e2efly eval")
+    o = _options(Eval, "eval", arguments)
     from e2efly.commands.evaluate import eval_command
 
     return eval_command(
@@ -407,14 +412,14 @@ def _eval(arguments: list[str]) -> int:
 
 
 def _export(arguments: list[str]) -> int:
-    options = tyro.cli(Export, args=arguments, prog="e2efly export")
+    options = _options(Export, "export", arguments)
     from e2efly.commands.export import export_command
 
     return export_command(options.run, options.out, options.which)
 
 
 def _validate(arguments: list[str]) -> int:
-    o = tyro.cli(Validate, args=arguments, prog="e2efly validate")
+    o = _options(Validate, "validate", arguments)
     from e2efly.commands.validate import validate_command
 
     return validate_command(**vars(o))
@@ -423,42 +428,57 @@ def _validate(arguments: list[str]) -> int:
 def _fly(arguments: list[str]) -> int:
     from e2efly.commands.fly import Fly, fly_command  # here, as its options are the bridge's own
 
-    return fly_command(tyro.cli(Fly, args=arguments, prog="e2efly fly", config=(tyro.conf.AvoidSubcommands,)))
+    raise_at_interrupt()  # its link and its log are closed in order
+    return fly_command(_options(Fly, "fly", arguments))
 
 
 def _fly_report(arguments: list[str]) -> int:
-    o = tyro.cli(FlyReport, args=arguments, prog="e2efly fly-report")
+    o = _options(FlyReport, "fly-report", arguments)
     from e2efly.commands.fly_report import fly_report_command
 
     return fly_report_command(o.log, o.out, o.blackbox, o.bag1, o.bag2)
 
 
 def _render(arguments: list[str]) -> int:
-    o = tyro.cli(Render, args=arguments, prog="e2efly render")
+    o = _options(Render, "render", arguments)
     from e2efly.commands.render import Request, render_command
 
     return render_command(Request(**vars(o)))
 
 
 def _firmware(arguments: list[str]) -> int:
-    o = tyro.cli(FirmwareOptions, args=arguments, prog="e2efly firmware")
+    o = _options(FirmwareOptions, "firmware", arguments)
     from e2efly.commands.firmware import firmware_command
 
     return firmware_command(o.archive, o.binary)
 
 
 def _bench(arguments: list[str]) -> int:
-    options = tyro.cli(Bench, args=arguments, prog="e2efly bench")
+    options = _options(Bench, "bench", arguments)
     from e2efly.commands.bench import bench_command
 
     return bench_command(options.json, options.device)
 
 
 def _list(arguments: list[str]) -> int:
-    tyro.cli(List, args=arguments, prog="e2efly list")
+    _options(List, "list", arguments)
     from e2efly.commands.catalogue import list_command
 
     return list_command()
+
+
+def _options(options: Any, command: str, arguments: list[str], **default: Any) -> Any:
+    """The parsed options of a command. Where there is a path, there must be a file, a folder or nothing.
+
+    Raises:
+        ValueError: for the path of a device or of a pipe: it may never end, and a report written there replaces it.
+    """
+    config = (tyro.conf.AvoidSubcommands,)
+    found = tyro.cli(options, args=arguments, prog=f"e2efly {command}", config=config, **default)
+    for name, value in vars(found).items():
+        if isinstance(value, Path) and value.exists() and not (value.is_file() or value.is_dir()):
+            raise ValueError(f"{name} is {value}; accepted: the path of a file or of a folder")
+    return found
 
 
 def _peek(arguments: list[str], flag: str, default: str) -> str:
@@ -477,7 +497,3 @@ def _tasks() -> str:
 
 def _join(names: Any) -> str:
     return ", ".join(names)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,10 +1,12 @@
 """Where JAX computes, and how it compiles. Call `prepare` before anything computes with JAX."""
 
 import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +32,13 @@ XLA_OPTIONS = {
 """What makes XLA fast on small batches on a CPU; docs/architecture.md says why."""
 
 
+_USUAL = {
+    "jax_enable_x64": False, "jax_disable_jit": False, "jax_numpy_dtype_promotion": "standard",
+    "jax_numpy_rank_promotion": "allow",
+}  # fmt: skip
+"""Settings of JAX without which nothing here computes, or not to its end."""
+
+
 def wide_vectors(vehicles: int) -> dict[str, Any]:
     """Options of XLA for a program in which a device steps so many vehicles: `jax.jit(f, compiler_options=...)`.
 
@@ -50,10 +59,29 @@ def set_xla_options() -> None:
     It has no effect once JAX has begun to compute.
     """
     flags = os.environ.get("XLA_FLAGS", "")
+    ours = {f"--{name}={value}" for name, value in XLA_OPTIONS.items()}
+    if not ours >= set(flags.split()):
+        _check_flags(flags)
     wanted = [f"--{name}={value}" for name, value in XLA_OPTIONS.items() if name not in flags]
     os.environ["XLA_FLAGS"] = " ".join([*flags.split(), *wanted])
     if "xla_force_host_platform_device_count" not in flags:
         _configure("jax_num_cpu_devices", cores())
+
+
+@cache
+def _check_flags(flags: str) -> None:
+    """Refuse what XLA would abort the process for, by trying it in another one.
+
+    Raises:
+        ValueError: naming the variable, its value and what XLA says of it.
+    """
+    code = "from jaxlib import xla_client; xla_client.CompileOptions()"  # reads them, and takes no device
+    tried = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    if tried.returncode:
+        told = (line.rpartition("] ")[2] for line in tried.stderr.splitlines())
+        lines = [line for line in told if "XLA_FLAGS" in line or "flag" in line]
+        said = f" ({lines[0]})" if lines else ""
+        raise ValueError(f"XLA_FLAGS is {flags!r}; accepted: flags and values that XLA knows{said}")
 
 
 def cores() -> int:
@@ -139,6 +167,19 @@ class Hosts:
             raise OSError(f"not all {self.count} processes met at {self.coordinator}: {reason}") from None
 
 
+def _check_configuration() -> None:
+    """Refuse settings of JAX under which nothing here computes.
+
+    Raises:
+        ValueError: naming the variable, its value and what is accepted.
+    """
+    import jax
+
+    for name, wanted in _USUAL.items():
+        if (value := getattr(jax.config, name)) != wanted:
+            raise ValueError(f"{name.upper()} is {value}; accepted: {wanted}, which the programs here need")
+
+
 def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:
     """Choose the device, set `XLA_OPTIONS` and turn on the persistent compilation cache, with digests.
 
@@ -159,6 +200,7 @@ def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:
     from e2efly.compiled import check_programs
 
     set_xla_options()
+    _check_configuration()
     _configure("jax_compilation_cache_dir", str(programs_folder()))
     check_programs()
     _configure("jax_persistent_cache_min_compile_time_secs", 0.05)
@@ -170,8 +212,7 @@ def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:
         found = jax.devices()[0].platform
     except (RuntimeError, AssertionError) as error:  # JAX 0.10 asserts where CUDA's plug-in sees no GPU
         reason = (str(error) or "JAX finds none").splitlines()[0]
-        raise ValueError(
-            f"--device {device} is not to be had: {reason} (NVIDIA GPUs: pip install 'e2efly[cuda]')"
-        ) from None
+        asked = f"--device {device}" if device else f"JAX_PLATFORMS={os.environ.get('JAX_PLATFORMS', '')}"
+        raise ValueError(f"{asked} is not to be had: {reason} (NVIDIA GPUs: pip install 'e2efly[cuda]')") from None
     if device and found != device:
         raise ValueError(f"--device {device} is not to be had: JAX computes on {found}")

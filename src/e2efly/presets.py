@@ -5,7 +5,7 @@ A preset is a function that returns a `TrainConfig`; a variant of one is `datacl
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from e2efly.config import (
@@ -393,6 +393,9 @@ def check(config: TrainConfig) -> None:
     Raises:
         ValueError: naming the field, the value and what is accepted.
     """
+    for name, value in _whole_numbers("", config):
+        if abs(value) >= (10**300 if name == "steps" else 2**53):  # of steps, the time is told
+            raise ValueError(f"{name} is {value}; accepted: whole numbers below 2^53")
     algo = config.algo
     positive = {
         "steps": config.steps, "chunk": config.chunk, "eval_episodes": config.eval_episodes,
@@ -435,3 +438,15 @@ def check(config: TrainConfig) -> None:
             raise ValueError(f"reward {name} is {value}; accepted: a finite number")
     if not config.reward.weights:
         raise ValueError("reward.weights is empty; accepted: at least one term (see `e2efly list`)")
+
+
+def _whole_numbers(name: str, value: Any) -> Iterator[tuple[str, int]]:
+    """Every whole number of a configuration, with its name."""
+    if dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            yield from _whole_numbers(f"{name}.{field.name}" if name else field.name, getattr(value, field.name))
+    elif isinstance(value, tuple):
+        for i, entry in enumerate(value):
+            yield from _whole_numbers(f"{name}[{i}]", entry)
+    elif isinstance(value, int):
+        yield name, value

@@ -13,6 +13,7 @@ from rich.console import Console
 from e2efly import presets
 from e2efly.commands.progress import TerminalProgress
 from e2efly.commands.tables import console_table, markdown
+from e2efly.commands.terminal import Terminal
 from e2efly.config import TrainConfig
 from e2efly.device import prepare
 from e2efly.storage import held, write_atomically, write_json
@@ -46,14 +47,10 @@ def ablate_command(request: Request) -> int:
     if request.seeds < 1:
         raise ValueError(f"--seeds is {request.seeds}; accepted: 1 or more")
     prepare(request.device)
-    console = Console(highlight=False)
+    console = Terminal()
     configs = {(algo, task): _config(request, task, algo) for algo in request.algos for task in request.tasks}
     with held(request.out):
-        try:
-            return _ablate(request, configs, console)
-        except KeyboardInterrupt:
-            console.print("Stopped; the same command goes on where it was, at most some seconds back.")
-            return 130
+        return _ablate(request, configs, console)
 
 
 def _ablate(request: Request, configs: dict[tuple[str, str], TrainConfig], console: Console) -> int:

@@ -3,9 +3,9 @@
 import os
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 
+from e2efly.commands.terminal import Terminal
 from e2efly.device import prepare
 from e2efly.storage import write_json
 
@@ -13,7 +13,7 @@ from e2efly.storage import write_json
 def bench_command(report: Path | None, device: str | None) -> int:
     """Measure and print; exit status 0."""
     prepare(device)
-    console = Console(highlight=False)
+    console = Terminal()
     figures = measure()
     table = Table("what", "per second", box=None, header_style="bold")
     for name, value in figures.items():

@@ -1,9 +1,9 @@
 """`e2efly list`."""
 
-from rich.console import Console
 from rich.table import Table
 
 from e2efly import presets
+from e2efly.commands.terminal import Terminal
 from e2efly.courses.tracks import track_names
 from e2efly.device import prepare
 from e2efly.vehicles import load_vehicle, vehicle_names
@@ -15,7 +15,7 @@ def list_command() -> int:
     from e2efly.physics import COMMAND_MODES, INTEGRATORS
     from e2efly.rewards import TERMS
 
-    console = Console(highlight=False)
+    console = Terminal()
     for kind, names in (
         ("tasks", presets.TASKS),
         ("algorithms", presets.ALGORITHMS),
@@ -25,7 +25,8 @@ def list_command() -> int:
         ("command modes", COMMAND_MODES),
         ("integrators", INTEGRATORS),
     ):
-        console.print(f"[bold]{kind}[/]: {', '.join(names)}")
+        console.print(kind, style="bold", end=": ")
+        console.print(", ".join(names))
     vehicles = Table("vehicle", "mass, kg", "thrust/weight", "latency, s", "hash", box=None, header_style="bold")
     for name in vehicle_names():
         v = load_vehicle(name)

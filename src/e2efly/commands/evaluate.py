@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from e2efly import presets
+from e2efly.budget import FASTEST, check_memory, check_time
+from e2efly.commands.terminal import Terminal
 from e2efly.config import CameraConfig, EnvConfig, ImuConfig, RewardConfig, TaskConfig
 from e2efly.deploy.images import NONE, Image
 from e2efly.deploy.policy import Policy, load_policy
@@ -22,6 +23,8 @@ from e2efly.zoo import beside, policy_path
 
 BATCH, DRAWN = 250, 12
 """Starts that are flown at once, and flights that are drawn."""
+FIGURES, ROW = 200, 3000
+"""Bytes that the figures of a start take, and its row of the report."""
 
 
 def eval_command(
@@ -53,8 +56,8 @@ def eval_command(
             f"vehicle_hash is {policy.contract.vehicle_hash} in {run.policy if run else path}, but vehicle "
             f"{env_config.vehicle} is {known.hash}; accepted: the vehicle that the policy was trained on, or --vehicle"
         )
-    flown, starts = fly_suites(policy, task, env_config, episodes, seed)
-    console = Console(highlight=False, quiet=quiet)
+    flown, starts = fly_suites(policy, task, env_config, episodes, seed, ROW if report else 0)
+    console = Terminal(quiet=quiet)
     console.print(_table(flown, episodes))
     if report:
         write_json(report, _report(policy, path, env_config, flown, starts, seed))
@@ -119,9 +122,20 @@ def _camera(image: Image) -> CameraConfig:
 
 
 def fly_suites(
-    policy: Policy, task: TaskConfig, env_config: EnvConfig, episodes: int, seed: int
+    policy: Policy, task: TaskConfig, env_config: EnvConfig, episodes: int, seed: int, kept: int = 0
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Fly `episodes` starts of every criterion of a task.
+
+    Args:
+        policy: as loaded.
+        task: what it flies.
+        env_config: where.
+        episodes: starts of each criterion.
+        seed: of the starts.
+        kept: bytes that the caller keeps of every start, beside the figures.
+
+    Raises:
+        ValueError: for more starts than fit into the machine's memory, or than anybody can wait for.
 
     Returns:
         By the criterion's name and of NumPy arrays: `Episodes`, and the `State` that each started from.
@@ -138,8 +152,13 @@ def fly_suites(
         start = env.reset(key, BATCH)[0].vehicle
         return run_episodes(env, callback(policy), key, BATCH, steps, settle), start
 
-    for name, suite in presets.suites(task).items():
-        env = Env.of(suite, RewardConfig({"prog2": 1.0}), env_config)
+    suites = presets.suites(task)
+    envs = {name: Env.of(suite, RewardConfig({"prog2": 1.0}), env_config) for name, suite in suites.items()}
+    asked = f"--episodes is {episodes}"
+    check_memory({asked: float(episodes) * len(suites) * (FIGURES + kept)})
+    check_time({asked: sum(episode_steps(suites[name], envs[name]) for name in suites) * float(episodes) / FASTEST})
+    for name, suite in suites.items():
+        env = envs[name]
         check_observation(policy, env)
         steps, settle = episode_steps(suite, env), float(getattr(suite, "settle_s", 0.0))
         keys = [random_key(seed, UNSEEN, i) for i in range(-(-episodes // BATCH))]
@@ -285,5 +304,6 @@ def _draw(
         plots.plot_time(flights, 0, folder / f"time_{name}.png", tag)
     plots.plot_errors(flown, folder / "errors.png", title, plots.limits(presets.suites(task)))
     if run and (rows := run.rows()):
-        shipped = run.read_json("summary.json")["shipped"]["update"] if (run.path / "summary.json").exists() else None
-        plots.plot_learning(rows, folder / "learning.png", title, best_update=shipped)
+        shipped = run.read_json("summary.json").get("shipped") if (run.path / "summary.json").exists() else None
+        update = shipped.get("update") if isinstance(shipped, dict) else None
+        plots.plot_learning(rows, folder / "learning.png", title, best_update=update)

@@ -2,18 +2,16 @@
 
 from pathlib import Path
 
-from rich.console import Console
-
+from e2efly.commands.terminal import Terminal
 from e2efly.deploy.policy import sealed_policy
 from e2efly.device import prepare
+from e2efly.storage import write_atomically
 
 
 def export_command(run_path: Path, out: Path | None, which: str) -> int:
     """Write policy.onnx from the checkpoint of a run, or anew from a file of an older e2efly, with its digest."""
-    console = Console(highlight=False)
+    console = Terminal()
     if run_path.is_file():
-        from e2efly.learn.checkpoint import write_atomically
-
         write_atomically(out or run_path, sealed_policy(run_path))
         console.print(f"Wrote {run_path} with its digest to {out or run_path}")
         return 0

@@ -3,8 +3,7 @@
 import time
 from pathlib import Path
 
-from rich.console import Console
-
+from e2efly.commands.terminal import Terminal
 from e2efly.validate import binary, firmware
 
 
@@ -19,14 +18,14 @@ def firmware_command(archive: Path | None, program: Path | None) -> int:
         OSError: when it cannot be fetched, built or started.
         ValueError: when the archive is not the known one, or the program no firmware that is known.
     """
-    console = Console(highlight=False, soft_wrap=True)
+    console = Terminal()
     if archive is not None and program is not None:
         raise ValueError("--archive and --binary are both given; accepted: one of them")
     if program is not None:
         with console.status("asking the program for its version"):
             found = binary.keep(program)
         firmware.choose(found.program.parent)
-        console.print(f"Flown from now on: {program}, kept as {found.program}", markup=False)
+        console.print(f"Flown from now on: {program}, kept as {found.program}")
     else:
         before, began = firmware.built(), time.monotonic()
         with console.status(f"fetching and building {firmware.PACKAGE} {firmware.VERSION} (a minute or two, once)"):

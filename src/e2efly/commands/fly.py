@@ -16,6 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from e2efly import __version__
+from e2efly.commands.terminal import Terminal
 from e2efly.deploy import throttle_map
 from e2efly.deploy.bridge import Bridge
 from e2efly.deploy.check import Row, examine, problems
@@ -89,7 +90,7 @@ def fly_command(options: Fly) -> int:
         ValueError: naming the option or setting, what it is and what is accepted.
         OSError: when link, pose source or log cannot be opened.
     """
-    console = Console(highlight=False)
+    console = Terminal()
     settings, policy = options.flight, options.policy
     check_settings(settings)
     if options.latency is not None and not 0 <= options.latency <= SLOWEST:
@@ -204,13 +205,13 @@ def _table(rows: tuple[Row, ...]) -> Table:
     for heading in ("", "setting", "is", "needed", "mend with"):
         table.add_column(heading, overflow="fold")
     for row in rows:
-        mark = "[green]ok[/]" if row.good else "[bold red]no[/]"
+        mark = Text("ok", "green") if row.good else Text("no", "bold red")
         table.add_row(mark, *map(_cell, (row.setting, row.value, row.needed, "" if row.good else row.mend)))
     return table
 
 
 def _cell(text: str) -> Text:
-    """What may come from outside, such as a craft's name: neither markup nor escape sequences."""
+    """What may come from outside, such as a craft's name: no escape sequences."""
     return Text(printable(text))
 
 
@@ -246,7 +247,7 @@ def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row,
     refusals = take_off_refusals(bridge.settings, bridge.flight, bridge.inputs)
     console.print("What stands against a take-off now:" if refusals else "Nothing stands against a take-off.")
     for refusal in refusals:
-        console.print(f"  - {printable(refusal)}", markup=False)
+        console.print(f"  - {printable(refusal)}")
     return 1 if problems(rows) or o is None else 0
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from e2efly.commands.terminal import Terminal
 from e2efly.deploy.blackbox import Alignment, Blackbox, align, read_blackbox
 from e2efly.deploy.flight_log import FlightLog, read_log
 
@@ -41,7 +42,7 @@ def fly_report_command(
     table = summary(log, *laid) if laid else summary(log)
     (out / "summary.json").write_text(json.dumps(table, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     draw(log, out, laid)
-    console = Console(highlight=False)
+    console = Terminal()
     _print(console, table)
     for bag, version in ((bag1, 1), (bag2, 2)):
         if bag:
@@ -102,7 +103,8 @@ def _laid_over(log: FlightLog, path: Path) -> tuple[Blackbox, Alignment]:
 def _print(console: Console, table: dict[str, Any]) -> None:
     console.print(f"{table['file']}: {table['duration_s']:.1f} s, vehicle {table['vehicle'] or 'unknown'}")
     if table["cut_off"]:
-        console.print(f"[bold]Cut off[/bold]: {table['cut_off']}; what follows is what was written until then")
+        console.print("Cut off", style="bold", end=": ")
+        console.print(f"{table['cut_off']}; what follows is what was written until then")
     modes = Table("mode", "from", "to", "error rms / max", "why", box=None, header_style="bold", pad_edge=False)
     for row in table["modes"]:
         error = table["error_m"].get(row["mode"])
@@ -116,7 +118,7 @@ def _print(console: Console, table: dict[str, Any]) -> None:
     console.print(figures)
     for event in table["events"]:
         if event["level"] in ("warning", "error"):
-            console.print(f"{event['time_s']:8.2f} s  {event['level']}: {event['text']}", markup=False)
+            console.print(f"{event['time_s']:8.2f} s  {event['level']}: {event['text']}")
 
 
 def _lines(table: dict[str, Any]) -> list[tuple[str, str]]:

@@ -11,10 +11,10 @@ class TerminalProgress:
 
     def __init__(self, console: Console, title: str) -> None:
         self._bar = Progress(
-            SpinnerColumn(),
-            TextColumn("[bold]{task.description}"),
+            SpinnerColumn("dots" if console.encoding.startswith("utf") else "line"),
+            TextColumn("{task.description}", "bold", markup=False),
             BarColumn(bar_width=24),
-            TextColumn("{task.fields[figures]}"),
+            TextColumn("{task.fields[figures]}", markup=False),
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeRemainingColumn(),

@@ -6,6 +6,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from e2efly.deploy.goal_options import GoalOptions, goal_for
 from e2efly.deploy.policy import Policy
@@ -40,7 +41,7 @@ def flights_table(flights: list[Rehearsal]) -> Table:
     for heading in ("whole flight", "complete", "hover error", "policy", "top speed", "modes"):
         table.add_column(heading)
     for i, flight in enumerate(flights):
-        mark = "[green]yes[/]" if flight.complete else "[bold red]no[/]"
+        mark = Text("yes", "green") if flight.complete else Text("no", "bold red")
         modes = " ".join(flight.modes) if flight.complete else "; ".join(flight.reasons)
         table.add_row(
             str(i + 1), mark, f"{100 * flight.hover_error:.1f} cm", _told(flight), f"{flight.top_speed:.1f} m/s", modes

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.progress import track
 
+from e2efly.commands.terminal import Terminal
 from e2efly.config import CameraConfig
 from e2efly.courses.references import read_csv, through_points
 from e2efly.device import prepare
@@ -44,6 +44,10 @@ def render_command(request: Request) -> int:
     for name, value in (("width", request.width), ("height", request.height)):
         if value is not None and not 8 <= value <= 4096:
             raise ValueError(f"--{name} is {value}; accepted: 8 to 4096 pixels")
+    for name in ("position", "yaw", "pitch", "time"):
+        value = getattr(request, name)
+        if value is not None and not np.all(np.isfinite(value)):
+            raise ValueError(f"--{name} is {value}; accepted: finite numbers")
     prepare()
     from e2efly.env import random_key
     from e2efly.scenes.camera import PRESETS
@@ -53,7 +57,7 @@ def render_command(request: Request) -> int:
     from e2efly.view.sheet import write_sheet
     from e2efly.view.video import frames, write_video
 
-    console = Console(highlight=False)
+    console = Terminal()
     place = find_place(request.scene, random_key(request.seed))
     out = request.out or Path("runs/render") / Path(request.scene).stem
     _make(out)

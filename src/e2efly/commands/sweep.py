@@ -7,8 +7,8 @@ cut short goes on: after an end of the sweep, and, by Ray, after the loss of a w
 import dataclasses
 import fcntl
 import itertools
-import json
 import logging
+import math
 import os
 import re
 import subprocess
@@ -22,12 +22,16 @@ import numpy as np
 from rich.console import Console
 
 from e2efly import presets
+from e2efly.budget import check_time
 from e2efly.commands.tables import console_table, markdown
+from e2efly.commands.terminal import Terminal
 from e2efly.config import TrainConfig
 from e2efly.device import cores
 from e2efly.learn.rundir import RunDirectory
 from e2efly.storage import held, write_atomically, write_json
 
+RUN_S = 5.0
+"""The least that a run takes, s; on one core alone."""
 _GIVEN = ("seed", "out", "resume", "algo", "preset", "device", "devices", "plots", "no-plots")
 """Options of `e2efly train` that a sweep gives itself."""
 _ALONE = {
@@ -67,8 +71,9 @@ class Trial:
 
     def ended(self) -> dict[str, Any] | None:
         """The summary of the run, where it has come to its end."""
-        summary = self.out / "summary.json"
-        found = json.loads(summary.read_text(encoding="utf-8")) if summary.exists() else {}
+        if not (self.out / "summary.json").exists():
+            return None
+        found = RunDirectory(self.out).read_json("summary.json")
         return found if found.get("finished") else None
 
 
@@ -83,11 +88,12 @@ def sweep_command(request: Request, config_of: Callable[[list[str]], TrainConfig
         ValueError: for options that cannot be varied so, and for a folder with runs of another configuration.
         OSError: when the folder cannot be written or the cluster not reached.
     """
-    console, trials = Console(highlight=False), list(trials_of(request))
+    console, trials = Terminal(), list(trials_of(request))
     if len({trial.out for trial in trials}) < len(trials):
         raise ValueError(f"--vary {' '.join(request.vary)}: two variants share a folder; accepted: values that differ")
+    configs = {trial.variant: config_of(list(trial.arguments)) for trial in trials if not trial.seed}
     for trial in trials:
-        _check(trial, config_of(list(trial.arguments)))
+        _check(trial, dataclasses.replace(configs[trial.variant], seed=trial.seed))
     with held(request.out):
         return _sweep(request, trials, console)
 
@@ -101,8 +107,8 @@ def _sweep(request: Request, trials: list[Trial], console: Console) -> int:
         summary = trial.ended()
         if summary is None:
             failed += 1
-            console.print(f"[bold red]failed:[/] {trial.out.name}: ", end="")
-            console.print(how, markup=False)
+            console.print("failed:", style="bold red", end=" ")
+            console.print(f"{trial.out.name}: {how}")
             continue
         found[trial.out] = summary
         seconds = summary["seconds_trained_from_process_start"]
@@ -132,6 +138,8 @@ def trials_of(request: Request) -> Iterator[Trial]:
         if option in varied:
             raise ValueError(f"--vary {option} twice; accepted: all of its values behind one")
         varied[option] = values.split(",")
+    runs = float(request.seeds) * math.prod(map(len, varied.values()))
+    check_time({f"--seeds is {request.seeds}, {runs:g} runs": runs * RUN_S}, f"at {RUN_S:g} s each")
     for values in itertools.product(*varied.values()):
         chosen = dict(zip(varied, values, strict=True))
         told = [f"{option} {value}" for option, value in chosen.items() if len(varied[option]) > 1]

@@ -11,9 +11,13 @@ from rich.console import Console
 from e2efly.commands.progress import TerminalProgress
 from e2efly.commands.supervised import is_watched, watched
 from e2efly.commands.tables import console_table
+from e2efly.commands.terminal import Terminal
 from e2efly.config import TrainConfig
 from e2efly.device import Hosts, cache_folder, prepare
 from e2efly.presets import algorithm_name, task_name
+
+LEARNED = 0.95
+"""Success by the worst criterion from which on a task counts as learned, where the user asks for no other."""
 
 
 def train_command(
@@ -43,7 +47,7 @@ def train_command(
     from e2efly.learn.hosts import LostHostError
 
     try:
-        return _train(config, out, resume, plots, again, Console(highlight=False, quiet=hosts.index > 0))
+        return _train(config, out, resume, plots, again, Terminal(quiet=hosts.index > 0))
     except (LostHostError, ValueError, OSError, FloatingPointError) as error:
         if hosts.count == 1:
             raise
@@ -69,9 +73,9 @@ def _train(config: TrainConfig, out: Path, resume: bool, plots: bool, again: str
         console.print("There is no checkpoint yet: the run begins at its beginning.")
     with TerminalProgress(console, f"{task} by {algo}") as progress:
         summary = train(config, out, progress, resume, traced=cache_folder() / "traced")
-    _report(console, summary)
+    _report(console, summary, config.stop_at)
     if summary["stopped_by_user"]:
-        console.print(f"Stopped; {again}", markup=False, soft_wrap=True)
+        console.print(f"Stopped; {again}")
         return 130
     if plots and not console.quiet:
         from e2efly.commands.evaluate import eval_command
@@ -82,7 +86,7 @@ def _train(config: TrainConfig, out: Path, resume: bool, plots: bool, again: str
     return 0
 
 
-def _report(console: Console, summary: dict[str, Any]) -> None:
+def _report(console: Console, summary: dict[str, Any], stop_at: float | None) -> None:
     rows = [
         {
             "policy": f"{name}, {called}",
@@ -97,10 +101,20 @@ def _report(console: Console, summary: dict[str, Any]) -> None:
         for name, d in summary[which].items()
         if name != "update"
     ]
-    seconds = summary["seconds_trained_from_process_start"]
+    seconds, steps = summary["seconds_trained_from_process_start"], summary["env_steps"] / 1e6
     console.print(
-        f"\nLearned to {summary['task']} by {summary['algorithm'].upper()} in {seconds:.1f} s from the start of the "
-        f"process ({summary['env_steps'] / 1e6:.2f} M environment steps). "
-        f"Flown from {summary['episodes']} starts that it never saw:"
+        f"\n{verdict(summary, stop_at)}, after {seconds:.1f} s from the start of the process ({steps:.2f} M "
+        f"environment steps). Flown from {summary['episodes']} starts that it never saw:"
     )
     console.print(console_table(rows))
+
+
+def verdict(summary: dict[str, Any], stop_at: float | None) -> str:
+    """Whether a run learned its task: what `--stop-at` asks for, or most of the starts of its worst criterion."""
+    what = f"{summary['task']} by {summary['algorithm'].upper()}"
+    success = min(found["success"] for name, found in summary["shipped"].items() if name != "update")
+    if summary["reached_criterion"] or success >= (stop_at or LEARNED):
+        return f"Learned {what}: {success:.1%} success"
+    if success == 0:
+        return f"Did not learn {what}: no success"
+    return f"Did not learn {what} reliably: {success:.1%} success"

@@ -4,13 +4,14 @@ Nothing that befalls a terminal may end a flight. It stalls, its connection ends
 lost then, and the flight goes on. A text that came from outside shows itself and does nothing else.
 """
 
-import os
 import queue
 import signal
 import threading
 import time
 from contextlib import suppress
 from typing import Any, TextIO
+
+from e2efly.process import write_nowhere
 
 LANDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 """Signals that ask for a landing: Ctrl-C, a polite end, a terminal whose connection has ended, Ctrl-\\, Ctrl-Z."""
@@ -79,9 +80,7 @@ class Speaker:
         self._thread.join(1.0)
         if self._gone:  # what the stream still holds would fail again as the interpreter ends
             with suppress(Exception):
-                nowhere = os.open(os.devnull, os.O_WRONLY)
-                os.dup2(nowhere, self._stream.fileno())
-                os.close(nowhere)
+                write_nowhere(self._stream.fileno())
 
     def _run(self) -> None:
         while (line := self._lines.get()) is not None:

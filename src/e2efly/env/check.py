@@ -16,6 +16,8 @@ _ANYWHERE = ("target", "centre", "camera_position", "camera_pitch", "circle_rate
 _MORE_THAN_0 = ("fence", "radius", "scale", "length", "width", "opening", "fov", "gyro_tau", "accel_tau")
 _RISING = ("distance", "height", "pad_size", "radius", "roll", "size", "speed")
 """From the smallest to the largest, where they are two."""
+COUNTED = 2**24
+"""Control steps that an episode can have: float32 counts no further."""
 _ENDLESS = ("fence", "ceiling", "gyro_tau", "accel_tau")
 """Options that may be infinite."""
 
@@ -43,7 +45,8 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
         raise ValueError(f"env.past_actions is {config.past_actions}; accepted: 0 or more")
     if not (math.isfinite(config.wind) and config.wind >= 0):
         raise ValueError(f"env.wind is {config.wind}; accepted: 0 or more, m/s")
-    rate = load_vehicle(config.vehicle).control_rate if config.control_rate is None else config.control_rate
+    vehicle = load_vehicle(config.vehicle)
+    rate = vehicle.control_rate if config.control_rate is None else config.control_rate
     for camera in config.cameras:
         check_camera(camera)
         check_noise(camera.noise, camera)
@@ -53,6 +56,12 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
     if not (math.isfinite(task.episode_s) and task.episode_s > 0):
         raise ValueError(f"task.episode_s is {task.episode_s}; accepted: a positive number of seconds")
     longest, hold = max(task.episode_s, getattr(task, "judged_s", 0.0)), getattr(task, "hold_s", 0.0)
+    if longest * rate > COUNTED:
+        field = "episode_s" if task.episode_s == longest else "judged_s"
+        raise ValueError(
+            f"task.{field} is {longest}; accepted: at most {COUNTED / rate:g} s, as far as float32 counts the control "
+            f"steps, 2^24 at {rate:g} Hz"
+        )
     if not 0 <= hold <= longest:
         raise ValueError(
             f"task.hold_s is {hold}; accepted: 0 to the {longest:g} s of task.episode_s, or of task.judged_s if longer"
@@ -61,6 +70,13 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
         raise ValueError(f"env.position_range is {config.position_range}; accepted: more than 0, m")
     for prefix, part in (("task", task), ("env.noise", config.noise), ("env.imu", config.imu)):
         _check_numbers(prefix, part)
+    for name in ("target", "centre"):
+        place = getattr(task, name, None)
+        if place is not None and place[2] <= vehicle.feet_height:
+            raise ValueError(
+                f"task.{name} is {place}; accepted: a place more than {vehicle.feet_height:g} m over the ground, the "
+                "height of the centre of mass over the feet"
+            )
 
 
 def _check_numbers(prefix: str, part: Any) -> None:

@@ -100,6 +100,7 @@ def ablate(
     setup = Setup.of(dataclasses.replace(config, devices=1))
     variants = (FULL, *terms)
     members = len(variants) * seeds
+    setup.check(members)
     devices = min(len(jax.devices()), members)
     room = -(-members // devices) * devices  # the last member repeated fills the devices
     places = np.minimum(np.arange(room), members - 1)

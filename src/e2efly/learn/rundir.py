@@ -9,6 +9,7 @@ import dataclasses
 import io
 import json
 import platform
+import reprlib
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -16,9 +17,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from e2efly.config import CameraConfig, StageConfig, TrainConfig
+from e2efly.config import TrainConfig
+from e2efly.config.reading import read
 from e2efly.learn.inputs import Kept, by_content, content_of, input_files, replaced, sha256, value_at
-from e2efly.presets import algorithm_name, preset, task_name
+from e2efly.presets import ALGORITHMS, TASKS, algorithm_name, preset, task_name
 from e2efly.storage import held, write_atomically, write_json
 
 _PACKAGES = ("e2efly", "jax", "jaxlib", "numpy", "optax", "onnx", "onnxruntime")
@@ -114,8 +116,6 @@ class RunDirectory:
         if not (self.path / "inputs.json").exists():
             return {}
         content, found = self.read_json("inputs.json"), {}
-        if not isinstance(content, dict):
-            raise ValueError(f"{self.path / 'inputs.json'} is {content!r}; accepted: an object")
         for field, about in content.items():
             try:
                 named, original, digest = (str(about[name]) for name in ("named", "original", "sha256"))
@@ -140,12 +140,17 @@ class RunDirectory:
         """Read a JSON file.
 
         Raises:
-            ValueError: when it is missing or no JSON.
+            ValueError: when it is missing, no JSON, or JSON of something else than an object.
         """
         try:
-            return json.loads((self.path / name).read_text(encoding="utf-8"))
+            found = json.loads((self.path / name).read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise ValueError(f"{self.path / name} cannot be read: {error}") from None
+        except RecursionError:
+            raise ValueError(f"{self.path / name} cannot be read: it is nested too deeply") from None
+        if not isinstance(found, dict):
+            raise ValueError(f"{self.path / name} is {reprlib.repr(found)}; accepted: an object")
+        return found
 
     def config(self, names_vehicle: bool = False) -> TrainConfig:
         """The configuration of the run, with its own copies of the files that it is made from.
@@ -262,38 +267,18 @@ def from_json(content: dict[str, Any], where: str) -> TrainConfig:
     """The configuration that `to_json` wrote, of this version or an older one.
 
     Raises:
-        ValueError: for unknown keys and missing ones without a default, naming them.
+        ValueError: for unknown keys and missing ones without a default, naming them; for a value of another type,
+            naming the field, the value and what is accepted.
     """
-    content = dict(content)
-    try:
-        like = preset(content.pop("task_name"), content.pop("algo_name"))
-    except KeyError as error:
-        raise ValueError(f"{where}: missing key {error}") from None
-    return _read(like, content, where)
-
-
-def _read(like: Any, content: Any, where: str) -> Any:
-    names = {f.name for f in dataclasses.fields(like)}
-    # what an older version did not know is as it was then: off, its field's default
-    needed = {f.name for f in dataclasses.fields(like) if f.default is f.default_factory is dataclasses.MISSING}
-    if not isinstance(content, dict) or not needed <= set(content) <= names:
-        found = sorted(set(content) - names | needed - set(content)) if isinstance(content, dict) else content
-        raise ValueError(f"{where}: unknown or missing key: {found}; accepted: {', '.join(sorted(names))}")
-    values = {name: _value(like, name, value, where) for name, value in content.items()}
-    return type(like)(**values)
-
-
-def _value(like: Any, name: str, value: Any, where: str) -> Any:
-    default = getattr(like, name)
-    if dataclasses.is_dataclass(default):
-        return _read(default, value, f"{where}: {name}")
-    if name == "cameras":
-        return tuple(_read(CameraConfig(), camera, f"{where}: {name}[{i}]") for i, camera in enumerate(value))
-    if name == "curriculum":
-        return tuple(_read(StageConfig({}), stage, f"{where}: {name}[{i}]") for i, stage in enumerate(value))
-    if isinstance(value, dict):
-        return {key: tuple(x) if isinstance(x, list) else x for key, x in value.items()}
-    return tuple(value) if isinstance(value, list) else value
+    names = {"task_name": TASKS, "algo_name": ALGORITHMS}
+    if missing := sorted(names.keys() - content.keys()):
+        raise ValueError(f"{where}: missing key {', '.join(map(repr, missing))}")
+    for name, known in names.items():
+        if not isinstance(content[name], str):
+            raise ValueError(f"{where}: {name} is {reprlib.repr(content[name])}; accepted: {', '.join(known)}")
+    like = preset(content["task_name"], content["algo_name"])
+    rest = {name: value for name, value in content.items() if name not in names}
+    return read(TrainConfig, rest, where, {"task": type(like.task), "algo": type(like.algo)})
 
 
 def differences(a: TrainConfig, b: TrainConfig) -> Iterator[str]:

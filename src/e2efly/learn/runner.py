@@ -237,17 +237,16 @@ def policy_of(state: TrainState) -> Weights:
 @contextmanager
 def _writing(run: RunDirectory, update: int) -> Iterator[Callable[[list[dict[str, float]]], None]]:
     """Writes rows to metrics.csv, and the last of them to TensorBoard's events; in process 0."""
-    from tensorboardX import SummaryWriter
+    from e2efly.learn.events import event_file
 
     if not hosts.first():
         yield lambda rows: None
         return
-    with SummaryWriter(str(run.events), purge_step=update) as events:
+    with event_file(run.events, update) as log:
 
         def write(rows: list[dict[str, float]]) -> None:
             run.append(rows)
-            for name, value in rows[-1].items():
-                events.add_scalar(name, value, int(rows[-1]["update"]))
+            log(rows[-1], int(rows[-1]["update"]))
 
         yield write
 
@@ -328,13 +327,15 @@ def _interruptible() -> Iterator[threading.Event]:
     def ask(signum: int, frame: Any) -> None:
         del signum, frame
         stop.set()
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGINT, old)
 
+    watched = signal.set_wakeup_fd(-1)  # or the command line's watcher would end what is to stop in order
     old = signal.signal(signal.SIGINT, ask)
     try:
         yield stop
     finally:
         signal.signal(signal.SIGINT, old)
+        signal.set_wakeup_fd(watched, warn_on_full_buffer=False)
 
 
 def load_policy_weights(setup: Setup, run: RunDirectory, which: str) -> Weights:

@@ -8,6 +8,7 @@ from e2efly import presets
 from e2efly.config import TrainConfig
 from e2efly.env import Env
 from e2efly.learn.algorithm import Algorithm, make_algorithm
+from e2efly.learn.budget import check_run
 from e2efly.learn.curriculum import Stage, stages
 from e2efly.learn.devices import share
 from e2efly.learn.networks import Actor
@@ -40,10 +41,17 @@ class Setup:
         actor = Actor.of(env.fields, env.cameras, config.network)
         algorithm = make_algorithm(config.algo, actor)
         per_update = config.algo.steps
-        chunks = math.ceil(config.steps / (per_update * config.chunk))
+        chunks = -(-config.steps // (per_update * config.chunk))
         devices = share(config.algo.envs, getattr(config.algo, "minibatch", None), config.devices)
         config = dataclasses.replace(config, devices=devices)
-        return Setup(config, course, algorithm, actor, chunks * config.chunk, devices)
+        setup = Setup(config, course, algorithm, actor, chunks * config.chunk, devices)
+        setup.check()
+        return setup
+
+    def check(self, members: int = 1) -> None:
+        """Refuse what `members` such runs, trained together, cannot have: see `e2efly.learn.budget`."""
+        judged = self.episode_steps * len(self.judges)
+        check_run(self.config, self.env, self.actor, self.updates, judged, members)
 
     @property
     def vehicles(self) -> int:

@@ -18,6 +18,11 @@ from e2efly.physics.state import Parts, State, split4
 from e2efly.vehicles.names import unknown
 from e2efly.vehicles.vehicle import Vehicle
 
+RATES = (0.1, 10_000.0)
+"""Slowest and fastest control rate, Hz: no flight controller's loop is faster."""
+STEPS = (1e-6, 1.0)
+"""Shortest and longest of the largest physics sub-step, s."""
+
 
 @partial(
     jax.tree_util.register_dataclass,
@@ -60,9 +65,11 @@ class Physics:
         if integrator not in INTEGRATORS:
             raise ValueError(unknown("integrator", integrator, INTEGRATORS))
         rate = vehicle.control_rate if control_rate is None else control_rate
-        for name, value in (("control_rate", rate), ("largest_step", largest_step)):
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} is {value}; accepted: a positive number")
+        for name, value, (low, high), unit in (
+            ("control_rate", rate, RATES, "Hz"), ("largest_step", largest_step, STEPS, "s")
+        ):  # fmt: skip
+            if not low <= value <= high:  # false for NaN
+                raise ValueError(f"{name} is {value}; accepted: a positive number, {low:g} to {high:g} {unit}")
         substeps = math.ceil(1 / (rate * largest_step) - 1e-9)
         nominal = jax.tree.map(lambda x: np.asarray(x, dtype), vehicle)
         return Physics(nominal, Mixer.of(vehicle, dtype), command_mode, integrator, 1 / rate, substeps)

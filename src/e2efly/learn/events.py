@@ -1,0 +1,58 @@
+"""TensorBoard's events, written in the thread that has them.
+
+A thread of the writer's own, as tensorboardX's `SummaryWriter` has, dies of a full disk with a traceback, and whoever
+hands it more then waits for ever.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from tensorboardX.event_file_writer import EventsWriter
+from tensorboardX.proto.event_pb2 import Event, SessionLog  # pyright: ignore[reportAttributeAccessIssue]
+from tensorboardX.summary import scalar
+
+
+@contextmanager
+def event_file(folder: Path, first: int) -> Iterator[Callable[[Mapping[str, float], int], None]]:
+    """A new file of events.
+
+    Args:
+        folder: where.
+        first: step from which on events of earlier files are void.
+
+    Yields:
+        Writes numbers by name, at a step.
+
+    Raises:
+        OSError: naming the folder, when it cannot be written.
+    """
+    writer: Any = None
+    try:
+        with _named(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            writer = EventsWriter(str(folder / "events"))
+            begun = SessionLog(status=SessionLog.START)
+            writer.write_event(Event(wall_time=time.time(), step=first, session_log=begun))
+
+        def write(numbers: Mapping[str, float], step: int) -> None:
+            with _named(folder):
+                for name, value in numbers.items():
+                    writer.write_event(Event(wall_time=time.time(), step=step, summary=scalar(name, value)))
+                writer.flush()
+
+        yield write
+    finally:
+        if writer is not None:
+            with suppress(OSError):  # what was whole is written
+                writer.close()
+
+
+@contextmanager
+def _named(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise OSError(f"cannot write {folder}: {error.strerror}") from None
