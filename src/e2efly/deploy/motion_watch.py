@@ -34,6 +34,8 @@ TILT = 0.5
 """Accepted between the controller's tilt and the odometry's, rad."""
 BY_HAND, BY_HAND_SHARE = 0.4, 1.2
 """The same of both while the vehicle is carried, where it may knock against something: only what is opposed is told."""
+CARRIED = 0.25
+"""What the sensors must have felt for that, m/s or rad: poses that jump while nothing moves are another matter."""
 ALIKE, MOVED = 0.4, 0.6
 """Carried so far, m/s, with a difference of less than this share of it, poses and sensors agree."""
 LASTING_S = 0.03
@@ -124,7 +126,10 @@ class MotionWatch:
         """How the poses contradict the sensors while the vehicle is carried; None: they do not."""
         x, y, z = (float(d) for d in self.differs.speed)
         off = (math.hypot(x, y), abs(z), self.differs.turn)
-        apart = any(d > BY_HAND + BY_HAND_SHARE * effort for d, effort in zip(off, self.effort, strict=True))
+        apart = any(
+            d > BY_HAND + BY_HAND_SHARE * effort and effort > CARRIED
+            for d, effort in zip(off, self.effort, strict=True)
+        )
         return self._text if apart else None
 
     @property

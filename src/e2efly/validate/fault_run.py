@@ -9,6 +9,7 @@ from e2efly.deploy.flight_log import read_log
 from e2efly.deploy.flight_state import Mode, Reason
 from e2efly.deploy.telemetry import Telemetry
 from e2efly.validate.faults import End, Fault
+from e2efly.validate.rig import STEP_S
 from e2efly.validate.stage import FENCE, Stage, Trace
 
 DOWN = (End.LANDED, End.OFF, End.FAILSAFE, End.FALLS)
@@ -56,7 +57,8 @@ def strike(stage: Stage, fault: Fault, log: Path) -> Outcome:
     if fault.during is Mode.INIT:
         return _refused(stage, fault, log)
     stage.ready(fault.during)
-    bridge, session, period = stage.session.bridge, stage.session, stage.session.period
+    bridge, session = stage.session.bridge, stage.session
+    period = math.ceil(session.period / STEP_S - ROUNDING) * STEP_S  # the rig's time goes on in whole steps
     stage.trace = Trace()
     with Telemetry(log) as telemetry:
         bridge.log = telemetry
@@ -95,6 +97,8 @@ def _arrived(stage: Stage, fault: Fault) -> bool:
     """Whether the flight is where it is to stay."""
     if fault.end is End.GOES_ON:
         return True
+    if fault.end is End.STANDS:
+        return stage.standing and stage.session.bridge.sent.throttle == 0
     if fault.end in DOWN:
         return stage.mode in (Mode.DONE, Mode.INIT)
     if fault.end is End.PILOT and fault.reason is Reason.LINK:
@@ -102,8 +106,12 @@ def _arrived(stage: Stage, fault: Fault) -> bool:
     return stage.mode is {End.HOVER: Mode.HOVER, End.PILOT: Mode.PILOT}[fault.end]
 
 
-_FIRST = {End.HOVER: Mode.HOVER} | dict.fromkeys(DOWN, Mode.LAND)
-_LAST = {End.HOVER: (Mode.HOVER,)} | dict.fromkeys(DOWN, (Mode.DONE, Mode.INIT)) | {End.LANDED: (Mode.DONE,)}
+_FIRST = {End.HOVER: Mode.HOVER, End.STANDS: Mode.LAND} | dict.fromkeys(DOWN, Mode.LAND)
+_LAST = (
+    {End.HOVER: (Mode.HOVER,), End.STANDS: (Mode.LAND,)}
+    | dict.fromkeys(DOWN, (Mode.DONE, Mode.INIT))
+    | {End.LANDED: (Mode.DONE,)}
+)
 
 
 def _change_problems(
@@ -130,7 +138,7 @@ def _world_problems(fault: Fault, trace: Trace, speed: float, tilt: float) -> li
     problems = []
     if max(trace.tilt) > math.pi / 2 and fault.end is not End.FALLS:
         problems.append(f"tilted by {max(trace.tilt):.2f} rad")
-    if fault.end in (End.LANDED, End.FAILSAFE) or (fault.end is End.PILOT and fault.reason is Reason.LINK):
+    if fault.end in (End.LANDED, End.STANDS, End.FAILSAFE) or (fault.end is End.PILOT and fault.reason is Reason.LINK):
         if not speed <= TOUCH_SPEED:
             problems.append(f"touched the ground at {speed:.2f} m/s; accepted: {TOUCH_SPEED}")
         if not tilt <= TOUCH_TILT:

@@ -43,6 +43,7 @@ class End(StrEnum):
     GOES_ON = "the flight goes on"
     HOVER = "hover"
     LANDED = "landed"
+    STANDS = "stands, throttle closed"
     PILOT = "the pilot flies"
     OFF = "motors off"
     FAILSAFE = "the controller lands it"
@@ -290,8 +291,8 @@ FAULTS = (
     Fault("poses: NaN", Mode.POLICY, _alter(_nan), End.LANDED, Reason.NO_ODOMETRY, OUTLIERS_S + POSE_S),
     Fault("poses: the heading drifts away", Mode.HOVER, _drift, End.LANDED, Reason.NO_ODOMETRY, HEADING_S,
           begins=_led_astray),
-    Fault("link: nothing but garbage comes back", Mode.POLICY, _link(spoilt=1.0), End.LANDED, Reason.LINK, 0.25),
-    Fault("link: half frames", Mode.POLICY, _link(halved=1.0), End.LANDED, Reason.LINK, 0.25),
+    Fault("link: nothing but garbage comes back", Mode.POLICY, _link(spoilt=1.0), End.STANDS, Reason.LINK, 0.25),
+    Fault("link: half frames", Mode.POLICY, _link(halved=1.0), End.STANDS, Reason.LINK, 0.25),
     Fault("link: slow, 60 ms each way", Mode.POLICY, _link(delay=0.06), End.LANDED, Reason.LINK, 0.25),
     Fault("battery low", Mode.HOVER, _rewrite(BatteryState.CODE, _low_battery), End.LANDED, Reason.BATTERY_LOW,
           BATTERY_S),

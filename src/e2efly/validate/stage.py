@@ -209,7 +209,7 @@ class Stage:
         self.rig.set(override=True, throttle=0.0)
         self.fly(0.2)
         self.rig.set(armed=True)
-        self.fly(0.2)
+        self.fly(5.0, lambda: self.session.bridge.flight.reasons == (Reason.WAITING,))
         self.rig.set(mission="hover")
         self._expect(self.settings.takeoff_height / self.settings.takeoff_speed + 6.0, Mode.HOVER)
 
