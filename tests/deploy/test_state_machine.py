@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from e2efly.deploy.fence import fence_problem, heading, moved, stopping, tilt_of
 from e2efly.deploy.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Pilot, Reason, Target
 from e2efly.deploy.hover import blind_time
+from e2efly.deploy.landing import FOUND_S, SLOWED_S
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.settings import Fence, FlightSettings
-from e2efly.deploy.state_machine import FALLEN_S, FOUND_S, LONGEST_STEP, NEAR_GROUND, SLOWED_S, step
+from e2efly.deploy.state_machine import FALLEN_S, LONGEST_STEP, NEAR_GROUND, step
 
 SETTINGS = FlightSettings()
 DT = 0.01

@@ -30,10 +30,10 @@ from e2efly.deploy.policy import Policy, load_policy
 from e2efly.deploy.policy_worker import PolicyWorker
 from e2efly.deploy.pose.checks import Checks
 from e2efly.deploy.pose.source import PoseSource, open_source
+from e2efly.deploy.refusals import take_off_refusals
 from e2efly.deploy.runtime import Envelope, Runtime, check
 from e2efly.deploy.settings import FlightSettings
 from e2efly.deploy.settings import check as check_settings
-from e2efly.deploy.state_machine import take_off_refusals
 from e2efly.deploy.sticks import sticks_of
 from e2efly.deploy.telemetry import Telemetry
 from e2efly.deploy.terminal import Speaker, Stop, printable

@@ -1,7 +1,7 @@
 """What the state machine knows, remembers and says: its inputs, its state, its reasons."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from e2efly.deploy.odometry import Odometry
@@ -208,3 +208,10 @@ class Flight:
     """The error of the odometry's heading for which it counts as lost, rad."""
     misled: str | None = None
     """Why the odometry is not the vehicle's own: until it stands, it counts as lost; None: it is."""
+
+
+def to(
+    flight: Flight, mode: Mode, *reasons: str, target: Target | None = None, blind: bool = False, **changes: bool
+) -> Flight:
+    """The flight in another mode, for these reasons, with the target and the fields that are given."""
+    return replace(flight, mode=mode, reasons=reasons, target=target, blind=blind, **changes)

@@ -1,0 +1,155 @@
+"""The landing: by odometry, without it, and while nothing is heard of the controller. Pure.
+
+It ends where the vehicle stands: at the height of its take-off by the odometry, higher up only where something is felt
+to carry it, without odometry where the ground is felt or by the clock; and never while the link is silent.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+
+from e2efly.deploy.fence import stopping
+from e2efly.deploy.flight_state import Flight, Inputs, Mode, Reason, Target, to
+from e2efly.deploy.hover import blind_time
+from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.settings import FlightSettings
+
+STANDING = 0.1
+"""A still vehicle this near to the height at which it stood before stands there again, m."""
+SLOW = 0.5
+"""Horizontal speed below which a landing sinks, m/s ..."""
+SLOWED_S = 3.0
+"""... or after so long: in a gust it may never be that slow, s."""
+LEAD = 0.6
+"""How far the target of a landing may be under the vehicle, m: farther shows no more than that there is ground."""
+PRESSED = 0.5
+"""A still vehicle with its target so far under it stands on something, m."""
+PRESSING = 0.5
+"""One that is still in the air, by its height, is pressed down ever harder until it is felt that it stands, m/s."""
+FOUND_S = 0.5
+"""Odometry that was lost in a landing must be good for so long, s, to be flown by again: one that comes and goes must
+not begin the landing anew each time."""
+STAYS_S, AWAY_S = 1.0, 3.0
+"""A landing that stays at one place for so long has ended at home, s, and, sent down blindly, elsewhere, s."""
+RECENT_S = 0.5
+"""An odometry as old as this still tells that the vehicle stands, s."""
+
+
+def land(settings: FlightSettings, flight: Flight, inputs: Inputs, *reasons: str) -> Flight:
+    """Begin a landing for these reasons: by odometry where there is some, without it otherwise."""
+    if inputs.seen is None:
+        return _blindly(settings, flight, inputs, *reasons)
+    return to(flight, Mode.LAND, *reasons, target=_down_from(settings, inputs.seen))
+
+
+def _blindly(settings: FlightSettings, flight: Flight, inputs: Inputs, *reasons: str) -> Flight:
+    lost = _last_seen(settings, flight, inputs)
+    begun = dataclasses.replace(flight, lost=lost, found_since=None)
+    return to(begun, Mode.LAND, *reasons, blind=True)
+
+
+def _down_from(settings: FlightSettings, odometry: Odometry) -> Target:
+    """Where it can stop, but no higher than it is: what has nearly landed must not rise to the fence's floor."""
+    target = stopping(settings.fence, odometry)
+    x, y, z = target.position
+    return dataclasses.replace(target, position=(x, y, min(z, float(odometry.position[2]))))
+
+
+def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
+    """A landing after another control step of `dt` s."""
+    flight = _looked(flight, inputs)
+    if inputs.link_problem and inputs.silent:  # what it does meanwhile is not known: nothing counts as landed
+        return _unheard(settings, flight, inputs)
+    if flight.standing_since is not None and flight.now - flight.standing_since >= _settled(settings, flight, inputs):
+        assert inputs.odometry is not None
+        return dataclasses.replace(to(flight, Mode.DONE, Reason.LANDED), home=float(inputs.odometry.position[2]))
+    odometry = inputs.seen
+    if odometry is None:
+        return _sinking(settings, flight, inputs)
+    if flight.blind:
+        found = flight.now if flight.found_since is None else flight.found_since
+        flight = dataclasses.replace(flight, found_since=found, lost=_last_seen(settings, flight, inputs))
+        return _sinking(settings, flight, inputs) if flight.now - found < FOUND_S else _see(settings, flight, odometry)
+    assert flight.target is not None
+    x, y, z = flight.target.position
+    height = float(odometry.position[2])
+    stopped = float(np.linalg.norm(odometry.velocity[:2])) < SLOW or flight.now - flight.since > SLOWED_S
+    sink = settings.land_speed if stopped else 0.0
+    still_for = 0.0 if flight.still_since is None else flight.now - flight.still_since
+    down = max(z - sink * dt, height - LEAD - PRESSING * max(still_for - settings.land_settle, 0.0))
+    still = float(np.linalg.norm(odometry.velocity)) < settings.still_speed and height - down > PRESSED
+    since = (flight.now if flight.still_since is None else flight.still_since) if still else None
+    low = height < flight.home + STANDING
+    if since is not None and flight.now - since >= settings.land_settle and (low or inputs.supported):
+        return dataclasses.replace(to(flight, Mode.DONE, Reason.LANDED), home=height)
+    target = Target((x, y, down), flight.target.yaw, -sink)
+    return dataclasses.replace(flight, target=target, still_since=since)
+
+
+def _see(settings: FlightSettings, flight: Flight, odometry: Odometry) -> Flight:
+    """Land by odometry from where it is."""
+    return dataclasses.replace(
+        flight, blind=False, found_since=None, lost=None, target=_down_from(settings, odometry), still_since=None,
+        nearest=math.inf,
+    )  # fmt: skip
+
+
+def _unheard(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
+    """While the link is down: no clock of the landing runs, and it will begin where the vehicle is."""
+    flight = dataclasses.replace(flight, still_since=None)
+    if inputs.seen is not None:
+        return _see(settings, flight, inputs.seen)
+    if not flight.blind or flight.lost is None:
+        return _blindly(settings, flight, inputs, *flight.reasons)
+    return dataclasses.replace(flight, lost=(flight.now, *flight.lost[1:]))
+
+
+def _looked(flight: Flight, inputs: Inputs) -> Flight:
+    """In a landing: since when the newest odometry, good or lost just now, has stayed at one place."""
+    odometry = inputs.odometry
+    if odometry is None or flight.misled or flight.now - odometry.time > RECENT_S:
+        return dataclasses.replace(flight, standing_since=None, stood_at=None)
+    x, y, z = (float(p) for p in odometry.position)
+    if not math.isfinite(x + y + z):
+        return flight
+    if flight.stood_at is None or math.dist(flight.stood_at, (x, y, z)) > STANDING:
+        return dataclasses.replace(flight, standing_since=flight.now, stood_at=(x, y, z))
+    return flight
+
+
+def _settled(settings: FlightSettings, flight: Flight, inputs: Inputs) -> float:
+    """For how long it must have stayed at one place to have landed, s."""
+    assert inputs.odometry is not None
+    if abs(float(inputs.odometry.position[2]) - flight.home) < STANDING:
+        return max(settings.land_settle, STAYS_S)
+    return AWAY_S if flight.blind else math.inf
+
+
+def _last_seen(settings: FlightSettings, flight: Flight, inputs: Inputs) -> tuple[float, float, float]:
+    """Now, and the height over home, m, and the climb, m/s, that the newest odometry tells; mirrored, it is as high."""
+    o = inputs.odometry
+    height, climb = (math.nan, math.nan) if o is None else (float(o.position[2]) - flight.home, float(o.velocity[2]))
+    if not math.isfinite(height):
+        height = settings.fence.high[2] - flight.home
+    return flight.now, abs(height), abs(climb) if math.isfinite(climb) else 0.0
+
+
+def _sinking(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
+    """Landing without odometry ends with the ground felt, or by the clock: what has landed must not start up again."""
+    if not flight.blind:
+        return _blindly(settings, flight, inputs, inputs.blindness)
+    if inputs.touched:
+        return to(flight, Mode.DONE, Reason.TOUCHED)
+    if inputs.seen is None:
+        flight = dataclasses.replace(flight, found_since=None)
+    at, height, climb = flight.lost or _last_seen(settings, flight, inputs)
+    if flight.now - at > blind_time(height, climb):
+        return to(flight, Mode.DONE, f"{Reason.LANDED}: without odometry, after {flight.now - at:.0f} s")
+    return flight
+
+
+def stands(settings: FlightSettings, flight: Flight, odometry: Odometry) -> bool:
+    """Whether it is still, at the height of its take-off."""
+    still = float(np.linalg.norm(odometry.velocity)) < settings.still_speed
+    return still and abs(float(odometry.position[2]) - flight.home) < STANDING
