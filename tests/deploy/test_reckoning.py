@@ -103,7 +103,7 @@ def test_the_speed_is_the_accelerometers_as_far_as_the_throttles_allows() -> Non
     assert after is not None
     assert after.velocity[2] == pytest.approx(-0.1) and after.lifted == pytest.approx(-0.3)
     assert after.doubt == pytest.approx(DOUBT + 0.05) and after.climb == pytest.approx(-0.3 + (DOUBT + 0.05) / 2)
-    assert after.height == pytest.approx(after.climb * 0.1)
+    assert after.height == pytest.approx((after.lifted + after.doubt) * 0.1)
 
 
 def test_what_is_not_known_is_taken_from_the_other() -> None:

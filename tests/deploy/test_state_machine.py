@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from e2efly.deploy.fence import fence_problem, heading, moved, stopping, tilt_of
 from e2efly.deploy.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Pilot, Reason, Target
 from e2efly.deploy.hover import blind_time
-from e2efly.deploy.landing import FOUND_S, SLOWED_S
+from e2efly.deploy.landing import FOUND_S, SLOWED_S, has_stood
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.settings import Fence, FlightSettings
 from e2efly.deploy.state_machine import FALLEN_S, LONGEST_STEP, NEAR_GROUND, step
@@ -470,6 +470,14 @@ def test_nothing_has_landed_while_the_link_is_down() -> None:
     silent = having(UP, link_problem="no answer", silent=True, odometry=at(0.79))
     flight = flown(hovering(), silent, 20.0)
     assert flight.mode is Mode.LAND and not flight.blind and flight.target is not None
+    assert not has_stood(SETTINGS, flight, silent.odometry)  # nor is the throttle closed
+    stands = dataclasses.replace(at(), time=flight.now)
+    assert has_stood(SETTINGS, flown(flight, having(silent, odometry=stands), 0.4), stands) is False
+    for _ in range(200):
+        stands = dataclasses.replace(at(), time=flight.now)
+        flight = flown(flight, having(silent, odometry=stands))
+    assert has_stood(SETTINGS, flight, stands) and flight.mode is Mode.LAND
+    flight = flown(hovering(), silent, 20.0)
     assert flight.target.position[2] == 0.79  # it will go on from where it is
     again = flown(flight, having(silent, link_problem=None), 0.5)
     assert again.target is not None and again.target.position[2] < 0.7

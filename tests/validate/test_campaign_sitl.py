@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from e2efly.deploy.goal_options import GoalOptions, goal_for
 from e2efly.deploy.msp.messages import RawImu
@@ -12,6 +13,7 @@ from e2efly.validate import firmware
 from e2efly.validate.campaign import Scenario, fly
 from e2efly.validate.injections import COUNTS, KINDS, Faults, Strike
 from e2efly.validate.rig import Rig
+from e2efly.validate.scenarios import CASES
 from e2efly.validate.stage import LATENCY_S, TARGET, Stage
 from e2efly.vehicles import load_vehicle
 
@@ -24,6 +26,31 @@ def test_poses_that_end_in_a_take_off_break_no_rule(policy_of: Callable[..., Pat
     assert 0.2 < flown.touch_speed < 1.5
     assert flown.climb == 0.0  # it never came to its hover
     assert flown.changes[0][1] == "land"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "accelerometer z times 0.93, poses lost with it",
+        "accelerometer z times 0.97, poses lost 3 s later",
+        "accelerometer z times -1, poses lost with it",
+        "accelerometer z times -1 on the ground, poses lost in flight",
+        "poses: NED and FRD from the ground, pose only",
+        "poses: z mirrored from the ground, with velocity",
+        "poses: quaternion conjugated from the ground, with velocity",
+        "poses: velocity negated from the ground",
+        "poses: velocity zero from the ground",
+        "poses: 5 Hz from the ground",
+        "poses: 0.15 s late from the ground",
+        "link: silent for 3 s in a quiet hover",
+    ],
+)
+def test_what_ended_badly_once_breaks_no_rule(name: str, policy_of: Callable[..., Path], tmp_path: Path) -> None:
+    """Each of these climbed away, fell, touched too fast, or stood armed for as long as it was watched."""
+    (scenario,) = (case for case in CASES if case.name == name)
+    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware.chosen(), tmp_path)
+    assert flown.violations == ()
+    assert flown.ended
 
 
 def test_every_kind_can_strike_and_end(policy_of: Callable[..., Path], tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from e2efly.deploy.heading_watch import HeadingWatch, watched
 from e2efly.deploy.hover import blind, controlled, flight_gains, held, roll_pitch
 from e2efly.deploy.inertial import Inertial, Measurement
 from e2efly.deploy.instruments import CLOSED, PROBE, ChannelProbe, Instruments, Reading
+from e2efly.deploy.landing import has_stood
 from e2efly.deploy.msp.client import Client
 from e2efly.deploy.msp.controller import ControllerInfo
 from e2efly.deploy.msp.messages import Attitude, RawImu, set_raw_rc
@@ -359,8 +360,7 @@ class Bridge:
         if flight.target is None or odometry is None or flight.blind:
             return self._blind(now, dt)
         if self.inputs.link_problem and self.inputs.silent:
-            stands = flight.standing_since is not None and now - flight.standing_since > self.settings.land_settle
-            return ("closed", None) if stands else ("held", held(odometry))
+            return ("closed", None) if has_stood(self.settings, flight, odometry) else ("held", held(odometry))
         return "hover", self._hover(flight.target, odometry, dt)
 
     def _blind(self, now: float, dt: float) -> tuple[str, Ctbr | None]:

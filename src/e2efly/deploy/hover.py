@@ -112,7 +112,7 @@ def blind_time(height: float, climb: float = 0.0) -> float:
     up = max(climb, 0.0)
     top = max(height, 0.0) + up**2 / (2 * SINK_ACCELERATION)
     sinking = (math.sqrt(SLOWEST_SINK**2 + 2 * SLOWEST_FASTER * top) - SLOWEST_SINK) / SLOWEST_FASTER
-    return 2.0 + up / SINK_ACCELERATION + sinking
+    return 1.8 + up / SINK_ACCELERATION + sinking
 
 
 def roll_pitch(quaternion: np.ndarray) -> tuple[float, float]:

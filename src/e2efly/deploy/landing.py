@@ -61,7 +61,7 @@ def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
     flight = _looked(flight, inputs)
     if inputs.link_problem and inputs.silent:  # what it does meanwhile is not known: nothing counts as landed
         return _unheard(settings, flight, inputs)
-    if flight.standing_since is not None and flight.now - flight.standing_since >= _settled(settings, flight, inputs):
+    if has_stood(settings, flight, inputs.odometry):
         assert inputs.odometry is not None
         return dataclasses.replace(to(flight, Mode.DONE, Reason.LANDED), home=float(inputs.odometry.position[2]))
     odometry = inputs.seen
@@ -118,12 +118,14 @@ def _looked(flight: Flight, inputs: Inputs) -> Flight:
     return flight
 
 
-def _settled(settings: FlightSettings, flight: Flight, inputs: Inputs) -> float:
-    """For how long it must have stayed at one place to have landed, s."""
-    assert inputs.odometry is not None
-    if abs(float(inputs.odometry.position[2]) - flight.home) < STANDING:
-        return max(settings.land_settle, STAYS_S)
-    return AWAY_S if flight.blind else math.inf
+def has_stood(settings: FlightSettings, flight: Flight, odometry: Odometry | None) -> bool:
+    """Whether a landing has stayed at one place for so long that it has ended there, by the newest odometry."""
+    if odometry is None or flight.standing_since is None:
+        return False
+    stayed = flight.now - flight.standing_since
+    if abs(float(odometry.position[2]) - flight.home) < STANDING:
+        return stayed >= max(settings.land_settle, STAYS_S)
+    return flight.blind and stayed >= AWAY_S
 
 
 def _last_seen(settings: FlightSettings, flight: Flight, inputs: Inputs) -> tuple[float, float, float]:

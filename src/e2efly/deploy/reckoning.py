@@ -30,6 +30,8 @@ FASTEST_SINK, LOW_SINK, LOW = 2.0, 1.3, 3.0
 SAG, SAG_RATE, SAG_S = 0.02, 0.05, 0.3
 """The thrust follows the force that is felt, as a battery sags: while they are no farther apart than this share, by so
 much in a second, within so long, s. What is farther off at once is no battery: it is the accelerometer."""
+SLOWER = 0.3
+"""The height is reckoned with a speed that is so much higher, m/s, at most."""
 DOUBT = 0.05
 """Error of the vertical speed that the poses show, m/s."""
 TRIM_GAIN, TRIM_ERROR, LARGEST_TRIM = 3.0, 0.6, 4.0
@@ -54,7 +56,7 @@ class Reckoning:
     since: float
     """When the odometry was seen last, s."""
     height: float
-    """Reckoned from the odometry's last, world, m."""
+    """Reckoned from the odometry's last, world, m: the largest that is plausible."""
     top: float
     """The highest since then, m."""
 
@@ -110,7 +112,7 @@ def reckon(
         before, velocity=(forward + ahead * dt, left + aside * dt, up + (above - GRAVITY) * dt),
         lifted=before.lifted + (lift - GRAVITY) * dt, doubt=before.doubt + doubt * dt, share=share, time=now,
     )  # fmt: skip
-    height = before.height + after.climb * dt
+    height = before.height + min(after.lifted + after.doubt, after.climb + SLOWER) * dt
     return replace(after, height=height, top=max(height, before.top))
 
 

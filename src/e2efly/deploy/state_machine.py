@@ -86,6 +86,8 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
     """
     if flight.mode in (Mode.INIT, Mode.DONE):
         return dataclasses.replace(flight, misled=None, turned=None, fallen_since=None)
+    if inputs.motion_problem and not flight.misled and not _nearly_landed(flight, inputs.odometry):
+        flight = dataclasses.replace(flight, misled=f"{Reason.MOTION}: {inputs.motion_problem}")
     odometry, target = inputs.seen, flight.target
     if odometry is None:
         return dataclasses.replace(flight, fallen_since=None)
@@ -95,11 +97,11 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
     error = inputs.heading_error
     if flight.misled and flight.turned is not None and error is not None:
         flight = dataclasses.replace(flight, turned=error)
-    if inputs.motion_problem and not flight.misled and not _nearly_landed(flight, odometry):
-        return dataclasses.replace(flight, misled=f"{Reason.MOTION}: {inputs.motion_problem}")
-    if target is None or flight.mode is Mode.PILOT:
+    if flight.mode is Mode.PILOT:
         misled = None if stands(settings, flight, odometry) else flight.misled
         return dataclasses.replace(flight, misled=misled, turned=flight.turned if misled else None)
+    if target is None:
+        return flight
     if error is not None and abs(error) > settings.heading_agreement:
         return dataclasses.replace(flight, misled=TURNED, turned=error)
     off = math.hypot(*np.subtract(target.position[:2], odometry.position[:2]).tolist())
@@ -109,8 +111,10 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
     return dataclasses.replace(flight, nearest=nearest, misled=misled)
 
 
-def _nearly_landed(flight: Flight, odometry: Odometry) -> bool:
-    return flight.mode is Mode.LAND and abs(float(odometry.position[2]) - flight.home) < NEAR_GROUND
+def _nearly_landed(flight: Flight, odometry: Odometry | None) -> bool:
+    if flight.mode is not Mode.LAND or flight.blind or odometry is None:
+        return False
+    return abs(float(odometry.position[2]) - flight.home) < NEAR_GROUND
 
 
 def _mission_low(inputs: Inputs) -> bool:
