@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,6 +21,10 @@ import jax  # noqa: E402
 
 jax.devices()  # reads them
 os.environ["XLA_FLAGS"] = _usual
+
+# A suite that was started in the background ignores Ctrl-C or the end of its terminal, and so would all that it starts.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402

@@ -392,6 +392,11 @@ def test_no_file_of_deploy_names_jax_or_the_simulator() -> None:
             for name in names:
                 root, part = (*name.split("."), "")[:2]
                 assert root not in ("jax", "jaxlib", "jaxtyping", "optax", "onnx"), f"{file} imports {name}"
-                assert root != "e2efly" or part in ("control", "courses", "deploy", "observation", "vehicles"), (
-                    f"{file} imports {name}"
-                )
+                assert root != "e2efly" or part in (
+                    "control",
+                    "courses",
+                    "deploy",
+                    "observation",
+                    "storage",
+                    "vehicles",
+                ), f"{file} imports {name}"
