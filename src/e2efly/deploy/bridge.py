@@ -16,6 +16,7 @@ from e2efly.deploy.hover import blind, controlled, flight_gains, held, roll_pitc
 from e2efly.deploy.inertial import Inertial, Measurement
 from e2efly.deploy.instruments import CLOSED, PROBE, ChannelProbe, Instruments, Reading
 from e2efly.deploy.landing import has_stood
+from e2efly.deploy.motion_watch import MotionWatch
 from e2efly.deploy.msp.client import Client
 from e2efly.deploy.msp.controller import ControllerInfo
 from e2efly.deploy.msp.messages import Attitude, RawImu, set_raw_rc
@@ -344,6 +345,8 @@ class Bridge:
             self._inertial = inertial.alone(self._inertial, wrong=self.flight.misled is not None)
         if self.flight.mode is not before.mode:
             self._inertial = dataclasses.replace(self._inertial, touch=Touch())
+            if self.flight.mode is Mode.TAKEOFF:  # what jumped while it stood is no sign of what follows
+                self._inertial = dataclasses.replace(self._inertial, watch=MotionWatch())
             self._trim = 0.0 if self.flight.mode in (Mode.TAKEOFF, Mode.LAND) else self._trim
             if self.log is not None:
                 record_mode(self.log, now, before, self.flight)
