@@ -155,7 +155,7 @@ def test_an_accelerometer_that_poses_and_throttle_contradict_is_the_one_that_is_
         watch = see(watch, Odometry(k / RATE, np.zeros(3), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3)))
         if watch.accelerometer_problem:
             break
-    assert watch.accelerometer_problem is not None and watch.problem is None and 100 <= k < 125
+    assert watch.accelerometer_problem is not None and watch.problem is None and 100 <= k < 135
 
 
 @pytest.mark.parametrize("late", [0.0, 0.05, 0.1, 0.14])

@@ -38,8 +38,8 @@ CARRIED = 0.25
 """What the sensors must have felt for that, m/s or rad: poses that jump while nothing moves are another matter."""
 ALIKE, MOVED = 0.4, 0.6
 """Carried so far, m/s, with a difference of less than this share of it, poses and sensors agree."""
-LASTING_S = 0.03
-"""A difference is believed after so long, s."""
+LASTING_S, BLAMED_S = 0.03, 0.15
+"""A difference is believed after so long, s; the accelerometer is blamed for it after so long, s."""
 TELLING, BETTER = 0.4, 0.2
 """How late poses are can be told while the felt velocity changes by so much within `LATEST_S`, m/s; too late they are
 where that explains them better by so much, m/s."""
@@ -117,7 +117,7 @@ class MotionWatch:
     @property
     def accelerometer_problem(self) -> str | None:
         """How the accelerometer contradicts poses and throttle, which agree; None: it does not."""
-        if self.lasting < LASTING_S or not self._accelerometer:
+        if self.lasting < BLAMED_S or not self._accelerometer:
             return None
         return f"it contradicts poses and throttle, which agree, by {abs(float(self.differs.speed[2])):.1f} m/s"
 

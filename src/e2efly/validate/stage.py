@@ -224,4 +224,5 @@ class Stage:
     def _expect(self, seconds: float, mode: Mode) -> None:
         if self.mode is not mode and not self.fly(seconds, lambda: self.mode is mode):
             flight = self.session.bridge.flight
-            raise RuntimeError(f"the flight is in {flight.mode} ({'; '.join(flight.reasons)}) rather than in {mode}")
+            came = [f"{m} ({'; '.join(why)})" for _, m, why in self.session.flown.changes[-4:]]
+            raise RuntimeError(f"the flight is in {flight.mode} rather than in {mode}, by way of {', '.join(came)}")
