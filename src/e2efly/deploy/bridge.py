@@ -189,7 +189,8 @@ class Bridge:
                     latest=self.latency + LATE_S,
                 )  # fmt: skip
                 self._watch_heading(odometry, now)
-                self._delays = turned(self._delays, odometry)
+                if self.flight.mode is Mode.INIT:
+                    self._delays = turned(self._delays, odometry)
         said_frozen = (self._pose_problem or "").startswith("frozen")  # which lasts already
         if self._pose_problem and not self._track.fault and now - self._good_pose < OUTLIERS_S and not said_frozen:
             self._pose_problem = None
@@ -237,8 +238,7 @@ class Bridge:
 
     def _accelerometer_problem(self) -> str | None:
         """What stands against a take-off, or was found in flight: that stays until the vehicle has landed."""
-        grounded = self.flight.mode in (Mode.INIT, Mode.DONE)
-        if grounded:
+        if self.flight.mode in (Mode.INIT, Mode.DONE):
             return self._inertial.rest_problem
         if self.flight.mode is Mode.TAKEOFF:  # the throttle map is not known well enough to be a judge
             return None
@@ -254,7 +254,7 @@ class Bridge:
             self._opposed = f"{watch.opposed}, when it was carried; carry it again, once frames and axes are right"
         elif watch.agrees:
             self._opposed = None
-        if self.ticks % DELAY_TICKS == 0:
+        if self.flight.mode is Mode.INIT and self.ticks % DELAY_TICKS == 0:
             self._delay = delay_of(self._delays) or self._delay
         return self._opposed or delay_problem(self._delay, self.latency + LATE_S)
 
@@ -271,7 +271,8 @@ class Bridge:
         attitude = self.client.message(Attitude.CODE, now, ATTITUDE_S)
         if (reply := reading.fresh.get(RawImu.CODE)) is not None:
             at = reply.time - reply.latency / 2
-            self._delays = felt(self._delays, at, reply.message.body_rate)
+            if self.flight.mode is Mode.INIT:
+                self._delays = felt(self._delays, at, reply.message.body_rate)
             sent = self._history.between(at - THRUST_DELAY[1], at - THRUST_DELAY[0])
             self._inertial = inertial.measure(self._inertial, Measurement(
                 np.array(reply.message.acceleration, float), np.array(reply.message.body_rate), attitude,
@@ -347,6 +348,7 @@ class Bridge:
             self._inertial = inertial.alone(self._inertial, wrong=self.flight.misled is not None)
         if self.flight.mode is not before.mode:
             self._inertial = dataclasses.replace(self._inertial, touch=Touch())
+            self._delays = DelayWatch()
             if self.flight.mode is Mode.TAKEOFF:  # what jumped while it stood is no sign of what follows
                 self._inertial = dataclasses.replace(self._inertial, watch=MotionWatch())
             self._trim = 0.0 if self.flight.mode in (Mode.TAKEOFF, Mode.LAND) else self._trim

@@ -57,8 +57,6 @@ class Reckoning:
     """When the odometry was seen last, s."""
     height: float
     """Reckoned from the odometry's last, world, m: the largest that is plausible."""
-    top: float
-    """The highest since then, m."""
 
     @property
     def climb(self) -> float:
@@ -72,7 +70,7 @@ def seen(odometry: Odometry, now: float, error: float = 0.0, share: float = 1.0)
     yaw = heading(odometry.quaternion) - error
     c, s = math.cos(yaw), math.sin(yaw)
     height = float(odometry.position[2])
-    return Reckoning((c * x + s * y, c * y - s * x, z), z, DOUBT, share, now, now, height, height)
+    return Reckoning((c * x + s * y, c * y - s * x, z), z, DOUBT, share, now, now, height)
 
 
 def reckon(
@@ -113,7 +111,7 @@ def reckon(
         lifted=before.lifted + (lift - GRAVITY) * dt, doubt=before.doubt + doubt * dt, share=share, time=now,
     )  # fmt: skip
     height = before.height + min(after.lifted + after.doubt, after.climb + SLOWER) * dt
-    return replace(after, height=height, top=max(height, before.top))
+    return replace(after, height=height)
 
 
 def trimmed(trim: float, reckoned: Reckoning, ground: float, dt: float) -> float:
