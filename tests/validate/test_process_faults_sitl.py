@@ -5,8 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.validate import process_faults
+from e2efly.validate import firmware, process_faults
 from tests.conftest import NetworkTrace
+
+
+@pytest.fixture(scope="module", autouse=True)
+def built() -> None:
+    """The firmware is there before the test looks at what its processes say to the network."""
+    firmware.build()
 
 
 @pytest.mark.parametrize("fault", process_faults.FAULTS)

@@ -32,6 +32,8 @@ LOOP_PRIORITY, POLICY_PRIORITY = 10, 9
 """Real-time priorities; the watchdog stands above them."""
 STATUS_PERIOD = 1.0
 """How often a line of status is told, s."""
+TAKEN = "; it keeps the link until you disarm: then end this by Ctrl-C and start it anew"
+"""Told once the watchdog has taken over, after its reason."""
 
 
 def loop_rate(control_rate: float) -> float:
@@ -61,7 +63,7 @@ def fly(
     identify_again: Callable[[], ControllerInfo | None] | None = None,
     clock: Clock = MONOTONIC,
 ) -> Timing:
-    """Run the bridge until `stop` says so and the vehicle is on the ground and disarmed.
+    """Run the bridge until `stop` says so and the vehicle is on the ground and disarmed, or the watchdog's for good.
 
     Args:
         bridge: what to run.
@@ -88,6 +90,8 @@ def fly(
                 ended = bridge.flight.mode in (Mode.INIT, Mode.DONE)  # not while the pilot flies: the sticks would stay
                 if ended and not bridge.inputs.armed:  # or the throttle stick, in its middle, would have the motors
                     return timing
+                if watchdog is not None and watchdog.taken_over:  # it lands on without this process
+                    return timing
             if bridge.client.link.connections != connection and bridge.flight.mode in (Mode.INIT, Mode.DONE):
                 if identify_again is not None and identify_again() is not None:
                     connection = bridge.client.link.connections
@@ -102,7 +106,7 @@ def fly(
                 _say(say, line)
             elif now - last_status >= STATUS_PERIOD:
                 last_status = now
-                _say(say, _status(bridge))
+                _say(say, watchdog.taken_over + TAKEN if watchdog and watchdog.taken_over else _status(bridge))
             done = clock.now()
             timing.rounds += 1
             timing.lateness.append(late)
