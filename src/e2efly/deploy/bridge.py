@@ -73,6 +73,8 @@ OVERDUE = 0.3
 """A blind descent whose height is reckoned so far under the ground feels for the ground, m, ..."""
 WEIGHT, LIGHTER, LIGHTEST = 0.97, 0.1, 0.6
 """... and gives no more than this share of its weight, less with each metre, and the last at least."""
+FROZEN = "its numbers do not change"
+"""Said of an accelerometer that does not even feel the rotors turn."""
 LIFTED = 0.12
 """So high over the ground the vehicle flies, m: below, nothing is learned and no tilt is asked."""
 
@@ -126,7 +128,7 @@ class Bridge:
         self._opposed: str | None = None
         self._delays = DelayWatch()
         self._delay: Delay | None = None
-        self._history = ThrottleHistory()
+        self._history = ThrottleHistory(30.0)  # a silence may last long
         self._trim = 0.0
         self._imu: Imu | None = None
         self._missed: deque[float] = deque()
@@ -231,6 +233,7 @@ class Bridge:
             missed_deadlines=len(self._missed),
             accelerometer_problem=self._accelerometer_problem(),
             motion_problem=self._motion_problem(),
+            buried=self.flight.blind and self._inertial.buried(self.flight.home, now),
             touched=self._inertial.touch.carried,
             supported=self._inertial.touch.rests and now - self._inertial.time < inertial.FRESH_S,
         )
@@ -240,9 +243,9 @@ class Bridge:
         """What stands against a take-off, or was found in flight: that stays until the vehicle has landed."""
         if self.flight.mode in (Mode.INIT, Mode.DONE):
             return self._inertial.rest_problem
-        if self.flight.mode is Mode.TAKEOFF:  # the throttle map is not known well enough to be a judge
-            return None
-        return "its numbers do not change" if self._inertial.frozen else self._inertial.watch.accelerometer_problem
+        if self.flight.mode is Mode.TAKEOFF:  # the throttle map is not known well enough to be another judge
+            return FROZEN if self._inertial.touch.frozen(self._last) else None
+        return FROZEN if self._inertial.frozen else self._inertial.watch.accelerometer_problem
 
     def _motion_problem(self) -> str | None:
         """On the ground: what was found while it was carried, until it was carried again and agreed."""
@@ -282,11 +285,14 @@ class Bridge:
                 climb=float(seen.velocity[2]) if flying and seen is not None else None,
             ), now)  # fmt: skip
             self._learn(sent, flying)
-        told = min(now, self._heard + SILENT_S)  # what is sent into the silence does not come
-        throttle = self._history.between(told - THRUST_DELAY[1], told - THRUST_DELAY[0])
-        lifts = self.flight.mode in (Mode.HOVER, Mode.POLICY, Mode.LAND)  # or the ground may carry it
-        thrust = self._thrust(throttle) if lifts and throttle is not None else None
-        self._inertial = inertial.carry(self._inertial, attitude, thrust, now)
+        thrust, held = self._lift(now), self._lift(min(now, self._heard))
+        self._inertial = inertial.carry(self._inertial, attitude, thrust, now, held=held)
+
+    def _lift(self, moment: float) -> tuple[float, float] | None:
+        """`_thrust` of what was sent for a moment, s, in the air; None: not known, or the ground may carry it."""
+        throttle = self._history.between(moment - THRUST_DELAY[1], moment - THRUST_DELAY[0])
+        lifts = self.flight.mode in (Mode.HOVER, Mode.POLICY, Mode.LAND)
+        return self._thrust(throttle) if lifts and throttle is not None else None
 
     def _thrust(self, throttle: float) -> tuple[float, float]:
         """Specific force of a throttle, and how far it may be off, m/s^2."""

@@ -126,6 +126,8 @@ class Inputs:
     """Why the controller's accelerometer cannot be flown by."""
     motion_problem: str | None = None
     """How the poses contradict what the controller's sensors feel."""
+    buried: bool = False
+    """Without odometry: by all that is reckoned it is far under the ground, and no sensor can feel whether it stands."""
     touched: bool = False
     """In a landing without odometry the ground was felt."""
     supported: bool = False

@@ -4,6 +4,7 @@ The scale of the accelerometer, whether poses are the vehicle's own, the velocit
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,15 +14,15 @@ from e2efly.deploy.accelerometer import Scale, learn, standing_problem
 from e2efly.deploy.motion_watch import MotionWatch
 from e2efly.deploy.msp.messages import Attitude
 from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.reckoning import Reckoning
+from e2efly.deploy.reckoning import ANCHOR_S, ANCHORS, Reckoning, Reckonings
 from e2efly.deploy.touch import Touch
 from e2efly.vehicles.vehicle import GRAVITY
 
 FRESH_S = 0.1
 """The force is taken for so long, s."""
-ANCHOR_S, ANCHORS = 0.2, 6
-"""Between two poses from which the velocity is reckoned on, s, and how many there are: those of the last moments may
-have been wrong already when that is found out, and one alone is noisy."""
+DELIVERED = 0.3
+"""After a silence: by so much nearer must the force be to what was sent than to what was held, m/s^2, to show that the
+commands came all the same."""
 SHARE_RATE, SHARE_S, SHARE_RANGE = 0.05, 0.3, (0.7, 1.3)
 """How fast the share of the map's force is followed, 1/s and s, and its bounds."""
 QUIET = 1.0
@@ -29,6 +30,8 @@ QUIET = 1.0
 flight the poses come too late to be compared with it."""
 BELIEVED = 0.3
 """Share by which the force along the body's z axis may be unlike the thrust: beyond, the accelerometer is broken."""
+BURIED = 1.5
+"""So far under the ground by the largest height that is plausible, the vehicle surely stands, m."""
 REST_SHARE = 0.05
 """Weight of a new measurement at rest."""
 
@@ -63,10 +66,12 @@ class Inertial:
     """Of the accelerometer, as poses in flight show it."""
     watch: MotionWatch = MotionWatch()
     """Poses against sensors."""
-    reckoned: Reckoning | None = None
-    """The velocity, from the newest pose on."""
-    anchors: tuple[Reckoning, ...] = ()
-    """The same from older poses on, oldest first."""
+    reckonings: Reckonings = Reckonings()
+    """The velocity, carried on from the poses by what was sent."""
+    held: Reckonings | None = None
+    """The same since the newest measurement, if the controller has held the command of that time ever since ..."""
+    held_thrust: float | None = None
+    """... and the specific force of it, m/s^2."""
     touch: Touch = Touch()
     """The ground."""
     force: np.ndarray | None = None
@@ -77,8 +82,20 @@ class Inertial:
     """Of the newest measurement, s."""
     share: float = 1.0
     """Of the throttle map's force that is felt, while poses are good."""
+    learned: tuple[tuple[float, Scale, float], ...] = ()
+    """What scale and share were at some moments, s, oldest first: wrong poses teach wrong ones before they are told."""
     frozen: bool = False
     """In flight the accelerometer repeats itself."""
+
+    @property
+    def reckoned(self) -> Reckoning | None:
+        """The velocity, from the newest pose on."""
+        return self.reckonings.newest
+
+    def buried(self, ground: float, now: float) -> bool:
+        """Whether it must be under the ground, whose height is given, m, and cannot feel that it stands on it."""
+        r = self.reckoned
+        return r is not None and ground - r.height > BURIED and not self.touch.able(now)
 
     @property
     def rest_problem(self) -> str | None:
@@ -97,6 +114,7 @@ def measure(before: Inertial, m: Measurement, now: float) -> Inertial:
     dt = min(max(now - before.time, 0.0), FRESH_S)
     plain = m.counts * (GRAVITY / gravity)
     scale, watch, felt = before.scale, before.watch, before.touch
+    before = replace(before, reckonings=_after_silence(before, m, scale.value * plain, now), held=None)
     if m.thrust is not None:
         felt = touch.seen(felt, tuple(m.counts.tolist()), m.thrust[0], now)
     if m.flying and felt.frozen(now):
@@ -138,44 +156,63 @@ def see(
     if not (moved and trusted):
         return replace(before, watch=watch)
     newest = reckoning.seen(odometry, now, turned, before.share)
-    anchors = before.anchors
-    if not anchors or now - anchors[-1].since >= ANCHOR_S:
-        anchors = (*anchors[-ANCHORS + 1 :], newest)
-    return replace(before, watch=watch, reckoned=newest, anchors=anchors)
+    learned = before.learned
+    if not learned or now - learned[-1][0] >= ANCHOR_S:
+        learned = (*learned[-ANCHORS + 1 :], (now, before.scale, before.share))
+    held = None if before.held is None else before.held.seen(newest)
+    return replace(before, watch=watch, reckonings=before.reckonings.seen(newest), held=held, learned=learned)
 
 
-def carry(before: Inertial, attitude: Attitude | None, thrust: tuple[float, float] | None, now: float) -> Inertial:
-    """Reckon on to `now`, s: see `reckoning.reckon`."""
-    force = None if before.force is None or now - before.time > FRESH_S else tuple(before.force.tolist())
-    if force is not None and thrust is not None and abs(force[2] - thrust[0]) > BELIEVED * GRAVITY + thrust[1]:
-        force = None
+def carry(
+    before: Inertial,
+    attitude: Attitude | None,
+    thrust: tuple[float, float] | None,
+    now: float,
+    *,
+    held: tuple[float, float] | None = None,
+) -> Inertial:
+    """Reckon on to `now`, s: see `reckoning.reckon`.
 
-    def on(r: Reckoning | None) -> Reckoning | None:
-        return None if r is None else reckoning.reckon(r, attitude, force, thrust, now)
-
-    anchors = tuple(after for anchor in before.anchors if (after := on(anchor)) is not None)
-    return replace(before, reckoned=on(before.reckoned), anchors=anchors)
-
-
-def alone(before: Inertial, *, wrong: bool) -> Inertial:
-    """From here on without poses: the velocity is the median of what was reckoned on from the last ones.
+    A controller that is not heard may get the commands, or hold the last one: both are reckoned, and the first
+    measurement afterwards tells which.
 
     Args:
         before: so far.
-        wrong: the poses were wrong, perhaps for a while: only the older half counts.
+        attitude: the controller's; None: not known.
+        thrust: specific force of the throttle that was sent, and how far it may be off, m/s^2; None: not known.
+        now: s.
+        held: the same of the throttle that was sent as the controller was heard last.
     """
-    every = (*before.anchors, *([before.reckoned] if before.reckoned else []))
-    if not every:
-        return before
-    believed = every[: (len(every) + 1) // 2] if wrong else every
-    ahead, left, up, lifted, height = (
-        float(np.median(values))
-        for values in zip(*((*r.velocity, r.lifted, r.height) for r in believed), strict=True)
-    )  # fmt: skip
-    begun = replace(
-        every[-1], velocity=(ahead, left, up), lifted=lifted, height=height, doubt=reckoning.DOUBT, share=before.share
-    )
-    return replace(before, reckoned=begun, anchors=())
+    force = None if before.force is None or now - before.time > FRESH_S else tuple(before.force.tolist())
+
+    def on(thrust: tuple[float, float] | None) -> Callable[[Reckoning], Reckoning | None]:
+        unlike = force is not None and thrust is not None and abs(force[2] - thrust[0]) > BELIEVED * GRAVITY + thrust[1]
+        believed = None if unlike else force
+        return lambda r: reckoning.reckon(r, attitude, believed, thrust, now)
+
+    after = replace(before, reckonings=before.reckonings.on(on(thrust)))
+    if now <= before.time:
+        return after
+    begun = before.reckonings if before.held is None else before.held
+    return replace(after, held=begun.on(on(held)), held_thrust=None if held is None else held[0])
+
+
+def _after_silence(before: Inertial, m: Measurement, force: np.ndarray, now: float) -> Reckonings:
+    """The velocity by what has come of the commands while nothing was heard."""
+    if before.held is None or before.held_thrust is None or m.thrust is None or now - before.time <= FRESH_S:
+        return before.reckonings
+    z = float(force[2])
+    came = abs(z - m.thrust[0]) < abs(z - before.held_thrust) - DELIVERED
+    return before.reckonings if came else before.held
+
+
+def alone(before: Inertial, *, wrong: bool) -> Inertial:
+    """From here on without poses: see `Reckonings.alone`."""
+    if wrong and before.learned:
+        _, scale, share = before.learned[0]
+        before = replace(before, scale=scale, share=share)
+    held = None if before.held is None else before.held.alone(before.share, wrong=wrong)
+    return replace(before, reckonings=before.reckonings.alone(before.share, wrong=wrong), held=held)
 
 
 def feel_for_ground(before: Inertial, thrust: float, now: float, *, overdue: bool) -> Inertial:

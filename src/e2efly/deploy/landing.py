@@ -60,7 +60,7 @@ def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
     """A landing after another control step of `dt` s."""
     flight = _looked(flight, inputs)
     if inputs.link_problem and inputs.silent:  # what it does meanwhile is not known: nothing counts as landed
-        return _unheard(settings, flight, inputs)
+        return _unheard(settings, flight, inputs, dt)
     if has_stood(settings, flight, inputs.odometry):
         assert inputs.odometry is not None
         return dataclasses.replace(to(flight, Mode.DONE, Reason.LANDED), home=float(inputs.odometry.position[2]))
@@ -95,14 +95,14 @@ def _see(settings: FlightSettings, flight: Flight, odometry: Odometry) -> Flight
     )  # fmt: skip
 
 
-def _unheard(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
-    """While the link is down: no clock of the landing runs, and it will begin where the vehicle is."""
+def _unheard(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
+    """While the link is down: no clock of the landing runs; with poses it will begin where the vehicle is."""
     flight = dataclasses.replace(flight, still_since=None)
     if inputs.seen is not None:
         return _see(settings, flight, inputs.seen)
     if not flight.blind or flight.lost is None:
         return _blindly(settings, flight, inputs, *flight.reasons)
-    return dataclasses.replace(flight, lost=(flight.now, *flight.lost[1:]))
+    return dataclasses.replace(flight, lost=(flight.lost[0] + dt, *flight.lost[1:]))
 
 
 def _looked(flight: Flight, inputs: Inputs) -> Flight:
@@ -146,7 +146,7 @@ def _sinking(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
     if inputs.seen is None:
         flight = dataclasses.replace(flight, found_since=None)
     at, height, climb = flight.lost or _last_seen(settings, flight, inputs)
-    if flight.now - at > blind_time(height, climb):
+    if flight.now - at > blind_time(height, climb) or inputs.buried:
         return to(flight, Mode.DONE, f"{Reason.LANDED}: without odometry, after {flight.now - at:.0f} s")
     return flight
 

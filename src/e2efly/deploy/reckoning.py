@@ -7,7 +7,10 @@ broken, then makes the vehicle sink a little slower or faster, and never climb.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from e2efly.control import Ctbr, Vec3
 from e2efly.deploy.accelerometer import level
@@ -27,13 +30,17 @@ SINK_GAIN = 3.0
 """Acceleration over the error of the vertical speed, 1/s."""
 FASTEST_SINK, LOW_SINK, LOW = 2.0, 1.3, 3.0
 """The speed of sinking grows up to the first, m/s, and below the height in the last, m, up to the second."""
-SAG, SAG_RATE, SAG_S = 0.02, 0.05, 0.3
-"""The thrust follows the force that is felt, as a battery sags: while they are no farther apart than this share, by so
-much in a second, within so long, s. What is farther off at once is no battery: it is the accelerometer."""
+SAG, SMOOTH_S, SAG_RATE, SAG_S = 0.017, 0.1, 0.05, 0.3
+"""The thrust follows the force that is felt, as a battery sags: while they are no farther apart than this share,
+smoothed over so long, s; by so much in a second, within so long, s. What is farther off at once is no battery: it is
+the accelerometer."""
 SLOWER = 0.3
 """The height is reckoned with a speed that is so much higher, m/s, at most."""
 DOUBT = 0.05
 """Error of the vertical speed that the poses show, m/s."""
+ANCHOR_S, ANCHORS = 0.2, 6
+"""Between two poses from which the velocity is reckoned on, s, and how many there are: those of the last moments may
+have been wrong already when that is found out, and one alone is noisy."""
 TRIM_GAIN, TRIM_ERROR, LARGEST_TRIM = 3.0, 0.6, 4.0
 """Growth of the trim over the error of the vertical speed, 1/s^2; the largest error that counts, m/s, as a motion that
 is being ended is none of the map's; and its bound, m/s^2: a map that is wrong by 30 %."""
@@ -57,11 +64,52 @@ class Reckoning:
     """When the odometry was seen last, s."""
     height: float
     """Reckoned from the odometry's last, world, m: the largest that is plausible."""
+    unlike: float = 0.0
+    """By how much more of the thrust is felt than `share`, smoothed."""
 
     @property
     def climb(self) -> float:
         """Vertical speed, m/s: the accelerometer's, as far as the throttle's allows; to sink faster, half as far."""
         return max(self.lifted - self.doubt, min(self.lifted + self.doubt / 2, self.velocity[2]))
+
+
+@dataclass(frozen=True)
+class Reckonings:
+    """The velocity, reckoned on from several poses. `Reckonings()` before the first."""
+
+    newest: Reckoning | None = None
+    """From the newest pose on."""
+    anchors: tuple[Reckoning, ...] = ()
+    """From older poses on, oldest first."""
+
+    def seen(self, newest: Reckoning) -> "Reckonings":
+        """With another pose."""
+        if self.anchors and newest.since - self.anchors[-1].since < ANCHOR_S:
+            return replace(self, newest=newest)
+        return Reckonings(newest, (*self.anchors[-ANCHORS + 1 :], newest))
+
+    def on(self, step: Callable[[Reckoning], Reckoning | None]) -> "Reckonings":
+        """All of them carried on; those that cannot be are left out."""
+        anchors = tuple(after for anchor in self.anchors if (after := step(anchor)) is not None)
+        return Reckonings(None if self.newest is None else step(self.newest), anchors)
+
+    def alone(self, share: float, *, wrong: bool) -> "Reckonings":
+        """From here on without poses: the median of all.
+
+        Args:
+            share: of the throttle's thrust that comes.
+            wrong: the poses were wrong, perhaps for a while: only the older half counts.
+        """
+        every = (*self.anchors, *([self.newest] if self.newest else []))
+        if not every:
+            return self
+        believed = every[: (len(every) + 1) // 2] if wrong else every
+        ahead, left, up, lifted, height = (
+            float(np.median(values))
+            for values in zip(*((*r.velocity, r.lifted, r.height) for r in believed), strict=True)
+        )  # fmt: skip
+        begun = replace(every[-1], velocity=(ahead, left, up), lifted=lifted, height=height, doubt=DOUBT, share=share)
+        return Reckonings(begun)
 
 
 def seen(odometry: Odometry, now: float, error: float = 0.0, share: float = 1.0) -> Reckoning:
@@ -99,16 +147,17 @@ def reckon(
     attitude = attitude or Attitude(0.0, 0.0, 0.0)
     upright = math.cos(attitude.roll) * math.cos(attitude.pitch)
     ahead, aside, above = (float(a) for a in level(attitude, force or (0.0, 0.0, thrust[0] if thrust else GRAVITY)))
-    share = before.share
+    share, unlike = before.share, before.unlike
     if thrust is not None and force is not None and thrust[0] > 0:
-        off = force[2] / thrust[0] - share
-        follow = max(-SAG_RATE * dt, min(SAG_RATE * dt, off * dt / SAG_S))
-        share += follow if abs(off) < SAG else 0.0
+        unlike += (force[2] / thrust[0] - share - unlike) * dt / SMOOTH_S
+        follow = max(-SAG_RATE * dt, min(SAG_RATE * dt, unlike * dt / SAG_S))
+        share += follow if abs(unlike) < SAG else 0.0
     lift, doubt = (above, 0.0) if thrust is None else (share * thrust[0] * upright, thrust[1])
     forward, left, up = before.velocity
     after = replace(
         before, velocity=(forward + ahead * dt, left + aside * dt, up + (above - GRAVITY) * dt),
-        lifted=before.lifted + (lift - GRAVITY) * dt, doubt=before.doubt + doubt * dt, share=share, time=now,
+        lifted=before.lifted + (lift - GRAVITY) * dt, doubt=before.doubt + doubt * dt, share=share, unlike=unlike,
+        time=now,
     )  # fmt: skip
     height = before.height + min(after.lifted + after.doubt, after.climb + SLOWER) * dt
     return replace(after, height=height)

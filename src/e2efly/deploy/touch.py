@@ -68,6 +68,10 @@ class Touch:
         """Whether the accelerometer repeats itself bit for bit though the thrust has changed."""
         return now - self.changed > FROZEN_S and self.ignored > IGNORED
 
+    def able(self, now: float) -> bool:
+        """Whether this accelerometer can feel the ground at all."""
+        return now - self.changed < ALIVE_S and self.usual is not None and abs(self.usual) < BELIEVED
+
     @property
     def rests(self) -> bool:
         """Something has carried the vehicle for a while, by an accelerometer that is right."""
@@ -111,8 +115,7 @@ def dip(before: Touch, now: float, *, overdue: bool, beyond: float) -> Touch:
         beyond: force minus thrust of the newest measurement, m/s^2.
     """
     shock = before.usual is not None and beyond - before.usual > SHOCK
-    alive = now - before.changed < ALIVE_S and before.usual is not None and abs(before.usual) < BELIEVED
-    if not (shock or overdue) or not alive or now - before.dip < AGAIN_S:
+    if not (shock or overdue) or not before.able(now) or now - before.dip < AGAIN_S:
         return before
     return replace(before, dip=now, low=(0.0, 0.0, 0), high=(0.0, 0.0, 0))
 

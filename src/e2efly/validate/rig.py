@@ -33,6 +33,9 @@ CALIBRATION_S = 6.0
 """The firmware stands still for so long before it can be armed, s."""
 POSE_NOISE = (0.0005, 0.01, 0.02, 0.001)
 """Of position, m; velocity, m/s; body rate, rad/s; attitude, rad: a motion capture system's, standard deviations."""
+VIBRATION = 0.3
+"""Of the force that the accelerometer feels while the rotors turn, before the firmware's own filter, m/s^2: a standard
+deviation as of a small quadrotor with good propellers."""
 LOST_CHANNEL = 13
 """AUX9: the receiver's own, by which firmware that does not hear its silence is told of it."""
 LANDING_S = 10
@@ -135,7 +138,7 @@ class Rig:
         self._real_time = real_time
         self._epoch = 0.0
         self._on = True
-        self._noise = np.random.default_rng(seed)
+        self._noise, self._shaking = np.random.default_rng(seed), np.random.default_rng([seed, 1])
         self._open = ExitStack()
 
     def __enter__(self) -> "Rig":
@@ -200,7 +203,7 @@ class Rig:
         motors = self.sitl.motors() if self._on else np.zeros(4)
         after = self.state if self.held else self.world.advance(self.state, motors * self.shares, dt, self.wind)
         if self._on:
-            sensed = self.world.sensed(self.state, after, dt)
+            sensed = self._shaken(self.world.sensed(self.state, after, dt), after)
             self.sitl.send_state(sensed if self.felt is None else self.felt(sensed))
         self.sitl.advance(dt)
         self.state = after
@@ -211,6 +214,12 @@ class Rig:
         if now >= self._next_pose:
             self._next_pose += self._pose_period
             self._poses.append(self._sample(now))
+
+    def _shaken(self, sensed: FirmwareState, after: Body) -> FirmwareState:
+        if not after.rotor_speed.any():
+            return sensed
+        noise = VIBRATION * self._shaking.standard_normal(3)
+        return dataclasses.replace(sensed, specific_force=sensed.specific_force + noise)
 
     def _receive(self) -> None:
         """A frame of the pilot's receiver; one that hears nothing sends none, or the switch that stands for it."""
