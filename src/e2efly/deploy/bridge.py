@@ -277,6 +277,7 @@ class Bridge:
             if self.flight.mode is Mode.INIT:
                 self._delays = felt(self._delays, at, reply.message.body_rate)
             sent = self._history.between(at - THRUST_DELAY[1], at - THRUST_DELAY[0])
+            sent = None if self.inputs.pilot is None else sent
             self._inertial = inertial.measure(self._inertial, Measurement(
                 np.array(reply.message.acceleration, float), np.array(reply.message.body_rate), attitude,
                 None if sent is None else self._thrust(sent),
@@ -289,9 +290,12 @@ class Bridge:
         self._inertial = inertial.carry(self._inertial, attitude, thrust, now, held=held)
 
     def _lift(self, moment: float) -> tuple[float, float] | None:
-        """`_thrust` of what was sent for a moment, s, in the air; None: not known, or the ground may carry it."""
+        """`_thrust` of what was sent for a moment, s, in the air; None: not known, or the ground may carry it.
+
+        A controller that does not hear the pilot flies by its own failsafe instead.
+        """
         throttle = self._history.between(moment - THRUST_DELAY[1], moment - THRUST_DELAY[0])
-        lifts = self.flight.mode in (Mode.HOVER, Mode.POLICY, Mode.LAND)
+        lifts = self.flight.mode in (Mode.HOVER, Mode.POLICY, Mode.LAND) and self.inputs.pilot is not None
         return self._thrust(throttle) if lifts and throttle is not None else None
 
     def _thrust(self, throttle: float) -> tuple[float, float]:

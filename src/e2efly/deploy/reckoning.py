@@ -30,7 +30,7 @@ SINK_GAIN = 3.0
 """Acceleration over the error of the vertical speed, 1/s."""
 FASTEST_SINK, LOW_SINK, LOW = 2.0, 1.3, 3.0
 """The speed of sinking grows up to the first, m/s, and below the height in the last, m, up to the second."""
-SAG, SMOOTH_S, SAG_RATE, SAG_S = 0.017, 0.1, 0.05, 0.3
+SAG, SMOOTH_S, SAG_RATE, SAG_S = 0.02, 0.1, 0.05, 0.3
 """The thrust follows the force that is felt, as a battery sags: while they are no farther apart than this share,
 smoothed over so long, s; by so much in a second, within so long, s. What is farther off at once is no battery: it is
 the accelerometer."""
@@ -64,8 +64,8 @@ class Reckoning:
     """When the odometry was seen last, s."""
     height: float
     """Reckoned from the odometry's last, world, m: the largest that is plausible."""
-    unlike: float = 0.0
-    """By how much more of the thrust is felt than `share`, smoothed."""
+    unlike: float | None = None
+    """By how much more of the thrust is felt than `share`, smoothed; None: nothing was felt yet."""
 
     @property
     def climb(self) -> float:
@@ -149,7 +149,8 @@ def reckon(
     ahead, aside, above = (float(a) for a in level(attitude, force or (0.0, 0.0, thrust[0] if thrust else GRAVITY)))
     share, unlike = before.share, before.unlike
     if thrust is not None and force is not None and thrust[0] > 0:
-        unlike += (force[2] / thrust[0] - share - unlike) * dt / SMOOTH_S
+        off = force[2] / thrust[0] - share
+        unlike = off if unlike is None else unlike + (off - unlike) * dt / SMOOTH_S
         follow = max(-SAG_RATE * dt, min(SAG_RATE * dt, unlike * dt / SAG_S))
         share += follow if abs(unlike) < SAG else 0.0
     lift, doubt = (above, 0.0) if thrust is None else (share * thrust[0] * upright, thrust[1])
