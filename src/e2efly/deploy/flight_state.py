@@ -127,7 +127,7 @@ class Inputs:
     motion_problem: str | None = None
     """How the poses contradict what the controller's sensors feel."""
     buried: bool = False
-    """Without odometry: by all that is reckoned it is far under the ground, and no sensor can feel whether it stands."""
+    """Without odometry: what is reckoned is far under the ground, and no sensor can feel whether it stands."""
     touched: bool = False
     """In a landing without odometry the ground was felt."""
     supported: bool = False
