@@ -87,6 +87,23 @@ def test_it_ends_on_the_ground_only_when_the_pilot_has_disarmed(mode: Mode) -> N
     assert disarmed.steps == 0
 
 
+def test_a_bridge_that_the_watchdog_has_replaced_ends_when_it_is_asked_to_and_says_so() -> None:
+    """Armed or not: it has no more say in the flight, and the watchdog lands on without it."""
+    said: list[str] = []
+    watchdog: Any = SimpleNamespace(taken_over="", plan=lambda plan: None)
+    bridge, clock = Grounded(mode=Mode.LAND, armed_steps=10**6), Clock()
+
+    def stop() -> bool:
+        assert clock.now() < 110.0
+        if clock.now() > 101.5:
+            watchdog.taken_over = "the bridge has been silent for 60 ms"
+        return clock.now() > (104.0 if watchdog.taken_over else 101.0)
+
+    fly(bridge, 100.0, watchdog=watchdog, say=said.append, stop=stop, clock=clock)
+    assert bridge.steps == pytest.approx(400, abs=2)
+    assert any("silent for 60 ms; it keeps the link until you disarm" in line for line in said)
+
+
 def test_on_the_ground_the_watchdog_keeps_the_throttle_of_an_armed_vehicle_closed() -> None:
     armed: Any = Grounded(armed_steps=1)
     plan = plan_of(armed)

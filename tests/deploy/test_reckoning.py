@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -116,3 +117,19 @@ def test_what_is_not_known_is_taken_from_the_other() -> None:
     assert level is not None and level.velocity == pytest.approx((1.0, 0.0, -0.2))
     assert reckon(known, LEVEL, (0.0, 0.0, GRAVITY), None, 5.0 + LONGEST_STEP + 0.01) is None
     assert reckon(known, LEVEL, None, None, 5.05) is None
+
+
+def test_a_force_that_leaves_the_thrust_slowly_is_a_battery_and_one_that_does_so_at_once_is_the_accelerometer() -> None:
+    def share(force: Callable[[float], float]) -> float:
+        known: Reckoning | None = seen(moving(0j, 0.0), 0.0)
+        for k in range(200):
+            now = (k + 1) * DT
+            noise = 0.3 * math.sin(40 * now)  # of the rotors
+            known = reckon(known, LEVEL, (0.0, 0.0, GRAVITY * force(now) + noise), (GRAVITY, 0.05), now)
+            assert known is not None
+        return known.share
+
+    assert share(lambda now: 1 - 0.03 * now) == pytest.approx(0.89, abs=0.02)
+    assert share(lambda now: 1.0) == pytest.approx(1.0, abs=0.01)
+    for step in (0.9, 1.1):
+        assert share(lambda now, step=step: 1.0 if now < 1 else step) == pytest.approx(1.0, abs=0.015)

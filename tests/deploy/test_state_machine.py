@@ -485,6 +485,27 @@ def test_nothing_has_landed_while_the_link_is_down() -> None:
     assert flown(sinking(), having(BLIND, link_problem="no answer", silent=True, touched=True), 1.0).mode is Mode.LAND
 
 
+def test_the_clock_of_a_blind_landing_stands_while_the_link_is_silent() -> None:
+    silent = having(BLIND, link_problem="no answer", silent=True)
+    longest = blind_time(1.0)
+    half = flown(sinking(), BLIND, longest / 2)
+    for _ in range(20):  # silent every other tenth of a second, it pauses and does not begin anew
+        half = flown(half, silent, 0.1)
+    assert flown(half, BLIND, longest / 2 - 0.3).mode is Mode.LAND
+    assert flown(half, BLIND, longest / 2 + 0.3).mode is Mode.DONE
+    flickering = sinking()
+    for _ in range(round(longest / 0.1) - 2):
+        flickering = flown(flown(flickering, silent, 0.1), BLIND, 0.1)
+    assert flickering.mode is Mode.LAND
+    assert flown(flickering, BLIND, 0.6).mode is Mode.DONE
+
+
+def test_what_is_reckoned_far_under_the_ground_has_landed_but_not_while_the_link_is_silent() -> None:
+    assert flown(sinking(), having(BLIND, buried=True)).mode is Mode.DONE
+    assert flown(sinking(), having(BLIND, buried=True, link_problem="no answer", silent=True), 1.0).mode is Mode.LAND
+    assert flown(landing(), having(UP, pilot=LAND, buried=True)).mode is Mode.LAND  # the poses know better
+
+
 def test_over_home_it_has_landed_only_where_something_is_felt_to_carry_it() -> None:
     still = having(UP, pilot=LAND, odometry=at(0.6))
     held = flown(landing(), still, 20.0)
@@ -502,6 +523,8 @@ def test_poses_that_contradict_the_sensors_count_as_lost() -> None:
     low = having(wrong, pilot=LAND, odometry=at(0.05 + NEAR_GROUND / 2))
     assert not flown(landing(), low).blind  # that is the shock of the ground
     assert flown(flown(with_pilot(), having(wrong, override=False)), UP).blind
+    by_accelerometer = flown(hovering(), having(wrong, accelerometer_problem="it does not feel the thrust"))
+    assert not by_accelerometer.blind and not by_accelerometer.misled  # that is wrong, and not the poses
 
 
 def test_a_blind_landing_ends_for_good() -> None:
@@ -699,6 +722,7 @@ NEWS = st.fixed_dictionaries(
         "motion_problem": st.sampled_from([None, None, None, "mirrored"]),
         "touched": st.sampled_from([False, False, False, True]),
         "supported": st.booleans(),
+        "buried": st.sampled_from([False, False, False, True]),
         "heading_error": st.sampled_from([None, None, None, 0.2, -1.5, 3.1]),
         "policy_problem": st.sampled_from([None, None, "late"]),
         "policy_done": st.booleans(),

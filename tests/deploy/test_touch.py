@@ -68,3 +68,18 @@ def test_what_carries_the_vehicle_is_told_after_a_while() -> None:
         touch = feel(touch, GRAVITY, 0.7 * GRAVITY, k * DT, DT)
         assert touch.rests is ((k + 1) * DT >= SUPPORT_S - 1e-9)
     assert not feel(touch, 0.75 * GRAVITY, 0.7 * GRAVITY, 2.0, DT).rests
+
+
+def test_an_accelerometer_that_repeats_itself_or_is_far_from_the_thrust_cannot_feel_the_ground() -> None:
+    def after_a_second(told: Sensor) -> Touch:
+        touch = Touch()
+        for k in range(50):
+            force = told(GRAVITY, k)
+            touch = feel(seen(touch, (0.0, 0.0, force), GRAVITY, k * DT), force, GRAVITY, k * DT, DT)
+        return touch
+
+    assert after_a_second(lambda force, k: force + 0.01 * (k % 3)).able(1.0)
+    assert not after_a_second(lambda force, k: force + 0.01 * (k % 3)).able(2.0)
+    assert not after_a_second(lambda force, k: force).able(1.0)
+    assert not after_a_second(lambda force, k: -force + 0.01 * (k % 3)).able(1.0)
+    assert not Touch().able(1.0)

@@ -1,0 +1,131 @@
+"""What the controller's sensors tell without poses: after silence, after wrong poses, by a broken accelerometer."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from e2efly.deploy.inertial import BURIED, Inertial, Measurement, alone, carry, measure, see
+from e2efly.deploy.msp.messages import Attitude
+from e2efly.deploy.odometry import Odometry
+from e2efly.vehicles.vehicle import GRAVITY
+
+DT = 0.02
+"""Between two measurements, s."""
+COUNTS = 2048.0 / GRAVITY
+LEVEL = Attitude(0.0, 0.0, 0.0)
+DOUBT = 0.05
+"""How far the throttle map may be off, m/s^2."""
+
+
+def measurement(
+    force: float, thrust: float | None = GRAVITY, *, jitter: float = 0.0, climb: float | None = None
+) -> Measurement:
+    counts = COUNTS * np.array([jitter, 0.0, force])
+    told = None if thrust is None else (thrust, DOUBT)
+    return Measurement(
+        counts, np.zeros(3), LEVEL, told, standing=thrust is None, flying=thrust is not None, climb=climb
+    )
+
+
+def pose(time: float, height: float = 2.0, climb: float = 0.0) -> Odometry:
+    return Odometry(time, np.array([0, 0, height]), np.array([0, 0, climb]), np.array([1.0, 0, 0, 0]), np.zeros(3))
+
+
+def seen(inertial: Inertial, now: float, height: float = 2.0, climb: float = 0.0) -> Inertial:
+    return see(inertial, pose(now, height, climb), now, moved=True, trusted=True, turned=0.0, latest=0.03)
+
+
+def at_rest() -> Inertial:
+    return measure(Inertial(), measurement(GRAVITY, None), 0.0)
+
+
+def hovering(until: float = 3.0, *, factor: float = 1.0, climb: float = 0.0) -> Inertial:
+    """A quiet hover with good poses; the accelerometer tells `factor` of the force, the poses tell `climb`, m/s."""
+    inertial, now = at_rest(), 0.0
+    while now < until:
+        now += DT
+        told = measurement(factor * GRAVITY, jitter=0.01 * math.sin(now), climb=climb)
+        inertial = seen(measure(inertial, told, now), now, climb=climb)
+    return inertial
+
+
+def climb_of(inertial: Inertial) -> float:
+    assert inertial.reckoned is not None
+    return inertial.reckoned.climb
+
+
+@pytest.mark.parametrize("came", [True, False])
+def test_after_a_silence_the_force_tells_whether_the_commands_came(came: bool) -> None:
+    """They were lowered during one second of it: the vehicle sinks, or has held the old command and hovers."""
+    inertial, now, low = hovering(), 3.0, 0.8 * GRAVITY
+    while now < 4.0:
+        now += DT
+        inertial = carry(inertial, LEVEL, (low, DOUBT), now, held=(GRAVITY, DOUBT))
+    assert climb_of(inertial) == pytest.approx(low - GRAVITY, abs=0.15)  # m/s, after the second
+    force = low if came else GRAVITY
+    inertial = measure(inertial, measurement(force, low), now + DT)
+    assert climb_of(inertial) == pytest.approx(low - GRAVITY if came else 0.0, abs=0.15)
+
+
+def test_a_pause_between_two_measurements_is_no_silence() -> None:
+    inertial = hovering()
+    inertial = carry(inertial, LEVEL, (0.8 * GRAVITY, DOUBT), 3.05, held=(GRAVITY, DOUBT))
+    by_what_was_sent = climb_of(inertial)
+    assert by_what_was_sent < -0.05
+    assert climb_of(measure(inertial, measurement(GRAVITY, 0.8 * GRAVITY), 3.06)) == by_what_was_sent
+
+
+def test_poses_that_come_during_a_silence_begin_the_reckoning_of_what_was_held_anew() -> None:
+    inertial, now = hovering(), 3.0
+    while now < 4.0:
+        now += DT
+        inertial = carry(inertial, LEVEL, (0.8 * GRAVITY, DOUBT), now, held=(GRAVITY, DOUBT))
+    inertial = seen(inertial, now, climb=-0.7)
+    assert inertial.held is not None and inertial.held.newest == inertial.reckoned
+    after = measure(inertial, measurement(GRAVITY, 0.8 * GRAVITY), now + DT)
+    assert climb_of(after) == pytest.approx(-0.7, abs=0.05)
+
+
+def test_wrong_poses_teach_no_scale() -> None:
+    """Poses that begin to tell a climb that is not: what the last second taught is forgotten, if they were wrong."""
+    inertial, now = hovering(factor=0.95), 3.0
+    good = inertial.scale.value
+    assert good == pytest.approx(1 / 0.95, abs=0.01)
+    for k in range(40):
+        now += DT
+        told = measurement(0.95 * GRAVITY, jitter=0.01 * math.sin(now), climb=1.5 * k * DT)
+        inertial = seen(measure(inertial, told, now), now, climb=1.5 * k * DT)
+    assert inertial.scale.value > good + 0.05
+    assert alone(inertial, wrong=False).scale == inertial.scale
+    forgotten = alone(inertial, wrong=True)
+    assert forgotten.scale.value == pytest.approx(good, abs=0.02)
+    assert climb_of(forgotten) < climb_of(inertial) - 0.3  # and their newest speeds count no more
+
+
+@pytest.mark.parametrize("frozen", [True, False])
+def test_under_the_ground_it_surely_stands_where_its_accelerometer_cannot_tell(frozen: bool) -> None:
+    inertial, now = hovering(), 3.0
+    while now < 6.0:
+        now += DT
+        jitter = 0.0 if frozen else 0.01 * math.sin(now)
+        inertial = measure(
+            inertial, measurement(GRAVITY, (0.9 + 0.05 * math.sin(9 * now)) * GRAVITY, jitter=jitter), now
+        )
+        inertial = carry(inertial, LEVEL, (0.9 * GRAVITY, DOUBT), now)
+    reckoned = inertial.reckoned
+    assert reckoned is not None
+    deep = dataclasses.replace(reckoned, height=-BURIED - 0.1)
+    inertial = dataclasses.replace(inertial, reckonings=dataclasses.replace(inertial.reckonings, newest=deep))
+    assert inertial.frozen is frozen
+    assert inertial.buried(0.0, now) is frozen
+    assert not inertial.buried(-0.2, now)
+
+
+def test_an_accelerometer_that_is_unlike_the_thrust_or_silent_leaves_the_reckoning_to_the_throttle() -> None:
+    for force, at in ((2.0 * GRAVITY, 3.0), (0.0, 3.0), (GRAVITY, 2.8)):
+        inertial = dataclasses.replace(hovering(), force=np.array([0.0, 0.0, force]), time=at)
+        inertial = carry(inertial, LEVEL, (0.9 * GRAVITY, DOUBT), 3.05, held=(0.9 * GRAVITY, DOUBT))
+        assert inertial.reckoned is not None
+        assert inertial.reckoned.velocity[2] == pytest.approx(-0.1 * GRAVITY * 0.05, abs=0.01)
