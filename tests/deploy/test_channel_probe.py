@@ -18,7 +18,7 @@ SENT = (*(STICKS.centre + offset for offset in PROBE), CLOSED)
 
 def reading(channels: tuple[int, ...] | None, override: bool = True) -> Reading:
     rc = None if channels is None else Rc(channels)
-    return Reading(None, False, override, None, None, (), rc, None, {})
+    return Reading(None, False, override, None, False, None, (), rc, None, {})
 
 
 def looked(channels: tuple[int, ...] | None) -> tuple[bool, tuple[str, ...]]:

@@ -20,12 +20,12 @@ DOUBT = 0.05
 
 
 def measurement(
-    force: float, thrust: float | None = GRAVITY, *, jitter: float = 0.0, climb: float | None = None
+    force: float, thrust: float | None = GRAVITY, *, now: float = 0.0, jitter: float = 0.0, climb: float | None = None
 ) -> Measurement:
     counts = COUNTS * np.array([jitter, 0.0, force])
     told = None if thrust is None else (thrust, DOUBT)
     return Measurement(
-        counts, np.zeros(3), LEVEL, told, standing=thrust is None, flying=thrust is not None, climb=climb
+        counts, np.zeros(3), LEVEL, told, now, standing=thrust is None, flying=thrust is not None, climb=climb
     )
 
 

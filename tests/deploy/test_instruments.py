@@ -107,3 +107,14 @@ def test_override_sticks_and_the_operator_are_believed_at_once(flying: Bench) ->
     assert reading.pilot is not None and reading.pilot.roll == 0.8
     reading = flying.read(ARM, OVERRIDE, land=True)
     assert reading.pilot is not None and reading.pilot.mission is Mission.LAND
+
+
+def test_its_failsafe_is_what_it_said_last_and_not_what_a_silent_link_leaves_unknown(flying: Bench) -> None:
+    for _ in range(2):
+        lost = flying.read(ARM, OVERRIDE, FAILSAFE)
+    assert lost.failsafe and lost.pilot is None
+    for _ in range(2):
+        heard = flying.read(ARM, OVERRIDE)
+    assert not heard.failsafe
+    silent = flying.instruments.read(flying.now + 5.0, Info(), land=False)  # type: ignore[arg-type]
+    assert silent.pilot is None and silent.link_problem and not silent.failsafe

@@ -14,10 +14,21 @@ Sensor = Callable[[float, int], float]
 """(true force along the body's z axis, number of the measurement) -> what is told, m/s^2."""
 
 
-def sink(sensor: Sensor, ground_at: float = 1.0, seconds: float = 4.0, *, overdue_at: float = 99.0) -> float | None:
-    """When the ground is felt, s; None: never. It touches after `ground_at` s with 0.8 m/s."""
+def sink(
+    sensor: Sensor,
+    ground_at: float = 1.0,
+    seconds: float = 4.0,
+    *,
+    overdue_at: float = 99.0,
+    late: float = 0.0,
+    lost: float = 0.0,
+) -> float | None:
+    """When the ground is felt, s; None: never. It touches after `ground_at` s with 0.8 m/s.
+
+    Commands arrive, and measurements are asked for, `late` s before the answers come; a share of them is `lost`.
+    """
     random, touch, shock = np.random.default_rng(0), Touch(), 0.0
-    sent = [0.98 * GRAVITY] * LAG
+    sent = [0.98 * GRAVITY] * (LAG + round(late / DT))
     for k in range(round(seconds / DT)):
         now = k * DT
         thrust = sent.pop(0)
@@ -25,7 +36,8 @@ def sink(sensor: Sensor, ground_at: float = 1.0, seconds: float = 4.0, *, overdu
         shock = 25.0 if on_ground and now < ground_at + 1.5 * DT else 0.5 * shock
         force = max(GRAVITY, thrust) if on_ground else thrust
         told = sensor(force + shock + random.normal(0, 0.1), k)
-        touch = feel(seen(touch, (0.0, 0.0, round(50 * told)), thrust, now), told, thrust, now, DT)
+        if random.random() >= lost:
+            touch = feel(seen(touch, (0.0, 0.0, round(50 * told)), thrust, now), told, thrust, now - late, DT)
         if touch.carried:
             return now
         wanted = 0.98 * GRAVITY
@@ -39,6 +51,13 @@ def sink(sensor: Sensor, ground_at: float = 1.0, seconds: float = 4.0, *, overdu
 def test_a_touch_is_felt_at_once_whatever_scale_and_bias(scale: float, bias: float) -> None:
     felt = sink(lambda force, k: scale * force + bias)
     assert felt is not None and 1.0 < felt < 1.8
+
+
+@pytest.mark.parametrize(("late", "lost"), [(0.17, 0.0), (0.1, 0.5), (0.0, 0.7)])
+def test_over_a_slow_or_bad_link_the_ground_is_felt_later_and_never_in_the_air(late: float, lost: float) -> None:
+    felt = sink(lambda force, k: force, overdue_at=2.0, seconds=12.0, late=late, lost=lost)
+    assert felt is not None and 1.0 < felt < 7.0
+    assert sink(lambda force, k: force, 99.0, 12.0, overdue_at=0.5, late=late, lost=lost) is None
 
 
 @pytest.mark.parametrize("scale", [0.9, 1.0, 1.15])
@@ -83,3 +102,20 @@ def test_an_accelerometer_that_repeats_itself_or_is_far_from_the_thrust_cannot_f
     assert not after_a_second(lambda force, k: force).able(1.0)
     assert not after_a_second(lambda force, k: -force + 0.01 * (k % 3)).able(1.0)
     assert not Touch().able(1.0)
+
+
+def test_numbers_that_repeat_are_frozen_at_once_under_another_thrust_and_after_a_while_under_any() -> None:
+    def after(seconds: float, thrust: Callable[[float], float | None]) -> Touch:
+        touch = Touch()
+        for k in range(round(seconds / DT) + 1):
+            touch = seen(touch, (1.0, 2.0, 500.0), thrust(k * DT), k * DT)
+        return touch
+
+    assert not after(0.3, lambda now: GRAVITY).frozen
+    assert after(0.3, lambda now: GRAVITY + 2.0 * now).frozen
+    for thrust in (GRAVITY, None):
+        assert not after(0.3, lambda now, thrust=thrust: thrust).frozen
+        assert after(0.5, lambda now, thrust=thrust: thrust).frozen
+    again = after(0.5, lambda now: None).afresh()
+    assert again.frozen and not again.carried and again.usual is None
+    assert not seen(again, (1.0, 2.0, 501.0), None, 0.6).frozen

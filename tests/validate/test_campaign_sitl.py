@@ -43,6 +43,10 @@ def test_poses_that_end_in_a_take_off_break_no_rule(policy_of: Callable[..., Pat
         "poses: 5 Hz from the ground",
         "poses: 0.15 s late from the ground",
         "link: silent for 3 s in a quiet hover",
+        "link: 55 ms late, poses lost",
+        "link: seven answers of ten spoilt, poses lost",
+        "link: silent for 0.7 s, poses lost with it",
+        "accelerometer frozen, receiver silent for 0.5 s with it",
     ],
 )
 def test_what_ended_badly_once_breaks_no_rule(name: str, policy_of: Callable[..., Path], tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ LATE_S = 0.05
 """Poses may be so much later than the latency for which the gains are, s."""
 OVERDUE = 0.3
 """A blind descent whose height is reckoned so far under the ground feels for the ground, m, ..."""
-WEIGHT, LIGHTER, LIGHTEST = 0.97, 0.1, 0.6
+WEIGHT, LIGHTER, LIGHTEST = 0.97, 0.04, 0.6
 """... and gives no more than this share of its weight, less with each metre, and the last at least."""
 FROZEN = "its numbers do not change"
 """Said of an accelerometer that does not even feel the rotors turn."""
@@ -135,6 +135,7 @@ class Bridge:
         self._last = 0.0
         self._heard = -math.inf
         self._stale: str | None = None
+        self._obeyed = False
 
     def tick(self, now: float, lateness: float = 0.0, slack: float = 0.004) -> Sent:
         """One control step at `now` s, which began `lateness` s after its time; a policy due within `slack` s acts."""
@@ -213,6 +214,7 @@ class Bridge:
         """What the controller has said, and all of it as inputs of the state machine."""
         self._heard = max((reply.time for reply in self.client.latest.values()), default=self._heard)
         reading = self.instruments.read(now, self.info, land=self.land_now, sends=sends)
+        self._obeyed = not reading.failsafe
         grounded = self.flight.mode is Mode.INIT
         probed = self.probe.look(now, reading, self.sticks, grounded=grounded) if sends else ()
         good = self._pose_problem is None and self._stale is None
@@ -243,9 +245,11 @@ class Bridge:
         """What stands against a take-off, or was found in flight: that stays until the vehicle has landed."""
         if self.flight.mode in (Mode.INIT, Mode.DONE):
             return self._inertial.rest_problem
+        if self._inertial.frozen or self._inertial.touch.frozen:
+            return FROZEN
         if self.flight.mode is Mode.TAKEOFF:  # the throttle map is not known well enough to be another judge
-            return FROZEN if self._inertial.touch.frozen(self._last) else None
-        return FROZEN if self._inertial.frozen else self._inertial.watch.accelerometer_problem
+            return None
+        return self._inertial.watch.accelerometer_problem
 
     def _motion_problem(self) -> str | None:
         """On the ground: what was found while it was carried, until it was carried again and agreed."""
@@ -273,14 +277,14 @@ class Bridge:
         seen = self.inputs.seen if not self.flight.misled else None
         attitude = self.client.message(Attitude.CODE, now, ATTITUDE_S)
         if (reply := reading.fresh.get(RawImu.CODE)) is not None:
-            at = reply.time - reply.latency / 2
+            asked = reply.time - reply.latency
             if self.flight.mode is Mode.INIT:
-                self._delays = felt(self._delays, at, reply.message.body_rate)
-            sent = self._history.between(at - THRUST_DELAY[1], at - THRUST_DELAY[0])
-            sent = None if self.inputs.pilot is None else sent
+                self._delays = felt(self._delays, asked + reply.latency / 2, reply.message.body_rate)
+            sent = self._history.between(asked - THRUST_DELAY[1], asked - THRUST_DELAY[0]) if self._obeyed else None
             self._inertial = inertial.measure(self._inertial, Measurement(
                 np.array(reply.message.acceleration, float), np.array(reply.message.body_rate), attitude,
                 None if sent is None else self._thrust(sent),
+                asked,
                 standing=self.flight.mode is Mode.INIT and not self.inputs.armed,
                 flying=flying and self.flight.mode is not Mode.TAKEOFF,
                 climb=float(seen.velocity[2]) if flying and seen is not None else None,
@@ -290,12 +294,9 @@ class Bridge:
         self._inertial = inertial.carry(self._inertial, attitude, thrust, now, held=held)
 
     def _lift(self, moment: float) -> tuple[float, float] | None:
-        """`_thrust` of what was sent for a moment, s, in the air; None: not known, or the ground may carry it.
-
-        A controller that does not hear the pilot flies by its own failsafe instead.
-        """
+        """`_thrust` of what was sent for a moment, s, in the air; None: not known, or the ground may carry it."""
         throttle = self._history.between(moment - THRUST_DELAY[1], moment - THRUST_DELAY[0])
-        lifts = self.flight.mode in (Mode.HOVER, Mode.POLICY, Mode.LAND) and self.inputs.pilot is not None
+        lifts = self.flight.mode in (Mode.HOVER, Mode.POLICY, Mode.LAND) and self._obeyed
         return self._thrust(throttle) if lifts and throttle is not None else None
 
     def _thrust(self, throttle: float) -> tuple[float, float]:
@@ -357,10 +358,10 @@ class Bridge:
         if self.flight.blind and not before.blind and self.flight.turned is None:
             self._inertial = inertial.alone(self._inertial, wrong=self.flight.misled is not None)
         if self.flight.mode is not before.mode:
-            self._inertial = dataclasses.replace(self._inertial, touch=Touch())
+            self._inertial = dataclasses.replace(self._inertial, touch=self._inertial.touch.afresh())
             self._delays = DelayWatch()
-            if self.flight.mode is Mode.TAKEOFF:  # what jumped while it stood is no sign of what follows
-                self._inertial = dataclasses.replace(self._inertial, watch=MotionWatch())
+            if self.flight.mode is Mode.TAKEOFF:  # what jumped or repeated itself while it stood tells nothing
+                self._inertial = dataclasses.replace(self._inertial, watch=MotionWatch(), touch=Touch())
             self._trim = 0.0 if self.flight.mode in (Mode.TAKEOFF, Mode.LAND) else self._trim
             if self.log is not None:
                 record_mode(self.log, now, before, self.flight)
@@ -384,16 +385,19 @@ class Bridge:
         """The descent without odometry."""
         attitude = self.client.message(Attitude.CODE, now, 0.5)
         reckoned = self._inertial.reckoned
+        overdue = True
         if reckoned is None:
             climb = 0.0 if self.flight.lost is None else self.flight.lost[2]
-            return "blind", blind(attitude, now - self.flight.since, climb)
-        ground = self.flight.home
-        self._trim = reckoning.trimmed(self._trim, reckoned, ground, dt)
-        command = reckoning.settle(attitude, reckoned, ground, self._trim)
-        under = ground - reckoned.height
-        overdue = under > OVERDUE
-        weight = GRAVITY * max(WEIGHT - LIGHTER * under, LIGHTEST)
-        thrust = min(float(command.thrust), weight) if overdue else float(command.thrust)
+            command = blind(attitude, now - self.flight.since, climb)
+            thrust = float(command.thrust)
+        else:
+            ground = self.flight.home
+            self._trim = reckoning.trimmed(self._trim, reckoned, ground, dt)
+            command = reckoning.settle(attitude, reckoned, ground, self._trim)
+            under = ground - reckoned.height
+            overdue = under > OVERDUE
+            weight = GRAVITY * max(WEIGHT - LIGHTER * under, LIGHTEST)
+            thrust = min(float(command.thrust), weight) if overdue else float(command.thrust)
         self._inertial = inertial.feel_for_ground(self._inertial, thrust, now, overdue=overdue)
         return "blind", Ctbr(thrust * self._inertial.touch.factor(now), command.rate)
 

@@ -15,7 +15,7 @@ LEVEL_GAIN = 4.0
 """Body rate over tilt of the blind descent, 1/s."""
 LEVEL_RATE = 3.0
 """Largest body rate of it, rad/s."""
-SINK_SPEED, SINK_ACCELERATION = 0.6, 3.0
+SINK_SPEED, SINK_ACCELERATION = 0.55, 3.0
 """A blind descent first goes to this speed, m/s, by this acceleration, m/s^2 ..."""
 SINK_TIME = SINK_SPEED / SINK_ACCELERATION
 """... which takes so long from rest, s ..."""

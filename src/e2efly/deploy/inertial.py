@@ -48,6 +48,8 @@ class Measurement:
     """The controller's; None: not known."""
     thrust: tuple[float, float] | None
     """Specific force by the throttle, and how far that may be off, m/s^2; None: not known."""
+    asked: float
+    """When it was asked for, s: what had been sent until then had arrived as it was taken."""
     standing: bool = False
     """It stands on the ground, disarmed."""
     flying: bool = False
@@ -115,9 +117,8 @@ def measure(before: Inertial, m: Measurement, now: float) -> Inertial:
     plain = m.counts * (GRAVITY / gravity)
     scale, watch, felt = before.scale, before.watch, before.touch
     before = replace(before, reckonings=_after_silence(before, m, scale.value * plain, now), held=None)
-    if m.thrust is not None:
-        felt = touch.seen(felt, tuple(m.counts.tolist()), m.thrust[0], now)
-    if m.flying and felt.frozen(now):
+    felt = touch.seen(felt, tuple(m.counts.tolist()), None if m.thrust is None else m.thrust[0], now)
+    if m.flying and felt.frozen:
         return replace(before, rest=rest, touch=felt, force=None, gyro=m.gyro, time=now, frozen=True)
     if m.climb is not None and m.attitude is not None and watch.moved < QUIET:
         scale = learn(scale, m.attitude, plain, m.climb, dt)
@@ -126,7 +127,7 @@ def measure(before: Inertial, m: Measurement, now: float) -> Inertial:
     if m.attitude is not None:
         watch = motion_watch.feel(watch, m.attitude, force, m.gyro, thrust, now)
     if m.thrust is not None:
-        felt = touch.feel(felt, float(force[2]), m.thrust[0], now, dt)
+        felt = touch.feel(felt, float(force[2]), m.thrust[0], m.asked, dt)
     share = before.share
     if m.climb is not None and m.thrust is not None and m.thrust[0] > 0 and watch.moved < QUIET:
         off = (float(force[2]) / m.thrust[0] - share) * dt / SHARE_S

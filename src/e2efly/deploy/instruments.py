@@ -46,7 +46,9 @@ class Reading:
     override: bool
     """It takes its sticks from here."""
     pilot: Pilot | None
-    """None: it does not hear the receiver."""
+    """None: what he wants is not known."""
+    failsafe: bool
+    """By its last word it does not hear the receiver: it flies by a failsafe of its own, not by what it is sent."""
     voltage: float | None
     """Of a cell, V; None: it does not know it."""
     meddling: tuple[str, ...]
@@ -116,6 +118,7 @@ class Instruments:
             armed=self._armed.held and status is not None,
             override=OVERRIDE in active,
             pilot=self._pilot(channels, fresh=Rc.CODE in fresh, land=land),
+            failsafe=not self._heard.held,
             voltage=self._voltage if battery_known else None,
             meddling=meddling if OVERRIDE in active else (),
             channels=channels,

@@ -96,6 +96,15 @@ CASES = (
     _case("battery sags to 0.8 within 3 s", Mode.HOVER, 1.0,
           Strike("battery: sag", 0.0, None, {"share": 0.8, "within": 3.0})),
     _case("controller reboots", Mode.HOVER, 1.0, Strike("controller: reboots", 0.0, 1.0)),
+    _case("link: 55 ms late, poses lost", Mode.HOVER, 2.4,
+          Strike("link: late", 0.0, 2.0, {"value": 0.055}), _without(0.0)),
+    _case("link: seven answers of ten spoilt, poses lost", Mode.HOVER, 1.2,
+          Strike("link: spoilt", 0.0, 8.0, {"value": 0.7}), _without(0.5)),
+    _case("link: silent for 0.7 s, poses lost with it", Mode.HOVER, 1.4,
+          Strike("link: silent", 0.0, 0.7), _without(0.0)),
+    _case("accelerometer frozen, receiver silent for 0.5 s with it", Mode.POLICY, 1.4,
+          Strike("accelerometer as told: frozen"), Strike("receiver: silent", 0.0, 0.5)),
+    _case("accelerometer frozen in the take-off", Mode.TAKEOFF, 1.5, Strike("accelerometer as told: frozen", 0.3)),
     _case("one motor at 0.85", Mode.HOVER, 1.0, Strike("motor: weak", 0.0, None, {"motor": 1, "share": 0.85})),
 )  # fmt: skip
 """Single faults, and what an adversary found first."""
