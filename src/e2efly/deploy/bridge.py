@@ -245,7 +245,7 @@ class Bridge:
         """What stands against a take-off, or was found in flight: that stays until the vehicle has landed."""
         if self.flight.mode in (Mode.INIT, Mode.DONE):
             return self._inertial.rest_problem
-        if self._inertial.frozen or self._inertial.touch.frozen:
+        if self._inertial.frozen:
             return FROZEN
         if self.flight.mode is Mode.TAKEOFF:  # the throttle map is not known well enough to be another judge
             return None
@@ -361,7 +361,7 @@ class Bridge:
             self._inertial = dataclasses.replace(self._inertial, touch=self._inertial.touch.afresh())
             self._delays = DelayWatch()
             if self.flight.mode is Mode.TAKEOFF:  # what jumped or repeated itself while it stood tells nothing
-                self._inertial = dataclasses.replace(self._inertial, watch=MotionWatch(), touch=Touch())
+                self._inertial = dataclasses.replace(self._inertial, watch=MotionWatch(), touch=Touch(), frozen=False)
             self._trim = 0.0 if self.flight.mode in (Mode.TAKEOFF, Mode.LAND) else self._trim
             if self.log is not None:
                 record_mode(self.log, now, before, self.flight)

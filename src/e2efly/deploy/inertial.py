@@ -87,7 +87,7 @@ class Inertial:
     learned: tuple[tuple[float, Scale, float], ...] = ()
     """What scale and share were at some moments, s, oldest first: wrong poses teach wrong ones before they are told."""
     frozen: bool = False
-    """In flight the accelerometer repeats itself."""
+    """The accelerometer repeats itself: the thrust stands for it."""
 
     @property
     def reckoned(self) -> Reckoning | None:
@@ -118,8 +118,11 @@ def measure(before: Inertial, m: Measurement, now: float) -> Inertial:
     scale, watch, felt = before.scale, before.watch, before.touch
     before = replace(before, reckonings=_after_silence(before, m, scale.value * plain, now), held=None)
     felt = touch.seen(felt, tuple(m.counts.tolist()), None if m.thrust is None else m.thrust[0], now)
-    if m.flying and felt.frozen:
-        return replace(before, rest=rest, touch=felt, force=None, gyro=m.gyro, time=now, frozen=True)
+    if felt.frozen and not m.standing:
+        watch = watch if before.frozen else MotionWatch(pose=watch.pose)  # the poses were compared with wrong numbers
+        if m.attitude is not None and m.thrust is not None:
+            watch = motion_watch.feel(watch, m.attitude, np.array([0.0, 0.0, m.thrust[0]]), m.gyro, m.thrust, now)
+        return replace(before, rest=rest, watch=watch, touch=felt, force=None, gyro=m.gyro, time=now, frozen=True)
     if m.climb is not None and m.attitude is not None and watch.moved < QUIET:
         scale = learn(scale, m.attitude, plain, m.climb, dt)
     force = scale.value * plain

@@ -86,8 +86,7 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
     """
     if flight.mode in (Mode.INIT, Mode.DONE):
         return dataclasses.replace(flight, misled=None, turned=None, fallen_since=None)
-    contradicted = inputs.motion_problem and not inputs.accelerometer_problem  # or it is that which is wrong
-    if contradicted and not flight.misled and not _nearly_landed(flight, inputs.odometry):
+    if inputs.motion_problem and not flight.misled and not _nearly_landed(flight, inputs.odometry):
         flight = dataclasses.replace(flight, misled=f"{Reason.MOTION}: {inputs.motion_problem}")
     odometry, target = inputs.seen, flight.target
     if odometry is None:
