@@ -10,8 +10,13 @@ from pathlib import Path
 
 from e2efly.device import set_xla_options
 
-QUICK = "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false"
-"""XLA options that halve the time of compilation, most of the suite's, to slower code. Not for what tests start."""
+QUICK = (
+    "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
+)
+"""XLA options that halve the time of compilation, most of the suite's, to slower code.
+
+What tests start has them where a test hands them on: where it waits for compilation, and not for what is compiled.
+"""
 os.environ["JAX_NUM_CPU_DEVICES"] = "2"
 set_xla_options()  # as the commands do, before anything computes
 _usual = os.environ["XLA_FLAGS"]
