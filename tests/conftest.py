@@ -39,6 +39,12 @@ settings.load_profile("suite")
 
 PARTS = ("ros1", "ros2", "mocap", "sitl")
 """What may be missing on a laptop: tests in files whose names end so need it, and fail without it."""
+LONGEST = (
+    "learn/test_runner.py", "learn/test_hosts.py", "commands/test_sweep.py", "test_zoo.py", "learn/test_ablation.py",
+    "learn/test_algorithms.py", "validate/test_faults_sitl.py", "validate/test_campaign_sitl.py", "test_examples.py",
+    "adapters/test_torch.py", "scenes/test_cast.py",
+)  # fmt: skip
+"""Files that take a minute or so, the longest first: they begin, so that of two workers neither ends long alone."""
 WITHOUT = tuple(filter(None, os.environ.get("E2EFLY_WITHOUT", "").split(",")))
 """Parts whose tests are left out by the environment's word, which the summary repeats."""
 
@@ -105,6 +111,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if out:
         config.hook.pytest_deselected(items=out)
         items[:] = [item for item in items if item not in out]
+    here = Path(__file__).parent
+    place = {here / name: i for i, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path, len(LONGEST)))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
