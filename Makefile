@@ -23,7 +23,7 @@ demo: $(READY)
 REAL_TIME := tests/validate/test_process_faults_sitl.py
 
 test: $(TEST_READY) lint
-	$(BIN)/python -m pytest -n 2 --dist loadfile --ignore=$(REAL_TIME)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --ignore=$(REAL_TIME)
 	$(BIN)/python -m pytest $(REAL_TIME)
 
 lint: $(TEST_READY)

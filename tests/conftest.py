@@ -10,8 +10,13 @@ from pathlib import Path
 
 from e2efly.device import set_xla_options
 
-QUICK = "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false"
-"""XLA options that halve the time of compilation, most of the suite's, to slower code. Not for what tests start."""
+QUICK = (
+    "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
+)
+"""XLA options that halve the time of compilation, most of the suite's, to slower code.
+
+What tests start has them where a test hands them on: where it waits for compilation, and not for what is compiled.
+"""
 os.environ["JAX_NUM_CPU_DEVICES"] = "2"
 set_xla_options()  # as the commands do, before anything computes
 _usual = os.environ["XLA_FLAGS"]
@@ -34,6 +39,12 @@ settings.load_profile("suite")
 
 PARTS = ("ros1", "ros2", "mocap", "sitl")
 """What may be missing on a laptop: tests in files whose names end so need it, and fail without it."""
+LONGEST = (
+    "learn/test_runner.py", "learn/test_hosts.py", "commands/test_sweep.py", "test_zoo.py", "learn/test_ablation.py",
+    "learn/test_algorithms.py", "validate/test_faults_sitl.py", "validate/test_campaign_sitl.py", "test_examples.py",
+    "adapters/test_torch.py", "scenes/test_cast.py",
+)  # fmt: skip
+"""Files that take a minute or so, the longest first: they begin, so that of two workers neither ends long alone."""
 WITHOUT = tuple(filter(None, os.environ.get("E2EFLY_WITHOUT", "").split(",")))
 """Parts whose tests are left out by the environment's word, which the summary repeats."""
 
@@ -100,6 +111,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if out:
         config.hook.pytest_deselected(items=out)
         items[:] = [item for item in items if item not in out]
+    here = Path(__file__).parent
+    place = {here / name: i for i, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path, len(LONGEST)))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

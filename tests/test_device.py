@@ -8,7 +8,7 @@ import pytest
 from jax._src import compilation_cache
 
 from e2efly.compiled import check_programs
-from e2efly.device import programs_folder, wide_vectors
+from e2efly.device import programs_folder, unless_said, wide_vectors
 
 GRADIENT = """
 import dataclasses, resource
@@ -86,3 +86,11 @@ def test_many_vehicles_have_wide_vectors() -> None:
 def test_what_the_user_says_of_vectors_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_prefer_vector_width=256")
     assert wide_vectors(100) == {}
+
+
+def test_what_the_user_says_of_other_options_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    options = {"xla_backend_optimization_level": 1, "xla_cpu_use_fusion_emitters": False}
+    monkeypatch.setenv("XLA_FLAGS", "--xla_backend_optimization_level=3 --xla_cpu_use_fusion")
+    assert unless_said(options) == {"xla_cpu_use_fusion_emitters": False}
+    monkeypatch.delenv("XLA_FLAGS")
+    assert unless_said(options) == options

@@ -53,6 +53,12 @@ def wide_vectors(vehicles: int) -> dict[str, Any]:
     return {"xla_cpu_prefer_vector_width": 512} if many else {}
 
 
+def unless_said(options: dict[str, Any]) -> dict[str, Any]:
+    """Options of XLA, without those that the user's XLA_FLAGS name: what they say stays."""
+    said = {flag.removeprefix("--").partition("=")[0] for flag in os.environ.get("XLA_FLAGS", "").split()}
+    return {name: value for name, value in options.items() if name not in said}
+
+
 def set_xla_options() -> None:
     """Set `XLA_OPTIONS` and make a device of each core, but for what the user's environment says.
 

@@ -12,6 +12,7 @@ import pytest
 from safetensors.numpy import load_file
 
 from e2efly.learn.rundir import RunDirectory
+from tests.conftest import QUICK
 from tests.learn.test_runner import MORE, SMALL, timeless, wait_for_update
 
 Process = subprocess.Popen[bytes]
@@ -22,7 +23,7 @@ BPTT = [*SMALL, "--algo", "bptt"]
 def start(cwd: Path, out: str, *flags: str, devices: int, told: str = "output.txt") -> Process:
     command = [sys.executable, "-m", "e2efly", "train", "hover", *flags, "--out", out]
     with (cwd / told).open("ab") as output:
-        environment = os.environ | {"JAX_NUM_CPU_DEVICES": str(devices)}
+        environment = os.environ | {"JAX_NUM_CPU_DEVICES": str(devices), "XLA_FLAGS": QUICK}
         return subprocess.Popen(command, cwd=cwd, stdout=output, stderr=output, env=environment)
 
 
@@ -68,11 +69,11 @@ def test_two_processes_learn_as_one_with_two_devices(tmp_path: Path) -> None:
 
 def test_four_devices_learn_as_one(tmp_path: Path) -> None:
     """By a method without noise, far from what ends an episode: each device draws its new starts for itself."""
-    flags = ["100" if BPTT[i - 1] == "--task.episode-s" else flag for i, flag in enumerate(BPTT)]
+    flags = ["20" if BPTT[i - 1] == "--task.episode-s" else flag for i, flag in enumerate(BPTT)]
     flags += ["--task.fence", "1000", "--task.target", "0", "0", "900"]
     for devices in ("4", "1"):
         ended(tmp_path, start(tmp_path, f"on{devices}", *flags, "--devices", devices, devices=4))
-    same_learning(tmp_path, "on4", "on1", 1e-3, flown=False)  # flights of 100 s tell every last bit
+    same_learning(tmp_path, "on4", "on1", 1e-3, flown=False)  # flights of 20 s tell every last bit
 
 
 def test_a_run_that_lost_a_process_says_so_and_resumes(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from e2efly.learn import runner
 from e2efly.learn.rundir import RunDirectory, from_json, to_json
 from e2efly.learn.runner import NonFiniteError, train
 from e2efly.learn.setup import Setup
+from tests.conftest import QUICK
 
 SMALL = ["--steps", "6144", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16", "--algo.horizon", "16",
          "--network.hidden", "8", "--task.episode-s", "1", "--no-plots"]  # fmt: skip
@@ -100,8 +101,9 @@ def test_what_met_the_criterion_is_shipped(tmp_path: Path, monkeypatch: pytest.M
 
 
 def cli(*arguments: str, cwd: Path) -> subprocess.Popen[bytes]:
+    command, environment = [sys.executable, "-m", "e2efly", *arguments], os.environ | {"XLA_FLAGS": QUICK}
     with (cwd / "output.txt").open("ab") as output:
-        return subprocess.Popen([sys.executable, "-m", "e2efly", *arguments], cwd=cwd, stdout=output, stderr=output)
+        return subprocess.Popen(command, cwd=cwd, stdout=output, stderr=output, env=environment)
 
 
 def output_of(cwd: Path) -> str:

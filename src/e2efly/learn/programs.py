@@ -23,7 +23,7 @@ import numpy as np
 from jax import export
 
 from e2efly.compiled import opened, sealed
-from e2efly.device import wide_vectors
+from e2efly.device import unless_said, wide_vectors
 from e2efly.env import Env, random_key
 from e2efly.evaluate import Act, Episodes, run_episodes
 from e2efly.learn.algorithm import TrainState, begin
@@ -59,7 +59,7 @@ class Programs:
                 nothing of the package was replaced.
         """
         config, env = setup.config, setup.env
-        options = FAST_COMPILE if config.fast_compile and jax.default_backend() == "cpu" else {}
+        options = unless_said(FAST_COMPILE) if config.fast_compile and jax.default_backend() == "cpu" else {}
         key = random_key(config.seed)
         started = start_program(setup).trace(env, parameters, key)
         state = started.out_info
