@@ -19,10 +19,13 @@ demo: $(READY)
 	@echo "                   $(BIN)/e2efly train land --algo bptt (exact gradients through the physics)"
 	@echo "                   $(BIN)/e2efly list                   (tasks, vehicles, tracks, reward terms)"
 
+# The tests that fly it build it, too, but one after another; here it is built beside the linting.
+FIRMWARE := case ",$$E2EFLY_WITHOUT," in *,sitl,*) ;; *) $(BIN)/e2efly firmware >/dev/null 2>&1;; esac
 # What runs in real time, in several processes, has both cores to itself.
 REAL_TIME := tests/validate/test_process_faults_sitl.py
 
-test: $(TEST_READY) lint
+test: $(TEST_READY)
+	@$(FIRMWARE) & $(MAKE) --no-print-directory lint && wait
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --ignore=$(REAL_TIME)
 	$(BIN)/python -m pytest $(REAL_TIME)
 

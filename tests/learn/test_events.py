@@ -58,3 +58,16 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
         event_file(tmp_path / "file/events", 0),
     ):
         pass
+
+
+def test_writing_events_loads_no_torch_and_leaves_it_to_others() -> None:
+    """It takes seconds, and every training would wait for them."""
+    code = (
+        "import sys\n"
+        "import e2efly.learn.events\n"
+        "print('torch' in sys.modules)\n"
+        "import torch\n"
+        "print(float(torch.ones(1)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout == "False\n1.0\n"

@@ -4,15 +4,21 @@ A thread of the writer's own, as tensorboardX's `SummaryWriter` has, dies of a f
 hands it more then waits for ever.
 """
 
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from tensorboardX.event_file_writer import EventsWriter
-from tensorboardX.proto.event_pb2 import Event, SessionLog  # pyright: ignore[reportAttributeAccessIssue]
-from tensorboardX.summary import scalar
+_torch = sys.modules.get("torch")
+sys.modules.setdefault("torch", None)  # type: ignore[arg-type]  # tensorboardX imports it where it is installed: 1.4 s
+from tensorboardX.event_file_writer import EventsWriter  # noqa: E402
+from tensorboardX.proto.event_pb2 import Event, SessionLog  # noqa: E402  # pyright: ignore[reportAttributeAccessIssue]
+from tensorboardX.summary import scalar  # noqa: E402
+
+if _torch is None:
+    del sys.modules["torch"]
 
 
 @contextmanager
