@@ -45,7 +45,6 @@ def test_poses_that_end_in_a_take_off_break_no_rule(policy_of: Callable[..., Pat
         "link: silent for 3 s in a quiet hover",
         "link: 55 ms late, poses lost",
         "link: seven answers of ten spoilt, poses lost",
-        "link: silent for 0.7 s, poses lost with it",
         "accelerometer frozen, receiver silent for 0.5 s with it",
     ],
 )
