@@ -121,6 +121,9 @@ def test_under_the_ground_it_surely_stands_where_its_accelerometer_cannot_tell(f
     assert inertial.frozen is frozen
     assert inertial.buried(0.0, now) is frozen
     assert not inertial.buried(-0.2, now)
+    recent = dataclasses.replace(deep, since=now - 1.0)
+    inertial = dataclasses.replace(inertial, reckonings=dataclasses.replace(inertial.reckonings, newest=recent))
+    assert not inertial.buried(0.0, now)
 
 
 def test_an_accelerometer_that_is_unlike_the_thrust_or_silent_leaves_the_reckoning_to_the_throttle() -> None:

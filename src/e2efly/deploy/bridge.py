@@ -12,7 +12,7 @@ from e2efly.deploy.delay_watch import Delay, DelayWatch, delay_of, delay_problem
 from e2efly.deploy.flight_state import AIRBORNE, Flight, Inputs, Mode, Target
 from e2efly.deploy.goals import LandGoal
 from e2efly.deploy.heading_watch import HeadingWatch, watched
-from e2efly.deploy.hover import blind, controlled, flight_gains, held, roll_pitch
+from e2efly.deploy.hover import blind, controlled, flight_gains, roll_pitch
 from e2efly.deploy.inertial import Inertial, Measurement
 from e2efly.deploy.instruments import CLOSED, PROBE, ChannelProbe, Instruments, Reading
 from e2efly.deploy.landing import has_stood
@@ -377,8 +377,8 @@ class Bridge:
             return "policy", controlled(self.vehicle, decision.mode, odometry, decision.command)
         if flight.target is None or odometry is None or flight.blind:
             return self._blind(now, dt)
-        if self.inputs.link_problem and self.inputs.silent:
-            return ("closed", None) if has_stood(self.settings, flight, odometry) else ("held", held(odometry))
+        if self.inputs.link_problem and self.inputs.silent and has_stood(self.settings, flight, odometry):
+            return "closed", None
         return "hover", self._hover(flight.target, odometry, dt)
 
     def _blind(self, now: float, dt: float) -> tuple[str, Ctbr | None]:

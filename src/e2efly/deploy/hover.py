@@ -26,12 +26,6 @@ SINK_FASTER = 0.2
 SLOWEST_SINK, SLOWEST_FASTER = 0.5, 0.07
 """The slowest that it sinks, m/s, and by which that grows, m/s^2: by them the time to the ground is estimated."""
 
-HELD_SINK, HELD_GAIN, HELD_ACCELERATION = 0.35, 1.0, 0.4
-"""What is sent while the link is silent sinks at this speed, m/s, by acceleration over the speed's error, 1/s, and no
-more than this acceleration, m/s^2 ..."""
-HELD_RATE = 0.5
-"""... and turns to level no faster than this, rad/s."""
-
 
 @dataclass(frozen=True)
 class FlightMotion:
@@ -87,15 +81,6 @@ def blind(attitude: Attitude | None, elapsed: float, climb: float = 0.0) -> Ctbr
         return Ctbr(thrust, Vec3(0.0, 0.0, 0.0))
     tilt = max(math.cos(attitude.roll) * math.cos(attitude.pitch), 0.5)
     return Ctbr(thrust / tilt, Vec3(_levelling(attitude.roll), _levelling(attitude.pitch), 0.0))
-
-
-def held(odometry: Odometry) -> Ctbr:
-    """What is sent while the controller is not heard, and may be held by it for long: level, and sinking slowly."""
-    roll, pitch = roll_pitch(odometry.quaternion)
-    up = float(odometry.velocity[2])
-    thrust = GRAVITY + min(max(-HELD_GAIN * (up + HELD_SINK), -HELD_ACCELERATION), 0.0)
-    x, y = (min(max(_levelling(angle), -HELD_RATE), HELD_RATE) for angle in (roll, pitch))
-    return Ctbr(thrust / max(math.cos(roll) * math.cos(pitch), 0.5), Vec3(x, y, 0.0))
 
 
 def _levelling(angle: float) -> float:

@@ -30,8 +30,9 @@ QUIET = 1.0
 flight the poses come too late to be compared with it."""
 BELIEVED = 0.3
 """Share by which the force along the body's z axis may be unlike the thrust: beyond, the accelerometer is broken."""
-BURIED = 1.5
-"""So far under the ground by the largest height that is plausible, the vehicle surely stands, m."""
+BURIED, BURIED_S = 1.5, 2.0
+"""So far under the ground by the largest height that is plausible, m, the vehicle surely stands; not sooner after the
+last pose than this, s, as what was reckoned at first may be wrong."""
 REST_SHARE = 0.05
 """Weight of a new measurement at rest."""
 
@@ -97,7 +98,8 @@ class Inertial:
     def buried(self, ground: float, now: float) -> bool:
         """Whether it must be under the ground, whose height is given, m, and cannot feel that it stands on it."""
         r = self.reckoned
-        return r is not None and ground - r.height > BURIED and not self.touch.able(now)
+        deep = r is not None and ground - r.height > BURIED and now - r.since > BURIED_S
+        return deep and not self.touch.able(now)
 
     @property
     def rest_problem(self) -> str | None:

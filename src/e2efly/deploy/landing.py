@@ -21,6 +21,8 @@ SLOW = 0.5
 """Horizontal speed below which a landing sinks, m/s ..."""
 SLOWED_S = 3.0
 """... or after so long: in a gust it may never be that slow, s."""
+UNHEARD_SINK = 0.35
+"""While the link is silent it sinks so slowly, m/s: the newest command may be held for long."""
 LEAD = 0.6
 """How far the target of a landing may be under the vehicle, m: farther shows no more than that there is ground."""
 PRESSED = 0.5
@@ -71,6 +73,17 @@ def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
         found = flight.now if flight.found_since is None else flight.found_since
         flight = dataclasses.replace(flight, found_since=found, lost=_last_seen(settings, flight, inputs))
         return _sinking(settings, flight, inputs) if flight.now - found < FOUND_S else _see(settings, flight, odometry)
+    flight = _lowered(settings, flight, odometry, dt)
+    height = float(odometry.position[2])
+    low = height < flight.home + STANDING
+    still = flight.still_since is not None and flight.now - flight.still_since >= settings.land_settle
+    if still and (low or inputs.supported):
+        return dataclasses.replace(to(flight, Mode.DONE, Reason.LANDED), home=height)
+    return flight
+
+
+def _lowered(settings: FlightSettings, flight: Flight, odometry: Odometry, dt: float) -> Flight:
+    """The target sinks by another control step, and never far under the vehicle; since when that has been still."""
     assert flight.target is not None
     x, y, z = flight.target.position
     height = float(odometry.position[2])
@@ -80,11 +93,7 @@ def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
     down = max(z - sink * dt, height - LEAD - PRESSING * max(still_for - settings.land_settle, 0.0))
     still = float(np.linalg.norm(odometry.velocity)) < settings.still_speed and height - down > PRESSED
     since = (flight.now if flight.still_since is None else flight.still_since) if still else None
-    low = height < flight.home + STANDING
-    if since is not None and flight.now - since >= settings.land_settle and (low or inputs.supported):
-        return dataclasses.replace(to(flight, Mode.DONE, Reason.LANDED), home=height)
-    target = Target((x, y, down), flight.target.yaw, -sink)
-    return dataclasses.replace(flight, target=target, still_since=since)
+    return dataclasses.replace(flight, target=Target((x, y, down), flight.target.yaw, -sink), still_since=since)
 
 
 def _see(settings: FlightSettings, flight: Flight, odometry: Odometry) -> Flight:
@@ -96,13 +105,17 @@ def _see(settings: FlightSettings, flight: Flight, odometry: Odometry) -> Flight
 
 
 def _unheard(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
-    """While the link is down: no clock of the landing runs; with poses it will begin where the vehicle is."""
-    flight = dataclasses.replace(flight, still_since=None)
-    if inputs.seen is not None:
-        return _see(settings, flight, inputs.seen)
-    if not flight.blind or flight.lost is None:
-        return _blindly(settings, flight, inputs, *flight.reasons)
-    return dataclasses.replace(flight, lost=(flight.lost[0] + dt, *flight.lost[1:]))
+    """While the link is down: it goes on landing, as its commands may arrive, but no clock of the landing runs."""
+    if inputs.seen is None:
+        flight = dataclasses.replace(flight, still_since=None)
+        if not flight.blind or flight.lost is None:
+            return _blindly(settings, flight, inputs, *flight.reasons)
+        return dataclasses.replace(flight, lost=(flight.lost[0] + dt, *flight.lost[1:]))
+    flight = _see(settings, flight, inputs.seen) if flight.blind else flight
+    assert flight.target is not None
+    x, y, _ = flight.target.position
+    target = Target((x, y, float(inputs.seen.position[2])), flight.target.yaw, -UNHEARD_SINK)
+    return dataclasses.replace(flight, target=target, still_since=None)
 
 
 def _looked(flight: Flight, inputs: Inputs) -> Flight:
