@@ -132,3 +132,12 @@ def test_an_accelerometer_that_is_unlike_the_thrust_or_silent_leaves_the_reckoni
         inertial = carry(inertial, LEVEL, (0.9 * GRAVITY, DOUBT), 3.05, held=(0.9 * GRAVITY, DOUBT))
         assert inertial.reckoned is not None
         assert inertial.reckoned.velocity[2] == pytest.approx(-0.1 * GRAVITY * 0.05, abs=0.01)
+
+
+def test_what_a_fall_taught_does_not_outlast_it() -> None:
+    """The scale that a vehicle learned while it tumbled ended its next take-off."""
+    fallen = hovering(factor=0.9)
+    assert fallen.scale.value > 1.05 and fallen.watch.moved >= 0.0
+    again = fallen.at_rest()
+    assert again.scale.value == 1.0 and again.share == 1.0 and not again.learned and not again.frozen
+    assert again.rest_problem is None and again.watch.felt == () and again.touch.usual is None

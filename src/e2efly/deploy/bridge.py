@@ -16,7 +16,6 @@ from e2efly.deploy.hover import blind, controlled, flight_gains, roll_pitch
 from e2efly.deploy.inertial import Inertial, Measurement
 from e2efly.deploy.instruments import CLOSED, PROBE, ChannelProbe, Instruments, Reading
 from e2efly.deploy.landing import has_stood
-from e2efly.deploy.motion_watch import MotionWatch
 from e2efly.deploy.msp.client import Client
 from e2efly.deploy.msp.controller import ControllerInfo
 from e2efly.deploy.msp.messages import Attitude, RawImu, set_raw_rc
@@ -42,7 +41,6 @@ from e2efly.deploy.runtime import Imu
 from e2efly.deploy.settings import FlightSettings
 from e2efly.deploy.sticks import Sticks
 from e2efly.deploy.throttle_map import ThrottleHistory, ThrottleMap, update
-from e2efly.deploy.touch import Touch
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 AFRESH_S = 1.0
@@ -360,8 +358,8 @@ class Bridge:
         if self.flight.mode is not before.mode:
             self._inertial = dataclasses.replace(self._inertial, touch=self._inertial.touch.afresh())
             self._delays = DelayWatch()
-            if self.flight.mode is Mode.TAKEOFF:  # what jumped or repeated itself while it stood tells nothing
-                self._inertial = dataclasses.replace(self._inertial, watch=MotionWatch(), touch=Touch(), frozen=False)
+            if self.flight.mode is Mode.TAKEOFF:
+                self._inertial = self._inertial.at_rest()
             self._trim = 0.0 if self.flight.mode in (Mode.TAKEOFF, Mode.LAND) else self._trim
             if self.log is not None:
                 record_mode(self.log, now, before, self.flight)

@@ -95,6 +95,10 @@ class Inertial:
         """The velocity, from the newest pose on."""
         return self.reckonings.newest
 
+    def at_rest(self) -> "Inertial":
+        """As a flight begins: of earlier ones, which may have ended in a fall, nothing counts but gravity at rest."""
+        return Inertial(rest=self.rest, reckonings=self.reckonings, force=self.force, gyro=self.gyro, time=self.time)
+
     def buried(self, ground: float, now: float) -> bool:
         """Whether it must be under the ground, whose height is given, m, and cannot feel that it stands on it."""
         r = self.reckoned
