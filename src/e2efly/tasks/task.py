@@ -30,7 +30,7 @@ class Shape:
 
 
 @jax.tree_util.register_dataclass
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Outcome:
     """What a control step came to, each of shape (n,)."""
 

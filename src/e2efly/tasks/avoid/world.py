@@ -123,4 +123,11 @@ class Avoid:
             "desired_speed": memory.speed,
         }
         error = jnp.maximum(c.forest.length - x, 0.0)
-        return memory, Outcome(ends | (x >= c.forest.length), success, success, crashed, error, signals)
+        return memory, Outcome(
+            terminated=ends | (x >= c.forest.length),
+            success=success,
+            arrived=success,
+            crashed=crashed,
+            error=error,
+            signals=signals,
+        )

@@ -191,7 +191,9 @@ class Gap:
         }
         arrived = (forward & inside) | success
         ends = lost | reached | (hit & (c.collisions_end > 0))
-        return moved, Outcome(ends, success, arrived, crashed, error, signals)
+        return moved, Outcome(
+            terminated=ends, success=success, arrived=arrived, crashed=crashed, error=error, signals=signals
+        )
 
 
 def rims(shape: Shape) -> Float[Array, "p 3"]:

@@ -88,4 +88,4 @@ class Hover:
         crashed = (error > c.fence) | touches_ground(self.shape, after)
         arrived = (held > 0) & (memory == 0)
         success = timed_out & ~crashed & (held >= c.hold_s - 1e-4)
-        return held, Outcome(crashed, success, arrived, crashed, error)
+        return held, Outcome(terminated=crashed, success=success, arrived=arrived, crashed=crashed, error=error)

@@ -151,4 +151,6 @@ class HoverAware:
         success = timed_out & ~crashed & (held >= c.hold_s - 1e-4)
         arrived = (held > 0) & (memory.held == 0)
         signals = {"pixel": pixel, "pixel_velocity": pixel_velocity}
-        return Memory(memory.seen, time, held), Outcome(crashed, success, arrived, crashed, error, signals)
+        return Memory(memory.seen, time, held), Outcome(
+            terminated=crashed, success=success, arrived=arrived, crashed=crashed, error=error, signals=signals
+        )

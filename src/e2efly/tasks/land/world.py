@@ -101,4 +101,10 @@ class Land:
             & (cos_tilt(after.quaternion) > jnp.cos(c.tilt))
         )
         lost = (sideways > c.fence) | (offset[:, 2] > c.fence)
-        return memory, Outcome(touched | lost, success, success, (touched & ~success) | lost, sideways)
+        return memory, Outcome(
+            terminated=touched | lost,
+            success=success,
+            arrived=success,
+            crashed=(touched & ~success) | lost,
+            error=sideways,
+        )

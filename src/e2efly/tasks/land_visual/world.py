@@ -95,4 +95,10 @@ class LandVisual:
             & (cos_tilt(after.quaternion) > jnp.cos(c.tilt))
         )
         lost = (sideways > c.fence) | (offset[:, 2] > c.fence)
-        return memory, Outcome(touched | lost, success, success, (touched & ~success) | lost, sideways)
+        return memory, Outcome(
+            terminated=touched | lost,
+            success=success,
+            arrived=success,
+            crashed=(touched & ~success) | lost,
+            error=sideways,
+        )

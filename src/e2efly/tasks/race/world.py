@@ -125,4 +125,6 @@ class Race:
         memory = memory + passed
         laps = self.config.laps if self.closed else 1
         finished = passed & (laps > 0) & (memory >= laps * self.count)
-        return memory, Outcome(crashed | finished, finished, passed, crashed, error)
+        return memory, Outcome(
+            terminated=crashed | finished, success=finished, arrived=passed, crashed=crashed, error=error
+        )

@@ -202,7 +202,9 @@ class RaceClutter:
             "desired_velocity": self.desired_velocity(memory, after),
             "overhang": self.overhang(memory, after),
         }
-        return moved, Outcome(ends, success, passed, crashed, error, signals)
+        return moved, Outcome(
+            terminated=ends, success=success, arrived=passed, crashed=crashed, error=error, signals=signals
+        )
 
 
 def _drawn_larger(track: RaceTrack, scale: float) -> RaceTrack:

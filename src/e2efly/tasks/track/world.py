@@ -146,4 +146,6 @@ class Track:
         crashed = (error > c.fence) | touches_ground(self.shape, after)
         mean = memory.error_sum / jnp.maximum(memory.steps, 1.0)
         success = timed_out & ~crashed & (mean < c.mean_error)
-        return memory, Outcome(crashed, success, jnp.zeros_like(crashed), crashed, error)
+        return memory, Outcome(
+            terminated=crashed, success=success, arrived=jnp.zeros_like(crashed), crashed=crashed, error=error
+        )
