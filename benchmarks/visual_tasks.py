@@ -24,7 +24,6 @@ prepare("cpu")
 import jax  # noqa: E402
 import numpy as np  # noqa: E402
 
-from e2efly import presets  # noqa: E402
 from e2efly.config import ImageNoiseConfig  # noqa: E402
 from e2efly.env import Env, random_key  # noqa: E402
 from e2efly.evaluate import run_episodes, wilson  # noqa: E402
@@ -57,7 +56,7 @@ def flown(out: Path, noise: ImageNoiseConfig) -> dict[str, float]:
     weights = load_policy_weights(setup, run, "best")
     cameras = tuple(dataclasses.replace(c, noise=noise, noise_share=1.0) for c in config.env.cameras)
     found = {}
-    for name, suite in presets.suites(config.task).items():
+    for name, suite in config.task.criteria().items():
         env = Env.of(suite, config.reward, dataclasses.replace(config.env, cameras=cameras))
         fly = jax.jit(
             lambda env, key: run_episodes(env, acting(setup.actor, weights), key, BATCH, setup.episode_steps),

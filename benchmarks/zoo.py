@@ -23,9 +23,9 @@ from typing import Any
 
 from common import arguments, table
 
-from e2efly import presets
 from e2efly.deploy.onnx_file import is_sealed
 from e2efly.storage import write_json
+from e2efly.tasks import TASKS
 from e2efly.vehicles import vehicle_names
 from e2efly.zoo import FOLDER, USUAL, contents
 
@@ -41,7 +41,7 @@ def run(*command: str) -> None:
 
 def algorithms(task: str) -> tuple[str, ...]:
     """What is tried, in this order."""
-    return ("bptt", "foppo") if task in ("hover", "land", "track", "race") else (presets.default_algorithm(task),)
+    return ("bptt", "foppo") if task in ("hover", "land", "track", "race") else (TASKS[task].best,)
 
 
 def trained(vehicle: str, task: str, algo: str, seed: int, folder: Path) -> tuple[float, dict[str, Any]]:
@@ -71,7 +71,7 @@ def write(zoo: dict[str, dict[str, dict[str, Any]]]) -> None:
 
 def main() -> None:
     """Train, keep the policies and zoo.json, print a table."""
-    options = arguments(__doc__ or "", vehicles=vehicle_names(), tasks=list(presets.TASKS), seeds=3, digests=False)
+    options = arguments(__doc__ or "", vehicles=vehicle_names(), tasks=list(TASKS), seeds=3, digests=False)
     if options.digests:
         for file in FOLDER.glob("*/*.onnx"):
             if not is_sealed(file.read_bytes()):

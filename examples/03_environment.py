@@ -3,8 +3,9 @@
 import jax
 import jax.numpy as jnp
 
-from e2efly.config import EnvConfig, HoverConfig, RewardConfig
+from e2efly.config import EnvConfig, RewardConfig
 from e2efly.env import Env, random_key
+from e2efly.tasks.hover import HoverConfig
 
 env = Env.of(
     HoverConfig(),

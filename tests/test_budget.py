@@ -7,9 +7,10 @@ import pytest
 
 from e2efly import budget, presets
 from e2efly.cli import run
-from e2efly.config import EnvConfig, NetworkConfig
+from e2efly.config import ALGORITHMS, EnvConfig, NetworkConfig
 from e2efly.learn.budget import run_memory
 from e2efly.learn.setup import Setup
+from e2efly.tasks import TASKS
 
 SMALL = presets.preset("hover", "ppo")
 
@@ -75,9 +76,9 @@ def test_an_estimate_is_near_to_what_the_programs_take() -> None:
     assert (took[1] - took[0]) / (1024 * 64) == pytest.approx(1224, rel=0.5)
 
 
-@pytest.mark.parametrize("task", presets.TASKS)
+@pytest.mark.parametrize("task", TASKS)
 def test_no_preset_is_refused_by_a_small_machine(task: str) -> None:
-    for algo in presets.ALGORITHMS:
+    for algo in ALGORITHMS:
         setup = Setup.of(presets.preset(task, algo))
         assert sum(run_memory(setup.config, setup.env, setup.actor).values()) < 2e9
 

@@ -9,19 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly import presets
-from e2efly.config import (
-    AvoidConfig,
-    EnvConfig,
-    ForestConfig,
-    HoverConfig,
-    ImuConfig,
-    LandConfig,
-    NoiseConfig,
-    RewardConfig,
-    TaskConfig,
-    TrackConfig,
-)
+from e2efly.config import EnvConfig, ForestConfig, ImuConfig, NoiseConfig, RewardConfig, TaskConfig
 from e2efly.env import UNSEEN, Env, numbers_of, random_key
 from e2efly.env.environment import STARTS
 from e2efly.learn.judge import CONFIRMED, REPORTED, WATCHED
@@ -29,7 +17,12 @@ from e2efly.physics.rotation import yaw_pitch_roll
 from e2efly.sensors import imu
 from e2efly.sensors.latency import acting_commands, delayed_state
 from e2efly.sensors.noise import add_noise
+from e2efly.tasks import TASKS
+from e2efly.tasks.avoid import AvoidConfig
+from e2efly.tasks.hover import HoverConfig
+from e2efly.tasks.land import LandConfig
 from e2efly.tasks.task import at_rest
+from e2efly.tasks.track import TrackConfig
 
 REWARD = RewardConfig({"prog2": 1.0, "anglev": 0.1})
 
@@ -38,9 +31,9 @@ def make(task: TaskConfig | None = None, **config: Any) -> Env:
     return Env.of(task or HoverConfig(), REWARD, EnvConfig(**config))
 
 
-@pytest.mark.parametrize("name", list(presets.TASKS))
+@pytest.mark.parametrize("name", list(TASKS))
 def test_starts_are_where_the_task_says(name: str) -> None:
-    env = make(presets.TASKS[name])
+    env = make(TASKS[name].training())
     state, observation = jax.jit(env.reset, static_argnums=1)(random_key(0), 2000)
     v = state.vehicle
     offset = np.asarray(v.position - env.task.goal(state.memory, state.time))

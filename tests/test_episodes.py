@@ -8,10 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly import presets
-from e2efly.config import EnvConfig, HoverConfig, ImuConfig, NoiseConfig, RewardConfig, TaskConfig
+from e2efly.config import EnvConfig, ImuConfig, NoiseConfig, RewardConfig, TaskConfig
 from e2efly.env import Env, EnvState, Step, random_key
 from e2efly.physics import COMMAND_MODES
+from e2efly.tasks import TASKS
+from e2efly.tasks.hover import HoverConfig
 
 REWARD = RewardConfig({"prog2": 1.0, "anglev": 0.1})
 N = 5
@@ -40,7 +41,7 @@ STATE_TASKS = ("hover", "land", "track", "race")
 
 @pytest.mark.parametrize(
     ("name", "mode"),
-    [(name, mode) for name in presets.TASKS for mode in (COMMAND_MODES if name in STATE_TASKS else ("ctbr",))],
+    [(name, mode) for name in TASKS for mode in (COMMAND_MODES if name in STATE_TASKS else ("ctbr",))],
 )
 def test_every_task_flies_under_every_command_mode(name: str, mode: str) -> None:
     """Traced, not run: shapes and types go round, so that a rollout can be compiled."""
@@ -49,7 +50,7 @@ def test_every_task_flies_under_every_command_mode(name: str, mode: str) -> None
         "noise": NoiseConfig(position=0.1), "randomize": {"mass": 0.1, "inertia": 0.1},
     }  # fmt: skip
     for options in ({}, config):
-        env = make(presets.TASKS[name], command_mode=mode, **options)
+        env = make(TASKS[name].training(), command_mode=mode, **options)
         key = random_key(0)
         state, observation = jax.eval_shape(lambda env=env, key=key: env.reset(key, N))
         after, out = jax.eval_shape(env.step, state, jax.ShapeDtypeStruct((N, 4), jnp.float32))
@@ -64,8 +65,8 @@ def test_every_task_flies_under_every_command_mode(name: str, mode: str) -> None
 
 @pytest.mark.parametrize(("name", "size"), [("hover", 13), ("land", 13), ("track", 40), ("race", 16)])
 def test_observation_sizes_of_the_paper(name: str, size: int) -> None:
-    assert make(presets.TASKS[name], past_actions=0).observation_size == size
-    assert make(presets.TASKS[name]).observation_size == size + 8  # VIS-R: two past actions
+    assert make(TASKS[name].training(), past_actions=0).observation_size == size
+    assert make(TASKS[name].training()).observation_size == size + 8  # VIS-R: two past actions
 
 
 def test_what_is_observed(advance: Any) -> None:

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly import presets
 from e2efly.commands import evaluate
 from e2efly.commands.evaluate import config_from_contract, fly_suites
 from e2efly.deploy.policy import load_policy
 from e2efly.device import wide_vectors
+from e2efly.tasks import TASKS
 from e2efly.vehicles import vehicle_names
 from e2efly.zoo import FOLDER, USUAL, beside, contents, policy_path
 from tests.conftest import QUICK, NetworkTrace
@@ -37,9 +37,9 @@ def test_every_policy_succeeds_as_often_as_it_says(vehicle: str, task: str, monk
 
 
 def test_it_has_every_task_for_the_usual_vehicle_and_none_is_large() -> None:
-    assert set(contents()[USUAL]) == set(presets.TASKS)
+    assert set(contents()[USUAL]) == set(TASKS)
     assert set(contents()) == set(vehicle_names())
-    assert {file.stem for file in FOLDER.glob("*/*.onnx")} == set(presets.TASKS)
+    assert {file.stem for file in FOLDER.glob("*/*.onnx")} == set(TASKS)
     assert max(file.stat().st_size for file in FOLDER.glob("*/*.onnx")) < 1_000_000
 
 

@@ -13,9 +13,10 @@ import tyro
 
 from e2efly import __version__, presets
 from e2efly.commands.terminal import Terminal
-from e2efly.config import EnvConfig, NetworkConfig, RewardConfig, TrainConfig
+from e2efly.config import ALGORITHMS, EnvConfig, NetworkConfig, RewardConfig, TrainConfig
 from e2efly.device import Hosts
 from e2efly.process import raise_at_interrupt, write_nowhere
+from e2efly.tasks import TASKS
 from e2efly.vehicles import unknown
 
 _ABOUT = f"""e2efly {__version__}: train an end-to-end quadrotor policy in seconds, check it, and fly it.
@@ -209,12 +210,12 @@ class List:
 
 def train_options(config: TrainConfig, preset: str) -> tuple[type, Any]:
     """The options of `train`: a dataclass and its defaults, which are those of a configuration."""
-    task, algo = presets.task_name(config.task), presets.algorithm_name(config.algo)
+    task, algo = config.task.name, presets.algorithm_name(config.algo)
     arg = tyro.conf.arg
     every = [
         ("task_name", tyro.conf.Positional[Annotated[str, arg(metavar="TASK", help=_tasks())]]),
-        ("algo_name", Annotated[str, arg(name="algo", help=f"Algorithm: {_join(presets.ALGORITHMS)}.")]),
-        ("preset", Annotated[str, arg(help=f"Where the defaults come from: {_join(presets.PRESETS)}.")]),
+        ("algo_name", Annotated[str, arg(name="algo", help=f"Algorithm: {_join(ALGORITHMS)}.")]),
+        ("preset", Annotated[str, arg(help=f"Where the defaults come from: {_join(presets.names())}.")]),
         ("vehicle", Annotated[str, arg(help="A shipped vehicle, or the path of a .toml file.")]),
         ("seed", Annotated[int, arg(help="Seed of everything random.")]),
         ("out", Annotated[Path | None, arg(help="Run directory; runs/TASK-ALGO-SEED when left out.")]),
@@ -322,7 +323,7 @@ def _command(name: str) -> Callable[[list[str]], int]:
 
 def _train(arguments: list[str]) -> int:
     parsed, config = _parsed(arguments)
-    out = parsed.out or Path("runs") / f"{parsed.task_name}-{parsed.algo_name}-{config.seed}"
+    out = parsed.out or Path("runs") / f"{config.task.name}-{parsed.algo_name}-{config.seed}"
     from e2efly.commands.train import train_command
 
     return train_command(
@@ -337,11 +338,11 @@ def _parsed(arguments: list[str]) -> tuple[Any, TrainConfig]:
     if "--resume" in arguments and (not arguments or arguments[0].startswith("-")) and "--help" not in arguments:
         return _parsed_of_run(arguments)
     task = next((a for a in arguments[:1] if not a.startswith("-")), "hover")
-    algo = _peek(arguments, "--algo", presets.default_algorithm(task))
+    algo = _peek(arguments, "--algo", TASKS.find(task).best)
     preset = _peek(arguments, "--preset", "ours")
     config = presets.preset(task, algo, preset)
     if arguments[:1] != [task] and not {"-h", "--help"} & set(arguments):
-        raise ValueError(f"train needs a task first: {_join(presets.TASKS)}")
+        raise ValueError(f"train needs a task first: {_join(TASKS)}")
     return _parsed_as(config, preset, arguments)
 
 
@@ -377,7 +378,7 @@ def _parsed_of_run(arguments: list[str]) -> tuple[Any, TrainConfig]:
     if not out:
         raise ValueError("--resume names no run; accepted: the run's folder, as in `e2efly train --resume DIR`")
     config = RunDirectory(Path(out)).config()
-    task, algo, preset = presets.task_name(config.task), presets.algorithm_name(config.algo), "the run"
+    task, algo, preset = config.task.name, presets.algorithm_name(config.algo), "the run"
     parsed, told = _parsed_as(config, preset, [task, *arguments])
     for option, said, known in (("--algo", parsed.algo_name, algo), ("--preset", parsed.preset, preset)):
         if said != known:
@@ -389,8 +390,8 @@ def _sweep(arguments: list[str]) -> int:
     o = _options(Sweep, "sweep", arguments)
     from e2efly.commands.sweep import Request, sweep_command
 
-    algo = o.algo or presets.default_algorithm(o.task)
-    out = o.out or Path("runs") / f"sweep-{o.task}-{algo}"
+    algo = o.algo or TASKS.find(o.task).best
+    out = o.out or Path("runs") / f"sweep-{TASKS.find(o.task).name}-{algo}"
     request = Request(**{**vars(o), "algo": algo, "out": out})
     return sweep_command(request, lambda given: _parsed(given)[1])
 
@@ -492,7 +493,7 @@ def _peek(arguments: list[str], flag: str, default: str) -> str:
 
 
 def _tasks() -> str:
-    return f"What to learn: {_join(presets.TASKS)}."
+    return f"What to learn: {_join(TASKS)}; or a task of your own: path/to/file.py:Name."
 
 
 def _join(names: Any) -> str:

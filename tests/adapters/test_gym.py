@@ -14,6 +14,7 @@ from e2efly import presets
 from e2efly.adapters.gym import QuadrotorEnv, QuadrotorVectorEnv
 from e2efly.config import TrainConfig
 from e2efly.env import Env, random_key
+from e2efly.tasks import TASKS
 
 
 def short(seconds: float = 0.2) -> TrainConfig:
@@ -33,7 +34,7 @@ def test_gymnasiums_checker_accepts_it(task: str) -> None:
 
 
 def test_every_task_is_registered_both_ways() -> None:
-    for task in presets.TASKS:
+    for task in TASKS:
         assert f"e2efly/{task}-v0" in gymnasium.registry
     envs = gymnasium.make_vec("e2efly/land-v0", num_envs=3, vectorization_mode="vector_entry_point")
     observations, _ = envs.reset(seed=0)

@@ -33,7 +33,7 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
             ["train", "hoover"],
             "unknown task 'hoover'; did you mean 'hover'? (there are: avoid, gap, hover, hover_aware, land, ",
         ),
-        (["train"], "train needs a task first: hover, land, track, race, hover_aware, gap"),
+        (["train"], "train needs a task first: avoid, gap, hover, hover_aware, land"),
         (["train", "hover", "--algo", "bppt"], "unknown algorithm 'bppt'; did you mean 'bptt'?"),
         (["train", "hover", "--preset", "papr"], "unknown preset 'papr'; did you mean 'paper'?"),
         (["train", "hover", "--vehicle", "vis_x"], "unknown vehicle 'vis_x'; did you mean 'vis_r'?"),

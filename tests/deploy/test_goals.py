@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from e2efly import presets
-from e2efly.config import RaceConfig
 from e2efly.courses.tracks import load_track
 from e2efly.deploy.contract import Contract
 from e2efly.deploy.goal_options import GoalOptions, goal_for
@@ -19,8 +18,10 @@ from e2efly.deploy.goals import GatesGoal, Goal, HoverGoal, LandGoal, ReferenceG
 from e2efly.deploy.odometry import Odometry
 from e2efly.env import Env
 from e2efly.learn.export import contract_of
-from e2efly.tasks import Race, Shape
-from e2efly.tasks.task import at_rest
+from e2efly.tasks import TASKS
+from e2efly.tasks.race import RaceConfig
+from e2efly.tasks.race.world import Race
+from e2efly.tasks.task import Shape, at_rest
 from e2efly.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
@@ -62,14 +63,14 @@ def through(name: str, count: int, gap: float = 0.2) -> np.ndarray:
 
 def test_the_defaults_are_the_trainings(contracts: dict[str, Contract]) -> None:
     options = GoalOptions()
-    hover, land, track, race = (presets.TASKS[name] for name in ("hover", "land", "track", "race"))
-    suites = presets.suites(track)
+    hover, land, track, race = (TASKS[name].training() for name in ("hover", "land", "track", "race"))
+    suites = track.criteria()
     assert options.target == hover.target
     for name in ("centre", "radius", "circle_rate", "lemniscate_speed"):
         assert {getattr(suite, name) for suite in suites.values()} == {getattr(options, name)}
     assert options.reference in suites
     assert options.track == race.track
-    assert options.laps == next(iter(presets.suites(race).values())).laps
+    assert options.laps == next(iter(race.criteria().values())).laps
     for name, config in (("hover", hover), ("land", land), ("track", track), ("race", race)):
         assert goal_for(contracts[name], options, VEHICLE).fence == config.fence
 

@@ -27,6 +27,7 @@ from e2efly.deploy.runtime import Envelope, Imu, Runtime, RuntimeState, act, beg
 from e2efly.env import Env, EnvState, random_key
 from e2efly.learn.export import contract_of, export_policy
 from e2efly.learn.networks import Actor, Weights, init_mlp
+from e2efly.tasks import TASKS
 from e2efly.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
@@ -38,7 +39,7 @@ CLOSE = 2e-5
 
 def make(folder: Path, task: TaskConfig, config: EnvConfig | None = None) -> tuple[Env, Path]:
     """An environment, and a policy of it that about hovers but answers to what it sees."""
-    preset = presets.preset(presets.task_name(task), "ppo")
+    preset = presets.preset(task.name, "ppo")
     preset = dataclasses.replace(preset, task=task, env=config or preset.env)
     env = Env.of(task, preset.reward, preset.env)
     actor, path = Actor.of(env.fields, (), NetworkConfig((16,))), folder / "policy.onnx"
@@ -51,7 +52,7 @@ def make(folder: Path, task: TaskConfig, config: EnvConfig | None = None) -> tup
 
 @pytest.fixture(scope="module")
 def hovering(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return make(tmp_path_factory.mktemp("hover"), presets.TASKS["hover"])[1]
+    return make(tmp_path_factory.mktemp("hover"), TASKS["hover"].training())[1]
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +79,7 @@ def still(position: Any = (0.0, 0.0, 2.0), **changes: Any) -> Odometry:
 
 def options_of(task: TaskConfig, state: EnvState, row: int) -> GoalOptions:
     """The options that fly what the environment drew."""
-    name = presets.task_name(task)
+    name = task.name
     if name == "track":
         (x, y, _), (vx, _, _) = np.asarray(state.memory.reference.knots)[row, 0, :2] - np.array([[0, 0, 3], [0, 0, 0]])
         if task.reference == "circle":  # type: ignore[union-attr]
@@ -107,10 +108,10 @@ def test_the_sign_of_the_pose_sources_quaternion_does_not_matter(runtime: Runtim
 
 
 SUITES = {
-    **presets.suites(presets.TASKS["hover"]),
-    **presets.suites(presets.TASKS["land"]),
-    **presets.suites(presets.TASKS["track"]),
-    "race": presets.TASKS["race"],
+    **TASKS["hover"].training().criteria(),
+    **TASKS["land"].training().criteria(),
+    **TASKS["track"].training().criteria(),
+    "race": TASKS["race"].training(),
 }
 
 
@@ -148,7 +149,7 @@ def test_it_sees_in_flight_what_the_environment_shows(name: str, imu: bool, tmp_
 @pytest.mark.parametrize("track", ["four_gates", "s_shaped"])
 def test_it_counts_gates_in_flight_as_the_environment_does(track: str, tmp_path: Path) -> None:
     """The vehicle is carried along the track, over two laps of the closed one; once it flies past a gate."""
-    task = dataclasses.replace(presets.TASKS["race"], track=track)
+    task = dataclasses.replace(TASKS["race"].training(), track=track)
     env, path = make(tmp_path, task)
     loaded, course = load_policy(path), load_track(track)
     flight = Runtime.of(loaded, goal_for(loaded.contract, GoalOptions(track=track, laps=0), VEHICLE), VEHICLE)
@@ -310,7 +311,7 @@ def make_goal_of_gates() -> Any:
 
 
 def test_a_policy_that_sees_an_imu_needs_its_measurements(tmp_path: Path) -> None:
-    path = make(tmp_path, presets.TASKS["hover"], EnvConfig(imu=ImuConfig(observed=True)))[1]
+    path = make(tmp_path, TASKS["hover"].training(), EnvConfig(imu=ImuConfig(observed=True)))[1]
     policy = load_policy(path)
     goal = goal_for(policy.contract, GoalOptions(), VEHICLE)
     with pytest.raises(ValueError, match=r"'gyroscope': there is no IMU(.|\n)*'accelerometer': there is no IMU"):
@@ -340,7 +341,7 @@ def test_the_envelope(runtime: Runtime) -> None:
 
 def test_a_race_begins_where_its_track_does_and_heads_as_it_says(tmp_path: Path) -> None:
     """Training begins nowhere else: four_gates at (0, 0, 1.5), heading 45 degrees."""
-    policy = load_policy(make(tmp_path, presets.TASKS["race"], EnvConfig())[1])
+    policy = load_policy(make(tmp_path, TASKS["race"].training(), EnvConfig())[1])
     runtime = Runtime.of(policy, goal_for(policy.contract, GoalOptions(), VEHICLE), VEHICLE)
 
     def begins(x: float, yaw: float) -> tuple[str, ...]:

@@ -9,7 +9,9 @@ import pytest
 
 from e2efly import presets
 from e2efly.cli import run
+from e2efly.config import ALGORITHMS
 from e2efly.learn.rundir import from_json, to_json
+from e2efly.tasks import TASKS
 
 GOOD = json.loads(json.dumps(to_json(presets.preset("avoid", "ppo"))))
 
@@ -46,7 +48,7 @@ def changed(path: str, value: Any) -> Any:
         ("reward.weights", ["near"], "reward: weights is ['near']; accepted: an object, with a number each"),
         ("reward.weights.vel", "1", "reward: weights.vel is '1'; accepted: a number"),
         ("curriculum.0.changes", None, "curriculum[0]: changes is None; accepted: an object, with a number or"),
-        ("task_name", ["avoid"], "task_name is ['avoid']; accepted: hover, land, track, race"),
+        ("task_name", ["avoid"], "task_name is ['avoid']; accepted: avoid, gap, hover, hover_aware"),
         ("algo_name", None, "algo_name is None; accepted: ppo, bptt"),
     ],
 )
@@ -57,9 +59,9 @@ def test_a_value_of_another_type_is_named(path: str, value: Any, said: str) -> N
     assert str(error.value).startswith("config.json: ")
 
 
-@pytest.mark.parametrize("task", presets.TASKS)
+@pytest.mark.parametrize("task", TASKS)
 def test_every_configuration_is_read_as_it_was(task: str) -> None:
-    for algo in presets.ALGORITHMS:
+    for algo in ALGORITHMS:
         config = presets.preset(task, algo)
         assert from_json(json.loads(json.dumps(to_json(config))), "here") == config
 

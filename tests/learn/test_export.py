@@ -18,6 +18,7 @@ from e2efly.learn.export import contract_of, export_policy, parity, random_obser
 from e2efly.learn.networks import ACTIVATIONS, Actor, Layers, Weights, init_mlp
 from e2efly.observation import ATTITUDE, BODY_RATE, VELOCITY, Field, past_actions
 from e2efly.physics import COMMAND_MODES
+from e2efly.tasks import TASKS
 from e2efly.vehicles import load_vehicle, vehicle_names
 
 GOALS = Field("goals", 6, "world", "m", 3.0, "two positions minus vehicle position")
@@ -59,7 +60,7 @@ def a_contract(fields: tuple[Field, ...]) -> Contract:
 
 
 @pytest.mark.parametrize("activation", list(ACTIVATIONS))
-@pytest.mark.parametrize("task", list(presets.TASKS))
+@pytest.mark.parametrize("task", list(TASKS))
 def test_parity_on_ten_thousand_observations(tmp_path: Path, task: str, activation: str) -> None:
     config, env = configured(task)
     actor, path = shaped(env.fields, activation), tmp_path / "policy.onnx"

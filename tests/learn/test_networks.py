@@ -3,11 +3,12 @@
 import jax
 import numpy as np
 
-from e2efly.config import HoverConfig, NetworkConfig, RewardConfig
+from e2efly.config import NetworkConfig, RewardConfig
 from e2efly.env import Env
 from e2efly.learn.networks import Actor, Features, init_mlp
 from e2efly.observation import ATTITUDE, VELOCITY
 from e2efly.physics.rotation import from_euler, multiply, rotate
+from e2efly.tasks.hover import HoverConfig
 
 
 def test_features_do_not_change_with_the_heading() -> None:

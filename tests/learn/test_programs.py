@@ -16,6 +16,7 @@ from e2efly.evaluate import Act, run_episodes
 from e2efly.learn.devices import share
 from e2efly.learn.programs import Programs, evaluation_program
 from e2efly.learn.setup import Setup
+from e2efly.tasks import TASKS
 
 
 def config(**changes: Any) -> TrainConfig:
@@ -88,7 +89,7 @@ def test_an_evaluation_is_the_same_on_one_device_and_on_two() -> None:
 
 
 def test_parts_of_the_episodes_are_the_whole() -> None:
-    env = Env.of(presets.TASKS["hover"], config().reward)
+    env = Env.of(TASKS["hover"].training(), config().reward)
     act = Act.of(lambda o: jnp.broadcast_to(env.hover, (o.shape[0], 4)))
     fly = jax.jit(lambda key, index: run_episodes(env, act, key, 7, 10, part=(index, 3)))
     whole = jax.jit(lambda key: run_episodes(env, act, key, 7, 10))(random_key(0))

@@ -9,8 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.config import CameraConfig, EnvConfig, HoverConfig, ImageNoiseConfig, LandVisualConfig, RewardConfig
+from e2efly.config import CameraConfig, EnvConfig, ImageNoiseConfig, RewardConfig
 from e2efly.env import Env, EnvState, random_key
+from e2efly.tasks.hover import HoverConfig
+from e2efly.tasks.land_visual import LandVisualConfig
 
 N = 3
 DOWN = CameraConfig("depth", 8, 8, fov=(0.2, 0.2), pitch=math.pi / 2, reach=(0.0, 50.0))

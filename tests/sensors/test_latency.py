@@ -7,10 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.config import EnvConfig, HoverConfig, RewardConfig
+from e2efly.config import EnvConfig, RewardConfig
 from e2efly.env import Env, EnvState, random_key
 from e2efly.physics import State
 from e2efly.sensors.latency import acting_commands, delayed_state, frames
+from e2efly.tasks.hover import HoverConfig
 from e2efly.vehicles import load_vehicle
 from tests.gradients import central, reverse
 

@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 
 from e2efly import rewards
-from e2efly.config import GapConfig
 from e2efly.env import random_key
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler, multiply, rotate, unrotate
 from e2efly.scenes.scene import WALL, clearance
-from e2efly.tasks import Gap, Outcome, Shape
-from e2efly.tasks.gap import Memory
-from e2efly.tasks.task import at_rest
+from e2efly.tasks.gap import GapConfig
+from e2efly.tasks.gap.world import Gap, Memory
+from e2efly.tasks.task import Outcome, Shape, at_rest
 
 SHAPE = Shape(0.05, 0.12)
 PERIOD = 1 / 30

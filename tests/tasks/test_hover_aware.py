@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from e2efly import rewards
-from e2efly.config import CameraConfig, HoverAwareConfig
+from e2efly.config import CameraConfig
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.env import random_key
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler, normalize
 from e2efly.scenes.camera import look, mount
 from e2efly.scenes.scene import OBSTACLE, Solids
-from e2efly.tasks import HoverAware, Shape
-from e2efly.tasks.hover_aware import OUTSIDE, Memory
-from e2efly.tasks.task import at_rest
+from e2efly.tasks.hover_aware import HoverAwareConfig
+from e2efly.tasks.hover_aware.world import OUTSIDE, HoverAware, Memory
+from e2efly.tasks.task import Shape, at_rest
 
 SHAPE = Shape(0.05, 0.12)
 PERIOD = 1 / 30

@@ -6,11 +6,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.config import HoverConfig, RaceConfig, TrackConfig
 from e2efly.courses.tracks import load_track, track_names
 from e2efly.env import random_key
-from e2efly.tasks import Outcome, Race, Shape, Track, make_task
-from e2efly.tasks.task import at_rest
+from e2efly.tasks.hover import HoverConfig
+from e2efly.tasks.race import RaceConfig
+from e2efly.tasks.race.world import Race
+from e2efly.tasks.task import Outcome, Shape, at_rest, make_task
+from e2efly.tasks.track import TrackConfig
+from e2efly.tasks.track.world import Track
 
 SHAPE = Shape(0.05, 0.12)
 

@@ -8,14 +8,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.config import AvoidConfig, LandVisualConfig, RaceClutterConfig
 from e2efly.env import random_key
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.scene import Solids, clearance
 from e2efly.scenes.shapes import DISC, SQUARE, TRIANGLE
-from e2efly.tasks import Outcome, Shape, make_task
-from e2efly.tasks.task import at_rest, struck
+from e2efly.tasks.avoid import AvoidConfig
+from e2efly.tasks.land_visual import LandVisualConfig
+from e2efly.tasks.race_clutter import RaceClutterConfig
+from e2efly.tasks.task import Outcome, Shape, at_rest, make_task, struck
 
 SHAPE = Shape(0.05, 0.15)
 PERIOD = 1 / 30

@@ -10,7 +10,6 @@ import jax
 import numpy as np
 import pytest
 
-from e2efly import presets
 from e2efly.commands.evaluate import BATCH as EVAL_BATCH
 from e2efly.commands.evaluate import callback, episode_steps
 from e2efly.config import RewardConfig, TaskConfig
@@ -18,6 +17,7 @@ from e2efly.deploy.policy import load_policy
 from e2efly.deploy.runtime import Runtime
 from e2efly.env import UNSEEN, Env, random_key
 from e2efly.evaluate import Episodes, run_episodes
+from e2efly.tasks import TASKS
 from e2efly.validate.flight import Trajectory, fly
 from e2efly.validate.judge import judge
 from e2efly.validate.plant import RigidState
@@ -27,7 +27,7 @@ from e2efly.vehicles import load_vehicle
 
 N = 4
 SEED = 1_000_000
-SUITES = {name: suite for task in presets.TASKS.values() for name, suite in presets.suites(task).items()}
+SUITES = {name: suite for task in TASKS.values() for name, suite in task.training().criteria().items()}
 
 
 def env_of(suite: TaskConfig) -> Env:
@@ -54,7 +54,7 @@ def test_flights_of_the_runtime_are_judged_as_episodes(
 ) -> None:
     suite = dataclasses.replace(SUITES[name], episode_s=seconds)
     suite = dataclasses.replace(suite, mean_error=2.0) if name == "circle" else suite  # what the controller can do
-    path, env = policy_of(presets.task_name(suite), sink), env_of(suite)
+    path, env = policy_of(suite.name, sink), env_of(suite)
     settle = float(getattr(suite, "settle_s", 0.0))
     starts = draw_starts(env, N, SEED)
     verdicts = judge(env, starts, flown(path, env, starts, float(suite.episode_s)), settle)

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from e2efly import presets
-from e2efly.config import RewardConfig, TaskConfig
+from e2efly.config import RewardConfig
+from e2efly.drawing import Face, Line, Mark
 from e2efly.env import Env, random_key
 from e2efly.evaluate import Act, Episodes, wilson
-from e2efly.tasks import Shape, Task, make_task
+from e2efly.tasks import TASKS
 from e2efly.view import plots
 from e2efly.view.flights import Flights, fly
-from e2efly.view.scene import Face, Line, Mark, scene
+from e2efly.view.scene import scene
 
 STEPS, PERIOD = 30, 1 / 30
-SUITES = {name: suite for task in presets.TASKS.values() for name, suite in presets.suites(task).items()}
+SUITES = {name: suite for task in TASKS.values() for name, suite in task.training().criteria().items()}
 
 
 def flights(n: int = 3, success: bool = True, seed: int = 0) -> Flights:
@@ -62,10 +62,6 @@ def rows(count: int, chunk: int = 5) -> list[dict[str, float]]:
     return table
 
 
-def task_of(config: TaskConfig) -> Task:
-    return make_task(config, Shape(0.05, 0.12), PERIOD)
-
-
 def check_png(path: Path, height: tuple[int, int] = (500, 1300)) -> None:
     """A PNG of a README's width that is neither blank nor all ink."""
     assert path.read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
@@ -88,13 +84,13 @@ def test_learning_without_a_single_reward_term(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", list(SUITES))
 def test_flights_of_every_task(tmp_path: Path, name: str) -> None:
-    plots.plot_flights(task_of(SUITES[name]), flights(), tmp_path / "flights.png", name)
+    plots.plot_flights(SUITES[name], flights(), tmp_path / "flights.png", name)
     check_png(tmp_path / "flights.png")
 
 
 def test_flights_that_all_failed_at_once(tmp_path: Path) -> None:
     failed = dataclasses.replace(flights(success=False), length=np.ones(3, int))
-    plots.plot_flights(task_of(SUITES["race"]), failed, tmp_path / "flights.png", "race")
+    plots.plot_flights(SUITES["race"], failed, tmp_path / "flights.png", "race")
     plots.plot_time(failed, 0, tmp_path / "time.png", "race")
     check_png(tmp_path / "flights.png")
     check_png(tmp_path / "time.png")
@@ -128,7 +124,7 @@ def test_limits_are_those_of_the_tasks() -> None:
 
 
 def test_scene_of_a_race_has_every_gate_where_it_stands() -> None:
-    things = scene(task_of(SUITES["race"]), flights())
+    things = scene(SUITES["race"], flights())
     assert [thing.text for thing in things if isinstance(thing, Mark)] == ["1", "2", "3", "4"]
     bars = [thing.points for thing in things if isinstance(thing, Face)]
     assert len(bars) == 16
@@ -139,7 +135,7 @@ def test_scene_of_a_race_has_every_gate_where_it_stands() -> None:
 
 
 def test_scene_of_tracking_ends_with_each_flight() -> None:
-    lines = [thing for thing in scene(task_of(SUITES["circle"]), flights()) if isinstance(thing, Line)]
+    lines = [thing for thing in scene(SUITES["circle"], flights()) if isinstance(thing, Line)]
     assert [len(line.points) for line in lines] == [10, 20, 30]
 
 

@@ -9,12 +9,12 @@ import pytest
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
-from e2efly.config import HoverConfig
 from e2efly.scenes.generate import room
 from e2efly.scenes.scene import Scene, Solids, distances
+from e2efly.tasks.hover import HoverConfig
 from e2efly.view import plots
 from e2efly.view.worlds import bodies, draw_plan, plot_flights_in_worlds
-from tests.view.test_plots import check_png, flights, task_of
+from tests.view.test_plots import check_png, flights
 
 SIZES = {
     "box": [0.5, 0.3, 0.2], "sphere": [0.6], "cylinder": [0.4, 1.0], "capsule": [0.3, 0.5],
@@ -78,7 +78,7 @@ def test_flights_each_in_its_own_world(tmp_path: Path) -> None:
 
 
 def test_flights_in_space_among_solids(tmp_path: Path) -> None:
-    task = task_of(HoverConfig())
+    task = HoverConfig()
     plots.plot_flights(task, flights(), tmp_path / "bare.png", "hover")
     plots.plot_flights(task, flights(), tmp_path / "among.png", "hover", bodies(one("cylinder")))
     check_png(tmp_path / "among.png")

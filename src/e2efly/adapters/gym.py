@@ -13,11 +13,11 @@ from gymnasium.spaces import Box, Dict, Space
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from e2efly import presets
 from e2efly.adapters.stepper import Stepper, configured
 from e2efly.config import TrainConfig
 from e2efly.env import Env
 from e2efly.sensors.eyes import image_shape
+from e2efly.tasks import TASKS
 
 Observation = np.ndarray | dict[str, np.ndarray]
 STATE, IMAGE = "state", "image_{}"
@@ -138,7 +138,7 @@ def _with_images(stepper: Stepper, state: np.ndarray) -> Observation:
     return {STATE: state} | {IMAGE.format(i): image for i, image in enumerate(stepper.images())}
 
 
-for _task in presets.TASKS:
+for _task in TASKS:
     gymnasium.register(
         f"e2efly/{_task}-v0",
         entry_point="e2efly.adapters.gym:QuadrotorEnv",

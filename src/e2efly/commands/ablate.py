@@ -18,9 +18,6 @@ from e2efly.config import TrainConfig
 from e2efly.device import prepare
 from e2efly.storage import held, write_atomically, write_json
 
-BY_ERROR = ("hover", "track")
-"""Tasks whose curves are errors, as in the paper; of the others they are success."""
-
 
 @dataclass(frozen=True)
 class Request:
@@ -64,7 +61,7 @@ def _ablate(request: Request, configs: dict[tuple[str, str], TrainConfig], conso
         for task in request.tasks:
             began = time.perf_counter()
             curves = known[algo, task] or _curves(request, configs[algo, task], console)
-            panels.append(Panel(task, curves, task in BY_ERROR))
+            panels.append(Panel(task, curves, configs[algo, task].task.shows_error))
             rows = _rows(curves)
             took = "as found" if known[algo, task] else f"in {time.perf_counter() - began:.0f} s"
             console.print(f"\n{task} by {algo.upper()}: {len(curves.variants)} rewards, {request.seeds} seeds, {took}")
@@ -87,7 +84,7 @@ def _config(request: Request, task: str, algo: str) -> TrainConfig:
 
 
 def _path(request: Request, config: TrainConfig) -> Path:
-    return request.out / f"{presets.task_name(config.task)}_{presets.algorithm_name(config.algo)}.json"
+    return request.out / f"{config.task.name}_{presets.algorithm_name(config.algo)}.json"
 
 
 def _about(request: Request, config: TrainConfig) -> dict[str, Any]:
@@ -117,7 +114,7 @@ def _curves(request: Request, config: TrainConfig, console: Console) -> Any:
     """Train all variants of a configuration; keep their curves."""
     from e2efly.learn.ablation import Kept, ablate
 
-    task, algo = presets.task_name(config.task), presets.algorithm_name(config.algo)
+    task, algo = config.task.name, presets.algorithm_name(config.algo)
     steps = config.steps * request.seeds * (len(config.reward.weights) + 1)
     with TerminalProgress(console, f"{task} by {algo}") as progress:
         progress.compiling()

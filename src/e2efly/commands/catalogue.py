@@ -4,8 +4,10 @@ from rich.table import Table
 
 from e2efly import presets
 from e2efly.commands.terminal import Terminal
+from e2efly.config import ALGORITHMS
 from e2efly.courses.tracks import track_names
 from e2efly.device import prepare
+from e2efly.tasks import TASKS
 from e2efly.vehicles import load_vehicle, vehicle_names
 
 
@@ -17,9 +19,9 @@ def list_command() -> int:
 
     console = Terminal()
     for kind, names in (
-        ("tasks", presets.TASKS),
-        ("algorithms", presets.ALGORITHMS),
-        ("presets", presets.PRESETS),
+        ("tasks", TASKS),
+        ("algorithms", ALGORITHMS),
+        ("presets", presets.names()),
         ("race tracks", track_names()),
         ("references", ["polynomial", "circle", "lemniscate", "FILE.csv"]),
         ("command modes", COMMAND_MODES),

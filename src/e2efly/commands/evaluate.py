@@ -152,7 +152,7 @@ def fly_suites(
         start = env.reset(key, BATCH)[0].vehicle
         return run_episodes(env, callback(policy), key, BATCH, steps, settle), start
 
-    suites = presets.suites(task)
+    suites = task.criteria()
     envs = {name: Env.of(suite, RewardConfig({"prog2": 1.0}), env_config) for name, suite in suites.items()}
     asked = f"--episodes is {episodes}"
     check_memory({asked: float(episodes) * len(suites) * (FIGURES + kept)})
@@ -292,7 +292,7 @@ def _draw(
     except OSError as error:
         raise OSError(f"cannot make the folder of the plots {folder}: {error.strerror}") from error
     title, key = f"{policy.contract.task} on {policy.contract.vehicle}", random_key(seed, UNSEEN, 0)
-    for name, suite in presets.suites(task).items():
+    for name, suite in task.criteria().items():
         env = Env.of(suite, RewardConfig({"prog2": 1.0}), env_config)
         flights = plots.fly(env, callback(policy), key, DRAWN, episode_steps(suite, env))
         tag = f"{title}: {name}" if len(flown) > 1 else title
@@ -300,9 +300,9 @@ def _draw(
             begun = jax.jit(Env.reset, static_argnums=2)(env, key, DRAWN)[0]
             plot_flights_in_worlds(flights, env.task.scene(begun.memory), folder / f"flights_{name}.png", tag)
         else:
-            plots.plot_flights(env.task, flights, folder / f"flights_{name}.png", tag)
+            plots.plot_flights(suite, flights, folder / f"flights_{name}.png", tag)
         plots.plot_time(flights, 0, folder / f"time_{name}.png", tag)
-    plots.plot_errors(flown, folder / "errors.png", title, plots.limits(presets.suites(task)))
+    plots.plot_errors(flown, folder / "errors.png", title, plots.limits(task.criteria()))
     if run and (rows := run.rows()):
         shipped = run.read_json("summary.json").get("shipped") if (run.path / "summary.json").exists() else None
         update = shipped.get("update") if isinstance(shipped, dict) else None

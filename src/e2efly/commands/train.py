@@ -13,8 +13,8 @@ from e2efly.commands.supervised import is_watched, watched
 from e2efly.commands.tables import console_table
 from e2efly.commands.terminal import Terminal
 from e2efly.config import TrainConfig
-from e2efly.device import Hosts, cache_folder, prepare
-from e2efly.presets import algorithm_name, task_name
+from e2efly.device import Hosts, prepare
+from e2efly.presets import algorithm_name
 
 LEARNED = 0.95
 """Success by the worst criterion from which on a task counts as learned, where the user asks for no other."""
@@ -65,14 +65,15 @@ def _again(out: Path, device: str | None, plots: bool, hosts: Hosts) -> str:
 
 
 def _train(config: TrainConfig, out: Path, resume: bool, plots: bool, again: str, console: Console) -> int:
+    from e2efly.learn.programs import traced_folder
     from e2efly.learn.rundir import RunDirectory
     from e2efly.learn.runner import train
 
-    task, algo = task_name(config.task), algorithm_name(config.algo)
+    task, algo = config.task.name, algorithm_name(config.algo)
     if resume and not RunDirectory(out).checkpoint.exists():
         console.print("There is no checkpoint yet: the run begins at its beginning.")
     with TerminalProgress(console, f"{task} by {algo}") as progress:
-        summary = train(config, out, progress, resume, traced=cache_folder() / "traced")
+        summary = train(config, out, progress, resume, traced=traced_folder(config))
     _report(console, summary, config.stop_at)
     if summary["stopped_by_user"]:
         console.print(f"Stopped; {again}")

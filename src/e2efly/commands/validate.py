@@ -9,7 +9,6 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from e2efly import presets
 from e2efly.budget import check_time
 from e2efly.commands.evaluate import ROW, check_observation, config_from_contract, fly_suites
 from e2efly.commands.terminal import Terminal
@@ -160,13 +159,13 @@ def _validate(
     from e2efly.validate.starts import draw_starts
 
     nominal, simulated = load_vehicle(env_config.vehicle), load_vehicle(vehicle or env_config.vehicle)
-    longest = max(float(suite.episode_s) for suite in presets.suites(task).values())
+    longest = max(float(suite.episode_s) for suite in task.criteria().values())
     kept = ROW + SAMPLE * int(longest * policy.contract.control_rate_hz)
     trained, _ = fly_suites(policy, task, env_config, episodes, seed, kept)
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     found = {}
     with Progress(*columns, console=console, transient=True) as progress:
-        for name, suite in presets.suites(task).items():
+        for name, suite in task.criteria().items():
             env = Env.of(suite, RewardConfig({"prog2": 1.0}), env_config)
             check_observation(policy, env)
             bar = progress.add_task(f"{name} on {plant}", total=episodes)
@@ -224,7 +223,7 @@ def _draw(
     except OSError as error:
         raise OSError(f"cannot make the folder of the plots {folder}: {error.strerror}") from error
     nominal = load_vehicle(env_config.vehicle)
-    for name, suite in presets.suites(task).items():
+    for name, suite in task.criteria().items():
         v = found[name]
         shown = [int(i) for i in np.argsort(v.flown.success, kind="stable")[:DRAWN]]  # failures first
         pairs = [(v.starts.states[i], v.starts.goals[i]) for i in shown]
@@ -238,7 +237,7 @@ def _draw(
                 policy, [v.flights[i] for i in shown], pairs, v.flown.duration[shown], v.flown.success[shown]
             ),
         }
-        plot_overlay(env.task, flown, folder / f"{plant}_{name}.png", f"{name} on {policy.contract.vehicle}: {plant}")
+        plot_overlay(suite, flown, folder / f"{plant}_{name}.png", f"{name} on {policy.contract.vehicle}: {plant}")
 
 
 def _flights(policy: Policy, flights: list[Any], pairs: list[Any], duration: np.ndarray, success: np.ndarray) -> Any:

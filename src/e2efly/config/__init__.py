@@ -5,6 +5,7 @@ recompile) unless the field says that it sets a shape.
 """
 
 from e2efly.config.algorithms import (
+    ALGORITHMS,
     ABPTConfig,
     AlgorithmConfig,
     BPTTConfig,
@@ -12,60 +13,49 @@ from e2efly.config.algorithms import (
     PPOConfig,
     SHACConfig,
 )
-from e2efly.config.tasks import (
-    AvoidConfig,
-    ClutterConfig,
-    ForestConfig,
-    GapConfig,
-    HoverAwareConfig,
-    HoverConfig,
-    LandConfig,
-    LandVisualConfig,
-    RaceClutterConfig,
-    RaceConfig,
-    TaskConfig,
-    TrackConfig,
-)
+from e2efly.config.numbers import check_numbers, number, shape
 from e2efly.config.train import (
     NetworkConfig,
+    Paper,
     RewardConfig,
     StageConfig,
+    TaskConfig,
     TrainConfig,
 )
 from e2efly.config.vehicle import (
+    D435I,
     CameraConfig,
     EnvConfig,
     ImageNoiseConfig,
     ImuConfig,
     NoiseConfig,
 )
+from e2efly.config.worlds import CLUTTER, ClutterConfig, ForestConfig
 
 __all__ = [
+    "ALGORITHMS",
+    "CLUTTER",
+    "D435I",
     "ABPTConfig",
     "AlgorithmConfig",
-    "AvoidConfig",
     "BPTTConfig",
     "CameraConfig",
     "ClutterConfig",
     "EnvConfig",
     "FOPPOConfig",
     "ForestConfig",
-    "GapConfig",
-    "HoverAwareConfig",
-    "HoverConfig",
     "ImageNoiseConfig",
     "ImuConfig",
-    "LandConfig",
-    "LandVisualConfig",
     "NetworkConfig",
     "NoiseConfig",
     "PPOConfig",
-    "RaceClutterConfig",
-    "RaceConfig",
+    "Paper",
     "RewardConfig",
     "SHACConfig",
     "StageConfig",
     "TaskConfig",
-    "TrackConfig",
     "TrainConfig",
+    "check_numbers",
+    "number",
+    "shape",
 ]

@@ -164,3 +164,8 @@ class FOPPOConfig(_Proximal, _FirstOrder):
 
 
 AlgorithmConfig = PPOConfig | BPTTConfig | SHACConfig | ABPTConfig | FOPPOConfig
+
+ALGORITHMS: dict[str, AlgorithmConfig] = {
+    "ppo": PPOConfig(), "bptt": BPTTConfig(), "shac": SHACConfig(), "abpt": ABPTConfig(), "foppo": FOPPOConfig(),
+}  # fmt: skip
+"""Algorithms by name, with their defaults."""

@@ -1,11 +1,12 @@
 """Options of a run: all of the others, and how to learn."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
-from e2efly.config.algorithms import AlgorithmConfig
-from e2efly.config.tasks import TaskConfig
-from e2efly.config.vehicle import EnvConfig
+from e2efly.config.algorithms import ALGORITHMS, AlgorithmConfig
+from e2efly.config.vehicle import CameraConfig, EnvConfig
+from e2efly.drawing import Thing
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,90 @@ class StageConfig:
     """Promotion: success of an evaluation in this stage."""
     steps: int | None = None
     """Promotion at the latest after so many environment steps."""
+
+
+@dataclass(frozen=True)
+class Paper:
+    """What the paper gives of a task's training (its tables)."""
+
+    weights: Mapping[str, float]
+    """Of the reward."""
+    ppo: Mapping[str, float]
+    """Those that PPO has in addition."""
+    millions: tuple[int, int]
+    """Environment steps by PPO and by BPTT, millions."""
+
+
+@dataclass(frozen=True)
+class TaskConfig:
+    """Options of a task, and all that commands ask of a task.
+
+    A task extends this and registers itself by `e2efly.tasks.register`. Its numbers are leaves of the compiled
+    programs; texts and fields made by `shape` decide which program is compiled.
+    """
+
+    name: ClassVar[str] = ""
+    """By which it is registered."""
+    world: ClassVar[Any] = ""
+    """The class of `e2efly.tasks.task.Task` that flies it, or its reference: `package.module:Name`."""
+    reward: ClassVar[Mapping[str, float]] = {}
+    """Weights of the reward's terms, where there is no `recipe`."""
+    best: ClassVar[str] = "ppo"
+    """The algorithm that learns it best."""
+    precision: ClassVar[Literal["final_error", "mean_error", "duration"]] = "final_error"
+    """What is to be small among policies that succeed as often."""
+    smooth: ClassVar[Mapping[str, float] | None] = None
+    """Rewards for methods that have both a gradient and a critic; None: PPO's. To a critic nothing follows a crash:
+    where every step costs, as in BPTT's rewards, an early crash would be the best end; these pay for living on, and
+    charge for a crash."""
+    cameras: ClassVar[tuple[CameraConfig, ...]] = ()
+    """What its policies see."""
+    curriculum: ClassVar[tuple["StageConfig", ...]] = ()
+    """No obstacles, few, and then the task itself."""
+    paper: ClassVar[Paper | None] = None
+    """What the paper gives."""
+    goal: ClassVar[str] = "goal"
+    """What plots call where it is to be."""
+    shows_error: ClassVar[bool] = False
+    """Whether the curves of an ablation show its error, as in the paper; else they show success."""
+    variants: ClassVar[tuple[str, ...]] = ()
+    """Presets of its own, beside `ours` and `paper`."""
+
+    episode_s: float = 10.0
+    """Length of an episode, s."""
+
+    @classmethod
+    def training(cls) -> "TaskConfig":
+        """The options that it is trained with."""
+        return cls()
+
+    def criteria(self) -> "dict[str, TaskConfig]":
+        """What a policy is judged by, by name. It counts by its worst."""
+        return {self.name: self}
+
+    def limits(self) -> dict[str, float]:
+        """The largest values, by field of `Episodes`, with which an episode still succeeds, for plots."""
+        return {}
+
+    def drawing(self) -> list[Thing] | None:
+        """What it has in space, for plots; None: nothing but its goal."""
+        return None
+
+    @classmethod
+    def recipe(cls, algo: str) -> "TrainConfig":
+        """How it is learned by an algorithm of `ALGORITHMS`; others build on that by ppo or bptt."""
+        return TrainConfig(cls.training(), ALGORITHMS[algo], RewardConfig(dict(cls.reward)))
+
+    @classmethod
+    def with_critic(cls, algo: str) -> dict[str, Any]:
+        """Options of an algorithm that has both a gradient and a critic, where they are not BPTT's."""
+        del algo
+        return {}
+
+    @classmethod
+    def variant(cls, preset: str, config: "TrainConfig") -> "TrainConfig":
+        """Its configuration by one of `variants`, made from `recipe`'s."""
+        raise NotImplementedError(preset)
 
 
 @dataclass(frozen=True)

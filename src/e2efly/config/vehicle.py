@@ -1,7 +1,10 @@
 """Options of the environment: the vehicle, its sensors, and what is random about them."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
+
+from e2efly.config.numbers import number
 
 
 @dataclass(frozen=True)
@@ -28,13 +31,13 @@ class ImuConfig:
     """Gyroscope white noise, rad/s/sqrt(Hz)."""
     gyro_bias: float = 2.23e-5
     """Gyroscope bias instability B, rad/s: the bias moves by B sqrt(dt / tau) a step."""
-    gyro_tau: float = 500.0
+    gyro_tau: float = number(500.0, above=0, endless=True)
     """Time constant of the gyroscope's bias walk, s."""
     accel_noise: float = 2.35e-3
     """Accelerometer white noise, m/s^2/sqrt(Hz)."""
     accel_bias: float = 3.53e-4
     """Accelerometer bias instability B, m/s^2."""
-    accel_tau: float = 800.0
+    accel_tau: float = number(800.0, above=0, endless=True)
     """Time constant of the accelerometer's bias walk, s."""
 
 
@@ -105,6 +108,10 @@ class CameraConfig:
     """Colours: relative half-width of the sun's random strength and direction, an episode."""
     colour_spread: float = 0.0
     """Colours: half-width of what is added at random to red, green and blue of each solid, an episode."""
+
+
+D435I = CameraConfig(fov=(math.radians(87), math.radians(58)), reach=(0.28, 10.0))
+"""Depth of an Intel RealSense D435i."""
 
 
 @dataclass(frozen=True)

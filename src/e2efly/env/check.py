@@ -1,25 +1,15 @@
 """Whether the numbers of an environment's configuration make sense."""
 
-import dataclasses
 import math
-from typing import Any
 
-from e2efly.config import ClutterConfig, EnvConfig, ForestConfig, TaskConfig
+from e2efly.config import EnvConfig, TaskConfig, check_numbers
 from e2efly.scenes.camera import check as check_camera
-from e2efly.scenes.generate import CLUTTER
 from e2efly.sensors.image_noise import check as check_noise
 from e2efly.vehicles import load_vehicle, unknown
 from e2efly.vehicles.vehicle import quantities
 
-_ANYWHERE = ("target", "centre", "camera_position", "camera_pitch", "circle_rate")
-"""Options of tasks that may be negative."""
-_MORE_THAN_0 = ("fence", "radius", "scale", "length", "width", "opening", "fov", "gyro_tau", "accel_tau")
-_RISING = ("distance", "height", "pad_size", "radius", "roll", "size", "speed")
-"""From the smallest to the largest, where they are two."""
 COUNTED = 2**24
 """Control steps that an episode can have: float32 counts no further."""
-_ENDLESS = ("fence", "ceiling", "gyro_tau", "accel_tau")
-"""Options that may be infinite."""
 
 
 def check(config: EnvConfig, task: TaskConfig) -> None:
@@ -69,7 +59,10 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
     if not (math.isfinite(config.position_range) and config.position_range > 0):
         raise ValueError(f"env.position_range is {config.position_range}; accepted: more than 0, m")
     for prefix, part in (("task", task), ("env.noise", config.noise), ("env.imu", config.imu)):
-        _check_numbers(prefix, part)
+        check_numbers(prefix, part)
+    for name, part in vars(task).items():
+        if hasattr(part, "check"):
+            part.check(f"task.{name}")
     for name in ("target", "centre"):
         place = getattr(task, name, None)
         if place is not None and place[2] <= vehicle.feet_height:
@@ -77,43 +70,3 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
                 f"task.{name} is {place}; accepted: a place more than {vehicle.feet_height:g} m over the ground, the "
                 "height of the centre of mass over the feet"
             )
-
-
-def _check_numbers(prefix: str, part: Any) -> None:
-    """That every number is finite and not negative, but for places, and that ranges rise."""
-    for field in dataclasses.fields(part):
-        name, value = f"{prefix}.{field.name}", getattr(part, field.name)
-        if dataclasses.is_dataclass(value):
-            _check_numbers(name, value)
-            _check_room(name, value)
-            continue
-        numbers = value if isinstance(value, tuple) else (value,)
-        if any(isinstance(x, bool) or not isinstance(x, int | float) for x in numbers):
-            continue
-        if not all(map(math.isfinite, numbers)) and not (field.name in _ENDLESS and value == math.inf):
-            raise ValueError(f"{name} is {value}; accepted: finite numbers")
-        if field.name in _ANYWHERE:
-            continue
-        if field.name in _MORE_THAN_0 and min(numbers) <= 0:
-            raise ValueError(f"{name} is {value}; accepted: more than 0")
-        if min(numbers) < 0:
-            raise ValueError(f"{name} is {value}; accepted: 0 or more")
-        if field.name in _RISING and list(numbers) != sorted(numbers):
-            raise ValueError(f"{name} is {value}; accepted: two rising numbers")
-
-
-def _check_room(name: str, world: Any) -> None:
-    """That a random world has places for what is to stand in it."""
-    if isinstance(world, ForestConfig):
-        trees = world.density * world.length * world.width
-        if trees > world.room + 1e-3:
-            raise ValueError(
-                f"{name}.room is {world.room}; accepted: {math.ceil(trees - 1e-3)} or more, the trees on average"
-            )
-    if isinstance(world, ClutterConfig):
-        if world.room < 1 or world.room % len(CLUTTER):
-            raise ValueError(f"{name}.room is {world.room}; accepted: a positive multiple of {len(CLUTTER)}")
-        if world.obstacles > world.room:
-            raise ValueError(f"{name}.obstacles is {world.obstacles}; accepted: at most {name}.room, {world.room}")
-        if world.moving > 1:
-            raise ValueError(f"{name}.moving is {world.moving}; accepted: a share, 0 to 1")

@@ -28,8 +28,7 @@ from e2efly.scenes import scene as scenes
 from e2efly.sensors import imu, latency
 from e2efly.sensors.eyes import Eye, image_shape, see
 from e2efly.sensors.noise import add_noise
-from e2efly.tasks import Shape, Task, make_task
-from e2efly.tasks.task import into_ball, uniform
+from e2efly.tasks.task import Shape, Task, into_ball, make_task, uniform
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 

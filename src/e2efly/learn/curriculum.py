@@ -7,7 +7,6 @@ from typing import Any
 import jax
 import numpy as np
 
-from e2efly import presets
 from e2efly.config import StageConfig, TaskConfig, TrainConfig
 from e2efly.env import Env
 
@@ -85,7 +84,7 @@ def changed(config: Any, path: str, value: Any, where: str) -> Any:
 
 def _stage(config: TrainConfig, task: TaskConfig, stage: StageConfig | None) -> Stage:
     env = Env.of(task, config.reward, config.env)
-    judges = {name: Env.of(t, config.reward, config.env) for name, t in presets.suites(task).items()}
+    judges = {name: Env.of(t, config.reward, config.env) for name, t in task.criteria().items()}
     return Stage(env, judges, stage)
 
 

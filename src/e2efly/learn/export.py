@@ -20,6 +20,7 @@ from e2efly.learn.networks import FAINTEST, NEAREST, Actor, View, Weights
 from e2efly.observation import Field
 from e2efly.physics import COMMAND_MODES, command_limits
 from e2efly.storage import write_atomically
+from e2efly.tasks import TASKS
 from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.vehicle import quantities
 
@@ -55,7 +56,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
     return Contract(
         contract_version=CONTRACT_VERSION,
         e2efly_version=__version__,
-        task=env.task.name,
+        task=TASKS.reference(type(config.task)),
         vehicle=vehicle.name,
         vehicle_hash=vehicle.hash,
         control_rate_hz=float(rate),

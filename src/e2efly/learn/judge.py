@@ -6,6 +6,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from e2efly.config import TaskConfig
 from e2efly.env import random_key
 from e2efly.evaluate import Episodes
 from e2efly.learn.networks import Weights
@@ -33,16 +34,16 @@ def success(flown: dict[str, Episodes]) -> float:
     return min(float(np.mean(e.success)) for e in flown.values())
 
 
-def score(task: str, flown: dict[str, Episodes]) -> float:
-    """What the best policy is chosen by: success of the worst criterion; among equals, precision (racing: lap time).
+def score(task: TaskConfig, flown: dict[str, Episodes]) -> float:
+    """What the best policy is chosen by: success of the worst criterion; among equals, the task's `precision`.
 
     No precision counts as much as one more success among the episodes.
     """
 
     def cost(e: Episodes) -> float:
-        if task in ("race", "race_clutter"):
+        if task.precision == "duration":
             return float(np.mean(e.duration[e.success])) / 10 if np.any(e.success) else math.inf
-        return float(np.mean(e.mean_error if task == "track" else e.final_error))
+        return float(np.mean(getattr(e, task.precision)))
 
     return min(float(np.mean(e.success)) - 0.5 * math.tanh(cost(e)) / len(e.success) for e in flown.values())
 

@@ -23,13 +23,15 @@ import numpy as np
 from jax import export
 
 from e2efly.compiled import opened, sealed
-from e2efly.device import unless_said, wide_vectors
+from e2efly.config import TrainConfig
+from e2efly.device import cache_folder, unless_said, wide_vectors
 from e2efly.env import Env, random_key
 from e2efly.evaluate import Act, Episodes, run_episodes
 from e2efly.learn.algorithm import TrainState, begin
 from e2efly.learn.devices import AXIS, OWN, SAME, on_each, own, shardings, stacked
 from e2efly.learn.networks import Actor, Weights
 from e2efly.learn.setup import Setup
+from e2efly.registry import is_shipped
 from e2efly.storage import write_atomically
 
 FAST_COMPILE: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
@@ -81,6 +83,11 @@ class Programs:
             return jax.tree.unflatten(structure, leaves), metrics
 
         return Programs(start, run_chunk, lambda *args: Episodes(**evaluate(*jax.tree.leaves(args))))
+
+
+def traced_folder(config: TrainConfig) -> Path | None:
+    """Where traced programs of a configuration are kept; None: they hold code that is not the package's."""
+    return cache_folder() / "traced" if is_shipped(type(config.task)) else None
 
 
 def start_program(setup: Setup) -> Any:

@@ -17,11 +17,12 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from e2efly.config import TrainConfig
+from e2efly.config import ALGORITHMS, TrainConfig
 from e2efly.config.reading import read
 from e2efly.learn.inputs import Kept, by_content, content_of, input_files, replaced, sha256, value_at
-from e2efly.presets import ALGORITHMS, TASKS, algorithm_name, preset, task_name
+from e2efly.presets import algorithm_name, preset
 from e2efly.storage import held, write_atomically, write_json
+from e2efly.tasks import TASKS
 
 _PACKAGES = ("e2efly", "jax", "jaxlib", "numpy", "optax", "onnx", "onnxruntime")
 
@@ -258,8 +259,8 @@ def _version(package: str) -> str:
 
 
 def to_json(config: TrainConfig) -> dict[str, Any]:
-    """A configuration as JSON, with the names of its task and algorithm."""
-    names = {"task_name": task_name(config.task), "algo_name": algorithm_name(config.algo)}
+    """A configuration as JSON, with the names of its task and algorithm, or where they are from."""
+    names = {"task_name": TASKS.reference(type(config.task)), "algo_name": algorithm_name(config.algo)}
     return {**names, **dataclasses.asdict(config)}
 
 

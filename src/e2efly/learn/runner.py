@@ -135,7 +135,7 @@ def _loop(
     setup: Setup, programs: Programs, run: RunDirectory, reporter: Reporter, state: Any, best: Any, progress: Progress
 ) -> tuple[Any, Any, Progress, bool]:
     """Chunks of updates, an evaluation and a checkpoint after each. Ends at the last update, the goal, or Ctrl-C."""
-    config, task = setup.config, presets.task_name(setup.config.task)
+    config = setup.config
     before, stopped = progress.seconds, False  # of earlier processes of this run
     with _writing(run, progress.update) as write, _interruptible() as stop:
         while progress.update < setup.updates and not progress.reached:
@@ -152,7 +152,7 @@ def _loop(
             rate = config.chunk * setup.steps_per_update / (time.perf_counter() - began)
             weights = policy_of(state)
             flown = judge(setup, programs.evaluate, weights, WATCHED, config.eval_episodes, stage=number)
-            reached, last, now = progress.reached, success(flown), score(task, flown)
+            reached, last, now = progress.reached, success(flown), score(config.task, flown)
             if config.stop_at and final and not reached and last >= config.stop_at:
                 confirmed = judge(setup, programs.evaluate, weights, CONFIRMED, REPORT_EPISODES)
                 if success(confirmed) >= config.stop_at:
@@ -206,7 +206,7 @@ def _finish(
     by_best = judge(setup, programs.evaluate, best, REPORTED, REPORT_EPISODES)
     by_last = judge(setup, programs.evaluate, policy_of(state), REPORTED, REPORT_EPISODES)
     summary = {
-        "task": presets.task_name(config.task),
+        "task": config.task.name,
         "algorithm": presets.algorithm_name(config.algo),
         "vehicle": setup.env.physics.nominal.name,
         "seed": config.seed,

@@ -81,7 +81,7 @@ class Setup:
     @property
     def episode_steps(self) -> int:
         """Control steps of the longest episode that the policy is judged by."""
-        longest = max(float(task.episode_s) for task in presets.suites(self.config.task).values())
+        longest = max(float(task.episode_s) for task in self.config.task.criteria().values())
         return math.ceil(longest / self.env.control_period - 1e-6)
 
     @property

@@ -7,14 +7,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.config import ClutterConfig, ForestConfig
+from e2efly.config import CLUTTER, ClutterConfig, ForestConfig
 from e2efly.scenes.scene import WALL, Solids
 from e2efly.scenes.shapes import SHAPES
 
 TRIES = 8
 """Places that are tried for an obstacle; where none is clear it is left out."""
-CLUTTER = ("box", "capsule", "cylinder", "sphere")
-"""Kinds of clutter, in equal shares."""
 
 
 def _between(key: PRNGKeyArray, shape: tuple[int, ...], bounds: tuple[float, float] | Array) -> Array:

@@ -1,48 +1,21 @@
 """What a task is to the environment."""
 
+import dataclasses
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from typing import Any, Protocol
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.config import (
-    AvoidConfig,
-    ClutterConfig,
-    ForestConfig,
-    GapConfig,
-    HoverAwareConfig,
-    HoverConfig,
-    LandConfig,
-    LandVisualConfig,
-    RaceClutterConfig,
-    RaceConfig,
-    TrackConfig,
-)
+from e2efly.config import TaskConfig
+from e2efly.config.numbers import SHAPE
 from e2efly.observation import Field
 from e2efly.physics import State
+from e2efly.registry import load, origin
 from e2efly.scenes.scene import Scene, gaps
-
-for _config, _static in (
-    (HoverConfig, ()),
-    (LandConfig, ()),
-    (LandVisualConfig, ()),
-    (TrackConfig, ("reference",)),
-    (RaceConfig, ("track",)),
-    (ForestConfig, ("room",)),
-    (ClutterConfig, ("room",)),
-    (RaceClutterConfig, ("track",)),
-    (AvoidConfig, ()),
-    (GapConfig, ()),
-    (HoverAwareConfig, ()),
-):
-    jax.tree_util.register_dataclass(
-        _config,
-        data_fields=[name for name in _config.__dataclass_fields__ if name not in _static],
-        meta_fields=list(_static),
-    )
+from e2efly.tasks.registry import TASKS
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["feet_height", "radius"], meta_fields=[])
@@ -57,7 +30,7 @@ class Shape:
 
 
 @jax.tree_util.register_dataclass
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Outcome:
     """What a control step came to, each of shape (n,)."""
 
@@ -78,9 +51,9 @@ class Outcome:
 class Task(Protocol):
     """A task: pure functions on a frozen dataclass whose numbers are leaves. All batched over one leading axis."""
 
-    @property
-    def name(self) -> str:
-        """The task's name."""
+    @classmethod
+    def of(cls, config: Any, shape: Shape, control_period: float, substeps: int) -> "Task":
+        """The task of some options; see `make_task`."""
         ...
 
     @property
@@ -123,6 +96,52 @@ class Task(Protocol):
     ) -> tuple[Any, Outcome]:
         """Judge the control step that ended at `time` and move the task's own state on."""
         ...
+
+
+METHODS = ("of", "start", "goal", "observe", "scene", "desired_yaw", "advance", "fields", "episode_s")
+"""What a task must have beside its options."""
+
+
+def make_task(config: TaskConfig, shape: Shape, control_period: float, substeps: int = 1) -> Task:
+    """The task of its options, for a vehicle of this shape, at this control period in s.
+
+    Collisions with obstacles are checked `substeps` times per control step.
+
+    Raises:
+        ValueError: when the options name something that does not exist or is broken; when their `world` is no task,
+            naming its file and what it lacks.
+    """
+    world = world_of(type(config))
+    if lacking := [name for name in METHODS if not hasattr(world, name)]:
+        raise ValueError(f"{origin(world)} has no {', '.join(lacking)}; accepted: all of {', '.join(METHODS)}")
+    register_options(type(config))
+    return world.of(config, shape, control_period, substeps)
+
+
+def world_of(options: type[TaskConfig]) -> Any:
+    """The class that flies a task.
+
+    Raises:
+        ValueError: when `world` leads nowhere.
+    """
+    return load(options.world) if isinstance(options.world, str) else options.world
+
+
+@cache
+def register_options(options: type) -> None:
+    """Make a class of options, and those of its parts, a pytree whose leaves are all that sets no shapes."""
+    static = []
+    for option in dataclasses.fields(options):
+        if option.metadata.get(SHAPE) or isinstance(option.default, str):
+            static.append(option.name)
+        if dataclasses.is_dataclass(option.default):
+            register_options(type(option.default))
+    numbers = [option.name for option in dataclasses.fields(options) if option.name not in static]
+    jax.tree_util.register_dataclass(options, data_fields=numbers, meta_fields=static)
+
+
+for _options in TASKS.values():
+    register_options(_options)
 
 
 def offsets(targets: Float[Array, "n k 3"], state: State) -> Float[Array, "n 3k"]:

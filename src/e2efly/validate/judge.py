@@ -10,7 +10,7 @@ from jaxtyping import Array
 
 from e2efly.env import Env
 from e2efly.physics import State
-from e2efly.tasks import Outcome, Task
+from e2efly.tasks.task import Outcome, Task
 from e2efly.validate.flight import Trajectory
 from e2efly.validate.starts import Starts
 

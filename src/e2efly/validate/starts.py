@@ -7,10 +7,12 @@ import jax
 import numpy as np
 from jaxtyping import Array
 
-from e2efly.deploy.goals import GatesGoal, Goal, HoverGoal, LandGoal, ReferenceGoal
+from e2efly.deploy.goals import Goal
 from e2efly.env import UNSEEN, Env, random_key
 from e2efly.physics import State
-from e2efly.tasks import Hover, Land, Race, Task, Track
+from e2efly.registry import origin
+from e2efly.tasks import TASKS
+from e2efly.tasks.task import Task, world_of
 from e2efly.validate.plant import RigidState
 
 BATCH = 250
@@ -63,14 +65,7 @@ def goal_of(task: Task, memory: Any) -> Goal:
     Raises:
         ValueError: for a task without a goal for the runtime.
     """
-    if isinstance(task, Hover):
-        return HoverGoal(np.asarray(task.config.target, np.float64), float(task.config.fence))
-    if isinstance(task, Land):
-        return LandGoal(np.zeros(3), float(task.shape.feet_height), float(task.config.fence))
-    if isinstance(task, Track):
-        return ReferenceGoal(memory.reference, float(task.config.fence))
-    if isinstance(task, Race):
-        gates = jax.tree.map(np.asarray, task.gates)
-        laps, radius, fence = int(task.config.laps), float(task.shape.radius), float(task.config.fence)
-        return GatesGoal(gates, task.closed, laps if task.closed else 1, radius, fence)
-    raise ValueError(f"task is {task.name!r}; accepted: hover, land, track or race")
+    if "flight_goal" not in vars(type(task)):  # inherited, it would be another task's
+        able = ", ".join(name for name, options in TASKS.items() if "flight_goal" in vars(world_of(options)))
+        raise ValueError(f"task is {origin(type(task))}, which has no flight_goal for the runtime; accepted: {able}")
+    return task.flight_goal(memory)  # type: ignore[attr-defined]

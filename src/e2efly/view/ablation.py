@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from e2efly.drawing import INK
 from e2efly.learn.ablation import FULL, Curves
-from e2efly.view.style import CYCLE, GREY, INK, figure
+from e2efly.view.style import CYCLE, GREY, figure
 
 _DASHES = ("-", (0, (4, 2)), (0, (1, 1.2)))
 

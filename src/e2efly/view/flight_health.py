@@ -8,9 +8,10 @@ from matplotlib.axes import Axes
 
 from e2efly.deploy.blackbox import Alignment, Blackbox
 from e2efly.deploy.flight_log import FlightLog
+from e2efly.drawing import INK, ORANGE
 from e2efly.view.flight_axes import XYZ, bands, empty, liveliest, note
 from e2efly.view.flight_log import AXES, GROUNDED, gyro, intervals
-from e2efly.view.style import BLUE, CYCLE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILLION, figure, say
+from e2efly.view.style import BLUE, CYCLE, GREEN, GREY, PURPLE, SKY, VERMILLION, figure, say
 
 LAG = 0.04
 """From a throttle sent to the thrust measured, s: middle of the 35 to 45 ms that Betaflight quadrotors show."""

@@ -11,10 +11,11 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from e2efly.deploy.flight_log import FlightLog
+from e2efly.drawing import INK
 from e2efly.view.flight_axes import XYZ, bands, colors, empty, liveliest, mode_handles, note
 from e2efly.view.flight_log import AXES, Interval, errors, gyro, intervals, tilt
 from e2efly.view.rate_response import StepResponse
-from e2efly.view.style import GREY, INK, PALE, figure, say
+from e2efly.view.style import GREY, PALE, figure, say
 
 _CHANGES = 15  # of mode, the first included, that are told
 _DASHED: dict[str, Any] = {"linewidth": 1.1, "linestyle": (0, (4, 2))}

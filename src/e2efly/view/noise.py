@@ -12,12 +12,13 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from e2efly.config import ImuConfig
+from e2efly.drawing import INK
 from e2efly.physics import State
 from e2efly.sensors.imu import ImuState, measure
 from e2efly.vehicles import load_vehicle
 from e2efly.view.images import Sight, scale, show
 from e2efly.view.sheet import BAR, DEPTH_NOISES, IMAGE_NOISES, noised
-from e2efly.view.style import BLUE, GREY, INK, VERMILLION, figure
+from e2efly.view.style import BLUE, GREY, VERMILLION, figure
 
 
 def plot_depth_noise(sight: Sight, key: PRNGKeyArray, path: str | Path) -> None:

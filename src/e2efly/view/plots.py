@@ -11,13 +11,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from e2efly.config import HoverConfig, LandConfig, TaskConfig, TrackConfig
+from e2efly.config import TaskConfig
+from e2efly.drawing import INK
 from e2efly.evaluate import Episodes, wilson
 from e2efly.physics.control import COMMAND_MODES
 from e2efly.vehicles.vehicle import GRAVITY
 from e2efly.view.flights import Flights, fly
 from e2efly.view.space import plot_flights
-from e2efly.view.style import BLUE, CYCLE, GREEN, GREY, INK, PURPLE, VERMILLION, figure, say
+from e2efly.view.style import BLUE, CYCLE, GREEN, GREY, PURPLE, VERMILLION, figure, say
 
 Rows = list[dict[str, float]]
 
@@ -179,13 +180,7 @@ def _unwound(time: np.ndarray, degrees: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 def limits(suites: Mapping[str, TaskConfig]) -> dict[str, dict[str, float]]:
     """The largest error, m, with which an episode still succeeds, by criterion and by field of `Episodes`."""
-    found: dict[str, dict[str, float]] = {}
-    for name, config in suites.items():
-        if isinstance(config, TrackConfig):
-            found[name] = {"mean_error": float(config.mean_error)}
-        elif isinstance(config, HoverConfig | LandConfig):
-            found[name] = {"final_error": float(config.radius)}
-    return found
+    return {name: found for name, config in suites.items() if (found := config.limits())}
 
 
 _PANELS = (

@@ -19,9 +19,11 @@ from matplotlib.transforms import Bbox
 from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
+from e2efly.config import TaskConfig
+from e2efly.drawing import INK, Face, Line, Mark, Thing
 from e2efly.view.flights import Flights
-from e2efly.view.scene import Face, Line, Mark, Thing, scene
-from e2efly.view.style import FAILURE, GREY, INK, MARK, PALE, SPEED, START, figure
+from e2efly.view.scene import scene
+from e2efly.view.style import FAILURE, GREY, MARK, PALE, SPEED, START, figure
 from e2efly.view.worlds import Body, draw_plan, draw_space
 
 Corner = Float[np.ndarray, "3"]
@@ -34,11 +36,11 @@ _TEXT: dict[str, Any] = {
 }  # fmt: skip
 
 
-def plot_flights(task: Any, flights: Flights, path: str | Path, title: str, solids: Sequence[Body] = ()) -> None:
+def plot_flights(task: TaskConfig, flights: Flights, path: str | Path, title: str, solids: Sequence[Body] = ()) -> None:
     """Draw episodes in space, in 3D and from above, coloured by speed, with what the task has there.
 
     Args:
-        task: the environment's task.
+        task: its options.
         flights: the episodes.
         path: the PNG file.
         title: of the figure.

@@ -11,10 +11,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
+from e2efly.drawing import INK, ORANGE
+
+BLUE, VERMILLION, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 CYCLE = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY)
 """Okabe and Ito's palette: told apart with every kind of colour vision."""
-INK, GREY, PALE, HALO = "#222222", "#767676", "#D0D0D0", "#F5CE85"
+GREY, PALE, HALO = "#767676", "#D0D0D0", "#F5CE85"
 
 WIDTH, DPI = 10.0, 120
 """Inches and dots an inch: 1200 pixels."""

@@ -8,10 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
+from e2efly.drawing import INK, Face, Line, Thing
 from e2efly.physics.control import COMMAND_MODES
 from e2efly.view.flights import Flights
-from e2efly.view.scene import Face, Line, Thing, scene
-from e2efly.view.style import BLUE, GREY, INK, VERMILLION, figure
+from e2efly.view.scene import scene
+from e2efly.view.style import BLUE, GREY, VERMILLION, figure
 
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": BLUE, "linewidth": 2.8, "alpha": 0.5},
@@ -25,7 +26,7 @@ def plot_overlay(task: Any, flown: Mapping[str, Flights], path: str | Path, titl
     """Draw all flights from above and from the side, and the first of them over time: speed, height and commands.
 
     Args:
-        task: the environment's task.
+        task: its options.
         flown: flights of the same starts in the same order, by the name of the place; two places.
         path: the PNG file.
         title: of the figure.

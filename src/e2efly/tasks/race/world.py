@@ -3,19 +3,22 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
-from e2efly.config import RaceConfig
 from e2efly.courses.gates import Gates
 from e2efly.courses.tracks import load_track
+from e2efly.deploy.goals import GatesGoal
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.course import frames
 from e2efly.scenes.scene import Scene
+from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.task import Outcome, Shape, at_rest, into_ball, offsets, touches_ground, uniform
 
 LOWEST_START = 0.3
@@ -34,16 +37,16 @@ class Race:
     gates: Gates
     closed: bool
 
-    name = "race"
     fields = (Field("gates", 6, "world", "m", 4.0, "centres of the next two gates minus vehicle position"),)
 
     @staticmethod
-    def of(config: RaceConfig, shape: Shape) -> "Race":
+    def of(config: RaceConfig, shape: Shape, control_period: float = 0.0, substeps: int = 1) -> "Race":
         """Load the track.
 
         Raises:
             ValueError: for an unknown or broken track.
         """
+        del control_period, substeps
         track = load_track(config.track)
         if config.laps > 1 and not track.closed:
             raise ValueError(f"laps is {config.laps}; accepted: 0 or 1, as track {track.name!r} is not closed")
@@ -92,6 +95,13 @@ class Race:
         n = memory.shape[0]
         return Scene.of({"gate": frames(self.gates, n)}, n)
 
+    def flight_goal(self, memory: Any) -> GatesGoal:
+        """See `e2efly.validate.starts.goal_of`."""
+        del memory
+        laps = int(self.config.laps) if self.closed else 1
+        gates = jax.tree.map(np.asarray, self.gates)
+        return GatesGoal(gates, self.closed, laps, float(self.shape.radius), float(self.config.fence))
+
     def desired_yaw(self, memory: Int[Array, " n"], state: State) -> Float[Array, " n"]:
         """Towards the next gate."""
         d = self.goal(memory, memory) - state.position
@@ -115,4 +125,6 @@ class Race:
         memory = memory + passed
         laps = self.config.laps if self.closed else 1
         finished = passed & (laps > 0) & (memory >= laps * self.count)
-        return memory, Outcome(crashed | finished, finished, passed, crashed, error)
+        return memory, Outcome(
+            terminated=crashed | finished, success=finished, arrived=passed, crashed=crashed, error=error
+        )

@@ -3,20 +3,22 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.config import TrackConfig
 from e2efly.courses.references import POINTS, SPACING, Lissajous, Spline, knot_count, read_csv, through_points
+from e2efly.deploy.goals import ReferenceGoal
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.scene import Scene
 from e2efly.tasks.references import polynomial
 from e2efly.tasks.task import Outcome, Shape, at_rest, into_ball, offsets, touches_ground, uniform
+from e2efly.tasks.track import TrackConfig
 from e2efly.vehicles.names import unknown
 
 
@@ -43,7 +45,6 @@ class Track:
     curve: Lissajous | Spline | None
     """What to follow: a curve, the spline of the user's file, or None: random polynomials."""
 
-    name = "track"
     fields = (
         Field(
             "reference", 3 * POINTS, "world", "m", 1.0,
@@ -52,12 +53,13 @@ class Track:
     )  # fmt: skip
 
     @staticmethod
-    def of(config: TrackConfig, shape: Shape) -> "Track":
+    def of(config: TrackConfig, shape: Shape, control_period: float = 0.0, substeps: int = 1) -> "Track":
         """Check the kind of reference and read the user's file, if it is one.
 
         Raises:
             ValueError: for an unknown kind or a broken file.
         """
+        del control_period, substeps
         numbers = dataclasses.replace(config, reference="")  # resolved here: references share a compiled program
         kinds = ("polynomial", "circle", "lemniscate")
         m = knot_count(config.episode_s + POINTS * SPACING)
@@ -123,6 +125,10 @@ class Track:
         """Level ground."""
         return Scene.of({}, memory.steps.shape[0])
 
+    def flight_goal(self, memory: Any) -> ReferenceGoal:
+        """See `e2efly.validate.starts.goal_of`."""
+        return ReferenceGoal(memory.reference, float(self.config.fence))
+
     def desired_yaw(self, memory: Memory, state: State) -> Float[Array, " n"]:
         """Along world x."""
         del state
@@ -140,4 +146,6 @@ class Track:
         crashed = (error > c.fence) | touches_ground(self.shape, after)
         mean = memory.error_sum / jnp.maximum(memory.steps, 1.0)
         success = timed_out & ~crashed & (mean < c.mean_error)
-        return memory, Outcome(crashed, success, jnp.zeros_like(crashed), crashed, error)
+        return memory, Outcome(
+            terminated=crashed, success=success, arrived=jnp.zeros_like(crashed), crashed=crashed, error=error
+        )

@@ -12,12 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.config import GapConfig
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler, rotate, unrotate
 from e2efly.scenes.scene import WALL, Scene, Solids
 from e2efly.scenes.shapes import FAR
+from e2efly.tasks.gap import GapConfig
 from e2efly.tasks.task import Outcome, Shape, at_rest, offsets, struck, uniform
 
 WALL_WIDTH = 3.0
@@ -53,7 +53,6 @@ class Gap:
     checks: int
     """How often a control step is checked for collisions."""
 
-    name = "gap"
     fields = (
         Field("gap", 6, "world", "m", 2.0, "middle of the slit and the point behind it minus vehicle position"),
         Field("gap_axes", 6, "world", "1", 1.0, "unit vectors: the way through the slit, across its short side"),
@@ -192,7 +191,9 @@ class Gap:
         }
         arrived = (forward & inside) | success
         ends = lost | reached | (hit & (c.collisions_end > 0))
-        return moved, Outcome(ends, success, arrived, crashed, error, signals)
+        return moved, Outcome(
+            terminated=ends, success=success, arrived=arrived, crashed=crashed, error=error, signals=signals
+        )
 
 
 def rims(shape: Shape) -> Float[Array, "p 3"]:

@@ -7,12 +7,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.config import LandVisualConfig
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import cos_tilt, from_euler
 from e2efly.scenes.scene import Scene, Solids, distances
 from e2efly.scenes.shapes import DISC, TRIANGLE
+from e2efly.tasks.land_visual import LandVisualConfig
 from e2efly.tasks.task import Outcome, Shape, at_rest, uniform
 
 
@@ -24,8 +24,13 @@ class LandVisual:
     config: LandVisualConfig
     shape: Shape
 
-    name = "land_visual"
     fields = (Field("height", 1, "none", "m", 1.0, "height of the feet over the ground"),)
+
+    @classmethod
+    def of(cls, config: LandVisualConfig, shape: Shape, control_period: float, substeps: int = 1) -> "LandVisual":
+        """See `e2efly.tasks.task.make_task`."""
+        del control_period, substeps
+        return cls(config, shape)
 
     @property
     def episode_s(self) -> float | Array:
@@ -90,4 +95,10 @@ class LandVisual:
             & (cos_tilt(after.quaternion) > jnp.cos(c.tilt))
         )
         lost = (sideways > c.fence) | (offset[:, 2] > c.fence)
-        return memory, Outcome(touched | lost, success, success, (touched & ~success) | lost, sideways)
+        return memory, Outcome(
+            terminated=touched | lost,
+            success=success,
+            arrived=success,
+            crashed=(touched & ~success) | lost,
+            error=sideways,
+        )

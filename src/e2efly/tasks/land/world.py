@@ -2,17 +2,20 @@
 
 import dataclasses
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.config import LandConfig
+from e2efly.deploy.goals import LandGoal
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import cos_tilt, from_euler
 from e2efly.scenes.scene import Scene, Solids
 from e2efly.scenes.shapes import DISC
+from e2efly.tasks.land import LandConfig
 from e2efly.tasks.task import Outcome, Shape, at_rest, touches_ground, uniform
 
 
@@ -24,10 +27,15 @@ class Land:
     config: LandConfig
     shape: Shape
 
-    name = "land"
     fields = (
         Field("position_error", 3, "world", "m", 1.0, "where the centre of mass is after landing, minus where it is"),
     )
+
+    @classmethod
+    def of(cls, config: LandConfig, shape: Shape, control_period: float, substeps: int = 1) -> "Land":
+        """See `e2efly.tasks.task.make_task`."""
+        del control_period, substeps
+        return cls(config, shape)
 
     @property
     def episode_s(self) -> float | Array:
@@ -61,6 +69,11 @@ class Land:
             {"pad": Solids.of("pad", jnp.zeros((n, 1, 3)), jnp.array([2 * self.config.radius, 0.002, DISC]))}, n
         )
 
+    def flight_goal(self, memory: Any) -> LandGoal:
+        """See `e2efly.validate.starts.goal_of`."""
+        del memory
+        return LandGoal(np.zeros(3), float(self.shape.feet_height), float(self.config.fence))
+
     def desired_yaw(self, memory: Float[Array, "n 0"], state: State) -> Float[Array, " n"]:
         """Along world x."""
         del memory
@@ -88,4 +101,10 @@ class Land:
             & (cos_tilt(after.quaternion) > jnp.cos(c.tilt))
         )
         lost = (sideways > c.fence) | (offset[:, 2] > c.fence)
-        return memory, Outcome(touched | lost, success, success, (touched & ~success) | lost, sideways)
+        return memory, Outcome(
+            terminated=touched | lost,
+            success=success,
+            arrived=success,
+            crashed=(touched & ~success) | lost,
+            error=sideways,
+        )

@@ -9,7 +9,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
-from e2efly.config import RaceClutterConfig
 from e2efly.courses.gates import Gates
 from e2efly.courses.tracks import RaceTrack, load_track
 from e2efly.observation import Field
@@ -19,6 +18,7 @@ from e2efly.scenes.course import frames
 from e2efly.scenes.generate import clutter
 from e2efly.scenes.scene import Scene, Solids
 from e2efly.scenes.shapes import FAR
+from e2efly.tasks.race_clutter import RaceClutterConfig
 from e2efly.tasks.task import Outcome, Shape, at_rest, into_ball, offsets, struck, uniform
 
 APPROACH = 0.7
@@ -63,7 +63,6 @@ class RaceClutter:
     checks: int
     """How often a control step is checked for collisions."""
 
-    name = "race_clutter"
     fields = (
         Field("gates", 6, "world", "m", 4.0, "centres of the next two gates minus vehicle position"),
         Field("gate_axes", 6, "world", "1", 1.0, "unit vectors along which the next two gates are flown through"),
@@ -203,7 +202,9 @@ class RaceClutter:
             "desired_velocity": self.desired_velocity(memory, after),
             "overhang": self.overhang(memory, after),
         }
-        return moved, Outcome(ends, success, passed, crashed, error, signals)
+        return moved, Outcome(
+            terminated=ends, success=success, arrived=passed, crashed=crashed, error=error, signals=signals
+        )
 
 
 def _drawn_larger(track: RaceTrack, scale: float) -> RaceTrack:

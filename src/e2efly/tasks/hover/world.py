@@ -2,16 +2,19 @@
 
 import dataclasses
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.config import HoverConfig
+from e2efly.deploy.goals import HoverGoal
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.scene import Scene
+from e2efly.tasks.hover import HoverConfig
 from e2efly.tasks.task import Outcome, Shape, at_rest, touches_ground, uniform
 
 
@@ -24,8 +27,13 @@ class Hover:
     shape: Shape
     control_period: float | Array
 
-    name = "hover"
     fields = (Field("position_error", 3, "world", "m", 1.0, "target position minus vehicle position"),)
+
+    @classmethod
+    def of(cls, config: HoverConfig, shape: Shape, control_period: float, substeps: int = 1) -> "Hover":
+        """See `e2efly.tasks.task.make_task`."""
+        del substeps
+        return cls(config, shape, control_period)
 
     @property
     def episode_s(self) -> float | Array:
@@ -54,6 +62,11 @@ class Hover:
         """Level ground."""
         return Scene.of({}, memory.shape[0])
 
+    def flight_goal(self, memory: Any) -> HoverGoal:
+        """See `e2efly.validate.starts.goal_of`."""
+        del memory
+        return HoverGoal(np.asarray(self.config.target, np.float64), float(self.config.fence))
+
     def desired_yaw(self, memory: Float[Array, " n"], state: State) -> Float[Array, " n"]:
         """Along world x."""
         del state
@@ -75,4 +88,4 @@ class Hover:
         crashed = (error > c.fence) | touches_ground(self.shape, after)
         arrived = (held > 0) & (memory == 0)
         success = timed_out & ~crashed & (held >= c.hold_s - 1e-4)
-        return held, Outcome(crashed, success, arrived, crashed, error)
+        return held, Outcome(terminated=crashed, success=success, arrived=arrived, crashed=crashed, error=error)

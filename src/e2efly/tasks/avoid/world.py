@@ -8,12 +8,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.config import AvoidConfig
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.generate import forest
 from e2efly.scenes.scene import Scene, Solids
+from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.task import Outcome, Shape, at_rest, struck, uniform
 from e2efly.tasks.way import open_heading
 
@@ -46,11 +46,15 @@ class Avoid:
     checks: int
     """How often a control step is checked for collisions."""
 
-    name = "avoid"
     fields = (
         Field("desired_velocity", 3, "world", "m/s", 4.0, "velocity to fly at, if nothing stood in the way"),
         Field("height", 1, "none", "m", 1.0, "height of the centre of mass over the ground"),
     )
+
+    @classmethod
+    def of(cls, config: AvoidConfig, shape: Shape, control_period: float, substeps: int = 1) -> "Avoid":
+        """See `e2efly.tasks.task.make_task`."""
+        return cls(config, shape, control_period, substeps)
 
     @property
     def episode_s(self) -> float | Array:
@@ -119,4 +123,11 @@ class Avoid:
             "desired_speed": memory.speed,
         }
         error = jnp.maximum(c.forest.length - x, 0.0)
-        return memory, Outcome(ends | (x >= c.forest.length), success, success, crashed, error, signals)
+        return memory, Outcome(
+            terminated=ends | (x >= c.forest.length),
+            success=success,
+            arrived=success,
+            crashed=crashed,
+            error=error,
+            signals=signals,
+        )

@@ -7,13 +7,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.config import CameraConfig, HoverAwareConfig
+from e2efly.config import CameraConfig
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.camera import mount, pose
 from e2efly.scenes.scene import Scene, Solids
+from e2efly.tasks.hover_aware import HoverAwareConfig
 from e2efly.tasks.task import Outcome, Shape, at_rest, touches_ground, uniform
 
 OUTSIDE = 10.0
@@ -44,11 +45,16 @@ class HoverAware:
     shape: Shape
     control_period: float | Array
 
-    name = "hover_aware"
     fields = (
         Field("position_error", 3, "world", "m", 1.0, "target position minus vehicle position"),
         Field("look_at", 3, "world", "m", 4.0, "position of what to look at minus vehicle position"),
     )
+
+    @classmethod
+    def of(cls, config: HoverAwareConfig, shape: Shape, control_period: float, substeps: int = 1) -> "HoverAware":
+        """See `e2efly.tasks.task.make_task`."""
+        del substeps
+        return cls(config, shape, control_period)
 
     @property
     def episode_s(self) -> float | Array:
@@ -145,4 +151,6 @@ class HoverAware:
         success = timed_out & ~crashed & (held >= c.hold_s - 1e-4)
         arrived = (held > 0) & (memory.held == 0)
         signals = {"pixel": pixel, "pixel_velocity": pixel_velocity}
-        return Memory(memory.seen, time, held), Outcome(crashed, success, arrived, crashed, error, signals)
+        return Memory(memory.seen, time, held), Outcome(
+            terminated=crashed, success=success, arrived=arrived, crashed=crashed, error=error, signals=signals
+        )

@@ -1,0 +1,49 @@
+"""What can be drawn in space: polylines, faces and marks. Plain data in world coordinates, m; imports no JAX."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+INK, ORANGE = "#222222", "#E69F00"
+"""Colours of what a task has in space: of Okabe and Ito's palette."""
+
+Points = Float[np.ndarray, "m 3"]
+
+
+@dataclass(frozen=True)
+class Line:
+    """A curve."""
+
+    points: Points
+    color: str
+    width: float
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Face:
+    """A flat polygon."""
+
+    points: Points
+    color: str
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A point with a Matplotlib marker or, where `text` is given, a word."""
+
+    point: Float[np.ndarray, "3"]
+    marker: str = ""
+    text: str = ""
+    label: str = ""
+
+
+Thing = Line | Face | Mark
+
+
+def circle(centre: Float[np.ndarray, "3"], radius: float) -> Points:
+    """A level circle."""
+    angle = np.linspace(0, 2 * np.pi, 49)
+    return centre + radius * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=-1)

@@ -1,0 +1,156 @@
+"""Registries: what there is of a kind, by name, and users' own code by reference. Imports no JAX.
+
+A reference is `path/to/file.py:Name` or `package.module:Name`. It is accepted wherever a name is.
+"""
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Generic, TypeVar
+
+from e2efly.vehicles.names import unknown
+
+T = TypeVar("T")
+
+
+class Registry(Generic[T], Mapping[str, T]):
+    """Things of one kind by name, in the order in which they were registered."""
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        self._known: dict[str, T] = {}
+
+    def __getitem__(self, name: str) -> T:
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._known)
+
+    def __len__(self) -> int:
+        return len(self._known)
+
+    def add(self, name: str, thing: T) -> T:
+        """Register something; the same thing twice is one.
+
+        Raises:
+            ValueError: for a name that is no word, or taken, naming where both are from.
+        """
+        if not name.isidentifier():
+            raise ValueError(f"{self.kind} {name!r} of {origin(thing)}; accepted: a name of letters, digits and _")
+        known = self._known.get(name, thing)
+        if known is not thing and origin(known) != origin(thing):
+            raise ValueError(
+                f"{self.kind} {name!r} of {origin(thing)} is also the name of {origin(known)}; accepted: another name"
+            )
+        self._known[name] = thing
+        return thing
+
+    def find(self, name: str) -> T:
+        """What a name or a reference stands for.
+
+        Raises:
+            ValueError: for an unknown name, with the nearest one and all there are; for a reference that leads nowhere
+                or to something that is not registered, naming file and name.
+        """
+        if name in self._known:
+            return self._known[name]
+        if ":" not in name:
+            raise ValueError(unknown(self.kind, name, self._known) + ", or path/to/file.py:Name, or module:Name")
+        where, _, attribute = name.rpartition(":")
+        whole = f"{Path(where).expanduser().absolute()}:{attribute}" if where.endswith(".py") else name
+        if (here := next((known for known in self._known.values() if origin(known) == whole), None)) is not None:
+            return here
+        thing = load(name)
+        if not any(thing is known for known in self._known.values()):
+            raise ValueError(f"{name} is {thing!r}; accepted: a {self.kind} that its file registers")
+        return thing
+
+    def reference(self, thing: T) -> str:
+        """By which `find` finds something again in another process: its name, or where it is from if that is not here.
+
+        Raises:
+            KeyError: when it is not registered.
+        """
+        name = next(name for name, known in self._known.items() if known is thing)
+        return name if is_shipped(thing) else origin(thing)
+
+
+def load(reference: str) -> Any:
+    """What `path/to/file.py:Name` or `package.module:Name` names; a file is imported once.
+
+    Raises:
+        ValueError: when the file or the module is missing, cannot be imported or has no such name.
+    """
+    where, _, name = reference.rpartition(":")
+    if not where or not name:
+        raise ValueError(f"reference is {reference!r}; accepted: path/to/file.py:Name or package.module:Name")
+    module = _file(Path(where)) if where.endswith(".py") else _imported(where, lambda: importlib.import_module(where))
+    try:
+        return getattr(module, name)
+    except AttributeError:
+        if module.__name__ in _BEGUN:
+            raise ValueError(f"{where} has no {name} yet: it imports itself") from None
+        names = sorted(n for n, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__)
+        raise ValueError(unknown(f"name in {where}", name, names)) from None
+
+
+def origin(thing: Any) -> str:
+    """The reference of something: of its file where that was given as a file, else of its module."""
+    module = sys.modules.get(getattr(thing, "__module__", ""))
+    name = getattr(thing, "__qualname__", repr(thing))
+    if module is None:
+        return name
+    file = getattr(module, "__file__", None)
+    of_file = module.__name__ == "__main__" or module.__name__.startswith(_OF_FILES)
+    return f"{Path(file).absolute()}:{name}" if of_file and file else f"{module.__name__}:{name}"
+
+
+def is_shipped(thing: Any) -> bool:
+    """Whether something comes with the package."""
+    return str(getattr(thing, "__module__", "")).split(".")[0] == __name__.split(".")[0]
+
+
+_OF_FILES = "e2efly_file_"
+"""Beginning of the names of modules that are imported from files."""
+_BEGUN: set[str] = set()
+"""The files whose import has begun and not ended."""
+
+
+def _file(path: Path) -> ModuleType:
+    path = path.expanduser().absolute()
+    if not path.is_file():
+        raise ValueError(f"there is no file {path}")
+    name = _OF_FILES + hashlib.sha256(str(path).encode()).hexdigest()[:16]
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+
+    def run() -> ModuleType:
+        sys.modules[name] = module
+        _BEGUN.add(name)
+        try:
+            spec.loader.exec_module(module)  # type: ignore[union-attr]
+        except BaseException:
+            del sys.modules[name]
+            raise
+        finally:
+            _BEGUN.discard(name)
+        return module
+
+    return _imported(str(path), run)
+
+
+def _imported(where: str, run: Callable[[], ModuleType]) -> ModuleType:
+    try:
+        return run()
+    except ValueError:
+        raise
+    except Exception as error:  # whatever the user's code raises
+        raise ValueError(f"{where} cannot be imported: {type(error).__name__}: {error}") from error

@@ -1,0 +1,86 @@
+"""Options and recipes: fly fast through a random forest that is only seen."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import ClassVar
+
+from e2efly.config import (
+    D435I,
+    AlgorithmConfig,
+    BPTTConfig,
+    EnvConfig,
+    ForestConfig,
+    ImageNoiseConfig,
+    NetworkConfig,
+    Paper,
+    PPOConfig,
+    RewardConfig,
+    StageConfig,
+    TaskConfig,
+    TrainConfig,
+    number,
+)
+from e2efly.tasks.registry import register
+
+
+@register("avoid")
+@dataclass(frozen=True)
+class AvoidConfig(TaskConfig):
+    """Fly fast through a random forest that is only seen."""
+
+    world: ClassVar[str] = "e2efly.tasks.avoid.world:Avoid"
+    best: ClassVar = "bptt"
+    cameras: ClassVar = (dataclasses.replace(D435I, noise=ImageNoiseConfig(d435i=True), width=32, height=12),)
+    curriculum: ClassVar = (
+        StageConfig({"forest.density": 0.0, "speed": (2.0, 4.0)}, success=0.9, steps=1_000_000),
+        StageConfig({"forest.density": 0.03, "speed": (2.0, 5.0)}, success=0.8, steps=2_000_000),
+    )
+    paper: ClassVar = Paper(
+        weights={"prog1": 0.9, "ori1": 0.04, "v3": 0.002, "anglev": 0.002, "avoid2": 0.01},
+        ppo={"goal": 5.0, "crash": 4.0},
+        millions=(100, 50),
+    )
+
+    episode_s: float = 20.0
+    """Length of an episode, s."""
+    forest: ForestConfig = ForestConfig()
+    """The forest; its lane is also the fence."""
+    speed: tuple[float, float] = number((3.0, 10.0), rising=True)
+    """Commanded speed, m/s, uniform an episode."""
+    sideways: float = 3.0
+    """Start within this of the middle of the lane, m."""
+    altitude: float = 1.5
+    """Where to fly, m over the ground."""
+    ceiling: float = number(3.0, endless=True)
+    """Higher than this the episode fails, m."""
+    collisions_end: bool = True
+    """Whether a collision ends the episode; training goes on, so that it learns from what comes after."""
+
+    @classmethod
+    def training(cls) -> "AvoidConfig":
+        """Collisions end no episode."""
+        return cls(collisions_end=False)
+
+    def criteria(self) -> dict[str, TaskConfig]:
+        """Two speeds; collisions end the episode."""
+        return {
+            f"{self.name}_{speed:g}": dataclasses.replace(self, speed=(speed, speed), collisions_end=True)
+            for speed in (5.0, 8.0)
+        }
+
+    @classmethod
+    def recipe(cls, algo: str) -> TrainConfig:
+        """Rewards for the velocity that leads through the forest, and for keeping off the trees."""
+        weights = {"vel": 4.0, "avoid": 30.0, "ori2": 0.1, "anglev_sq": 0.01, "act2_sq": 0.02}
+        parameters = {"avoid_reach": 0.5}
+        settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=3e-4, gradient_decay=1.5, average=0.99)
+        task, network = cls.training(), NetworkConfig((128, 64), pool=(12, 32), recurrent=64)
+        curriculum: tuple[StageConfig, ...] = ()
+        if algo == "ppo":
+            weights = {"vel": 0.3, "avoid": 0.1, "anglev_sq": 0.002, "act2_sq": 0.02, "goal": 5.0, "crash": 5.0}
+            settings, task, parameters = PPOConfig(learning_rate=2e-3, gamma=0.98), cls(), {}
+            network, curriculum = dataclasses.replace(network, recurrent=0), cls.curriculum
+        return TrainConfig(
+            task, settings, RewardConfig(weights, parameters), EnvConfig(cameras=cls.cameras), network,
+            steps=4_000_000, chunk=100, eval_episodes=250, curriculum=curriculum, fast_compile=False,
+        )  # fmt: skip

@@ -1,0 +1,71 @@
+"""Options and recipes: fly through a narrow slit in a wall, tilted so that only a banked vehicle fits."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import ClassVar
+
+from e2efly.config import AlgorithmConfig, BPTTConfig, PPOConfig, RewardConfig, TaskConfig, TrainConfig, number
+from e2efly.tasks.registry import register
+
+
+@register("gap")
+@dataclass(frozen=True)
+class GapConfig(TaskConfig):
+    """Fly through a narrow slit in a wall, tilted so that only a banked vehicle fits."""
+
+    world: ClassVar[str] = "e2efly.tasks.gap.world:Gap"
+    best: ClassVar = "bptt"
+
+    episode_s: float = 6.0
+    """Length of an episode, s."""
+    distance: tuple[float, float] = number((2.5, 4.0), rising=True)
+    """From the start to the slit, m, uniform."""
+    sideways: float = 0.5
+    """Half-width of the slit's random place about straight ahead, m an axis."""
+    altitude: float = 2.0
+    """Height of the start, m."""
+    yaw: float = 0.3
+    """Half-width of the wall's random turn about up, rad."""
+    roll: tuple[float, float] = number((0.4, 0.8), rising=True)
+    """Tilt of the slit to either side, rad, uniform."""
+    opening: tuple[float, float] = number((0.7, 0.18), above=0)
+    """Long and short side of the slit, m."""
+    thickness: float = 0.1
+    """Of the wall, m."""
+    approach: float = 1.5
+    """From this distance to the wall on, the vehicle counts as approaching, m."""
+    beyond: float = 2.0
+    """Success: reach the point this far behind the slit ..."""
+    radius: float = number(0.5, above=0)
+    """... to within this, m."""
+    fence: float = number(6.0, above=0, endless=True)
+    """Farther than this from the next target the episode fails, m."""
+    collisions_end: bool = True
+    """Whether a collision ends the episode; training goes on, so that it learns from what comes after."""
+
+    @classmethod
+    def training(cls) -> "GapConfig":
+        """Collisions end no episode."""
+        return cls(collisions_end=False)
+
+    def criteria(self) -> dict[str, TaskConfig]:
+        """Collisions end the episode."""
+        return {self.name: dataclasses.replace(self, collisions_end=True)}
+
+    @classmethod
+    def recipe(cls, algo: str) -> TrainConfig:
+        """Rewards for coming nearer, and for an attitude and a place that fit through."""
+        constants = {"desired_speed": 2.0, "fit_margin": 0.02, "fit_limit": 0.1}
+        if algo == "ppo":
+            weights = {
+                "prog1": 1.0, "ori4": 0.1, "fit": 1.0, "overspeed": 0.02, "anglev_sq": 0.0005, "act2_sq": 0.005,
+                "goal": 1.0, "crash": 1.0,
+            }  # fmt: skip
+            settings: AlgorithmConfig = PPOConfig(gamma=0.97, learning_rate=5e-3, learning_rate_end=5e-4)
+            return TrainConfig(cls.training(), settings, RewardConfig(weights, constants), steps=3_000_000)
+        weights = {
+            "prog1": 1.0, "near": 0.1, "ori4": 0.1, "fit": 1.0, "overspeed": 0.02, "anglev_sq": 0.0005,
+            "act2_sq": 0.005,
+        }  # fmt: skip
+        settings = BPTTConfig(learning_rate=6e-3, max_grad_norm=1.0, gradient_decay=1.0)
+        return TrainConfig(cls.training(), settings, RewardConfig(weights, constants), steps=6_000_000, chunk=60)

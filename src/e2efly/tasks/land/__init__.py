@@ -1,0 +1,69 @@
+"""Options and recipes: touch down gently on a point of the ground."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from e2efly.config import AlgorithmConfig, BPTTConfig, Paper, PPOConfig, RewardConfig, TaskConfig, TrainConfig, number
+from e2efly.courses import defaults
+from e2efly.drawing import INK, ORANGE, Face, Line, Thing, circle
+from e2efly.tasks.registry import register
+
+
+@register("land")
+@dataclass(frozen=True)
+class LandConfig(TaskConfig):
+    """Touch down gently on a point of the ground."""
+
+    world: ClassVar[str] = "e2efly.tasks.land.world:Land"
+    smooth: ClassVar = {
+        "prog1": 4.0, "progxy": 0.1, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02,
+        "goal": 10.0, "crash": 10.0,
+    }  # fmt: skip
+    paper: ClassVar = Paper(
+        weights={"progxy": 0.04, "vz": 0.1, "anglev": 0.001},
+        ppo={"act3": 1.0, "goal": 1.0, "crash": 1.0},
+        millions=(100, 10),
+    )
+
+    episode_s: float = 10.0
+    """Length of an episode, s."""
+    sideways: float = 2.0
+    """Start within this of the pad's centre, m an axis."""
+    height: tuple[float, float] = number((1.0, 3.0), rising=True)
+    """Start height of the feet, m."""
+    velocity: float = 0.5
+    """Start velocity, m/s an axis, uniform in +-."""
+    radius: float = number(0.10, above=0)
+    """Success: horizontal error at touch, m."""
+    height_error: float = 0.05
+    """Success: height error at touch, m."""
+    speed: float = 0.5
+    """Success: speed at touch, m/s."""
+    tilt: float = 0.2617993877991494
+    """Success: tilt at touch, rad."""
+    fence: float = number(defaults.LAND_FENCE, above=0, endless=True)
+    """Farther than this from the pad, sideways or up, the episode fails, m."""
+
+    def limits(self) -> dict[str, float]:
+        """The pad's radius."""
+        return {"final_error": float(self.radius)}
+
+    def drawing(self) -> list[Thing]:
+        """The pad."""
+        pad = circle(np.zeros(3), float(self.radius))
+        return [Face(pad, ORANGE, label="pad: touch down within"), Line(pad, INK, 1.0)]
+
+    @classmethod
+    def recipe(cls, algo: str) -> TrainConfig:
+        """Rewards for coming nearer, sinking and staying upright."""
+        if algo == "ppo":
+            weights = {
+                "prog1": 4.0, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02,
+                "goal": 10.0, "crash": 10.0,
+            }  # fmt: skip
+            settings: AlgorithmConfig = PPOConfig(learning_rate=5e-3, learning_rate_end=5e-4)
+            return TrainConfig(cls(), settings, RewardConfig(weights), steps=2_000_000)
+        weights = {"progxy": 1.0, "descent": 1.0, "upright": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02}
+        return TrainConfig(cls(), BPTTConfig(learning_rate=8e-3), RewardConfig(weights), steps=1_000_000, chunk=10)

@@ -1,0 +1,76 @@
+"""Options and recipes: touch down gently on a pad that is only seen."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from e2efly.config import (
+    AlgorithmConfig,
+    BPTTConfig,
+    CameraConfig,
+    EnvConfig,
+    NetworkConfig,
+    Paper,
+    PPOConfig,
+    RewardConfig,
+    TaskConfig,
+    TrainConfig,
+    number,
+)
+from e2efly.courses import defaults
+from e2efly.tasks.registry import register
+
+
+@register("land_visual")
+@dataclass(frozen=True)
+class LandVisualConfig(TaskConfig):
+    """Touch down gently on a pad that is only seen."""
+
+    world: ClassVar[str] = "e2efly.tasks.land_visual.world:LandVisual"
+    best: ClassVar = "bptt"
+    cameras: ClassVar = (CameraConfig("mask", 16, 16, fov=(math.pi / 2, math.pi / 2), pitch=math.pi / 2),)
+    paper: ClassVar = Paper(
+        weights={"progxy": 0.04, "ori2": 0.003, "vz": 0.1, "anglev": 0.001},
+        ppo={"act3": 1.0, "goal": 1.0, "crash": 1.0},
+        millions=(100, 1),
+    )
+
+    episode_s: float = 10.0
+    """Length of an episode, s."""
+    sideways: float = 1.0
+    """Start within this of the pad's centre, m an axis."""
+    height: tuple[float, float] = number((1.0, 3.0), rising=True)
+    """Start height of the feet over the pad, m."""
+    velocity: float = 0.5
+    """Start velocity, m/s an axis, uniform in +-."""
+    pad_size: tuple[float, float] = number((0.4, 0.6), rising=True)
+    """Width of the pad, m, uniform; its shape is a disc, a square or a triangle."""
+    pad_height: float = 0.2
+    """Height of the pad over the ground, m."""
+    radius: float = number(0.10, above=0)
+    """Success: horizontal error at touch, m."""
+    height_error: float = 0.05
+    """Success: height error at touch, m."""
+    speed: float = 0.5
+    """Success: speed at touch, m/s."""
+    tilt: float = 0.2617993877991494
+    """Success: tilt at touch, rad."""
+    fence: float = number(defaults.LAND_FENCE, above=0, endless=True)
+    """Farther than this from the pad, sideways or up, the episode fails, m."""
+
+    @classmethod
+    def recipe(cls, algo: str) -> TrainConfig:
+        """As landing's, with small images."""
+        weights = {"progxy": 1.0, "descent": 1.0, "upright": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02}
+        settings: AlgorithmConfig = BPTTConfig(envs=32, horizon=48, learning_rate_end=1.2e-4)
+        steps = 650_000
+        if algo == "ppo":
+            weights = {
+                "prog1": 4.0, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02, "goal": 10.0,
+                "crash": 10.0,
+            }  # fmt: skip
+            settings, steps = PPOConfig(learning_rate=2e-3), 2_000_000
+        network, seen = NetworkConfig((128, 64)), EnvConfig(cameras=cls.cameras)
+        return TrainConfig(
+            cls(), settings, RewardConfig(weights), seen, network, steps=steps, chunk=30, eval_episodes=100
+        )

@@ -1,0 +1,97 @@
+"""Options and recipes: fly through gates in order."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from e2efly.config import (
+    AlgorithmConfig,
+    BPTTConfig,
+    Paper,
+    PPOConfig,
+    RewardConfig,
+    TaskConfig,
+    TrainConfig,
+    number,
+    shape,
+)
+from e2efly.courses import defaults
+from e2efly.courses.gates import FRAME, Gates
+from e2efly.courses.tracks import load_track
+from e2efly.drawing import ORANGE, Face, Mark, Thing
+from e2efly.tasks.registry import register
+
+
+@register("race")
+@dataclass(frozen=True)
+class RaceConfig(TaskConfig):
+    """Fly through gates in order."""
+
+    world: ClassVar[str] = "e2efly.tasks.race.world:Race"
+    precision: ClassVar = "duration"
+    smooth: ClassVar = {"prog1": 1.0, "anglev_sq": 0.0005, "act2_sq": 0.005, "goal": 1.0, "crash": 1.0}
+    paper: ClassVar = Paper(
+        weights={"prog1": 0.9, "ori2": 0.001, "v1": 0.002, "anglev": 0.002},
+        ppo={"act3": 1.0, "goal": 5.0, "crash": 4.0},
+        millions=(100, 50),
+    )
+
+    episode_s: float = 12.0
+    """Length of an episode, s."""
+    track: str = shape(defaults.TRACK)
+    """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file (its gate count sets shapes)."""
+    position: float = 1.0
+    """Start within this ball about the track's start, m."""
+    laps: int = 1
+    """Laps that end the episode with success; 0: fly on until time is out."""
+    fence: float = number(defaults.RACE_FENCE, above=0, endless=True)
+    """Farther than this from the next gate the episode fails, m."""
+
+    @classmethod
+    def training(cls) -> "RaceConfig":
+        """Lap after lap; it is judged on one."""
+        return cls(laps=0)
+
+    def criteria(self) -> dict[str, TaskConfig]:
+        """One lap, or as many as are asked for."""
+        return {self.name: dataclasses.replace(self, laps=max(self.laps, 1))}
+
+    def drawing(self) -> list[Thing]:
+        """The gates with their numbers."""
+        return _frames(Gates.of(load_track(self.track)))
+
+    @classmethod
+    def recipe(cls, algo: str) -> TrainConfig:
+        """Rewards for coming nearer to the next gate."""
+        if algo == "ppo":
+            weights = {"prog1": 1.0, "anglev_sq": 0.0005, "act2_sq": 0.005, "goal": 1.0, "crash": 1.0}
+            settings: AlgorithmConfig = PPOConfig(gamma=0.97, learning_rate=5e-3, learning_rate_end=5e-4)
+            return TrainConfig(cls.training(), settings, RewardConfig(weights), steps=3_000_000)
+        weights = {"prog1": 1.0, "near": 0.2, "anglev_sq": 0.0005, "act2_sq": 0.005}
+        settings = BPTTConfig(learning_rate=8e-3, max_grad_norm=1.0, gradient_decay=1.0)
+        return TrainConfig(cls.training(), settings, RewardConfig(weights), steps=2_500_000, chunk=15)
+
+    @classmethod
+    def with_critic(cls, algo: str) -> dict[str, Any]:
+        """Longer windows than other tasks have; SHAC needs smaller steps and more noise."""
+        longer = {} if algo == "abpt" else {"horizon": 64}
+        return longer | ({"learning_rate": 4e-3, "noise": 0.1} if algo == "shac" else {})
+
+
+def _frames(gates: Gates) -> list[Thing]:
+    things: list[Thing] = []
+    rows = zip(*(np.asarray(x, float) for x in (gates.position[:-1], gates.cos, gates.sin, gates.half)), strict=True)
+    for i, (centre, cos, sin, half) in enumerate(rows):
+        left, up = np.array([-sin, cos, 0.0]), np.array([0.0, 0.0, 1.0])
+        inner, outer = (
+            [centre + a * w * left + b * h * up for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+            for w, h in (half, half + FRAME)
+        )
+        for k in range(4):
+            bar = np.stack([inner[k], inner[k - 1], outer[k - 1], outer[k]])
+            things.append(Face(bar, ORANGE, label="gate, numbered in order" if i == k == 0 else ""))
+        beyond = centre + (half[1] + FRAME + 0.3) * up + (half[0] + FRAME + 0.3) * left
+        things.append(Mark(beyond, text=str(i + 1)))
+    return things

@@ -1,0 +1,103 @@
+"""Options and recipes: fly through gates in order, among obstacles that are only seen."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import ClassVar
+
+from e2efly.config import (
+    D435I,
+    AlgorithmConfig,
+    BPTTConfig,
+    ClutterConfig,
+    EnvConfig,
+    ImageNoiseConfig,
+    NetworkConfig,
+    Paper,
+    PPOConfig,
+    RewardConfig,
+    StageConfig,
+    TaskConfig,
+    TrainConfig,
+    number,
+    shape,
+)
+from e2efly.tasks.registry import register
+
+
+@register("race_clutter")
+@dataclass(frozen=True)
+class RaceClutterConfig(TaskConfig):
+    """Fly through gates in order, among obstacles that are only seen."""
+
+    world: ClassVar[str] = "e2efly.tasks.race_clutter.world:RaceClutter"
+    best: ClassVar = "bptt"
+    precision: ClassVar = "duration"
+    cameras: ClassVar = (
+        dataclasses.replace(
+            D435I, noise=ImageNoiseConfig(d435i=True), width=48, height=24, pitch=-0.35, noise_share=0.5
+        ),
+    )
+    curriculum: ClassVar = (
+        StageConfig({"clutter.obstacles": 0.0}, success=0.8, steps=2_000_000),
+        StageConfig({"clutter.obstacles": 5.0}, success=0.7, steps=2_000_000),
+    )
+    paper: ClassVar = Paper(
+        weights={"prog1": 0.9, "act3": 1.0, "ori1": 0.04, "avoid1": 0.01},
+        ppo={"goal": 5.0, "crash": 4.0},
+        millions=(100, 50),
+    )
+
+    episode_s: float = 20.0
+    """Length of an episode, s."""
+    track: str = shape("s_shaped")
+    """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file (its gate count sets shapes)."""
+    scale: float = number(2.0, above=0)
+    """The track's ground plan is this many times larger: wide enough for 10 m/s."""
+    clutter: ClutterConfig = ClutterConfig()
+    """The obstacles."""
+    gate_position: float = 0.3
+    """Half-width of each gate's random place about the track's, m an axis."""
+    gate_yaw: float = 0.2
+    """Half-width of each gate's random turn, rad."""
+    speed: tuple[float, float] = number((4.0, 12.0), rising=True)
+    """Commanded speed, m/s, uniform an episode."""
+    position: float = 0.5
+    """Start within this ball about the track's start, m."""
+    laps: int = 1
+    """Laps that end the episode with success; 0: fly on until time is out."""
+    fence: float = number(20.0, above=0, endless=True)
+    """Farther than this from the next gate the episode fails, m."""
+    collisions_end: bool = True
+    """Whether a collision ends the episode; training goes on, so that it learns from what comes after."""
+
+    @classmethod
+    def training(cls) -> "RaceClutterConfig":
+        """Lap after lap, through whatever it strikes."""
+        return cls(laps=0, collisions_end=False)
+
+    def criteria(self) -> dict[str, TaskConfig]:
+        """One lap, or as many as are asked for; collisions end the episode."""
+        return {self.name: dataclasses.replace(self, laps=max(self.laps, 1), collisions_end=True)}
+
+    @classmethod
+    def recipe(cls, algo: str) -> TrainConfig:
+        """Rewards for the velocity that leads through the gates, and for keeping off the obstacles."""
+        weights = {
+            "vel": 1.5, "near": 1.0, "avoid": 12.0, "fit": 20.0, "ori2": 0.3, "anglev_sq": 0.01, "act2_sq": 0.02,
+        }  # fmt: skip
+        parameters = {"fit_margin": 0.25, "fit_limit": 2.0}
+        settings: AlgorithmConfig = BPTTConfig(horizon=48, gradient_decay=1.5, average=0.99)
+        task, network = cls.training(), NetworkConfig((128, 64), pool=(12, 48), recurrent=64)
+        steps, curriculum = 12_000_000, ()
+        if algo == "ppo":
+            weights = {
+                "prog1": 1.0, "overspeed": 0.01, "avoid": 0.05, "ori2": 0.1, "anglev_sq": 0.0005, "act2_sq": 0.005,
+                "goal": 1.0, "crash": 2.0,
+            }  # fmt: skip
+            settings, parameters, steps = PPOConfig(gamma=0.97), {}, 8_000_000
+            task, curriculum = cls(laps=0), cls.curriculum
+            network = dataclasses.replace(network, recurrent=0)
+        return TrainConfig(
+            task, settings, RewardConfig(weights, parameters), EnvConfig(cameras=cls.cameras), network,
+            steps=steps, chunk=200, eval_episodes=500, curriculum=curriculum, fast_compile=False,
+        )  # fmt: skip

@@ -1,0 +1,29 @@
+"""The tasks by name. A task's options register themselves: `@register("name")`. Imports no JAX."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from e2efly.config import TaskConfig
+from e2efly.registry import Registry
+
+TASKS: Registry[type[TaskConfig]] = Registry("task")
+"""The classes of options."""
+
+C = TypeVar("C", bound=type[TaskConfig])
+
+
+def register(name: str) -> Callable[[C], C]:
+    """Register the options of a task under a name, by which commands, adapters and policies know it.
+
+    Raises:
+        ValueError: for a name that is taken, or a class that is no `TaskConfig`.
+    """
+
+    def registered(options: C) -> C:
+        if not (isinstance(options, type) and issubclass(options, TaskConfig)):
+            raise ValueError(f"task {name!r} is {options!r}; accepted: a frozen dataclass that extends TaskConfig")
+        options.name = name
+        TASKS.add(name, options)
+        return options
+
+    return registered

@@ -1,0 +1,88 @@
+"""Options and recipes: follow a reference that is seen one second ahead."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from e2efly.config import (
+    AlgorithmConfig,
+    BPTTConfig,
+    Paper,
+    PPOConfig,
+    RewardConfig,
+    TaskConfig,
+    TrainConfig,
+    number,
+    shape,
+)
+from e2efly.courses import defaults
+from e2efly.tasks.registry import register
+
+
+@register("track")
+@dataclass(frozen=True)
+class TrackConfig(TaskConfig):
+    """Follow a reference that is seen one second ahead."""
+
+    world: ClassVar[str] = "e2efly.tasks.track.world:Track"
+    goal: ClassVar = "reference"
+    shows_error: ClassVar = True
+    precision: ClassVar = "mean_error"
+    smooth: ClassVar = {"near": 1.0, "prog2": 0.2, "anglev_sq": 0.002, "act2_sq": 0.02, "crash": 10.0}
+    paper: ClassVar = Paper(
+        weights={"prog2": 0.02, "ori2": 0.001, "v1": 0.002, "anglev": 0.002},
+        ppo={"act3": 1.0, "crash": 1.0},
+        millions=(50, 20),
+    )
+
+    episode_s: float = 10.0
+    """Length of an episode, s (sets shapes)."""
+    reference: str = shape("polynomial")
+    """polynomial (random, smooth), circle, lemniscate, or the path of a .csv file with columns t, x, y, z."""
+    centre: tuple[float, float, float] = number(defaults.CENTRE, low=-math.inf)
+    """Centre of the reference, world, m."""
+    position: float = 1.0
+    """Start within this ball about the reference, m."""
+    velocity: float = 0.5
+    """Start velocity, m/s an axis, uniform in +-."""
+    settle_s: float = 2.0
+    """The error counts after this time, s."""
+    mean_error: float = 0.08
+    """Success: mean distance to the reference, m."""
+    fence: float = number(defaults.TRACK_FENCE, above=0, endless=True)
+    """Farther than this from the reference the episode fails, m."""
+    radius: float = number(defaults.RADIUS, above=0)
+    """Circle: radius; lemniscate: half its length, m."""
+    circle_rate: float = number(defaults.CIRCLE_RATE, low=-math.inf)
+    """Circle: angular rate, rad/s."""
+    lemniscate_speed: float = defaults.LEMNISCATE_SPEED
+    """Lemniscate: top speed, m/s."""
+    polynomial_reach: float = 2.0
+    """Random polynomial: its knots lie within this of the centre, m an axis."""
+    polynomial_speed: float = 2.5
+    """Random polynomial: largest speed at a knot, m/s."""
+
+    def criteria(self) -> dict[str, TaskConfig]:
+        """Trained on random references it is judged on a circle and on a lemniscate, which it never saw."""
+        if self.reference != "polynomial":
+            return {self.name: self}
+        return {
+            "circle": dataclasses.replace(self, reference="circle", mean_error=0.08),
+            "lemniscate": dataclasses.replace(self, reference="lemniscate", mean_error=0.15),
+        }
+
+    def limits(self) -> dict[str, float]:
+        """The mean error."""
+        return {"mean_error": float(self.mean_error)}
+
+    @classmethod
+    def recipe(cls, algo: str) -> TrainConfig:
+        """PPO's reward pays for being near; BPTT's for coming nearer."""
+        if algo == "ppo":
+            weights = {"near": 1.0, "anglev_sq": 0.002, "act2_sq": 0.02}
+            settings: AlgorithmConfig = PPOConfig(horizon=48, gamma=0.95, learning_rate=5e-3)
+            return TrainConfig(cls(), settings, RewardConfig(weights), steps=2_000_000)
+        weights = {"prog2": 1.0, "anglev_sq": 0.01, "act2_sq": 0.02}
+        settings = BPTTConfig(horizon=32, learning_rate=8e-3)
+        return TrainConfig(cls(), settings, RewardConfig(weights), steps=1_000_000)

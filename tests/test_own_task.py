@@ -1,0 +1,68 @@
+"""A task from a file outside of the package: trained, evaluated, resumed, refused when its file is gone."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+import e2efly
+from e2efly.cli import run
+from e2efly.registry import load
+from e2efly.tasks import TASKS
+
+EXAMPLE = Path(__file__).parent.parent / "examples" / "06_own_task.py"
+SMALL = ["--steps", "4096", "--algo.envs", "32", "--algo.horizon", "32", "--eval-episodes", "32", "--no-plots"]
+
+
+@pytest.fixture(autouse=True)
+def _as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a test registers goes with it."""
+    monkeypatch.setattr(TASKS, "_known", dict(TASKS._known))
+
+
+def test_a_task_of_ones_own_goes_all_the_way(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, out = tmp_path / "orbit.py", tmp_path / "run"
+    shutil.copy(EXAMPLE, file)
+    file.write_text(file.read_text().replace('register_task("orbit")', 'register_task("orbit_of_the_test")'))
+    reference = f"{file}:OrbitConfig"
+    assert run(["train", reference, "--out", str(out), "--task.circle", "0.7", *SMALL]) == 0
+    assert json.loads((out / "config.json").read_text())["task_name"] == reference
+    policy = e2efly.load_policy(out / "policy.onnx")
+    assert policy.contract.task == reference
+    assert policy.contract.observation[0].name == "position_error"
+    capsys.readouterr()
+    for what in (out, out / "policy.onnx"):
+        assert run(["eval", str(what), "--episodes", "20", "--plots", str(tmp_path / "plots")]) == 0
+        assert "success" in capsys.readouterr().out
+    assert run(["train", "--resume", str(out)]) == 0
+    assert run(["validate", str(out), "--episodes", "2"]) == 2
+    assert "Orbit, which has no flight_goal for the runtime; accepted: hover, land" in capsys.readouterr().err
+    # a bad number of its own is named by its field's rule
+    assert run(["train", reference, "--out", str(tmp_path / "other"), "--task.circle", "-1", *SMALL]) == 2
+    assert "task.circle is -1.0; accepted: more than 0" in capsys.readouterr().err
+
+
+def test_a_run_whose_task_is_gone_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, out = tmp_path / "gone.py", tmp_path / "run"
+    shutil.copy(EXAMPLE, file)
+    file.write_text(file.read_text().replace('register_task("orbit")', 'register_task("orbit_that_goes")'))
+    config = e2efly.preset(f"{file}:OrbitConfig")
+    from e2efly.learn.rundir import RunDirectory
+
+    RunDirectory(out).create(config)
+    content = (out / "config.json").read_text()
+    (out / "config.json").write_text(content.replace("gone.py", "elsewhere.py"))
+    assert run(["train", "--resume", str(out)]) == 2
+    assert f"there is no file {tmp_path / 'elsewhere.py'}" in " ".join(capsys.readouterr().err.split())
+
+
+def test_the_python_face_takes_a_name_a_class_or_options() -> None:
+    options = load("e2efly.tasks.hover:HoverConfig")
+    by_name, by_class = e2efly.preset("hover", "bptt"), e2efly.preset(options, "bptt")
+    assert by_name == by_class
+    assert e2efly.preset(options(radius=0.2)).task.radius == 0.2
+    env = e2efly.make_env("hover", wind=1.0)
+    assert env.observation_size == 21
+    with pytest.raises(ValueError, match=r"env\.wind is -1.0; accepted: 0 or more"):
+        e2efly.make_env("hover", wind=-1.0)
