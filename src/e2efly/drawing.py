@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
 INK, ORANGE = "#222222", "#E69F00"
 """Colours of what a task has in space: of Okabe and Ito's palette."""
 
-Points = Float[np.ndarray, "m 3"]
+Points = np.ndarray
+"""(m, 3)."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Face:
 class Mark:
     """A point with a Matplotlib marker or, where `text` is given, a word."""
 
-    point: Float[np.ndarray, "3"]
+    point: np.ndarray
     marker: str = ""
     text: str = ""
     label: str = ""
@@ -43,7 +43,7 @@ class Mark:
 Thing = Line | Face | Mark
 
 
-def circle(centre: Float[np.ndarray, "3"], radius: float) -> Points:
+def circle(centre: np.ndarray, radius: float) -> Points:
     """A level circle."""
     angle = np.linspace(0, 2 * np.pi, 49)
     return centre + radius * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=-1)
