@@ -14,10 +14,8 @@ from e2efly.config import (
     AlgorithmConfig,
     BPTTConfig,
     EnvConfig,
-    FOPPOConfig,
     PPOConfig,
     RewardConfig,
-    SHACConfig,
     TaskConfig,
     TrainConfig,
 )
@@ -109,15 +107,6 @@ def algorithm_name(config: AlgorithmConfig) -> str:
     return next(name for name, known in ALGORITHMS.items() if type(known) is type(config))
 
 
-_ANY, _SHARE = (0.0, math.inf), (0.0, 1.0)
-_BOUNDS: dict[str, tuple[float, float]] = {
-    "gradient_decay": _ANY, "gae_lambda": _SHARE, "td_lambda": _SHARE, "clip": _ANY, "value_weight": _ANY,
-    "entropy_weight": _ANY, "log_std": (-10.0, 2.0), "critic_rate": _ANY, "exact_rate": _ANY, "target_share": _SHARE,
-    "noise": _ANY, "fresh_share": _SHARE, "at_once": _SHARE, "average": (0.0, 0.9999),
-}  # fmt: skip
-"""Of options of algorithms, smallest and largest."""
-
-
 def check(config: TrainConfig) -> None:
     """Check the numbers of a run.
 
@@ -127,35 +116,10 @@ def check(config: TrainConfig) -> None:
     for name, value in _whole_numbers("", config):
         if abs(value) >= (10**300 if name == "steps" else 2**53):  # of steps, the time is told
             raise ValueError(f"{name} is {value}; accepted: whole numbers below 2^53")
-    algo = config.algo
-    positive = {
-        "steps": config.steps, "chunk": config.chunk, "eval_episodes": config.eval_episodes,
-        "algo.envs": algo.envs, "algo.horizon": algo.horizon, "algo.learning_rate": algo.learning_rate,
-        "algo.learning_rate_end": algo.learning_rate_end, "algo.max_grad_norm": algo.max_grad_norm,
-    }  # fmt: skip
-    if isinstance(algo, PPOConfig | SHACConfig | FOPPOConfig):
-        positive |= {"algo.epochs": algo.epochs, "algo.minibatch": algo.minibatch}
-    if isinstance(algo, ABPTConfig):
-        positive |= {"algo.collect": algo.collect, "algo.fits": algo.fits, "algo.minibatch": algo.minibatch}
-        for name, value, of in (
-            ("buffer", algo.buffer, algo.envs * algo.collect), ("places", algo.places, algo.envs)
-        ):  # fmt: skip
-            if value < 1 or of < 1 or value % of:
-                raise ValueError(f"algo.{name} is {value}; accepted: a positive multiple of {of}, what an update adds")
-    for name, value in positive.items():
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} is {value}; accepted: more than 0")
-    for name, (low, high) in {**_BOUNDS, "horizon_start": (0, algo.horizon)}.items():
-        value = getattr(algo, name, None)
-        if value is not None and not (math.isfinite(value) and low <= value <= high):
-            accepted = f"{low:g} to {high:g}" if math.isfinite(high) else f"{low:g} or more"
-            raise ValueError(f"algo.{name} is {value}; accepted: {accepted}")
-    if not 0 < algo.gamma <= 1:
-        raise ValueError(f"algo.gamma is {algo.gamma}; accepted: above 0, at most 1")
-    if isinstance(algo, PPOConfig | SHACConfig | FOPPOConfig) and algo.steps % algo.minibatch:
-        raise ValueError(
-            f"algo.minibatch is {algo.minibatch}; accepted: a divisor of algo.envs * algo.horizon ({algo.steps})"
-        )
+    for name in ("steps", "chunk", "eval_episodes"):
+        if getattr(config, name) <= 0:
+            raise ValueError(f"{name} is {getattr(config, name)}; accepted: more than 0")
+    config.algo.check()
     if not config.network.hidden or min(config.network.hidden) <= 0:
         raise ValueError(f"network.hidden is {config.network.hidden}; accepted: one or more positive sizes")
     judged = getattr(config.task, "judged_s", 0.0)

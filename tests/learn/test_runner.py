@@ -284,7 +284,12 @@ def test_bad_numbers_are_named(change: dict[str, Any], message: str) -> None:
         ("shac", "target_share", 7.0, "0 to 1"),
         ("shac", "noise", -1.0, "0 or more"),
         ("abpt", "fresh_share", 1.5, "0 to 1"),
-        ("foppo", "exact_rate", math.inf, "0 or more"),
+        ("foppo", "exact_rate", math.inf, "finite numbers"),
+        ("ppo", "gamma", 1.1, "above 0, at most 1"),
+        ("ppo", "gamma", 0.0, "above 0, at most 1"),
+        ("ppo", "learning_rate", 0.0, "more than 0"),
+        ("ppo", "minibatch", 511, r"a divisor of algo.envs \* algo.horizon \(4096\)"),
+        ("abpt", "places", 100, "a positive multiple of 64, what an update adds"),
     ],
 )
 def test_bad_options_of_algorithms_are_named(algo: str, option: str, value: float, accepted: str) -> None:

@@ -1,23 +1,39 @@
 """Options of the learning algorithms."""
 
+import math
 from dataclasses import dataclass
+
+from e2efly.config.numbers import check_numbers, number
 
 
 @dataclass(frozen=True)
 class _Batch:
     """What every algorithm has."""
 
-    envs: int = 64
+    envs: int = number(64, above=0)
     """Environments side by side (sets shapes)."""
-    horizon: int = 64
+    horizon: int = number(64, above=0)
     """Steps of each environment between updates: a rollout, a window (sets shapes)."""
-    max_grad_norm: float = 0.5
+    max_grad_norm: float = number(0.5, above=0)
     """Norm to which a gradient is clipped."""
 
     @property
     def steps(self) -> int:
         """Environment steps of an update."""
         return self.envs * self.horizon
+
+    def check(self) -> None:
+        """Check the numbers, each by itself and together.
+
+        Raises:
+            ValueError: naming the field, the value and what is accepted.
+        """
+        check_numbers("algo", self)
+
+
+def _check_minibatch(steps: int, minibatch: int) -> None:
+    if steps % minibatch:
+        raise ValueError(f"algo.minibatch is {minibatch}; accepted: a divisor of algo.envs * algo.horizon ({steps})")
 
 
 @dataclass(frozen=True)
@@ -27,25 +43,31 @@ class _FirstOrder(_Batch):
     gradient_decay: float = 0.0
     """Decay of the gradient from step to step through the vehicle's state, 1/s of backward time; what goes through the
     policy's observation of it does not decay. 0: the exact gradient."""
-    horizon_start: int = 0
+    horizon_start: int = number(0, low=-math.inf)
     """Steps, of the horizon, after which the gradient is cut at first; they grow over the run. 0: never cut."""
     term_gradients: bool = False
     """Whether to log the norm of the gradient of each term of the reward; an update takes as many times as long."""
+
+    def check(self) -> None:
+        """See `_Batch.check`."""
+        super().check()
+        if not 0 <= self.horizon_start <= self.horizon:
+            raise ValueError(f"algo.horizon_start is {self.horizon_start}; accepted: 0 to {self.horizon}")
 
 
 @dataclass(frozen=True)
 class _Proximal(_Batch):
     """What proximal policy optimisation and what builds on it have."""
 
-    epochs: int = 2
+    epochs: int = number(2, above=0)
     """Passes over the samples of an update (sets shapes)."""
-    minibatch: int = 512
+    minibatch: int = number(512, above=0)
     """Samples of a gradient step; divides envs * horizon (sets shapes)."""
-    learning_rate: float = 3e-3
+    learning_rate: float = number(3e-3, above=0)
     """Adam's step at the start."""
-    learning_rate_end: float = 3e-4
+    learning_rate_end: float = number(3e-4, above=0)
     """Adam's step at the end; exponential in between."""
-    gae_lambda: float = 0.95
+    gae_lambda: float = number(0.95, high=1)
     """Lambda of the generalised advantage estimate."""
     clip: float = 0.2
     """Clip of the probability ratio."""
@@ -53,15 +75,20 @@ class _Proximal(_Batch):
     """Weight of the critic's loss."""
     entropy_weight: float = 0.0
     """Weight of the entropy bonus."""
-    log_std: float = -1.0
+    log_std: float = number(-1.0, low=-10, high=2)
     """Initial log standard deviation of the action noise."""
+
+    def check(self) -> None:
+        """See `_Batch.check`."""
+        super().check()
+        _check_minibatch(self.steps, self.minibatch)
 
 
 @dataclass(frozen=True)
 class PPOConfig(_Proximal):
     """Proximal policy optimisation (Schulman et al. 2017)."""
 
-    gamma: float = 0.96
+    gamma: float = number(0.96, above=0, high=1)
     """Discount a step."""
 
 
@@ -69,13 +96,13 @@ class PPOConfig(_Proximal):
 class BPTTConfig(_FirstOrder):
     """Back-propagation through time: the exact gradient of the return through physics and policy."""
 
-    learning_rate: float = 4e-3
+    learning_rate: float = number(4e-3, above=0)
     """Adam's step at the start."""
-    learning_rate_end: float = 1e-4
+    learning_rate_end: float = number(1e-4, above=0)
     """Adam's step at the end; exponential in between."""
-    gamma: float = 0.99
+    gamma: float = number(0.99, above=0, high=1)
     """Discount a step within the window."""
-    average: float | None = None
+    average: float | None = number(None, high=0.9999)
     """Share of the old in a running mean of the policy, an update, at most; as long as there are few, their plain mean.
     The mean is judged and shipped. None: the policy itself (sets the program)."""
 
@@ -84,26 +111,31 @@ class BPTTConfig(_FirstOrder):
 class SHACConfig(_FirstOrder):
     """Short-horizon actor-critic (Xu et al. 2022): the exact gradient over a window, and a critic's beyond it."""
 
-    horizon: int = 32
+    horizon: int = number(32, above=0)
     """Steps of a window (sets shapes)."""
-    epochs: int = 4
+    epochs: int = number(4, above=0)
     """Passes of the critic over the samples of a window (sets shapes)."""
-    minibatch: int = 512
+    minibatch: int = number(512, above=0)
     """Samples of a gradient step of the critic; divides envs * horizon (sets shapes)."""
-    learning_rate: float = 4e-3
+    learning_rate: float = number(4e-3, above=0)
     """Adam's step at the start."""
-    learning_rate_end: float = 1e-4
+    learning_rate_end: float = number(1e-4, above=0)
     """Adam's step at the end; exponential in between."""
     critic_rate: float = 0.5
     """The critic's step over the policy's."""
-    gamma: float = 0.98
+    gamma: float = number(0.98, above=0, high=1)
     """Discount a step."""
-    td_lambda: float = 0.95
+    td_lambda: float = number(0.95, high=1)
     """Lambda of the returns that the critic learns."""
-    target_share: float = 0.2
+    target_share: float = number(0.2, high=1)
     """How far the critic's slow copy follows it, an update."""
     noise: float = 0.0
     """Standard deviation of the noise on the action."""
+
+    def check(self) -> None:
+        """See `_Batch.check`."""
+        super().check()
+        _check_minibatch(self.steps, self.minibatch)
 
 
 @dataclass(frozen=True)
@@ -112,35 +144,35 @@ class ABPTConfig(_FirstOrder):
     learn from a replay buffer.
     """
 
-    horizon: int = 32
+    horizon: int = number(32, above=0)
     """Steps of a window (sets shapes)."""
-    collect: int = 8
+    collect: int = number(8, above=0)
     """Steps of each environment into the replay buffer, an update (sets shapes)."""
     buffer: int = 65_536
     """Transitions in the replay buffer, a multiple of envs * collect (sets shapes)."""
     places: int = 1024
     """Visited states that windows may begin at, a multiple of envs (sets shapes)."""
-    minibatch: int = 1024
+    minibatch: int = number(1024, above=0)
     """Samples of a gradient step of the critics (sets shapes)."""
-    fits: int = 8
+    fits: int = number(8, above=0)
     """Gradient steps of the critics, an update (sets shapes)."""
-    learning_rate: float = 4e-3
+    learning_rate: float = number(4e-3, above=0)
     """Adam's step at the start."""
-    learning_rate_end: float = 1e-4
+    learning_rate_end: float = number(1e-4, above=0)
     """Adam's step at the end; exponential in between."""
     critic_rate: float = 0.5
     """The critics' step over the policy's."""
-    gamma: float = 0.98
+    gamma: float = number(0.98, above=0, high=1)
     """Discount a step."""
-    target_share: float = 0.02
+    target_share: float = number(0.02, high=1)
     """How far the critics' slow copies follow them, a gradient step."""
-    fresh_share: float = 0.5
+    fresh_share: float = number(0.5, high=1)
     """Share of the windows that begin at a new start; the others begin at visited states."""
-    at_once: float = 0.5
+    at_once: float = number(0.5, high=1)
     """Weight of the critics' value of a window's first action; the window's own return has the rest."""
     entropy_weight: float = 1e-3
     """Weight of the entropy bonus."""
-    log_std: float = -2.0
+    log_std: float = number(-2.0, low=-10, high=2)
     """Initial log standard deviation of the action noise."""
 
     @property
@@ -148,18 +180,25 @@ class ABPTConfig(_FirstOrder):
         """Environment steps of an update."""
         return self.envs * (self.collect + self.horizon)
 
+    def check(self) -> None:
+        """See `_Batch.check`."""
+        super().check()
+        for name, value, of in (("buffer", self.buffer, self.envs * self.collect), ("places", self.places, self.envs)):
+            if value < 1 or value % of:
+                raise ValueError(f"algo.{name} is {value}; accepted: a positive multiple of {of}, what an update adds")
+
 
 @dataclass(frozen=True)
 class FOPPOConfig(_Proximal, _FirstOrder):
     """PPO refined by first-order gradients: epochs over a rollout, then a step along its exact gradient. Ours."""
 
-    horizon: int = 32
+    horizon: int = number(32, above=0)
     """Steps of a rollout, which is the window of the exact gradient (sets shapes)."""
-    log_std: float = -1.5
+    log_std: float = number(-1.5, low=-10, high=2)
     """Initial log standard deviation of the action noise."""
     exact_rate: float = 3.0
     """The step along the exact gradient over that of the epochs."""
-    gamma: float = 0.98
+    gamma: float = number(0.98, above=0, high=1)
     """Discount a step."""
 
 

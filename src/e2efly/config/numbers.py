@@ -17,16 +17,27 @@ class Rule:
     """At least this ..."""
     above: float | None = None
     """... and, where this is given, more than it."""
+    high: float = math.inf
+    """At most this."""
     rising: bool = False
     """Two numbers, the smaller one first."""
     endless: bool = False
     """Infinity is accepted, too."""
+
+    @property
+    def _between(self) -> str:
+        most = f"{self.high:g}"
+        return f"{self.low:g} to {most}" if self.above is None else f"above {self.above:g}, at most {most}"
 
     def problem(self, value: Any) -> str | None:
         """What is accepted in place of a value; None: it is accepted."""
         numbers = value if isinstance(value, tuple) else (value,)
         if any(isinstance(x, bool) or not isinstance(x, int | float) for x in numbers):
             return None
+        if math.isfinite(self.high):
+            least = self.low if self.above is None else self.above
+            within = all(least <= x <= self.high and x != self.above for x in numbers)  # false for NaN
+            return None if within else self._between
         if not all(map(math.isfinite, numbers)) and not (self.endless and value == math.inf):
             return "finite numbers"
         if self.above is not None and min(numbers) <= self.above:
@@ -43,7 +54,13 @@ NOT_NEGATIVE = Rule()
 
 
 def number(
-    default: Any, *, low: float = 0.0, above: float | None = None, rising: bool = False, endless: bool = False
+    default: Any,
+    *,
+    low: float = 0.0,
+    above: float | None = None,
+    high: float = math.inf,
+    rising: bool = False,
+    endless: bool = False,
 ) -> Any:
     """A field of one number or several, with its default and what else than numbers of at least 0 is accepted.
 
@@ -51,10 +68,11 @@ def number(
         default: of the field.
         low: at least this; -inf for places, angles and rates.
         above: more than this.
+        high: at most this.
         rising: two numbers, the smaller one first.
         endless: infinity is accepted, too.
     """
-    return dataclasses.field(default=default, metadata={RULE: Rule(low, above, rising, endless)})
+    return dataclasses.field(default=default, metadata={RULE: Rule(low, above, high, rising, endless)})
 
 
 def shape(default: Any) -> Any:
