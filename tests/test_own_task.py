@@ -1,13 +1,17 @@
 """A task from a file outside of the package: trained, evaluated, resumed, refused when its file is gone."""
 
+import dataclasses
 import json
 import shutil
 from pathlib import Path
 
+import jax
+import jax.numpy as jnp
 import pytest
 
 import e2efly
 from e2efly.cli import run
+from e2efly.config import RewardConfig
 from e2efly.registry import load
 from e2efly.tasks import TASKS
 
@@ -66,3 +70,33 @@ def test_the_python_face_takes_a_name_a_class_or_options() -> None:
     assert env.observation_size == 21
     with pytest.raises(ValueError, match=r"env\.wind is -1.0; accepted: 0 or more"):
         e2efly.make_env("hover", wind=-1.0)
+
+
+def test_a_reward_term_of_ones_own_is_learned_by_and_never_from_an_old_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    from e2efly import rewards
+    from e2efly.env import Env
+    from e2efly.learn.programs import traced_folder
+
+    monkeypatch.setattr(rewards.TERMS, "_known", dict(rewards.TERMS._known))
+
+    @e2efly.register_reward("differentiable")
+    def low(height: jax.Array, steepness: float = 2.0) -> jax.Array:
+        """Minus the height over the goal, m."""
+        return -steepness * height
+
+    config = e2efly.preset("hover", "ppo")
+    mine = dataclasses.replace(config, reward=RewardConfig({"near": 1.0, "low": 0.5}, {"steepness": 3.0}))
+    assert traced_folder(config) is not None
+    assert traced_folder(mine) is None
+    env = Env.of(mine.task, mine.reward, mine.env)
+    state, _ = env.reset(jax.random.key(0), 4)
+    _, out = env.step(state, jnp.broadcast_to(env.hover, (4, 4)))
+    assert set(out.terms) == {"near", "low"}
+    with pytest.raises(ValueError, match=r"'near' of .*<locals>.near is also the name of e2efly.rewards:near"):
+
+        @e2efly.register_reward("differentiable")
+        def near(offset: jax.Array) -> jax.Array:
+            return offset[..., 0]
+
+    with pytest.raises(ValueError, match="kind of a reward term is 'smooth'; accepted: differentiable, partly, sparse"):
+        e2efly.register_reward("smooth")  # type: ignore[arg-type]

@@ -13,10 +13,20 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from e2efly.api import list_tasks, make_env, preset, train
     from e2efly.deploy.policy import load_policy
+    from e2efly.rewards import register as register_reward
     from e2efly.tasks import register as register_task
     from e2efly.vehicles import load_vehicle
 
-__all__ = ["list_tasks", "load_policy", "load_vehicle", "make_env", "preset", "register_task", "train"]
+__all__ = [
+    "list_tasks",
+    "load_policy",
+    "load_vehicle",
+    "make_env",
+    "preset",
+    "register_reward",
+    "register_task",
+    "train",
+]
 
 __version__ = "0.1.0"
 
@@ -37,7 +47,8 @@ if _too_late:  # ONNX Runtime reads its variable once, while it is imported
 
 _FACE = {
     "list_tasks": "e2efly.api", "load_policy": "e2efly.deploy.policy", "load_vehicle": "e2efly.vehicles",
-    "make_env": "e2efly.api", "preset": "e2efly.api", "register_task": "e2efly.tasks:register", "train": "e2efly.api",
+    "make_env": "e2efly.api", "preset": "e2efly.api", "register_reward": "e2efly.rewards:register",
+    "register_task": "e2efly.tasks:register", "train": "e2efly.api",
 }  # fmt: skip
 
 

@@ -46,6 +46,10 @@ class Registry(Generic[T], Mapping[str, T]):
             raise ValueError(
                 f"{self.kind} {name!r} of {origin(thing)} is also the name of {origin(known)}; accepted: another name"
             )
+        return self.put(name, thing)
+
+    def put(self, name: str, thing: T) -> T:
+        """Register something in place of what had its name."""
         self._known[name] = thing
         return thing
 

@@ -12,15 +12,17 @@ docstring says what we do; docs/rewards.md has the table.
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from e2efly.control.vectors import safe_sqrt
+from e2efly.registry import Registry, origin
 from e2efly.vehicles.names import unknown
 
+F = TypeVar("F", bound=Callable[..., Array])
 Scalar = Float[Array, "*n"]
 Vector = Float[Array, "*n 3"]
 
@@ -274,13 +276,43 @@ _KINDS: dict[Kind, tuple[Callable[..., Array], ...]] = {
     "partly": (ori2, ori4, vz, avoid1, avoid2, avoid, descent, fit),
     "sparse": (goal, crash),
 }  # fmt: skip
-TERMS: dict[str, Term] = {
-    function.__name__: Term(function, kind) for kind, functions in _KINDS.items() for function in functions
-}
+TERMS: Registry[Term] = Registry("reward term")
 """Every term by name."""
 
-PARAMETERS: frozenset[str] = frozenset(name for term in TERMS.values() for name in term.parameters)
-"""Constants of all terms."""
+
+def register(kind: Kind) -> Callable[[F], F]:
+    """Register a term under its function's name.
+
+    Args:
+        kind: `differentiable`, `partly` or `sparse`; see the head of this module.
+
+    Raises:
+        ValueError: for another kind, or a name that another function has.
+    """
+    if kind not in _KINDS:
+        raise ValueError(f"kind of a reward term is {kind!r}; accepted: {', '.join(_KINDS)}")
+
+    def registered(function: F) -> F:
+        known = TERMS.get(function.__name__)
+        if known is not None and origin(known.function) != origin(function):
+            raise ValueError(
+                f"reward term {function.__name__!r} of {origin(function)} is also the name of "
+                f"{origin(known.function)}; accepted: another name"
+            )
+        TERMS.put(function.__name__, Term(function, kind))
+        return function
+
+    return registered
+
+
+for _kind, _functions in _KINDS.items():
+    for _function in _functions:
+        register(_kind)(_function)
+
+
+def constants() -> set[str]:
+    """Constants of all terms."""
+    return {name for term in TERMS.values() for name in term.parameters}
 
 
 def check(weights: Mapping[str, float], parameters: Mapping[str, float]) -> None:
@@ -293,8 +325,8 @@ def check(weights: Mapping[str, float], parameters: Mapping[str, float]) -> None
         if name not in TERMS:
             raise ValueError(unknown("reward term", name, TERMS))
     for name in parameters:
-        if name not in PARAMETERS:
-            raise ValueError(unknown("reward parameter", name, PARAMETERS))
+        if name not in (known := constants()):
+            raise ValueError(unknown("reward parameter", name, known))
 
 
 def reward(

@@ -32,6 +32,7 @@ from e2efly.learn.devices import AXIS, OWN, SAME, on_each, own, shardings, stack
 from e2efly.learn.networks import Actor, Weights
 from e2efly.learn.setup import Setup
 from e2efly.registry import is_shipped
+from e2efly.rewards import TERMS
 from e2efly.storage import write_atomically
 
 FAST_COMPILE: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
@@ -87,7 +88,8 @@ class Programs:
 
 def traced_folder(config: TrainConfig) -> Path | None:
     """Where traced programs of a configuration are kept; None: they hold code that is not the package's."""
-    return cache_folder() / "traced" if is_shipped(type(config.task)) else None
+    terms = (TERMS[name].function for name in config.reward.weights if name in TERMS)
+    return cache_folder() / "traced" if all(map(is_shipped, (type(config.task), *terms))) else None
 
 
 def start_program(setup: Setup) -> Any:
