@@ -122,9 +122,6 @@ def check(config: TrainConfig) -> None:
     config.algo.check()
     if not config.network.hidden or min(config.network.hidden) <= 0:
         raise ValueError(f"network.hidden is {config.network.hidden}; accepted: one or more positive sizes")
-    judged = getattr(config.task, "judged_s", 0.0)
-    if not (math.isfinite(judged) and judged >= 0):
-        raise ValueError(f"task.judged_s is {judged}; accepted: 0 or more")
     if not 0 <= config.seed < 2**32:
         raise ValueError(f"seed is {config.seed}; accepted: 0 to 2^32 - 1")
     if config.stop_at is not None and not 0 < config.stop_at <= 1:

@@ -20,8 +20,9 @@ T = TypeVar("T")
 class Registry(Generic[T], Mapping[str, T]):
     """Things of one kind by name, in the order in which they were registered."""
 
-    def __init__(self, kind: str) -> None:
+    def __init__(self, kind: str, source: Callable[[T], Any] = lambda thing: thing) -> None:
         self.kind = kind
+        self._source = source  # what of a thing tells where it is from
         self._known: dict[str, T] = {}
 
     def __getitem__(self, name: str) -> T:
@@ -41,15 +42,9 @@ class Registry(Generic[T], Mapping[str, T]):
         """
         if not name.isidentifier():
             raise ValueError(f"{self.kind} {name!r} of {origin(thing)}; accepted: a name of letters, digits and _")
-        known = self._known.get(name, thing)
-        if known is not thing and origin(known) != origin(thing):
-            raise ValueError(
-                f"{self.kind} {name!r} of {origin(thing)} is also the name of {origin(known)}; accepted: another name"
-            )
-        return self.put(name, thing)
-
-    def put(self, name: str, thing: T) -> T:
-        """Register something in place of what had its name."""
+        new, known = (origin(self._source(t)) for t in (thing, self._known.get(name, thing)))
+        if known != new:
+            raise ValueError(f"{self.kind} {name!r} of {new} is also the name of {known}; accepted: another name")
         self._known[name] = thing
         return thing
 

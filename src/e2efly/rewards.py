@@ -19,7 +19,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from e2efly.control.vectors import safe_sqrt
-from e2efly.registry import Registry, origin
+from e2efly.registry import Registry
 from e2efly.vehicles.names import unknown
 
 F = TypeVar("F", bound=Callable[..., Array])
@@ -276,7 +276,7 @@ _KINDS: dict[Kind, tuple[Callable[..., Array], ...]] = {
     "partly": (ori2, ori4, vz, avoid1, avoid2, avoid, descent, fit),
     "sparse": (goal, crash),
 }  # fmt: skip
-TERMS: Registry[Term] = Registry("reward term")
+TERMS: Registry[Term] = Registry("reward term", source=lambda term: term.function)
 """Every term by name."""
 
 
@@ -293,13 +293,7 @@ def register(kind: Kind) -> Callable[[F], F]:
         raise ValueError(f"kind of a reward term is {kind!r}; accepted: {', '.join(_KINDS)}")
 
     def registered(function: F) -> F:
-        known = TERMS.get(function.__name__)
-        if known is not None and origin(known.function) != origin(function):
-            raise ValueError(
-                f"reward term {function.__name__!r} of {origin(function)} is also the name of "
-                f"{origin(known.function)}; accepted: another name"
-            )
-        TERMS.put(function.__name__, Term(function, kind))
+        TERMS.add(function.__name__, Term(function, kind))
         return function
 
     return registered
