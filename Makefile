@@ -16,13 +16,13 @@ demo: $(READY)
 	@echo "flew it from 1000 starts that it never saw, and wrote plots and policy.onnx, the file that flies."
 	@echo "What to look at:   runs/demo/plots/*.png   runs/demo/summary.json   tensorboard --logdir runs/demo/events"
 	@echo "What to try next:  $(BIN)/e2efly train race            (fly a lap through four gates)"
-	@echo "                   $(BIN)/e2efly train land --algo bptt (exact gradients through the physics)"
+	@echo "                   $(BIN)/e2efly eval runs/demo --stress (other masses, thrusts, delays, winds)"
 	@echo "                   $(BIN)/e2efly list                   (tasks, vehicles, tracks, reward terms)"
 
 # The tests that fly it build it, too, but one after another; here it is built beside the linting.
 FIRMWARE := case ",$$E2EFLY_WITHOUT," in *,sitl,*) ;; *) $(BIN)/e2efly firmware >/dev/null 2>&1;; esac
 # What runs in real time, in several processes, has both cores to itself.
-REAL_TIME := tests/validate/test_process_faults_sitl.py
+REAL_TIME := tests/validation/test_process_faults_sitl.py
 
 test: $(TEST_READY)
 	@$(FIRMWARE) & $(MAKE) --no-print-directory lint && wait

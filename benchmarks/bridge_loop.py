@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 from common import arguments, table, write
 from fault_table import hover_policy
+from tests.faults.process_faults import BridgeProcess, RigClient, take_off
 
-from e2efly.deploy.flight_log import read_log
 from e2efly.deploy.flight_loop import LOOP_PRIORITY
+from e2efly.deploy.log.flight_log import read_log
 from e2efly.deploy.settings import FlightSettings
-from e2efly.validate.process_faults import BridgeProcess, RigClient, take_off
 
 TARGET = (0.0, 0.0, 2.0)
 BARE_S = 30.0

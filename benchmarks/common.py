@@ -6,13 +6,17 @@ import math
 import os
 import platform
 import statistics
+import sys
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from e2efly.commands.tables import markdown
+from e2efly.device import processor
 from e2efly.storage import write_json
+from e2efly.terminal import markdown
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # the fault laboratory is the tests'
 
 RESULTS = Path(__file__).parent / "results"
 """Where the published figures are kept."""
@@ -20,13 +24,9 @@ RESULTS = Path(__file__).parent / "results"
 
 def machine() -> dict[str, Any]:
     """What the figures were measured on."""
-    model = platform.processor()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        names = [line.split(":", 1)[1].strip() for line in cpuinfo.read_text().splitlines() if "model name" in line]
-        model = names[0] if names else model
+    model, avx512 = processor()
     packages = {name: metadata.version(name) for name in ("e2efly", "jax", "jaxlib", "numpy")}
-    return {"cpu": model, "cores": os.cpu_count(), "python": platform.python_version(), **packages}
+    return {"cpu": model, "avx512": avx512, "cores": os.cpu_count(), "python": platform.python_version(), **packages}
 
 
 def arguments(about: str, **extra: Any) -> argparse.Namespace:

@@ -22,14 +22,13 @@ from pathlib import Path
 from typing import Any
 
 from common import table, write
+from tests.faults.campaign import Scenario, fly
+from tests.faults.scenarios import CASES, drawn
 
 import e2efly
-from e2efly.deploy.policy import load_policy
-from e2efly.validate import firmware
-from e2efly.validate.campaign import Scenario, fly
-from e2efly.validate.scenarios import CASES, drawn
+from e2efly.deploy.policy.loader import load_policy
+from e2efly.validation import firmware
 from e2efly.vehicles import load_vehicle
-from e2efly.zoo import policy_path
 
 KEPT = Path(tempfile.gettempdir()) / "e2efly-fault-campaign"
 
@@ -37,7 +36,7 @@ KEPT = Path(tempfile.gettempdir()) / "e2efly-fault-campaign"
 def flown(scenario: Scenario) -> dict[str, Any]:
     """One flight, and how long it took; one that cannot be brought to its faults says why."""
     began = time.perf_counter()
-    policy, vehicle = load_policy(policy_path(Path("hover"))), load_vehicle("vis_r")
+    policy, vehicle = load_policy("hover"), load_vehicle("vis_r")
     with tempfile.TemporaryDirectory() as folder:
         try:
             outcome = asdict(fly(scenario, policy, vehicle, firmware.chosen(), Path(folder)))

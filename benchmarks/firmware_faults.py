@@ -12,21 +12,22 @@ from typing import Any
 
 from common import arguments
 from fault_table import run
+from tests.faults.fault_run import strike
+from tests.faults.faults import FAULTS
+from tests.faults.stage import LATENCY_S, TARGET, Stage
 
-from e2efly.deploy.goal_options import GoalOptions, goal_for
-from e2efly.deploy.policy import load_policy
-from e2efly.validate import firmware
-from e2efly.validate.fault_run import strike
-from e2efly.validate.faults import FAULTS
-from e2efly.validate.rig import Rig
-from e2efly.validate.stage import LATENCY_S, TARGET, Stage
+from e2efly.deploy.policy.loader import load_policy
+from e2efly.tasks.hover.goal import HoverRoute
+from e2efly.tasks.route import course_for
+from e2efly.validation import firmware
+from e2efly.validation.rig import Rig
 from e2efly.vehicles import load_vehicle
 
 
 def virtual(policy_file: Path, folder: Path, seed: int, only: list[str]) -> list[dict[str, Any]]:
     """Every fault once, in virtual time; a rig that a fault has left unfit is replaced."""
     policy, vehicle = load_policy(policy_file), load_vehicle("vis_r")
-    goal = goal_for(policy.contract, GoalOptions(target=TARGET), vehicle)
+    goal = course_for(policy.contract, vehicle, HoverRoute(target=TARGET))
     left = [fault for fault in FAULTS if not only or any(text in fault.name for text in only)]
     rows: list[dict[str, Any]] = []
     while left:

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import common
 
-from e2efly.deploy.msp.client import MESSAGES
-from e2efly.deploy.msp.codec import REPLY, Decoder, Frame, encode
+from e2efly.deploy.betaflight.client import MESSAGES
+from e2efly.deploy.betaflight.codec import REPLY, Decoder, Frame, encode
 
 GOLDEN = Path(__file__).parents[1] / "tests" / "data" / "msp_golden.json"
 

@@ -12,8 +12,7 @@ from typing import Any
 
 from common import arguments
 from fault_table import run
-
-from e2efly.validate.process_faults import FAULTS, strike
+from tests.faults.process_faults import FAULTS, strike
 
 
 def real(policy: Path, folder: Path, seed: int) -> list[dict[str, Any]]:

@@ -43,16 +43,16 @@ def flight(path: str, acts: int) -> dict[str, float]:
     began = time.perf_counter()
     import numpy as np
 
-    from e2efly.deploy.goal_options import GoalOptions, goal_for
     from e2efly.deploy.odometry import Odometry
-    from e2efly.deploy.policy import load_policy
-    from e2efly.deploy.runtime import Runtime, act, begin
+    from e2efly.deploy.policy.loader import load_policy
+    from e2efly.deploy.policy.runtime import Runtime, act, begin
+    from e2efly.tasks.route import course_for
     from e2efly.vehicles import load_vehicle
 
     imported = time.perf_counter()
     policy = load_policy(path)
     vehicle = load_vehicle(policy.contract.vehicle)
-    goal = goal_for(policy.contract, GoalOptions(), vehicle)
+    goal = course_for(policy.contract, vehicle)
     runtime = Runtime.of(policy, goal, vehicle)
     rng, level = np.random.default_rng(0), np.array([1.0, 0.0, 0.0, 0.0])
     above = np.array([0.0, 0.0, 3.0])

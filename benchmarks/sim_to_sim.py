@@ -6,7 +6,6 @@ python benchmarks/sim_to_sim.py [--tasks hover ...] [--plants mujoco simulator] 
 `--runs` names a folder of finished runs, FOLDER/TASK; left out, each task is trained anew (some 20 s).
 """
 
-import json
 import os
 import subprocess
 import sys
@@ -15,7 +14,7 @@ from pathlib import Path
 
 from common import arguments, table, write
 
-from e2efly.commands.validate import validate_command
+from e2efly.validation.validate import validate
 
 TASKS = ["hover", "land", "track", "race"]
 
@@ -23,13 +22,28 @@ TASKS = ["hover", "land", "track", "race"]
 def train(task: str, folder: Path) -> Path:
     """A run of the task's preset."""
     out = folder / task
-    command = [sys.executable, "-m", "e2efly", "train", task, "--out", str(out), "--no-plots", "--device", "cpu"]
+    command = [
+        sys.executable,
+        "-m",
+        "e2efly",
+        "train",
+        task,
+        "--algo",
+        "ppo",
+        "--preset",
+        "nominal",
+        "--out",
+        str(out),
+        "--no-plots",
+        "--device",
+        "cpu",
+    ]
     subprocess.run(command, env=os.environ, stdout=subprocess.DEVNULL, check=True)
     return out
 
 
 def _both(a: dict, b: dict, name: str) -> str:
-    return f"{100 * a['mean'][name]:.2f} / {100 * b['mean'][name]:.2f}"
+    return f"{100 * a[name]:.2f} / {100 * b[name]:.2f}"
 
 
 def main() -> None:
@@ -40,10 +54,9 @@ def main() -> None:
         for task in options.tasks:
             run = Path(options.runs) / task if options.runs else train(task, Path(folder))
             for plant in options.plants:
-                file = Path(folder) / "report.json"
-                out = Path(folder) / "plots"
-                failed |= bool(validate_command(run, plant, options.episodes, out, json=file, quiet=True))
-                report = json.loads(file.read_text())
+                found = validate(run, plant, options.episodes)
+                failed |= not found.passed
+                report = found.as_json()
                 for name, criterion in report["criteria"].items():
                     del criterion["starts"]
                     a, b = criterion["training"], criterion[plant]
@@ -54,8 +67,8 @@ def main() -> None:
                             "success in training's simulator": f"{100 * a['success']:.1f} %",
                             "on the plant": f"{100 * b['success']:.1f} %",
                             "drop, points": f"{criterion['drop']:.1f}",
-                            "final error, cm": _both(a, b, "final_error"),
-                            "mean error, cm": _both(a, b, "mean_error"),
+                            "final error, cm": _both(a, b, "final_error_m"),
+                            "mean error, cm": _both(a, b, "mean_error_m"),
                         }
                     )
                     print(rows[-1], flush=True)

@@ -6,7 +6,8 @@ Both step 64 vehicles with the rewards, features and starts of our PPO preset. S
 own defaults, and with what of our preset it has: rollout, minibatch, epochs, discount, learning rate, first noise,
 networks. The criterion is 99 % of 250 starts, and of 1000 others. Evaluations take time on both sides: ours after every
 20 updates, theirs after every rollout of the defaults, after every 8 of the short ones. `limit`: seconds after which a
-run is given up.
+run is given up. After the clock has stopped, what Stable-Baselines3 has learned is exported, evaluated and flown in
+MuJoCo.
 """
 
 import json
@@ -21,6 +22,7 @@ from typing import Any
 from common import arguments, median, table, write
 from time_to_criterion import run as ours
 
+import e2efly
 from e2efly.learn.clock import since_process_start
 
 GOAL = 0.99
@@ -28,7 +30,7 @@ KINDS = ["defaults", "our numbers"]
 
 
 def theirs(kind: str, seed: int, limit: float) -> dict[str, float]:
-    """Train in this process until the criterion; seconds and steps, NaN where it was not met."""
+    """Train in this process until the criterion: seconds, steps, success of the export; NaN if not met."""
     from e2efly.device import prepare
 
     prepare("cpu")
@@ -63,7 +65,11 @@ def theirs(kind: str, seed: int, limit: float) -> dict[str, float]:
     while since_process_start() < limit:
         model.learn(between, reset_num_timesteps=False)
         if success(1) >= GOAL and np.mean([success(2 + i) for i in range(4)]) >= GOAL:
-            return {"seconds": since_process_start(), "steps": float(model.num_timesteps)}
+            found = {"seconds": since_process_start(), "steps": float(model.num_timesteps)}
+            with tempfile.TemporaryDirectory() as folder:
+                path = e2efly.export(model, Path(folder) / "policy.onnx")
+                mujoco = e2efly.validate(path).criteria["hover"].flown
+                return found | {"eval": e2efly.evaluate(path).success, "mujoco": float(np.mean(mujoco.success))}
     return {"seconds": math.nan, "steps": math.nan}
 
 
@@ -99,6 +105,8 @@ def main() -> None:
             "seconds, every seed": " ".join(f"{r['seconds']:.1f}" for r in each),
             "million steps": f"{median([r['steps'] for r in each]) / 1e6:.2f}",
             "times ours, later": f"{median([r['seconds'] for r in each]) / usual:.1f}",
+            "success, exported": " ".join(f"{r['eval']:.1%}" for r in each if "eval" in r),
+            "success, MuJoCo": " ".join(f"{r['mujoco']:.1%}" for r in each if "mujoco" in r),
         }
         for name, each in found.items()
     ]

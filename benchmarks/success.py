@@ -1,4 +1,4 @@
-"""Success over 1000 unseen starts of the shipped policy of the full presets, for every task, algorithm and seed.
+"""Success over 1000 unseen starts of the shipped policy of the nominal presets, for every task, algorithm and seed.
 
 python benchmarks/success.py [--tasks hover ...] [--algos ppo bptt] [--seeds 5] [--json FILE]
 
@@ -22,8 +22,8 @@ def run(task: str, algo: str, seed: int) -> dict:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "run"
         command = [
-            sys.executable, "-m", "e2efly", "train", task, "--algo", algo, "--seed", str(seed), "--out", str(out),
-            "--no-plots", "--device", "cpu",
+            sys.executable, "-m", "e2efly", "train", task, "--algo", algo, "--preset", "nominal", "--seed", str(seed),
+            "--out", str(out), "--no-plots", "--device", "cpu",
         ]  # fmt: skip
         subprocess.run(command, env=os.environ, stdout=subprocess.DEVNULL, check=True)
         return json.loads((out / "summary.json").read_text())

@@ -26,7 +26,7 @@ import numpy as np  # noqa: E402
 
 from e2efly.config import ImageNoiseConfig  # noqa: E402
 from e2efly.env import Env, random_key  # noqa: E402
-from e2efly.evaluate import run_episodes, wilson  # noqa: E402
+from e2efly.episodes import run_episodes, wilson  # noqa: E402
 from e2efly.learn.programs import acting  # noqa: E402
 from e2efly.learn.rundir import RunDirectory  # noqa: E402
 from e2efly.learn.runner import load_policy_weights  # noqa: E402

@@ -1,12 +1,15 @@
-"""Train the policy zoo: the default preset of each task for each vehicle, kept as package data with its success.
+"""Train the policy zoo: the best preset of each task for each vehicle, kept as package data with its success.
 
     python benchmarks/zoo.py [--vehicles vis_r ...] [--tasks hover ...] [--seeds 3]
     python benchmarks/zoo.py --digests
+    python benchmarks/zoo.py --again
 
-The best of at most `seeds` runs by each algorithm is kept, if it succeeds more often than not; none more is made once
-one meets 99.5 %. What is best the runs' own reports say. The success that is stated is that of the ONNX file itself, of
-the 1000 starts of `e2efly eval`, which nothing was chosen by.
+The preset is `robust` where the task has it. The best of at most `seeds` runs by each algorithm is kept, if it succeeds
+more often than not; none more is made once one meets 99.5 %, or a robust one 97 % in its worst row of the stress. What
+is best the runs' own reports say, and of robust ones those rows, from starts of their own. The success that is stated
+is that of the lone ONNX file, of the 1000 starts of `e2efly eval` and `eval --stress`, which nothing was chosen by.
 
+`--again` trains nothing: it flies the robust policies that are there in all rows of the stress.
 `--digests` trains nothing: it gives the files that are there their digests, where they have none, and writes the digest
 of each file into zoo.json.
 """
@@ -23,7 +26,9 @@ from typing import Any
 
 from common import arguments, table
 
-from e2efly.deploy.onnx_file import is_sealed
+from e2efly.deploy.policy.onnx_file import is_sealed
+from e2efly.env.stress import ALL
+from e2efly.learn.judge import worst_success
 from e2efly.storage import write_json
 from e2efly.tasks import TASKS
 from e2efly.vehicles import vehicle_names
@@ -31,7 +36,9 @@ from e2efly.zoo import FOLDER, USUAL, contents
 
 BY_SIGHT = ("land_visual", "avoid", "race_clutter")
 """For the usual vehicle alone: what a camera sees depends little on who carries it, and they take minutes."""
-ENOUGH, WORTH = 0.995, 0.5
+ENOUGH, ENOUGH_STRESSED, WORTH = 0.995, 0.97, 0.5
+CHOSEN_BY = 2_000_000
+"""Seed of the starts that a robust policy is chosen by."""
 
 
 def run(*command: str) -> None:
@@ -41,23 +48,54 @@ def run(*command: str) -> None:
 
 def algorithms(task: str) -> tuple[str, ...]:
     """What is tried, in this order."""
-    return ("bptt", "foppo") if task in ("hover", "land", "track", "race") else (TASKS[task].best,)
+    return (TASKS[task].best,)
+
+
+def stressed(policy: Path, folder: Path, *options: str) -> dict[str, float]:
+    """Success of the worst criterion in each row of the stress."""
+    report = folder / "stress.json"
+    run("eval", str(policy), "--stress", "--json", str(report), "--plots", str(folder / "plots"), *options)
+    rows = json.loads(report.read_text())["stress"]
+    return {row: min(found["success"] for found in criteria.values()) for row, criteria in rows.items()}
 
 
 def trained(vehicle: str, task: str, algo: str, seed: int, folder: Path) -> tuple[float, dict[str, Any]]:
     """A run in `folder`: its worst success by its own report, and what there is to say of its policy."""
     out, report = folder / f"{algo}{seed}", folder / "report.json"
-    run("train", task, "--algo", algo, "--vehicle", vehicle, "--seed", str(seed), "--out", str(out), "--no-plots")
-    run("eval", str(out / "policy.onnx"), "--json", str(report), "--plots", str(folder / "plots"))
+    robust = TASKS[task].best in TASKS[task].robust
+    preset = ("--preset", "robust") if robust else ()
+    run(
+        "train",
+        task,
+        "--algo",
+        algo,
+        *preset,
+        "--vehicle",
+        vehicle,
+        "--seed",
+        str(seed),
+        "--out",
+        str(out),
+        "--no-plots",
+    )
+    lone = shutil.copy(out / "policy.onnx", folder / "lone.onnx")  # without its run: on the vehicle of its contract
+    run("eval", str(lone), "--json", str(report), "--plots", str(folder / "plots"))
     suites = json.loads(report.read_text())["criteria"]
     summary = json.loads((out / "summary.json").read_text())
-    reported = min(suite["success"] for name, suite in summary["shipped"].items() if name != "update")
+    reported = worst_success(summary["shipped"])
+    more: dict[str, Any] = {}
+    if robust:
+        rows = stressed(out / "policy.onnx", folder, "--episodes", "250", "--seed", str(CHOSEN_BY))
+        together = rows.pop(ALL)
+        reported = min(rows.values()) + 1e-3 * together  # among equals the one that stands all at once more often
+        more = {"preset": "robust", "stress": stressed(out / "policy.onnx", folder)}
     return reported, {
         "algorithm": algo,
         "seed": seed,
         "env_steps": summary["env_steps"],
         "version": summary["versions"]["e2efly"],
         "success": {name: suite["success"] for name, suite in suites.items()},
+        **more,
     }
 
 
@@ -71,12 +109,21 @@ def write(zoo: dict[str, dict[str, dict[str, Any]]]) -> None:
 
 def main() -> None:
     """Train, keep the policies and zoo.json, print a table."""
-    options = arguments(__doc__ or "", vehicles=vehicle_names(), tasks=list(TASKS), seeds=3, digests=False)
+    options = arguments(__doc__ or "", vehicles=vehicle_names(), tasks=list(TASKS), seeds=3, digests=False, again=False)
     if options.digests:
         for file in FOLDER.glob("*/*.onnx"):
             if not is_sealed(file.read_bytes()):
                 run("export", str(file))
         write(contents())
+        return
+    if options.again:
+        zoo = contents()
+        for vehicle, task in itertools.product(options.vehicles, options.tasks):
+            if "stress" in (about := zoo[vehicle].get(task, {})):
+                with tempfile.TemporaryDirectory() as folder:
+                    about["stress"] = stressed(FOLDER / vehicle / f"{task}.onnx", Path(folder))
+                print(vehicle, task, f"{about['stress'][ALL]:.3f} {ALL}", flush=True)
+        write(zoo)
         return
     rows = []
     for vehicle in options.vehicles:
@@ -89,9 +136,9 @@ def main() -> None:
                     reported, found = trained(vehicle, task, algo, seed, Path(folder))
                     if reported > highest:
                         highest, best = reported, found
-                    if highest >= ENOUGH:
+                    if highest >= (ENOUGH_STRESSED if algo in TASKS[task].robust else ENOUGH):
                         break
-                if highest < WORTH:
+                if min(best["success"].values()) < WORTH:
                     print(f"{vehicle} {task}: {best['success']}, not kept", flush=True)
                     continue
                 kept = FOLDER / vehicle / f"{task}.onnx"

@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from e2efly.commands.tables import markdown
+from e2efly.terminal import markdown
 
 DOCS = Path(__file__).parent
 RESULTS = DOCS.parent / "benchmarks" / "results"
@@ -22,6 +22,8 @@ TITLES = {
     "stable_baselines3_ppo": "Time to the hover criterion, Stable-Baselines3 on the same environment, at most 200 s",
     "success": "Success over 1000 unseen starts, full presets",
     "ablation": "The reward ablation, from process start, empty cache",
+    "robust": "The preset robust: seconds from process start, cold, and success under stress",
+    "zoo_stress": "The zoo under stress: vehicles, air and sensors that are not those of the training",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
     "firmware_faults": "Faults injected into flights of the real firmware",
@@ -38,11 +40,10 @@ def noise() -> None:
     import numpy as np
     from PIL import Image
 
-    from e2efly.commands.render import sized
     from e2efly.config import ImuConfig
     from e2efly.env import random_key
     from e2efly.scenes.camera import PRESETS
-    from e2efly.view.images import look_around
+    from e2efly.view.images import look_around, sized
     from e2efly.view.noise import plot_depth_noise, plot_image_noise, plot_imu
     from e2efly.view.places import find_place
 
@@ -96,7 +97,10 @@ def main() -> None:
         if path.exists():
             content = json.loads(path.read_text())
             m = content["machine"]
-            about = f"`benchmarks/{name}.py`, {content['date']}, {m['cores']} cores of {m['cpu']}, JAX {m['jax']}."
+            avx512 = {True: " with AVX-512", False: " without AVX-512"}.get(m.get("avx512"), "")
+            about = (
+                f"`benchmarks/{name}.py`, {content['date']}, {m['cores']} cores of {m['cpu']}{avx512}, JAX {m['jax']}."
+            )
             lines += [f"## {title}", "", about, "", *markdown(content["table"]), ""]
     (DOCS / "benchmarks.md").write_text("\n".join(lines))
     thrown()

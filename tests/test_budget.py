@@ -19,7 +19,10 @@ SMALL = presets.preset("hover", "ppo")
     ("arguments", "said"),
     [
         ("train hover --steps 1" + 30 * "0", "years, even at 100 million steps per second; accepted: what takes at mo"),
-        ("train hover --steps 10" + 12 * "0", "accepted: at most 8796093018112: int32 counts updates and samples"),
+        (
+            "train hover --algo ppo --preset nominal --steps 10" + 12 * "0",
+            "accepted: at most 8796093018112: int32 counts updates and samples",
+        ),
         ("train hover --algo.envs 1000000000000", "algo.envs is 1000000000000, algo.horizon 64, with 21 observed numb"),
         ("train hover --algo.horizon 1000000000000", "algo.envs is 64, algo.horizon 1000000000000, with 21 observed"),
         ("train hover --algo.epochs 1000000000000", "chunk 20, algo.epochs 1000000000000: about 805 years, even"),

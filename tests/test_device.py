@@ -8,7 +8,7 @@ import pytest
 from jax._src import compilation_cache
 
 from e2efly.compiled import check_programs
-from e2efly.device import programs_folder, unless_said, wide_vectors
+from e2efly.device import processor, programs_folder, unless_said, wide_vectors
 
 GRADIENT = """
 import dataclasses, resource
@@ -70,7 +70,7 @@ def test_a_damaged_compiled_program_is_told_of_and_compiled_anew(
 def test_a_cache_that_the_user_names_stays_in_jaxs_own_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compilation_cache, "get_file_cache", compilation_cache.get_file_cache)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    check_programs()
+    check_programs(programs_folder)
     for folder, checked in ((programs_folder(), True), (tmp_path / "shared", False)):
         cache, _ = compilation_cache.get_file_cache(str(folder))
         cache.put("key", b"program")
@@ -94,3 +94,10 @@ def test_what_the_user_says_of_other_options_stays(monkeypatch: pytest.MonkeyPat
     assert unless_said(options) == {"xla_cpu_use_fusion_emitters": False}
     monkeypatch.delenv("XLA_FLAGS")
     assert unless_said(options) == options
+
+
+def test_the_processor_and_whether_it_has_avx_512() -> None:
+    told = "processor : 0\nmodel name : A: B\nflags : fpu avx2{}\n"
+    assert processor(told.format(" avx512f avx512dq")) == ("A: B", True)
+    assert processor(told.format("")) == ("A: B", False)
+    assert processor("")[1] is None

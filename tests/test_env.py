@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from functools import partial
 from typing import Any
 
 import jax
@@ -9,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from e2efly import presets
 from e2efly.config import EnvConfig, ForestConfig, ImuConfig, NoiseConfig, RewardConfig, TaskConfig
 from e2efly.env import UNSEEN, Env, numbers_of, random_key
 from e2efly.env.environment import STARTS
@@ -96,15 +98,14 @@ def test_the_same_seed_gives_the_same_flight_and_another_one_another() -> None:
     assert not np.array_equal(fly(random_key(1)), fly(random_key(2)))
 
 
-def test_new_starts_under_a_full_mask_are_a_reset() -> None:
-    env = make(randomize={"mass": 0.1}, wind=1.0, observation_latency=(0.0, 0.05), imu=ImuConfig(observed=True))
+def test_a_new_start_is_a_reset() -> None:
+    options = {"wind": 1.0, "observation_latency": (0.0, 0.05), "imu": ImuConfig(observed=True)}
+    env = make(HoverConfig(episode_s=0.03, hold_s=0.0), randomize={"mass": 0.1}, **options)  # of one step
     state, _ = env.reset(random_key(0), 16)
-    state, out = jax.jit(env.advance)(state, jnp.zeros((16, 4)))
-    again, over = env.restart(state, dataclasses.replace(out, terminated=jnp.ones(16, bool)))
-    fresh, observation = env.reset(jax.random.fold_in(jax.random.fold_in(state.key, state.tick), STARTS), 16)
-    np.testing.assert_allclose(
-        over.observation, observation, rtol=2e-6, atol=1e-7
-    )  # compiled apart: rounding may differ
+    again, out = jax.jit(env.step)(state, jnp.zeros((16, 4)))
+    assert out.truncated.all()
+    fresh, observation = env.reset(jax.random.fold_in(jax.random.fold_in(again.key, again.tick), STARTS), 16)
+    np.testing.assert_allclose(out.observation, observation, rtol=2e-6, atol=1e-7)  # compiled apart: rounding differs
     for a, b in zip(jax.tree.leaves(again)[:-2], jax.tree.leaves(fresh)[:-2], strict=True):
         np.testing.assert_allclose(a, b, rtol=2e-6, atol=1e-7)
 
@@ -112,13 +113,27 @@ def test_new_starts_under_a_full_mask_are_a_reset() -> None:
 def test_only_ended_episodes_start_anew() -> None:
     env = make()
     state, _ = env.reset(random_key(0), 6)
-    state, out = jax.jit(env.advance)(state, jnp.zeros((6, 4)))
-    mask = jnp.arange(6) % 2 == 0
-    again, over = env.restart(state, dataclasses.replace(out, truncated=mask))
-    np.testing.assert_array_equal(again.time[1::2], state.time[1::2])
+    late = jnp.where(jnp.arange(6) % 2 == 0, env.task.episode_s - env.control_period, state.time)
+    state = dataclasses.replace(state, time=late)
+    again, out = jax.jit(env.step)(state, jnp.zeros((6, 4)))
+    on, _ = jax.jit(partial(env.step, restart=False))(state, jnp.zeros((6, 4)))
+    np.testing.assert_array_equal(again.time[1::2], on.time[1::2])
     np.testing.assert_array_equal(again.time[::2], 0)
-    np.testing.assert_array_equal(over.observation[1::2], out.final_observation[1::2])
-    assert not np.any(np.all(over.observation[::2] == out.final_observation[::2], axis=-1))
+    np.testing.assert_array_equal(out.observation[1::2], out.final_observation[1::2])
+    assert not np.any(np.all(out.observation[::2] == out.final_observation[::2], axis=-1))
+
+
+@pytest.mark.parametrize("name", ["hover", "land_visual"])
+def test_what_a_critic_knows_is_of_what_was_reached_before_new_starts(name: str) -> None:
+    env = make(TASKS[name].training(), cameras=presets.preset(name, "ppo").env.cameras)
+    state, _ = env.reset(random_key(0), 3)
+    state = dataclasses.replace(state, time=jnp.full(3, env.task.episode_s - env.control_period))
+    _, out = jax.jit(partial(env.step, privileged=True))(state, jnp.zeros((3, 4)))
+    reached, without = jax.jit(partial(env.step, restart=False))(state, jnp.zeros((3, 4)))
+    assert out.done.all()
+    assert without.final_privileged is None
+    assert out.final_privileged.shape == (3, env.privileged_size)
+    np.testing.assert_allclose(out.final_privileged, env.privileged(reached), rtol=1e-5, atol=1e-6)
 
 
 def test_time_out_is_told_apart_from_termination() -> None:
@@ -132,7 +147,7 @@ def test_time_out_is_told_apart_from_termination() -> None:
     assert np.all(state.time == 0)
     low = make(LandConfig(height=(0.0, 0.001), velocity=0.0))
     state, _ = low.reset(random_key(0), 4)
-    advance = jax.jit(low.advance)
+    advance = jax.jit(lambda state, action: low.step(state, action, restart=False))
     for _ in range(10):
         state, out = advance(state, -jnp.ones((4, 4)))
     assert out.terminated.all()
@@ -183,7 +198,9 @@ def test_the_gradient_flows_through_the_latency() -> None:
     @jax.jit
     def end(late: jax.Array) -> jax.Array:
         state = dataclasses.replace(start, action_latency=late[None])
-        return jax.lax.scan(lambda s, a: (env.advance(s, a)[0], None), state, actions)[0].vehicle.position.sum()
+        return jax.lax.scan(lambda s, a: (env.step(s, a, restart=False)[0], None), state, actions)[
+            0
+        ].vehicle.position.sum()
 
     exact = jax.grad(end)(jnp.float64(0.047))
     numeric = (end(jnp.float64(0.047 + 1e-6)) - end(jnp.float64(0.047 - 1e-6))) / 2e-6

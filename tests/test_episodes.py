@@ -1,6 +1,7 @@
 """What the environment promises to an algorithm: shapes, ends of episodes, nothing compiled twice."""
 
 import dataclasses
+from functools import partial
 from typing import Any
 
 import jax
@@ -20,12 +21,13 @@ N = 5
 
 @pytest.fixture(scope="module")
 def advance() -> Any:
-    return jax.jit(Env.advance)
+    """A step after which episodes go on."""
+    return jax.jit(partial(Env.step, restart=False))
 
 
 @pytest.fixture(scope="module")
-def restart() -> Any:
-    return jax.jit(Env.restart)
+def step() -> Any:
+    return jax.jit(Env.step)
 
 
 def make(task: TaskConfig | None = None, reward: RewardConfig = REWARD, **config: Any) -> Env:
@@ -87,7 +89,7 @@ def moved(state: EnvState, **changes: Any) -> EnvState:
     return dataclasses.replace(state, vehicle=dataclasses.replace(state.vehicle, **changes))
 
 
-def test_ends_of_an_episode(advance: Any, restart: Any) -> None:
+def test_ends_of_an_episode(advance: Any, step: Any) -> None:
     """Rows: flying on, time out, crashed, crashed as the time runs out, flying on."""
     env = make()
     state, _ = reset(env)
@@ -98,7 +100,7 @@ def test_ends_of_an_episode(advance: Any, restart: Any) -> None:
     np.testing.assert_array_equal(out.terminated, [False, False, True, True, False])
     np.testing.assert_array_equal(out.truncated, [False, True, False, False, False])
     np.testing.assert_array_equal(out.done, [False, True, True, True, False])
-    again, over = restart(env, reached, out)
+    again, over = step(env, state, jnp.zeros((N, 4)))
     # what was reached is kept beside the new start
     np.testing.assert_array_equal(over.final_observation, out.final_observation)
     np.testing.assert_allclose(over.final_observation[:, :3], np.array([0, 0, 3]) - reached.vehicle.position, atol=1e-5)
@@ -106,7 +108,7 @@ def test_ends_of_an_episode(advance: Any, restart: Any) -> None:
     assert np.abs(over.final_observation[2:4, 1]).min() > 8.5
     assert np.abs(over.observation[1:4, :3]).max() <= 2.0
     for f in dataclasses.fields(Step):
-        if f.name not in ("observation", "terms"):
+        if f.name not in ("observation", "terms", "final_privileged"):
             np.testing.assert_array_equal(getattr(over, f.name), getattr(out, f.name))
     # the others fly on, to the last bit
     for a, b in zip(jax.tree.leaves(again)[:-2], jax.tree.leaves(reached)[:-2], strict=True):
@@ -115,13 +117,12 @@ def test_ends_of_an_episode(advance: Any, restart: Any) -> None:
     assert int(again.tick) == 1
 
 
-def test_new_starts_differ_from_each_other_and_from_the_first(advance: Any, restart: Any) -> None:
-    env = make()
+def test_new_starts_differ_from_each_other_and_from_the_first(step: Any) -> None:
+    env = make(HoverConfig(episode_s=0.03, hold_s=0.0))  # of one step
     state, _ = reset(env)
     starts = [np.asarray(state.vehicle.position)]
     for _ in range(3):
-        state, out = advance(env, state, jnp.zeros((N, 4)))
-        state, _ = restart(env, state, dataclasses.replace(out, truncated=jnp.ones(N, bool)))
+        state, _ = step(env, state, jnp.zeros((N, 4)))
         starts.append(np.asarray(state.vehicle.position))
     assert len(np.unique(np.concatenate(starts)[:, 0])) == 4 * N
 
@@ -133,7 +134,7 @@ def test_an_episode_has_as_many_steps_as_its_seconds_hold(rate: float, seconds: 
     state, _ = reset(env, 1)
 
     def one(state: EnvState, _: None) -> tuple[EnvState, jax.Array]:
-        after, out = env.advance(state, jnp.broadcast_to(env.hover, (1, 4)))
+        after, out = env.step(state, jnp.broadcast_to(env.hover, (1, 4)), restart=False)
         return dataclasses.replace(after, vehicle=state.vehicle), out.truncated[0]
 
     ended = jax.jit(lambda s: jax.lax.scan(one, s, None, round(rate * seconds) + 5)[1])(state)
@@ -148,7 +149,7 @@ def test_numbers_of_a_configuration_do_not_recompile() -> None:
     def program(env: Env, key: jax.Array) -> jax.Array:
         traces.append(1)
         state, _ = env.reset(key, 4)
-        return env.advance(state, jnp.zeros((4, 4)))[1].reward
+        return env.step(state, jnp.zeros((4, 4)))[1].reward
 
     base: dict[str, Any] = {"wind": 1.0, "noise": NoiseConfig(position=0.1), "randomize": {"mass": 0.1}}
     base["action_latency"] = (0.02, 0.06)
@@ -210,6 +211,10 @@ BROKEN: list[tuple[dict[str, Any], str]] = [
     ({"wind": float("nan")}, r"env\.wind is nan; accepted: 0 or more"),
     ({"observation_latency": (0.0, float("nan"))}, r"env\.observation_latency is \(0\.0, nan\); accepted: two rising"),
     ({"action_latency": (0.0, 2.0)}, r"env\.action_latency is \(0\.0, 2\.0\); accepted: two rising .* in \[0, 1\]"),
+    (
+        {"latency_spread": (0.0, 0.95)},
+        r"latency of vehicle vis_r is 0\.06 s, env\.latency_spread .*at most 1 s together",
+    ),
     ({"randomize": {"mass": float("nan")}}, r"env\.randomize\.mass is nan; accepted: at least 0 and below 1"),
     ({"randomize": {"name": 0.1}}, "unknown vehicle parameter 'name'"),
 ]

@@ -18,7 +18,7 @@ SNIPPETS = [
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_example(path: Path, tmp_path: Path) -> None:
-    arguments = ["20000"] if path.stem in ("04_train", "06_own_task") else []
+    arguments = ["20000"] if path.stem in ("04_train", "06_own_task", "08_own_algorithm") else []
     done = subprocess.run(
         [sys.executable, str(path), *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
     )

@@ -63,7 +63,7 @@ def test_loading_and_validating_a_policy_reach_nobody_and_keep_no_identifier(
     python(
         """if True:
         import sys
-        from e2efly.deploy.policy import load_policy
+        from e2efly.deploy.policy.loader import load_policy
         from e2efly.zoo import FOLDER
         assert load_policy(FOLDER / "vis_r" / "hover.onnx").contract.task == "hover"
         from e2efly.cli import run
@@ -76,7 +76,9 @@ def test_loading_and_validating_a_policy_reach_nobody_and_keep_no_identifier(
     assert kept(home) == []
 
 
-@pytest.mark.parametrize("module", ["e2efly.deploy.policy", "e2efly.deploy.watchdog", "e2efly.learn.export"])
+@pytest.mark.parametrize(
+    "module", ["e2efly.deploy.policy.loader", "e2efly.deploy.betaflight.watchdog", "e2efly.learn.export"]
+)
 def test_every_module_switches_telemetry_off_for_itself_and_what_it_starts(home: Path, module: str) -> None:
     code = f"import {module}; import onnxruntime, subprocess, sys; subprocess.run([sys.executable, '-c', sys.argv[1]])"
     python(code, "import onnxruntime, os; assert os.environ['RAY_USAGE_STATS_ENABLED'] == '0'")

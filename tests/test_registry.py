@@ -61,8 +61,8 @@ def test_a_file_of_ones_own_is_found_again_by_its_reference(file: Path) -> None:
         ("{folder}/none.py:Mine", "there is no file .*none.py"),
         ("{file}:Other", r"name in .*my_task.py.*'Other'.*Mine"),
         ("{file}:", r"accepted: path/to/file.py:Name"),
-        ("{file}:World", "accepted: a task that its file registers"),
-        ("{file}:Unregistered", "accepted: a task that its file registers"),
+        ("{file}:World", "accepted: what its file registers as task"),
+        ("{file}:Unregistered", "accepted: what its file registers as task"),
         ("no.such.module:Mine", "no.such.module cannot be imported: ModuleNotFoundError"),
         ("{folder}/broken.py:Mine", r"broken.py cannot be imported: ZeroDivisionError: division by zero"),
         (
@@ -119,4 +119,6 @@ def test_the_public_face_is_lazy_and_says_what_it_offers() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
     first, second = done.stdout.splitlines()
     assert first == "avoid vis_r False"
-    assert second.startswith("module 'e2efly' has no attribute 'trian'; it offers list_tasks, load_policy")
+    assert second.startswith(
+        "module 'e2efly' has no attribute 'trian'; it offers Plant, RigidState, evaluate, export, list_tasks"
+    )

@@ -1,6 +1,7 @@
 """e2efly: train an end-to-end quadrotor policy in seconds, check it, and fly it.
 
-`e2efly.train("hover")` trains, `e2efly.load_policy(FILE)` loads what was trained. Importing the package imports no JAX:
+`e2efly.train("hover")` trains, `e2efly.evaluate("runs/hover-bptt-0")` flies what was trained from unseen starts,
+`e2efly.validate` flies it on another physics, `e2efly.load_policy` loads it. Importing the package imports no JAX:
 each name of this face is imported when it is used.
 """
 
@@ -11,21 +12,36 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from e2efly.adapters.export import export
     from e2efly.api import list_tasks, make_env, preset, train
-    from e2efly.deploy.policy import load_policy
+    from e2efly.config.algorithms import register as register_algorithm
+    from e2efly.deploy.policy.loader import load_policy
+    from e2efly.deploy.pose.registry import register as register_pose_source
+    from e2efly.evaluation import evaluate
     from e2efly.rewards import register as register_reward
     from e2efly.tasks import register as register_task
+    from e2efly.validation.plant import Plant, RigidState
+    from e2efly.validation.plants import register as register_plant
+    from e2efly.validation.validate import validate
     from e2efly.vehicles import load_vehicle
 
 __all__ = [
+    "Plant",
+    "RigidState",
+    "evaluate",
+    "export",
     "list_tasks",
     "load_policy",
     "load_vehicle",
     "make_env",
     "preset",
+    "register_algorithm",
+    "register_plant",
+    "register_pose_source",
     "register_reward",
     "register_task",
     "train",
+    "validate",
 ]
 
 __version__ = "0.1.0"
@@ -46,9 +62,14 @@ if _too_late:  # ONNX Runtime reads its variable once, while it is imported
     )
 
 _FACE = {
-    "list_tasks": "e2efly.api", "load_policy": "e2efly.deploy.policy", "load_vehicle": "e2efly.vehicles",
-    "make_env": "e2efly.api", "preset": "e2efly.api", "register_reward": "e2efly.rewards:register",
-    "register_task": "e2efly.tasks:register", "train": "e2efly.api",
+    "Plant": "e2efly.validation.plant", "RigidState": "e2efly.validation.plant", "evaluate": "e2efly.evaluation",
+    "export": "e2efly.adapters.export",
+    "list_tasks": "e2efly.api", "load_policy": "e2efly.deploy.policy.loader", "load_vehicle": "e2efly.vehicles",
+    "make_env": "e2efly.api", "preset": "e2efly.api", "register_algorithm": "e2efly.config.algorithms:register",
+    "register_plant": "e2efly.validation.plants:register",
+    "register_reward": "e2efly.rewards:register", "register_task": "e2efly.tasks:register", "train": "e2efly.api",
+    "validate": "e2efly.validation.validate",
+    "register_pose_source": "e2efly.deploy.pose.registry:register",
 }  # fmt: skip
 
 

@@ -6,12 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from e2efly import presets
-from e2efly.config import AlgorithmConfig, EnvConfig, NetworkConfig, RewardConfig, TaskConfig, TrainConfig
+from e2efly.config import ALGORITHMS, AlgorithmConfig, EnvConfig, NetworkConfig, RewardConfig, TaskConfig, TrainConfig
 from e2efly.device import prepare
 from e2efly.tasks import TASKS
+from e2efly.zoo import policy_file
 
 TaskLike = str | type[TaskConfig] | TaskConfig
 """A name, a reference (`path/to/file.py:Name`), a class of options, or options."""
+AlgoLike = str | type[AlgorithmConfig]
+"""A name, a reference, or a class of options."""
 
 
 def list_tasks() -> list[str]:
@@ -19,13 +22,14 @@ def list_tasks() -> list[str]:
     return list(TASKS)
 
 
-def preset(task: TaskLike, algo: str | None = None, name: str = presets.OURS) -> TrainConfig:
+def preset(task: TaskLike, algo: AlgoLike | None = None, name: str | None = None) -> TrainConfig:
     """The configuration by which a task is learned.
 
     Args:
         task: what to learn; options take the place of the preset's.
-        algo: ppo, bptt, shac, abpt or foppo; left out: what learns the task best.
-        name: ours, paper, or a variant of the task.
+        algo: ppo, bptt, shac, abpt, foppo, a reference, or a class of options; left out: what learns the task best.
+        name: robust, nominal, paper, or a variant of the task; left out: robust, where the task has that for the
+            algorithm, else nominal.
 
     Raises:
         ValueError: for an unknown name, with the nearest one and all there are.
@@ -33,22 +37,27 @@ def preset(task: TaskLike, algo: str | None = None, name: str = presets.OURS) ->
     options = task if isinstance(task, TaskConfig) else None
     if not isinstance(task, str):
         task = TASKS.reference(type(task) if isinstance(task, TaskConfig) else task)
-    config = presets.preset(task, algo or TASKS.find(task).best, name)
+    kind = TASKS.find(task)
+    algo = algo or kind.best
+    algo = algo if isinstance(algo, str) else ALGORITHMS.reference(algo)
+    config = presets.preset(task, algo, presets.default(kind, ALGORITHMS.find(algo)) if name is None else name)
     return config if options is None else dataclasses.replace(config, task=options)
 
 
 def train(
     task: TaskLike,
-    algo: str | None = None,
+    algo: AlgoLike | None = None,
     *,
-    preset_name: str = presets.OURS,
+    preset_name: str | None = None,
     out: str | os.PathLike[str] | None = None,
     vehicle: str | None = None,
     reward: dict[str, float] | RewardConfig | None = None,
     env: EnvConfig | None = None,
     network: NetworkConfig | None = None,
     options: AlgorithmConfig | None = None,
+    start_from: str | os.PathLike[str] | None = None,
     resume: bool = False,
+    overwrite: bool = False,
     progress: bool = False,
     device: str | None = None,
     **changes: Any,
@@ -58,14 +67,17 @@ def train(
     Args:
         task: what to learn.
         algo: by which algorithm; left out: the one that learns it best.
-        preset_name: where the defaults come from.
-        out: the run directory; runs/TASK-ALGO-SEED when left out.
+        preset_name: where the defaults come from; left out: robust, where the task has it, else nominal.
+        out: the run directory; left out: as `e2efly train` names it, runs/TASK-ALGO-SEED.
         vehicle: a shipped one, or the path of a .toml file.
         reward: weights in place of the preset's.
         env: in place of the preset's.
         network: in place of the preset's.
         options: of the algorithm, in place of the preset's.
+        start_from: a policy whose weights it begins with: a task of the zoo, a run directory, a policy.onnx. The
+            learning rate then is that with which others end, unless `options` say another.
         resume: go on with the run in `out`.
+        overwrite: delete the run in `out`, and begin anew.
         progress: print what the command line prints.
         device: cpu or gpu.
         changes: other fields of `TrainConfig`, such as steps or seed.
@@ -78,22 +90,25 @@ def train(
         FloatingPointError: when a loss is not finite; the checkpoint before is kept.
     """
     config = preset(task, algo, preset_name)
+    config = config if start_from is None else presets.gentle(config)
     given = {"env": env, "network": network, "algo": options} | changes
     if reward is not None:
         given["reward"] = reward if isinstance(reward, RewardConfig) else RewardConfig(reward, config.reward.parameters)
     config = dataclasses.replace(config, **{name: value for name, value in given.items() if value is not None})
     if vehicle is not None:
-        config = dataclasses.replace(config, env=dataclasses.replace(config.env, vehicle=vehicle))
-    name = presets.algorithm_name(config.algo)
-    folder = Path("runs") / f"{config.task.name}-{name}-{config.seed}" if out is None else Path(out)
+        config = presets.for_vehicle(config, vehicle)
+    if start_from is not None:
+        config = dataclasses.replace(config, start_from=str(policy_file(start_from, vehicle).absolute()))
     prepare(device)
-    from e2efly.commands.progress import TerminalProgress
-    from e2efly.commands.terminal import Terminal
     from e2efly.learn.programs import traced_folder
+    from e2efly.learn.rundir import run_folder
     from e2efly.learn.runner import train as run
+    from e2efly.terminal import Terminal, TerminalProgress
 
-    with TerminalProgress(Terminal(quiet=not progress), f"{config.task.name} by {name}") as reporter:
-        return run(config, folder, reporter, resume, traced=traced_folder(config))
+    folder = run_folder(config) if out is None else Path(out)
+    title = f"{config.task.name} by {config.algo.name}"
+    with TerminalProgress(Terminal(quiet=not progress), title) as reporter:
+        return run(config, folder, reporter, resume, overwrite, traced=traced_folder(config))
 
 
 def make_env(task: TaskLike, num_envs: int | None = None, **options: Any) -> Any:
@@ -108,7 +123,7 @@ def make_env(task: TaskLike, num_envs: int | None = None, **options: Any) -> Any
     Raises:
         ValueError: naming the field, the value and what is accepted.
     """
-    config = preset(task, "ppo")
+    config = preset(task, "ppo", presets.NOMINAL)
     config = dataclasses.replace(config, env=dataclasses.replace(config.env, **options))
     if num_envs is not None:
         from e2efly.adapters.gym import QuadrotorVectorEnv

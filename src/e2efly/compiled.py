@@ -2,13 +2,12 @@
 
 import hashlib
 import logging
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from jax._src import compilation_cache
 from jax._src.compilation_cache_interface import CacheInterface
-
-from e2efly.device import programs_folder
 
 _DIGEST = 32
 """Bytes of a SHA-256, which stand before what they are of."""
@@ -44,8 +43,8 @@ class CheckedCache(CacheInterface):
         self._base.put(key, sealed(value))
 
 
-def check_programs() -> None:
-    """Keep digests in our own cache of compiled programs. Before anything is compiled.
+def check_programs(folder: Callable[[], Path]) -> None:
+    """Keep digests in our own cache of compiled programs, which lies in `folder()`. Before anything is compiled.
 
     A folder that the user names by JAX's own variable is shared with other programs, and stays in JAX's own format.
     """
@@ -53,7 +52,7 @@ def check_programs() -> None:
 
     def ours(path: str) -> Any:
         found = theirs(path)
-        return found if found is None or Path(path) != programs_folder() else (CheckedCache(found[0]), found[1])
+        return found if found is None or Path(path) != folder() else (CheckedCache(found[0]), found[1])
 
     if theirs.__module__ != __name__:
         compilation_cache.get_file_cache = ours

@@ -1,6 +1,7 @@
 """Where JAX computes, and how it compiles. Call `prepare` before anything computes with JAX."""
 
 import os
+import platform
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -93,6 +94,21 @@ def _check_flags(flags: str) -> None:
 def cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def processor(told: str | None = None) -> tuple[str, bool | None]:
+    """The model of the processor, and whether it has AVX-512, which decides what physics costs; None: not known.
+
+    Args:
+        told: what the system says of its processors; left out: /proc/cpuinfo, where there is one.
+    """
+    file = Path("/proc/cpuinfo")
+    told = told if told is not None else file.read_text() if file.exists() else ""
+    about = {
+        name.strip(): value.strip() for name, colon, value in (x.partition(":") for x in told.splitlines()) if colon
+    }
+    flags = about.get("flags", about.get("Features"))
+    return about.get("model name") or platform.processor(), None if flags is None else "avx512f" in flags.split()
 
 
 @contextmanager
@@ -208,7 +224,7 @@ def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:
     set_xla_options()
     _check_configuration()
     _configure("jax_compilation_cache_dir", str(programs_folder()))
-    check_programs()
+    check_programs(programs_folder)
     _configure("jax_persistent_cache_min_compile_time_secs", 0.05)
     _configure("jax_persistent_cache_min_entry_size_bytes", -1)
     hosts.join()
@@ -219,6 +235,6 @@ def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:
     except (RuntimeError, AssertionError) as error:  # JAX 0.10 asserts where CUDA's plug-in sees no GPU
         reason = (str(error) or "JAX finds none").splitlines()[0]
         asked = f"--device {device}" if device else f"JAX_PLATFORMS={os.environ.get('JAX_PLATFORMS', '')}"
-        raise ValueError(f"{asked} is not to be had: {reason} (NVIDIA GPUs: pip install 'e2efly[cuda]')") from None
+        raise ValueError(f"{asked} is not available: {reason} (NVIDIA GPUs: pip install 'e2efly[cuda]')") from None
     if device and found != device:
-        raise ValueError(f"--device {device} is not to be had: JAX computes on {found}")
+        raise ValueError(f"--device {device} is not available: JAX computes on {found}")

@@ -1,4 +1,4 @@
-"""The configurations that a task is learned by: our own, the paper's, and variants of the task. Imports no JAX.
+"""The configurations that a task is learned by: robust, nominal, the paper's, variants of the task. Imports no JAX.
 
 A preset is a `TrainConfig`; a variant of one is `dataclasses.replace`.
 """
@@ -13,51 +13,74 @@ from e2efly.config import (
     ABPTConfig,
     AlgorithmConfig,
     BPTTConfig,
+    DisturbanceConfig,
     EnvConfig,
     PPOConfig,
     RewardConfig,
     TaskConfig,
     TrainConfig,
 )
+from e2efly.registry import is_shipped
 from e2efly.tasks import TASKS
+from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.names import unknown
 
-OURS, PAPER = "ours", "paper"
+ROBUST, NOMINAL, PAPER = "robust", "nominal", "paper"
+OTHERS = EnvConfig(
+    latency_spread=(0.04, 0.05),
+    randomize={
+        "mass": 0.25, "inertia": 0.5, "motor_time_constant": 0.8, "drag_linear": 0.9, "drag_quadratic": 0.9,
+        "torque_ratio": 0.3, "rate_gain": 0.5,
+    },
+    wind=3.0,
+    disturbance=DisturbanceConfig(gust=1.0, thrust=0.25, rotor=0.1, sag=0.2, centre_of_mass=0.006),
+)  # fmt: skip
+"""The vehicles of the preset `robust`."""
 
 
 def names() -> tuple[str, ...]:
     """The presets that there are; not every task has each."""
-    return OURS, PAPER, *dict.fromkeys(name for task in TASKS.values() for name in task.variants)
+    return ROBUST, NOMINAL, PAPER, *dict.fromkeys(name for task in TASKS.values() for name in task.variants)
 
 
-def preset(task: str, algo: str, name: str = OURS) -> TrainConfig:
+def default(task: type[TaskConfig], learner: type[AlgorithmConfig]) -> str:
+    """The preset that a task is learned by where none is named: robust, where the algorithm has a recipe for that."""
+    return ROBUST if learner.name in task.robust else NOMINAL
+
+
+def preset(task: str, algo: str, name: str = NOMINAL) -> TrainConfig:
     """The configuration of a task and an algorithm.
 
     Args:
         task: its name, or the reference of one's own: `path/to/file.py:Name`, `package.module:Name`.
-        algo: of `ALGORITHMS`.
+        algo: its name, or the reference of one's own.
         name: of `names()`.
 
     Raises:
         ValueError: for an unknown name, with the nearest one and all there are; for a preset that the task has not.
     """
     options = TASKS.find(task)
-    for kind, value, known in (("algorithm", algo, ALGORITHMS), ("preset", name, names())):
-        if value not in known:
-            raise ValueError(unknown(kind, value, known))
+    learner = ALGORITHMS.find(algo)
+    if name not in names():
+        raise ValueError(unknown("preset", name, names()))
     if name == PAPER:
-        return _paper(options, algo)
-    config = _ours(options, algo)
-    if name == OURS:
+        return _paper(options, learner.name)
+    config = _nominal(options, learner)
+    if name == NOMINAL:
         return config
+    if name == ROBUST:
+        return _robust(options, config)
     if name not in options.variants:
         having = ", ".join(other for other, known in TASKS.items() if name in known.variants)
         raise ValueError(f"preset {name!r}: accepted for task {having}, not {options.name!r}")
     return options.variant(name, config)
 
 
-def _ours(task: type[TaskConfig], algo: str) -> TrainConfig:
-    return task.recipe(algo) if algo in ("ppo", "bptt") else _with_critic(task, algo)
+def _nominal(task: type[TaskConfig], learner: type[AlgorithmConfig]) -> TrainConfig:
+    """The task's recipe; for an algorithm of one's own its defaults, with the recipe of the one that it is like."""
+    if not is_shipped(learner):
+        return dataclasses.replace(task.recipe(learner.like), algo=learner())
+    return task.recipe(learner.name) if learner.name in ("ppo", "bptt") else _with_critic(task, learner.name)
 
 
 def _with_critic(task: type[TaskConfig], algo: str) -> TrainConfig:
@@ -69,12 +92,29 @@ def _with_critic(task: type[TaskConfig], algo: str) -> TrainConfig:
     taken: dict[str, Any] = {name: getattr(config.algo, name) for name in shared} | task.with_critic(algo)
     smooth = task.smooth
     reward = task.recipe("ppo").reward if smooth is None else RewardConfig(dict(smooth), config.reward.parameters)
-    return dataclasses.replace(config, algo=dataclasses.replace(ALGORITHMS[algo], **taken), reward=reward)
+    return dataclasses.replace(config, algo=ALGORITHMS[algo](**taken), reward=reward)
+
+
+def _robust(task: type[TaskConfig], config: TrainConfig) -> TrainConfig:
+    """Other vehicles in every episode, and a policy with a memory by which it feels them."""
+    given = task.robust.get(config.algo.name)
+    if given is None:
+        having = ", ".join(f"{name} by {' or '.join(known.robust)}" for name, known in TASKS.items() if known.robust)
+        raise ValueError(f"preset 'robust': accepted for {having}; not for {task.name} by {config.algo.name}")
+    return dataclasses.replace(
+        config,
+        env=OTHERS,
+        network=dataclasses.replace(config.network, recurrent=given.recurrent, hidden=given.hidden),
+        algo=dataclasses.replace(config.algo, **given.algo),
+        reward=config.reward if given.weights is None else RewardConfig(dict(given.weights), config.reward.parameters),
+        steps=given.steps,
+        chunk=given.chunk,
+    )
 
 
 def _paper(task: type[TaskConfig], algo: str) -> TrainConfig:
     """The paper's rewards, sizes and learning rates (its tables; see docs/rewards.md for what it leaves open)."""
-    if algo in ("shac", "foppo"):
+    if algo not in ("ppo", "bptt", "abpt"):
         raise ValueError(f"preset 'paper': the paper does not train by {algo!r}; accepted: ppo, bptt, abpt")
     given = task.paper
     if given is None:
@@ -102,9 +142,39 @@ def _paper(task: type[TaskConfig], algo: str) -> TrainConfig:
     )  # fmt: skip
 
 
-def algorithm_name(config: AlgorithmConfig) -> str:
-    """The name of an algorithm's configuration."""
-    return next(name for name, known in ALGORITHMS.items() if type(known) is type(config))
+def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
+    """A configuration for another vehicle, a name or a .toml file.
+
+    What the preset `robust` draws of mass and thrust becomes narrower, all in the same share, where its weakest vehicle
+    could not hover.
+
+    Raises:
+        ValueError: for a vehicle that there is not.
+    """
+    env = dataclasses.replace(config.env, vehicle=vehicle)
+    if (env.randomize, env.disturbance) == (OTHERS.randomize, OTHERS.disturbance):
+        margin = load_vehicle(vehicle).thrust_to_weight
+        shares = (_narrower(percent / 100) for percent in range(100, -1, -1))
+        drawn = next(drawn for drawn in shares if margin * drawn.weakest >= 1)
+        env = dataclasses.replace(env, randomize=drawn.randomize, disturbance=drawn.disturbance)
+    return dataclasses.replace(config, env=env)
+
+
+def _narrower(share: float) -> EnvConfig:
+    d = OTHERS.disturbance
+    return dataclasses.replace(
+        OTHERS,
+        randomize={**OTHERS.randomize, "mass": share * OTHERS.randomize["mass"]},
+        disturbance=dataclasses.replace(d, thrust=share * d.thrust, rotor=share * d.rotor, sag=share * d.sag),
+    )
+
+
+def gentle(config: TrainConfig) -> TrainConfig:
+    """A configuration for a run that begins with a policy's weights: at the learning rate with which others end."""
+    if not hasattr(config.algo, "learning_rate_end"):
+        return config
+    rate: Any = config.algo.learning_rate_end  # type: ignore[attr-defined]
+    return dataclasses.replace(config, algo=dataclasses.replace(config.algo, **{"learning_rate": rate}))
 
 
 def check(config: TrainConfig) -> None:

@@ -1,6 +1,7 @@
 """Registries: what there is of a kind, by name, and users' own code by reference. Imports no JAX.
 
-A reference is `path/to/file.py:Name` or `package.module:Name`. It is accepted wherever a name is.
+A reference is `path/to/file.py:Name` or `package.module:Name`. It is accepted wherever a name is. Installed packages
+register by entry points, which are looked at when a name is unknown (`load_installed`).
 """
 
 import hashlib
@@ -8,6 +9,8 @@ import importlib
 import importlib.util
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from importlib import metadata
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, TypeVar
@@ -55,6 +58,8 @@ class Registry(Generic[T], Mapping[str, T]):
             ValueError: for an unknown name, with the nearest one and all there are; for a reference that leads nowhere
                 or to something that is not registered, naming file and name.
         """
+        if name not in self._known and ":" not in name:
+            load_installed()
         if name in self._known:
             return self._known[name]
         if ":" not in name:
@@ -65,17 +70,30 @@ class Registry(Generic[T], Mapping[str, T]):
             return here
         thing = load(name)
         if not any(thing is known for known in self._known.values()):
-            raise ValueError(f"{name} is {thing!r}; accepted: a {self.kind} that its file registers")
+            raise ValueError(f"{name} is {thing!r}; accepted: what its file registers as {self.kind}")
         return thing
 
     def reference(self, thing: T) -> str:
         """By which `find` finds something again in another process: its name, or where it is from if that is not here.
 
         Raises:
-            KeyError: when it is not registered.
+            ValueError: when it is not registered.
         """
-        name = next(name for name, known in self._known.items() if known is thing)
+        name = next((name for name, known in self._known.items() if known is thing), None)
+        if name is None:
+            raise ValueError(f"{origin(thing)} is no registered {self.kind}; accepted: {', '.join(self._known)}")
         return name if is_shipped(thing) else origin(thing)
+
+
+def load_installed() -> None:
+    """Import what installed packages register: the modules that their entry points of the group `e2efly` name.
+
+    Raises:
+        ValueError: naming the package and the entry point, where its module cannot be imported.
+    """
+    for point in metadata.entry_points(group="e2efly"):
+        where = f"entry point {point.name} = {point.value} of the package {point.dist.name if point.dist else '?'}"
+        _imported(where, partial(importlib.import_module, point.module))
 
 
 def load(reference: str) -> Any:

@@ -19,7 +19,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from e2efly.control.vectors import safe_sqrt
-from e2efly.registry import Registry
+from e2efly.registry import Registry, load_installed
 from e2efly.vehicles.names import unknown
 
 F = TypeVar("F", bound=Callable[..., Array])
@@ -316,6 +316,8 @@ def check(weights: Mapping[str, float], parameters: Mapping[str, float]) -> None
         ValueError: naming the unknown name, the nearest one and all there are.
     """
     for name in weights:
+        if name not in TERMS:
+            load_installed()
         if name not in TERMS:
             raise ValueError(unknown("reward term", name, TERMS))
     for name in parameters:

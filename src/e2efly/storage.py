@@ -122,3 +122,13 @@ def _holder(path: Path) -> str:
         return f"process {content['process']} on {content['host']} since {content['since']}"
     except (OSError, ValueError, TypeError, KeyError):
         return "another process"
+
+
+def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object whose keys are there once."""
+    content: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in content:
+            raise ValueError(f"key {key[:80]!r} is there twice")
+        content[key] = value
+    return content

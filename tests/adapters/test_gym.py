@@ -1,6 +1,7 @@
 """The environment behind Gymnasium's interfaces."""
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -30,7 +31,7 @@ def vector(task: Any = "hover", n: int = 4, **given: Any) -> QuadrotorVectorEnv:
 @pytest.mark.filterwarnings("ignore:.*Box observation space.*")
 @pytest.mark.parametrize("task", ["hover", "avoid"])
 def test_gymnasiums_checker_accepts_it(task: str) -> None:
-    check_env(gymnasium.make(f"e2efly/{task}-v0").unwrapped)
+    check_env(gymnasium.make(f"e2efly/{task}-v0", render_mode="rgb_array").unwrapped)  # which draws, too
 
 
 def test_every_task_is_registered_both_ways() -> None:
@@ -40,6 +41,21 @@ def test_every_task_is_registered_both_ways() -> None:
     observations, _ = envs.reset(seed=0)
     assert observations.shape == (3, envs.single_observation_space.shape[0])  # type: ignore[index]
     assert envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+
+
+def test_a_task_of_ones_own_is_made_by_its_reference() -> None:
+    task = f"{Path(__file__).parents[2] / 'examples' / '06_own_task.py'}:OrbitConfig"
+    env: Any = gymnasium.make("e2efly/task-v0", task=task, render_mode="rgb_array").unwrapped
+    assert type(env.stepper.config.task).__name__ == "OrbitConfig"
+    env.reset(seed=0)
+    assert env.render().shape == (320, 480, 3)
+    kind = {"vectorization_mode": "vector_entry_point", "render_mode": "rgb_array"}
+    envs: Any = gymnasium.make_vec("e2efly/task-v0", 3, task=task, **kind)
+    envs.reset(seed=0)
+    assert envs.step(np.zeros((3, 4), np.float32))[0].shape == (3, *env.observation_space.shape)
+    assert len(envs.render()) == 3
+    with pytest.raises(ValueError, match="unknown task 'orbitt'"):
+        gymnasium.make("e2efly/task-v0", task="orbitt")
 
 
 def test_it_steps_as_our_own_environment_does() -> None:
@@ -116,3 +132,38 @@ def test_actions_of_another_shape_are_refused() -> None:
     envs.reset(seed=0)
     with pytest.raises(ValueError, match=r"\(3, 4\); accepted: \(4, 4\)"):
         envs.step(np.zeros((3, 4)))
+
+
+@pytest.mark.parametrize("task", ["race", "avoid"])
+def test_it_is_drawn_from_behind_with_its_goal(task: str) -> None:
+    env = gymnasium.make(f"e2efly/{task}-v0", render_mode="rgb_array")
+    with pytest.raises((RuntimeError, gymnasium.error.ResetNeeded)):
+        env.render()
+    env.reset(seed=0)
+    first: Any = env.render()
+    assert (first.shape, first.dtype) == ((320, 480, 3), np.uint8)
+    middle = first[130:230, 190:290].astype(int)
+    red = (middle[..., 0] > 1.6 * middle[..., 1]) & (middle[..., 0] > 1.6 * middle[..., 2])
+    assert red.sum() > 20  # the rotors in front
+    for _ in range(20):
+        env.step(np.array([1.0, 0.0, 0.0, 0.0], np.float32))
+    later: Any = env.render()
+    assert np.mean(first != later) > 0.05
+    assert env.metadata["render_fps"] == 30
+
+
+def test_all_of_a_batch_are_drawn_and_other_modes_are_refused() -> None:
+    envs = QuadrotorVectorEnv("hover", 3, render_mode="rgb_array")
+    with pytest.raises(RuntimeError, match="render before the first reset"):
+        envs.render()
+    envs.reset(seed=0)
+    pictures = envs.render()
+    assert pictures is not None
+    assert [picture.shape for picture in pictures] == [(320, 480, 3)] * 3
+    assert np.any(pictures[0] != pictures[1])
+    gates = QuadrotorVectorEnv("race_clutter", 4, render_mode="rgb_array")  # of as many gates as vehicles
+    gates.reset(seed=0)
+    assert len(gates.render() or ()) == 4
+    assert QuadrotorEnv("hover").render() is None
+    with pytest.raises(ValueError, match="render_mode is 'human'; accepted: None, rgb_array"):
+        QuadrotorEnv("hover", render_mode="human")

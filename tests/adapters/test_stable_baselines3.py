@@ -51,6 +51,23 @@ def test_what_was_reached_stands_in_the_infos_of_episodes_that_ended() -> None:
     assert ended >= 16
 
 
+def test_returns_and_lengths_of_episodes_are_logged() -> None:
+    env, sums, lengths, ended = SB3VecEnv("hover", 8), np.zeros(8), np.zeros(8), 0
+    env.seed(0)
+    env.reset()
+    for _ in range(100):
+        _, reward, done, told = env.step(np.ones((8, 4), np.float32))
+        sums, lengths = sums + reward, lengths + 1
+        for i in np.flatnonzero(done):
+            assert told[i]["episode"]["r"] == pytest.approx(sums[i], rel=1e-5)
+            assert told[i]["episode"]["l"] == lengths[i]
+            sums[i], lengths[i], ended = 0, 0, ended + 1
+    assert ended >= 8
+    model = PPO("MlpPolicy", env, n_steps=64, batch_size=64, device="cpu", seed=0)
+    model.learn(512)
+    assert len(model.ep_info_buffer) > 0  # from which it logs ep_rew_mean
+
+
 def test_the_same_seed_starts_the_same() -> None:
     env = SB3VecEnv("hover", 3)
     starts = []

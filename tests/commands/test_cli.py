@@ -11,7 +11,9 @@ import pytest
 
 import e2efly
 from e2efly.cli import run
-from e2efly.commands.train import verdict
+from e2efly.commands.train import parse
+from e2efly.learn.judge import verdict
+from e2efly.vehicles import vehicle_file
 
 
 def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
@@ -44,7 +46,10 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["train", "hover", "--reward.weights", "prog9", "1"], "unknown reward term 'prog9'"),
         (["train", "hover", "--steps", "-1"], "steps is -1; accepted: more than 0"),
         (["train", "hover", "--algo.envs", "0"], "algo.envs is 0; accepted: more than 0"),
-        (["train", "hover", "--algo.minibatch", "1000"], "algo.minibatch is 1000; accepted: a divisor"),
+        (
+            ["train", "hover", "--algo", "ppo", "--algo.minibatch", "1000"],
+            "algo.minibatch is 1000; accepted: a divisor",
+        ),
         (["train", "hover", "--env.randomize", "mas", "0.1"], "unknown vehicle parameter 'mas'; did you mean 'mass'?"),
         (
             ["train", "hover", "--vehicle", "vis_r", "--env.vehicle", "crazyflie"],
@@ -60,7 +65,7 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         ),
         (["train", "hover_aware", "--task.target", "0", "0", "0"], "task.target is (0.0, 0.0, 0.0); accepted: a place"),
         (["train", "track", "--task.centre", "0", "0", "-1"], "task.centre is (0.0, 0.0, -1.0); accepted: a place"),
-        (["train", "hover", "--device", "gpu"], "--device gpu is not to be had"),
+        (["train", "hover", "--device", "gpu"], "--device gpu is not available"),
         (["train", "hover", "--hosts.count", "0", "--hosts.coordinator", "a:1"], "hosts.count is 0; accepted: 1 or"),
         (["train", "hover", "--task.radius", "-1"], "task.radius is -1.0; accepted: more than 0"),
         (["train", "hover", "--task.fence", "nan"], "task.fence is nan; accepted: finite numbers"),
@@ -120,6 +125,55 @@ def test_bad_input_is_named_with_what_exists(
     if arguments[0] == "train" and len(arguments) > 1:
         arguments = [*arguments, "--out", str(tmp_path / "run")]
     assert said in error_of(arguments, capsys)
+
+
+def test_whole_numbers_may_be_written_with_an_exponent(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = parse(["hover", "--steps", "1e6", "--algo.horizon", "1.28e2", "--seed", "7"]).config
+    assert (asked.steps, asked.algo.horizon, asked.seed) == (1_000_000, 128, 7)
+    for wrong in ("1e-6", "1.5", "many", "inf"):
+        assert "Error parsing --steps" in error_of(["train", "hover", "--steps", wrong], capsys)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "folder"),
+    [
+        ("hover", "runs/hover-bptt-0"),
+        ("hover --algo ppo --seed 3", "runs/hover-ppo-3"),
+        ("hover --vehicle crazyflie", "runs/hover-bptt-crazyflie-0"),
+        ("hover --env.vehicle=my/heavy.toml", "runs/hover-bptt-heavy-0"),
+        ("hover --vehicle crazyflie --out here", "here"),
+    ],
+)
+def test_runs_of_another_vehicle_have_a_folder_of_their_own(
+    arguments: str, folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my").mkdir()
+    (tmp_path / "my/heavy.toml").write_text(vehicle_file("vis_r").read_text())
+    assert parse(arguments.split()).out == Path(folder)
+
+
+def test_a_run_is_deleted_only_when_that_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder, mine = tmp_path / "run", tmp_path / "run" / "notes.txt"
+    flags = ["--algo", "ppo", "--steps", "1024", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16",
+             "--algo.horizon", "16", "--algo.minibatch", "128", "--task.episode-s", "1", "--no-plots",
+             "--out", str(folder)]  # fmt: skip
+    assert run(["train", "hover", *flags]) == 0
+    mine.write_text("mine")
+    before = (folder / "checkpoint.safetensors").read_bytes()
+    assert "already holds a run; accepted: a new folder, --resume to go on with this one, or --overwrite" in error_of(
+        ["train", "hover", *flags, "--seed", "3"], capsys
+    )
+    assert "--resume and --overwrite are both given" in error_of(
+        ["train", "hover", *flags, "--resume", "--overwrite"], capsys
+    )
+    # what is refused deletes nothing
+    assert "unknown vehicle" in error_of(["train", "hover", *flags, "--overwrite", "--vehicle", "vis_x"], capsys)
+    assert (folder / "checkpoint.safetensors").read_bytes() == before
+    assert run(["train", "hover", *flags, "--seed", "3", "--overwrite"]) == 0
+    assert json.loads((folder / "summary.json").read_text())["seed"] == 3
+    assert len((folder / "metrics.csv").read_text().splitlines()) == 5  # a header, and its own four updates
+    assert mine.read_text() == "mine"
 
 
 def test_resume_needs_a_run(capsys: pytest.CaptureFixture[str]) -> None:
@@ -205,8 +259,8 @@ def test_what_was_not_learned_is_not_called_learned(
 
 def test_train_eval_export_and_plots_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "run"
-    flags = ["--steps", "2048", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16", "--algo.horizon", "16",
-             "--algo.minibatch", "128", "--task.episode-s", "1"]  # fmt: skip
+    flags = ["--algo", "ppo", "--steps", "2048", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16",
+             "--algo.horizon", "16", "--algo.minibatch", "128", "--task.episode-s", "1"]  # fmt: skip
     mine = tmp_path / "mine.toml"
     mine.write_text((Path(e2efly.__file__).parent / "vehicles/vis_r.toml").read_text())
     flags += ["--vehicle", str(mine)]

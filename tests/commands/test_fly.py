@@ -14,10 +14,12 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.commands.fly import Fly, fly_command
-from e2efly.deploy.flight_log import read_log
-from e2efly.deploy.msp.codec import REPLY, Frame, encode
-from e2efly.deploy.msp.messages import Name
+from e2efly.commands.fly import Fly, parse
+from e2efly.commands.fly import run as fly_command
+from e2efly.deploy.betaflight.codec import REPLY, Frame, encode
+from e2efly.deploy.betaflight.messages import Name
+from e2efly.deploy.log.flight_log import read_log
+from e2efly.tasks.hover.goal import HoverRoute
 from tests.deploy.test_msp_client import controller, recorded
 
 FORGED = "\x1b[2K\rPOLICY: all is well"
@@ -93,3 +95,10 @@ def test_a_craft_s_name_is_neither_markup_nor_an_escape_sequence(capsys: pytest.
     said = capsys.readouterr().out
     assert "\x1b" not in said
     assert "[/]" in said
+
+
+def test_the_policy_of_the_goal_s_options_is_looked_for_in_no_device(tmp_path: Path) -> None:
+    """A pipe that nobody writes to is read for ever, as a serial port is."""
+    os.mkfifo(tmp_path / "port")
+    options = parse(["--link", str(tmp_path / "port"), "hover", "--goal.target", "0", "0", "2"])
+    assert isinstance(options.goal, HoverRoute)

@@ -11,7 +11,7 @@ import pytest
 from rich.table import Table
 
 from e2efly.cli import run
-from e2efly.commands.terminal import Terminal
+from e2efly.terminal import Terminal
 
 
 def e2efly(*arguments: str, **how: object) -> subprocess.CompletedProcess[str]:
@@ -77,7 +77,7 @@ def test_a_device_is_neither_read_nor_replaced(
         ("XLA_FLAGS", "--xla_cpu_prefer_vector_width=wide", "Couldn't interpret value wide for flag xla_cpu_prefer"),
         ("XLA_FLAGS", "no/file", "XLA_FLAGS is 'no/file'; accepted: flags and values that XLA knows (Could not open"),
         ("JAX_ENABLE_X64", "1", "JAX_ENABLE_X64 is True; accepted: False, which the programs here need"),
-        ("JAX_NUM_CPU_DEVICES", "0", "--device cpu is not to be had: Unable to initialize backend 'cpu'"),
+        ("JAX_NUM_CPU_DEVICES", "0", "--device cpu is not available: Unable to initialize backend 'cpu'"),
         ("JAX_DISABLE_JIT", "1", "JAX_DISABLE_JIT is True; accepted: False, which the programs here need"),
         ("JAX_NUMPY_RANK_PROMOTION", "raise", "JAX_NUMPY_RANK_PROMOTION is raise; accepted: allow, which"),
     ],

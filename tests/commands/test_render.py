@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from e2efly import cli
 from e2efly.cli import run
-from e2efly.commands.render import sized
+from e2efly.commands.render import Render
 from e2efly.env import random_key
 from e2efly.scenes.camera import PRESETS
 from e2efly.view import video
-from e2efly.view.images import look_around
+from e2efly.view.images import look_around, sized
 from e2efly.view.places import find_place
 from e2efly.view.tour import Tour, attitudes, plan
 
@@ -45,7 +44,7 @@ def test_it_writes_pictures_and_a_video(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_what_help_says_of_cameras_is_what_there_is() -> None:
-    assert set(typing.get_args(typing.get_type_hints(cli.Render)["camera"])) == set(PRESETS)
+    assert set(typing.get_args(typing.get_type_hints(Render)["camera"])) == set(PRESETS)
 
 
 def test_pixels_are_square_unless_asked_otherwise() -> None:

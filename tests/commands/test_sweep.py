@@ -11,19 +11,19 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.commands.sweep import Request, trials_of
+from e2efly.commands.sweep import Sweep, trials_of
 from tests.conftest import NetworkTrace
 
 SMALL = ["steps=6144", "chunk=2", "eval-episodes=20", "algo.envs=16", "algo.horizon=16", "algo.minibatch=128",
          "task.episode-s=1"]  # fmt: skip
 
 
-def request(*vary: str, seeds: int = 1) -> Request:
-    return Request("hover", "ppo", "ours", seeds, vary, Path("sweep"), 1, 0, None)
+def request(*vary: str, seeds: int = 1) -> Sweep:
+    return Sweep("hover", "ppo", "nominal", seeds, vary, Path("sweep"), 1, 0, None)
 
 
 def sweep(cwd: Path, *flags: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "e2efly", "sweep", "hover", "--out", "sweep", *flags]
+    command = [sys.executable, "-m", "e2efly", "sweep", "hover", "--algo", "ppo", "--out", "sweep", *flags]
     return subprocess.Popen(command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 

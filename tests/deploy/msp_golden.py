@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from e2efly.deploy.msp.codec import Decoder
+from e2efly.deploy.betaflight.codec import Decoder
 
 GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[1] / "data" / "msp_golden.json").read_text())
 REPLIES = {

@@ -22,10 +22,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from e2efly.deploy.msp.client import MESSAGES, Client, ask, tell
-from e2efly.deploy.msp.codec import Decoder, Frame, encode
-from e2efly.deploy.msp.link import open_link
-from e2efly.deploy.msp.messages import Debug, Rc, set_raw_rc
+from e2efly.deploy.betaflight.client import MESSAGES, Client, ask, tell
+from e2efly.deploy.betaflight.codec import Decoder, Frame, encode
+from e2efly.deploy.betaflight.link import open_link
+from e2efly.deploy.betaflight.messages import Debug, Rc, set_raw_rc
 
 GOLDEN = Path(__file__).parents[1] / "data" / "msp_golden.json"
 SET_RC_TUNING, SET_RC_DEADBAND = 204, 218

@@ -10,12 +10,13 @@ import sys
 import tempfile
 from pathlib import Path
 
-from e2efly.deploy.msp.client import MESSAGES, Client, ask
-from e2efly.deploy.msp.codec import Decoder, encode
-from e2efly.deploy.msp.controller import identify
-from e2efly.deploy.msp.link import Link, open_link
-from e2efly.validate import binary
-from e2efly.validate.rig import Rig
+from e2efly.deploy.betaflight import settings_by_name
+from e2efly.deploy.betaflight.client import MESSAGES, Client, ask
+from e2efly.deploy.betaflight.codec import Decoder, encode
+from e2efly.deploy.betaflight.controller import identify
+from e2efly.deploy.betaflight.link import Link, open_link
+from e2efly.validation import binary
+from e2efly.validation.rig import Rig
 from e2efly.vehicles import load_vehicle
 
 RELEASES = Path(__file__).parents[1] / "data" / "msp_releases.json"
@@ -45,9 +46,13 @@ def record(program: Path) -> tuple[str, dict[str, str]]:
         client = Client(link)  # type: ignore[arg-type]
         for code in MESSAGES:
             ask(client, code, 5.0, clock=rig)
-        version = identify(client, 5.0, clock=rig).firmware
+        info = identify(client, 5.0, clock=rig)
+        told = {}
+        for name, _ in info.by_name:
+            ask(client, settings_by_name.CODE, 5.0, settings_by_name.request(name), clock=rig)
+            told[f"{settings_by_name.CODE} {name}"] = link.frames[settings_by_name.CODE].hex()
         link.inner.close()
-    return version, {str(code): link.frames[code].hex() for code in MESSAGES}
+    return info.firmware, {str(code): link.frames[code].hex() for code in MESSAGES} | told
 
 
 if __name__ == "__main__":

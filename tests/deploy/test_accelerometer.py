@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from e2efly.deploy.accelerometer import RANGE, Scale, learn, level, standing_problem
-from e2efly.deploy.msp.messages import Attitude
+from e2efly.deploy.attitude import Attitude
+from e2efly.deploy.pilot.accelerometer import RANGE, Scale, learn, level, standing_problem
 from e2efly.vehicles.vehicle import GRAVITY
 
 DT = 0.02

@@ -10,9 +10,9 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from e2efly.deploy.bags import BODY_FRAME, TOPICS, WORLD_FRAME, export_bag
-from e2efly.deploy.flight_log import FlightLog, read_log
-from e2efly.deploy.telemetry import Telemetry
+from e2efly.deploy.log.bags import BODY_FRAME, TOPICS, WORLD_FRAME, export_bag
+from e2efly.deploy.log.flight_log import FlightLog, read_log
+from e2efly.deploy.log.telemetry import Telemetry
 
 HALF = math.sqrt(0.5)
 

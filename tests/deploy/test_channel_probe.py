@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from e2efly.deploy.instruments import CLOSED, PROBE, PROBE_S, ChannelProbe, Instruments, Reading
-from e2efly.deploy.msp.messages import Rc, StatusEx
+from e2efly.deploy.betaflight.instruments import CLOSED, PROBE, PROBE_S, ChannelProbe, Instruments, Reading
+from e2efly.deploy.betaflight.messages import Rc, StatusEx
+from e2efly.deploy.betaflight.sticks import RATES_PULSE
 from e2efly.deploy.settings import FlightSettings
-from e2efly.deploy.sticks import RATES_PULSE
 from tests.deploy.test_sticks import STICKS
 
 WITH_ANGLE = replace(STICKS, angle=2)

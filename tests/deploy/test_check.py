@@ -5,14 +5,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
-from e2efly.deploy.check import Row, examine, problems
-from e2efly.deploy.msp.client import MESSAGES, Client
-from e2efly.deploy.msp.codec import Decoder
-from e2efly.deploy.msp.controller import ControllerInfo, identify
-from e2efly.deploy.msp.settings import ModeRange, RxFailConfig
+from e2efly.commands.fly import _table
+from e2efly.deploy.betaflight import messages, settings_by_name
+from e2efly.deploy.betaflight.check import NOT_TOLD, Row, examine, problems
+from e2efly.deploy.betaflight.client import MESSAGES, Client
+from e2efly.deploy.betaflight.codec import ERROR, Decoder, Frame, encode
+from e2efly.deploy.betaflight.controller import ControllerInfo, identify
+from e2efly.deploy.betaflight.settings import ModeRange, RxFailConfig
+from e2efly.deploy.betaflight.sticks import RATES_PULSE, sticks_of
 from e2efly.deploy.settings import FlightSettings
-from e2efly.deploy.sticks import RATES_PULSE, sticks_of
 from e2efly.vehicles import load_vehicle
 
 REPLIES: dict[str, dict[str, str]] = json.loads(
@@ -35,7 +38,15 @@ class Wire:
         pass
 
     def send(self, data: bytes) -> None:
-        self.pending += b"".join(bytes.fromhex(self.replies[str(f.code)]) for f in self.decoder.feed(data))
+        self.pending += b"".join(self.reply(frame) for frame in self.decoder.feed(data))
+
+    def reply(self, frame: Frame) -> bytes:
+        if frame.code != settings_by_name.CODE:
+            return bytes.fromhex(self.replies[str(frame.code)])
+        key = f"{frame.code} {messages.text(frame.payload)}"
+        if key not in self.replies:
+            return encode(Frame(frame.code, direction=ERROR, version=2))
+        return bytes.fromhex(self.replies[key])
 
     def receive(self) -> bytes:
         data, self.pending = self.pending, b""
@@ -57,7 +68,7 @@ def rows_of(info: ControllerInfo, vehicle: object = VEHICLE) -> dict[str, Row]:
 def test_a_controller_that_is_set_as_the_guide_asks_may_take_off(version: str) -> None:
     info = recorded(version)
     assert info.firmware == version
-    assert set(REPLIES[version]) == {str(code) for code in MESSAGES}
+    assert {code for code in REPLIES[version] if code.isdigit()} == {str(code) for code in MESSAGES}
     assert problems(examine(info, VEHICLE, FlightSettings())) == ()
     rows = rows_of(info)
     assert rows["firmware"].value.startswith(f"BTFL {version}, MSP ")
@@ -121,6 +132,82 @@ def test_a_throttle_stick_that_climbs_in_its_middle_is_refused_where_it_is_hande
     assert rows_of(replace(new, throttle=replace(new.throttle, hover=30)), LIGHT)[name].good  # what mends it
 
 
+@pytest.mark.parametrize("version", list(REPLIES))
+def test_without_airmode_nothing_takes_off(version: str) -> None:
+    info = recorded(version)
+    assert rows_of(info)["feature AIRMODE"].value == "on"
+    off = replace(info, features=info.features - {"AIRMODE"})
+    assert problems(examine(off, VEHICLE, FlightSettings())) == (
+        "feature AIRMODE is off; needed: on: torque goes before thrust at any throttle (feature AIRMODE)",
+    )
+
+
+@pytest.mark.parametrize(("low", "high", "good"), [(900, 2100, True), (1700, 2100, False), (900, 1700, False)])
+def test_the_mode_air_mode_counts_where_it_is_always_on(low: int, high: int, good: bool) -> None:
+    info = recorded(NEWEST)
+    modes = (*info.modes, ModeRange(28, 5, low, high))
+    row = rows_of(replace(info, features=info.features - {"AIRMODE"}, modes=modes))["feature AIRMODE"]
+    assert row.good is good and row.value == f"off, mode AIR MODE on AUX6 {low} to {high}"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "good"),
+    [
+        ("mixer_type", "LEGACY", True), ("mixer_type", "LINEAR", True), ("mixer_type", "DYNAMIC", True),
+        ("mixer_type", "EZLANDING", False), ("mixer_type", "4", False), ("msp_override_failsafe", "ON", False),
+        ("max_aux_channels", "8", True), ("max_aux_channels", "7", False), ("max_aux_channels", "-1", False),
+        ("serial_update_rate_hz", "100", False),
+    ],
+)  # fmt: skip
+def test_settings_that_new_firmware_tells_by_name(name: str, value: str, good: bool) -> None:
+    info = recorded("2026.6.1")
+    assert dict(info.by_name) == {
+        "mixer_type": "LEGACY", "msp_override_failsafe": "OFF", "max_aux_channels": "14",
+        "serial_update_rate_hz": "1000",
+    }  # fmt: skip
+    row = rows_of(replace(info, by_name=tuple((dict(info.by_name) | {name: value}).items())))[name]
+    assert (row.good, row.told, row.value) == (good, True, value)
+    assert row.mend.startswith(f"set {name}=")
+
+
+@pytest.mark.parametrize("version", ["4.5.5", "4.6.0", "2025.12.5"])
+def test_settings_that_older_firmware_does_not_tell_are_the_pilots_to_look_at(version: str) -> None:
+    rows = rows_of(recorded(version))
+    for name in settings_by_name.NAMES:
+        assert (rows[name].value, rows[name].good, rows[name].told) == (NOT_TOLD, True, False)
+    assert rows["mixer_type"].mend == "set mixer_type=LEGACY"
+
+
+def test_a_firmware_built_without_its_command_line_tells_nothing_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    bare = {code: reply for code, reply in REPLIES["2026.6.1"].items() if code.isdigit()}
+    monkeypatch.setitem(REPLIES, "2026.6.1", bare)
+    info = recorded("2026.6.1")
+    assert info.by_name == () and not rows_of(info)["mixer_type"].told
+
+
+@pytest.mark.parametrize("said", ["mixer_type", "mixer_type = ", "mixer = LEGACY", ""])
+def test_a_reply_about_another_setting_is_none(said: str) -> None:
+    with pytest.raises(ValueError, match="answers for mixer_type; accepted: 'mixer_type = "):
+        settings_by_name.value_of("mixer_type", said.encode())
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "row", "mend"),
+    [
+        ("thrust_linear", 20, "thrust_linear", "set thrust_linear=0"),
+        ("vbat_sag_compensation", 100, "vbat_sag_compensation", "set vbat_sag_compensation=0"),
+        ("throttle_boost", 6, "throttle_boost", "set throttle_boost=0"),
+        ("motor_output_limit", 99, "motor_output_limit", "set motor_output_limit=100"),
+    ],
+)
+def test_what_bends_the_throttle_is_refused(field: str, value: int, row: str, mend: str) -> None:
+    info = recorded(NEWEST)
+    changed = replace(info, pid_advanced=replace(info.pid_advanced, **{field: value}))
+    found = rows_of(changed)[row]
+    assert not found.good and found.mend == mend
+    assert len(problems(examine(changed, VEHICLE, FlightSettings()))) == 1
+
+
 def test_the_sticks_keep_angle_off_on_its_own_channel() -> None:
     info = recorded(NEWEST)
     mid = info.rx.mid
@@ -129,3 +216,10 @@ def test_the_sticks_keep_angle_off_on_its_own_channel() -> None:
     far = replace(sticks, angle=5).arrange((mid, mid, mid, 1000), ())
     assert far == (1500, 1500, 1000, 1500, 1500, 1500, 1500, 1500, 1500, RATES_PULSE)
     assert replace(sticks, angle=None).arrange((mid, mid, mid, 1000), ()) == (1500, 1500, 1000, *[1500] * 5)
+
+
+def test_the_table_says_which_settings_the_pilot_has_to_look_at(capsys: pytest.CaptureFixture[str]) -> None:
+    Console(width=200).print(_table(examine(recorded("2025.12.5"), VEHICLE, FlightSettings())))
+    lines = {line.split()[1]: line for line in capsys.readouterr().out.splitlines() if len(line.split()) > 1}
+    assert lines["mixer_type"].startswith("look ") and "set mixer_type=LEGACY" in lines["mixer_type"]
+    assert lines["thrust_linear"].startswith("ok ") and "set " not in lines["thrust_linear"]

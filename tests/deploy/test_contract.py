@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from e2efly.deploy.contract import ACTION_MAPPING, COMMANDS, Contract
+from e2efly.deploy.policy.contract import ACTION_MAPPING, COMMANDS, Contract
 from e2efly.physics import COMMAND_MODES
 
 Path = tuple[str | int, ...]
@@ -149,6 +149,16 @@ def test_a_missing_key_is_named(path: Path) -> None:
         Contract.from_json(json.dumps(content))
 
 
+def test_a_recurrent_policy_of_before_memory_was_in_the_contract_is_told_what_lacks() -> None:
+    content = {key: value for key, value in EXAMPLE.items() if key != "memory_size"}
+    with pytest.raises(
+        ValueError, match=r"^contract: missing key 'memory_size'; accepted: all of .*memory_size.*again"
+    ):
+        Contract.from_json(json.dumps(content))
+    with pytest.raises(ValueError, match=r"^contract: contract_version is 1; accepted: 2; export it again"):
+        Contract.from_json(json.dumps(content | {"contract_version": 1}))
+
+
 @pytest.mark.parametrize("path", [("tusk",), ("action", "lov"), ("observation", 1, "nome")], ids=spelled)
 def test_an_unknown_key_is_named_with_what_was_meant(path: Path) -> None:
     meant = {"tusk": "task", "lov": "low", "nome": "name"}[str(path[-1])]
@@ -175,6 +185,13 @@ def test_an_unknown_key_is_named_with_what_was_meant(path: Path) -> None:
         (("latency_s",), 0.07, "within latency_range_s"),
         (("latency_range_s",), [0.06, 0.04], "two rising numbers"),
         (("latency_range_s",), [-0.01, 0.06], "two rising numbers"),
+        (("latency_range_s",), [0.04, 1.1], "two rising numbers of seconds in [0, 1]"),
+        (("latency_range_s",), [0.04, 0.05, 0.06], "a list of 2 numbers"),
+        (("latency_range_s",), ["0.04", 0.06], "latency_range_s[0] is '0.04'; accepted: a finite number"),
+        (("latency_range_s",), 0.05, "a list of 2 numbers"),
+        (("images", 0, "latency_range_s"), [0.03, 0.02], "images[0].latency_range_s is [0.03, 0.02]; accepted: two"),
+        (("images", 0, "reach_m"), [5.0, 1.0], "two rising numbers of metres"),
+        (("observation_latency_range_s",), [0.0, 1e6], "two rising numbers of seconds in [0, 1]"),
         (("observation_latency_range_s",), [0.0], "a list of 2 numbers"),
         (("observation", 0, "frame"), "body_world", "'world' or 'body'"),
         (("observation", 0, "size"), 0, "a whole number, 1 or more"),
@@ -187,6 +204,11 @@ def test_an_unknown_key_is_named_with_what_was_meant(path: Path) -> None:
         (("observation",), [EXAMPLE["observation"][1]] * 2, "different names"),
         (("images",), None, "a list of images"),
         (("memory_size",), -1, "a whole number, 0 or more"),
+        (("memory_size",), 32.0, "a whole number, 0 or more"),
+        (("action", "low"), [-0.1, -10.0, -10.0, -4.0], "collective thrust, is [-0.1, 27.3]; accepted: from 0 or more"),
+        (("action", "low"), [9.9, -10.0, -10.0, -4.0], "below 9.81 m/s^2, to more than it, which hovers"),
+        (("action", "high"), [9.7, 10.0, 10.0, 4.0], "is [0.0, 9.7]; accepted: from 0 or more, below 9.81 m/s^2"),
+        (("action", "high"), [27.3, 10.0, 10.0, -4.0], "four numbers below action.high"),
         (("action", "mode"), "rates", "'ctbr'"),
         (("action", "mode"), "velocity", "as action.mode is 'velocity'"),
         (("action", "units"), ["m/s^2", "deg/s", "deg/s", "deg/s"], "'rad/s'"),

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from e2efly.deploy.delay_watch import Delay, DelayWatch, delay_of, delay_problem, felt, turned
 from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.pilot.delay_watch import Delay, DelayWatch, delay_of, delay_problem, felt, turned
 from e2efly.deploy.pose.tracking import rotation_between
 
 LENGTH_S = 3.5

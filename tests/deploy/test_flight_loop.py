@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from e2efly.deploy.flight_loop import fly, plan_of
-from e2efly.deploy.flight_state import Flight, Mode
-from e2efly.deploy.throttle_map import ThrottleMap
+from e2efly.deploy.pilot.flight_state import Flight, Mode
+from e2efly.deploy.pilot.throttle_map import ThrottleMap
 from e2efly.vehicles import load_vehicle
 from tests.deploy.test_sticks import STICKS
 

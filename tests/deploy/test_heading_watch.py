@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from e2efly.deploy.heading_watch import HeadingWatch, watched
-from e2efly.deploy.msp.messages import Attitude
+from e2efly.deploy.attitude import Attitude
 from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.pilot.heading_watch import HeadingWatch, watched
 from e2efly.vehicles.vehicle import GRAVITY
 
 RATE = 100.0

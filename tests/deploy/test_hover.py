@@ -9,7 +9,9 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from e2efly.control import CASCADE
-from e2efly.deploy.hover import (
+from e2efly.deploy.attitude import Attitude
+from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.pilot.hover import (
     LEVEL_RATE,
     SINK_SPEED,
     SINK_TIME,
@@ -21,8 +23,6 @@ from e2efly.deploy.hover import (
     roll_pitch,
     sink_time,
 )
-from e2efly.deploy.msp.messages import Attitude
-from e2efly.deploy.odometry import Odometry
 from e2efly.vehicles import Vehicle, load_vehicle, vehicle_names
 from e2efly.vehicles.vehicle import GRAVITY
 

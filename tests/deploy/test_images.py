@@ -10,18 +10,19 @@ import numpy as np
 import pytest
 
 from e2efly import presets
-from e2efly.commands.fly import Fly, fly_command
-from e2efly.commands.validate import validate_command
+from e2efly.commands.fly import Fly
+from e2efly.commands.fly import run as fly_command
 from e2efly.config import CameraConfig, EnvConfig, NetworkConfig
-from e2efly.deploy.contract import Contract
-from e2efly.deploy.goal_options import GoalOptions, goal_for
-from e2efly.deploy.images import Image
 from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.policy import Policy, load_policy
-from e2efly.deploy.runtime import Runtime, act, begin
+from e2efly.deploy.policy.contract import Contract
+from e2efly.deploy.policy.images import Image
+from e2efly.deploy.policy.loader import Policy, load_policy
+from e2efly.deploy.policy.runtime import Runtime, act, begin
 from e2efly.env import Env
 from e2efly.learn.export import contract_of, export_policy
 from e2efly.learn.networks import Actor
+from e2efly.tasks.route import course_for
+from e2efly.validation.validate import validate
 from e2efly.vehicles import load_vehicle
 from tests.deploy.test_contract import EXAMPLE
 
@@ -144,18 +145,18 @@ def test_images_of_a_contract_agree_with_each_other_and_with_the_rate() -> None:
 def test_no_camera_no_flight(path: Path, policy: Policy) -> None:
     """Neither bridge nor validation has images: refused before anything is opened."""
     message = r"image 'image_0' \(depth, 2 rows, 4 columns\): there is no camera; accepted: a policy without images"
-    goal = goal_for(policy.contract, GoalOptions(), VEHICLE)
+    goal = course_for(policy.contract, VEHICLE)
     with pytest.raises(ValueError, match=message):
         Runtime.of(policy, goal, VEHICLE)
     with pytest.raises(ValueError, match=message):
         fly_command(Fly(link="nowhere:1", pose="nowhere:1", policy=path))
     with pytest.raises(ValueError, match=message):
-        validate_command(path, "simulator", None, None, 5.0, None, 0)
+        validate(path, "simulator")
 
 
 def test_the_runtime_hands_the_memory_on(tmp_path: Path) -> None:
     policy = load_policy(make(tmp_path / "policy.onnx", (), recurrent=3))
-    runtime = Runtime.of(policy, goal_for(policy.contract, GoalOptions(), VEHICLE), VEHICLE)
+    runtime = Runtime.of(policy, course_for(policy.contract, VEHICLE), VEHICLE)
     zero = np.zeros(3)
     still = Odometry(0.0, np.array([0.0, 0.0, 2.0]), zero, np.array([1.0, 0, 0, 0]), zero)
     state, memory = begin(runtime, still, 0.0), None
@@ -163,5 +164,5 @@ def test_the_runtime_hands_the_memory_on(tmp_path: Path) -> None:
         state, decision = act(runtime, state, still, k * runtime.period)
         action, memory = policy.act(decision.observation, memory=memory)
         np.testing.assert_array_equal(decision.action, action)
-        np.testing.assert_array_equal(state.memory, memory)
+        np.testing.assert_array_equal(state.recurrent, memory)
     assert np.abs(memory).max() > 0

@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from e2efly.deploy.inertial import BURIED, Inertial, Measurement, alone, carry, measure, see
-from e2efly.deploy.msp.messages import Attitude
+from e2efly.deploy.attitude import Attitude
 from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.pilot.inertial import BURIED, Inertial, Measurement, alone, carry, measure, see
 from e2efly.vehicles.vehicle import GRAVITY
 
 DT = 0.02

@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from e2efly.deploy.flight_state import Mission
-from e2efly.deploy.instruments import ARM, FAILSAFE, OVERRIDE, Instruments, Reading
-from e2efly.deploy.msp.client import Client, Reply
-from e2efly.deploy.msp.messages import Rc, StatusEx
+from e2efly.deploy.betaflight.client import Client, Reply
+from e2efly.deploy.betaflight.instruments import ARM, FAILSAFE, OVERRIDE, Instruments, Reading
+from e2efly.deploy.betaflight.messages import Rc, StatusEx
+from e2efly.deploy.pilot.flight_state import Mission
 from e2efly.deploy.settings import FlightSettings
 from tests.deploy.test_msp_client import Wire
 

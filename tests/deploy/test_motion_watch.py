@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from e2efly.control.vectors import Quat
-from e2efly.deploy.motion_watch import MotionWatch, feel, see
-from e2efly.deploy.msp.messages import Attitude
+from e2efly.deploy.attitude import Attitude
 from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.pilot.motion_watch import MotionWatch, feel, see
 from e2efly.vehicles.vehicle import GRAVITY
 
 RATE = 50.0

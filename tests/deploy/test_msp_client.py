@@ -7,11 +7,11 @@ from contextlib import contextmanager
 
 import pytest
 
-from e2efly.deploy.msp import messages, settings
-from e2efly.deploy.msp.client import FORGOTTEN, MAX_BACKLOG, MAX_IN_FLIGHT, SCHEDULE, TIMEOUT, Client, ask
-from e2efly.deploy.msp.codec import ERROR, REPLY, Decoder, Frame, encode
-from e2efly.deploy.msp.controller import identify
-from e2efly.deploy.msp.link import MOST, open_link
+from e2efly.deploy.betaflight import messages, settings
+from e2efly.deploy.betaflight.client import FORGOTTEN, MAX_BACKLOG, MAX_IN_FLIGHT, SCHEDULE, TIMEOUT, Client, ask
+from e2efly.deploy.betaflight.codec import ERROR, REPLY, Decoder, Frame, encode
+from e2efly.deploy.betaflight.controller import identify
+from e2efly.deploy.betaflight.link import MOST, open_link
 from tests.deploy.msp_golden import REPLIES, payload
 
 STICKS = messages.set_raw_rc([1500] * 8)
@@ -53,7 +53,7 @@ def test_a_reply_is_kept_with_its_time_and_latency() -> None:
     assert len(wire.sent) == 1
     wire.answer()
     client.poll(1.2)
-    assert client.latest[108].message == messages.Attitude(0.0, 0.0, 0.0)
+    assert client.latest[108].message == messages.AttitudeReply(0.0, 0.0, 0.0)
     assert (client.latest[108].time, client.latest[108].latency) == (1.2, pytest.approx(0.2))
     assert client.message(108, 1.3, 0.2) is not None
     assert client.message(108, 1.5, 0.2) is None
@@ -89,7 +89,7 @@ def test_of_a_flood_the_newest_bytes_are_read_and_the_answer_at_its_end_is_found
     wire.inbox = junk
     wire.answer()
     client.poll(1.01)
-    assert client.message(108, 1.01, 0.1) == messages.Attitude(0.0, 0.0, 0.0)
+    assert client.message(108, 1.01, 0.1) == messages.AttitudeReply(0.0, 0.0, 0.0)
     assert fed == [MOST]
     assert client.link.inbox == b""  # nothing old waits: what comes next is read at once
 

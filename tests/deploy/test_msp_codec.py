@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from e2efly.deploy.msp.codec import ERROR, MAX_PAYLOAD, REPLY, REQUEST, Decoder, Frame, encode
+from e2efly.deploy.betaflight.codec import ERROR, MAX_PAYLOAD, REPLY, REQUEST, Decoder, Frame, encode
 from tests.deploy.msp_golden import REPLIES, UNKNOWN
 
 frames = st.one_of(

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.deploy.msp.link import FIRST_RETRY, LONGEST_RETRY, MAX_UNSENT, StreamLink, open_link
+from e2efly.deploy.betaflight.link import FIRST_RETRY, LONGEST_RETRY, MAX_UNSENT, StreamLink, open_link
 
 
 def until(done: Callable[[], object], seconds: float = 10.0) -> None:

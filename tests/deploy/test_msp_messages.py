@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from e2efly.deploy.msp import messages, settings
-from e2efly.deploy.msp.client import MESSAGES
-from e2efly.deploy.msp.names import BOXES, arming_disabled, bits
+from e2efly.deploy.betaflight import messages, settings
+from e2efly.deploy.betaflight.client import MESSAGES
+from e2efly.deploy.betaflight.names import BOXES, arming_disabled, bits
 from tests.deploy.msp_golden import GOLDEN, REPLIES, payload
 
 
@@ -61,7 +61,7 @@ def test_body_rates_are_flu_as_the_firmware_senses_them() -> None:
 
 def test_attitude_and_acceleration_are_flu_as_the_firmware_senses_them() -> None:
     tilted = GOLDEN["tilted"]
-    attitude = messages.Attitude.parse(payload(tilted["attitude"]))
+    attitude = messages.AttitudeReply.parse(payload(tilted["attitude"]))
     assert (attitude.roll, attitude.pitch) == pytest.approx((tilted["roll"], tilted["pitch"]), abs=2e-3)
     assert attitude.yaw == pytest.approx(0.5, abs=0.01)
     roll, pitch = tilted["roll"], tilted["pitch"]
@@ -72,7 +72,7 @@ def test_attitude_and_acceleration_are_flu_as_the_firmware_senses_them() -> None
 
 @pytest.mark.parametrize(("heading", "yaw"), [(0, 0.0), (90, -math.pi / 2), (180, math.pi), (350, math.radians(10))])
 def test_yaw_is_positive_to_the_left(heading: int, yaw: float) -> None:
-    assert messages.Attitude.parse(struct.pack("<3h", 0, 0, heading)).yaw == pytest.approx(yaw)
+    assert messages.AttitudeReply.parse(struct.pack("<3h", 0, 0, heading)).yaw == pytest.approx(yaw)
 
 
 def test_status_with_modes_beyond_32_and_the_older_last_flag() -> None:
@@ -117,6 +117,13 @@ def test_any_payload_parses_or_is_refused(kind: type, data: bytes) -> None:
         kind.parse(data)
     except ValueError as error:
         assert len(str(error)) > 10
+
+
+def test_what_stands_between_throttle_and_motors() -> None:
+    assert golden(settings.PidAdvanced) == settings.PidAdvanced(5, 100, 0, 0)
+    payload = bytearray(57)
+    payload[30], payload[47], payload[55], payload[56] = 1, 2, 3, 4
+    assert settings.PidAdvanced.parse(bytes(payload)) == settings.PidAdvanced(1, 2, 3, 4)
 
 
 def test_a_map_that_is_no_permutation_is_refused() -> None:

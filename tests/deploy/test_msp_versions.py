@@ -4,9 +4,9 @@ import struct
 
 import pytest
 
-from e2efly.deploy.msp.messages import FcVersion, StatusEx
-from e2efly.deploy.msp.names import BOXES
-from e2efly.deploy.msp.versions import RELEASES, release_of, version_text
+from e2efly.deploy.betaflight.messages import FcVersion, StatusEx
+from e2efly.deploy.betaflight.names import BOXES
+from e2efly.deploy.betaflight.versions import RELEASES, release_of, version_text
 
 NEWEST = RELEASES[-1]
 

@@ -2,6 +2,7 @@
 
 import ast
 import dataclasses
+import json
 import os
 import re
 import subprocess
@@ -17,13 +18,14 @@ from onnx import TensorProto, helper, numpy_helper
 import e2efly.deploy
 from e2efly import presets
 from e2efly.config import NetworkConfig
-from e2efly.deploy.contract import METADATA_KEY
-from e2efly.deploy.onnx_file import sealed
-from e2efly.deploy.policy import Policy, load_policy, sealed_policy
+from e2efly.deploy.policy.contract import METADATA_KEY
+from e2efly.deploy.policy.loader import Policy, load_policy, sealed_policy
+from e2efly.deploy.policy.onnx_file import sealed
 from e2efly.env import Env
 from e2efly.learn.export import contract_of, export_policy, random_observations
 from e2efly.learn.networks import Actor, Weights, init_mlp
 from e2efly.vehicles import load_vehicle
+from e2efly.zoo import policy_file
 
 Change = Callable[[onnx.ModelProto], None]
 
@@ -361,6 +363,18 @@ def test_a_file_that_contradicts_its_contract_is_refused(
         load_policy(out)
 
 
+@pytest.mark.parametrize(("task", "said"), [("hover", 0), ("hover", 32), ("hover_aware", 8)])
+def test_a_contract_that_knows_another_memory_than_the_graph_is_refused(task: str, said: int, tmp_path: Path) -> None:
+    file, out = policy_file(task), tmp_path / "policy.onnx"
+    has = load_policy(file).contract.memory_size
+    model = onnx.load(str(file))
+    contract = json.loads(model.metadata_props[0].value) | {"memory_size": said}
+    _metadata(json.dumps(contract))(model)
+    out.write_bytes(sealed(model.SerializeToString()))
+    with pytest.raises(ValueError, match=f"memory_size is {said} in the contract; accepted: {has}, the numbers of mem"):
+        load_policy(out)
+
+
 def test_metadata_that_is_no_text_is_refused(path: Path, tmp_path: Path) -> None:
     content, out = path.read_bytes(), tmp_path / "bytes.onnx"
     assert content.count(b'"task"') == 1
@@ -370,23 +384,26 @@ def test_metadata_that_is_no_text_is_refused(path: Path, tmp_path: Path) -> None
 
 
 def test_loading_imports_no_jax_and_no_simulator(path: Path) -> None:
-    code = f"import sys; from e2efly.deploy.policy import load_policy; load_policy({str(path)!r}); print(*sys.modules)"
+    code = f"import sys; from e2efly import load_policy; load_policy({str(path)!r}); print(*sys.modules)"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     out = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     loaded = out.stdout.split()
-    assert "e2efly.deploy.policy" in loaded
+    assert "e2efly.deploy.policy.loader" in loaded
     ours = {name.split(".")[1] for name in loaded if name.startswith("e2efly.")}
-    assert ours == {"deploy", "observation", "vehicles"}
+    assert ours == {"control", "deploy", "observation", "storage", "vehicles", "zoo"}
     assert not {"jax", "jaxlib", "jaxtyping", "onnx", "optax", "scipy", "matplotlib"} & set(loaded)
 
 
-OURS = ("control", "courses", "deploy", "observation", "process", "storage", "vehicles")
+OURS = (
+    "control", "courses", "deploy", "goal", "numbers", "observation", "process", "registry", "storage", "vehicles",
+    "zoo",
+)  # fmt: skip
 """Parts of the package that flight may import."""
 
 
 def test_no_file_of_deploy_names_jax_or_the_simulator() -> None:
     files = sorted(file for folder in e2efly.deploy.__path__ for file in Path(folder).glob("**/*.py"))
-    assert {"contract.py", "policy.py"} <= {file.name for file in files}
+    assert {"contract.py", "loader.py"} <= {file.name for file in files}
     for file in files:
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []

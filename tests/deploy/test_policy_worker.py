@@ -16,16 +16,17 @@ import pytest
 
 from e2efly import presets
 from e2efly.config import NetworkConfig
-from e2efly.deploy import policy_worker, runtime
-from e2efly.deploy.goal_options import GoalOptions, goal_for
 from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.onnx_file import sealed
-from e2efly.deploy.policy import load_policy
-from e2efly.deploy.policy_worker import PolicyWorker
-from e2efly.deploy.runtime import Runtime
+from e2efly.deploy.policy import runtime
+from e2efly.deploy.policy import worker as worker_module
+from e2efly.deploy.policy.loader import load_policy
+from e2efly.deploy.policy.onnx_file import sealed
+from e2efly.deploy.policy.runtime import Runtime
+from e2efly.deploy.policy.worker import PolicyWorker
 from e2efly.env import Env
 from e2efly.learn.export import contract_of, export_policy
 from e2efly.learn.networks import Actor, Weights, init_mlp
+from e2efly.tasks.route import course_for
 from e2efly.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
@@ -48,7 +49,7 @@ def policy_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def flight(path: Path) -> Runtime:
     policy = load_policy(path)
-    return Runtime.of(policy, goal_for(policy.contract, GoalOptions(), VEHICLE), VEHICLE)
+    return Runtime.of(policy, course_for(policy.contract, VEHICLE), VEHICLE)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +79,7 @@ STILL = Odometry(START, np.array([0.0, 0.0, 1.0]), ZERO, np.array([1.0, 0, 0, 0]
 
 
 def misbehave(monkeypatch: pytest.MonkeyPatch, act: Callable[..., Any]) -> None:
-    monkeypatch.setattr(policy_worker, "act", act)
+    monkeypatch.setattr(worker_module, "act", act)
 
 
 def test_it_decides_when_due_on_a_grid_without_drift(workers: Workers) -> None:
@@ -124,7 +125,8 @@ def test_a_policy_of_nan_is_a_problem_and_decides_nothing(policy_file: Path, tmp
     path = tmp_path / "policy.onnx"
     path.write_bytes(sealed(model.SerializeToString()))
     worker = workers(of=flight(path))
-    at_goal = np.asarray(worker.runtime.goal.position(None, START))
+    course = worker.runtime.course
+    at_goal = np.asarray(course.goal.goal(course.memory, np.zeros(1)))[0]
     worker.start(dataclasses.replace(STILL, position=at_goal), START)
     assert worker.step(dataclasses.replace(STILL, position=at_goal), START, 0.0, None), worker.problem
     decision = worker.decision
@@ -210,11 +212,19 @@ def test_a_goal_that_can_no_longer_be_reached_is_a_problem_and_one_that_is_reach
     workers: Workers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     worker = workers()
-    monkeypatch.setattr(type(worker.runtime.goal), "failed", lambda *_: "gate 2 missed")
+    asked = worker_module.act
+    said = {"failure": "gate 2 missed"}
+
+    def answer(*question: Any) -> Any:
+        state, decision = asked(*question)
+        return dataclasses.replace(state, **said), decision
+
+    monkeypatch.setattr(worker_module, "act", answer)
     assert not worker.done
     assert worker.step(STILL, START, 0.0, None)
     assert worker.problem == "gate 2 missed"
-    monkeypatch.setattr(type(worker.runtime.goal), "done", lambda *_: True)
+    said = {"done": True}
+    assert worker.step(STILL, START + worker.runtime.period, 0.0, None)
     assert worker.done
 
 
@@ -222,10 +232,10 @@ def test_a_policy_that_never_answers_does_not_keep_the_program_from_ending() -> 
     code = """
 import threading
 from types import SimpleNamespace
-from e2efly.deploy import policy_worker
-policy_worker.act = lambda *_: threading.Event().wait()
-policy_worker.due = lambda *_: 0.0
-worker = policy_worker.PolicyWorker(None, 0.01)
+from e2efly.deploy.policy import worker as worker_module
+worker_module.act = lambda *_: threading.Event().wait()
+worker_module.due = lambda *_: 0.0
+worker = worker_module.PolicyWorker(None, 0.01)
 worker.state = SimpleNamespace()
 assert not worker.step(None, 1.0, 0.0, None)
 assert worker.problem.startswith("late"), worker.problem

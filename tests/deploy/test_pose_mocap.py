@@ -17,7 +17,7 @@ import pytest
 
 from e2efly.deploy.pose import relay
 from e2efly.deploy.pose.relay import RelaySource
-from e2efly.deploy.pose.source import open_source
+from e2efly.deploy.pose.sources import open_source
 
 CONNECT, SERVER_INFO, REQUEST_MODEL, MODEL, FRAME = 0, 1, 4, 5, 7
 BODY, NUMBER = b"quad", 7
@@ -179,7 +179,7 @@ def test_closing_ends_a_client_that_waits_for_a_frame(server: Server) -> None:
 def test_the_client_ends_with_the_bridge_however_that_ends() -> None:
     code = (
         "import os, signal\n"
-        "from e2efly.deploy.pose.source import open_source\n"
+        "from e2efly.deploy.pose.sources import open_source\n"
         "print(open_source('mocap:mock:localhost:quad')._process.pid, flush=True)\n"
         "os.kill(os.getpid(), signal.SIGKILL)\n"
     )

@@ -12,7 +12,8 @@ import pytest
 
 from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pose.relay import SYSTEM_PYTHON, RelaySource
-from e2efly.deploy.pose.source import PoseSource, open_source
+from e2efly.deploy.pose.source import PoseSource
+from e2efly.deploy.pose.sources import open_source
 
 PACKAGES = "apt-get install python3-roslaunch python3-rosmaster python3-rospy python3-nav-msgs python3-geometry-msgs"
 PUBLISHER = """

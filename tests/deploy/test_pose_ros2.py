@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from e2efly.deploy.odometry import Sample
-from e2efly.deploy.pose.source import PoseSource, open_source
+from e2efly.deploy.pose.source import PoseSource
+from e2efly.deploy.pose.sources import open_source
 
 PACKAGES = 'pip install "ros-rclpy[fastrtps]" ros-nav-msgs ros-geometry-msgs'
 PUBLISHER = """

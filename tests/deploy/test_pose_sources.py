@@ -15,9 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from e2efly.deploy.odometry import Sample
-from e2efly.deploy.pose.json_source import DRAIN, LONGEST, Lines, TcpSource, UdpSource, parse_pose
+from e2efly.deploy.pose.json_source import LONGEST, Lines, parse_pose
 from e2efly.deploy.pose.relay import RelaySource
-from e2efly.deploy.pose.source import LARGEST_BATCH, PlantSource, PoseSource, open_source
+from e2efly.deploy.pose.source import LARGEST_BATCH, PlantSource, PoseSource
+from e2efly.deploy.pose.sources import open_source
+from e2efly.deploy.pose.sources.tcp import TcpSource
+from e2efly.deploy.pose.sources.udp import DRAIN, UdpSource
 
 POSE = {"position": [1, 2.5, -3], "quaternion": [0.5, 0.5, -0.5, 0.5]}
 FULL = {**POSE, "velocity": [0, 1, 2], "body_rate": [3, 4, 5], "stamp": 12.25, "frame": "map"}
@@ -384,8 +387,8 @@ def test_a_plant_is_read_and_its_exceptions_do_not_escape() -> None:
 @pytest.mark.parametrize(
     ("text", "accepted"),
     [
-        ("", "udp:PORT .*; tcp:HOST:PORT; mocap:.*; ros1:/topic; ros2:/topic"),
-        ("serial:9870", "udp:PORT"),
+        ("", "mocap:.*; ros1:/topic; ros2:/topic; tcp:HOST:PORT; udp:PORT .*; or path/to/file.py:Name"),
+        ("serial:9870", "mocap:.*udp:PORT"),
         ("udp:", "udp:PORT or udp:HOST:PORT"),
         ("udp:0", "udp:PORT"),
         ("udp:127.0.0.1:70000", "udp:PORT"),
@@ -403,7 +406,7 @@ def test_a_source_that_makes_no_sense_is_refused(text: str, accepted: str) -> No
 def test_sources_leave_no_thread_and_import_nothing_heavy() -> None:
     code = (
         "import sys, threading, time\n"
-        "from e2efly.deploy.pose.source import open_source\n"
+        "from e2efly.deploy.pose.sources import open_source\n"
         "import e2efly.deploy.pose.tracking\n"
         "open_source('tcp:127.0.0.1:9').read(time.monotonic())\n"
         "assert threading.active_count() == 1\n"
@@ -411,3 +414,50 @@ def test_sources_leave_no_thread_and_import_nothing_heavy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.stdout, done.stderr) == ("[]\n", "")
+
+
+# A source of one's own
+
+OWN = """
+import e2efly
+from e2efly.deploy.odometry import Sample
+
+
+@e2efly.register_pose_source("beacon", "beacon:HEIGHT")
+class Beacon:
+    refused, problem = 0, None
+
+    def __init__(self, where):
+        self.height = float(where)
+
+    def read(self, now):
+        return [Sample(now, (0.0, 0.0, self.height), (1.0, 0.0, 0.0, 0.0))]
+
+    def close(self):
+        pass
+
+    def describe(self):
+        return "beacon"
+
+
+class Mute:
+    def __init__(self, where):
+        pass
+"""
+
+
+def test_a_source_of_ones_own_is_opened_by_reference_and_by_name(tmp_path: Path) -> None:
+    file = tmp_path / "beacon.py"
+    file.write_text(OWN)
+    source = open_source(f"{file}:Beacon:1.5")
+    assert source.read(3.0)[0].position == (0.0, 0.0, 1.5)
+    assert open_source("beacon:2").read(0.0)[0].position == (0.0, 0.0, 2.0)  # registered by now
+    with pytest.raises(ValueError, match=r"beacon.py:Mute has no refused, problem, read, close, describe; accepted"):
+        open_source(f"{file}:Mute")
+    with pytest.raises(ValueError, match=r"unknown name in .*beacon.py 'Beakon'; did you mean 'Beacon'"):
+        open_source(f"{file}:Beakon")
+    with pytest.raises(ValueError, match=r"there is no file .*nowhere.py"):
+        open_source("nowhere.py:Beacon:1")
+    (tmp_path / "twice.py").write_text(OWN)
+    with pytest.raises(ValueError, match=r"pose source 'beacon' of .*twice.py:Beacon is also the name of .*beacon.py"):
+        open_source(f"{tmp_path}/twice.py:Beacon:1")

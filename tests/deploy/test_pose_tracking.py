@@ -58,7 +58,7 @@ REFUSALS = {
     "order": (sample(0.485), "its stamp is 0.005 s before the last"),
     "order same": (sample(0.49), "its stamp is 0 s before the last; accepted: later"),
     "late": (sample(0.5, received=50.8), "0.3 s later than the quickest; accepted: at most 0.1 s"),
-    "speed": (sample(0.5, velocity=np.array([0, -16.0, 0])), "velocity is .* at most 15 an axis"),
+    "speed": (sample(0.5, velocity=np.array([0, -16.0, 0])), "velocity is .* at most 15 per axis"),
     "velocity": (sample(0.5, velocity=np.array([3.0, 0, 0])), "3 from how the position changes"),
     "jump": (sample(0.5, x=1.0), "by 1 m and 0 rad within 0.01 s; accepted: at most 0.2 m and 0.55 rad"),
     "jump attitude": (sample(0.5, quaternion=turned(1.0)), "by .* m and 1 rad"),

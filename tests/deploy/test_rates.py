@@ -8,8 +8,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from e2efly.deploy.msp.settings import RcTuning
-from e2efly.deploy.rates import (
+from e2efly.deploy.betaflight.rates import (
     RATES_TYPES,
     RateProfile,
     channel_to_stick,
@@ -17,7 +16,8 @@ from e2efly.deploy.rates import (
     stick_to_channel,
     stick_to_rate,
 )
-from e2efly.deploy.throttle_curve import ThrottleCurve
+from e2efly.deploy.betaflight.settings import RcTuning
+from e2efly.deploy.betaflight.throttle_curve import ThrottleCurve
 from tests.deploy.msp_golden import GOLDEN, payload
 
 MIN_CHECK = 1040

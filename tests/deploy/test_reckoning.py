@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from e2efly.deploy.hover import blind_time
-from e2efly.deploy.msp.messages import Attitude
+from e2efly.deploy.attitude import Attitude
 from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.reckoning import BRAKE_S, DOUBT, LONGEST_STEP, Reckoning, reckon, seen, settle, trimmed
+from e2efly.deploy.pilot.hover import blind_time
+from e2efly.deploy.pilot.reckoning import BRAKE_S, DOUBT, LONGEST_STEP, Reckoning, reckon, seen, settle, trimmed
 from e2efly.vehicles.vehicle import GRAVITY
 
 DT = 0.02

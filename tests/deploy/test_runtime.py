@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +20,17 @@ import pytest
 from e2efly import presets
 from e2efly.config import EnvConfig, ImuConfig, NetworkConfig, TaskConfig
 from e2efly.courses.tracks import load_track
-from e2efly.deploy.contract import Contract
-from e2efly.deploy.goal_options import GoalOptions, goal_for
 from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.policy import Policy, load_policy
-from e2efly.deploy.runtime import Envelope, Imu, Runtime, RuntimeState, act, begin, check, due, outside
+from e2efly.deploy.policy.contract import Contract
+from e2efly.deploy.policy.loader import Policy, load_policy
+from e2efly.deploy.policy.runtime import Envelope, Imu, Runtime, RuntimeState, act, begin, check, due, outside
 from e2efly.env import Env, EnvState, random_key
 from e2efly.learn.export import contract_of, export_policy
 from e2efly.learn.networks import Actor, Weights, init_mlp
 from e2efly.tasks import TASKS
+from e2efly.tasks.race.goal import RaceRoute
+from e2efly.tasks.route import Route, course_for, fields_of
+from e2efly.tasks.track.goal import TrackRoute
 from e2efly.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
@@ -62,7 +65,7 @@ def policy(hovering: Path) -> Policy:
 
 @pytest.fixture(scope="module")
 def runtime(policy: Policy) -> Runtime:
-    return Runtime.of(policy, goal_for(policy.contract, GoalOptions(), VEHICLE), VEHICLE)
+    return Runtime.of(policy, course_for(policy.contract, VEHICLE), VEHICLE)
 
 
 def odometry(state: EnvState, row: int, time: float = START) -> Odometry:
@@ -77,15 +80,15 @@ def still(position: Any = (0.0, 0.0, 2.0), **changes: Any) -> Odometry:
     )
 
 
-def options_of(task: TaskConfig, state: EnvState, row: int) -> GoalOptions:
-    """The options that fly what the environment drew."""
+def route_to(task: TaskConfig, state: EnvState, row: int) -> Route | None:
+    """The route that leads along what the environment drew."""
     name = task.name
     if name == "track":
         (x, y, _), (vx, _, _) = np.asarray(state.memory.reference.knots)[row, 0, :2] - np.array([[0, 0, 3], [0, 0, 0]])
         if task.reference == "circle":  # type: ignore[union-attr]
-            return GoalOptions(phase=math.atan2(y, x))
-        return GoalOptions(reference="lemniscate", phase=math.atan2(x / 2, vx / (2 * 3 / (2 * math.sqrt(2)))))
-    return GoalOptions(laps=0) if name == "race" else GoalOptions()
+            return TrackRoute(phase=math.atan2(y, x))
+        return TrackRoute(reference="lemniscate", phase=math.atan2(x / 2, vx / (2 * 3 / (2 * math.sqrt(2)))))
+    return RaceRoute(laps=0) if name == "race" else None
 
 
 def compare(decision: Any, state: RuntimeState, wanted: np.ndarray, contract: Contract) -> None:
@@ -123,10 +126,10 @@ def test_it_sees_in_flight_what_the_environment_shows(name: str, imu: bool, tmp_
     loaded, n, steps = load_policy(path), 2, round(float(env.task.episode_s) / env.control_period)
     contract = loaded.contract
     state, observation = jax.jit(env.reset, static_argnums=1)(random_key(3), n)
-    goals = [goal_for(contract, options_of(task, state, row), VEHICLE) for row in range(n)]
-    flights = [Runtime.of(loaded, goal, VEHICLE, 30.0, imu=imu) for goal in goals]
+    courses = [course_for(contract, VEHICLE, route_to(task, state, row)) for row in range(n)]
+    flights = [Runtime.of(loaded, course, VEHICLE, 30.0, imu=imu) for course in courses]
     begun = [begin(flight, odometry(state, row), START) for row, flight in enumerate(flights)]
-    advance = jax.jit(env.advance)
+    advance = jax.jit(partial(env.step, restart=False))
     for k in range(steps):
         actions = []
         for row, flight in enumerate(flights):
@@ -152,7 +155,7 @@ def test_it_counts_gates_in_flight_as_the_environment_does(track: str, tmp_path:
     task = dataclasses.replace(TASKS["race"].training(), track=track)
     env, path = make(tmp_path, task)
     loaded, course = load_policy(path), load_track(track)
-    flight = Runtime.of(loaded, goal_for(loaded.contract, GoalOptions(track=track, laps=0), VEHICLE), VEHICLE)
+    flight = Runtime.of(loaded, course_for(loaded.contract, VEHICLE, RaceRoute(track=track, laps=0)), VEHICLE)
     forward = np.stack([np.cos(course.yaw), np.sin(course.yaw), 0 * course.yaw], -1)
     laps = 2 if course.closed else 1
     middle = np.tile(course.position, (laps, 1))
@@ -179,13 +182,13 @@ def test_it_counts_gates_in_flight_as_the_environment_does(track: str, tmp_path:
         actions = jnp.concatenate([jnp.asarray(decision.action)[None, None], state.actions[:, :-1]], axis=1)
         state = dataclasses.replace(state, actions=actions)
         outcomes.append(racing and bool(outcome.crashed[0]))
-        failures.append(flight.goal.failed(run.goal))
-        assert run.goal.passed == int(memory[0])
-    assert run.goal.passed == len(middle)
+        failures.append(run.failure)
+        assert run.task[0] == int(memory[0])
+    assert run.task[0] == len(middle)
     assert sum(outcomes) == 1
     assert failures[: outcomes.index(True)] == [""] * outcomes.index(True)
     assert set(failures[outcomes.index(True) :]) == {"gate 1 of lap 1 missed"}
-    assert flight.goal.done(run.goal) == (not course.closed)
+    assert not run.done  # what has missed a gate has not done its task, whatever comes after
 
 
 def carried(env: Env, state: EnvState, point: np.ndarray) -> EnvState:
@@ -270,11 +273,14 @@ REFUSED: list[tuple[Callable[[Contract], Contract], str]] = [
     (lambda c: _field(c, "velocity", name="air_speed"), "observation field 'air_speed': nothing on board"),
     (lambda c: _field(c, "velocity", frame="body"), "observation field 'velocity' has size 3, frame 'body'"),
     (lambda c: _field(c, "body_rate", unit="deg/s"), "observation field 'body_rate' has .* unit 'deg/s'; accepted: 3"),
-    (lambda c: _field(c, "position_error", unit="cm"), "observation field 'position_error' has .*accepted: 'world'"),
+    (
+        lambda c: _field(c, "position_error", unit="cm"),
+        "observation field 'position_error' has .*accepted: 3, 'world' and 'm'",
+    ),
     (lambda c: _field(c, "past_actions", size=7), "observation field 'past_actions' has size 7; accepted: a multiple"),
     (
         lambda c: _field(c, "velocity", name="gates", unit="m"),
-        r"observation shows the goals \['position_error', 'gates'\]",
+        "observation field 'gates': nothing on board says it",
     ),
     (
         lambda c: _field(c, "body_rate", name="gyroscope"),
@@ -287,33 +293,34 @@ REFUSED: list[tuple[Callable[[Contract], Contract], str]] = [
 def test_what_cannot_fly_is_refused_by_name(
     policy: Policy, change: Callable[[Contract], Contract], message: str
 ) -> None:
-    assert check(policy.contract, VEHICLE, 30.0) == ()
-    reasons = check(change(policy.contract), VEHICLE, 30.0)
+    shown = fields_of(policy.contract)
+    assert check(policy.contract, VEHICLE, shown, 30.0) == ()
+    reasons = check(change(policy.contract), VEHICLE, shown, 30.0)
     assert len(reasons) == 1
     assert re.match(message, reasons[0])
 
 
 def test_all_reasons_are_given_at_once(policy: Policy) -> None:
-    goal = goal_for(policy.contract, GoalOptions(), VEHICLE)
+    goal = course_for(policy.contract, VEHICLE)
     race = make_goal_of_gates()
     with pytest.raises(
         ValueError, match=r"vehicle 'vis_h' has hash(.|\n)*control_rate is 50(.|\n)*envelope.tilt is -1"
     ):
         Runtime.of(policy, goal, load_vehicle("vis_h"), 50.0, envelope=Envelope(tilt=-1.0))
-    with pytest.raises(ValueError, match="goal shows 'gates' of size 6; accepted: a goal of the policy's task 'hover'"):
+    with pytest.raises(ValueError, match=r"observation shows .*; accepted: with gates, as its task is 'hover'"):
         Runtime.of(policy, race, VEHICLE)
 
 
 def make_goal_of_gates() -> Any:
     config = presets.preset("race", "ppo")
     contract = contract_of(Env.of(config.task, config.reward, config.env), config)
-    return goal_for(contract, GoalOptions(), VEHICLE)
+    return course_for(contract, VEHICLE)
 
 
 def test_a_policy_that_sees_an_imu_needs_its_measurements(tmp_path: Path) -> None:
     path = make(tmp_path, TASKS["hover"].training(), EnvConfig(imu=ImuConfig(observed=True)))[1]
     policy = load_policy(path)
-    goal = goal_for(policy.contract, GoalOptions(), VEHICLE)
+    goal = course_for(policy.contract, VEHICLE)
     with pytest.raises(ValueError, match=r"'gyroscope': there is no IMU(.|\n)*'accelerometer': there is no IMU"):
         Runtime.of(policy, goal, VEHICLE)
     runtime = Runtime.of(policy, goal, VEHICLE, imu=True)
@@ -342,7 +349,7 @@ def test_the_envelope(runtime: Runtime) -> None:
 def test_a_race_begins_where_its_track_does_and_heads_as_it_says(tmp_path: Path) -> None:
     """Training begins nowhere else: four_gates at (0, 0, 1.5), heading 45 degrees."""
     policy = load_policy(make(tmp_path, TASKS["race"].training(), EnvConfig())[1])
-    runtime = Runtime.of(policy, goal_for(policy.contract, GoalOptions(), VEHICLE), VEHICLE)
+    runtime = Runtime.of(policy, course_for(policy.contract, VEHICLE), VEHICLE)
 
     def begins(x: float, yaw: float) -> tuple[str, ...]:
         turned = np.array([math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)])
@@ -359,13 +366,13 @@ def test_flying_imports_no_jax_and_no_simulator(hovering: Path) -> None:
     code = f"""
 import sys
 import numpy as np
-from e2efly.deploy.goal_options import GoalOptions, goal_for
+from e2efly.tasks.route import course_for
 from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.policy import load_policy
-from e2efly.deploy.runtime import Runtime, act, begin
+from e2efly.deploy.policy.loader import load_policy
+from e2efly.deploy.policy.runtime import Runtime, act, begin
 from e2efly.vehicles import load_vehicle
 policy, vehicle = load_policy({str(hovering)!r}), load_vehicle("vis_r")
-runtime = Runtime.of(policy, goal_for(policy.contract, GoalOptions(), vehicle), vehicle)
+runtime = Runtime.of(policy, course_for(policy.contract, vehicle), vehicle)
 still = Odometry(0.0, np.ones(3), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3))
 act(runtime, begin(runtime, still, 0.0), still, 0.0)
 print(*sys.modules)
@@ -374,6 +381,7 @@ print(*sys.modules)
     out = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     loaded = out.stdout.split()
     assert {name.split(".")[1] for name in loaded if name.startswith("e2efly.")} == {
-        "courses", "deploy", "observation", "vehicles"
+        "config", "control", "courses", "deploy", "drawing", "goal", "numbers", "observation", "registry",
+        "storage", "tasks", "vehicles", "zoo",
     }  # fmt: skip
     assert not {"jax", "jaxlib", "jaxtyping", "onnx", "optax", "scipy", "matplotlib"} & set(loaded)

@@ -16,7 +16,7 @@ POSITIVE = [
 
 
 def refused(settings: FlightSettings, named: str) -> None:
-    with pytest.raises(ValueError, match=f"^{re.escape(named)}.*; accepted: "):
+    with pytest.raises(ValueError, match=f"^flight.{re.escape(named)}.*; accepted: "):
         check(settings)
 
 
@@ -54,9 +54,9 @@ def test_numbers_that_make_no_sense(name: str, value: object) -> None:
         (Fence(high=(1, 2, math.nan)), "fence.high is"),
         (Fence(high=(1, 2, "3")), "fence.high is"),  # type: ignore[arg-type]
         (Fence(low=None), "fence.low is"),  # type: ignore[arg-type]
-        (Fence(low=(3, 0, 0)), "fence.low and fence.high are 3 and 3.0 in x"),
-        (Fence(low=(0, 5, 0)), "fence.low and fence.high are 5 and 3.0 in y"),
-        (Fence(low=(0, 0, 4.2)), "fence.low and fence.high are 4.2 and 4.5 in z"),
+        (Fence(low=(3, 0, 0)), "fence.low and flight.fence.high are 3 and 3.0 in x"),
+        (Fence(low=(0, 5, 0)), "fence.low and flight.fence.high are 5 and 3.0 in y"),
+        (Fence(low=(0, 0, 4.2)), "fence.low and flight.fence.high are 4.2 and 4.5 in z"),
     ],
 )  # fmt: skip
 def test_a_fence_that_is_none(fence: Fence, named: str) -> None:

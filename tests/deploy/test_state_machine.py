@@ -12,13 +12,13 @@ from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from e2efly.deploy.fence import fence_problem, heading, moved, stopping, tilt_of
-from e2efly.deploy.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Pilot, Reason, Target
-from e2efly.deploy.hover import blind_time
-from e2efly.deploy.landing import FOUND_S, SLOWED_S, has_stood
-from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.odometry import Odometry, tilt_of, yaw_of
+from e2efly.deploy.pilot.fence import fence_problem, moved, stopping
+from e2efly.deploy.pilot.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Pilot, Reason, Target
+from e2efly.deploy.pilot.hover import blind_time
+from e2efly.deploy.pilot.landing import FOUND_S, SLOWED_S, has_stood
+from e2efly.deploy.pilot.state_machine import FALLEN_S, LONGEST_STEP, NEAR_GROUND, step
 from e2efly.deploy.settings import Fence, FlightSettings
-from e2efly.deploy.state_machine import FALLEN_S, LONGEST_STEP, NEAR_GROUND, step
 
 SETTINGS = FlightSettings()
 DT = 0.01
@@ -683,7 +683,7 @@ def test_heading_and_tilt(yaw: float, pitch: float, roll: float) -> None:
     q = compose(compose(half(yaw, 2), half(pitch, 1)), half(roll, 0))
     R = turn(yaw, 2) @ turn(pitch, 1) @ turn(roll, 0)
     assert tilt_of(q) == pytest.approx(math.acos(max(-1.0, min(1.0, R[2, 2]))), abs=1e-6)
-    assert math.cos(heading(q) - yaw) == pytest.approx(1.0)
+    assert math.cos(yaw_of(q) - yaw) == pytest.approx(1.0)
 
 
 # What no sequence of inputs may bring about

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from e2efly.deploy.msp import settings
-from e2efly.deploy.msp.controller import ControllerInfo
-from e2efly.deploy.msp.messages import BuildInfo, Name
-from e2efly.deploy.msp.settings import RcTuning
-from e2efly.deploy.rates import RateProfile
-from e2efly.deploy.sticks import Sticks, sticks_of
-from e2efly.deploy.throttle_curve import ThrottleCurve
+from e2efly.deploy.betaflight import settings
+from e2efly.deploy.betaflight.controller import ControllerInfo
+from e2efly.deploy.betaflight.messages import BuildInfo, Name
+from e2efly.deploy.betaflight.rates import RateProfile
+from e2efly.deploy.betaflight.settings import RcTuning
+from e2efly.deploy.betaflight.sticks import Sticks, sticks_of
+from e2efly.deploy.betaflight.throttle_curve import ThrottleCurve
 from tests.deploy.msp_golden import GOLDEN, REPLIES, payload
 
 LINEAR = RateProfile("ACTUAL", (67, 67, 67), (67, 67, 67), (0, 0, 0))
@@ -33,7 +33,8 @@ def recorded() -> ControllerInfo:
         throttle=replace(tuning.throttle, min_check=rx.min_check), rx=rx, rx_map=read(settings.RxMap),
         deadband=read(settings.RcDeadband), failsafe=read(settings.FailsafeConfig), rx_fail=read(settings.RxFailConfig),
         modes=read(settings.ModeRanges).ranges, box_ids=read(settings.BoxIds).ids, motor=read(settings.MotorConfig),
-        advanced=read(settings.AdvancedConfig), mixer=read(settings.MixerConfig),
+        advanced=read(settings.AdvancedConfig), pid_advanced=read(settings.PidAdvanced),
+        mixer=read(settings.MixerConfig),
         alignment=read(settings.BoardAlignment),
     )  # fmt: skip
 

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from e2efly.deploy import telemetry
-from e2efly.deploy.channels import CHANNELS, channel_table
-from e2efly.deploy.flight_log import read_log
-from e2efly.deploy.telemetry import Telemetry
+from e2efly.deploy.log import telemetry
+from e2efly.deploy.log.channels import CHANNELS, channel_table
+from e2efly.deploy.log.flight_log import read_log
+from e2efly.deploy.log.telemetry import Telemetry
 
 ROOT = Path(__file__).parents[2]
 
@@ -201,7 +201,7 @@ def test_an_existing_file_and_a_folder_that_cannot_be_are_refused(tmp_path: Path
 
 FLYING = """
 import sys, time
-from e2efly.deploy.telemetry import Telemetry
+from e2efly.deploy.log.telemetry import Telemetry
 log = Telemetry(sys.argv[1])
 step = 0
 while True:
@@ -230,7 +230,7 @@ def test_kill_9_loses_no_more_than_the_last_moments(tmp_path: Path) -> None:
 
 FULL = """
 import resource, sys, time
-from e2efly.deploy.telemetry import Telemetry
+from e2efly.deploy.log.telemetry import Telemetry
 resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, resource.RLIM_INFINITY))
 with Telemetry(sys.argv[1]) as log:
     for step in range(100_000):

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from e2efly.deploy.throttle_map import (
+from e2efly.deploy.pilot.throttle_map import (
     GAIN_RANGE,
     GAIN_RATE,
     SCALE_RANGE,

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from e2efly.deploy.touch import SUPPORT_S, Touch, dip, feel, seen
+from e2efly.deploy.pilot.touch import SUPPORT_S, Touch, dip, feel, seen
 from e2efly.vehicles.vehicle import GRAVITY
 
 DT, LAG = 0.02, 3

@@ -21,10 +21,11 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.deploy import watchdog
-from e2efly.deploy.msp.codec import REPLY, Decoder, Frame, encode
-from e2efly.deploy.msp.messages import SET_RAW_RC, Attitude, StatusEx, set_raw_rc
-from e2efly.deploy.watchdog import LEVEL_GAIN, LEVEL_RATE, STALE_S, Plan, WatchedLink, descent
+from e2efly.deploy.attitude import Attitude
+from e2efly.deploy.betaflight import watchdog
+from e2efly.deploy.betaflight.codec import REPLY, Decoder, Frame, encode
+from e2efly.deploy.betaflight.messages import SET_RAW_RC, AttitudeReply, StatusEx, set_raw_rc
+from e2efly.deploy.betaflight.watchdog import LEVEL_GAIN, LEVEL_RATE, STALE_S, Plan, WatchedLink, descent
 
 RATES = tuple(0.5 * i for i in range(-8, 9))
 PULSES = tuple(1500 + round(100 * rate) for rate in RATES)
@@ -149,10 +150,10 @@ class Controller:
         now = time.monotonic()
         if frame.code == SET_RAW_RC:
             self.sticks.append((now, struct.unpack(f"<{len(frame.payload) // 2}H", frame.payload)))
-        elif frame.code == Attitude.CODE and self.attitude is not None:
+        elif frame.code == AttitudeReply.CODE and self.attitude is not None:
             roll, pitch = self.attitude
             peer.sendall(encode(Frame(frame.code, struct.pack("<3h", int(10 * roll), int(10 * pitch), 0), REPLY)))
-        elif frame.code != Attitude.CODE:
+        elif frame.code != AttitudeReply.CODE:
             self.others.append(frame)
             peer.sendall(encode(Frame(frame.code, frame.payload, REPLY, frame.version)))
 
@@ -180,9 +181,9 @@ def running(pid: int) -> bool:
 
 BRIDGE = """
 import json, sys, time
-from e2efly.deploy.msp.codec import encode
-from e2efly.deploy.msp.messages import set_raw_rc
-from e2efly.deploy.watchdog import Plan, WatchedLink
+from e2efly.deploy.betaflight.codec import encode
+from e2efly.deploy.betaflight.messages import set_raw_rc
+from e2efly.deploy.betaflight.watchdog import Plan, WatchedLink
 target, sticks, plan = sys.argv[1], json.loads(sys.argv[2]), Plan(**json.loads(sys.argv[3]))
 link = WatchedLink(target, 1.0)
 print(link._process.pid, flush=True)
@@ -477,5 +478,5 @@ def test_a_controller_that_says_nothing_any_more_is_given_up(monkeypatch: pytest
 
 
 def test_it_starts_without_numpy_and_onnx_runtime() -> None:
-    code = "import sys, e2efly.deploy.watchdog; sys.exit(bool({'numpy', 'onnxruntime', 'serial'} & set(sys.modules)))"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    code = "import sys, e2efly.deploy.betaflight.watchdog; print({'numpy', 'onnxruntime', 'serial'} & set(sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout.strip() == b"set()"

@@ -59,7 +59,7 @@ class Probe:
     def _observe(self, n: int) -> Array:
         return jnp.tile(jnp.array([1.0, 0.5, -0.5, 1.0, 0, 0, 0]), (n, 1))
 
-    def advance(self, state: ProbeState, action: Array) -> tuple[ProbeState, Step]:
+    def _advance(self, state: ProbeState, action: Array) -> tuple[ProbeState, Step]:
         acted = state.vehicle.rotor_speed if self.delay else action
         error = rewards.norm(acted - jnp.array(self.target))  # with a gradient where it is zero
         count = state.count + 1
@@ -80,15 +80,15 @@ class Probe:
         )
         return reached, out
 
-    def restart(self, state: ProbeState, out: Step) -> tuple[ProbeState, Step]:
-        return dataclasses.replace(state, count=jnp.where(out.done, 0.0, state.count)), out
-
-    def look(self, state: ProbeState, renewed: Array) -> ProbeState:
-        del renewed
-        return state
-
     def privileged(self, state: ProbeState) -> Array:
         return state.vehicle.rotor_speed[:, : self.privileged_size]
 
-    def step(self, state: ProbeState, action: Array) -> tuple[ProbeState, Step]:
-        return self.restart(*self.advance(state, action))
+    def step(
+        self, state: ProbeState, action: Array, *, restart: bool = True, privileged: bool = False
+    ) -> tuple[ProbeState, Step]:
+        reached, out = self._advance(state, action)
+        if privileged:
+            out = dataclasses.replace(out, final_privileged=self.privileged(reached))
+        if restart:
+            reached = dataclasses.replace(reached, count=jnp.where(out.done, 0.0, reached.count))
+        return reached, out

@@ -10,7 +10,7 @@ import pytest
 
 from e2efly.config import ABPTConfig, AlgorithmConfig, BPTTConfig, FOPPOConfig, NetworkConfig, PPOConfig, SHACConfig
 from e2efly.env import random_key
-from e2efly.learn.algorithm import TrainState, annealed, ends, make_algorithm
+from e2efly.learn.algorithm import TrainState, annealed, gradient_cuts, make_algorithm
 from e2efly.learn.critic import gae
 from e2efly.learn.devices import OWN, on_each, own, stacked
 from e2efly.learn.networks import Actor, mlp
@@ -128,9 +128,9 @@ def test_critics_know_what_follows_a_time_out_and_that_nothing_follows_an_end() 
 
 def test_the_pieces_of_a_window_grow_over_the_run() -> None:
     config = dataclasses.replace(BPTT_CONFIG, horizon=16, horizon_start=4)
-    cuts = {p: np.flatnonzero(np.asarray(ends(config, jnp.float32(p)))).tolist() for p in (0.0, 0.5, 1.0)}
+    cuts = {p: np.flatnonzero(np.asarray(gradient_cuts(config, jnp.float32(p)))).tolist() for p in (0.0, 0.5, 1.0)}
     assert cuts == {0.0: [4, 8, 12], 0.5: [8], 1.0: []}
-    assert not np.asarray(ends(BPTT_CONFIG, jnp.float32(0.0))).any()
+    assert not np.asarray(gradient_cuts(BPTT_CONFIG, jnp.float32(0.0))).any()
 
 
 @pytest.mark.parametrize("config", [BPTT_CONFIG, SHAC_CONFIG], ids=["bptt", "shac"])

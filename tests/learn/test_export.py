@@ -11,8 +11,8 @@ import pytest
 
 from e2efly import presets
 from e2efly.config import EnvConfig, ImuConfig, NetworkConfig, TrainConfig
-from e2efly.deploy.contract import METADATA_KEY, Contract
-from e2efly.deploy.policy import load_policy
+from e2efly.deploy.policy.contract import METADATA_KEY, Contract
+from e2efly.deploy.policy.loader import load_policy
 from e2efly.env import Env
 from e2efly.learn.export import contract_of, export_policy, parity, random_observations
 from e2efly.learn.networks import ACTIVATIONS, Actor, Layers, Weights, init_mlp

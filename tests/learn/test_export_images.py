@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from e2efly import presets
-from e2efly.commands.evaluate import callback, check_observation, config_from_contract
 from e2efly.config import CameraConfig, EnvConfig, ImuConfig, NetworkConfig, RewardConfig, TrainConfig
-from e2efly.deploy.policy import load_policy
+from e2efly.deploy.policy.loader import load_policy
 from e2efly.env import Env
-from e2efly.evaluate import Act
+from e2efly.episodes import Act
+from e2efly.evaluation import act_of, check_observation, config_from_contract
 from e2efly.learn.export import contract_of, export_policy, parity, random_images, random_observations
 from e2efly.learn.networks import Actor, View, Weights
 from e2efly.learn.programs import acting
@@ -139,7 +139,7 @@ def test_a_lone_file_brings_its_cameras_and_acts_in_compiled_programs(tmp_path: 
         _, memory = act.act(observation, images, act.begin(n))
         return act.act(observation, images, memory)
 
-    by_file, by_weights = jax.jit(lambda: [twice(act) for act in (callback(policy), acting(actor, weights))])()
+    by_file, by_weights = jax.jit(lambda: [twice(act) for act in (act_of(policy), acting(actor, weights))])()
     for a, b in zip(by_file, by_weights, strict=True):
         np.testing.assert_allclose(a, b, atol=1e-5)
     other = dataclasses.replace(rebuilt, cameras=(rebuilt.cameras[1],))

@@ -70,7 +70,7 @@ def test_two_processes_learn_as_one_with_two_devices(tmp_path: Path) -> None:
 def test_four_devices_learn_as_one(tmp_path: Path) -> None:
     """By a method without noise, far from what ends an episode: each device draws its new starts for itself."""
     flags = ["20" if BPTT[i - 1] == "--task.episode-s" else flag for i, flag in enumerate(BPTT)]
-    flags += ["--task.fence", "1000", "--task.target", "0", "0", "900"]
+    flags += ["--preset", "nominal", "--task.fence", "1000", "--task.target", "0", "0", "900"]
     for devices in ("4", "1"):
         ended(tmp_path, start(tmp_path, f"on{devices}", *flags, "--devices", devices, devices=4))
     same_learning(tmp_path, "on4", "on1", 1e-3, flown=False)  # flights of 20 s tell every last bit

@@ -12,7 +12,7 @@ import pytest
 from e2efly import presets
 from e2efly.config import NetworkConfig, TrainConfig
 from e2efly.env import Env, random_key
-from e2efly.evaluate import Act, run_episodes
+from e2efly.episodes import Act, run_episodes
 from e2efly.learn.devices import share
 from e2efly.learn.programs import Programs, evaluation_program
 from e2efly.learn.setup import Setup

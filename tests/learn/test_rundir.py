@@ -10,8 +10,8 @@ import pytest
 
 from e2efly.cli import run as cli
 from e2efly.config import TrainConfig
+from e2efly.episodes import summary
 from e2efly.learn.inputs import input_files
-from e2efly.learn.judge import digest
 from e2efly.learn.rundir import RunDirectory
 from e2efly.storage import held
 from e2efly.vehicles import load_vehicle
@@ -183,7 +183,7 @@ def test_metrics_cut_anywhere_go_on_with_what_is_whole(tmp_path: Path) -> None:
 
 
 def test_a_policy_that_never_succeeds_has_no_time_of_success(tmp_path: Path) -> None:
-    found = digest(flown([False, False], 1.0, 8.0)["task"])
+    found = summary(flown([False, False], 1.0, 8.0)["task"])
     assert found["seconds_of_success"] is None
     run = RunDirectory(tmp_path)
     run.write_json("summary.json", {"shipped": found})

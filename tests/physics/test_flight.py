@@ -44,7 +44,7 @@ def test_hover_stays(name: str, integrator: str, fly: Callable[..., State]) -> N
         )
 
 
-@pytest.mark.parametrize(("integrator", "sampled"), [("rk4", 0), ("euler", -1), ("semi_implicit", 1)])
+@pytest.mark.parametrize(("integrator", "sampled"), [("rk3", 0), ("rk4", 0), ("euler", -1), ("semi_implicit", 1)])
 def test_free_fall(integrator: str, sampled: int, vis_r: Vehicle, stone: Vehicle, fly: Callable[..., State]) -> None:
     """-g t^2 / 2; the first-order methods take the velocity of the step's start or end: -g t (t -+ dt) / 2."""
     physics = physics_of(vis_r, integrator=integrator)

@@ -12,8 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.physics import State
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.control.vectors import Vec3
+from e2efly.physics import COMMAND_MODES, Physics, State, command_limits, step
+from e2efly.physics.integrate import INTEGRATORS
+from e2efly.physics.plant import Plant, Rotors
+from e2efly.physics.state import Parts
+from e2efly.vehicles import Vehicle, load_vehicle, vehicle_names
 
 pytestmark = pytest.mark.usefixtures("x64")
 
@@ -102,7 +106,7 @@ def test_first_order_methods_converge_to_the_reference(integrator: str, errors: 
     np.testing.assert_array_less(np.abs(2 * finest - fine), 0.1 * fine)  # extrapolated to no step: the reference
 
 
-@pytest.mark.parametrize(("integrator", "order"), [("euler", 1), ("semi_implicit", 1), ("rk4", 4)])
+@pytest.mark.parametrize(("integrator", "order"), [("euler", 1), ("semi_implicit", 1), ("rk3", 3), ("rk4", 4)])
 def test_order_of_the_integrator(
     integrator: str, order: int, golden: Golden, random_state: Callable[..., State], fly_open_loop: Callable[..., State]
 ) -> None:
@@ -122,3 +126,38 @@ def test_order_of_the_integrator(
     exact = end("rk4", 24)
     coarse, fine = (np.abs(end(integrator, n) - exact).max() for n in (1, 2))
     assert np.log2(coarse / fine) == pytest.approx(order, abs=0.15)
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_the_default_physics_is_exact_to_a_millimetre_over_two_seconds(name: str) -> None:
+    """As a policy flies it: float32, its sub-steps; against the same commands and rate loop, integrated finely."""
+    vehicle, rng, flights = load_vehicle(name), np.random.default_rng(0), 20
+    steps = round(2 * vehicle.control_rate)
+    asked = rng.uniform([4, -4, -4, -4], [16, 4, 4, 4], (steps // 6 + 1, flights, 4))
+    commands = np.clip(asked.repeat(6, 0)[:steps], *command_limits(COMMAND_MODES["ctbr"], vehicle))
+    quaternion = rng.normal([3, 0, 0, 0], 1, (flights, 4))
+    start = dataclasses.replace(
+        State.hovering(vehicle, np.zeros((flights, 3))),
+        velocity=jnp.asarray(rng.uniform(-3, 3, (flights, 3))),
+        quaternion=jnp.asarray(quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)),
+    )
+
+    def end(dtype: type, **integrator: str) -> np.ndarray:
+        physics = Physics.of(vehicle, dtype=dtype, **integrator)
+
+        def flight(start: State, commands: jax.Array) -> State:
+            return jax.lax.scan(lambda s, c: (step(physics, physics.nominal, s, c), None), start, commands)[0]
+
+        first, asked = jax.tree.map(lambda x: jnp.asarray(x, dtype), (start, commands))
+        return np.asarray(jax.jit(flight)(first, asked).position, np.float64)
+
+    def fine(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
+        count = 16
+        finer = dataclasses.replace(plant, decay=plant.decay ** (1 / count), half_decay=plant.half_decay ** (1 / count))
+        return jax.lax.fori_loop(0, count, lambda _, p: INTEGRATORS["rk4"](finer, p, command, wind, dt / count), parts)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(INTEGRATORS, "fine", fine)
+        exact = end(np.float64, integrator="fine")
+    error = np.linalg.norm(end(np.float32) - exact, axis=1)
+    assert error.max() < 1e-3

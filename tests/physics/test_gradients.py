@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
 
-from e2efly.physics import COMMAND_MODES, Physics, State, rotation, step
+from e2efly.physics import COMMAND_MODES, INTEGRATORS, Physics, State, rotation, step
 from e2efly.vehicles import Vehicle
 from tests.gradients import central, reverse
 
@@ -61,6 +61,7 @@ def inputs(mode: str, q: Any, command: list[float], speed: float = 1.0, switch: 
         "switch": jnp.asarray(switch),
         "wind": jnp.asarray([0.4, -0.6, 0.2]) * speed,
         "plant": {name: jnp.ones(shape) for name, shape in SHAPES.items()},
+        "share": jnp.asarray([1.0, 0.9, 0.95, 1.05]),
     }
 
 
@@ -88,6 +89,7 @@ def stepper(vehicle: Vehicle, mode: str, integrator: str = "semi_implicit") -> C
         end = step(
             physics, plant, state, i["command"],
             previous=i["previous"], switch_time=i["switch"] * physics.control_period, wind=i["wind"],
+            rotor_share=i["share"],
         )  # fmt: skip
         return jnp.concatenate([end.position, end.velocity, end.quaternion, end.body_rate, end.rotor_speed / KRAD], -1)
 
@@ -120,7 +122,9 @@ def corners(mode: str) -> list[dict[str, Any]]:
 
 
 @pytest.mark.parametrize(
-    ("mode", "integrator"), [(mode, "semi_implicit") for mode in COMMAND_MODES] + [("ctbr", "euler"), ("ctbr", "rk4")]
+    ("mode", "integrator"),
+    [(mode, "semi_implicit") for mode in COMMAND_MODES]
+    + [("ctbr", name) for name in INTEGRATORS if name != "semi_implicit"],
 )
 def test_gradients_of_a_step(mode: str, integrator: str, vis_r: Vehicle) -> None:
     """With respect to state, both commands, the switch, wind and plant: exact where smooth, finite everywhere."""
@@ -134,7 +138,7 @@ def test_gradients_of_a_step(mode: str, integrator: str, vis_r: Vehicle) -> None
     for i, point in enumerate(points):
         wrong = np.argwhere(np.abs(exact[i] - numeric[i]) > 1e-6 * (1 + np.abs(numeric[i])))
         assert not len(wrong), [(point, int(o), entries[p], exact[i, o, p], numeric[i, o, p]) for o, p in wrong[:5]]
-    for name in ("velocity", "command", "previous", "switch", "wind", "mass", "thrust_map", "drag_linear"):
+    for name in ("velocity", "command", "previous", "switch", "wind", "mass", "thrust_map", "drag_linear", "share"):
         column = [i for i, entry in enumerate(entries) if entry.startswith(name)]
         assert np.max(np.abs(exact[0][:, column])) > 1e-8, name  # each of them matters
 

@@ -137,7 +137,7 @@ def test_as_few_substeps_as_keep_the_largest_step(
 def test_wrong_options(vis_r: Vehicle) -> None:
     with pytest.raises(ValueError, match=r"unknown command mode 'ctbs'; did you mean 'ctbr'\? \(there are: acc"):
         Physics.of(vis_r, "ctbs")
-    with pytest.raises(ValueError, match=r"unknown integrator 'rk5'; did you mean 'rk4'.*euler, rk4, semi_implicit"):
+    with pytest.raises(ValueError, match=r"unknown integrator 'rk5'; did you mean 'rk4'.*euler, rk3, rk4, semi"):
         Physics.of(vis_r, integrator="rk5")
     for bad in (0.0, -30.0, float("nan"), float("inf")):
         with pytest.raises(ValueError, match=f"control_rate is {bad}; accepted: a positive number"):
@@ -147,6 +147,6 @@ def test_wrong_options(vis_r: Vehicle) -> None:
 
 
 def test_registries_have_the_papers_entries() -> None:
-    assert set(INTEGRATORS) == {"euler", "semi_implicit", "rk4"}
+    assert set(INTEGRATORS) == {"euler", "semi_implicit", "rk3", "rk4"}
     assert list(COMMAND_MODES) == [mode.name for mode in COMMAND_MODES.values()]
     assert len(COMMAND_MODES) == 6

@@ -364,7 +364,7 @@ class TestLoad:
         program = (
             "import sys; sys.modules['embreex'] = None\n"
             "from e2efly.scenes.meshes.load import load_mesh_scene\n"
-            "from e2efly.scenes.meshes.engine import engine\n"
+            "from e2efly.scenes.meshes.engines import engine\n"
             "engine(load_mesh_scene('garage'))"
         )
         done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

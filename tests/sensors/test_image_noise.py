@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import zlib
 from pathlib import Path
 
 import jax
@@ -12,6 +13,9 @@ import pytest
 from e2efly.config import CameraConfig, ImageNoiseConfig
 from e2efly.env import random_key
 from e2efly.sensors.image_noise import (
+    OF_DEPTH,
+    OF_VALUES,
+    OWN,
     add_image_noise,
     check,
     d435i,
@@ -140,8 +144,8 @@ ALL = ImageNoiseConfig(0.005, True, "synthetic", 0.02, 256.0, 0.01, 0.02)
 def test_a_configuration_applies_its_noises_in_order_each_with_its_own_draws() -> None:
     image = flat(4.0).at[:, :20].set(0.0)
     one = {name: add_image_noise(dataclasses.replace(ImageNoiseConfig(), **{name: value}), KEY, image, DEPTH)
-           for name, value in vars(ALL).items() if name not in ("speckle", "poisson")}  # fmt: skip
-    keys = {name: jax.random.fold_in(KEY, i) for i, name in enumerate(vars(ALL))}
+           for name, value in vars(ALL).items() if name not in ("speckle", "poisson", "own")}  # fmt: skip
+    keys = {name: jax.random.fold_in(KEY, zlib.crc32(name.encode())) for name in vars(ALL)}
     np.testing.assert_allclose(one["d435i"], d435i(keys["d435i"], image, FOV), rtol=1e-6)
     np.testing.assert_allclose(one["redwood"], redwood(keys["redwood"], image, synthetic_distortion()), rtol=1e-6)
     chain = inverse_depth(keys["inverse_depth"], image, 0.02)
@@ -153,6 +157,21 @@ def test_a_configuration_applies_its_noises_in_order_each_with_its_own_draws() -
     assert float(one["gaussian"][:, 20:].std()) == pytest.approx(0.01 * 8.0, rel=0.05)
     assert np.all(one["gaussian"][:, :20] == 0) and np.all(one["inverse_depth"][:, :20] == 0)
     assert float(jnp.mean(one["salt_and_pepper"][:, :20] == 8.0)) == pytest.approx(0.01, rel=0.3)
+
+
+def test_a_noise_draws_the_same_whatever_other_noises_there_are() -> None:
+    image = flat(4.0)
+    alone = np.asarray(add_image_noise(ImageNoiseConfig(gaussian=0.01), KEY, image, DEPTH))
+    both = np.asarray(add_image_noise(ImageNoiseConfig(gaussian=0.01, salt_and_pepper=0.1), KEY, image, DEPTH))
+    changed = alone != both
+    assert changed.mean() == pytest.approx(0.1, rel=0.05)
+    assert set(np.unique(both[changed])) == {0.0, 8.0}
+    salt = np.asarray(add_image_noise(ImageNoiseConfig(salt_and_pepper=0.1), KEY, image, DEPTH))
+    np.testing.assert_array_equal(salt != image, changed)
+
+
+def test_every_option_is_a_noise_in_the_order_of_the_options() -> None:
+    assert list(OF_DEPTH | OF_VALUES | OWN) == list(vars(ImageNoiseConfig()))
 
 
 def test_the_reach_of_the_camera_holds_after_the_noise() -> None:
@@ -195,8 +214,8 @@ def test_strengths_are_leaves_of_one_program_and_which_noises_are_in_is_not() ->
     [
         ({"gaussian": -0.1}, DEPTH, "camera.noise.gaussian is -0.1; accepted: 0 or more"),
         ({"speckle": math.nan}, DEPTH, "camera.noise.speckle is nan"),
-        ({"salt_and_pepper": 1.5}, DEPTH, r"camera.noise.salt_and_pepper is 1.5; accepted: a number in \[0, 1\]"),
-        ({"poisson": 0.0}, DEPTH, r"camera.noise.poisson is 0.0; accepted: a number in \[2, 65536\]"),
+        ({"salt_and_pepper": 1.5}, DEPTH, r"camera.noise.salt_and_pepper is 1.5; accepted: 0 to 1"),
+        ({"poisson": 0.0}, DEPTH, r"camera.noise.poisson is 0.0; accepted: 2 to 65536"),
         ({"inverse_depth": 0.1}, LABEL, "camera.noise.inverse_depth is 0.1; accepted: None where"),
         ({"d435i": True}, CameraConfig("range"), "camera.noise.d435i is on; accepted with camera.sees depth"),
         ({"redwood": "synthetic"}, CameraConfig(projection="spherical"), "camera.noise.redwood is on; accepted with"),
@@ -220,3 +239,28 @@ def test_a_table_of_one_s_own(tmp_path: Path) -> None:
     for path, said in ((small, r"of \(80, 80\); accepted"), (zero, "not positive; accepted")):
         with pytest.raises(ValueError, match=said):
             check(ImageNoiseConfig(redwood=path), DEPTH)
+
+
+def test_a_noise_of_ones_own_comes_last(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "import jax, jax.numpy as jnp\n"
+        "def lines(key, image, camera):\n"
+        "    lost = jax.random.bernoulli(key, 0.5, (image.shape[0], image.shape[1], 1))\n"
+        "    return jnp.where(lost, 0.0, image)\n"
+        "def smaller(key, image, camera):\n    return image[:, 1:]\n"
+        "def broken(key, image, camera):\n    return image + camera.focus\n"
+    )
+    config = ImageNoiseConfig(own=f"{file}:lines")
+    check(config, DEPTH)
+    noisy = np.asarray(add_image_noise(config, KEY, flat(4.0), DEPTH))
+    whole = (noisy == 0).all(-1)
+    assert 0.3 < whole.mean() < 0.7
+    np.testing.assert_allclose(noisy[~whole], 4.0, rtol=1e-6)
+    for name, message in (
+        ("smaller", r"mine.py:smaller, which returns .*; accepted: an image of \(2, 64, 64\)"),
+        ("broken", "mine.py:broken, which fails: AttributeError"),
+        ("absent", "unknown name in .*mine.py 'absent'"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            check(ImageNoiseConfig(own=f"{file}:{name}"), DEPTH)

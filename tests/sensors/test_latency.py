@@ -67,7 +67,7 @@ def flight(env: Env, state: EnvState, actions: jax.Array) -> EnvState:
     """The states under actions (t, n, 4), without new starts."""
 
     def one(state: EnvState, action: jax.Array) -> tuple[EnvState, State]:
-        state, _ = env.advance(state, action)
+        state, _ = env.step(state, action, restart=False)
         return state, state.vehicle
 
     return jax.lax.scan(one, state, actions)[1]
@@ -159,7 +159,7 @@ def test_the_policy_sees_the_delayed_state() -> None:
     np.testing.assert_allclose(observation[:, 7:10], first.velocity, rtol=1e-6)
 
     def one(state: EnvState, action: jax.Array) -> tuple[EnvState, tuple[State, jax.Array]]:
-        state, out = env.advance(state, action)
+        state, out = env.step(state, action, restart=False)
         return state, (state.vehicle, out.final_observation)
 
     _, (path, seen) = jax.jit(lambda s, a: jax.lax.scan(one, s, a))(state, jnp.zeros((6, 3, 4)))

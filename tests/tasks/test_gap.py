@@ -15,7 +15,8 @@ from e2efly.physics import State
 from e2efly.physics.rotation import from_euler, multiply, rotate, unrotate
 from e2efly.scenes.scene import WALL, clearance
 from e2efly.tasks.gap import GapConfig
-from e2efly.tasks.gap.world import Gap, Memory
+from e2efly.tasks.gap.goal import Memory
+from e2efly.tasks.gap.world import Gap
 from e2efly.tasks.task import Outcome, Shape, at_rest
 
 SHAPE = Shape(0.05, 0.12)

@@ -16,9 +16,10 @@ from e2efly.env import random_key
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler, normalize
 from e2efly.scenes.camera import look, mount
-from e2efly.scenes.scene import OBSTACLE, Solids
+from e2efly.scenes.scene import OBSTACLE
 from e2efly.tasks.hover_aware import HoverAwareConfig
-from e2efly.tasks.hover_aware.world import OUTSIDE, HoverAware, Memory
+from e2efly.tasks.hover_aware.goal import OUTSIDE, Memory
+from e2efly.tasks.hover_aware.world import HoverAware
 from e2efly.tasks.task import Shape, at_rest
 
 SHAPE = Shape(0.05, 0.12)
@@ -34,10 +35,12 @@ def make(**changes: Any) -> HoverAware:
     return HoverAware(HoverAwareConfig(**changes), SHAPE, PERIOD)
 
 
-def ball(place: Any, sine: Any = (0.0, 0.0, 0.0), rate: float = 0.0, held: float = 0.0) -> Memory:
-    seen = Solids.of("sphere", jnp.asarray([[place]], jnp.float32), jnp.array([0.2]))
-    seen = dataclasses.replace(seen, sine=jnp.asarray([[sine]], jnp.float32), rate=jnp.array([[rate]]))
-    return Memory(seen, jnp.zeros(1), jnp.array([held]))
+def ball(place: Any, rate: float = 0.0, held: float = 0.0) -> Memory:
+    """What to look at, at (x, y, z) from the world's origin, and turning about it."""
+    x, y, z = (jnp.array([v], jnp.float32) for v in place)
+    away, angle = jnp.hypot(x, y), jnp.arctan2(y, x)
+    centre = jnp.stack([0 * x, 0 * x, z], axis=-1)
+    return Memory(centre, away, angle, jnp.array([rate]), jnp.zeros(1), jnp.array([held]))
 
 
 def turned(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> jax.Array:
@@ -68,7 +71,9 @@ def test_the_pixel_is_where_a_rendered_camera_sees_the_ball() -> None:
         dataclasses.replace(at_rest(jnp.array([[0.0, 0, 3]])), quaternion=turned(0.1, 0.1, 0.3)),
     )
     camera = CameraConfig("label", width=96, height=64, fov=c.fov, pitch=c.camera_pitch, position=c.camera_position)
-    image = np.asarray(look(camera, task.scene(memory), mount(camera, 1), state.position, state.quaternion)[0])
+    image = np.asarray(
+        look(camera, task.scene(memory).at(jnp.zeros(1)), mount(camera, 1), state.position, state.quaternion)[0]
+    )
     rows, columns = np.nonzero(image == OBSTACLE)
     assert len(rows) > 8
     seen = [(columns.mean() + 0.5) / 96 * 2 - 1, (rows.mean() + 0.5) / 64 * 2 - 1]
@@ -80,7 +85,7 @@ def test_the_pixel_is_where_a_rendered_camera_sees_the_ball() -> None:
 def test_the_pixels_velocity_against_differences() -> None:
     task = make(camera_pitch=0.2, camera_position=(0.1, 0.02, 0.03))
     double = lambda tree: jax.tree.map(lambda x: x.astype(jnp.float64) if x.dtype == jnp.float32 else x, tree)  # noqa: E731
-    memory = double(ball((4.0, 1.0, 2.5), sine=(0.5, 1.0, 0.2), rate=0.7))
+    memory = double(ball((4.0, 1.0, 2.5), rate=0.4))
     state = double(
         dataclasses.replace(
             at_rest(jnp.array([[0.2, -0.1, 3.0]])),
@@ -174,7 +179,7 @@ def test_what_to_look_at_circles_slowly_around_where_to_hover() -> None:
 
 def test_the_observation_and_the_wanted_heading() -> None:
     task = make()
-    memory = ball((4.0, 4.0, 3.2), sine=(1.0, 0.0, 0.0), rate=0.5 * math.pi)
+    memory = ball((4.0, 4.0, 3.2), rate=0.5 * math.pi)
     state = at_rest(jnp.array([[1.0, 0.0, 2.0]]))
-    np.testing.assert_allclose(task.observe(memory, jnp.ones(1), state), [[-1, 0, 1, 4, 4, 1.2]], atol=1e-5)
+    np.testing.assert_allclose(task.observe(memory, jnp.ones(1), state), [[-1, 0, 1, -5, 4, 1.2]], atol=1e-5)
     np.testing.assert_allclose(task.desired_yaw(memory, state), [math.atan2(4, 3)], atol=1e-5)

@@ -1,6 +1,8 @@
 """What each task judges, by hand-made flights; references and tracks."""
 
 import dataclasses
+import subprocess
+import sys
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -11,6 +13,7 @@ from e2efly.courses.references import Lissajous, read_csv, through_points
 from e2efly.courses.tracks import load_track, track_names
 from e2efly.env import random_key
 from e2efly.physics.rotation import from_euler
+from e2efly.tasks import TASKS
 from e2efly.tasks.hover import HoverConfig
 from e2efly.tasks.hover.world import Hover
 from e2efly.tasks.land import LandConfig
@@ -223,3 +226,10 @@ def test_broken_references_are_named(text: str, message: str, tmp_path: Path) ->
     path.write_text(text)
     with pytest.raises(ValueError, match=message):
         Track.of(TrackConfig(reference=str(path)), SHAPE)
+
+
+@pytest.mark.parametrize("name", list(TASKS))
+def test_each_task_starts_in_a_process_that_knows_no_other(name: str) -> None:
+    code = f"import jax, e2efly; jax.eval_shape(lambda k: e2efly.make_env({name!r}).reset(k, 2), jax.random.key(0))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

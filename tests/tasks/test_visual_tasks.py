@@ -166,7 +166,7 @@ def test_the_open_way_through_a_forest_is_flown_at_the_commanded_speed() -> None
     task = make_task(AvoidConfig(), SHAPE, PERIOD, 7)
     state, memory = task.start(random_key(6), 50)
     inside = dataclasses.replace(state, position=state.position + jnp.array([15.0, 0.0, 0.0]))
-    asked, way = task.desired_velocity(memory, inside), task.open_velocity(memory, inside)
+    asked, way = task.desired_velocity(memory, memory.speed, inside), task.open_velocity(memory, inside)
     np.testing.assert_allclose(np.linalg.norm(way[:, :2], axis=1), memory.speed, rtol=1e-5)
     np.testing.assert_array_equal(way[:, 2], asked[:, 2])
     assert 0.2 < np.mean(np.abs(way - asked).max(axis=1) > 0.1) < 1.0  # many are turned aside

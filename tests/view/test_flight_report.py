@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from e2efly.commands.fly_report import draw, fly_report_command
-from e2efly.deploy.blackbox import align, read_blackbox
-from e2efly.deploy.flight_log import FlightLog, read_log
-from e2efly.deploy.telemetry import Telemetry
+from e2efly.commands.fly_report import FlyReport, run
+from e2efly.deploy.log.blackbox import align, read_blackbox
+from e2efly.deploy.log.flight_log import FlightLog, read_log
+from e2efly.deploy.log.telemetry import Telemetry
+from e2efly.view.flight_figures import draw
 from e2efly.view.flight_log import blackbox_responses, intervals, responses, summary
 from e2efly.view.rate_response import step_response
 
@@ -194,7 +195,7 @@ def test_the_command_draws_prints_and_exports(
     tmp_path: Path, log: FlightLog, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bag1, bag2 = tmp_path / "flight.bag", tmp_path / "bag"
-    assert fly_report_command(log.path, tmp_path / "out", bag1=bag1, bag2=bag2) == 0
+    assert run(FlyReport(log.path, tmp_path / "out", bag1=bag1, bag2=bag2)) == 0
     told = capsys.readouterr().out
     for word in ("POLICY", "odometry stale", "deadlines missed", "policy handed over", "ROS 1 bag", "ROS 2 bag"):
         assert word in told
@@ -232,7 +233,7 @@ def test_a_cut_off_flight_is_reported_and_told(
     monkeypatch.setattr("e2efly.view.style.DPI", 30)
     data = log.path.read_bytes()
     (tmp_path / "cut.mcap").write_bytes(data[: len(data) // 2])
-    assert fly_report_command(tmp_path / "cut.mcap") == 0
+    assert run(FlyReport(tmp_path / "cut.mcap")) == 0
     assert "Cut off" in capsys.readouterr().out
     table = json.loads((tmp_path / "cut_report" / "summary.json").read_text())
     assert table["cut_off"] and 5 < table["duration_s"] < 20
@@ -257,14 +258,14 @@ def test_a_blackbox_is_laid_over_by_the_gyro(tmp_path: Path) -> None:
     for axis, r in blackbox_responses(session).items():
         if axis != "yaw":  # which was commanded too little beside what the other axes do to it
             assert r.rise == pytest.approx(responses(log)[axis].rise, abs=0.005)
-    assert fly_report_command(DATA / "sitl.mcap", tmp_path, DATA / "sitl.bfl") == 0
+    assert run(FlyReport(DATA / "sitl.mcap", tmp_path, DATA / "sitl.bfl")) == 0
     table = json.loads((tmp_path / "summary.json").read_text())["blackbox"]
     assert table["start_s"] == pytest.approx(laid.time[0]) and (tmp_path / "blackbox.png").is_file()
 
 
 def test_the_blackbox_of_another_flight_is_refused(tmp_path: Path, log: FlightLog) -> None:
     with pytest.raises(ValueError, match=r"no session is of the flight .*best correlation 0\.\d+, needed 0\.8"):
-        fly_report_command(log.path, tmp_path / "out", DATA / "sitl.bfl")
+        run(FlyReport(log.path, tmp_path / "out", DATA / "sitl.bfl"))
     assert not (tmp_path / "out").exists()
 
 

@@ -10,7 +10,7 @@ from matplotlib.image import imread
 from e2efly.config import RewardConfig
 from e2efly.drawing import Face, Line, Mark
 from e2efly.env import Env, random_key
-from e2efly.evaluate import Act, Episodes, wilson
+from e2efly.episodes import Act, Episodes, wilson
 from e2efly.tasks import TASKS
 from e2efly.view import plots
 from e2efly.view.flights import Flights, fly

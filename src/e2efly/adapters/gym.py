@@ -1,7 +1,8 @@
 """Gymnasium environments: one vehicle (`QuadrotorEnv`), or a batch that steps together (`QuadrotorVectorEnv`).
 
-`pip install 'e2efly[gym]'`. Importing this module registers `e2efly/TASK-v0` for every task, for `gymnasium.make` and
-`gymnasium.make_vec(..., vectorization_mode="vector_entry_point")`.
+`pip install 'e2efly[gym]'`. Importing this module registers `e2efly/TASK-v0` for every task that is known then, and
+`e2efly/task-v0`, whose `task` is a name or a reference, such as `path/to/file.py:Orbit`. Both are for `gymnasium.make`
+and for `gymnasium.make_vec(..., vectorization_mode="vector_entry_point")`.
 """
 
 import math
@@ -13,9 +14,9 @@ from gymnasium.spaces import Box, Dict, Space
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from e2efly.adapters.picture import Chase
 from e2efly.adapters.stepper import Stepper, configured
 from e2efly.config import TrainConfig
-from e2efly.env import Env
 from e2efly.sensors.eyes import image_shape
 from e2efly.tasks import TASKS
 
@@ -25,7 +26,7 @@ STATE, IMAGE = "state", "image_{}"
 
 
 def observation_space(stepper: Stepper) -> Space[Any]:
-    """A vector; with cameras a dictionary of it and the images: metres, or [0, 1]."""
+    """A vector; with cameras a dictionary of it and the images, in metres or in [0, 1]."""
     state = Box(-math.inf, math.inf, (stepper.size,), np.float32)
     if not stepper.env.cameras:
         return state
@@ -39,110 +40,138 @@ def observation_space(stepper: Stepper) -> Space[Any]:
 
 
 def action_space() -> Box:
-    """What the policy commands, each of four in [-1, 1] (docs/architecture.md)."""
+    """The four commands of a policy, each in [-1, 1] (docs/architecture.md)."""
     return Box(-1.0, 1.0, (4,), np.float32)
 
 
 class QuadrotorEnv(gymnasium.Env[Any, np.ndarray]):
-    """One vehicle."""
+    """A task for one vehicle."""
 
-    metadata: dict[str, Any] = {"render_modes": []}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 30}
 
-    def __init__(self, task: str | TrainConfig = "hover", raw: bool = False, render_mode: None = None) -> None:
+    def __init__(self, task: str | TrainConfig = "hover", raw: bool = False, render_mode: str | None = None) -> None:
         """Make it.
 
         Args:
-            task: the name of a task, with its preset for PPO, or a configuration, of which task, reward and
+            task: a task's name or reference, with its preset for PPO, or a configuration, of which task, reward and
                 environment count.
             raw: observations as measured, not as features.
-            render_mode: none there is.
+            render_mode: rgb_array: `render` returns a picture from behind the vehicle; None: it returns None.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.
         """
-        config = configured(task)
-        self.stepper = Stepper(Env.of(config.task, config.reward, config.env), 1, raw)
+        self.stepper = Stepper(configured(task), 1, raw)
         self.observation_space, self.action_space = observation_space(self.stepper), action_space()
-        self.render_mode = render_mode
+        self.render_mode, self.metadata = _rendering(self.metadata, render_mode, self.stepper)
+        self._chase: Chase | None = None
+
+    def render(self) -> np.ndarray | None:  # type: ignore[override]
+        """The picture of the vehicle, uint8 (h, w, 3); None without a render mode."""
+        if self.render_mode is None:
+            return None
+        self._chase = self._chase or Chase(self.stepper.env)
+        return self._chase(_started(self.stepper))
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict]:
         """Start an episode."""
         super().reset(seed=seed, options=options)
-        first = self.stepper.reset(_drawn(self.np_random))
-        return self._whole(first), {}
+        first = self.stepper.reset(_seed(self.np_random))
+        return self._observation(first), {}
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """A control step. `info` has `success`, `error` (m) and the weighted terms of the reward, `reward/NAME`."""
-        out, _, reached = self.stepper.step(np.asarray(action)[None], renew=False)
-        info = {name: value[0].item() for name, value in _told(out).items()}
-        return self._whole(reached), float(out.reward[0]), bool(out.terminated[0]), bool(out.truncated[0]), info
+        """Make a control step. `info` has `success`, `error` (m) and the weighted reward terms, `reward/NAME`."""
+        out, _, final = self.stepper.step(np.asarray(action)[None], restart=False)
+        info = {name: value[0].item() for name, value in _info(out).items()}
+        return self._observation(final), float(out.reward[0]), bool(out.terminated[0]), bool(out.truncated[0]), info
 
-    def _whole(self, state: np.ndarray) -> Observation:
-        whole = _with_images(self.stepper, state)
-        return {name: part[0] for name, part in whole.items()} if isinstance(whole, dict) else whole[0]
+    def _observation(self, state: np.ndarray) -> Observation:
+        batch = _observations(self.stepper, state)
+        return {name: part[0] for name, part in batch.items()} if isinstance(batch, dict) else batch[0]
 
 
 class QuadrotorVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
-    """A batch of vehicles in one compiled program; an episode that ends is followed by a new one in the same step.
+    """A task for a batch of vehicles in one compiled program.
 
-    What was reached before the new start stands in `info["final_obs"]`, rows that count in `info["_final_obs"]`; it
-    holds no images.
+    An episode that ends is followed by a new one in the same step. `info["final_obs"]` then holds the last observations
+    of the old episodes, without images, in the rows that `info["_final_obs"]` marks.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
+    metadata: dict[str, Any] = {
+        "render_modes": ["rgb_array"], "render_fps": 30, "autoreset_mode": AutoresetMode.SAME_STEP,
+    }  # fmt: skip
 
     def __init__(
-        self, task: str | TrainConfig = "hover", num_envs: int = 64, raw: bool = False, render_mode: None = None
+        self, task: str | TrainConfig = "hover", num_envs: int = 64, raw: bool = False, render_mode: str | None = None
     ) -> None:
         """Make it; see `QuadrotorEnv`.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.
         """
-        if num_envs < 1:
-            raise ValueError(f"num_envs is {num_envs}; accepted: 1 or more")
-        config = configured(task)
-        self.num_envs, self.render_mode = num_envs, render_mode
-        self.stepper = Stepper(Env.of(config.task, config.reward, config.env), num_envs, raw)
+        self.num_envs = num_envs
+        self.stepper = Stepper(configured(task), num_envs, raw)
+        self.render_mode, self.metadata = _rendering(self.metadata, render_mode, self.stepper)
+        self._chase: Chase | None = None
         self.single_observation_space, self.single_action_space = observation_space(self.stepper), action_space()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
+    def render(self) -> tuple[np.ndarray, ...] | None:  # type: ignore[override]
+        """The picture of each vehicle, uint8 (h, w, 3); None without a render mode."""
+        if self.render_mode is None:
+            return None
+        chase = self._chase = self._chase or Chase(self.stepper.env)
+        return tuple(chase(_started(self.stepper), i) for i in range(self.num_envs))
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict]:
         """Start all episodes."""
         super().reset(seed=seed, options=options)
-        first = self.stepper.reset(_drawn(self.np_random))
-        return _with_images(self.stepper, first), {}
+        first = self.stepper.reset(_seed(self.np_random))
+        return _observations(self.stepper, first), {}
 
     def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """A control step of all. `info` as of `QuadrotorEnv`, of all vehicles, and the last observations."""
+        """Make a control step of all vehicles. `info` is that of `QuadrotorEnv`, per vehicle, with `final_obs`."""
         out: Any
-        out, seen, reached = self.stepper.step(actions, renew=True)
-        info: dict[str, Any] = _told(out)
+        out, shown, final = self.stepper.step(actions, restart=True)
+        info: dict[str, Any] = _info(out)
         if out.done.any():
-            info |= {"final_obs": reached, "_final_obs": np.asarray(out.done)}
-        return _with_images(self.stepper, seen), out.reward, out.terminated, out.truncated, info
+            info |= {"final_obs": final, "_final_obs": np.asarray(out.done)}
+        return _observations(self.stepper, shown), out.reward, out.terminated, out.truncated, info
 
 
-def _drawn(rng: np.random.Generator) -> int:
+def _rendering(metadata: dict[str, Any], mode: str | None, stepper: Stepper) -> tuple[str | None, dict[str, Any]]:
+    """The render mode, and the metadata with the frames per second of the task."""
+    if mode not in (None, *metadata["render_modes"]):
+        raise ValueError(f"render_mode is {mode!r}; accepted: None, {', '.join(metadata['render_modes'])}")
+    return mode, metadata | {"render_fps": round(1 / float(stepper.env.control_period))}
+
+
+def _started(stepper: Stepper) -> Any:
+    if stepper.state is None:
+        raise RuntimeError("render before the first reset")
+    return stepper.state
+
+
+def _seed(rng: np.random.Generator) -> int:
     return int(rng.integers(2**32))
 
 
-def _told(out: Any) -> dict[str, np.ndarray]:
+def _info(out: Any) -> dict[str, np.ndarray]:
     return {"success": out.success, "error": out.error} | {f"reward/{name}": x for name, x in out.terms.items()}
 
 
-def _with_images(stepper: Stepper, state: np.ndarray) -> Observation:
+def _observations(stepper: Stepper, state: np.ndarray) -> Observation:
     if not stepper.env.cameras:
         return state
     return {STATE: state} | {IMAGE.format(i): image for i, image in enumerate(stepper.images())}
 
 
-for _task in TASKS:
+for _task in (*TASKS, None):
     gymnasium.register(
-        f"e2efly/{_task}-v0",
+        f"e2efly/{_task or 'task'}-v0",
         entry_point="e2efly.adapters.gym:QuadrotorEnv",
         vector_entry_point="e2efly.adapters.gym:QuadrotorVectorEnv",
-        kwargs={"task": _task},
+        kwargs={"task": _task} if _task else {},
         disable_env_checker=True,
     )

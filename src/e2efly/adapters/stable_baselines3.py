@@ -1,5 +1,6 @@
-"""Our batch of vehicles as a vectorised environment of Stable-Baselines3. `pip install 'e2efly[sb3]'`."""
+"""A batch of vehicles as a vectorised environment of Stable-Baselines3. `pip install 'e2efly[sb3]'`."""
 
+import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,7 +12,7 @@ from e2efly.config import TrainConfig
 
 
 class SB3VecEnv(VecEnv):
-    """What Stable-Baselines3's algorithms train on.
+    """A task on which the algorithms of Stable-Baselines3 train.
 
     model = PPO("MlpPolicy", SB3VecEnv("hover", 64))
     """
@@ -26,6 +27,8 @@ class SB3VecEnv(VecEnv):
         if self.envs.stepper.env.cameras:
             raise ValueError(f"task is {task!r}, which has cameras; accepted: tasks flown by state")
         self._actions: np.ndarray | None = None
+        self._returns, self._lengths = np.zeros(num_envs), np.zeros(num_envs, int)
+        self._began = time.monotonic()
         self._seed: int | None = None
         super().__init__(num_envs, self.envs.single_observation_space, self.envs.single_action_space)
 
@@ -33,46 +36,56 @@ class SB3VecEnv(VecEnv):
         """Start all episodes."""
         first, _ = self.envs.reset(seed=self._seed)
         self._seed = None
+        self._returns[:], self._lengths[:] = 0, 0
         return first
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Of the next reset."""
+        """Seed the next reset."""
         self._seed = seed
         return [seed] * self.num_envs
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Take note of the actions."""
+        """Keep the actions for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> Any:
-        """Step: observations, rewards, dones, and infos, of episodes that ended with what was reached."""
+        """Make a control step: observations, rewards, dones and infos.
+
+        The info of an ended episode has its last observation, its success and, as that of SB3's `Monitor`, its return,
+        length and time, from which SB3 logs `ep_rew_mean` and `ep_len_mean`.
+        """
         assert self._actions is not None
         observations, rewards, terminated, truncated, info = self.envs.step(self._actions)
         dones = terminated | truncated
-        told: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        self._returns += rewards
+        self._lengths += 1
+        elapsed = round(time.monotonic() - self._began, 6)
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for i in np.flatnonzero(dones):
-            told[i] = {
+            infos[i] = {
                 "terminal_observation": info["final_obs"][i],
                 "TimeLimit.truncated": bool(truncated[i]),
                 "is_success": bool(info["success"][i]),
+                "episode": {"r": float(self._returns[i]), "l": int(self._lengths[i]), "t": elapsed},
             }
-        return observations, rewards, dones, told
+        self._returns[dones], self._lengths[dones] = 0, 0
+        return observations, rewards, dones, infos
 
     def close(self) -> None:
         """Nothing is open."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute, once for each vehicle asked for."""
+        """An attribute of the batch, once per vehicle."""
         return [getattr(self.envs, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """The vehicles share what they have."""
+        """Refused: the vehicles share their attributes."""
         raise NotImplementedError("the vehicles are one program: make another SB3VecEnv instead of changing this one")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """The vehicles have no methods of their own."""
+        """Refused: the vehicles have no methods of their own."""
         raise NotImplementedError("the vehicles are one program: none has methods of its own")
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """No vehicle is."""
+        """False: no vehicle is wrapped."""
         return [False] * len(list(self._get_indices(indices)))

@@ -1,9 +1,8 @@
-"""The compiled steps of an environment that frameworks outside JAX call, with NumPy arrays going in and out."""
+"""The compiled steps of an environment, with NumPy arrays in and out: what all adapters call."""
 
 from dataclasses import dataclass, field
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -15,7 +14,7 @@ from e2efly.learn.networks import Features, View
 
 
 def configured(task: str | TrainConfig) -> TrainConfig:
-    """The preset of a task's name, of PPO: its rewards know events, too.
+    """The configuration of a task: the PPO preset of a name or a reference, whose rewards know events, too.
 
     Raises:
         ValueError: for an unknown name, with the nearest one and all there are.
@@ -25,17 +24,23 @@ def configured(task: str | TrainConfig) -> TrainConfig:
 
 @dataclass
 class Stepper:
-    """An environment with its state; observations as `e2efly.learn` feeds its own networks, or as measured."""
+    """An environment and its state."""
 
-    env: Env
+    config: TrainConfig
+    """Of which task, reward and environment count."""
     n: int
-    """Vehicles."""
+    """Number of vehicles, 1 or more."""
     raw: bool = False
     """Observations as measured; else as features: body frame, heading-free, scaled (`learn.networks.Features`)."""
     state: EnvState | None = None
+    """None before the first reset."""
+    env: Env = field(init=False)
     features: Features = field(init=False)
 
     def __post_init__(self) -> None:
+        if self.n < 1:
+            raise ValueError(f"num_envs is {self.n}; accepted: 1 or more")
+        self.env = Env.of(self.config.task, self.config.reward, self.config.env)
         whole = NetworkConfig(pool=(1 << 30, 1 << 30))  # images come apart from the features
         views = tuple(View.of(camera, whole) for camera in self.env.cameras)
         self.features = Features(self.env.fields, views)
@@ -44,19 +49,23 @@ class Stepper:
 
     @property
     def size(self) -> int:
-        """Numbers of an observation, images aside."""
+        """Length of an observation, without images."""
         return self.env.observation_size if self.raw else self.features.state_size
 
     def reset(self, seed: int) -> Float[np.ndarray, "n o"]:
-        """Start all episodes: their observations."""
+        """Start all episodes and return their observations."""
         self.state, observation = self.begin(random_key(seed))
         return np.array(observation)
 
-    def step(self, action: Float[np.ndarray, "n 4"], renew: bool) -> tuple[Step, np.ndarray, np.ndarray]:
-        """A control step, with new starts where an episode ended, or without.
+    def step(self, action: Float[np.ndarray, "n 4"], restart: bool) -> tuple[Step, np.ndarray, np.ndarray]:
+        """Make a control step.
+
+        Args:
+            action: in [-1, 1]; what is beyond is clipped.
+            restart: start anew where an episode ended.
 
         Returns:
-            What the environment said; what to act on next; and what was reached before any new start.
+            The environment's step, the observations to act on next, and the last ones before any new start.
 
         Raises:
             RuntimeError: before the first reset.
@@ -66,26 +75,22 @@ class Stepper:
             raise RuntimeError("step before the first reset")
         if np.shape(action) != (self.n, 4):
             raise ValueError(f"actions have the shape {np.shape(action)}; accepted: {(self.n, 4)}")
-        self.state, out, seen, reached = self._advance(self.state, np.asarray(action, np.float32), renew)
-        return jax.tree.map(np.array, out), np.array(seen), np.array(reached)  # copies: callers change them
+        self.state, out, shown, final = self._advance(self.state, np.asarray(action, np.float32), restart)
+        return jax.tree.map(np.array, out), np.array(shown), np.array(final)  # copies: callers change them
 
     def images(self) -> list[np.ndarray]:
         """The newest image of each camera, (n, h, w) or (n, h, w, 3)."""
         assert self.state is not None
         return [np.asarray(image) for image in self.state.images]
 
-    def seen(self, observation: Float[Array, "n o"]) -> Float[Array, "n s"]:
-        """An observation as the framework gets it."""
+    def shown(self, observation: Float[Array, "n o"]) -> Float[Array, "n s"]:
+        """Observations as the framework gets them."""
         return observation if self.raw else self.features.of_state(observation)
 
     def _begin(self, key: jax.Array) -> tuple[EnvState, Array]:
         state, observation = self.env.reset(key, self.n)
-        return state, self.seen(observation)
+        return state, self.shown(observation)
 
-    def _one(self, state: EnvState, action: Array, renew: bool) -> tuple[EnvState, Step, Array, Array]:
-        if renew:
-            state, out = self.env.step(state, action)
-        else:
-            state, out = self.env.advance(state, action)
-            state = self.env.look(state, jnp.zeros_like(out.terminated))
-        return state, out, self.seen(out.observation), self.seen(out.final_observation)
+    def _one(self, state: EnvState, action: Array, restart: bool) -> tuple[EnvState, Step, Array, Array]:
+        state, out = self.env.step(state, action, restart=restart)
+        return state, out, self.shown(out.observation), self.shown(out.final_observation)

@@ -1,7 +1,7 @@
-"""Back-propagation from PyTorch through our steps: the state goes to and fro by DLPack, without a copy.
+"""Back-propagation from PyTorch through the environment's steps; states are shared by DLPack, without a copy.
 
-`pip install 'e2efly[torch]'`. The gradient is that of JAX, by its transposed program; as everywhere, a new start cuts
-it.
+`pip install 'e2efly[torch]'`. The gradient is that of JAX, by its transposed program. A new start of an
+episode cuts it.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ import torch
 from e2efly.adapters.stepper import Stepper, configured
 from e2efly.config import TrainConfig
 from e2efly.device import wide_vectors
-from e2efly.env import Env, EnvState, random_key
+from e2efly.env import EnvState, random_key
 
 
 @dataclass(frozen=True)
@@ -22,29 +22,29 @@ class TorchState:
     """The state of a batch of environments. Its tensors share memory with JAX: never change them in place."""
 
     moving: tuple[torch.Tensor, ...]
-    """What has a gradient."""
+    """Floating-point leaves, which have a gradient."""
     rest: tuple[jax.Array, ...]
-    """What has none: counters, keys, masks."""
+    """Leaves without a gradient: counters, keys, masks."""
 
     def detach(self) -> "TorchState":
-        """The same, cut from the graph: where the next window of truncated back-propagation begins."""
+        """The state without its graph, with which the next window of truncated back-propagation begins."""
         return TorchState(tuple(x.detach() for x in self.moving), self.rest)
 
 
 @dataclass(frozen=True)
 class TorchStep:
-    """What a step says, each tensor (n, ...); the first two have a gradient."""
+    """Result of a step, each tensor (n, ...); the first two have a gradient."""
 
     observation: torch.Tensor
-    """What to act on next: of a new episode where the last one ended."""
+    """Observation to act on next; of a new episode where the last one ended."""
     reward: torch.Tensor
     final_observation: torch.Tensor
-    """What was reached, before any new start."""
+    """Observation reached by the step, before any new start."""
     terminated: torch.Tensor
     truncated: torch.Tensor
     success: torch.Tensor
     images: tuple[torch.Tensor, ...]
-    """The newest of each camera."""
+    """Newest images of each camera."""
 
 
 class TorchEnv:
@@ -58,7 +58,7 @@ class TorchEnv:
         """Make it.
 
         Args:
-            task: the name of a task, with its preset for PPO, or a configuration, of which task, reward and
+            task: a task's name or reference, with its preset for PPO, or a configuration, of which task, reward and
                 environment count.
             num_envs: vehicles.
             raw: observations as measured, not as features (`learn.networks.Features`).
@@ -66,11 +66,8 @@ class TorchEnv:
         Raises:
             ValueError: naming the field, the value and what is accepted.
         """
-        if num_envs < 1:
-            raise ValueError(f"num_envs is {num_envs}; accepted: 1 or more")
-        config = configured(task)
         self.num_envs = num_envs
-        self.stepper = Stepper(Env.of(config.task, config.reward, config.env), num_envs, raw)
+        self.stepper = Stepper(configured(task), num_envs, raw)
         shape = jax.eval_shape(lambda key: self.stepper.env.reset(key, num_envs)[0], random_key(0))
         leaves, self._structure = jax.tree.flatten(shape)
         self._moves = [jnp.issubdtype(x.dtype, jnp.floating) for x in leaves]
@@ -80,21 +77,21 @@ class TorchEnv:
 
     @property
     def observation_size(self) -> int:
-        """Numbers of an observation, images aside."""
+        """Length of an observation, without images."""
         return self.stepper.size
 
     def reset(self, seed: int = 0) -> tuple[TorchState, torch.Tensor]:
-        """Start all episodes: the state and the first observations (n, o)."""
+        """Start all episodes and return the state and the first observations (n, o)."""
         state, observation = self.stepper.begin(random_key(seed))
         moving, rest = self._apart(state)
         return TorchState(tuple(map(torch.from_dlpack, moving)), rest), torch.from_dlpack(observation)
 
     def step(self, state: TorchState, action: torch.Tensor) -> tuple[TorchState, TorchStep]:
-        """A control step, with new starts where an episode ended.
+        """Make a control step, with new starts where an episode ended.
 
         Args:
-            state: of `reset` or the last step.
-            action: (n, 4), in [-1, 1]: what is beyond is clipped.
+            state: returned by `reset` or by the last step.
+            action: (n, 4), in [-1, 1]; what is beyond is clipped.
 
         Raises:
             ValueError: for actions of another shape or type.
@@ -104,11 +101,11 @@ class TorchEnv:
                 f"actions are {action.dtype} of shape {tuple(action.shape)}; accepted: torch.float32 of "
                 f"{(self.num_envs, 4)}"
             )
-        told: dict[str, Any] = {}
-        *moving, observation, reward = _Step.apply(self, state.rest, told, action, *state.moving)  # pyright: ignore
-        signs = {name: torch.from_dlpack(told[name]) for name in ("final_observation", *_SIGNS)}
-        images = tuple(map(torch.from_dlpack, told["images"]))
-        return TorchState(tuple(moving), told["rest"]), TorchStep(observation, reward, images=images, **signs)
+        extra: dict[str, Any] = {}
+        *moving, observation, reward = _Step.apply(self, state.rest, extra, action, *state.moving)  # pyright: ignore
+        flags = {name: torch.from_dlpack(extra[name]) for name in ("final_observation", *_FLAGS)}
+        images = tuple(map(torch.from_dlpack, extra["images"]))
+        return TorchState(tuple(moving), extra["rest"]), TorchStep(observation, reward, images=images, **flags)
 
     def _apart(self, state: EnvState) -> tuple[tuple[jax.Array, ...], tuple[jax.Array, ...]]:
         leaves = list(zip(jax.tree.leaves(state), self._moves, strict=True))
@@ -119,14 +116,14 @@ class TorchEnv:
         return jax.tree.unflatten(self._structure, [next(one if moves else other) for moves in self._moves])
 
     def _advance(self, moving: tuple, rest: tuple, action: jax.Array) -> tuple[Any, dict[str, Any]]:
-        """(what has a gradient: state, observation, reward), and the rest."""
+        """What has a gradient (state, observation, reward), and what has none."""
         state = self._together(moving, rest)
         state, out = self.stepper.env.step(state, action)
         moving, rest = self._apart(state)
-        seen, reached = self.stepper.seen(out.observation), self.stepper.seen(out.final_observation)
-        told = {name: getattr(out, name) for name in _SIGNS}
-        return (moving, seen, out.reward), told | {
-            "final_observation": reached, "rest": rest, "images": state.images
+        shown, final = self.stepper.shown(out.observation), self.stepper.shown(out.final_observation)
+        extra = {name: getattr(out, name) for name in _FLAGS}
+        return (moving, shown, out.reward), extra | {
+            "final_observation": final, "rest": rest, "images": state.images
         }  # fmt: skip
 
     def _transposed(self, moving: tuple, rest: tuple, action: jax.Array, cotangent: Any) -> tuple[Any, jax.Array]:
@@ -134,18 +131,18 @@ class TorchEnv:
         return pull(cotangent)
 
 
-_SIGNS = ("terminated", "truncated", "success")
+_FLAGS = ("terminated", "truncated", "success")
 
 
 class _Step(torch.autograd.Function):
-    """One step in PyTorch's graph. Its transposed program computes the step again: no residual is kept."""
+    """One step in PyTorch's graph. The backward pass computes the step again instead of keeping residuals."""
 
     @staticmethod
-    def forward(ctx: Any, env: TorchEnv, rest: tuple, told: dict[str, Any], action: torch.Tensor, *moving: Any) -> Any:
+    def forward(ctx: Any, env: TorchEnv, rest: tuple, extra: dict[str, Any], action: torch.Tensor, *moving: Any) -> Any:
         ctx.env, ctx.rest = env, rest
         ctx.save_for_backward(action, *moving)
         (after, observation, reward), more = env._forward(_to_jax(moving), rest, *_to_jax((action,)))
-        told |= more
+        extra |= more
         return tuple(map(torch.from_dlpack, (*after, observation, reward)))
 
     @staticmethod

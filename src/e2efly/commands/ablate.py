@@ -5,34 +5,40 @@ import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+import tyro
 from rich.console import Console
 
 from e2efly import presets
-from e2efly.commands.progress import TerminalProgress
-from e2efly.commands.tables import console_table, markdown
-from e2efly.commands.terminal import Terminal
 from e2efly.config import TrainConfig
 from e2efly.device import prepare
 from e2efly.storage import held, write_atomically, write_json
+from e2efly.terminal import Terminal, TerminalProgress, console_table, markdown
 
 
 @dataclass(frozen=True)
-class Request:
-    """What to compare."""
+class Ablate:
+    """Learn tasks without each term of their reward in turn, over several seeds in one compiled program; draw it."""
 
-    tasks: tuple[str, ...]
-    algos: tuple[str, ...]
-    preset: str
-    seeds: int
-    steps: int | None
-    out: Path
-    device: str | None
+    tasks: tyro.conf.Positional[tuple[str, ...]] = ("hover", "land", "track", "race")
+    """Tasks to ablate (default: hover land track race)."""
+    algos: tuple[str, ...] = ("ppo", "bptt")
+    """By which algorithms; a figure each."""
+    preset: str = "nominal"
+    """Where rewards and sizes come from: nominal, robust, paper or thrown; their curricula are left out."""
+    seeds: int = 3
+    """Runs of each variant."""
+    steps: int | None = None
+    """Environment steps of each run; the preset's when left out."""
+    out: Path = Path("runs/ablation")
+    """Folder of the figures, the table and the curves. What is there already is not trained again."""
+    device: Literal["cpu", "gpu"] | None = None
+    """Where to compute."""
 
 
-def ablate_command(request: Request) -> int:
+def run(options: Ablate) -> int:
     """Train every variant of every task by every algorithm; write JSON, a table and a figure an algorithm.
 
     What an earlier run with the same configuration wrote is taken, not trained again, and what it was at goes on.
@@ -41,81 +47,81 @@ def ablate_command(request: Request) -> int:
         ValueError: for unknown names, and numbers that cannot be used.
         OSError: when the folder cannot be written.
     """
-    if request.seeds < 1:
-        raise ValueError(f"--seeds is {request.seeds}; accepted: 1 or more")
-    prepare(request.device)
+    if options.seeds < 1:
+        raise ValueError(f"--seeds is {options.seeds}; accepted: 1 or more")
+    prepare(options.device)
     console = Terminal()
-    configs = {(algo, task): _config(request, task, algo) for algo in request.algos for task in request.tasks}
-    with held(request.out):
-        return _ablate(request, configs, console)
+    configs = {(algo, task): _config(options, task, algo) for algo in options.algos for task in options.tasks}
+    with held(options.out):
+        return _ablate(options, configs, console)
 
 
-def _ablate(request: Request, configs: dict[tuple[str, str], TrainConfig], console: Console) -> int:
+def _ablate(options: Ablate, configs: dict[tuple[str, str], TrainConfig], console: Console) -> int:
     """In a folder that is this ablation's alone."""
     from e2efly.view.ablation import Panel, plot_ablation
 
-    known = {pair: _known(request, config) for pair, config in configs.items()}
+    known = {pair: _known(options, config) for pair, config in configs.items()}
     lines: list[str] = []
-    for algo in request.algos:
+    for algo in options.algos:
         panels = []
-        for task in request.tasks:
+        for task in options.tasks:
             began = time.perf_counter()
-            curves = known[algo, task] or _curves(request, configs[algo, task], console)
+            curves = known[algo, task] or _curves(options, configs[algo, task], console)
             panels.append(Panel(task, curves, configs[algo, task].task.shows_error))
             rows = _rows(curves)
             took = "as found" if known[algo, task] else f"in {time.perf_counter() - began:.0f} s"
-            console.print(f"\n{task} by {algo.upper()}: {len(curves.variants)} rewards, {request.seeds} seeds, {took}")
+            console.print(f"\n{task} by {algo.upper()}: {len(curves.variants)} rewards, {options.seeds} seeds, {took}")
             console.print(console_table(rows))
             lines += [f"## {task} by {algo.upper()}", "", *markdown(rows), ""]
-        path = request.out / f"ablation_{algo}.png"
+        path = options.out / f"ablation_{algo}.png"
         plot_ablation(panels, path, f"What each reward term is good for: {algo.upper()}")
         console.print(f"Figure: {path}")
-    write_atomically(request.out / "ablation.md", "\n".join(lines).encode())
-    console.print(f"Table: {request.out / 'ablation.md'}")
+    write_atomically(options.out / "ablation.md", "\n".join(lines).encode())
+    console.print(f"Table: {options.out / 'ablation.md'}")
     return 0
 
 
-def _config(request: Request, task: str, algo: str) -> TrainConfig:
-    config = dataclasses.replace(presets.preset(task, algo, request.preset), curriculum=())
-    if request.steps is not None:
-        config = dataclasses.replace(config, steps=request.steps)
+def _config(options: Ablate, task: str, algo: str) -> TrainConfig:
+    config = dataclasses.replace(presets.preset(task, algo, options.preset), curriculum=())
+    if options.steps is not None:
+        config = dataclasses.replace(config, steps=options.steps)
     presets.check(config)
     return config
 
 
-def _path(request: Request, config: TrainConfig) -> Path:
-    return request.out / f"{config.task.name}_{presets.algorithm_name(config.algo)}.json"
+def _path(options: Ablate, config: TrainConfig) -> Path:
+    return options.out / f"{config.task.name}_{config.algo.name}.json"
 
 
-def _about(request: Request, config: TrainConfig) -> dict[str, Any]:
+def _about(options: Ablate, config: TrainConfig) -> dict[str, Any]:
     """What decides the curves."""
     from e2efly.learn.checkpoint import FORMAT
     from e2efly.learn.rundir import to_json
 
-    return {"format": FORMAT, "seeds": request.seeds, "config": to_json(config)}
+    return {"format": FORMAT, "seeds": options.seeds, "config": to_json(config)}
 
 
-def _known(request: Request, config: TrainConfig) -> Any:
+def _known(options: Ablate, config: TrainConfig) -> Any:
     """The curves that an earlier run wrote, or None."""
     from e2efly.learn.ablation import Curves
     from e2efly.learn.rundir import different_values
 
-    path = _path(request, config)
+    path = _path(options, config)
     if not path.exists():
         return None
-    found, about = json.loads(path.read_text(encoding="utf-8")), json.loads(json.dumps(_about(request, config)))
+    found, about = json.loads(path.read_text(encoding="utf-8")), json.loads(json.dumps(_about(options, config)))
     if different := list(different_values(found["about"], about)):
         raise ValueError(f"{path} is of another ablation: {'; '.join(different)}; accepted: another --out")
     parts = {part: {k: np.array(v, np.float64) for k, v in found[part].items()} for part in ("success", "error")}
     return Curves(tuple(found["variants"]), np.array(found["steps"]), **parts)
 
 
-def _curves(request: Request, config: TrainConfig, console: Console) -> Any:
+def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
     """Train all variants of a configuration; keep their curves."""
     from e2efly.learn.ablation import Kept, ablate
 
-    task, algo = config.task.name, presets.algorithm_name(config.algo)
-    steps = config.steps * request.seeds * (len(config.reward.weights) + 1)
+    task, algo = config.task.name, config.algo.name
+    steps = config.steps * options.seeds * (len(config.reward.weights) + 1)
     with TerminalProgress(console, f"{task} by {algo}") as progress:
         progress.compiling()
         began, best = time.perf_counter(), 0.0
@@ -126,16 +132,16 @@ def _curves(request: Request, config: TrainConfig, console: Console) -> Any:
             done = share * steps
             progress.progress(int(done), steps, done / (time.perf_counter() - began), success, best, "")
 
-        kept = Kept(_path(request, config).with_suffix(".safetensors"), _about(request, config))
-        curves = ablate(config, request.seeds, told, kept)
+        kept = Kept(_path(options, config).with_suffix(".safetensors"), _about(options, config))
+        curves = ablate(config, options.seeds, told, kept)
     content = {
-        "about": _about(request, config),
+        "about": _about(options, config),
         "variants": list(curves.variants),
         "steps": curves.steps.tolist(),
         "success": {name: x.tolist() for name, x in curves.success.items()},
         "error": {name: x.tolist() for name, x in curves.error.items()},
     }
-    write_json(_path(request, config), content, indent=None)
+    write_json(_path(options, config), content, indent=None)
     kept.path.unlink(missing_ok=True)
     return curves
 

@@ -1,26 +1,40 @@
 """`e2efly bench`: what this machine does in a few seconds. The published figures are made by benchmarks/."""
 
-import os
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from rich.table import Table
 
-from e2efly.commands.terminal import Terminal
-from e2efly.device import prepare
+from e2efly.device import cores, prepare, processor
 from e2efly.storage import write_json
+from e2efly.terminal import Terminal
 
 
-def bench_command(report: Path | None, device: str | None) -> int:
-    """Measure and print; exit status 0."""
-    prepare(device)
-    console = Terminal()
-    figures = measure()
+@dataclass(frozen=True)
+class Bench:
+    """Measure this machine: physics sub-steps/s, environment steps/s, training steps/s."""
+
+    json: Path | None = None
+    """Write the figures to this file."""
+    device: Literal["cpu", "gpu"] | None = None
+    """Where to compute."""
+
+
+def run(options: Bench) -> int:
+    """Measure, print and write."""
+    prepare(options.device)
+    console, figures = Terminal(), measure()
     table = Table("what", "per second", box=None, header_style="bold")
     for name, value in figures.items():
         table.add_row(name, f"{value / 1e6:.2f} M" if value >= 1e6 else f"{value / 1e3:.0f} k")
+    model, avx512 = processor()
+    with_avx512 = {True: ", with AVX-512", False: ", without AVX-512", None: ""}[avx512]
+    console.print(f"{cores()} cores of {model}{with_avx512}", style="dim")
     console.print(table)
-    if report:
-        write_json(report, {"cores": os.cpu_count(), "per_second": figures})
+    if options.json:
+        about = {"cpu": model, "avx512": avx512, "cores": cores()}
+        write_json(options.json, {**about, "per_second": figures})
     return 0
 
 

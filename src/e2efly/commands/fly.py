@@ -5,7 +5,7 @@ import json
 import platform
 import sys
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,31 +16,32 @@ from rich.table import Table
 from rich.text import Text
 
 from e2efly import __version__
-from e2efly.commands.terminal import Terminal
-from e2efly.deploy import throttle_map
+from e2efly.commands.options import parse as parse_options
+from e2efly.deploy.betaflight.check import Row, examine, problems
+from e2efly.deploy.betaflight.client import SCHEDULE, Client
+from e2efly.deploy.betaflight.controller import ControllerInfo, identify
+from e2efly.deploy.betaflight.link import Link, open_link
+from e2efly.deploy.betaflight.watchdog import WatchedLink
 from e2efly.deploy.bridge import Bridge
-from e2efly.deploy.check import Row, examine, problems
 from e2efly.deploy.flight_loop import LOWEST_RATE, fly, loop_rate
-from e2efly.deploy.goal_options import GoalOptions, goal_for
-from e2efly.deploy.hover import roll_pitch
-from e2efly.deploy.msp.client import SCHEDULE, Client
-from e2efly.deploy.msp.controller import ControllerInfo, identify
-from e2efly.deploy.msp.link import Link, open_link
-from e2efly.deploy.policy import Policy, load_policy
-from e2efly.deploy.policy_worker import PolicyWorker
-from e2efly.deploy.pose.checks import Checks
-from e2efly.deploy.pose.source import PoseSource, open_source
-from e2efly.deploy.refusals import take_off_refusals
-from e2efly.deploy.runtime import Envelope, Runtime, check
+from e2efly.deploy.log.telemetry import Telemetry
+from e2efly.deploy.pilot import throttle_map
+from e2efly.deploy.pilot.hover import roll_pitch
+from e2efly.deploy.pilot.refusals import take_off_refusals
+from e2efly.deploy.policy.loader import Policy, load_policy
+from e2efly.deploy.policy.runtime import Envelope, Runtime, check
+from e2efly.deploy.policy.worker import PolicyWorker
+from e2efly.deploy.pose.source import PoseSource
+from e2efly.deploy.pose.sources import open_source
 from e2efly.deploy.settings import FlightSettings
 from e2efly.deploy.settings import check as check_settings
-from e2efly.deploy.sticks import sticks_of
-from e2efly.deploy.telemetry import Telemetry
 from e2efly.deploy.terminal import Speaker, Stop, printable
-from e2efly.deploy.watchdog import WatchedLink
 from e2efly.learn.rundir import run_of
+from e2efly.process import raise_at_interrupt
+from e2efly.tasks.route import Route, course_for, fields_of, route_of
+from e2efly.terminal import Terminal
 from e2efly.vehicles import Vehicle, load_vehicle
-from e2efly.zoo import policy_path
+from e2efly.zoo import policy_file
 
 CONNECT_S = 5.0
 """How long the controller may take to answer first, s."""
@@ -55,11 +56,13 @@ class Fly:
     """Fly on a Betaflight quadrotor; the pilot's switches decide. See docs/flying.md before the first flight."""
 
     policy: tyro.conf.Positional[Path | None] = None
-    """A policy.onnx, a run directory, or a task (the zoo's policy); left out: take-off, hover and landing only."""
+    """A policy.onnx, a run directory, or a task (the zoo's policy); left out: take-off, hover and landing only.
+    `e2efly fly POLICY --help` also lists the options of its goal."""
     link: str = "/dev/ttyACM0"
     """To the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT."""
     pose: str = "udp:9870"
-    """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic or ros2:/topic."""
+    """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic, ros2:/topic, or a source of your
+    own, path/to/file.py:Name[:...]."""
     vehicle: str | None = None
     """A shipped vehicle or a .toml file; left out: the policy's."""
     check: bool = False
@@ -72,7 +75,7 @@ class Fly:
     """Let a process of its own hold the link and land the vehicle should this one die. Do not fly without."""
     latency: float | None = None
     """From the vehicle's motion to its rate loop, s: sets the hover gains; left out: the vehicle file's."""
-    goal: GoalOptions = GoalOptions()
+    goal: tyro.conf.Suppress[Route | None] = None
     """Where the policy is to fly."""
     flight: FlightSettings = FlightSettings()
     """Heights, speeds, time-outs, fence, channels."""
@@ -80,7 +83,26 @@ class Fly:
     """In which state the policy may take over."""
 
 
-def fly_command(options: Fly) -> int:
+def parse(arguments: list[str]) -> Fly:
+    """The options of the command; those of the goal are of the task of the policy that the arguments name."""
+    options = Fly
+    if route := next(filter(None, map(_route, arguments)), None):
+        goal = [("goal", route, dataclasses.field(default=route()))]
+        options = dataclasses.make_dataclass("Fly", goal, bases=(Fly,), frozen=True, namespace={"__doc__": Fly.__doc__})
+    return parse_options(options, "fly", arguments)
+
+
+def _route(argument: str) -> type[Route] | None:
+    """The options of the task of a policy; None: the argument names none that can be flown."""
+    if argument.startswith("-"):
+        return None
+    with suppress(ValueError, OSError):
+        if policy_file(argument).is_file():  # a link's device, read, would never end
+            return route_of(load_policy(argument).contract)
+    return None
+
+
+def run(options: Fly) -> int:
     """Fly, or with `check` print what stands against it.
 
     Returns:
@@ -90,24 +112,22 @@ def fly_command(options: Fly) -> int:
         ValueError: naming the option or setting, what it is and what is accepted.
         OSError: when link, pose source or log cannot be opened.
     """
-    console = Terminal()
-    settings, policy = options.flight, options.policy
+    raise_at_interrupt()  # its link and its log are closed in order
+    console, settings = Terminal(), options.flight
     check_settings(settings)
     if options.latency is not None and not 0 <= options.latency <= SLOWEST:
         raise ValueError(f"--latency is {options.latency}; accepted: 0 to {SLOWEST:g} s")
-    loaded = None
-    if policy is not None:
-        policy = policy_path(policy, options.vehicle)
-        loaded = load_policy(policy / "policy.onnx" if policy.is_dir() else policy)
+    policy = None if options.policy is None else policy_file(options.policy, options.vehicle)
+    loaded = None if policy is None else load_policy(policy)
     if loaded is None and options.vehicle is None:
         raise ValueError("--vehicle is left out; accepted: a vehicle's name or .toml file, as no policy names one")
     body = load_vehicle(options.vehicle or _own_vehicle(policy, loaded))
     runtime = None
     if loaded is not None:
-        if reasons := check(loaded.contract, body, imu=True):
+        if reasons := check(loaded.contract, body, fields_of(loaded.contract), imu=True):
             raise ValueError("\n".join(reasons))
-        where = goal_for(loaded.contract, options.goal, body)
-        runtime = Runtime.of(loaded, where, body, envelope=options.envelope, imu=True)
+        course = course_for(loaded.contract, body, options.goal)
+        runtime = Runtime.of(loaded, course, body, envelope=options.envelope, imu=True)
     saved = options.throttle_map
     known = throttle_map.from_json(_read(saved, "--throttle-map"), body) if saved else None
     open_link(options.link).close()  # a wrong text is refused here rather than by the watchdog
@@ -124,8 +144,8 @@ def fly_command(options: Fly) -> int:
         if worker is not None:
             stack.callback(worker.close)
         bridge = Bridge(
-            client, info, sticks_of(info), source, body, settings, worker=worker, latency=options.latency,
-            settings_problems=problems(rows), throttle_map=known, checks=Checks(max_age=settings.odometry_timeout),
+            client, info, source, body, settings, worker=worker, latency=options.latency,
+            settings_problems=problems(rows), throttle_map=known,
         )  # fmt: skip
         source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:
@@ -192,7 +212,7 @@ def _identify_again(
     """After a new connection nothing that was read before holds."""
     try:
         info = identify(bridge.client, 1.0)
-        bridge.adopt(info, sticks_of(info), problems(examine(info, body, settings, contract)))
+        bridge.adopt(info, problems(examine(info, body, settings, contract)))
     except (ValueError, TimeoutError) as error:
         bridge.settings_problems = (f"read anew: {error}",)
         return None
@@ -206,7 +226,9 @@ def _table(rows: tuple[Row, ...]) -> Table:
         table.add_column(heading, overflow="fold")
     for row in rows:
         mark = Text("ok", "green") if row.good else Text("no", "bold red")
-        table.add_row(mark, *map(_cell, (row.setting, row.value, row.needed, "" if row.good else row.mend)))
+        mark = mark if row.told else Text("look", "yellow")
+        mend = "" if row.good and row.told else row.mend
+        table.add_row(mark, *map(_cell, (row.setting, row.value, row.needed, mend)))
     return table
 
 
@@ -228,7 +250,7 @@ def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row,
     else:
         roll, pitch = roll_pitch(o.quaternion)
         age = sum(s.received - (s.stamp or s.received) for s in poses) / max(len(poses), 1)
-        pace = bridge.pace
+        pace = bridge.estimate.pace
         said = f"{pace.rate:.0f} Hz from {source.describe()}, refused {source.refused}"
         table.add_row("poses", _cell(f"{said}; the newest was up to {1e3 * pace.oldest:.0f} ms old"))
         table.add_row("", _cell(f"position {o.position.round(3).tolist()} m, roll {roll:+.2f}, pitch {pitch:+.2f} rad"))
@@ -240,7 +262,7 @@ def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row,
         sticks = ", ".join(f"{name} {getattr(pilot, name):+.2f}" for name in ("roll", "pitch", "throttle", "yaw"))
         heard = f"mission {pilot.mission}; {sticks}"
     table.add_row("receiver", heard)
-    table.add_row("battery", f"{bridge.inputs.voltage:.2f} V a cell" if bridge.inputs.voltage else "unknown")
+    table.add_row("battery", f"{bridge.inputs.voltage:.2f} V per cell" if bridge.inputs.voltage else "unknown")
     error = bridge.inputs.attitude_error
     table.add_row("attitude", "not heard" if error is None else f"controller and poses differ by {error:.3f} rad")
     console.print(table)

@@ -1,103 +1,59 @@
 """`e2efly fly-report`: what happened in a flight, from its log."""
 
 import json
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import tyro
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.commands.terminal import Terminal
-from e2efly.deploy.blackbox import Alignment, Blackbox, align, read_blackbox
-from e2efly.deploy.flight_log import FlightLog, read_log
+from e2efly.terminal import Terminal
 
 
-def fly_report_command(
-    path: Path,
-    out: Path | None = None,
-    blackbox: Path | None = None,
-    bag1: Path | None = None,
-    bag2: Path | None = None,
-) -> int:
-    """Draw a flight, print and write its summary, export bags where asked; exit status 0.
+@dataclass(frozen=True)
+class FlyReport:
+    """Draw a flight: tracks, commands against response, latency, timing, modes and their reasons."""
 
-    Args:
-        path: the flight log.
-        out: folder for figures and summary.json; None: beside the log, named after it.
-        blackbox: the flight controller's blackbox log of the same flight, laid over the figures.
-        bag1: a ROS 1 bag to write.
-        bag2: a ROS 2 bag to write.
+    log: tyro.conf.Positional[Path]
+    """A flight log (.mcap)."""
+    out: Path | None = None
+    """Folder of the figures; LOG_report when left out."""
+    blackbox: Path | None = None
+    """A Betaflight blackbox log of the flight, to be laid over it."""
+    bag1: Path | None = None
+    """Also write a ROS 1 bag."""
+    bag2: Path | None = None
+    """Also write a ROS 2 bag."""
+
+
+def run(options: FlyReport) -> int:
+    """Draw a flight, print and write its summary, export bags where asked.
 
     Raises:
         ValueError: for files that cannot be read or that exist already.
     """
-    from e2efly.deploy.bags import export_bag
+    from e2efly.deploy.log.bags import export_bag
+    from e2efly.deploy.log.flight_log import read_log
+    from e2efly.view.flight_figures import draw, laid_over
     from e2efly.view.flight_log import summary
 
-    log = read_log(path)
-    laid = _laid_over(log, blackbox) if blackbox else None
-    out = out or path.with_name(f"{path.stem}_report")
+    log = read_log(options.log)
+    laid = laid_over(log, options.blackbox) if options.blackbox else None
+    out = options.out or options.log.with_name(f"{options.log.stem}_report")
     out.mkdir(parents=True, exist_ok=True)
     table = summary(log, *laid) if laid else summary(log)
     (out / "summary.json").write_text(json.dumps(table, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     draw(log, out, laid)
     console = Terminal()
     _print(console, table)
-    for bag, version in ((bag1, 1), (bag2, 2)):
+    for bag, version in ((options.bag1, 1), (options.bag2, 2)):
         if bag:
             counts = export_bag(log, bag, version)
             console.print(f"ROS {version} bag: {bag} ({sum(counts.values())} messages of {len(counts)} topics)")
     console.print(f"Figures and summary.json: {out}")
     return 0
-
-
-def draw(log: FlightLog, out: Path, laid: tuple[Blackbox, Alignment] | None = None) -> list[Path]:
-    """Draw the figures of a flight for which anything was recorded into a folder; their paths."""
-    from e2efly.view import flight_health as health
-    from e2efly.view import flight_report as report
-    from e2efly.view.flight_log import blackbox_responses, responses
-
-    estimates = {"log": responses(log)} | ({"blackbox": blackbox_responses(laid[0])} if laid else {})
-    figures: dict[str, tuple[tuple[str, ...], Callable[[Path], None]]] = {
-        "track": (("odometry",), lambda path: report.plot_tracks(log, path)),
-        "motion": (("odometry", "mode"), lambda path: report.plot_motion(log, path)),
-        "rates": (("command",), lambda path: report.plot_rates(log, path)),
-        "response": (("command",), lambda path: report.plot_response(estimates, path)),
-        "loop": (("timing", "policy", "status"), lambda path: health.plot_loop(log, path)),
-        "health": (("battery", "link", "odometry"), lambda path: health.plot_health(log, path)),
-        "throttle": (("sticks", "throttle_map"), lambda path: health.plot_throttle(log, path)),
-    }
-    paths = []
-    for name, (channels, plot) in figures.items():
-        if any(channel in log.series for channel in channels):
-            paths.append(out / f"{name}.png")
-            plot(paths[-1])
-    if laid:
-        paths.append(out / "blackbox.png")
-        health.plot_blackbox(log, *laid, paths[-1])
-    return paths
-
-
-def _laid_over(log: FlightLog, path: Path) -> tuple[Blackbox, Alignment]:
-    """The session of a blackbox log that is of this flight, and where it lies.
-
-    Raises:
-        ValueError: where none is.
-    """
-    from e2efly.view.flight_log import gyro
-
-    time, rate, _ = gyro(log)
-    found: list[tuple[Blackbox, Alignment]] = []
-    reasons: list[str] = []
-    for session in read_blackbox(path):
-        try:
-            found.append((session, align(time, rate, session)))
-        except ValueError as error:
-            reasons.append(str(error))
-    if not found:
-        raise ValueError(f"{path}: no session is of the flight of {log.path}: {'; '.join(reasons)}")
-    return max(found, key=lambda pair: pair[1].correlation * pair[1].overlap)
 
 
 def _print(console: Console, table: dict[str, Any]) -> None:

@@ -1,79 +1,88 @@
 """`e2efly render`: what sensors see of a world, as pictures and as a video of a flight."""
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+import tyro
 from rich.progress import track
 
-from e2efly.commands.terminal import Terminal
-from e2efly.config import CameraConfig
+from e2efly.control import Quat
 from e2efly.courses.references import read_csv, through_points
 from e2efly.device import prepare
+from e2efly.terminal import Terminal
 
 PERIOD = 0.05
 """Seconds between the frames of a video."""
 PICTURE, PANEL = 640, 256
 """Columns of a picture and of a panel of the video."""
-_TILE = 16
-"""Rows and columns are multiples of it: the ray caster's tiles."""
 
 
 @dataclass(frozen=True)
-class Request:
-    """What to render."""
+class Render:
+    """Draw what sensors see of a world: pictures, a contact sheet with every noise, and a video of a flight."""
 
-    scene: str
-    camera: str
-    width: int | None
-    height: int | None
-    position: tuple[float, float, float] | None
-    yaw: float | None
-    pitch: float
-    time: float
-    seed: int
-    flight: Path | None
-    out: Path | None
+    scene: tyro.conf.Positional[str]
+    """forest, clutter, room, corridor, garage, terrain, warehouse, a race track, or a .toml, .glb, .obj, .ply file."""
+    camera: Literal["d435i", "fpv", "down", "lidar"] = "d435i"
+    """The sensor of the pictures and the video: a RealSense, an FPV camera, one that looks down, a LiDAR."""
+    width: int | None = None
+    """Columns of its image; 640, and 256 in the video, when left out."""
+    height: int | None = None
+    """Rows; those of square pixels when left out."""
+    position: tuple[float, float, float] | None = None
+    """Where the pictures are taken, world, m; after a tenth of the flight when left out."""
+    yaw: float | None = None
+    """Heading there, degrees; the flight's when left out."""
+    pitch: float = 0.0
+    """Nose down, degrees."""
+    time: float = 0.0
+    """When the pictures are taken, s: of what moves."""
+    seed: int = 0
+    """Seed of a random world and of the noise."""
+    flight: Path | None = None
+    """A .csv file with columns t, x, y, z (s, m) to fly in the video; a flight clear of the solids when left out."""
+    out: Path | None = None
+    """Folder of the files; runs/render/SCENE when left out."""
 
 
-def render_command(request: Request) -> int:
-    """Write the pictures, the contact sheet and the video; exit status 0."""
-    for name, value in (("width", request.width), ("height", request.height)):
+def run(options: Render) -> int:
+    """Write the pictures, the contact sheet and the video."""
+    for name, value in (("width", options.width), ("height", options.height)):
         if value is not None and not 8 <= value <= 4096:
             raise ValueError(f"--{name} is {value}; accepted: 8 to 4096 pixels")
     for name in ("position", "yaw", "pitch", "time"):
-        value = getattr(request, name)
+        value = getattr(options, name)
         if value is not None and not np.all(np.isfinite(value)):
             raise ValueError(f"--{name} is {value}; accepted: finite numbers")
     prepare()
     from e2efly.env import random_key
     from e2efly.scenes.camera import PRESETS
     from e2efly.view.cloud import write_cloud
-    from e2efly.view.images import look_around, write_pictures
+    from e2efly.view.images import look_around, sized, write_pictures
     from e2efly.view.places import find_place
     from e2efly.view.sheet import write_sheet
     from e2efly.view.video import frames, write_video
 
     console = Terminal()
-    place = find_place(request.scene, random_key(request.seed))
-    out = request.out or Path("runs/render") / Path(request.scene).stem
+    place = find_place(options.scene, random_key(options.seed))
+    out = options.out or Path("runs/render") / Path(options.scene).stem
     _make(out)
     with console.status("Planning a flight"):
-        tour = _tour(request, place)
-    camera = sized(PRESETS[request.camera], PICTURE, request.width, request.height)
-    position, quaternion = viewpoint(request, tour)
-    where = f"{request.scene}, seed {request.seed}, {request.camera} at ({', '.join(f'{x:.1f}' for x in position)}) m"
+        tour = _tour(options, place)
+    camera = sized(PRESETS[options.camera], PICTURE, options.width, options.height)
+    position, quaternion = viewpoint(options, tour)
+    where = f"{options.scene}, seed {options.seed}, {options.camera} at ({', '.join(f'{x:.1f}' for x in position)}) m"
     with console.status("Drawing pictures"):
-        sight = look_around(camera, place.scene, request.time, position, quaternion)
-        lidar = look_around(PRESETS["lidar"], place.scene, request.time, position, quaternion)
+        sight = look_around(camera, place.scene, options.time, position, quaternion)
+        lidar = look_around(PRESETS["lidar"], place.scene, options.time, position, quaternion)
         write_pictures(sight, out, where)
-        write_cloud(lidar, out / "lidar.png", f"{request.scene}, seed {request.seed}")
-        title = f"What sensors see: {Path(request.scene).stem}"
-        write_sheet(sight, lidar, place, tour, random_key(request.seed), out / "sheet.png", title, where)
-    small = sized(PRESETS[request.camera], PANEL, request.width, request.height)
+        write_cloud(lidar, out / "lidar.png", f"{options.scene}, seed {options.seed}")
+        title = f"What sensors see: {Path(options.scene).stem}"
+        write_sheet(sight, lidar, place, tour, random_key(options.seed), out / "sheet.png", title, where)
+    small = sized(PRESETS[options.camera], PANEL, options.width, options.height)
     film = frames(small, place.scene, tour, PANEL if camera.projection == "pinhole" else 3 * PANEL)
     written = write_video(
         track(film, "Filming", total=len(tour.time), console=console, transient=True), out / "flight", PERIOD
@@ -83,33 +92,22 @@ def render_command(request: Request) -> int:
     return 0
 
 
-def sized(camera: CameraConfig, columns: int, width: int | None, height: int | None) -> CameraConfig:
-    """The camera with so many columns, or `width`; square pixels where `height` is left out. A LiDAR keeps its rays."""
-    if camera.projection == "spherical":
-        return dataclasses.replace(camera, width=width or camera.width, height=height or camera.height)
-    width = width or columns
-    square = width * math.tan(camera.fov[1] / 2) / math.tan(camera.fov[0] / 2)
-    return dataclasses.replace(camera, width=width, height=height or max(_TILE * round(square / _TILE), _TILE))
-
-
-def viewpoint(request: Request, tour: Any) -> tuple[np.ndarray, np.ndarray]:
+def viewpoint(options: Render, tour: Any) -> tuple[np.ndarray, np.ndarray]:
     """Where the pictures are taken: as asked for, or on the flight after a tenth of it. Level but for `--pitch`."""
     i = len(tour.time) // 10
-    w, x, y, z = tour.quaternion[i]
-    heading = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    yaw = heading if request.yaw is None else math.radians(request.yaw)
-    pitch = math.radians(request.pitch)
+    yaw = float(Quat.of(tour.quaternion[i]).yaw()) if options.yaw is None else math.radians(options.yaw)
+    pitch = math.radians(options.pitch)
     cy, sy, cp, sp = math.cos(yaw / 2), math.sin(yaw / 2), math.cos(pitch / 2), math.sin(pitch / 2)
-    position = tour.position[i] if request.position is None else np.asarray(request.position)
+    position = tour.position[i] if options.position is None else np.asarray(options.position)
     return position, np.array([cy * cp, -sy * sp, cy * sp, sy * cp])
 
 
-def _tour(request: Request, place: Any) -> Any:
+def _tour(options: Render, place: Any) -> Any:
     from e2efly.view.tour import Tour, plan
 
-    if request.flight is None:
+    if options.flight is None:
         return plan(place.clearance, place.route, place.straight, PERIOD)
-    spline = through_points(read_csv(request.flight))
+    spline = through_points(read_csv(options.flight))
     return Tour.of(spline.position(np.arange(0.0, spline.duration, PERIOD)[None])[0], PERIOD)
 
 

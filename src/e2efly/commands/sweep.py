@@ -13,22 +13,24 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tyro
 from rich.console import Console
 
 from e2efly import presets
 from e2efly.budget import check_time
-from e2efly.commands.tables import console_table, markdown
-from e2efly.commands.terminal import Terminal
-from e2efly.config import TrainConfig
+from e2efly.commands import train
+from e2efly.config import ALGORITHMS, TrainConfig
 from e2efly.device import cores
 from e2efly.learn.rundir import RunDirectory
 from e2efly.storage import held, write_atomically, write_json
+from e2efly.tasks import TASKS
+from e2efly.terminal import Terminal, console_table, markdown
 
 RUN_S = 5.0
 """The least that a run takes, s; on one core alone."""
@@ -44,18 +46,42 @@ _ALONE = {
 
 
 @dataclass(frozen=True)
-class Request:
-    """What to run, and where."""
+class Sweep:
+    """Learn a task over seeds and options, runs side by side on Ray (pip install 'e2efly[ray]')."""
 
-    task: str
-    algo: str
-    preset: str
-    seeds: int
-    vary: tuple[str, ...]
-    out: Path
-    cores: int
-    gpus: int
-    address: str | None
+    task: tyro.conf.Positional[str]
+    """What to learn."""
+    algo: str | None = None
+    """By which algorithm; what learns the task best when left out."""
+    preset: str | None = None
+    """Where everything that is not varied comes from; left out: robust, where the task has it, else nominal."""
+    seeds: int = 5
+    """Runs of each variant: seeds 0, 1, ..."""
+    vary: tuple[str, ...] = ()
+    """Options of `e2efly train` with their values: algo.learning-rate=1e-3,4e-3 steps=500000. Each with each."""
+    out: Path | None = None
+    """Folder of the runs and the table; runs/sweep-TASK-ALGO when left out. All machines of a cluster must share it."""
+    cores: int = 1
+    """Cores of a run, each a device where there are no GPUs."""
+    gpus: int = 0
+    """GPUs of a run, each a device; 0: it computes on the CPU."""
+    address: str | None = None
+    """A Ray cluster's address, or auto; left out: this machine alone, bound to loopback."""
+
+    @property
+    def algorithm(self) -> str:
+        """`algo`, or what learns the task best."""
+        return self.algo or TASKS.find(self.task).best
+
+    @property
+    def defaults(self) -> str:
+        """`preset`, or the one that `e2efly train` takes."""
+        return self.preset or presets.default(TASKS.find(self.task), ALGORITHMS.find(self.algorithm))
+
+    @property
+    def folder(self) -> Path:
+        """`out`, or a folder named after task and algorithm."""
+        return self.out or Path("runs") / f"sweep-{TASKS.find(self.task).name}-{self.algorithm}"
 
 
 @dataclass(frozen=True)
@@ -77,33 +103,33 @@ class Trial:
         return found if found.get("finished") else None
 
 
-def sweep_command(request: Request, config_of: Callable[[list[str]], TrainConfig]) -> int:
+def run(options: Sweep) -> int:
     """Run every variant with every seed; write sweep.json and a table. Exit status 1 when a run failed.
-
-    Args:
-        request: what to run.
-        config_of: the configuration of arguments of `e2efly train`; ends the program for what it cannot understand.
 
     Raises:
         ValueError: for options that cannot be varied so, and for a folder with runs of another configuration.
         OSError: when the folder cannot be written or the cluster not reached.
     """
-    console, trials = Terminal(), list(trials_of(request))
+    console, trials = Terminal(), list(trials_of(options))
     if len({trial.out for trial in trials}) < len(trials):
-        raise ValueError(f"--vary {' '.join(request.vary)}: two variants share a folder; accepted: values that differ")
-    configs = {trial.variant: config_of(list(trial.arguments)) for trial in trials if not trial.seed}
+        raise ValueError(f"--vary {' '.join(options.vary)}: two variants share a folder; accepted: values that differ")
+    configs = {trial.variant: train.parse(list(trial.arguments)).config for trial in trials if not trial.seed}
     for trial in trials:
         _check(trial, dataclasses.replace(configs[trial.variant], seed=trial.seed))
-    with held(request.out):
-        return _sweep(request, trials, console)
+    with held(options.folder):
+        return _sweep(options, trials, console)
 
 
-def _sweep(request: Request, trials: list[Trial], console: Console) -> int:
+def _sweep(options: Sweep, trials: list[Trial], console: Console) -> int:
     """In a folder that is this sweep's alone."""
+    from e2efly.learn.judge import reported
+
     found = {trial.out: summary for trial in trials if (summary := trial.ended())}
-    console.print(f"{len(trials)} runs of {request.task} by {request.algo.upper()}, {len(found)} of them there already")
+    console.print(
+        f"{len(trials)} runs of {options.task} by {options.algorithm.upper()}, {len(found)} of them there already"
+    )
     left, failed = [trial for trial in trials if trial.out not in found], 0
-    for trial, how in _run(left, request) if left else ():
+    for trial, how in _run(left, options) if left else ():
         summary = trial.ended()
         if summary is None:
             failed += 1
@@ -111,23 +137,23 @@ def _sweep(request: Request, trials: list[Trial], console: Console) -> int:
             console.print(f"{trial.out.name}: {how}")
             continue
         found[trial.out] = summary
-        seconds = summary["seconds_trained_from_process_start"]
-        console.print(f"{len(found)} of {len(trials)}: {trial.out.name}: {_success(summary):.1%} in {seconds:.0f} s")
-    _report(request, trials, found, console)
+        rate, seconds = reported(summary), summary["seconds_trained_from_process_start"]
+        console.print(f"{len(found)} of {len(trials)}: {trial.out.name}: {rate:.1%} in {seconds:.0f} s")
+    _report(options, trials, found, console)
     return 1 if failed else 0
 
 
-def trials_of(request: Request) -> Iterator[Trial]:
+def trials_of(options: Sweep) -> Iterator[Trial]:
     """Every combination of the values of the varied options, with every seed.
 
     Raises:
         ValueError: naming the option and what is accepted.
     """
     for name, least in (("seeds", 1), ("cores", 1), ("gpus", 0)):
-        if getattr(request, name) < least:
-            raise ValueError(f"--{name} is {getattr(request, name)}; accepted: {least} or more")
+        if getattr(options, name) < least:
+            raise ValueError(f"--{name} is {getattr(options, name)}; accepted: {least} or more")
     varied: dict[str, list[str]] = {}
-    for item in request.vary:
+    for item in options.vary:
         option, equals, values = item.partition("=")
         option = option.lstrip("-").replace("_", "-")
         if not equals or not values or option in _GIVEN or option.startswith("hosts"):
@@ -138,20 +164,21 @@ def trials_of(request: Request) -> Iterator[Trial]:
         if option in varied:
             raise ValueError(f"--vary {option} twice; accepted: all of its values behind one")
         varied[option] = values.split(",")
-    runs = float(request.seeds) * math.prod(map(len, varied.values()))
-    check_time({f"--seeds is {request.seeds}, {runs:g} runs": runs * RUN_S}, f"at {RUN_S:g} s each")
+    runs = float(options.seeds) * math.prod(map(len, varied.values()))
+    check_time({f"--seeds is {options.seeds}, {runs:g} runs": runs * RUN_S}, f"at {RUN_S:g} s each")
     for values in itertools.product(*varied.values()):
         chosen = dict(zip(varied, values, strict=True))
         told = [f"{option} {value}" for option, value in chosen.items() if len(varied[option]) > 1]
-        variant = ", ".join(told) or request.preset
+        variant = ", ".join(told) or options.defaults
         given = [part for option, value in chosen.items() for part in (f"--{option}", *value.split())]
-        for seed in range(request.seeds):
+        for seed in range(options.seeds):
             folder = re.sub(r"[^\w.+-]", "-", "_".join([*told, f"seed {seed}"]))
             arguments = (
-                request.task, "--algo", request.algo, "--preset", request.preset, "--seed", str(seed), "--no-plots",
-                "--devices", str(request.gpus or request.cores), "--device", "gpu" if request.gpus else "cpu", *given,
+                options.task, "--algo", options.algorithm, "--preset", options.defaults, "--seed", str(seed),
+                "--no-plots", "--devices", str(options.gpus or options.cores),
+                "--device", "gpu" if options.gpus else "cpu", *given,
             )  # fmt: skip
-            yield Trial(variant, seed, arguments, (request.out / folder).absolute())
+            yield Trial(variant, seed, arguments, (options.folder / folder).absolute())
 
 
 def train_trial(trial: Trial) -> int:
@@ -173,9 +200,9 @@ def _check(trial: Trial, config: TrainConfig) -> None:
         run.check_same(config)
 
 
-def _run(trials: list[Trial], request: Request) -> Iterator[tuple[Trial, str]]:
+def _run(trials: list[Trial], options: Sweep) -> Iterator[tuple[Trial, str]]:
     """The trials as they end, and how each did."""
-    if request.address is None:
+    if options.address is None:
         os.environ.update(_ALONE)  # before the import, which reads it
     try:
         import ray
@@ -183,17 +210,17 @@ def _run(trials: list[Trial], request: Request) -> Iterator[tuple[Trial, str]]:
     except ModuleNotFoundError as error:
         raise ValueError(f"a sweep needs the package {error.name}: pip install 'e2efly[ray]'") from None
     here: dict[str, Any] = {"num_cpus": cores(), "include_dashboard": False, "_node_ip_address": "127.0.0.1"}
-    where: dict[str, Any] = {"address": "local", **here} if request.address is None else {"address": request.address}
+    where: dict[str, Any] = {"address": "local", **here} if options.address is None else {"address": options.address}
     try:
         ray.init(**where, log_to_driver=False, logging_level=logging.ERROR)
     except ConnectionError as error:
-        raise OSError(f"--address {request.address}: {error}") from None
+        raise OSError(f"--address {options.address}: {error}") from None
     try:
         machines = [node["Resources"] for node in ray.nodes() if node["Alive"]]
-        if not any(m.get("CPU", 0) >= request.cores and m.get("GPU", 0) >= request.gpus for m in machines):
+        if not any(m.get("CPU", 0) >= options.cores and m.get("GPU", 0) >= options.gpus for m in machines):
             known = "; ".join(f"{m.get('CPU', 0):g} cores and {m.get('GPU', 0):g} GPUs" for m in machines)
-            raise ValueError(f"--cores {request.cores} --gpus {request.gpus}; accepted: what one machine has: {known}")
-        remote = ray.remote(num_cpus=request.cores, num_gpus=request.gpus, max_retries=3)(train_trial)
+            raise ValueError(f"--cores {options.cores} --gpus {options.gpus}; accepted: what one machine has: {known}")
+        remote = ray.remote(num_cpus=options.cores, num_gpus=options.gpus, max_retries=3)(train_trial)
         waiting = {remote.remote(trial): trial for trial in trials}
         while waiting:
             (done, *_), _ = ray.wait(list(waiting))
@@ -208,23 +235,20 @@ def _run(trials: list[Trial], request: Request) -> Iterator[tuple[Trial, str]]:
         ray.shutdown()
 
 
-def _success(summary: dict[str, Any]) -> float:
-    """Of the shipped policy, by its worst criterion."""
-    return min(found["success"] for name, found in summary["shipped"].items() if name != "update")
-
-
 def _last_line(trial: Trial) -> str:
     log = trial.out / "train.log"
     lines = log.read_text(errors="replace").strip().splitlines() if log.exists() else []
     return lines[-1] if lines else "it said nothing"
 
 
-def _report(request: Request, trials: list[Trial], found: dict[Path, dict[str, Any]], console: Console) -> None:
+def _report(options: Sweep, trials: list[Trial], found: dict[Path, dict[str, Any]], console: Console) -> None:
     """A row a variant, and a file with every run."""
+    from e2efly.learn.judge import reported
+
     rows = []
     for variant in dict.fromkeys(trial.variant for trial in trials):
         of = [found[trial.out] for trial in trials if trial.variant == variant and trial.out in found]
-        success = [_success(summary) for summary in of]
+        success = [reported(summary) for summary in of]
         seconds = [summary["seconds_trained_from_process_start"] for summary in of]
         rows.append(
             {
@@ -236,7 +260,7 @@ def _report(request: Request, trials: list[Trial], found: dict[Path, dict[str, A
             }
         )
     runs = [{**dataclasses.asdict(trial), "out": trial.out.name, "summary": found.get(trial.out)} for trial in trials]
-    write_json(request.out / "sweep.json", runs)
-    write_atomically(request.out / "sweep.md", ("\n".join(markdown(rows)) + "\n").encode())
+    write_json(options.folder / "sweep.json", runs)
+    write_atomically(options.folder / "sweep.md", ("\n".join(markdown(rows)) + "\n").encode())
     console.print(console_table(rows))
-    console.print(f"Table: {request.out / 'sweep.md'}   every run: {request.out / 'sweep.json'}")
+    console.print(f"Table: {options.folder / 'sweep.md'}   every run: {options.folder / 'sweep.json'}")

@@ -1,121 +1,285 @@
-"""`e2efly train`."""
+"""`e2efly train`. Its options are those of the task and the algorithm, with the defaults of a preset."""
 
+import dataclasses
 import os
 import shlex
 import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
+import tyro
 from rich.console import Console
 
-from e2efly.commands.progress import TerminalProgress
-from e2efly.commands.supervised import is_watched, watched
-from e2efly.commands.tables import console_table
-from e2efly.commands.terminal import Terminal
-from e2efly.config import TrainConfig
+from e2efly import presets
+from e2efly.commands.options import parse as parse_options
+from e2efly.commands.options import peek
+from e2efly.config import ALGORITHMS, EnvConfig, NetworkConfig, RewardConfig, TrainConfig
 from e2efly.device import Hosts, prepare
-from e2efly.presets import algorithm_name
+from e2efly.supervised import is_watched, watched
+from e2efly.tasks import TASKS
+from e2efly.terminal import Terminal, TerminalProgress, console_table, seconds
+from e2efly.zoo import policy_file
 
-LEARNED = 0.95
-"""Success by the worst criterion from which on a task counts as learned, where the user asks for no other."""
+_FLOWN = {"nominal": "best, nominal", "stress": "best, stress", "shipped": "best", "last": "last"}
+"""Parts of a summary that say how a policy flew, and what the table calls them."""
+_POLICY = "a policy: a task of the zoo, a run, or a policy.onnx"
+_OWN = "a task of your own: path/to/file.py:Name"
 
 
-def train_command(
-    config: TrainConfig,
-    out: Path,
-    resume: bool,
-    device: str | None,
-    plots: bool,
-    hosts: Hosts,
-    arguments: list[str],
-) -> int:
-    """Train, ship the best policy, evaluate it and draw plots; exit status 0, or 130 when the user stopped it.
+@dataclass(frozen=True)
+class Train:
+    """What `e2efly train` is asked to do."""
 
-    Args:
-        config: everything that decides the outcome.
-        out: the run directory.
-        resume: go on with the run in it.
-        device: where to compute.
-        plots: evaluate and draw at the end.
-        hosts: the processes of the run.
-        arguments: of `e2efly train`, for the process that a run on several hosts is.
+    config: TrainConfig
+    """Everything that decides the outcome."""
+    out: Path
+    """The run directory."""
+    resume: bool
+    """Go on with the run in it."""
+    overwrite: bool
+    """Delete the run in it."""
+    device: str | None
+    """Where to compute."""
+    plots: bool
+    """Evaluate and draw at the end."""
+    hosts: Hosts
+    """The processes of the run."""
+    arguments: list[str]
+    """As given, for the process that a run on several hosts is."""
+
+
+def run(options: Train) -> int:
+    """Train, ship the best policy, evaluate it and draw plots.
+
+    Returns:
+        0, or 130 when the user stopped it.
     """
-    again = _again(out, device, plots, hosts)
-    if hosts.count > 1 and not is_watched():
-        return watched([sys.executable, "-m", "e2efly", "train", *arguments], lambda reason: f"{reason}; {again}")
-    prepare(device, hosts)
+    o, again = options, _again(options)
+    if o.hosts.count > 1 and not is_watched():
+        return watched([sys.executable, "-m", "e2efly", "train", *o.arguments], lambda reason: f"{reason}; {again}")
+    prepare(o.device, o.hosts)
     from e2efly.learn.hosts import LostHostError
 
     try:
-        return _train(config, out, resume, plots, again, Terminal(quiet=hosts.index > 0))
+        return _train(o, again, Terminal(quiet=o.hosts.index > 0))
     except (LostHostError, ValueError, OSError, FloatingPointError) as error:
-        if hosts.count == 1:
+        if o.hosts.count == 1:
             raise
         print(f"error: {error}{f'; {again}' if isinstance(error, LostHostError) else ''}", file=sys.stderr, flush=True)
         os._exit(2)  # JAX would wait for the others, and abort
 
 
-def _again(out: Path, device: str | None, plots: bool, hosts: Hosts) -> str:
+def parse(arguments: list[str]) -> Train:
+    """The options of `train`.
+
+    Raises:
+        ValueError: for unknown names, options that contradict each other, a run that is not there.
+    """
+    from e2efly.learn.rundir import run_folder
+
+    parsed, config = _parsed(arguments)
+    if parsed.resume and parsed.overwrite:
+        raise ValueError("--resume and --overwrite are both given; accepted: one of them")
+    return Train(
+        config, parsed.out or run_folder(config), parsed.resume, parsed.overwrite, parsed.device, parsed.plots,
+        parsed.hosts, arguments,
+    )  # fmt: skip
+
+
+def _again(o: Train) -> str:
     """How to go on with a run that was stopped."""
-    command = ["e2efly", "train", "--resume", str(out)]
-    command += ["--device", device] if device else []
-    command += [] if plots else ["--no-plots"]
-    every = f", in all {hosts.count} processes and with their --hosts options" if hosts.count > 1 else ""
+    command = ["e2efly", "train", "--resume", str(o.out)]
+    command += ["--device", o.device] if o.device else []
+    command += [] if o.plots else ["--no-plots"]
+    every = f", in all {o.hosts.count} processes and with their --hosts options" if o.hosts.count > 1 else ""
     return f"go on with: {shlex.join(command)}{every}"
 
 
-def _train(config: TrainConfig, out: Path, resume: bool, plots: bool, again: str, console: Console) -> int:
+def _train(o: Train, again: str, console: Console) -> int:
+    from e2efly.learn.clock import since_process_start
     from e2efly.learn.programs import traced_folder
     from e2efly.learn.rundir import RunDirectory
     from e2efly.learn.runner import train
 
-    task, algo = config.task.name, algorithm_name(config.algo)
-    if resume and not RunDirectory(out).checkpoint.exists():
+    if o.resume and not RunDirectory(o.out).checkpoint.exists():
         console.print("There is no checkpoint yet: the run begins at its beginning.")
-    with TerminalProgress(console, f"{task} by {algo}") as progress:
-        summary = train(config, out, progress, resume, traced=traced_folder(config))
-    _report(console, summary, config.stop_at)
+    with TerminalProgress(console, f"{o.config.task.name} by {o.config.algo.name}") as progress:
+        summary = train(o.config, o.out, progress, o.resume, o.overwrite, traced=traced_folder(o.config))
+    _report(console, summary, o.config.stop_at)
     if summary["stopped_by_user"]:
         console.print(f"Stopped; {again}")
         return 130
-    if plots and not console.quiet:
-        from e2efly.commands.evaluate import eval_command
+    if o.plots and not console.quiet:
+        from e2efly.view.evaluation import plot_run
 
-        eval_command(out, quiet=True)
-        console.print(f"Plots: {out / 'plots'}")
-    console.print(f"Policy: {out / 'policy.onnx'} (its contract is inside; `e2efly eval {out}` flies it again)")
+        plot_run(o.out, *progress.end)
+        console.print(f"Plots: {o.out / 'plots'}")
+    console.print(f"Policy: {o.out / 'policy.onnx'} (its contract is inside; `e2efly eval {o.out}` flies it again)")
+    console.print(f"All of this took {since_process_start():.1f} s.")
     return 0
 
 
 def _report(console: Console, summary: dict[str, Any], stop_at: float | None) -> None:
+    from e2efly.learn.judge import verdict
+
     rows = [
         {
             "policy": f"{name}, {called}",
-            "update": summary[which]["update"],
+            "update": summary["last" if which == "last" else "shipped"]["update"],
             "success": f"{d['success']:.1%}",
             "final error": f"{100 * d['final_error_m']:.1f} cm",
             "mean error": f"{100 * d['mean_error_m']:.1f} cm",
-            "time": "none" if d["seconds_of_success"] is None else f"{d['seconds_of_success']:.2f} s",
+            "time": seconds(d["seconds_of_success"]),
             "top speed": f"{d['top_speed_m_s']:.1f} m/s",
         }
-        for which, called in (("shipped", "best"), ("last", "last"))
-        for name, d in summary[which].items()
+        for which, called in _FLOWN.items()
+        for name, d in summary.get(which, {}).items()
         if name != "update"
     ]
-    seconds, steps = summary["seconds_trained_from_process_start"], summary["env_steps"] / 1e6
+    took, steps = summary["seconds_trained_from_process_start"], summary["env_steps"] / 1e6
     console.print(
-        f"\n{verdict(summary, stop_at)}, after {seconds:.1f} s from the start of the process ({steps:.2f} M "
+        f"\n{verdict(summary, stop_at)}, trained by {took:.1f} s after the start of the process ({steps:.2f} M "
         f"environment steps). Flown from {summary['episodes']} starts that it never saw:"
     )
     console.print(console_table(rows))
 
 
-def verdict(summary: dict[str, Any], stop_at: float | None) -> str:
-    """Whether a run learned its task: what `--stop-at` asks for, or most of the starts of its worst criterion."""
-    what = f"{summary['task']} by {summary['algorithm'].upper()}"
-    success = min(found["success"] for name, found in summary["shipped"].items() if name != "update")
-    if summary["reached_criterion"] or success >= (stop_at or LEARNED):
-        return f"Learned {what}: {success:.1%} success"
-    if success == 0:
-        return f"Did not learn {what}: no success"
-    return f"Did not learn {what} reliably: {success:.1%} success"
+def _options(config: TrainConfig, preset: str) -> tuple[type, Any]:
+    """The options of `train`: a dataclass and its defaults, which are those of a configuration."""
+    task, algo = config.task.name, config.algo.name
+    every: list[tuple[str, Any]] = [
+        ("task_name", tyro.conf.Positional[_help(str, f"What to learn: {_join(TASKS)}; or {_OWN}.", metavar="TASK")]),
+        ("algo_name", _help(str, f"Algorithm: {_join(ALGORITHMS)}; or {_OWN}.", name="algo")),
+        ("preset", _help(str, f"Where the defaults come from: {_join(presets.names())}.")),
+        ("vehicle", _help(str, "A shipped vehicle, or the path of a .toml file.")),
+        ("seed", _help(int, "Seed of everything random.")),
+        ("out", _help(Path | None, "Run directory; left out: runs/TASK-ALGO-SEED, or runs/TASK-ALGO-VEHICLE-SEED.")),
+        ("resume", _help(bool, "Go on with the run in --out. `e2efly train --resume DIR` is enough.")),
+        ("start_from", _help(str | None, f"Begin with the weights of {_POLICY}.", name="from")),
+        ("overwrite", _help(bool, "Delete the run that is in --out, and begin anew.")),
+        ("device", _help(Literal["cpu", "gpu"] | None, "Where to compute.")),
+        ("plots", _help(bool, "Evaluate and draw plots at the end.")),
+        ("steps", _help(int, "Environment steps of the whole run.")),
+        ("chunk", _help(int, "Updates between two evaluations (sets shapes).")),
+        ("eval_episodes", _help(int, "Starts of an evaluation while training (sets shapes).")),
+        ("devices", _help(int | None, "Devices (CPU: cores) to share the environments among.")),
+        ("fast_compile", _help(bool, "On a CPU: compile faster, run slower; right for runs of seconds.")),
+        ("curriculum", _help(bool, "Go through the stages of the preset's curriculum, if it has one.")),
+        ("stop_at", _help(float | None, "Stop once the success on 1000 starts is at least this.")),
+        ("hosts", Hosts),
+        ("env", EnvConfig),
+        ("task", Annotated[type(config.task), tyro.conf.arg(name="task")]),
+        ("algo", Annotated[type(config.algo), tyro.conf.arg(name="algo")]),
+        ("network", NetworkConfig),
+        ("reward", RewardConfig),
+    ]
+    options = dataclasses.make_dataclass("Train", every, frozen=True)
+    weights = ", ".join(f"{name} {weight:g}" for name, weight in config.reward.weights.items())
+    options.__doc__ = f"Train a policy ({task}, {algo}). The defaults are preset {preset}'s; reward: {weights}."
+    top = {
+        name: getattr(config, name)
+        for name in ("seed", "steps", "chunk", "eval_episodes", "devices", "fast_compile", "stop_at")
+    }
+    parts = {name: getattr(config, name) for name in ("env", "task", "algo", "network")}
+    # changes to the preset's; a filled dictionary would take no new names
+    parts |= {"reward": RewardConfig(), "env": dataclasses.replace(config.env, randomize={})}
+    defaults = options(
+        task_name=tyro.MISSING, algo_name=algo, preset=preset, vehicle=config.env.vehicle, out=None, resume=False,
+        start_from=config.start_from, overwrite=False, device=None, plots=True, curriculum=True, hosts=Hosts(), **top,
+        **parts,
+    )  # fmt: skip
+    return options, defaults
+
+
+def _help(kind: Any, text: str, **names: Any) -> Any:
+    return Annotated[kind, tyro.conf.arg(help=text, **names)]
+
+
+def _config(options: Any, config: TrainConfig) -> TrainConfig:
+    """The `TrainConfig` of parsed options, whose defaults were those of a configuration."""
+    shared = {f.name: getattr(options, f.name) for f in dataclasses.fields(config)}
+    shared["curriculum"] = config.curriculum if options.curriculum else ()
+    changes, old = options.reward, config.reward
+    shared["reward"] = RewardConfig(_changed(old.weights, changes.weights), {**old.parameters, **changes.parameters})
+    randomize = _changed(config.env.randomize, options.env.randomize)
+    shared["env"] = dataclasses.replace(options.env, randomize=randomize)
+    if options.start_from is not None:
+        shared["start_from"] = str(policy_file(options.start_from, options.vehicle).absolute())
+    if options.vehicle != config.env.vehicle:
+        shared["env"] = dataclasses.replace(shared["env"], vehicle=options.vehicle)
+    return dataclasses.replace(config, **shared)
+
+
+def _changed(preset: Mapping[str, float], given: Mapping[str, float]) -> dict[str, float]:
+    """The preset's numbers with those given in their place; 0 takes one out."""
+    return {name: value for name, value in {**preset, **given}.items() if value != 0}
+
+
+def _parsed(arguments: list[str]) -> tuple[Any, TrainConfig]:
+    """The options of `train` and the configuration that they make."""
+    arguments = _with_folder(arguments)
+    if "--resume" in arguments and (not arguments or arguments[0].startswith("-")) and "--help" not in arguments:
+        return _parsed_of_run(arguments)
+    task = next((a for a in arguments[:1] if not a.startswith("-")), "hover")
+    algo = peek(arguments, "--algo", TASKS.find(task).best)
+    preset = peek(arguments, "--preset", presets.default(TASKS.find(task), ALGORITHMS.find(algo)))
+    config = presets.preset(task, algo, preset)
+    if vehicle := _vehicle(arguments):
+        config = presets.for_vehicle(config, vehicle)
+    if peek(arguments, "--from", ""):
+        config = presets.gentle(config)
+    if arguments[:1] != [task] and not {"-h", "--help"} & set(arguments):
+        raise ValueError(f"train needs a task first: {_join(TASKS)}")
+    return _parsed_as(config, preset, arguments)
+
+
+def _parsed_as(config: TrainConfig, preset: str, arguments: list[str]) -> tuple[Any, TrainConfig]:
+    """As `_parsed`, where the defaults are those of a configuration."""
+    options, defaults = _options(config, preset)
+    _vehicle(arguments)
+    parsed = parse_options(options, "train", arguments, default=defaults)
+    return parsed, _config(parsed, config)
+
+
+def _vehicle(arguments: list[str]) -> str:
+    """The vehicle that is asked for; empty where none is."""
+    given = [vehicle for flag in ("--vehicle", "--env.vehicle") if (vehicle := peek(arguments, flag, ""))]
+    if len(set(given)) > 1:
+        raise ValueError(f"--vehicle is {given[0]} and --env.vehicle is {given[1]}; accepted: one of them alone")
+    return given[0] if given else ""
+
+
+def _with_folder(arguments: list[str]) -> list[str]:
+    """`--resume DIR` as `--out DIR --resume`."""
+    for i, argument in enumerate(arguments):
+        if argument.startswith("--resume="):
+            return [*arguments[:i], "--out", argument.removeprefix("--resume="), "--resume", *arguments[i + 1 :]]
+        if argument == "--resume" and i + 1 < len(arguments) and not arguments[i + 1].startswith("-"):
+            return [*arguments[:i], "--out", arguments[i + 1], "--resume", *arguments[i + 2 :]]
+    return arguments
+
+
+def _parsed_of_run(arguments: list[str]) -> tuple[Any, TrainConfig]:
+    """As `_parsed`, of a run that goes on, where no task is named: everything comes from the run.
+
+    Raises:
+        ValueError: when there is no such run, or an option says otherwise.
+    """
+    from e2efly.learn.rundir import RunDirectory
+
+    out = peek(arguments, "--out", "")
+    if not out:
+        raise ValueError("--resume names no run; accepted: the run's folder, as in `e2efly train --resume DIR`")
+    config = RunDirectory(Path(out)).config()
+    task, algo, preset = config.task.name, config.algo.name, "the run"
+    parsed, told = _parsed_as(config, preset, [task, *arguments])
+    for option, said, known in (("--algo", parsed.algo_name, algo), ("--preset", parsed.preset, preset)):
+        if said != known:
+            raise ValueError(f"{option} is {said}, but {out} goes on as it began ({known}); accepted: to leave it out")
+    return parsed, told
+
+
+def _join(names: Any) -> str:
+    return ", ".join(names)

@@ -13,11 +13,11 @@ from e2efly.config.algorithms import (
     PPOConfig,
     SHACConfig,
 )
-from e2efly.config.numbers import check_numbers, number, shape
 from e2efly.config.train import (
     NetworkConfig,
     Paper,
     RewardConfig,
+    Robust,
     StageConfig,
     TaskConfig,
     TrainConfig,
@@ -25,12 +25,14 @@ from e2efly.config.train import (
 from e2efly.config.vehicle import (
     D435I,
     CameraConfig,
+    DisturbanceConfig,
     EnvConfig,
     ImageNoiseConfig,
     ImuConfig,
     NoiseConfig,
 )
 from e2efly.config.worlds import CLUTTER, ClutterConfig, ForestConfig
+from e2efly.numbers import check_numbers, number, shape
 
 __all__ = [
     "ALGORITHMS",
@@ -41,6 +43,7 @@ __all__ = [
     "BPTTConfig",
     "CameraConfig",
     "ClutterConfig",
+    "DisturbanceConfig",
     "EnvConfig",
     "FOPPOConfig",
     "ForestConfig",
@@ -51,6 +54,7 @@ __all__ = [
     "PPOConfig",
     "Paper",
     "RewardConfig",
+    "Robust",
     "SHACConfig",
     "StageConfig",
     "TaskConfig",

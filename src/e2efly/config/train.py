@@ -63,6 +63,24 @@ class Paper:
     """Environment steps by PPO and by BPTT, millions."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Robust:
+    """How a task's recipe changes where every episode has another vehicle, which the policy has to feel."""
+
+    weights: Mapping[str, float] | None = None
+    """Of the reward, in place of the recipe's; None: those."""
+    algo: Mapping[str, Any] = field(default_factory=dict)
+    """Options of the algorithm."""
+    steps: int
+    """Environment steps."""
+    chunk: int = 30
+    """Updates between two evaluations."""
+    recurrent: int = 64
+    """Units of the GRU, which remembers how the vehicle has answered."""
+    hidden: tuple[int, ...] = (64, 64)
+    """Units of the hidden layers."""
+
+
 @dataclass(frozen=True)
 class TaskConfig:
     """Options of a task, and all that commands ask of a task.
@@ -75,6 +93,10 @@ class TaskConfig:
     """By which it is registered."""
     world: ClassVar[Any] = ""
     """The class of `e2efly.tasks.task.Task` that flies it, or its reference: `package.module:Name`."""
+    goal_class: ClassVar[Any] = None
+    """The class of `e2efly.goal.Goal` that flight uses, without JAX, or its reference; None: `world`."""
+    route: ClassVar[Any] = None
+    """The class of `e2efly.tasks.route.Route` that says where to fly, or its reference; None: `fly` refuses it."""
     reward: ClassVar[Mapping[str, float]] = {}
     """Weights of the reward's terms, where there is no `recipe`."""
     best: ClassVar[str] = "ppo"
@@ -85,6 +107,8 @@ class TaskConfig:
     """Rewards for methods that have both a gradient and a critic; None: PPO's. To a critic nothing follows a crash:
     where every step costs, as in BPTT's rewards, an early crash would be the best end; these pay for living on, and
     charge for a crash."""
+    robust: ClassVar[Mapping[str, Robust]] = {}
+    """How it is learned for vehicles that are not the file's, by algorithm: those have the preset `robust`."""
     cameras: ClassVar[tuple[CameraConfig, ...]] = ()
     """What its policies see."""
     curriculum: ClassVar[tuple["StageConfig", ...]] = ()
@@ -96,7 +120,7 @@ class TaskConfig:
     shows_error: ClassVar[bool] = False
     """Whether the curves of an ablation show its error, as in the paper; else they show success."""
     variants: ClassVar[tuple[str, ...]] = ()
-    """Presets of its own, beside `ours` and `paper`."""
+    """Presets of its own, beside `robust`, `nominal` and `paper`."""
 
     episode_s: float = 10.0
     """Length of an episode, s."""
@@ -110,6 +134,10 @@ class TaskConfig:
         """What a policy is judged by, by name. It counts by its worst."""
         return {self.name: self}
 
+    def course(self) -> dict[str, Any]:
+        """What all its episodes share of what is to be flown, for reports; `Goal.drawn` says what each has besides."""
+        return {}
+
     def limits(self) -> dict[str, float]:
         """The largest values, by field of `Episodes`, with which an episode still succeeds, for plots."""
         return {}
@@ -121,7 +149,7 @@ class TaskConfig:
     @classmethod
     def recipe(cls, algo: str) -> "TrainConfig":
         """How it is learned by an algorithm of `ALGORITHMS`; others build on that by ppo or bptt."""
-        return TrainConfig(cls.training(), ALGORITHMS[algo], RewardConfig(dict(cls.reward)))
+        return TrainConfig(cls.training(), ALGORITHMS[algo](), RewardConfig(dict(cls.reward)))
 
     @classmethod
     def with_critic(cls, algo: str) -> dict[str, Any]:
@@ -149,6 +177,8 @@ class TrainConfig:
     """Vehicle, latency, randomisation, noise."""
     network: NetworkConfig = NetworkConfig()
     """The networks."""
+    start_from: str | None = None
+    """The policy.onnx whose weights it begins with; left out: fresh ones."""
     seed: int = 0
     """Seed of everything random."""
     steps: int = 2_000_000

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from e2efly.config.numbers import number, shape
+from e2efly.numbers import number, shape
 
 CLUTTER = ("box", "capsule", "cylinder", "sphere")
 """Forms of obstacles, which share the places of a world."""
@@ -48,7 +48,7 @@ class ClutterConfig:
     obstacles: float = 16.0
     """How many on average; each of `room` places is taken with the same probability."""
     sideways: float = 2.5
-    """Their centres lie within this of the straight lines from gate to gate, m an axis."""
+    """Their centres lie within this of the straight lines from gate to gate, m per axis."""
     size: tuple[float, float] = number((0.15, 0.4), rising=True)
     """Half-lengths and radii, m."""
     clear: float = 0.5

@@ -54,11 +54,11 @@ class Vec3:
         return Vec3(self.x * scale, self.y * scale, self.z * scale)
 
     def times(self, other: "Vec3") -> "Vec3":
-        """Product an axis."""
+        """Product per axis."""
         return Vec3(self.x * other.x, self.y * other.y, self.z * other.z)
 
     def abs(self) -> "Vec3":
-        """Absolute value an axis."""
+        """Absolute value per axis."""
         return Vec3(abs(self.x), abs(self.y), abs(self.z))
 
     def clip(self, limit: "Vec3") -> "Vec3":
@@ -170,6 +170,21 @@ class Quat:
             2.0 * (self.y * self.z - self.w * self.x),
             1.0 - 2.0 * (self.x**2 + self.y**2),
         )
+
+    def yaw(self) -> Array:
+        """Heading: the angle about world z of the body's x axis, rad in [-pi, pi].
+
+        Its gradient is finite, and the angle 0, where the axis points straight up or down.
+        """
+        sine, cosine = 2.0 * (self.w * self.z + self.x * self.y), 1.0 - 2.0 * (self.y**2 + self.z**2)
+        xp, defined = namespace(sine), sine**2 + cosine**2 > 1e-12
+        angle = xp.arctan2(xp.where(defined, sine, 0.0), xp.where(defined, cosine, 1.0))
+        return xp.where(defined, angle, 0.0)
+
+    def tilt(self) -> Array:
+        """The angle between the body's z axis and up, rad in [0, pi]; its gradient is not finite at either end."""
+        up = 1.0 - 2.0 * (self.x**2 + self.y**2)
+        return namespace(up).arccos(namespace(up).clip(up, -1.0, 1.0))
 
 
 def stack(*parts: Array) -> Array:

@@ -29,6 +29,19 @@ class Origin:
         """Points (..., 3) of the course, m, in the room."""
         return self.vectors(np.asarray(point, np.float64)) + np.asarray(self.position, np.float64)
 
+    def seen_vectors(self, vector: np.ndarray) -> np.ndarray:
+        """Vectors (..., 3) of the room, in the course's axes."""
+        return Origin(yaw=-self.yaw).vectors(vector)
+
+    def seen(self, point: np.ndarray) -> np.ndarray:
+        """Points (..., 3) of the room, m, in the course's axes."""
+        return self.seen_vectors(np.asarray(point, np.float64) - np.asarray(self.position, np.float64))
+
+    def at(self, inner: "Origin") -> "Origin":
+        """The origin, in the room, of a course whose own origin `inner` is told in this one's axes."""
+        x, y, z = (float(value) for value in self.points(inner.position))
+        return Origin((x, y, z), self.yaw + inner.yaw)
+
     def spline(self, spline: Spline) -> Spline:
         """A spline of NumPy arrays, in the room."""
         knots = self.vectors(spline.knots)

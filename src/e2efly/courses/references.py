@@ -125,6 +125,20 @@ class Lissajous:
         """Gerono's figure of eight, x = A sin, y = A sin cos: A in m, top speed (in the middle) in m/s."""
         return Lissajous(half_length, half_length / 2, 2.0, 0.0, speed / (half_length * math.sqrt(2.0)))
 
+    def phase(self, centre: Any, start: Any) -> Any:
+        """The phases p in [-pi, pi], (n,), rad, of the curves about `centre` (3,), m, that begin so.
+
+        Args:
+            centre: of all.
+            start: (n, 3, 3) position, m; velocity, m/s; acceleration, m/s^2: the first knot of each.
+        """
+        xp = start.__array_namespace__()
+        away = (start[:, 0] - xp.asarray(centre)) / self.half_x
+        still = self.rate == 0  # then the speed says nothing, but of a circle the other axis does
+        turning = start[:, 1, 0] / (self.half_x * xp.where(still, 1.0, self.rate))
+        angle = xp.atan2(away[:, 0], xp.where(still, -away[:, 1], turning)) - self.shift
+        return xp.atan2(xp.sin(angle), xp.cos(angle))
+
     def spline(self, centre: Any, phase: Any, m: int) -> Spline:
         """The curve about `centre` (3,), m, from each phase p (n,), rad, as `m` knots in the phases' own library."""
         xp = phase.__array_namespace__()

@@ -10,15 +10,15 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 
 from e2efly.control import Ctbr
+from e2efly.deploy.betaflight.controller import ControllerInfo
+from e2efly.deploy.betaflight.instruments import CLOSED
+from e2efly.deploy.betaflight.watchdog import Plan, WatchedLink
 from e2efly.deploy.bridge import Bridge
 from e2efly.deploy.clock import MONOTONIC, Clock
-from e2efly.deploy.flight_state import Mode
-from e2efly.deploy.hover import blind, blind_time, sink_time
-from e2efly.deploy.instruments import CLOSED
-from e2efly.deploy.msp.controller import ControllerInfo
-from e2efly.deploy.record import Log
+from e2efly.deploy.log.record import Log
+from e2efly.deploy.pilot.flight_state import Mode
+from e2efly.deploy.pilot.hover import blind, blind_time, sink_time
 from e2efly.deploy.terminal import printable
-from e2efly.deploy.watchdog import Plan, WatchedLink
 
 LOWEST_RATE = 100.0
 """The loop runs at least so often, Hz."""

@@ -1,8 +1,12 @@
 """Where the vehicle is and how it moves: what pose sources deliver and what the bridge flies by."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+
+from e2efly.control import Quat
+from e2efly.courses.origin import Origin
 
 
 @dataclass(frozen=True)
@@ -39,3 +43,29 @@ class Odometry:
     """(4,) unit, wxyz, body FLU to world ENU, w >= 0 not enforced: continuous in time."""
     body_rate: np.ndarray
     """(3,) about body x, y, z, rad/s."""
+
+    @property
+    def batch(self) -> "Odometry":
+        """The same motion as a batch of one: each array with a leading axis."""
+        p, v, q, w = self.position, self.velocity, self.quaternion, self.body_rate
+        return Odometry(self.time, p[None], v[None], q[None], w[None])
+
+    def seen_from(self, origin: Origin) -> "Odometry":
+        """The motion in the axes of a world with this origin."""
+        if origin == Origin():
+            return self
+        half = origin.yaw / 2
+        turn = Quat(math.cos(half), 0.0, 0.0, -math.sin(half))
+        attitude = turn.compose(Quat.of(self.quaternion)).stack()
+        position, velocity = origin.seen(self.position), origin.seen_vectors(self.velocity)
+        return Odometry(self.time, position, velocity, attitude, self.body_rate)
+
+
+def yaw_of(quaternion: np.ndarray) -> float:
+    """The angle about world z of the body's x axis, rad; quaternion (4,) wxyz."""
+    return float(Quat.of(quaternion).yaw())
+
+
+def tilt_of(quaternion: np.ndarray) -> float:
+    """The angle between the body's z axis and up, rad; quaternion (4,) wxyz."""
+    return float(Quat.of(quaternion).tilt())

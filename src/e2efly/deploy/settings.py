@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+from e2efly.numbers import check_numbers, number
+
 Point = tuple[float, float, float]
 
 
@@ -10,17 +12,17 @@ Point = tuple[float, float, float]
 class Fence:
     """Outside of it no policy flies. World ENU, m, m/s, rad."""
 
-    low: Point = (-3.0, -3.0, 0.2)
+    low: Point = number((-3.0, -3.0, 0.2), low=-math.inf)
     """Smallest x, y, z."""
-    high: Point = (3.0, 3.0, 4.5)
+    high: Point = number((3.0, 3.0, 4.5), low=-math.inf)
     """Largest x, y, z."""
-    speed: float = 6.0
+    speed: float = number(6.0, above=0)
     """Largest speed, m/s."""
-    tilt: float = 1.4
+    tilt: float = number(1.4, above=0)
     """Largest angle between the body's z axis and up, rad."""
-    braking: float = 6.0
+    braking: float = number(6.0, above=0)
     """Deceleration that hovering can count on, m/s^2: the guard takes over while that still stops inside."""
-    reaction: float = 0.15
+    reaction: float = number(0.15, above=0)
     """Time before the braking acts, s."""
 
 
@@ -44,42 +46,42 @@ class PilotChannels:
 class FlightSettings:
     """How the bridge flies."""
 
-    takeoff_height: float = 1.0
+    takeoff_height: float = number(1.0, above=0)
     """Height of the hover after take-off over where it stood, m."""
-    takeoff_speed: float = 0.4
+    takeoff_speed: float = number(0.4, above=0)
     """m/s."""
-    land_speed: float = 0.35
+    land_speed: float = number(0.35, above=0)
     """m/s."""
-    reposition_speed: float = 0.8
+    reposition_speed: float = number(0.8, above=0)
     """Speed of the hover point at full stick, m/s."""
-    odometry_timeout: float = 0.1
+    odometry_timeout: float = number(0.1, above=0)
     """Odometry older than this is lost, s."""
-    link_timeout: float = 0.25
+    link_timeout: float = number(0.25, above=0)
     """Silence of the flight controller after which the link is lost, s."""
-    policy_timeout: float = 0.01
+    policy_timeout: float = number(0.01, above=0)
     """How long a control step waits for the policy, s."""
-    missed_deadlines: int = 3
+    missed_deadlines: int = number(3, low=1)
     """So many late control steps within a second end a policy's flight."""
-    lateness: float = 0.02
+    lateness: float = number(0.02, above=0)
     """A control step this late missed its deadline, s."""
-    battery_low: float = 3.5
-    """Volts a cell: no take-off below, and hovering lands."""
+    battery_low: float = number(3.5, above=0)
+    """Volts per cell: no take-off below, and hovering lands."""
     battery_unknown: bool = False
     """Fly although the flight controller reports no battery voltage."""
-    stick_deadband: float = 0.12
+    stick_deadband: float = number(0.12, above=0, high=0.99)
     """Stick deflection, of 1, that counts as the pilot's will."""
-    still_speed: float = 0.1
+    still_speed: float = number(0.1, above=0)
     """Largest speed before take-off, and when landed, m/s."""
-    ground_height: float = 0.0
+    ground_height: float = number(0.0, low=-math.inf)
     """Height of the ground, world, m."""
-    land_settle: float = 1.0
+    land_settle: float = number(1.0, above=0)
     """Still for so long, with the target well below: landed, s."""
-    attitude_agreement: float = 0.2
+    attitude_agreement: float = number(0.2, above=0)
     """Largest roll and pitch between the controller's estimate and the odometry before take-off, rad."""
-    follow_distance: float = 1.0
+    follow_distance: float = number(1.0, above=0)
     """A vehicle that flies so far away from its target, having come to rest nearer, has odometry that is not its own:
     a wrong heading, another vehicle's body, m."""
-    heading_agreement: float = 0.7
+    heading_agreement: float = number(0.7, above=0)
     """Largest error of the odometry's heading, as the flight itself shows it, rad."""
     fence: Fence = Fence()
     """Where policies may fly."""
@@ -91,11 +93,6 @@ SMALLEST = 0.5
 """The fence is at least so long, wide and high, m."""
 CHANNELS = (5, 18)
 """First and last channel that a switch or a copy of a stick can be on: 1 to 4 are the sticks."""
-_POSITIVE = (
-    "takeoff_height", "takeoff_speed", "land_speed", "reposition_speed", "odometry_timeout", "link_timeout",
-    "policy_timeout", "missed_deadlines", "lateness", "battery_low", "stick_deadband", "still_speed", "land_settle",
-    "attitude_agreement", "follow_distance", "heading_agreement",
-)  # fmt: skip
 
 
 def check(settings: FlightSettings) -> None:
@@ -104,35 +101,22 @@ def check(settings: FlightSettings) -> None:
     Raises:
         ValueError: naming the field, the value and what is accepted.
     """
-    for name in _POSITIVE:
-        _positive(name, getattr(settings, name))
-    if type(settings.missed_deadlines) is not int:
-        raise ValueError(f"missed_deadlines is {settings.missed_deadlines!r}; accepted: a whole number, 1 or more")
-    if settings.stick_deadband >= 1:
-        raise ValueError(f"stick_deadband is {settings.stick_deadband}; accepted: less than 1, the whole stick")
-    if not _number(settings.ground_height):
-        raise ValueError(f"ground_height is {settings.ground_height!r}; accepted: a finite number")
+    _check_channels(settings.channels)
+    check_numbers("flight", settings)
     _check_fence(settings.fence)
     low, high = settings.fence.low[2], settings.fence.high[2]
     if not low < settings.ground_height + settings.takeoff_height < high:
         raise ValueError(
-            f"takeoff_height is {settings.takeoff_height} m over {settings.ground_height} m; accepted: inside the "
-            f"fence, {low} to {high} m"
+            f"flight.takeoff_height is {settings.takeoff_height} m over {settings.ground_height} m; accepted: inside "
+            f"the fence, {low} to {high} m"
         )
-    _check_channels(settings.channels)
 
 
 def _check_fence(fence: Fence) -> None:
-    for name in ("low", "high"):
-        point = getattr(fence, name)
-        if not (isinstance(point, tuple) and len(point) == 3 and all(map(_number, point))):
-            raise ValueError(f"fence.{name} is {point!r}; accepted: x, y and z, m")
     for axis, low, high in zip("xyz", fence.low, fence.high, strict=True):
         if high - low < SMALLEST:
-            said = f"fence.low and fence.high are {low} and {high} in {axis}"
+            said = f"flight.fence.low and flight.fence.high are {low} and {high} in {axis}"
             raise ValueError(f"{said}; accepted: low at least {SMALLEST} m below high")
-    for name in ("speed", "tilt", "braking", "reaction"):
-        _positive(f"fence.{name}", getattr(fence, name))
 
 
 def _check_channels(channels: PilotChannels) -> None:
@@ -146,16 +130,7 @@ def _check_channels(channels: PilotChannels) -> None:
         if type(channel) is not int or not first <= channel <= last:
             none = "" if name == "mission" else ", or None"
             raise ValueError(
-                f"channels.{name} is {channel!r}; accepted: {first} to {last}{none} (1 to 4 are the sticks)"
+                f"flight.channels.{name} is {channel!r}; accepted: {first} to {last}{none} (1 to 4 are the sticks)"
             )
     if len(set(named.values())) != len(named):
-        raise ValueError(f"channels are {named}; accepted: each another")
-
-
-def _number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _positive(name: str, value: float) -> None:
-    if not (_number(value) and value > 0):
-        raise ValueError(f"{name} is {value!r}; accepted: a positive number")
+        raise ValueError(f"flight.channels are {named}; accepted: each another")

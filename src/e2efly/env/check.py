@@ -3,6 +3,7 @@
 import math
 
 from e2efly.config import EnvConfig, TaskConfig, check_numbers
+from e2efly.deploy.policy.contract_json import LATEST
 from e2efly.scenes.camera import check as check_camera
 from e2efly.sensors.image_noise import check as check_noise
 from e2efly.vehicles import load_vehicle, unknown
@@ -29,13 +30,27 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
         ("observation_latency", config.observation_latency),
         *((f"cameras.{i}.latency", camera.latency) for i, camera in enumerate(config.cameras)),
     ):
-        if bounds is not None and not (0 <= bounds[0] <= bounds[1] <= 1):
-            raise ValueError(f"env.{field} is {bounds}; accepted: two rising numbers of seconds in [0, 1]")
+        if bounds is not None and not (0 <= bounds[0] <= bounds[1] <= LATEST):
+            raise ValueError(f"env.{field} is {bounds}; accepted: two rising numbers of seconds in [0, {LATEST:g}]")
+    if not all(0 <= x <= 1 for x in config.latency_spread):
+        raise ValueError(f"env.latency_spread is {config.latency_spread}; accepted: two numbers of seconds in [0, 1]")
     if config.past_actions is not None and config.past_actions < 0:
         raise ValueError(f"env.past_actions is {config.past_actions}; accepted: 0 or more")
     if not (math.isfinite(config.wind) and config.wind >= 0):
         raise ValueError(f"env.wind is {config.wind}; accepted: 0 or more, m/s")
     vehicle = load_vehicle(config.vehicle)
+    d, drawn = config.disturbance, vehicle.thrust_to_weight * config.weakest
+    if drawn < 1:
+        raise ValueError(
+            f"env.randomize is {dict(config.randomize)} and env.disturbance has thrust {d.thrust:g}, "
+            f"rotor {d.rotor:g}, sag {d.sag:g}: the weakest vehicle of these cannot hover (thrust to weight "
+            f"{drawn:.2f}; {config.vehicle} has {vehicle.thrust_to_weight:.2f}); accepted: draws that leave at least 1"
+        )
+    if config.action_latency is None and vehicle.latency + config.latency_spread[1] > LATEST:
+        raise ValueError(
+            f"latency of vehicle {vehicle.name} is {vehicle.latency} s, env.latency_spread {config.latency_spread}; "
+            f"accepted: at most {LATEST:g} s together"
+        )
     rate = vehicle.control_rate if config.control_rate is None else config.control_rate
     for camera in config.cameras:
         check_camera(camera)
@@ -58,7 +73,12 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
         )
     if not (math.isfinite(config.position_range) and config.position_range > 0):
         raise ValueError(f"env.position_range is {config.position_range}; accepted: more than 0, m")
-    for prefix, part in (("task", task), ("env.noise", config.noise), ("env.imu", config.imu)):
+    for prefix, part in (
+        ("task", task),
+        ("env.noise", config.noise),
+        ("env.disturbance", config.disturbance),
+        ("env.imu", config.imu),
+    ):
         check_numbers(prefix, part)
     for name, part in vars(task).items():
         if hasattr(part, "check"):

@@ -17,7 +17,16 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from e2efly import rewards
-from e2efly.config import CameraConfig, EnvConfig, ImuConfig, NoiseConfig, RewardConfig, TaskConfig
+from e2efly.config import (
+    CameraConfig,
+    DisturbanceConfig,
+    EnvConfig,
+    ImuConfig,
+    NoiseConfig,
+    RewardConfig,
+    TaskConfig,
+)
+from e2efly.env import disturbance
 from e2efly.env.check import check
 from e2efly.env.state import EnvState, Step
 from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field, past_actions
@@ -29,12 +38,12 @@ from e2efly.sensors import imu, latency
 from e2efly.sensors.eyes import Eye, image_shape, see
 from e2efly.sensors.noise import add_noise
 from e2efly.tasks.task import Shape, Task, into_ball, make_task, uniform
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles import Flown, Vehicle, load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
 LEADS = (0.0, 0.25, 0.5, 1.0, 1.5)
 """How far ahead a critic is told the clearance, s."""
-STARTS, INERTIAL, SEEN, IMAGES = range(4)
+STARTS, INERTIAL, SEEN, IMAGES, DISTURBED = range(5)
 """What is random in a control step: each has keys of its own."""
 DEFAULT = EnvConfig()
 """The VIS-R, nothing random but the starts."""
@@ -44,7 +53,7 @@ DEFAULT = EnvConfig()
     jax.tree_util.register_dataclass,
     data_fields=[
         "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range",
-        "observation_latency_range", "randomize", "wind", "noise", "imu", "cameras",
+        "observation_latency_range", "randomize", "wind", "disturbance", "noise", "imu", "cameras",
     ],
     meta_fields=["queue", "seen_actions", "past"],
 )  # fmt: skip
@@ -68,6 +77,7 @@ class Env:
     """Relative half-width of each randomised vehicle parameter."""
     wind: Any
     """Largest wind speed, m/s; None: still air."""
+    disturbance: DisturbanceConfig | None
     noise: NoiseConfig | None
     imu: ImuConfig | None
     cameras: tuple[CameraConfig, ...]
@@ -79,8 +89,21 @@ class Env:
     """States that are kept for late observations and images; 0: none."""
 
     @staticmethod
-    def of(task: TaskConfig, reward: RewardConfig, config: EnvConfig = DEFAULT, dtype: type = np.float32) -> "Env":
+    def of(
+        task: TaskConfig,
+        reward: RewardConfig,
+        config: EnvConfig = DEFAULT,
+        dtype: type = np.float32,
+        flown: Flown | None = None,
+    ) -> "Env":
         """Build the environment of a configuration.
+
+        Args:
+            task: its options.
+            reward: what it pays for.
+            config: its vehicle gives the limits of the commands, the control rate and the latency.
+            dtype: of all numbers.
+            flown: what flies, and what the flight controller takes it for; None: both are the configuration's vehicle.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.
@@ -89,15 +112,22 @@ class Env:
         physics = Physics.of(
             vehicle, config.command_mode, config.integrator, config.control_rate, config.largest_step, dtype
         )
-        period = physics.control_period
+        period, body = physics.control_period, vehicle
+        if flown is not None:
+            body, believed = flown.body, flown.believed
+            physics = Physics.of(
+                believed, config.command_mode, config.integrator, config.control_rate, config.largest_step, dtype
+            )
+            physics = physics if flown.as_believed else physics.flying(body, dtype)
         check(config, task)
         rewards.check(reward.weights, reward.parameters)
-        late = config.action_latency or (vehicle.latency, vehicle.latency)
+        sooner, later = config.latency_spread
+        late = config.action_latency or (max(vehicle.latency - sooner, 0.0), vehicle.latency + later)
         frames = latency.frames(late[1], period)
         seen = frames if config.past_actions is None else config.past_actions
         low, high = command_limits(COMMAND_MODES[config.command_mode], vehicle, config.position_range)
         noisy = config.noise != NoiseConfig()
-        shape = Shape(vehicle.feet_height, vehicle.radius)
+        shape = Shape(body.feet_height, body.radius)
         oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
         return Env(
             physics=physics,
@@ -111,12 +141,33 @@ class Env:
             observation_latency_range=np.asarray(config.observation_latency, dtype),
             randomize=dict(config.randomize),
             wind=config.wind or None,
+            disturbance=None if config.disturbance == DisturbanceConfig() else config.disturbance,
             noise=config.noise if noisy else None,
             imu=config.imu if config.imu.observed else None,
             cameras=config.cameras,
             queue=max(frames + 1, seen, 2),
             seen_actions=seen,
             past=latency.frames(oldest, period) + 1 if oldest else 0,
+        )
+
+    @property
+    def is_disturbed(self) -> bool:
+        """Whether episodes have vehicles, delays or air that are not those of the vehicle's file."""
+        sooner, later = self.latency_range
+        spread = sooner != later
+        return bool(spread or any(self.randomize.values()) or self.wind or self.disturbance)
+
+    def undisturbed(self) -> "Env":
+        """The environment with the vehicle of the file, its delay and still air. Numbers alone differ, so that the
+        same compiled programs take it.
+        """
+        nominal = np.clip(np.asarray(self.physics.nominal.latency, self.latency_range.dtype), *self.latency_range)
+        return dataclasses.replace(
+            self,
+            latency_range=np.stack([nominal, nominal]),
+            randomize={name: 0 * width for name, width in self.randomize.items()},
+            wind=self.wind and 0 * self.wind,
+            disturbance=self.disturbance and DisturbanceConfig(),
         )
 
     @property
@@ -147,14 +198,31 @@ class Env:
             The state and the first observation.
         """
         state = self._start(key, n, jnp.zeros((), jnp.int32))
-        return self.look(state, jnp.ones(n, bool)), self._observe(state)
+        return self._look(state, jnp.ones(n, bool)), self._observe(state)
 
-    def step(self, state: EnvState, action: Float[Array, "n 4"]) -> tuple[EnvState, Step]:
-        """One control step, with new starts where an episode ended."""
-        state, out = self.restart(*self.advance(state, action))
-        return self.look(state, out.done), out
+    def step(
+        self, state: EnvState, action: Float[Array, "n 4"], *, restart: bool = True, privileged: bool = False
+    ) -> tuple[EnvState, Step]:
+        """One control step.
 
-    def look(self, state: EnvState, renewed: Bool[Array, " n"]) -> EnvState:
+        Args:
+            state: of `reset`, or of the step before.
+            action: in [-1, 1]; what is beyond is clipped.
+            restart: start anew where an episode ended; without, it goes on.
+            privileged: fill `Step.final_privileged`, for a critic.
+
+        Returns:
+            The state to act on next, and what happened.
+        """
+        reached, out = self._advance(state, action)
+        if privileged:
+            out = dataclasses.replace(out, final_privileged=self.privileged(reached))
+        if not restart:
+            return self._look(reached, jnp.zeros_like(out.terminated)), out
+        reached, out = self._restart(reached, out)
+        return self._look(reached, out.done), out
+
+    def _look(self, state: EnvState, renewed: Bool[Array, " n"]) -> EnvState:
         """The state with the images that are there to act on.
 
         New are those of cameras whose turn it is, and those of vehicles whose episode is new.
@@ -202,8 +270,8 @@ class Env:
         ahead = jax.vmap(lambda t: scenes.clearance(scene, s.position + t * s.velocity, state.time + t), out_axes=1)
         return jnp.concatenate([jnp.clip(away, -5.0, 5.0), jnp.clip(ahead(jnp.asarray(LEADS)), -1.0, 3.0)], axis=-1)
 
-    def restart(self, state: EnvState, out: Step) -> tuple[EnvState, Step]:
-        """Start anew where `out` says that the episode ended; all of it under a full mask is a reset."""
+    def _restart(self, state: EnvState, out: Step) -> tuple[EnvState, Step]:
+        """Start anew where `out` says that the episode ended."""
 
         def anew(_: None) -> tuple[EnvState, Array]:
             fresh = self._start(_key(state, STARTS), out.reward.shape[0], state.tick)
@@ -213,14 +281,20 @@ class Env:
         state, observation = jax.lax.cond(jnp.any(out.done), anew, lambda _: (state, out.final_observation), None)
         return state, dataclasses.replace(out, observation=observation)
 
-    def advance(self, state: EnvState, action: Float[Array, "n 4"]) -> tuple[EnvState, Step]:
-        """One control step without new starts."""
+    def _advance(self, state: EnvState, action: Float[Array, "n 4"]) -> tuple[EnvState, Step]:
+        """One control step without new starts, with the images of the last."""
         period = self.control_period
         actions = jnp.concatenate([action[:, None], state.actions[:, :-1]], axis=1)
         old, new, switch = latency.acting_commands(self.command(actions), state.action_latency, period)
         before = state.vehicle
-        plant = dataclasses.replace(self.physics.nominal, **state.plant)
-        after = step(self.physics, plant, before, new, previous=old, switch_time=switch, wind=state.wind)
+        plant = dataclasses.replace(self.physics.flown, **state.plant)
+        wind, share, disturbed = state.wind, None, state.disturbance
+        if disturbed is not None:
+            gust = jnp.asarray(disturbed.gust)
+            wind = gust if wind is None else wind + gust
+            share = disturbed.share(state.time / self.task.episode_s)
+            disturbed = disturbance.advance(disturbed, _key(state, DISTURBED), period)
+        after = step(self.physics, plant, before, new, previous=old, switch_time=switch, wind=wind, rotor_share=share)
 
         time = (jnp.round(state.time / period) + 1) * period  # whole periods: float32 sums drift
         late = time >= self.task.episode_s - 1e-3 * period
@@ -237,6 +311,7 @@ class Env:
             action_latency=state.action_latency,
             plant=state.plant,
             wind=state.wind,
+            disturbance=disturbed,
             past=None if state.past is None else _push(state.past, after),
             observation_latency=state.observation_latency,
             imu=inertial,
@@ -280,9 +355,15 @@ class Env:
 
     def _start(self, key: PRNGKeyArray, n: int, tick: Int[Array, ""]) -> EnvState:
         task_key, plant_key, wind_key, action_key, observation_key, eyes_key, onward = jax.random.split(key, 7)
-        nominal, dtype = self.physics.nominal, self.center.dtype
+        disturbed, plant = None, _perturbed(plant_key, n, self.physics.flown, self.randomize)
+        if self.disturbance is not None:
+            disturbed_key, mass_key = jax.random.split(jax.random.fold_in(plant_key, 1))
+            disturbed = disturbance.draw(self.disturbance, disturbed_key, n)
+            rotors: Any = plant.get("rotor_position", self.physics.flown.rotor_position)
+            plant["rotor_position"] = rotors - self.disturbance.centre_of_mass * uniform(mass_key, n, 2)[:, None]
+        dtype = self.center.dtype
         vehicle, memory = self.task.start(task_key, n)
-        rotor_speed = jnp.broadcast_to(hover_rotor_speed(nominal), (n, 4))
+        rotor_speed = jnp.broadcast_to(hover_rotor_speed(self.physics.flown), (n, 4))
         vehicle = dataclasses.replace(vehicle, rotor_speed=rotor_speed)
         vehicle = jax.tree.map(lambda x: x.astype(dtype), vehicle)
         past = None
@@ -294,8 +375,9 @@ class Env:
             time=jnp.zeros(n, dtype),
             actions=jnp.broadcast_to(self.hover, (n, self.queue, 4)).astype(dtype),
             action_latency=_between(action_key, n, self.latency_range),
-            plant=_perturbed(plant_key, n, nominal, self.randomize),
+            plant=plant,
             wind=None if self.wind is None else self.wind * into_ball(uniform(wind_key, n, 3)),
+            disturbance=disturbed,
             past=past,
             observation_latency=_between(observation_key, n, self.observation_latency_range),
             imu=None if self.imu is None else imu.ImuState.at(vehicle),
@@ -333,6 +415,8 @@ class Env:
         seen = state.vehicle
         if state.past is not None:
             seen = latency.delayed_state(state.past, state.observation_latency, self.control_period)
+        if state.disturbance is not None:
+            seen = dataclasses.replace(seen, position=seen.position + state.disturbance.drift)
         if self.noise is not None:
             seen = add_noise(self.noise, _key(state, SEEN), seen)
         n = seen.position.shape[0]

@@ -6,6 +6,7 @@ from typing import Any
 import jax
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
+from e2efly.env.disturbance import Disturbance
 from e2efly.physics import State
 from e2efly.sensors import imu
 from e2efly.sensors.eyes import Eye
@@ -29,6 +30,8 @@ class EnvState:
     """The randomised vehicle parameters."""
     wind: Float[Array, "n 3"] | None
     """World, m/s."""
+    disturbance: Disturbance | None
+    """Gusts, rotors, sag and drift."""
     past: State | None
     """The last states, newest first, when observations are late."""
     observation_latency: Float[Array, " n"]
@@ -64,6 +67,8 @@ class Step:
     """The episode ended in this step and met the criterion."""
     error: Float[Array, " n"]
     """The task's error, m."""
+    final_privileged: Float[Array, "n p"] | None = None
+    """`Env.privileged` of what was reached, before any new start; None where it was not asked for."""
 
     @property
     def done(self) -> Bool[Array, " n"]:

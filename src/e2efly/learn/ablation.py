@@ -19,7 +19,7 @@ from jaxtyping import Float
 
 from e2efly.config import TrainConfig
 from e2efly.env import Env, random_key
-from e2efly.evaluate import Episodes, run_episodes
+from e2efly.episodes import Episodes, run_episodes
 from e2efly.learn.algorithm import TrainState, begin
 from e2efly.learn.checkpoint import load_checkpoint, read_about, save_checkpoint
 from e2efly.learn.devices import AXIS, OWN, SAME, on_each

@@ -17,11 +17,21 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import ABPTConfig
 from e2efly.env import Env, EnvState
-from e2efly.learn.algorithm import TrainState, annealed, ascended, at_rest, descend, ends, episode_metrics
-from e2efly.learn.critic import known
-from e2efly.learn.networks import Actor, Layers, Weights, init_mlp, mlp
+from e2efly.learn.algorithm import (
+    Algorithm,
+    TrainState,
+    adam_state,
+    annealed,
+    descend,
+    episode_metrics,
+    followed,
+    gradient_cuts,
+    gradient_per_term,
+)
+from e2efly.learn.critic import critic_input
+from e2efly.learn.networks import Layers, Weights, init_mlp, mlp
 from e2efly.learn.replay import Places, Ring
-from e2efly.learn.window import Flight, Worth, cut_off, flown
+from e2efly.learn.rollout import RolloutState, advance, window
 
 QUIETEST = -5.0
 """The log standard deviation of the action noise falls no lower."""
@@ -55,7 +65,7 @@ class Situation:
 
     features: Float[Array, "n f"]
     memory: Float[Array, "n k"]
-    known: Float[Array, "n c"]
+    critic_input: Float[Array, "n c"]
     """What critics are fed beside the action."""
 
 
@@ -72,11 +82,8 @@ class Transition:
     there: Situation
 
 
-@dataclass(frozen=True)
-class ABPT:
-    """The algorithm on one environment's shapes; its numbers come in with `config` at every call."""
-
-    actor: Actor
+class ABPT(Algorithm):
+    """Amended back-propagation through time; see the module."""
 
     def init(self, env: Env, config: ABPTConfig, seed: int) -> Parameters:
         """Fresh networks, made by NumPy."""
@@ -87,14 +94,14 @@ class ABPT:
         return Parameters(policy, np.full(4, config.log_std, np.float32), critics, jax.tree.map(np.copy, critics))
 
     def optimizer(self, config: ABPTConfig, parameters: Parameters) -> dict[str, Any]:
-        """Adam at rest, of the policy and of the critics."""
+        """Adam's initial states, of the policy and of the critics."""
         policy = Stochastic(parameters.policy, parameters.log_std)
-        return {"policy": at_rest(config, policy), "critics": at_rest(config, parameters.critics)}
+        return {"policy": adam_state(config, policy), "critics": adam_state(config, parameters.critics)}
 
     def replay(self, env: Env, config: ABPTConfig, state: EnvState, observation: Float[Array, "n o"]) -> dict[str, Any]:
         """An empty buffer of transitions, and the first states as places to begin windows at."""
         n = observation.shape[0]
-        here = self._situation(env, state, observation, self.actor.memory(n))
+        here = self._here(env, RolloutState(state, observation, self.actor.memory(n)))
         one = Transition(here, jnp.zeros((n, 4)), jnp.zeros(n), jnp.zeros(n), here)
         devices = config.envs // n
         places = Places.of((state, observation, self.actor.memory(n)), config.places // config.envs)
@@ -103,91 +110,74 @@ class ABPT:
     def update(
         self, env: Env, config: ABPTConfig, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[TrainState, dict[str, Array]]:
-        """Steps into the buffer, gradient steps of the critics, one window and one gradient step of the policy.
-
-        Args:
-            env: the environment.
-            config: numbers of the algorithm.
-            state: where the last update ended.
-            progress: share of the run that is done, in [0, 1]: sets the learning rates.
-
-        Returns:
-            The new state and the metrics of this update.
-        """
+        """Steps into the buffer, gradient steps of the critics, one window and one gradient step of the policy."""
         key, collect_key, critic_key, start_key, window_key = jax.random.split(state.key, 5)
         learned, rate = state.parameters, annealed(config, progress)
         policy = Stochastic(learned.policy, learned.log_std)
-        (env_state, observation, memory), transitions, metrics = self._collect(env, config, policy, state, collect_key)
+        end, transitions, metrics = self._collect(env, config, policy, state, collect_key)
         ring = state.replay["transitions"].filled(transitions)
-        places = state.replay["places"].filled((env_state, observation, memory))
+        places = state.replay["places"].filled((end.env, end.observation, end.memory))
         critics, targets, critics_adam, metrics["loss/value"] = self._fit(
             config, config.critic_rate * rate, policy, learned, state.optimizer["critics"], ring, critic_key
         )
-
-        start = self._start(env, config, places, env_state, start_key)
+        start = self._start(env, config, places, end.env, start_key)
 
         def gain(policy: Stochastic) -> tuple[dict[str, Array], dict[str, Array]]:
             return self._window(env, config, policy, targets, start, window_key, progress)
 
-        grads, more, norms = ascended(gain, policy, config.term_gradients)
+        grads, more, norms = gradient_per_term(gain, policy, config.term_gradients)
         policy, policy_adam, norm = descend(config, rate, policy, state.optimizer["policy"], grads)
         log_std = jnp.maximum(policy.log_std, QUIETEST)
-        return dataclasses.replace(
+        return end.into(
             state,
             parameters=Parameters(policy.mean, log_std, critics, targets),
             optimizer={"policy": policy_adam, "critics": critics_adam},
-            env=env_state,
-            observation=observation,
-            memory=memory,
             key=key,
             replay={"transitions": ring, "places": places},
         ), metrics | more | norms | {"loss/gradient_norm": norm, "std": jnp.mean(jnp.exp(log_std))}
 
-    def _situation(self, env: Env, state: EnvState, observation: Array, memory: Array) -> Situation:
-        features = self.actor.features(observation, state.images)
-        return Situation(features, memory, known(self.actor, env, state, observation))
+    def _situation(self, images: Any, observation: Array, privileged: Array, memory: Array) -> Situation:
+        features = self.actor.features(observation, images)
+        return Situation(features, memory, critic_input(self.actor, observation, privileged))
+
+    def _here(self, env: Env, at: RolloutState) -> Situation:
+        return self._situation(at.env.images, at.observation, env.privileged(at.env), at.memory)
 
     def _act(self, policy: Stochastic, here: Situation, z: Float[Array, "n 4"]) -> tuple[Array, Array]:
-        """An action with noise, and the GRU's next memory."""
+        """An action with noise, and the next recurrent state."""
         mean, memory = self.actor(policy.mean, here.features, here.memory)
         return mean + jnp.exp(policy.log_std) * z, memory
 
     def _q(self, critics: tuple[Layers, Layers], here: Situation, action: Array) -> tuple[Array, Array]:
-        fed = jnp.concatenate([here.known, jnp.clip(action, -1.0, 1.0)], axis=-1)
+        fed = jnp.concatenate([here.critic_input, jnp.clip(action, -1.0, 1.0)], axis=-1)
         one, other = (mlp(critic, fed, self.actor.network.activation)[..., 0] for critic in critics)
         return one, other
 
-    def _worth(self, policy: Stochastic, targets: tuple[Layers, Layers], here: Situation, z: Array) -> Array:
-        """What follows from here, at the policy's word: the smaller estimate of the two."""
+    def _value(self, policy: Stochastic, targets: tuple[Layers, Layers], here: Situation, z: Array) -> Array:
+        """What follows from here by the policy's action: the smaller estimate of the two."""
         return jnp.minimum(*self._q(targets, here, self._act(policy, here, z)[0]))
 
     def _collect(
         self, env: Env, config: ABPTConfig, policy: Stochastic, state: TrainState, key: PRNGKeyArray
-    ) -> tuple[Any, Transition, dict[str, Array]]:
+    ) -> tuple[RolloutState, Transition, dict[str, Array]]:
         """Steps without gradients: where they end, the transitions (steps * n, ...), and the metrics."""
 
-        def step(carry: tuple[EnvState, Array, Array], z: Array) -> tuple[Any, Any]:
-            env_state, observation, memory = carry
-            here = self._situation(env, env_state, observation, memory)
+        def step(at: RolloutState, z: Array) -> tuple[RolloutState, Any]:
+            here = self._here(env, at)
             action, memory = self._act(policy, here, z)
-            reached, out = env.advance(env_state, action)
-            env_state, out = env.restart(reached, out)
-            env_state = env.look(env_state, out.done)
+            after, out = advance(env, config, at, action, memory, critic=True)
             # where an episode's time is out its last image stands for the next: good enough for a value
             images = tuple(
                 jnp.where(out.done.reshape(-1, *[1] * (new.ndim - 1)), old, new)
-                for old, new in zip(reached.images, env_state.images, strict=True)
+                for old, new in zip(at.env.images, after.env.images, strict=True)
             )
-            seen = dataclasses.replace(reached, images=images)
-            there = self._situation(env, seen, out.final_observation, memory)
+            assert out.final_privileged is not None
+            there = self._situation(images, out.final_observation, out.final_privileged, memory)
             ended = out.terminated.astype(jnp.float32)
-            memory = jnp.where(out.done[:, None], 0.0, memory)
-            gathered = Transition(here, action, out.reward, ended, there), out.done, out.success
-            return (env_state, out.observation, memory), gathered
+            return after, (Transition(here, action, out.reward, ended, there), out.done, out.success)
 
         noise = jax.random.normal(key, (config.collect, *state.observation.shape[:1], 4))
-        first = (state.env, state.observation, state.memory)
-        last, (transitions, done, success) = jax.lax.scan(step, first, noise)
+        last, (transitions, done, success) = jax.lax.scan(step, RolloutState.of(state), noise)
         flat = jax.tree.map(lambda x: x.reshape(x.shape[0] * x.shape[1], *x.shape[2:]), transitions)
         return last, flat, {"reward": jnp.mean(transitions.reward), **episode_metrics(done, success)}
 
@@ -210,21 +200,17 @@ class ABPT:
             critics, targets, optimizer = carry
             rows_key, noise_key = jax.random.split(key)
             batch = ring.drawn(rows_key, size)
-            follows = self._worth(policy, targets, batch.there, jax.random.normal(noise_key, (size, 4)))
+            follows = self._value(policy, targets, batch.there, jax.random.normal(noise_key, (size, 4)))
             target = batch.reward + config.gamma * (1.0 - batch.ended) * follows
             loss, grads = jax.value_and_grad(error)(critics, batch, target)
             critics, optimizer, _ = descend(config, rate, critics, optimizer, grads)
-            share = config.target_share
-            targets = jax.tree.map(lambda old, new: old + share * (new - old), targets, critics)
-            return (critics, targets, optimizer), loss
+            return (critics, followed(targets, critics, config.target_share), optimizer), loss
 
         first = (learned.critics, learned.targets, optimizer)
         (critics, targets, optimizer), losses = jax.lax.scan(minibatch, first, jax.random.split(key, config.fits))
         return critics, targets, optimizer, jnp.mean(losses)
 
-    def _start(
-        self, env: Env, config: ABPTConfig, places: Places, now: EnvState, key: PRNGKeyArray
-    ) -> tuple[EnvState, Array, Array]:
+    def _start(self, env: Env, config: ABPTConfig, places: Places, now: EnvState, key: PRNGKeyArray) -> RolloutState:
         """Where windows begin: new starts and visited states."""
         reset_key, which_key, draw_key = jax.random.split(key, 3)
         state, observation, memory = places.drawn(draw_key)
@@ -239,7 +225,11 @@ class ABPT:
             return jnp.where(fresh.reshape(-1, *[1] * (old.ndim - 1)), new, old)
 
         anew = dataclasses.replace(anew, tick=now.tick)
-        return jax.tree.map(choose, (anew, first, self.actor.memory(n)), (state, observation, memory))
+        fresh_starts, visited = (
+            RolloutState(anew, first, self.actor.memory(n)),
+            RolloutState(state, observation, memory),
+        )
+        return dataclasses.replace(jax.tree.map(choose, fresh_starts, visited), discount=jnp.ones(n))
 
     def _window(
         self,
@@ -247,30 +237,22 @@ class ABPT:
         config: ABPTConfig,
         policy: Stochastic,
         targets: tuple[Layers, Layers],
-        start: tuple[EnvState, Array, Array],
+        start: RolloutState,
         key: PRNGKeyArray,
         progress: Float[Array, ""],
     ) -> tuple[dict[str, Array], dict[str, Array]]:
-        noise = jax.random.normal(key, (config.horizon + 2, start[1].shape[0], 4))
+        noise = jax.random.normal(key, (config.horizon + 2, start.observation.shape[0], 4))
 
-        def worth(policy: Stochastic, z: Array) -> Worth:
-            return lambda *there: self._worth(policy, targets, self._situation(env, *there), z)
+        def follows(images: Any, observation: Array, privileged: Array, memory: Array, z: Array) -> Array:
+            return self._value(policy, targets, self._situation(images, observation, privileged, memory), z)
 
-        def step(flight: Flight, x: tuple[Array, Array]) -> tuple[Flight, Any]:
-            z, cut = x
-            flight, late = cut_off(config, flight, cut, worth(policy, z))
-            here = self._situation(env, flight.env, flight.observation, flight.memory)
-            action, memory = self._act(policy, here, z)
-            flight, gain, _, out = flown(env, config, flight, action, memory, worth(policy, jnp.zeros_like(z)))
-            gain["value"] += late
-            return flight, (gain, {name: jnp.mean(x) for name, x in out.terms.items()})
+        def act(at: RolloutState, z: Array) -> tuple[Array, Array, None]:
+            return *self._act(policy, self._here(env, at), z), None
 
-        first = Flight.of(*start)
-        at_once = first.worth(worth(policy, noise[-1]))
-        flight, (gain, terms) = jax.lax.scan(step, first, (noise[: config.horizon], ends(config, progress)))
-        share, scale = config.at_once, 1.0 / config.horizon
-        gain = {name: scale * (1 - share) * jnp.sum(x) for name, x in gain.items()}
-        gain["value"] += scale * (1 - share) * flight.worth(worth(policy, noise[-2]))
-        gain["at_once"] = scale * share * at_once
-        gain["entropy"] = scale * config.entropy_weight * jnp.sum(policy.log_std)
-        return gain, {"value": at_once, **{f"reward/{name}": jnp.mean(x) for name, x in terms.items()}}
+        at_once = start.value(env, follows, noise[-1])
+        cuts = gradient_cuts(config, progress)
+        gain, _, (_, _, record) = window(env, config, start, act, follows, noise[: config.horizon], cuts, noise[-2])
+        gain = {name: (1 - config.at_once) * x for name, x in gain.items()}
+        gain["at_once"] = config.at_once / config.horizon * at_once
+        gain["entropy"] = config.entropy_weight / config.horizon * jnp.sum(policy.log_std)
+        return gain, {"value": at_once, **record.term_metrics()}

@@ -1,9 +1,11 @@
 """What every algorithm is to the runner, and what they share."""
 
 import dataclasses
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from functools import cache
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -11,19 +13,12 @@ import optax
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.config import ABPTConfig, AlgorithmConfig, BPTTConfig, FOPPOConfig, PPOConfig, SHACConfig
+from e2efly.config import ALGORITHMS, AlgorithmConfig
 from e2efly.env import Env, EnvState
-from e2efly.evaluate import part_of
+from e2efly.episodes import part_of
 from e2efly.learn.devices import AXIS
 from e2efly.learn.networks import Actor
-
-for _config in (PPOConfig, BPTTConfig, SHACConfig, ABPTConfig, FOPPOConfig):
-    _fields = dataclasses.fields(_config)
-    jax.tree_util.register_dataclass(
-        _config,
-        data_fields=[field.name for field in _fields if field.type is float],
-        meta_fields=[field.name for field in _fields if field.type is not float],
-    )
+from e2efly.registry import load, origin
 
 
 @jax.tree_util.register_dataclass
@@ -37,40 +32,49 @@ class TrainState:
     env: EnvState
     observation: Float[Array, "n o"]
     memory: Float[Array, "n k"]
-    """Of the policy's GRU."""
+    """Recurrent state of the policy."""
     key: PRNGKeyArray
     replay: Any = None
     """What an off-policy method keeps of earlier steps."""
 
 
-class Algorithm(Protocol):
-    """A learning algorithm on the shapes of one environment."""
+@dataclass(frozen=True)
+class Algorithm(ABC):
+    """A learning algorithm on the shapes of one environment. Its numbers come in with `config` at every call.
 
-    @property
-    def actor(self) -> Actor:
-        """The policy that learns."""
-        ...
+    Whatever an update draws, flies and learns is in the `TrainState` that it takes and returns.
+    """
 
+    actor: Actor
+    """The policy that learns."""
+
+    @abstractmethod
     def init(self, env: Env, config: Any, seed: int) -> Any:
-        """Fresh parameters, made by NumPy: nothing to compile."""
-        ...
+        """Fresh parameters, a registered dataclass with at least `policy`; made by NumPy: nothing to compile."""
 
-    def optimizer(self, config: Any, parameters: Any) -> Any:
-        """The optimiser's first state."""
-        ...
-
-    def replay(self, env: Env, config: Any, state: EnvState, observation: Float[Array, "n o"]) -> Any:
-        """What an off-policy method keeps of earlier steps, as it is at first; None: nothing."""
-        ...
-
+    @abstractmethod
     def update(
         self, env: Env, config: Any, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[TrainState, dict[str, Array]]:
-        """One update at `progress` in [0, 1] of the run: the new state, and scalar metrics.
+        """One update, on each device, on its own environments, inside `e2efly.learn.devices.on_each`.
 
-        Runs on each device, on its own environments, inside `e2efly.learn.devices.on_each`.
+        Args:
+            env: the environment.
+            config: numbers of the algorithm.
+            state: where the last update ended.
+            progress: share of the run that is done, in [0, 1]: sets the learning rate.
+
+        Returns:
+            The new state, and scalar metrics of this update.
         """
-        ...
+
+    def optimizer(self, config: Any, parameters: Any) -> Any:
+        """The optimiser's initial state: Adam's, of all parameters."""
+        return adam_state(config, parameters)
+
+    def replay(self, env: Env, config: Any, state: EnvState, observation: Float[Array, "n o"]) -> Any:
+        """What an off-policy method keeps of earlier steps, as it is at first; None: nothing."""
+        return None
 
 
 def adam(max_grad_norm: float | Array) -> optax.GradientTransformation:
@@ -78,13 +82,13 @@ def adam(max_grad_norm: float | Array) -> optax.GradientTransformation:
     return optax.chain(optax.clip_by_global_norm(max_grad_norm), optax.scale_by_adam())
 
 
-def at_rest(config: AlgorithmConfig, parameters: Any) -> Any:
-    """Adam's state before its first step on these parameters."""
+def adam_state(config: AlgorithmConfig, parameters: Any) -> Any:
+    """Adam's initial state."""
     return adam(config.max_grad_norm).init(ravel_pytree(parameters)[0])
 
 
 def begin(algorithm: Algorithm, env: Env, config: AlgorithmConfig, parameters: Any, key: PRNGKeyArray) -> TrainState:
-    """A device's first state of a run: its part of the environments as started, the optimiser at rest.
+    """A device's first state of a run: its part of the environments as started, the optimiser's initial state.
 
     All devices together start the same environments, however many they are.
     """
@@ -114,16 +118,55 @@ def descend(
     return parameters, optimizer, jnp.linalg.norm(flat)
 
 
-def damped(tree: Any, keep: Array) -> Any:
-    """The same values; their gradient scaled by `keep`."""
+def epochs(
+    config: Any,
+    rate: Float[Array, ""],
+    loss: Callable[[Any, Any], tuple[Array, dict[str, Array]]],
+    parameters: Any,
+    optimizer: Any,
+    samples: Any,
+    key: PRNGKeyArray,
+) -> tuple[Any, Any, dict[str, Array]]:
+    """`config.epochs` passes over samples in minibatches, a step of Adam each.
 
-    def damp(x: Array) -> Array:
-        return keep * x + jax.lax.stop_gradient((1 - keep) * x) if jnp.issubdtype(x.dtype, jnp.floating) else x
+    Args:
+        config: of the algorithm: envs, horizon, minibatch, epochs, max_grad_norm.
+        rate: of Adam's steps.
+        loss: (parameters, minibatch) -> what to descend, and losses by name.
+        parameters: at first.
+        optimizer: state of Adam at first.
+        samples: a tree whose leaves are (steps, n, ...).
+        key: decides the order.
 
-    return jax.tree.map(damp, tree)
+    Returns:
+        New parameters and optimiser, and the means of the losses and of the gradient's norm, `loss/NAME`.
+    """
+    steps, n = jax.tree.leaves(samples)[0].shape[:2]
+    size, count = steps * n, config.envs * config.horizon // config.minibatch
+    # one sort of random bits: sorting is slow on a CPU, so that all epochs share the order
+    order = jnp.argsort(jax.random.bits(key, (size,)))
+    flat = jax.tree.map(lambda x: x.reshape(size, *x.shape[2:])[order], samples)
+    batches = jax.tree.map(lambda x: x.reshape(count, size // count, *x.shape[1:]), flat)
+
+    def minibatch(carry: tuple[Any, Any], batch: Any) -> tuple[tuple[Any, Any], dict[str, Array]]:
+        parameters, optimizer = carry
+        grads, losses = jax.grad(loss, has_aux=True)(parameters, batch)
+        parameters, optimizer, norm = descend(config, rate, parameters, optimizer, grads)
+        return (parameters, optimizer), {**losses, "gradient_norm": norm}
+
+    def epoch(carry: tuple[Any, Any], _: None) -> tuple[Any, dict[str, Array]]:
+        return jax.lax.scan(minibatch, carry, batches)
+
+    (parameters, optimizer), losses = jax.lax.scan(epoch, (parameters, optimizer), None, length=config.epochs)
+    return parameters, optimizer, {f"loss/{name}": jnp.mean(x) for name, x in losses.items()}
 
 
-def ascended(
+def followed(target: Any, source: Any, share: float | Array) -> Any:
+    """A slow copy of parameters, after it went `share` of the way to them."""
+    return jax.tree.map(lambda old, new: old + share * (new - old), target, source)
+
+
+def gradient_per_term(
     parts: Callable[[Any], tuple[dict[str, Array], Any]], parameters: Any, apart: bool
 ) -> tuple[Any, Any, dict[str, Array]]:
     """The gradient of minus the sum of an objective's parts.
@@ -151,7 +194,7 @@ def ascended(
     return jax.tree.map(lambda x: jnp.sum(x, axis=0), each), more, norms
 
 
-def ends(config: Any, progress: Float[Array, ""]) -> Bool[Array, " h"]:
+def gradient_cuts(config: Any, progress: Float[Array, ""]) -> Bool[Array, " h"]:
     """Before which steps of a window the gradient is cut: every `horizon_start` at first, nowhere at last; in between
     the pieces grow exponentially. Without `horizon_start` it is cut nowhere.
     """
@@ -167,20 +210,39 @@ def episode_metrics(done: Array, success: Array) -> dict[str, Array]:
     return {"episodes": episodes, "train_success": successes / jnp.maximum(episodes, 1)}
 
 
-def annealed(config: AlgorithmConfig, progress: Float[Array, ""]) -> Float[Array, ""]:
+def annealed(config: Any, progress: Float[Array, ""]) -> Float[Array, ""]:
     """The learning rate, exponential from `learning_rate` to `learning_rate_end`."""
     return config.learning_rate * (config.learning_rate_end / config.learning_rate) ** progress
 
 
-def make_algorithm(config: AlgorithmConfig, actor: Actor) -> Algorithm:
-    """The algorithm of a configuration."""
-    from e2efly.learn.abpt import ABPT
-    from e2efly.learn.bptt import BPTT
-    from e2efly.learn.foppo import FOPPO
-    from e2efly.learn.ppo import PPO
-    from e2efly.learn.shac import SHAC
+METHODS = ("init", "update", "optimizer", "replay")
+"""What the program of an algorithm must have; `Algorithm` has the last two."""
 
-    makers: dict[type, type] = {
-        PPOConfig: PPO, BPTTConfig: BPTT, SHACConfig: SHAC, ABPTConfig: ABPT, FOPPOConfig: FOPPO
-    }  # fmt: skip
-    return makers[type(config)](actor)
+
+def make_algorithm(config: AlgorithmConfig, actor: Actor) -> Algorithm:
+    """The algorithm of a configuration.
+
+    Raises:
+        ValueError: when `program` leads nowhere or to something that lacks a method, naming its file.
+    """
+    program = load(config.program) if isinstance(config.program, str) else config.program
+    if lacking := [name for name in METHODS if not hasattr(program, name)]:
+        raise ValueError(f"{origin(program)} has no {', '.join(lacking)}; accepted: all of {', '.join(METHODS)}")
+    if getattr(program, "__abstractmethods__", None):
+        left = ", ".join(sorted(program.__abstractmethods__))
+        raise ValueError(f"{origin(program)} has no {left}; accepted: all of {', '.join(METHODS)}")
+    register_options(type(config))
+    return program(actor)
+
+
+@cache
+def register_options(options: type) -> None:
+    """Make a class of options a pytree whose leaves are its numbers of type float."""
+    fields = dataclasses.fields(options)
+    numbers = [field.name for field in fields if field.type is float]
+    others = [field.name for field in fields if field.type is not float]
+    jax.tree_util.register_dataclass(options, data_fields=numbers, meta_fields=others)
+
+
+for _options in ALGORITHMS.values():
+    register_options(_options)

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from e2efly import presets
-from e2efly.config import BPTTConfig, EnvConfig, NetworkConfig
+from e2efly.config import EnvConfig, NetworkConfig
 from e2efly.env import Env, random_key
 from e2efly.learn.devices import AXIS, OWN, SAME, on_each, own, placed, share, stacked
 from e2efly.learn.programs import start_program
@@ -85,7 +85,7 @@ def training_steps(task: str, algo: str, wide: bool = False, general: bool = Fal
     config = presets.preset(task, algo)
     if general:
         config = dataclasses.replace(config, env=dataclasses.replace(config.env, randomize=GENERAL))
-    if wide and isinstance(config.algo, BPTTConfig):
+    if wide and config.algo.exact:
         algo_config = dataclasses.replace(config.algo, envs=100, horizon=96)
         config = dataclasses.replace(config, algo=algo_config, network=NetworkConfig((192, 96)))
     setup = Setup.of(config)

@@ -5,12 +5,11 @@ algorithms, within a factor of two.
 """
 
 from itertools import pairwise
-from typing import Any
 
 import jax
 
 from e2efly.budget import FASTEST, check_memory, check_time, machine_memory
-from e2efly.config import ABPTConfig, PPOConfig, TrainConfig
+from e2efly.config import TrainConfig
 from e2efly.env import Env
 from e2efly.learn.networks import Actor
 
@@ -52,7 +51,7 @@ def run_memory(config: TrainConfig, env: Env, actor: Actor, members: int = 1) ->
     images = {f"images of {camera.width} x {camera.height}": camera.width * camera.height for camera in env.cameras}
     solids, pixels = float(sum(rooms.values())), float(sum(images.values()))
     vehicle = 4 * (150 + 4.0 * env.queue + 17.0 * env.past + 6 * pixels + 30 * solids + units)
-    step = 4 * (200 + 2 * features + (0 if isinstance(algo, PPOConfig) else 1.3 * units + 25 * solids))
+    step = 4 * (200 + 2 * features + (1.3 * units + 25 * solids if algo.exact else 0))
     past = [] if config.env.past_actions is None else [f"env.past_actions {config.env.past_actions}"]
     together = [f"{members} runs together"] if members > 1 else []
     observed = ", ".join((f"with {env.observation_size} observed numbers", *past, *rooms, *images, *together))
@@ -67,20 +66,16 @@ def run_memory(config: TrainConfig, env: Env, actor: Actor, members: int = 1) ->
     }
     if (minibatch := getattr(algo, "minibatch", 0)) > 0:
         parts[f"algo.minibatch is {minibatch}"] = 8 * units * minibatch
-    if isinstance(algo, ABPTConfig):
-        parts[f"algo.buffer is {algo.buffer}"] = 4 * (3 * features + 26) * algo.buffer * members
-        parts[f"algo.places is {algo.places}"] = vehicle * algo.places * members
+    for name, (count, what) in algo.kept().items():
+        size = vehicle if what == "state" else 4 * (3 * features + 26)
+        parts[f"algo.{name} is {count}"] = size * count * members
     return parts
 
 
 def run_steps(config: TrainConfig, updates: int, judged: int) -> dict[str, float]:
     """Environment steps, and samples of gradient steps, of a whole run, by the options that decide them."""
-    algo: Any = config.algo
-    samples, learning = 0, ""
-    if isinstance(algo, ABPTConfig):
-        samples, learning = algo.fits * algo.minibatch, f", algo.fits {algo.fits}, algo.minibatch {algo.minibatch}"
-    elif hasattr(algo, "epochs"):
-        samples, learning = algo.epochs * algo.steps, f", algo.epochs {algo.epochs}"
+    algo = config.algo
+    samples, learning = algo.fitted()
     flown = f"eval_episodes is {config.eval_episodes}, task.episode_s {config.task.episode_s}"
     return {
         f"steps is {config.steps}, chunk {config.chunk}{learning}": float(updates) * (algo.steps + samples),

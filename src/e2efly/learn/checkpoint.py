@@ -40,11 +40,11 @@ def read_about(path: Path) -> dict[str, Any]:
     return about
 
 
-def load_checkpoint(path: Path, like: Any) -> Any:
-    """Read a tree of the structure, shapes and types of `like`.
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """The leaves of the tree that was saved, by the path of each, such as `['state'].parameters.log_std`.
 
     Raises:
-        ValueError: when the file is missing, truncated, damaged, or of another structure.
+        ValueError: when the file is missing, truncated, damaged or of another format.
     """
     about = read_about(path)
     try:
@@ -54,6 +54,16 @@ def load_checkpoint(path: Path, like: Any) -> Any:
         raise ValueError(f"checkpoint {path} cannot be read (truncated or damaged?): {error}") from None
     if _checksum(arrays) != about["crc32"]:
         raise ValueError(f"checkpoint {path}: its checksum is wrong; the file is damaged")
+    return arrays
+
+
+def load_checkpoint(path: Path, like: Any) -> Any:
+    """Read a tree of the structure, shapes and types of `like`.
+
+    Raises:
+        ValueError: when the file is missing, truncated, damaged, or of another structure.
+    """
+    arrays = read_arrays(path)
     leaves, structure = jax.tree_util.tree_flatten_with_path(like)
     found = []
     for where, leaf in leaves:

@@ -3,9 +3,9 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
-from e2efly.env import Env, EnvState
+from e2efly.env import Env
 from e2efly.learn.networks import Actor, Layers, init_mlp, mlp
 
 
@@ -14,10 +14,10 @@ def init_critic(rng: np.random.Generator, actor: Actor, env: Env) -> Layers:
     return init_mlp(rng, (actor.features.state_size + env.privileged_size, *actor.network.hidden, 1), 1.0)
 
 
-def known(actor: Actor, env: Env, state: EnvState, observation: Float[Array, "n o"]) -> Float[Array, "n c"]:
-    """What a critic is fed: the features of the observation and, where there are cameras, the true scene."""
+def critic_input(actor: Actor, observation: Float[Array, "n o"], privileged: Float[Array, "n p"]) -> Array:
+    """The features of an observation and, where there are cameras, of the true scene (`Env.privileged`): (n, c)."""
     seen = actor.features.of_state(observation)
-    return jnp.concatenate([seen, env.privileged(state)], axis=-1) if env.privileged_size else seen
+    return jnp.concatenate([seen, privileged], axis=-1) if privileged.shape[-1] else seen
 
 
 def value(actor: Actor, critic: Layers, features: Float[Array, "*n c"]) -> Float[Array, "*n"]:
@@ -29,8 +29,8 @@ def gae(
     reward: Float[Array, "t n"],
     value: Float[Array, "t n"],
     next_value: Float[Array, "t n"],
-    terminated: Float[Array, "t n"],
-    done: Float[Array, "t n"],
+    terminated: Float[Array, "t n"] | Bool[Array, "t n"],
+    done: Float[Array, "t n"] | Bool[Array, "t n"],
     gamma: float | Array,
     lam: float | Array,
 ) -> Float[Array, "t n"]:

@@ -10,10 +10,10 @@ from onnx import helper
 
 from e2efly import __version__
 from e2efly.config import TrainConfig
-from e2efly.deploy.contract import CONTRACT_VERSION, METADATA_KEY, Action, Contract
-from e2efly.deploy.images import NONE, Image
-from e2efly.deploy.onnx_file import sealed
-from e2efly.deploy.policy import load_policy
+from e2efly.deploy.policy.contract import CONTRACT_VERSION, METADATA_KEY, Action, Contract
+from e2efly.deploy.policy.images import NONE, Image
+from e2efly.deploy.policy.loader import load_policy
+from e2efly.deploy.policy.onnx_file import sealed
 from e2efly.env import Env
 from e2efly.learn.graph import OPERATORS, policy_graph
 from e2efly.learn.networks import FAINTEST, NEAREST, Actor, View, Weights
@@ -60,7 +60,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         vehicle=vehicle.name,
         vehicle_hash=vehicle.hash,
         control_rate_hz=float(rate),
-        latency_s=sum(latency) / 2,
+        latency_s=float(vehicle.latency) if latency[0] <= vehicle.latency <= latency[1] else sum(latency) / 2,
         latency_range_s=latency,
         observation_latency_range_s=_decimals(env.observation_latency_range),
         observation=env.fields,
@@ -137,7 +137,6 @@ def export_policy(path: Path, weights: Weights, actor: Actor, contract: Contract
         ValueError: naming what does not fit together: weights, actor or contract.
         OSError: when the file cannot be written.
     """
-    about = contract.to_json()
     images = images_of(actor, contract.control_rate_hz)
     for name, has, wanted in (
         ("observation", contract.observation, actor.features.fields),
@@ -148,6 +147,16 @@ def export_policy(path: Path, weights: Weights, actor: Actor, contract: Contract
             raise ValueError(f"contract.{name} is {has}; accepted: that of the policy, {wanted}")
     _check(weights, actor)
     graph = policy_graph(jax.tree.map(lambda x: np.asarray(x, np.float32), weights), actor, [i.name for i in images])
+    write_policy(path, graph, contract)
+
+
+def write_policy(path: Path, graph: onnx.GraphProto, contract: Contract) -> None:
+    """Write a graph with its contract and its digest, atomically.
+
+    Raises:
+        ValueError: for a graph that ONNX refuses.
+        OSError: when the file cannot be written.
+    """
     model = helper.make_model(
         graph,
         opset_imports=[helper.make_opsetid("", OPSET)],
@@ -155,7 +164,7 @@ def export_policy(path: Path, weights: Weights, actor: Actor, contract: Contract
         producer_name="e2efly",
         producer_version=contract.e2efly_version,
     )
-    helper.set_model_props(model, {METADATA_KEY: about})
+    helper.set_model_props(model, {METADATA_KEY: contract.to_json()})
     onnx.checker.check_model(model, full_check=True)
     write_atomically(Path(path), sealed(model.SerializeToString()))
 

@@ -6,7 +6,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from e2efly.deploy.policy import INPUT, MEMORY, NEXT_MEMORY, OUTPUT
+from e2efly.deploy.policy.loader import INPUT, MEMORY, NEXT_MEMORY, OUTPUT
 from e2efly.learn.networks import FAINTEST, NEAREST, Actor, Features, Gru, Layers, View, Weights
 from e2efly.sensors.eyes import image_shape
 
@@ -42,6 +42,20 @@ class _Graph:
             source = self.node(operator, [linear], target if i == len(layers) - 1 else f"{prefix}hidden_{i + 1}")
         return source
 
+    def clip(self, source: str, most: float, target: str) -> str:
+        """Clipped to [-most, most]."""
+        ends = [self.constant(f"{target}_{side}", np.float32(sign * most)) for side, sign in (("low", -1), ("high", 1))]
+        return self.node("Clip", [source, *ends], target)
+
+    def whole(self, inputs: dict[str, tuple[int, ...]], outputs: dict[str, tuple[int, ...]]) -> onnx.GraphProto:
+        """All of it, of inputs and outputs of these shapes behind the batch axis."""
+        taken, given = (
+            [helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", *shape]) for name, shape in shapes.items()]
+            for shapes in (inputs, outputs)
+        )
+        constants = [numpy_helper.from_array(value, name) for name, value in self.constants.items()]
+        return helper.make_graph(self.nodes, "policy", taken, given, constants)
+
 
 def policy_graph(weights: Weights, actor: Actor, images: list[str]) -> onnx.GraphProto:
     """The graph of a policy.
@@ -60,17 +74,39 @@ def policy_graph(weights: Weights, actor: Actor, images: list[str]) -> onnx.Grap
     if weights.cell is not None:
         source = graph.node("Concat", [source, _remembered(graph, weights.cell, source)], "known", axis=1)
     graph.layers(weights.head, source, [operator] * (len(weights.head) - 1) + ["Tanh"], OUTPUT)
-
-    def values(shapes: dict[str, tuple[int, ...]]) -> list[onnx.ValueInfoProto]:
-        return [helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", *shape]) for name, shape in shapes.items()]
-
     inputs: dict[str, tuple[int, ...]] = {INPUT: (sum(field.size for field in features.fields),)}
     inputs |= {name: image_shape(view.camera) for name, view in zip(images, features.views, strict=True)}
-    outputs: dict[str, tuple[int, ...]] = {OUTPUT: (4,)}
-    if units:
-        inputs[MEMORY] = outputs[NEXT_MEMORY] = (units,)
-    constants = [numpy_helper.from_array(value, name) for name, value in graph.constants.items()]
-    return helper.make_graph(graph.nodes, "policy", values(inputs), values(outputs), constants)
+    memory = {MEMORY: (units,)} if units else {}
+    return graph.whole(inputs | memory, {OUTPUT: (4,)} | ({NEXT_MEMORY: (units,)} if units else {}))
+
+
+def perceptron_graph(
+    features: Features,
+    layers: Layers,
+    operators: list[str],
+    raw: bool = False,
+    normal: tuple[np.ndarray, np.ndarray, float] | None = None,
+) -> onnx.GraphProto:
+    """The graph of a multilayer perceptron that another framework has learned; its actions are clipped to [-1, 1].
+
+    Args:
+        features: that it was shown.
+        layers: weights (in, out) and biases (out,), float32.
+        operators: ONNX's operator behind each layer, such as Tanh or Identity.
+        raw: whether it was shown the observation itself rather than its features.
+        normal: mean and standard deviation by which its input is normalised, and where that is clipped.
+    """
+    graph, source = _Graph(), INPUT
+    if not raw:
+        _of_state(graph, features)
+        source = "features"
+    if normal is not None:
+        mean, deviation, most = normal
+        centred = graph.node("Sub", [source, graph.constant("mean", mean.astype(np.float32))], "centred")
+        scaled = graph.node("Div", [centred, graph.constant("deviation", deviation.astype(np.float32))], "scaled")
+        source = graph.clip(scaled, most, "normalised")
+    graph.clip(graph.layers(layers, source, operators, "unclipped"), 1.0, OUTPUT)
+    return graph.whole({INPUT: (sum(field.size for field in features.fields),)}, {OUTPUT: (4,)})
 
 
 def _encoded(graph: _Graph, name: str, view: View, layers: Layers, operator: str) -> str:

@@ -1,4 +1,6 @@
-"""The files that a run is made from (vehicle, track, reference, table of a noise): named, kept, compared by content."""
+"""The files that a run is made from (vehicle, track, reference, table of a noise, first policy): named, kept, compared
+by content.
+"""
 
 import dataclasses
 import hashlib
@@ -23,6 +25,8 @@ def input_files(config: TrainConfig) -> dict[str, Path]:
     found = {"env.vehicle": vehicle_file(config.env.vehicle)}
     if track := getattr(config.task, "track", ""):
         found["task.track"] = track_file(track)
+    if config.start_from is not None:
+        found["start_from"] = Path(config.start_from)
     named = {"task.reference": getattr(config.task, "reference", "")}
     named |= {f"env.cameras.{i}.noise.redwood": c.noise.redwood or "" for i, c in enumerate(config.env.cameras)}
     return found | {field: Path(name) for field, name in named.items() if name.endswith(OWN_FILES)}

@@ -26,7 +26,7 @@ from e2efly.compiled import opened, sealed
 from e2efly.config import TrainConfig
 from e2efly.device import cache_folder, unless_said, wide_vectors
 from e2efly.env import Env, random_key
-from e2efly.evaluate import Act, Episodes, run_episodes
+from e2efly.episodes import Act, Episodes, run_episodes
 from e2efly.learn.algorithm import TrainState, begin
 from e2efly.learn.devices import AXIS, OWN, SAME, on_each, own, shardings, stacked
 from e2efly.learn.networks import Actor, Weights
@@ -89,7 +89,9 @@ class Programs:
 def traced_folder(config: TrainConfig) -> Path | None:
     """Where traced programs of a configuration are kept; None: they hold code that is not the package's."""
     terms = (TERMS[name].function for name in config.reward.weights if name in TERMS)
-    return cache_folder() / "traced" if all(map(is_shipped, (type(config.task), *terms))) else None
+    shipped = all(map(is_shipped, (type(config.task), type(config.algo), *terms)))
+    own_noise = any(camera.noise.own for camera in config.env.cameras)
+    return cache_folder() / "traced" if shipped and not own_noise else None
 
 
 def start_program(setup: Setup) -> Any:
@@ -132,7 +134,7 @@ def _evaluate(setup: Setup) -> Callable[[Env, Weights, jax.Array], Episodes]:
 
 
 def acting(actor: Actor, weights: Weights) -> Act:
-    """A policy with these weights, for `e2efly.evaluate`."""
+    """A policy with these weights, for `e2efly.episodes`."""
     return Act(
         lambda observation, images, memory: actor(weights, actor.features(observation, images), memory), actor.memory
     )
@@ -175,7 +177,7 @@ def _read(file: Path) -> bytes | None:
 
 def _fingerprint(setup: Setup, args: tuple) -> str:
     """Of everything that a traced program depends on."""
-    config = dataclasses.asdict(dataclasses.replace(setup.config, seed=0, stop_at=None))
+    config = dataclasses.asdict(dataclasses.replace(setup.config, seed=0, stop_at=None, start_from=None))
     shapes = [(np.shape(x), str(x.dtype) if hasattr(x, "dtype") else type(x).__name__) for x in jax.tree.leaves(args)]
     numbers = [np.asarray(x).tolist() for x in jax.tree.leaves((setup.env, setup.judges))]
     device = jax.devices()[0]

@@ -10,6 +10,7 @@ import io
 import json
 import platform
 import reprlib
+import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -17,13 +18,19 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from e2efly.config import ALGORITHMS, TrainConfig
+from e2efly.config import ALGORITHMS, EnvConfig, TrainConfig
 from e2efly.config.reading import read
 from e2efly.learn.inputs import Kept, by_content, content_of, input_files, replaced, sha256, value_at
-from e2efly.presets import algorithm_name, preset
+from e2efly.presets import preset
 from e2efly.storage import held, write_atomically, write_json
 from e2efly.tasks import TASKS
 
+_FILES = (
+    "config.json", "versions.json", "inputs.json", "metrics.csv", "checkpoint.safetensors", "policy.onnx",
+    "summary.json",
+)  # fmt: skip
+_FOLDERS = ("inputs", "events", "plots")
+"""All that a run writes into its folder."""
 _PACKAGES = ("e2efly", "jax", "jaxlib", "numpy", "optax", "onnx", "onnxruntime")
 
 
@@ -77,31 +84,46 @@ class RunDirectory:
         """
         if self.began:
             raise ValueError(
-                f"--out {self.path} already holds a run; accepted: a new folder, or --resume to go on with this one"
+                f"--out {self.path} already holds a run; accepted: a new folder, --resume to go on with this one, "
+                "or --overwrite to delete it"
             )
 
-    def create(self, config: TrainConfig) -> None:
+    def clear(self) -> None:
+        """Delete the run's files, where the folder holds a run; others stay."""
+        if (self.path / "config.json").is_file():
+            for name in _FILES:
+                (self.path / name).unlink(missing_ok=True)
+            for name in _FOLDERS:
+                shutil.rmtree(self.path / name, ignore_errors=True)
+
+    def create(self, config: TrainConfig, overwrite: bool = False) -> None:
         """Make the folder; write the configuration, the versions and copies of the files that it is made from.
+
+        Args:
+            config: everything that decides the outcome.
+            overwrite: delete the run that it holds.
 
         Raises:
             OSError: when it cannot be written.
             ValueError: when it already holds a run.
         """
+        inputs = {field: (path, content_of(path)) for field, path in input_files(config).items()}
+        if overwrite:  # perhaps the run that the files are of
+            self.clear()
         self.check_new()
         try:
             self.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OSError(f"cannot make --out {self.path}: {error.strerror}") from error
         self.metrics.unlink(missing_ok=True)  # of a run that never got to a checkpoint
-        self._keep(config)
+        self._keep(config, inputs)
         self.write_json("versions.json", versions())
         self.write_json("config.json", to_json(config))  # last: with it a folder holds a run
 
-    def _keep(self, config: TrainConfig) -> None:
-        """Copy the files that a configuration names."""
+    def _keep(self, config: TrainConfig, inputs: dict[str, tuple[Path, bytes]]) -> None:
+        """Write copies of the files that a configuration names."""
         about = {}
-        for field, path in input_files(config).items():
-            data = content_of(path)
+        for field, (path, data) in inputs.items():
             copy = self.path / "inputs" / field / path.name
             copy.parent.mkdir(parents=True, exist_ok=True)
             write_atomically(copy, data)
@@ -236,6 +258,13 @@ class RunDirectory:
             self.metrics.unlink(missing_ok=True)
 
 
+def run_folder(config: TrainConfig) -> Path:
+    """Where a run lies unless told: runs/TASK-ALGO-SEED, with the vehicle before the seed where it is another one."""
+    usual = config.env.vehicle == EnvConfig().vehicle
+    parts = config.task.name, config.algo.name, *(() if usual else (Path(config.env.vehicle).stem,))
+    return Path("runs") / "-".join((*parts, str(config.seed)))
+
+
 def run_of(path: Path) -> RunDirectory | None:
     """The run that a path is the folder, or the policy.onnx, of."""
     folder = path.parent if path.name == "policy.onnx" else path
@@ -260,7 +289,7 @@ def _version(package: str) -> str:
 
 def to_json(config: TrainConfig) -> dict[str, Any]:
     """A configuration as JSON, with the names of its task and algorithm, or where they are from."""
-    names = {"task_name": TASKS.reference(type(config.task)), "algo_name": algorithm_name(config.algo)}
+    names = {"task_name": TASKS.reference(type(config.task)), "algo_name": ALGORITHMS.reference(type(config.algo))}
     return {**names, **dataclasses.asdict(config)}
 
 

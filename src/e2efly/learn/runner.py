@@ -18,17 +18,17 @@ from typing import Any, Protocol
 import jax
 import numpy as np
 
-from e2efly import presets
 from e2efly.config import TrainConfig
-from e2efly.env import random_key
-from e2efly.evaluate import Episodes
+from e2efly.env import Env, random_key
+from e2efly.episodes import Episodes
+from e2efly.episodes import summary as summary_of
 from e2efly.learn import hosts
 from e2efly.learn.algorithm import TrainState
 from e2efly.learn.checkpoint import load_checkpoint, read_about, save_checkpoint
 from e2efly.learn.clock import peak_memory, since_process_start
 from e2efly.learn.devices import placed
 from e2efly.learn.inputs import by_content
-from e2efly.learn.judge import CONFIRMED, REPORTED, WATCHED, digest, judge, score, success
+from e2efly.learn.judge import CONFIRMED, REPORTED, WATCHED, judge, score, stressed, success
 from e2efly.learn.networks import Weights
 from e2efly.learn.programs import Programs, start_program
 from e2efly.learn.rundir import RunDirectory, differences, different_values, from_json, to_json, versions
@@ -48,6 +48,10 @@ class Reporter(Protocol):
         """Environment steps done, of how many, steps/s, success of the last and of the best evaluation, and the stage
         of the curriculum, where there is one.
         """
+        ...
+
+    def ended(self, setup: Setup, weights: Weights, flown: dict[str, Episodes], /) -> None:
+        """The run, its best policy, and how that flew unseen starts of each criterion: nominal, where there is that."""
         ...
 
 
@@ -75,7 +79,12 @@ class NonFiniteError(FloatingPointError):
 
 @hosts.together()
 def train(
-    config: TrainConfig, out: Path, reporter: Reporter, resume: bool = False, traced: Path | None = None
+    config: TrainConfig,
+    out: Path,
+    reporter: Reporter,
+    resume: bool = False,
+    overwrite: bool = False,
+    traced: Path | None = None,
 ) -> dict[str, Any]:
     """Train a policy into a run directory.
 
@@ -84,6 +93,7 @@ def train(
         out: the run directory: new, or with `resume` an unfinished one.
         reporter: shows the progress.
         resume: go on from the checkpoint.
+        overwrite: delete the run that `out` holds, once this one has been compiled.
         traced: a folder for traced programs, see `Programs.compile`.
 
     Returns:
@@ -98,21 +108,27 @@ def train(
     run = RunDirectory(out)
     setup = Setup.of(config)
     with run.held() if hosts.first() else nullcontext():
-        return _train(setup, run, reporter, resume, traced)
+        return _train(setup, run, reporter, resume, overwrite, traced)
 
 
-def _train(setup: Setup, run: RunDirectory, reporter: Reporter, resume: bool, traced: Path | None) -> dict[str, Any]:
+def _train(
+    setup: Setup, run: RunDirectory, reporter: Reporter, resume: bool, overwrite: bool, traced: Path | None
+) -> dict[str, Any]:
     """In a folder that is this run's alone."""
     config, content = setup.config, by_content(setup.config)
     if hosts.first():
         hosts.told({"resume": resume, "versions": _deciding(versions()), "config": to_json(content)})
         if resume:
             _check_resume(run, config)
-        else:
+        elif not overwrite:
             run.check_new()
     else:
         _check_same(content, resume)
     parameters = setup.algorithm.init(setup.env, config.algo, config.seed)
+    if config.start_from is not None and not (resume and run.checkpoint.exists()):
+        from e2efly.learn.warm_start import started_from
+
+        parameters = started_from(parameters, Path(config.start_from), setup)
     reporter.compiling()
     programs = Programs.compile(setup, parameters, traced if jax.process_count() == 1 else None)
     if resume and hosts.told(run.checkpoint.exists()):
@@ -122,13 +138,15 @@ def _train(setup: Setup, run: RunDirectory, reporter: Reporter, resume: bool, tr
         progress = Progress()
     if hosts.first():
         if not resume:
-            run.create(config)  # once all that a configuration can spoil has gone well
+            run.create(config, overwrite)  # once all that a configuration can spoil has gone well
         run.forget_after(progress.update)
         setup = dataclasses.replace(setup, config=run.with_copies(config))
         if different := list(differences(content, by_content(setup.config))):
             raise ValueError(f"a file changed while the run began: {'; '.join(different)}; start it again")
+    if config.start_from is not None and not progress.update:
+        _save(run, config, state, best, progress)  # the run that it begins with may be gone when this one is resumed
     state, best, progress, stopped = _loop(setup, programs, run, reporter, state, best, progress)
-    return _finish(setup, programs, run, state, best, progress, stopped)
+    return _finish(setup, programs, run, reporter, state, best, progress, stopped)
 
 
 def _loop(
@@ -151,7 +169,7 @@ def _loop(
             _check_finite(metrics, progress.update)
             rate = config.chunk * setup.steps_per_update / (time.perf_counter() - began)
             weights = policy_of(state)
-            flown = judge(setup, programs.evaluate, weights, WATCHED, config.eval_episodes, stage=number)
+            flown = judge(setup, programs.evaluate, weights, WATCHED, config.eval_episodes, stage.judges)
             reached, last, now = progress.reached, success(flown), score(config.task, flown)
             if config.stop_at and final and not reached and last >= config.stop_at:
                 confirmed = judge(setup, programs.evaluate, weights, CONFIRMED, REPORT_EPISODES)
@@ -196,18 +214,32 @@ def _save(run: RunDirectory, config: TrainConfig, state: Any, best: Any, progres
 
 
 def _finish(
-    setup: Setup, programs: Programs, run: RunDirectory, state: Any, best: Any, progress: Progress, stopped: bool
+    setup: Setup,
+    programs: Programs,
+    run: RunDirectory,
+    reporter: Reporter,
+    state: Any,
+    best: Any,
+    progress: Progress,
+    stopped: bool,
 ) -> dict[str, Any]:
     """Judge the best and the last policy on unseen starts; write policy.onnx and summary.json."""
     from e2efly.learn.export import contract_of, export_policy
 
     trained = progress.seconds
     config = setup.config
-    by_best = judge(setup, programs.evaluate, best, REPORTED, REPORT_EPISODES)
-    by_last = judge(setup, programs.evaluate, policy_of(state), REPORTED, REPORT_EPISODES)
+
+    def flown(weights: Weights, judges: dict[str, Env]) -> dict[str, Episodes]:
+        return judge(setup, programs.evaluate, weights, REPORTED, REPORT_EPISODES, judges)
+
+    def told(flown: dict[str, Episodes]) -> dict[str, Any]:
+        return {name: summary_of(e) for name, e in flown.items()}
+
+    by_best = flown(best, setup.judges)
+
     summary = {
         "task": config.task.name,
-        "algorithm": presets.algorithm_name(config.algo),
+        "algorithm": config.algo.name,
         "vehicle": setup.env.physics.nominal.name,
         "seed": config.seed,
         "finished": progress.update >= setup.updates or bool(progress.reached),
@@ -216,14 +248,18 @@ def _finish(
         "seconds_trained_from_process_start": round(trained, 3),
         "reached_criterion": progress.reached,
         "peak_memory_gb": round(peak_memory() / 1e9, 3),
-        "shipped": {"update": progress.best_update, **{n: digest(e) for n, e in by_best.items()}},
-        "last": {"update": progress.update, **{n: digest(e) for n, e in by_last.items()}},
+        "shipped": {"update": progress.best_update, **told(by_best)},
+        "last": {"update": progress.update, **told(flown(policy_of(state), setup.judges))},
         "episodes": REPORT_EPISODES,
         "versions": versions(),
     }
+    if nominal := setup.nominal:
+        summary["nominal"] = told(by_best := flown(best, nominal))
+        summary["stress"] = told(stressed(setup, best, REPORT_EPISODES))
     if hosts.first():
         export_policy(run.policy, best, setup.actor, contract_of(setup.env, config))
         run.write_json("summary.json", summary)
+    reporter.ended(setup, best, by_best)
     return summary
 
 

@@ -74,6 +74,11 @@ class Setup:
         return self.stages[-1].judges
 
     @property
+    def nominal(self) -> dict[str, Env]:
+        """The same with the vehicle of the file in still air; empty where they are like that already."""
+        return {name: env.undisturbed() for name, env in self.judges.items() if env.is_disturbed}
+
+    @property
     def steps_per_update(self) -> int:
         """Environment steps of one update."""
         return self.config.algo.steps

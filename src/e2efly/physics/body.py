@@ -13,10 +13,13 @@ jax.tree_util.register_dataclass(Vehicle, data_fields=[f.name for f in quantitie
 
 
 def rotor_thrust(plant: Plant, rotor_speed: Rotors) -> Rotors:
-    """Thrust of each rotor, N: the quadratic thrust map, never negative."""
+    """Thrust of each rotor, N: the quadratic thrust map, never negative, times the rotor's share."""
     k2, k1, k0 = plant.thrust_map
     a, b, c, d = (jnp.maximum((k2 * w + k1) * w + k0, 0.0) for w in rotor_speed)
-    return a, b, c, d
+    if plant.rotor_share is None:
+        return a, b, c, d
+    s = plant.rotor_share
+    return a * s[0], b * s[1], c * s[2], d * s[3]
 
 
 def rotor_speed_for(vehicle: Vehicle, thrust: Rotors) -> Rotors:
@@ -41,7 +44,7 @@ def rotor_wrench(plant: Plant, thrust: Rotors) -> tuple[Array, Vec3]:
 
 
 def drag(plant: Plant, air_velocity: Vec3) -> Vec3:
-    """Drag in the body frame, N: -(k1 v + k2 v |v|) an axis of the body-frame air-relative velocity, m/s.
+    """Drag in the body frame, N: -(k1 v + k2 v |v|) per axis of the body-frame air-relative velocity, m/s.
 
     The paper writes k v v, which has no sign and pushes a vehicle that flies backwards.
     """

@@ -12,6 +12,7 @@ import numpy as np
 from jax import Array
 
 from e2efly.control import CASCADE, Ctbr, Vec3
+from e2efly.control.modes import COMMANDS
 from e2efly.physics.body import gyroscopic_torque, rotor_speed_for
 from e2efly.physics.mixer import Mixer
 from e2efly.physics.plant import Rotors
@@ -53,10 +54,18 @@ class CommandMode:
 
     name: str
     law: Law
-    fields: tuple[str, str, str, str]
-    units: tuple[str, str, str, str]
     limits: Callable[[Vehicle, float], tuple[list[float], list[float]]]
     """(nominal vehicle, position range in m) -> smallest and largest command."""
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the four numbers."""
+        return COMMANDS[self.name][0]
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Their units."""
+        return COMMANDS[self.name][1]
 
 
 def _symmetric(*limit: float) -> tuple[list[float], list[float]]:
@@ -77,52 +86,18 @@ def _attitude_limits(vehicle: Vehicle, _: float) -> tuple[list[float], list[floa
     return [0.0, *low], [_collective_max(vehicle), *high]
 
 
+_LIMITS: dict[str, Callable[[Vehicle, float], tuple[list[float], list[float]]]] = {
+    "rotor_thrust": lambda v, _: ([v.thrust_range[0]] * 4, [v.thrust_range[1]] * 4),
+    "ctbr": _ctbr_limits,
+    "attitude": _attitude_limits,
+    "acceleration": lambda v, _: _symmetric(*v.acceleration_max, np.pi),
+    "velocity": lambda v, _: _symmetric(*v.speed_max, np.pi),
+    "position": lambda _, reach: _symmetric(reach, reach, reach, np.pi),
+}
+
 COMMAND_MODES: dict[str, CommandMode] = {
-    mode.name: mode
-    for mode in (
-        CommandMode(
-            "rotor_thrust",
-            rotor_thrust_law,
-            ("rear_right", "front_right", "rear_left", "front_left"),
-            ("N", "N", "N", "N"),
-            lambda v, _: ([v.thrust_range[0]] * 4, [v.thrust_range[1]] * 4),
-        ),
-        CommandMode(
-            "ctbr",
-            _law("ctbr"),
-            ("collective_thrust", "roll_rate", "pitch_rate", "yaw_rate"),
-            ("m/s^2", "rad/s", "rad/s", "rad/s"),
-            _ctbr_limits,
-        ),
-        CommandMode(
-            "attitude",
-            _law("attitude"),
-            ("collective_thrust", "roll", "pitch", "yaw"),
-            ("m/s^2", "rad", "rad", "rad"),
-            _attitude_limits,
-        ),
-        CommandMode(
-            "acceleration",
-            _law("acceleration"),
-            ("x", "y", "z", "yaw"),
-            ("m/s^2", "m/s^2", "m/s^2", "rad"),
-            lambda v, _: _symmetric(*v.acceleration_max, np.pi),
-        ),
-        CommandMode(
-            "velocity",
-            _law("velocity"),
-            ("x", "y", "z", "yaw"),
-            ("m/s", "m/s", "m/s", "rad"),
-            lambda v, _: _symmetric(*v.speed_max, np.pi),
-        ),
-        CommandMode(
-            "position",
-            _law("position"),
-            ("x", "y", "z", "yaw"),
-            ("m", "m", "m", "rad"),
-            lambda _, reach: _symmetric(reach, reach, reach, np.pi),
-        ),
-    )
+    name: CommandMode(name, rotor_thrust_law if name == "rotor_thrust" else _law(name), limits)
+    for name, limits in _LIMITS.items()
 }
 """Command modes by name."""
 

@@ -43,20 +43,36 @@ def semi_implicit(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None
     )
 
 
+def rk3(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
+    """Kutta's method with the exact rotor speeds at the start, middle and end. Third order.
+
+    Source: W. Kutta, "Beitrag zur naeherungsweisen Integration totaler Differentialgleichungen", 1901.
+    """
+    middle = lagged(parts.rotor_speed, command, plant.half_decay)
+    end = lagged(middle, command, plant.half_decay)
+    k1 = _rate(plant, parts, parts.rotor_speed, wind)
+    k2 = _rate(plant, _advance(parts, k1, dt / 2), middle, wind)
+    last = jax.tree.map(lambda x, a, b: x + (2 * b - a) * dt, parts, k1, k2)
+    k3 = _rate(plant, last, end, wind)
+    mean = jax.tree.map(lambda a, b, c: (a + 4 * b + c) / 6, k1, k2, k3)
+    return _finish(_advance(parts, mean, dt), end)
+
+
 def rk4(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
     """Classical Runge-Kutta with the exact rotor speeds at the start, middle and end. Fourth order."""
     middle = lagged(parts.rotor_speed, command, plant.half_decay)
     end = lagged(middle, command, plant.half_decay)
 
-    def rate(at: Parts, speed: Rotors) -> Parts:
-        return derivative(plant, dataclasses.replace(at, rotor_speed=speed), wind)
-
-    k1 = rate(parts, parts.rotor_speed)
-    k2 = rate(_advance(parts, k1, dt / 2), middle)
-    k3 = rate(_advance(parts, k2, dt / 2), middle)
-    k4 = rate(_advance(parts, k3, dt), end)
+    k1 = _rate(plant, parts, parts.rotor_speed, wind)
+    k2 = _rate(plant, _advance(parts, k1, dt / 2), middle, wind)
+    k3 = _rate(plant, _advance(parts, k2, dt / 2), middle, wind)
+    k4 = _rate(plant, _advance(parts, k3, dt), end, wind)
     mean = jax.tree.map(lambda a, b, c, d: (a + 2 * b + 2 * c + d) / 6, k1, k2, k3, k4)
     return _finish(_advance(parts, mean, dt), end)
+
+
+def _rate(plant: Plant, parts: Parts, rotor_speed: Rotors, wind: Vec3 | None) -> Parts:
+    return derivative(plant, dataclasses.replace(parts, rotor_speed=rotor_speed), wind)
 
 
 def _advance(parts: Parts, rate: Parts, dt: float) -> Parts:
@@ -67,5 +83,5 @@ def _finish(parts: Parts, rotor_speed: Rotors) -> Parts:
     return dataclasses.replace(parts, attitude=parts.attitude.normalized(), rotor_speed=rotor_speed)
 
 
-INTEGRATORS: dict[str, Integrator] = {"euler": euler, "semi_implicit": semi_implicit, "rk4": rk4}
+INTEGRATORS: dict[str, Integrator] = {"euler": euler, "semi_implicit": semi_implicit, "rk3": rk3, "rk4": rk4}
 """Integrators by name."""

@@ -23,6 +23,8 @@ class Mixer:
     """Thrust of a rotor at idle, N."""
     thrust_max: float | Array
     """Largest thrust of a rotor, N."""
+    plain: Array | None = None
+    """1: each rotor is clipped by itself, 0: attitude goes before thrust, (*n,); None: 0."""
 
     @staticmethod
     def of(vehicle: Vehicle, dtype: type = np.float32) -> "Mixer":
@@ -46,8 +48,12 @@ class Mixer:
         span = _max4(spread) - _min4(spread)
         available = self.thrust_max - self.thrust_min
         scale = available / jnp.maximum(span, available)
+        if self.plain is not None:
+            scale = scale + (1 - scale) * self.plain
         asked = [m[i, 0] * collective + scale * spread[i] for i in range(4)]
         shift = jnp.maximum(self.thrust_min - _min4(asked), 0.0) - jnp.maximum(_max4(asked) - self.thrust_max, 0.0)
+        if self.plain is not None:
+            shift = shift * (1 - self.plain)
         return self.limit((asked[0] + shift, asked[1] + shift, asked[2] + shift, asked[3] + shift))
 
 

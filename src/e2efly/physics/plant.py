@@ -41,14 +41,16 @@ class Plant:
     """N*s/m."""
     drag_quadratic: Vec3
     """N*s^2/m^2."""
+    rotor_share: Rotors | None
+    """Thrust of each rotor over that of the thrust map; None: 1."""
     decay: Array | np.ndarray
     """What is left of a rotor's lag after a sub-step, ..."""
     half_decay: Array | np.ndarray
     """... and after half of one."""
 
     @staticmethod
-    def of(vehicle: Vehicle, dt: float) -> "Plant":
-        """Of a vehicle, any field of which may be batched, for sub-steps of `dt` seconds."""
+    def of(vehicle: Vehicle, dt: float, rotor_share: Array | None = None) -> "Plant":
+        """Of a vehicle, any field of which may be batched, for sub-steps of `dt` seconds; `rotor_share` is (*n, 4)."""
         v, time = vehicle, vehicle.motor_time_constant
         exp = jnp.exp if isinstance(time, jax.Array) else np.exp
         k2, k1, k0 = (v.thrust_map[..., i] for i in range(3))
@@ -63,6 +65,7 @@ class Plant:
             mobility=Vec3.of(1 / v.inertia),
             drag_linear=Vec3.of(v.drag_linear),
             drag_quadratic=Vec3.of(v.drag_quadratic),
+            rotor_share=None if rotor_share is None else split4(rotor_share),
             decay=exp(-dt / time),
             half_decay=exp(-0.5 * dt / time),
         )

@@ -46,11 +46,8 @@ def from_euler(roll: Array, pitch: Array, yaw: Array) -> Quaternion:
 
 
 def yaw(q: Quaternion) -> Float[Array, "*n"]:
-    """Heading: the angle about world z of the body's x axis, rad in (-pi, pi]; gradient finite when x points up."""
-    w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
-    sine, cosine = 2 * (w * z + x * y), 1 - 2 * (y * y + z * z)
-    defined = sine**2 + cosine**2 > 1e-12
-    return jnp.where(defined, jnp.arctan2(jnp.where(defined, sine, 0.0), jnp.where(defined, cosine, 1.0)), 0.0)
+    """Heading: the angle about world z of the body's x axis, rad in [-pi, pi]; gradient finite when x points up."""
+    return Quat.of(q).yaw()
 
 
 def cos_tilt(q: Quaternion) -> Float[Array, "*n"]:

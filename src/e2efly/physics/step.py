@@ -1,5 +1,6 @@
 """One control step: physics sub-steps under a command, the rate loop running at each of them."""
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from functools import partial
@@ -26,7 +27,7 @@ STEPS = (1e-6, 1.0)
 
 @partial(
     jax.tree_util.register_dataclass,
-    data_fields=["nominal", "mixer"],
+    data_fields=["nominal", "mixer", "body", "full_speed"],
     meta_fields=["command_mode", "integrator", "control_period", "substeps"],
 )
 @dataclass(frozen=True)
@@ -45,12 +46,26 @@ class Physics:
     """Seconds a control step."""
     substeps: int
     """Physics steps a control step."""
+    body: Vehicle | None = None
+    """What flies, as arrays, where the flight controller does not know it; None: the nominal vehicle."""
+    full_speed: float | Array | None = None
+    """Largest speed of that body's rotors, rad/s, whatever they are told; None: the mixer's own limit."""
+
+    @property
+    def flown(self) -> Vehicle:
+        """The vehicle that flies."""
+        return self.nominal if self.body is None else self.body
+
+    def flying(self, body: Vehicle, dtype: type = np.float32) -> "Physics":
+        """The same flight controller over another (loaded) body, of which it is not told."""
+        moved = jax.tree.map(lambda x: np.asarray(x, dtype), body)
+        return dataclasses.replace(self, body=moved, full_speed=dtype(body.full_rotor_speed))
 
     @staticmethod
     def of(
         vehicle: Vehicle,
         command_mode: str = "ctbr",
-        integrator: str = "semi_implicit",
+        integrator: str = "rk3",
         control_rate: float | None = None,
         largest_step: float = 0.005,
         dtype: type = np.float32,
@@ -84,12 +99,14 @@ def step(
     previous: Float[Array, "*n 4"] | None = None,
     switch_time: Float[Array, "*n"] | None = None,
     wind: Float[Array, "*n 3"] | None = None,
+    rotor_share: Float[Array, "*n 4"] | None = None,
 ) -> State:
     """Advance the state by one control period.
 
     Args:
         physics: how to integrate and control.
-        vehicle: the plant; any field may be batched.
+        vehicle: the plant; any field may be batched. Its `rate_gain` is that of the rate loop; in all else the flight
+            controller believes in `physics.nominal`.
         state: where it starts.
         command: in the units of the command mode.
         previous: the command that still acts before `switch_time`, for latencies that are no whole steps.
@@ -97,11 +114,13 @@ def step(
             [0, control_period]. A sub-step that holds the switch gets the time average of the two, which keeps the
             step differentiable in the latency.
         wind: velocity of the air in the world, m/s.
+        rotor_share: thrust of each rotor over that of the vehicle's thrust map; None: 1.
     """
     law = COMMAND_MODES[physics.command_mode].law
     integrate = INTEGRATORS[physics.integrator]
     dt = physics.control_period / physics.substeps
-    plant = Plant.of(vehicle, dt)
+    plant = Plant.of(vehicle, dt, rotor_share)
+    controller = dataclasses.replace(physics.nominal, rate_gain=vehicle.rate_gain)
     air = None if wind is None else Vec3.of(wind)
     after = split4(command)
     before = None if previous is None else split4(previous)
@@ -111,7 +130,10 @@ def step(
         if before is not None and switch_time is not None:
             done = jnp.clip((index + 1) - switch_time / dt, 0.0, 1.0).astype(command.dtype)
             acting = _blend(before, after, done)
-        rotor_command = law(physics.nominal, physics.mixer, parts, acting)
+        rotor_command = law(controller, physics.mixer, parts, acting)
+        if physics.full_speed is not None:
+            a, b, c, d = (jnp.minimum(speed, physics.full_speed) for speed in rotor_command)
+            rotor_command = a, b, c, d
         return integrate(plant, parts, rotor_command, air, dt), None
 
     # a gradient computes each sub-step again from its start: faster than storing what is inside, and far smaller

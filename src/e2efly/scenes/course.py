@@ -1,10 +1,13 @@
 """Race courses as solids."""
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
 from e2efly.courses.gates import FRAME, Gates
 from e2efly.scenes.scene import Solids
+
+jax.tree_util.register_dataclass(Gates, data_fields=list(Gates.__dataclass_fields__), meta_fields=[])
 
 HALF_DEPTH = 0.05
 """Half the depth of a gate's bars, m."""

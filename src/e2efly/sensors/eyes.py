@@ -14,7 +14,7 @@ from e2efly.scenes import camera
 from e2efly.scenes.camera import Mount
 from e2efly.scenes.cast import Light, usual_light
 from e2efly.scenes.scene import Scene
-from e2efly.sensors.image_noise import add_image_noise
+from e2efly.sensors.image_noise import add_image_noise, chosen
 
 TINTS = 8
 """Random tints in a world."""
@@ -29,21 +29,21 @@ jax.tree_util.register_dataclass(
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Eye:
-    """One camera on each of n vehicles, as it is for an episode; leaves."""
+    """One camera on each of n vehicles, as it is during an episode."""
 
     mount: Mount
     latency: Float[Array, " n"]
-    """Age of its images, s."""
+    """Age of the camera's images, s."""
     noisy: Bool[Array, " n"]
-    """Whether its images have the noise."""
+    """Whether the camera's images have the noise."""
     light: Light | None
-    """Where it sees colours."""
+    """Light of the world, for a camera that sees colours."""
     tints: Float[Array, "n 8 3"] | None
-    """Where it sees colours: what is added to those of solids, in turn."""
+    """What is added to the colours of the solids, in turn, for a camera that sees colours."""
 
     @staticmethod
     def of(config: CameraConfig, key: PRNGKeyArray, n: int) -> "Eye":
-        """Draw how the cameras sit, how late they are and under what light they look."""
+        """Draw the mounting, the latency and the light of each camera."""
         mount_key, latency_key, light_key, tint_key, noise_key = jax.random.split(key, 5)
         low, high = config.latency
         latency = low + (high - low) * jax.random.uniform(latency_key, (n,))
@@ -94,8 +94,7 @@ def see(config: CameraConfig, eye: Eye, scene: Scene, state: State, key: PRNGKey
     if eye.tints is not None:
         scene = _tinted(scene, eye.tints)
     image = camera.look(config, scene, eye.mount, position, quaternion, eye.light)
-    noisy = any(x is not None and x is not False for x in vars(config.noise).values())
-    if not noisy:
+    if not chosen(config.noise):
         return image
     each = eye.noisy.reshape(-1, *[1] * (image.ndim - 1))
     return jnp.where(each, add_image_noise(config.noise, key, image, config), image)

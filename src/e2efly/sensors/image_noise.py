@@ -3,21 +3,25 @@
 Depth is planar, m, (n, h, w); 0 is a hole, where nothing was measured. Other images have values in [0, 1].
 """
 
+import dataclasses
 import math
+import zlib
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from e2efly.config import CameraConfig, ImageNoiseConfig
+from e2efly.config import CameraConfig, ImageNoiseConfig, check_numbers
+from e2efly.registry import load
 
-STRENGTHS = ("inverse_depth", "speckle", "poisson", "gaussian", "salt_and_pepper")
-"""Fields of `ImageNoiseConfig` that are numbers: leaves."""
-
-jax.tree_util.register_dataclass(ImageNoiseConfig, data_fields=list(STRENGTHS), meta_fields=["d435i", "redwood"])
+_STRENGTHS = [field.name for field in dataclasses.fields(ImageNoiseConfig) if field.type == float | None]
+_STATIC = [field.name for field in dataclasses.fields(ImageNoiseConfig) if field.name not in _STRENGTHS]
+jax.tree_util.register_dataclass(ImageNoiseConfig, data_fields=_STRENGTHS, meta_fields=_STATIC)
 
 Image = Float[Array, "n h w *c"]
 Depth = Float[Array, "n h w"]
@@ -39,50 +43,41 @@ BEYOND = 20.0
 
 
 def add_image_noise(config: ImageNoiseConfig, key: PRNGKeyArray, image: Image, camera: CameraConfig) -> Image:
-    """Everything that a configuration says a camera does to its image, in the order of its fields.
+    """Add every noise of a configuration to a camera's images, in the order of its fields.
 
-    Depth and range go through the depth noises in m and then, as shares of the farthest, through the image noises;
-    holes stay holes but for salt. Other images have values in [0, 1]. A noise draws the same whatever others are in.
+    Depth and range go through `OF_DEPTH` in m and then, as shares of the farthest, through `OF_VALUES`; holes stay
+    holes but for salt. Other images have values in [0, 1]. The name of a noise decides its random stream: switching
+    one on changes no other.
 
     Args:
         config: which noises (static) and how strong (leaves); see `check`.
-        key: of the noise.
+        key: of all noises.
         image: what the camera sees: depth or range in m, (n, h, w); or values in [0, 1], (n, h, w) or (n, h, w, 3).
         camera: static.
 
     Returns:
         An image of the same kind and unit, within the camera's reach.
     """
-    keys = {name: jax.random.fold_in(key, i) for i, name in enumerate(ImageNoiseConfig.__dataclass_fields__)}
+    noises = chosen(config)
+
+    def through(table: dict[str, Noise], noisy: Image) -> Image:
+        for name, noise in table.items():
+            if name in noises:
+                stream = jax.random.fold_in(key, zlib.crc32(name.encode()))
+                noisy = noise(stream, noisy, noises[name], camera)
+        return noisy
+
     if camera.sees not in ("depth", "range"):
-        return _on_values(config, keys, image, holes=False)
+        return jnp.clip(through(OWN, through(OF_VALUES, image)), 0.0, 1.0)
     near, far = camera.reach
-    depth = jnp.where(image >= far, max(far, BEYOND), image)
-    if config.inverse_depth is not None:
-        depth = inverse_depth(keys["inverse_depth"], depth, config.inverse_depth)
-    if config.d435i:
-        depth = d435i(keys["d435i"], depth, camera.fov[0])
-    if config.redwood is not None:
-        depth = redwood(keys["redwood"], depth, distortion(config.redwood))
-    share = jnp.minimum(depth / far, 1.0)
-    noisy = far * _on_values(config, keys, share, holes=True)
+    depth = through(OF_DEPTH, jnp.where(image >= far, max(far, BEYOND), image))
+    noisy = jnp.clip(through(OWN, far * through(OF_VALUES, jnp.minimum(depth / far, 1.0))), 0.0, far)
     return jnp.where(noisy < near, 0.0, noisy)
 
 
-def _on_values(config: ImageNoiseConfig, keys: dict[str, PRNGKeyArray], image: Image, holes: bool) -> Image:
-    """The noises of images in [0, 1]; where there are holes, 0 stays 0 but for salt."""
-    noisy = image
-    if config.speckle is not None:
-        noisy = speckle(keys["speckle"], noisy, config.speckle)
-    if config.poisson is not None:
-        noisy = poisson(keys["poisson"], noisy, config.poisson)
-    if config.gaussian is not None:
-        noisy = gaussian(keys["gaussian"], noisy, config.gaussian)
-    if holes:
-        noisy = jnp.where(image > 0, noisy, 0.0)
-    if config.salt_and_pepper is not None:
-        noisy = salt_and_pepper(keys["salt_and_pepper"], noisy, config.salt_and_pepper)
-    return noisy
+def chosen(config: ImageNoiseConfig) -> dict[str, Any]:
+    """The noises that are switched on, and their options, by field."""
+    return {name: value for name, value in vars(config).items() if value is not None and value is not False}
 
 
 def check(config: ImageNoiseConfig, camera: CameraConfig) -> None:
@@ -91,27 +86,37 @@ def check(config: ImageNoiseConfig, camera: CameraConfig) -> None:
     Raises:
         ValueError: naming the field, the value and what is accepted.
     """
-    for name in STRENGTHS:
-        value = getattr(config, name)
-        low, high = {"salt_and_pepper": (0.0, 1.0), "poisson": (2.0, 65536.0)}.get(name, (0.0, math.inf))
-        if value is not None and not (math.isfinite(value) and low <= value <= high):
-            accepted = f"{low:g} or more" if high == math.inf else f"a number in [{low:g}, {high:g}]"
-            raise ValueError(f"camera.noise.{name} is {value}; accepted: {accepted}, or None to leave it out")
-    chosen = [name for name, value in vars(config).items() if value is not None and value is not False]
-    if chosen and camera.sees in ("normal", "instance"):
-        raise ValueError(f"camera.noise.{chosen[0]} is on; accepted where camera.sees is depth, range, label or rgb")
-    if config.inverse_depth is not None and camera.sees not in ("depth", "range"):
-        raise ValueError(
-            f"camera.noise.inverse_depth is {config.inverse_depth}; accepted: None where camera.sees is {camera.sees}"
-        )
+    check_numbers("camera.noise", config)
+    noises = chosen(config)
+    if noises and camera.sees in ("normal", "instance"):
+        first = next(iter(noises))
+        raise ValueError(f"camera.noise.{first} is on; accepted where camera.sees is depth, range, mask, label or rgb")
     planar = camera.sees == "depth" and camera.projection == "pinhole"
-    for name in ("d435i", "redwood"):
-        if getattr(config, name) and not planar:
+    for name in [name for name in OF_DEPTH if name in noises]:
+        if name == "inverse_depth" and camera.sees not in ("depth", "range"):
+            raise ValueError(
+                f"camera.noise.{name} is {noises[name]}; accepted: None where camera.sees is {camera.sees}"
+            )
+        if name != "inverse_depth" and not planar:
             raise ValueError(
                 f"camera.noise.{name} is on; accepted with camera.sees depth and camera.projection pinhole"
             )
     if config.redwood is not None:
         distortion(config.redwood)
+    if config.own is not None:
+        _check_own(config.own, camera)
+
+
+def _check_own(reference: str, camera: CameraConfig) -> None:
+    """Try a function of the user's own on the shape of an image, before anything compiles."""
+    own = load(reference)
+    image = jax.ShapeDtypeStruct((2, camera.height, camera.width, *(3,) * (camera.sees == "rgb")), jnp.float32)
+    try:
+        out = jax.eval_shape(lambda key, x: own(key, x, camera), jax.random.key(0), image)
+    except Exception as error:  # whatever it is that the user's code raises
+        raise ValueError(f"camera.noise.own is {reference}, which fails: {type(error).__name__}: {error}") from None
+    if getattr(out, "shape", None) != image.shape:
+        raise ValueError(f"camera.noise.own is {reference}, which returns {out}; accepted: an image of {image.shape}")
 
 
 def _normal(key: PRNGKeyArray, image: Array) -> Array:
@@ -237,3 +242,32 @@ def redwood(key: PRNGKeyArray, depth: Depth, table: Float[Array | np.ndarray, "8
     noise = REDWOOD_DISPARITY_DEVIATION * _normal(noise_key, depth)
     eighths = jnp.rint((REDWOOD_FOCAL_BASELINE / jnp.maximum(z, 1e-3) + noise) * 8.0)
     return jnp.where((z > 0) & (eighths > 0), REDWOOD_FOCAL_BASELINE * 8.0 / jnp.maximum(eighths, 1.0), 0.0)
+
+
+def _except_holes(noise: Callable[[PRNGKeyArray, Image, Strength], Image]) -> "Noise":
+    """A noise of values that leaves alone what is 0 where 0 is a hole."""
+
+    def applied(key: PRNGKeyArray, image: Image, strength: Strength, camera: CameraConfig) -> Image:
+        noisy = noise(key, image, strength)
+        return jnp.where(image > 0, noisy, 0.0) if camera.sees in ("depth", "range") else noisy
+
+    return applied
+
+
+Noise = Callable[[PRNGKeyArray, Array, Any, CameraConfig], Array]
+"""What is done to images: of a key, images, the option of `ImageNoiseConfig` and the camera."""
+OF_DEPTH: dict[str, Noise] = {
+    "inverse_depth": lambda key, depth, deviation, _: inverse_depth(key, depth, deviation),
+    "d435i": lambda key, depth, _, camera: d435i(key, depth, camera.fov[0]),
+    "redwood": lambda key, depth, table, _: redwood(key, depth, distortion(table)),
+}
+"""Noises of depth and range in m, in their order, by field of `ImageNoiseConfig`."""
+OF_VALUES: dict[str, Noise] = {
+    "speckle": _except_holes(speckle),
+    "poisson": _except_holes(poisson),
+    "gaussian": _except_holes(gaussian),
+    "salt_and_pepper": lambda key, image, amount, _: salt_and_pepper(key, image, amount),
+}
+"""Noises of values in [0, 1], in their order, by field of `ImageNoiseConfig`."""
+OWN: dict[str, Noise] = {"own": lambda key, image, reference, camera: load(reference)(key, image, camera)}
+"""The user's noise, which comes last, of images in their unit."""

@@ -19,12 +19,12 @@ jax.tree_util.register_dataclass(
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class ImuState:
-    """Biases, and the last measurement."""
+    """Biases of an IMU, and its last measurement."""
 
     gyro_bias: Float[Array, "*n 3"]
-    """rad/s."""
+    """Bias of the gyroscope, body, rad/s."""
     accel_bias: Float[Array, "*n 3"]
-    """m/s^2."""
+    """Bias of the accelerometer, body, m/s^2."""
     gyroscope: Float[Array, "*n 3"]
     """Measured angular velocity, body, rad/s."""
     accelerometer: Float[Array, "*n 3"]
@@ -41,9 +41,10 @@ class ImuState:
 def measure(
     imu: ImuConfig, key: PRNGKeyArray, state: ImuState, before: State, after: State, dt: float | Array
 ) -> ImuState:
-    """Measure the mean specific force of a step of `dt` seconds and the body rate at its end.
+    """Measure the mean specific force during a step of `dt` seconds, and the body rate at its end.
 
-    White noise of density N has standard deviation N / sqrt(dt) a sample; a bias moves by B sqrt(dt / tau) a step.
+    White noise of density N has the standard deviation N / sqrt(dt) per sample; a bias moves by B sqrt(dt / tau) per
+    step.
     """
     draw = jax.random.normal(key, (4, *after.position.shape), after.position.dtype)
     gyro_bias = state.gyro_bias + imu.gyro_bias * jnp.sqrt(dt / imu.gyro_tau) * draw[0]

@@ -21,7 +21,7 @@ def polynomial(
 ) -> Spline:
     """Random and smooth: minimum-jerk-like pieces of `every` knot periods between random points of a box.
 
-    The way points lie uniformly within `reach` of the centre, an axis. Their velocities are the mean slope to their
+    The way points lie uniformly within `reach` of the centre per axis. Their velocities are the mean slope to their
     neighbours, the average speed of each vehicle's path being uniform between 0 and `speed`, m/s.
     """
     points_key, speed_key = jax.random.split(key)

@@ -1,8 +1,7 @@
 """What a task is to the environment."""
 
 import dataclasses
-from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import cache
 from typing import Any, Protocol
 
 import jax
@@ -10,42 +9,16 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.config import TaskConfig
-from e2efly.config.numbers import SHAPE
+from e2efly.goal import Outcome, Shape
+from e2efly.numbers import SHAPE
 from e2efly.observation import Field
 from e2efly.physics import State
 from e2efly.registry import load, origin
 from e2efly.scenes.scene import Scene, gaps
 from e2efly.tasks.registry import TASKS
 
-
-@partial(jax.tree_util.register_dataclass, data_fields=["feet_height", "radius"], meta_fields=[])
-@dataclass(frozen=True)
-class Shape:
-    """What of the vehicle can touch things."""
-
-    feet_height: float | Array
-    """Height of the centre of mass over the feet, m."""
-    radius: float | Array
-    """Radius of the sphere that holds it, m."""
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """What a control step came to, each of shape (n,)."""
-
-    terminated: Bool[Array, " n"]
-    """The episode is over, for good or ill."""
-    success: Bool[Array, " n"]
-    """The episode is over and met the task's criterion."""
-    arrived: Bool[Array, " n"]
-    """A goal was reached in this step."""
-    crashed: Bool[Array, " n"]
-    """The vehicle hit something or left the fence in this step."""
-    error: Float[Array, " n"]
-    """The task's error now, m."""
-    signals: dict[str, Array] = field(default_factory=dict)
-    """What the task offers to the terms of the reward, beside what every environment does."""
+jax.tree_util.register_dataclass(Shape)
+jax.tree_util.register_dataclass(Outcome)
 
 
 class Task(Protocol):
@@ -144,16 +117,6 @@ for _options in TASKS.values():
     register_options(_options)
 
 
-def offsets(targets: Float[Array, "n k 3"], state: State) -> Float[Array, "n 3k"]:
-    """Positions minus the vehicle's, world, m, target after target."""
-    return (targets - state.position[:, None]).reshape(targets.shape[0], -1)
-
-
-def touches_ground(shape: Shape, state: State) -> Bool[Array, " n"]:
-    """Touching: the feet, `feet_height` below the centre of mass, at or under the ground z = 0."""
-    return state.position[:, 2] <= shape.feet_height
-
-
 def struck(
     scene: Scene,
     before: State,
@@ -181,9 +144,10 @@ def uniform(key: PRNGKeyArray, n: int, size: int) -> Float[Array, "n size"]:
 
 
 def into_ball(cube: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
-    """Points of the cube [-1, 1]^3 drawn into the unit ball: those outside it onto its surface."""
-    length = jnp.linalg.norm(cube, axis=-1, keepdims=True)
-    return cube / jnp.maximum(length, 1.0)
+    """Uniform points of the unit ball, from uniform points of the cube [-1, 1]^3."""
+    u, z, turn = cube[:, 0], cube[:, 1], jnp.pi * cube[:, 2]
+    radius, flat = jnp.cbrt((u + 1) / 2), jnp.sqrt(1 - z**2)
+    return radius[:, None] * jnp.stack([flat * jnp.cos(turn), flat * jnp.sin(turn), z], axis=-1)
 
 
 def at_rest(position: Float[Array, "n 3"]) -> State:

@@ -8,7 +8,7 @@ import hashlib
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -21,6 +21,9 @@ GRAVITY = 9.81
 """Standard gravity of the paper, m/s^2."""
 
 _HERE = Path(__file__).parent
+
+Controller = Literal["policy", "plant"]
+"""The vehicle that the flight controller believes in: the policy's own, or the one that flies."""
 
 
 def _quantity(unit: str, shape: tuple[int, ...] = (), at_least: float | None = None, above: float | None = None) -> Any:
@@ -58,9 +61,9 @@ class Vehicle:
     motor_time_constant: Any = _quantity("s", above=0.0)
     """Time constant of the first-order motor lag."""
     drag_linear: Any = _quantity("N*s/m", (3,), at_least=0.0)
-    """Drag an axis of the body over air-relative speed."""
+    """Drag per axis of the body over air-relative speed."""
     drag_quadratic: Any = _quantity("N*s^2/m^2", (3,), at_least=0.0)
-    """Drag an axis of the body over air-relative speed squared, signed."""
+    """Drag per axis of the body over air-relative speed squared, signed."""
     body_rate_max: Any = _quantity("rad/s", (3,), above=0.0)
     """Largest body rates that are commanded."""
     rate_gain: Any = _quantity("1/s", (3,), above=0.0)
@@ -92,6 +95,15 @@ class Vehicle:
         values = {f.name: np.asarray(getattr(self, f.name), np.float64).tolist() for f in quantities()}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
+    def under(self, other: "Vehicle", *names: str) -> "Vehicle":
+        """This body with the flight controller of another vehicle.
+
+        Args:
+            other: whose values to take.
+            names: the fields; none: all of `CONTROLLED`.
+        """
+        return dataclasses.replace(self, **{name: getattr(other, name) for name in names or CONTROLLED})
+
     @property
     def thrust_range(self) -> tuple[float, float]:
         """Smallest and largest thrust of one rotor, N: at idle, and at the tighter of the two maxima."""
@@ -104,6 +116,13 @@ class Vehicle:
         return float(4 * self.thrust_range[1] / (self.mass * GRAVITY))
 
     @property
+    def full_rotor_speed(self) -> float:
+        """Largest speed of a rotor, rad/s: where the tighter of its two maxima binds."""
+        k2, k1, k0 = self.thrust_map
+        top = self.thrust_range[1]
+        return float((-k1 + np.sqrt(k1**2 + 4 * k2 * (top - k0))) / (2 * k2))
+
+    @property
     def hover_rotor_speed(self) -> float:
         """Rotor speed at which four equal rotors carry the weight, rad/s."""
         k2, k1, k0 = self.thrust_map
@@ -113,6 +132,50 @@ class Vehicle:
         """Thrust of one rotor, N, at a rotor speed, rad/s."""
         k2, k1, k0 = self.thrust_map
         return max(k2 * speed**2 + k1 * speed + k0, 0.0)
+
+
+TIMED = ("control_rate", "latency")
+"""What a vehicle's file says of the policy's computer and its link."""
+CONTROLLED = (
+    "body_rate_max", "rate_gain", "attitude_gain", "velocity_gain", "position_gain", "tilt_max", "acceleration_max",
+    "speed_max", *TIMED,
+)  # fmt: skip
+"""What a vehicle's file says of the flight controller and what asks it; all else is the body."""
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What flies, and what its flight controller takes it for."""
+
+    body: Vehicle
+    """Which moves; of the flight controller's numbers the rate loop's gain counts."""
+    believed: Vehicle
+    """In which the flight controller believes: thrust per mass, inertia, mixer, gains, limits."""
+
+    @staticmethod
+    def of(own: Vehicle, flown: Vehicle, controller: str = "policy") -> "Flown":
+        """A policy's vehicle gives way to another one.
+
+        Args:
+            own: the vehicle that the policy was trained on. Control rate and latency stay its own.
+            flown: the vehicle that flies.
+            controller: policy: the flight controller stays that of `own`, nobody has told it of the body; plant: it is
+                tuned to the vehicle that flies.
+
+        Raises:
+            ValueError: for another controller.
+        """
+        if controller not in get_args(Controller):
+            raise ValueError(f"--controller is {controller!r}; accepted: {' or '.join(get_args(Controller))}")
+        if controller == "policy":
+            return Flown(flown.under(own), own)
+        tuned = flown.under(own, *TIMED)
+        return Flown(tuned, tuned)
+
+    @property
+    def as_believed(self) -> bool:
+        """Whether the flight controller knows exactly what flies."""
+        return self.body.hash == self.believed.hash
 
 
 def quantities() -> tuple[dataclasses.Field, ...]:

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from e2efly.deploy.flight_log import FlightLog
+from e2efly.deploy.log.flight_log import FlightLog
 from e2efly.drawing import ORANGE
 from e2efly.view.flight_log import Interval
 from e2efly.view.style import BLUE, GREEN, GREY, PALE, PURPLE, SKY, VERMILLION, say

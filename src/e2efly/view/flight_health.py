@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from e2efly.deploy.blackbox import Alignment, Blackbox
-from e2efly.deploy.flight_log import FlightLog
+from e2efly.deploy.log.blackbox import Alignment, Blackbox
+from e2efly.deploy.log.flight_log import FlightLog
 from e2efly.drawing import INK, ORANGE
 from e2efly.view.flight_axes import XYZ, bands, empty, liveliest, note
 from e2efly.view.flight_log import AXES, GROUNDED, gyro, intervals
@@ -41,7 +41,7 @@ def plot_loop(log: FlightLog, path: str | Path) -> None:
         over.set_ylabel("lateness (ms)")
         if len(timing):
             over.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderpad=0.1)
-        spent = timing.numbers("cpu_load")  # told once a second
+        spent = timing.numbers("cpu_load")  # told once per second
         load.plot(timing.time[np.isfinite(spent)], 100 * spent[np.isfinite(spent)], color=BLUE, label="companion")
         load.plot(log["status"].time, 100 * log["status"].numbers("cpu_load"), color=VERMILLION, label="controller")
         load.set_ylabel("processor load (%)")

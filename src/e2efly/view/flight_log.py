@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.deploy.blackbox import Alignment, Blackbox
-from e2efly.deploy.flight_log import FlightLog
+from e2efly.control import Quat
+from e2efly.deploy.log.blackbox import Alignment, Blackbox
+from e2efly.deploy.log.flight_log import FlightLog
 from e2efly.view.rate_response import StepResponse, step_response
 
 AXES = ("roll", "pitch", "yaw")
@@ -82,7 +83,7 @@ def errors(log: FlightLog) -> tuple[np.ndarray, np.ndarray]:
 
 def tilt(quaternion: np.ndarray) -> np.ndarray:
     """Angle, rad, between body z and up of quaternions (n, 4)."""
-    return np.arccos(np.clip(1 - 2 * (quaternion[:, 1] ** 2 + quaternion[:, 2] ** 2), -1, 1))
+    return Quat.of(quaternion).tilt()
 
 
 def summary(log: FlightLog, blackbox: Blackbox | None = None, alignment: Alignment | None = None) -> dict[str, Any]:

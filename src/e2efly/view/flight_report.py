@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-from e2efly.deploy.flight_log import FlightLog
+from e2efly.deploy.log.flight_log import FlightLog
 from e2efly.drawing import INK
 from e2efly.view.flight_axes import XYZ, bands, colors, empty, liveliest, mode_handles, note
 from e2efly.view.flight_log import AXES, Interval, errors, gyro, intervals, tilt

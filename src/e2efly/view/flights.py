@@ -1,13 +1,16 @@
 """Flights of a policy as NumPy arrays: what the plots draw."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
+from e2efly.control import Quat
 from e2efly.env import Env
-from e2efly.evaluate import Act, trace
+from e2efly.episodes import Act, trace
 
 
 @dataclass(frozen=True)
@@ -51,28 +54,31 @@ class Flights:
     @property
     def yaw(self) -> Float[np.ndarray, "t n"]:
         """Heading of the body's x axis, rad in [-pi, pi]."""
-        w, x, y, z = np.moveaxis(self.quaternion, -1, 0)
-        return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        return Quat.of(self.quaternion).yaw()
 
 
-def fly(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int) -> Flights:
+def fly(
+    env: Env, act: Act | Callable[[Any], Act], key: PRNGKeyArray, n: int, steps: int, weights: Any = None
+) -> Flights:
     """Fly `n` episodes of at most `steps` control steps.
 
     Args:
         env: the environment.
-        act: the policy, as a function that JAX can compile.
+        act: the policy; with `weights`, what makes it of them.
         key: decides the starts and all noise.
         n: episodes, side by side.
         steps: control steps; an episode that is longer is cut.
+        weights: of the policy: given apart, so that the compiled program is found again for other weights.
     """
 
     @jax.jit
-    def program(env: Env, key: PRNGKeyArray) -> tuple[Array, ...]:
-        state, command, goal, out = trace(env, act, key, n, steps)
+    def program(env: Env, key: PRNGKeyArray, weights: Any) -> tuple[Array, ...]:
+        policy = act if isinstance(act, Act) else act(weights)
+        state, command, goal, out = trace(env, policy, key, n, steps)
         s = (state.position, state.velocity, state.quaternion, state.body_rate, state.rotor_speed)
         return *s, command, goal, out.done, out.success
 
-    *arrays, done, success = (np.asarray(x) for x in program(env, key))
+    *arrays, done, success = (np.asarray(x) for x in program(env, key, weights))
     length = np.where(done.any(axis=0), done.argmax(axis=0) + 1, steps)
     return Flights(
         env.control_period * np.arange(1, steps + 1),

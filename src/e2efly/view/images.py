@@ -38,6 +38,8 @@ SENSORS = {
     "normal": "Surface normal",
 }
 """What a camera sees, and its title."""
+TILE = 16
+"""Rows and columns of images are multiples of it: the ray caster's tiles."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,15 @@ def _followed(
     images = follow(origin, matrix, rays, channels, usual_light(1) if "rgb" in channels else None)
     directions = jnp.einsum("ij,tjr->itr", matrix[0], rays.tiles)
     return images, jnp.stack([rays.image(d[None])[0] for d in directions], axis=-1), origin[0]
+
+
+def sized(camera: CameraConfig, columns: int, width: int | None, height: int | None) -> CameraConfig:
+    """The camera with so many columns, or `width`; square pixels where `height` is left out. A LiDAR keeps its rays."""
+    if camera.projection == "spherical":
+        return dataclasses.replace(camera, width=width or camera.width, height=height or camera.height)
+    width = width or columns
+    square = width * math.tan(camera.fov[1] / 2) / math.tan(camera.fov[0] / 2)
+    return dataclasses.replace(camera, width=width, height=height or max(TILE * round(square / TILE), TILE))
 
 
 def look_around(

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.config import ClutterConfig, ForestConfig
+from e2efly.control import Quat
 from e2efly.courses.tracks import RaceTrack, load_track, track_names
 from e2efly.scenes import generate
 from e2efly.scenes.file import load_scene
@@ -143,8 +144,7 @@ def _of_scene(scene: Scene) -> Place:
     there = {kind: np.asarray(s.active[0]) for kind, s in scene.solids.items()}
     if "gate" in scene.kinds and there["gate"].any():
         s = scene.solids["gate"]
-        w, x, y, z = np.moveaxis(np.asarray(s.quaternion[0][there["gate"]], float), -1, 0)
-        yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        yaw = Quat.of(np.asarray(s.quaternion[0][there["gate"]], float)).yaw()
         route, straight = _through(np.asarray(s.centre[0][there["gate"]], float), yaw)
         ends = route[0] + (route[0] - route[1]), route[-1] + (route[-1] - route[-2])
         return Place(scene, np.vstack([ends[0], route, ends[1]]), np.concatenate([[False], straight, [False]]))

@@ -13,7 +13,7 @@ from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullF
 
 from e2efly.config import TaskConfig
 from e2efly.drawing import INK
-from e2efly.evaluate import Episodes, wilson
+from e2efly.episodes import Episodes, wilson
 from e2efly.physics.control import COMMAND_MODES
 from e2efly.vehicles.vehicle import GRAVITY
 from e2efly.view.flights import Flights, fly

@@ -4,12 +4,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
+from e2efly.deploy.policy.loader import Policy
 from e2efly.drawing import INK, Face, Line, Thing
 from e2efly.physics.control import COMMAND_MODES
+from e2efly.validation.fleet import Flight, Mission, fly_all
+from e2efly.validation.judge import judge
+from e2efly.validation.reality import Reality
+from e2efly.validation.validate import Validation
+from e2efly.vehicles import load_vehicle
 from e2efly.view.flights import Flights
 from e2efly.view.scene import scene
 from e2efly.view.style import BLUE, GREY, VERMILLION, figure
@@ -19,6 +26,8 @@ _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": VERMILLION, "linewidth": 1.2},
 )
 """The first place wide and pale, the second thin on top of it: where they agree, both are seen."""
+DRAWN = 6
+"""Starts of each criterion that are drawn."""
 _FAILED: dict[str, Any] = {"marker": "X", "markersize": 8, "markeredgecolor": "white", "linestyle": ""}
 
 
@@ -92,3 +101,59 @@ def _space(ax: Axes, places: list, things: list[Thing], axes: tuple[int, int]) -
             if length and not flights.success[i]:
                 ax.plot(*track[-1, :, None], color=look["color"], zorder=7, **_FAILED)
     ax.set_aspect("equal", adjustable="datalim")
+
+
+def plot_validation(found: Validation, folder: Path) -> None:
+    """Fly some starts by the same runtime in the training simulator, and lay both places over each other.
+
+    Raises:
+        OSError: when the folder cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"cannot make the folder of the plots {folder}: {error.strerror}") from error
+    flew, plant = found.candidate, found.plant.name
+    contract, nominal = flew.policy.contract, load_vehicle(flew.env.vehicle)
+    for name, suite in flew.task.criteria().items():
+        v = found.criteria[name]
+        shown = [int(i) for i in np.argsort(v.flown.success, kind="stable")[:DRAWN]]  # failures first
+        home = Reality(nominal, contract.latency_s)
+        asked = [Flight(v.starts.states[i], v.starts.courses[i], home) for i in shown]
+        mission = Mission(flew.file, "simulator", nominal, nominal, float(suite.episode_s))
+        again = fly_all(mission, asked, processes=1)
+        verdicts = judge(flew.at_home.environment(suite), v.starts.of(shown), again)
+        there = [v.flights[i] for i in shown]
+        flown = {
+            "training simulator": _flights(flew.policy, again, verdicts.duration, verdicts.success),
+            plant: _flights(flew.policy, there, v.flown.duration[shown], v.flown.success[shown]),
+        }
+        plot_overlay(suite, flown, folder / f"{plant}_{name}.png", f"{name} on {contract.vehicle}: {plant}")
+
+
+def _flights(policy: Policy, flights: list[Any], duration: np.ndarray, success: np.ndarray) -> Any:
+    """What the plots draw, until the episodes ended."""
+    period = 1 / policy.contract.control_rate_hz
+    length = np.rint(duration / period).astype(int)
+    steps = max(int(length.max()), 1)
+    time = period * np.arange(1, steps + 1)
+
+    def column(name: str, first: int) -> np.ndarray:
+        """(steps, n, ...): what is missing behind the end of a flight is not a number."""
+        rows = [getattr(f, name)[first:][:steps] for f in flights]
+        whole = np.full((steps, len(rows), *rows[0].shape[1:]), np.nan)
+        for i, row in enumerate(rows):
+            whole[: len(row), i] = row
+        return whole
+
+    moved = [column(name, 1) for name in ("position", "velocity", "quaternion", "body_rate")]
+    return Flights(
+        time,
+        *moved,
+        rotor_speed=np.full((steps, len(flights), 4), np.nan),
+        command=column("command", 0),
+        goal=column("goal", 0),
+        length=length,
+        success=success,
+        command_mode=policy.contract.action.mode,
+    )

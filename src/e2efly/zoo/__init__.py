@@ -2,10 +2,11 @@
 
 import hashlib
 import json
+import os
 from pathlib import Path
 from typing import Any
 
-from e2efly.vehicles import unknown
+from e2efly.vehicles import load_vehicle, unknown, vehicle_file
 
 FOLDER = Path(__file__).parent
 USUAL = "vis_r"
@@ -28,32 +29,44 @@ def contents() -> dict[str, dict[str, dict[str, Any]]]:
     return zoo
 
 
-def policy_path(name_or_path: Path, vehicle: str | None = None) -> Path:
-    """A policy's path: what is there under the name, or the zoo's policy of the task of that name.
+def policy_file(policy: str | os.PathLike[str], vehicle: str | Path | None = None) -> Path:
+    """The file of a policy: every command and function that takes a policy finds it by this.
 
     Args:
-        name_or_path: a run directory, a policy.onnx, or a task.
-        vehicle: whose policy, of the zoo's; `USUAL` when left out.
+        policy: a policy.onnx, a run directory (its policy.onnx), or the name of a task (the zoo's policy of it).
+        vehicle: whose policy, of the zoo's: a shipped name, or a file: that of the shipped vehicle with the same
+            values, or else of the same name, and of `USUAL` for any other file, and when left out.
 
     Raises:
-        ValueError: when there is neither, with what the zoo has; when the zoo's file is not what zoo.json says.
+        ValueError: for a name that the zoo has not, with what it has; when the zoo's file is not what zoo.json says.
     """
-    if name_or_path.exists() or len(name_or_path.parts) > 1 or name_or_path.suffix:
-        return name_or_path
-    zoo, task = contents(), str(name_or_path)
+    path = Path(policy)
+    if path.is_dir():
+        return path / "policy.onnx"
+    if path.exists() or len(path.parts) > 1 or path.suffix:
+        return path
+    zoo, task = contents(), str(path)
     if not any(task in tasks for tasks in zoo.values()):
         tasks = sorted({task for tasks in zoo.values() for task in tasks})
         raise ValueError(unknown("policy", task, tasks) + ", a run directory, or the path of a policy.onnx")
-    if task not in zoo.get(vehicle or USUAL, {}):
-        having = [known for known, tasks in zoo.items() if task in tasks]
-        raise ValueError(
-            f"the zoo has no policy {task!r} of vehicle {vehicle or USUAL!r}; accepted: {', '.join(having)}"
-        )
-    file = FOLDER / (vehicle or USUAL) / f"{task}.onnx"
+    having = [known for known, tasks in zoo.items() if task in tasks]
+    name = _whose(vehicle_file(vehicle or USUAL), having)
+    if name not in having:
+        raise ValueError(f"the zoo has no policy {task!r} of vehicle {name!r}; accepted: {', '.join(having)}")
+    file = FOLDER / name / f"{task}.onnx"
     found = hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else "missing"
-    if found != zoo[vehicle or USUAL][task].get("sha256"):
+    if found != zoo[name][task].get("sha256"):
         raise ValueError(f"{file}: SHA-256 is {found}, another than zoo.json says; install e2efly again")
     return file
+
+
+def _whose(body: Path, having: list[str]) -> str:
+    """The shipped vehicle whose policy flies the vehicle of a file, where these have one."""
+    if body.parent == vehicle_file(USUAL).parent:
+        return body.stem
+    found = load_vehicle(body).hash
+    same = [name for name in having if load_vehicle(name).hash == found]
+    return next((name for name in (*same, body.stem) if name in having), USUAL)
 
 
 def beside(policy: Path) -> Path:

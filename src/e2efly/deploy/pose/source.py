@@ -1,4 +1,4 @@
-"""Where poses come from: one small interface, and its choice by a line of text."""
+"""Where poses come from: one small interface."""
 
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -6,14 +6,6 @@ from typing import Protocol
 
 from e2efly.deploy.odometry import Sample
 
-FORMS = {
-    "udp": "udp:PORT or udp:HOST:PORT, with HOST an address of this machine; without it 127.0.0.1",
-    "tcp": "tcp:HOST:PORT",
-    "mocap": "mocap:TYPE:HOST:RIGID_BODY",
-    "ros1": "ros1:/topic",
-    "ros2": "ros2:/topic",
-}
-"""The sources that `open_source` knows, and how each is written."""
 LARGEST_BATCH = 16
 """Most messages that one `read` parses: of a flood the newest, so that the control loop stays in time."""
 
@@ -115,51 +107,3 @@ class Inbox:
             except ValueError as error:
                 self.refuse(str(error))
         return samples
-
-
-def open_source(text: str) -> PoseSource:
-    """Open a pose source that is written as in `FORMS`.
-
-    Raises:
-        ValueError: naming the text and what is accepted; for a port that is taken or a host without an address; for a
-            package that is not installed or a peer that does not answer, with what to do.
-    """
-    kind, _, rest = text.partition(":")
-    if kind == "udp":
-        from e2efly.deploy.pose.json_source import UdpSource
-
-        host, _, port = rest.rpartition(":")
-        return UdpSource(host or "127.0.0.1", _port(text, port))
-    if kind == "tcp":
-        from e2efly.deploy.pose.json_source import TcpSource
-
-        host, _, port = rest.rpartition(":")
-        return TcpSource(_part(text, host), _port(text, port))
-    if kind == "mocap":
-        from e2efly.deploy.pose.mocap import open_mocap
-
-        system, _, rest = rest.partition(":")
-        host, _, body = rest.partition(":")
-        return open_mocap(_part(text, system), _part(text, host), _part(text, body))
-    if kind in ("ros1", "ros2"):
-        from e2efly.deploy.pose.ros import open_ros
-
-        return open_ros(int(kind[-1]), _part(text, rest))
-    raise _refusal(text)
-
-
-def _part(text: str, part: str) -> str:
-    if not part.strip():
-        raise _refusal(text)
-    return part
-
-
-def _port(text: str, part: str) -> int:
-    if not (part.isascii() and part.isdigit() and 1 <= int(part) <= 65535):
-        raise _refusal(text)
-    return int(part)
-
-
-def _refusal(text: str) -> ValueError:
-    form = FORMS.get(text.partition(":")[0])
-    return ValueError(f"pose source is {text!r}; accepted: {form or '; '.join(FORMS.values())}")

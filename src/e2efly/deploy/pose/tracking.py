@@ -121,7 +121,7 @@ def _content(checks: Checks, sample: Sample) -> str | None:
         ("body_rate", sample.body_rate, checks.jump_rate),
     ):
         if value is not None and float(np.abs(value).max()) > limit:
-            return f"speed: {name} is {value.tolist()}; accepted: at most {limit:g} an axis"
+            return f"speed: {name} is {value.tolist()}; accepted: at most {limit:g} per axis"
     return None
 
 

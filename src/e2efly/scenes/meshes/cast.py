@@ -14,7 +14,8 @@ from jaxtyping import Array, Float
 
 from e2efly.device import cores
 from e2efly.scenes.cast import CHANNELS, Light, Pattern
-from e2efly.scenes.meshes.engine import Engine, engine
+from e2efly.scenes.meshes.engine import Engine
+from e2efly.scenes.meshes.engines import engine
 from e2efly.scenes.meshes.scene import MeshScene
 from e2efly.scenes.scene import COLOURS, SKY
 

@@ -1,15 +1,11 @@
-"""What follows rays through triangles: Embree on a CPU, Warp on CUDA."""
+"""What an engine that follows rays through triangles offers."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple, Protocol
-from weakref import WeakKeyDictionary
 
-import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
-
-from e2efly.scenes.meshes.scene import MeshScene
 
 
 class Hits(NamedTuple):
@@ -48,9 +44,6 @@ class Engine(Protocol):
         ...
 
 
-_READY: WeakKeyDictionary[MeshScene, Engine] = WeakKeyDictionary()
-
-
 @contextmanager
 def needed(extra: str) -> Iterator[None]:
     """Around the imports of what an extra installs.
@@ -62,20 +55,3 @@ def needed(extra: str) -> Iterator[None]:
         yield
     except ModuleNotFoundError as error:
         raise ValueError(f"mesh scenes need the package {error.name}: pip install 'e2efly[{extra}]'") from None
-
-
-def engine(scene: MeshScene) -> Engine:
-    """The engine of where JAX computes; made once for a scene.
-
-    Raises:
-        ValueError: naming the package that is missing, and how to install it.
-    """
-    if scene not in _READY:
-        cuda = jax.default_backend() == "gpu"
-        with needed("mesh-cuda" if cuda else "mesh"):
-            if cuda:
-                from e2efly.scenes.meshes.warp import Warp as Kind
-            else:
-                from e2efly.scenes.meshes.embree import Embree as Kind
-        _READY[scene] = Kind(scene.triangles)
-    return _READY[scene]

@@ -29,6 +29,8 @@ class AvoidConfig(TaskConfig):
     """Fly fast through a random forest that is only seen."""
 
     world: ClassVar[str] = "e2efly.tasks.avoid.world:Avoid"
+    goal_class: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidGoal"
+    route: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidRoute"
     best: ClassVar = "bptt"
     cameras: ClassVar = (dataclasses.replace(D435I, noise=ImageNoiseConfig(d435i=True), width=32, height=12),)
     curriculum: ClassVar = (
@@ -46,7 +48,7 @@ class AvoidConfig(TaskConfig):
     forest: ForestConfig = ForestConfig()
     """The forest; its lane is also the fence."""
     speed: tuple[float, float] = number((3.0, 10.0), rising=True)
-    """Commanded speed, m/s, uniform an episode."""
+    """Commanded speed, m/s, uniform per episode."""
     sideways: float = 3.0
     """Start within this of the middle of the lane, m."""
     altitude: float = 1.5

@@ -14,6 +14,8 @@ class GapConfig(TaskConfig):
     """Fly through a narrow slit in a wall, tilted so that only a banked vehicle fits."""
 
     world: ClassVar[str] = "e2efly.tasks.gap.world:Gap"
+    goal_class: ClassVar[str] = "e2efly.tasks.gap.goal:GapGoal"
+    route: ClassVar[str] = "e2efly.tasks.gap.goal:GapRoute"
     best: ClassVar = "bptt"
 
     episode_s: float = 6.0
@@ -21,7 +23,7 @@ class GapConfig(TaskConfig):
     distance: tuple[float, float] = number((2.5, 4.0), rising=True)
     """From the start to the slit, m, uniform."""
     sideways: float = 0.5
-    """Half-width of the slit's random place about straight ahead, m an axis."""
+    """Half-width of the slit's random place about straight ahead, m per axis."""
     altitude: float = 2.0
     """Height of the start, m."""
     yaw: float = 0.3

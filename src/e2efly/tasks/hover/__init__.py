@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from e2efly.config import BPTTConfig, Paper, PPOConfig, RewardConfig, TaskConfig, TrainConfig, number
+from e2efly.config import BPTTConfig, Paper, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
 from e2efly.courses import defaults
 from e2efly.drawing import INK, Line, Mark, Thing, circle
 from e2efly.tasks.registry import register
@@ -19,9 +19,20 @@ class HoverConfig(TaskConfig):
     """Fly to a point and stay there."""
 
     world: ClassVar[str] = "e2efly.tasks.hover.world:Hover"
+    goal_class: ClassVar[str] = "e2efly.tasks.hover.goal:HoverGoal"
+    route: ClassVar[str] = "e2efly.tasks.hover.goal:HoverRoute"
     shows_error: ClassVar = True
     variants: ClassVar = ("thrown",)
     smooth: ClassVar = {"near": 1.0, "prog2": 0.2, "v1": 0.02, "anglev_sq": 0.002, "act2_sq": 0.02, "crash": 10.0}
+    best: ClassVar = "bptt"
+    robust: ClassVar = {
+        "bptt": Robust(
+            weights={"prog2": 1.0, "near": 0.3, "v1": 0.1, "anglev_sq": 0.06, "act2_sq": 0.05},
+            algo={"horizon": 96, "learning_rate": 8e-3},
+            steps=2_200_000,
+        ),
+        "ppo": Robust(steps=6_000_000, recurrent=96),
+    }
     paper: ClassVar = Paper(
         weights={"prog2": 0.01, "ori2": 0.0001, "v1": 0.002, "anglev": 0.002},
         ppo={"act3": 1.0, "goal": 1.0, "crash": 1.0},
@@ -35,13 +46,13 @@ class HoverConfig(TaskConfig):
     target: tuple[float, float, float] = number(defaults.TARGET, low=-math.inf)
     """Where to hover, world, m."""
     position: float = 2.0
-    """Start within this of the target, m an axis."""
+    """Start within this of the target, m per axis."""
     velocity: float = 1.0
-    """Start velocity, m/s an axis, uniform in +-."""
+    """Start velocity, m/s per axis, uniform in +-."""
     tilt: float = 0.5235987755982988
     """Start roll and pitch, rad, uniform in +-."""
     body_rate: float = 1.0
-    """Start body rates, rad/s an axis, uniform in +-."""
+    """Start body rates, rad/s per axis, uniform in +-."""
     radius: float = number(0.1, above=0)
     """Success: within this of the target, m, ..."""
     hold_s: float = 1.0

@@ -15,15 +15,17 @@ class HoverAwareConfig(TaskConfig):
     """Hover at a point and keep a slowly moving target in the middle of the camera's image."""
 
     world: ClassVar[str] = "e2efly.tasks.hover_aware.world:HoverAware"
+    goal_class: ClassVar[str] = "e2efly.tasks.hover_aware.goal:HoverAwareGoal"
+    route: ClassVar[str] = "e2efly.tasks.hover_aware.goal:HoverAwareRoute"
 
     episode_s: float = 8.0
     """Length of an episode, s."""
     target: tuple[float, float, float] = number(defaults.TARGET, low=-math.inf)
     """Where to hover, world, m."""
     position: float = 1.5
-    """Start within this of the target, m an axis."""
+    """Start within this of the target, m per axis."""
     velocity: float = 0.5
-    """Start velocity, m/s an axis, uniform in +-."""
+    """Start velocity, m/s per axis, uniform in +-."""
     tilt: float = 0.2617993877991494
     """Start roll and pitch, rad, uniform in +-; any heading."""
     distance: tuple[float, float] = number((4.0, 6.0), rising=True)

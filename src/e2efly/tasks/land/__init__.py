@@ -5,7 +5,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from e2efly.config import AlgorithmConfig, BPTTConfig, Paper, PPOConfig, RewardConfig, TaskConfig, TrainConfig, number
+from e2efly.config import (
+    AlgorithmConfig,
+    BPTTConfig,
+    Paper,
+    PPOConfig,
+    RewardConfig,
+    Robust,
+    TaskConfig,
+    TrainConfig,
+    number,
+)
 from e2efly.courses import defaults
 from e2efly.drawing import INK, ORANGE, Face, Line, Thing, circle
 from e2efly.tasks.registry import register
@@ -17,10 +27,20 @@ class LandConfig(TaskConfig):
     """Touch down gently on a point of the ground."""
 
     world: ClassVar[str] = "e2efly.tasks.land.world:Land"
+    goal_class: ClassVar[str] = "e2efly.tasks.land.goal:LandGoal"
+    route: ClassVar[str] = "e2efly.tasks.land.goal:LandRoute"
     smooth: ClassVar = {
         "prog1": 4.0, "progxy": 0.1, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02,
         "goal": 10.0, "crash": 10.0,
     }  # fmt: skip
+    best: ClassVar = "bptt"
+    robust: ClassVar = {
+        "bptt": Robust(
+            weights={"progxy": 1.0, "descent": 1.0, "upright": 0.1, "anglev_sq": 0.05, "act2_sq": 0.05},
+            algo={"horizon": 96},
+            steps=2_200_000,
+        )
+    }
     paper: ClassVar = Paper(
         weights={"progxy": 0.04, "vz": 0.1, "anglev": 0.001},
         ppo={"act3": 1.0, "goal": 1.0, "crash": 1.0},
@@ -30,11 +50,11 @@ class LandConfig(TaskConfig):
     episode_s: float = 10.0
     """Length of an episode, s."""
     sideways: float = 2.0
-    """Start within this of the pad's centre, m an axis."""
+    """Start within this of the pad's centre, m per axis."""
     height: tuple[float, float] = number((1.0, 3.0), rising=True)
     """Start height of the feet, m."""
     velocity: float = 0.5
-    """Start velocity, m/s an axis, uniform in +-."""
+    """Start velocity, m/s per axis, uniform in +-."""
     radius: float = number(0.10, above=0)
     """Success: horizontal error at touch, m."""
     height_error: float = 0.05

@@ -27,6 +27,8 @@ class LandVisualConfig(TaskConfig):
     """Touch down gently on a pad that is only seen."""
 
     world: ClassVar[str] = "e2efly.tasks.land_visual.world:LandVisual"
+    goal_class: ClassVar[str] = "e2efly.tasks.land_visual.goal:LandVisualGoal"
+    route: ClassVar[str] = "e2efly.tasks.land_visual.goal:LandVisualRoute"
     best: ClassVar = "bptt"
     cameras: ClassVar = (CameraConfig("mask", 16, 16, fov=(math.pi / 2, math.pi / 2), pitch=math.pi / 2),)
     paper: ClassVar = Paper(
@@ -38,11 +40,11 @@ class LandVisualConfig(TaskConfig):
     episode_s: float = 10.0
     """Length of an episode, s."""
     sideways: float = 1.0
-    """Start within this of the pad's centre, m an axis."""
+    """Start within this of the pad's centre, m per axis."""
     height: tuple[float, float] = number((1.0, 3.0), rising=True)
     """Start height of the feet over the pad, m."""
     velocity: float = 0.5
-    """Start velocity, m/s an axis, uniform in +-."""
+    """Start velocity, m/s per axis, uniform in +-."""
     pad_size: tuple[float, float] = number((0.4, 0.6), rising=True)
     """Width of the pad, m, uniform; its shape is a disc, a square or a triangle."""
     pad_height: float = 0.2

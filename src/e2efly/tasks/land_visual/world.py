@@ -7,35 +7,26 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.observation import Field
+from e2efly.goal import Outcome, Shape
 from e2efly.physics import State
-from e2efly.physics.rotation import cos_tilt, from_euler
+from e2efly.physics.rotation import from_euler
 from e2efly.scenes.scene import Scene, Solids, distances
 from e2efly.scenes.shapes import DISC, TRIANGLE
 from e2efly.tasks.land_visual import LandVisualConfig
-from e2efly.tasks.task import Outcome, Shape, at_rest, uniform
+from e2efly.tasks.land_visual.goal import LandVisualGoal
+from e2efly.tasks.task import at_rest, uniform
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class LandVisual:
-    """The pad stands at the world's origin. The task's memory is the pad."""
-
-    config: LandVisualConfig
-    shape: Shape
-
-    fields = (Field("height", 1, "none", "m", 1.0, "height of the feet over the ground"),)
+class LandVisual(LandVisualGoal):
+    """Starts over and beside the pad, which is the task's state."""
 
     @classmethod
     def of(cls, config: LandVisualConfig, shape: Shape, control_period: float, substeps: int = 1) -> "LandVisual":
         """See `e2efly.tasks.task.make_task`."""
         del control_period, substeps
         return cls(config, shape)
-
-    @property
-    def episode_s(self) -> float | Array:
-        """Time limit, s."""
-        return self.config.episode_s
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Solids]:
         """Level, any heading, over and beside the pad."""
@@ -54,17 +45,6 @@ class LandVisual:
         pad = Solids.of("pad", centre[:, None], size[:, None], yaw=jnp.pi * u[:, 8:])
         return dataclasses.replace(state, velocity=c.velocity * u[:, 3:6], quaternion=quaternion), pad
 
-    def goal(self, memory: Solids, time: Float[Array, " n"]) -> Float[Array, "n 3"]:
-        """The centre of mass of a vehicle that stands on the pad."""
-        del memory
-        zero = jnp.zeros_like(time)
-        return jnp.stack([zero, zero, zero + self.config.pad_height + self.shape.feet_height], axis=-1)
-
-    def observe(self, memory: Solids, time: Float[Array, " n"], state: State) -> Float[Array, "n 1"]:
-        """Height over the ground."""
-        del memory, time
-        return state.position[:, 2:] - self.shape.feet_height
-
     def scene(self, memory: Solids) -> Scene:
         """The pad on level ground."""
         return Scene.of({"pad": memory}, memory.active.shape[0])
@@ -77,28 +57,8 @@ class LandVisual:
     def advance(
         self, memory: Solids, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
     ) -> tuple[Solids, Outcome]:
-        """The episode ends at the first touch of pad or ground, judged at the step's end.
-
-        Success: on the pad's top, near its centre, slow, upright.
-        """
+        """The goal's verdict; what touches is told by the pad's outline."""
         del before, timed_out
-        c = self.config
-        offset = after.position - self.goal(memory, time)
-        sideways = jnp.linalg.norm(offset[:, :2], axis=-1)
         feet = after.position - jnp.array([0.0, 0.0, 1.0]) * self.shape.feet_height
         touched = (feet[:, 2] <= 0) | (distances("pad", memory, feet, time)[:, 0] <= 0)
-        success = (
-            touched
-            & (sideways < c.radius)
-            & (jnp.abs(offset[:, 2]) < c.height_error)
-            & (jnp.linalg.norm(after.velocity, axis=-1) < c.speed)
-            & (cos_tilt(after.quaternion) > jnp.cos(c.tilt))
-        )
-        lost = (sideways > c.fence) | (offset[:, 2] > c.fence)
-        return memory, Outcome(
-            terminated=touched | lost,
-            success=success,
-            arrived=success,
-            crashed=(touched & ~success) | lost,
-            error=sideways,
-        )
+        return memory, self.verdict(memory, after, time, touched)

@@ -12,6 +12,7 @@ from e2efly.config import (
     Paper,
     PPOConfig,
     RewardConfig,
+    Robust,
     TaskConfig,
     TrainConfig,
     number,
@@ -30,8 +31,20 @@ class RaceConfig(TaskConfig):
     """Fly through gates in order."""
 
     world: ClassVar[str] = "e2efly.tasks.race.world:Race"
+    goal_class: ClassVar[str] = "e2efly.tasks.race.goal:RaceGoal"
+    route: ClassVar[str] = "e2efly.tasks.race.goal:RaceRoute"
     precision: ClassVar = "duration"
     smooth: ClassVar = {"prog1": 1.0, "anglev_sq": 0.0005, "act2_sq": 0.005, "goal": 1.0, "crash": 1.0}
+    best: ClassVar = "bptt"
+    robust: ClassVar = {
+        "bptt": Robust(
+            weights={"prog1": 1.0, "near": 0.2, "anglev_sq": 0.001, "act2_sq": 0.01},
+            steps=8_000_000,
+            chunk=50,
+            recurrent=96,
+            hidden=(96, 96),
+        )
+    }
     paper: ClassVar = Paper(
         weights={"prog1": 0.9, "ori2": 0.001, "v1": 0.002, "anglev": 0.002},
         ppo={"act3": 1.0, "goal": 5.0, "crash": 4.0},

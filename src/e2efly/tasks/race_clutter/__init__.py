@@ -30,6 +30,8 @@ class RaceClutterConfig(TaskConfig):
     """Fly through gates in order, among obstacles that are only seen."""
 
     world: ClassVar[str] = "e2efly.tasks.race_clutter.world:RaceClutter"
+    goal_class: ClassVar[str] = "e2efly.tasks.race_clutter.goal:RaceClutterGoal"
+    route: ClassVar[str] = "e2efly.tasks.race_clutter.goal:RaceClutterRoute"
     best: ClassVar = "bptt"
     precision: ClassVar = "duration"
     cameras: ClassVar = (
@@ -56,11 +58,11 @@ class RaceClutterConfig(TaskConfig):
     clutter: ClutterConfig = ClutterConfig()
     """The obstacles."""
     gate_position: float = 0.3
-    """Half-width of each gate's random place about the track's, m an axis."""
+    """Half-width of each gate's random place about the track's, m per axis."""
     gate_yaw: float = 0.2
     """Half-width of each gate's random turn, rad."""
     speed: tuple[float, float] = number((4.0, 12.0), rising=True)
-    """Commanded speed, m/s, uniform an episode."""
+    """Commanded speed, m/s, uniform per episode."""
     position: float = 0.5
     """Start within this ball about the track's start, m."""
     laps: int = 1

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from e2efly.config import (
     AlgorithmConfig,
@@ -11,6 +11,7 @@ from e2efly.config import (
     Paper,
     PPOConfig,
     RewardConfig,
+    Robust,
     TaskConfig,
     TrainConfig,
     number,
@@ -26,10 +27,21 @@ class TrackConfig(TaskConfig):
     """Follow a reference that is seen one second ahead."""
 
     world: ClassVar[str] = "e2efly.tasks.track.world:Track"
+    goal_class: ClassVar[str] = "e2efly.tasks.track.goal:TrackGoal"
+    route: ClassVar[str] = "e2efly.tasks.track.goal:TrackRoute"
     goal: ClassVar = "reference"
     shows_error: ClassVar = True
     precision: ClassVar = "mean_error"
     smooth: ClassVar = {"near": 1.0, "prog2": 0.2, "anglev_sq": 0.002, "act2_sq": 0.02, "crash": 10.0}
+    best: ClassVar = "bptt"
+    robust: ClassVar = {
+        "bptt": Robust(
+            weights={"prog2": 1.0, "anglev_sq": 0.02, "act2_sq": 0.03},
+            algo={"horizon": 96},
+            steps=3_000_000,
+        ),
+        "ppo": Robust(algo={"horizon": 64, "learning_rate": 2e-3, "gamma": 0.96}, steps=6_000_000, recurrent=96),
+    }
     paper: ClassVar = Paper(
         weights={"prog2": 0.02, "ori2": 0.001, "v1": 0.002, "anglev": 0.002},
         ppo={"act3": 1.0, "crash": 1.0},
@@ -45,7 +57,7 @@ class TrackConfig(TaskConfig):
     position: float = 1.0
     """Start within this ball about the reference, m."""
     velocity: float = 0.5
-    """Start velocity, m/s an axis, uniform in +-."""
+    """Start velocity, m/s per axis, uniform in +-."""
     settle_s: float = 2.0
     """The error counts after this time, s."""
     mean_error: float = 0.08
@@ -59,7 +71,7 @@ class TrackConfig(TaskConfig):
     lemniscate_speed: float = defaults.LEMNISCATE_SPEED
     """Lemniscate: top speed, m/s."""
     polynomial_reach: float = 2.0
-    """Random polynomial: its knots lie within this of the centre, m an axis."""
+    """Random polynomial: its knots lie within this of the centre, m per axis."""
     polynomial_speed: float = 2.5
     """Random polynomial: largest speed at a knot, m/s."""
 
@@ -71,6 +83,17 @@ class TrackConfig(TaskConfig):
             "circle": dataclasses.replace(self, reference="circle", mean_error=0.08),
             "lemniscate": dataclasses.replace(self, reference="lemniscate", mean_error=0.15),
         }
+
+    def course(self) -> dict[str, Any]:
+        """The reference, but for the phase that an episode draws, or the knots of its polynomial."""
+        shared: dict[str, Any] = {"reference": self.reference, "duration_s": float(self.episode_s)}
+        centre = {"centre_m": [float(x) for x in self.centre]}
+        if self.reference == "circle":
+            return shared | centre | {"radius_m": float(self.radius), "rate_rad_s": float(self.circle_rate)}
+        if self.reference == "lemniscate":
+            size = {"half_length_m": float(self.radius), "top_speed_m_s": float(self.lemniscate_speed)}
+            return shared | centre | size
+        return shared
 
     def limits(self) -> dict[str, float]:
         """The mean error."""

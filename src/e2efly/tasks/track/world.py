@@ -3,54 +3,34 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, PRNGKeyArray
+from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.courses.references import POINTS, SPACING, Lissajous, Spline, knot_count, read_csv, through_points
-from e2efly.deploy.goals import ReferenceGoal
-from e2efly.observation import Field
+from e2efly.goal import Shape
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.scene import Scene
 from e2efly.tasks.references import polynomial
-from e2efly.tasks.task import Outcome, Shape, at_rest, into_ball, offsets, touches_ground, uniform
+from e2efly.tasks.task import at_rest, into_ball, uniform
 from e2efly.tasks.track import TrackConfig
+from e2efly.tasks.track.goal import Memory, TrackGoal
 from e2efly.vehicles.names import unknown
 
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Memory:
-    """The reference, and the error summed since it counts."""
-
-    reference: Spline
-    error_sum: Float[Array, " n"]
-    """Sum of the distance to the reference over the counted steps, m."""
-    steps: Float[Array, " n"]
-    """Counted steps."""
+jax.tree_util.register_dataclass(Memory)
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "curve"], meta_fields=["knots"])
 @dataclass(frozen=True)
-class Track:
+class Track(TrackGoal):
     """Follow a reference; make it with `Track.of`."""
 
-    config: TrackConfig
-    shape: Shape
     knots: int
     curve: Lissajous | Spline | None
     """What to follow: a curve, the spline of the user's file, or None: random polynomials."""
-
-    fields = (
-        Field(
-            "reference", 3 * POINTS, "world", "m", 1.0,
-            f"{POINTS} reference points minus vehicle position, {SPACING} s apart, the first for now",
-        ),
-    )  # fmt: skip
 
     @staticmethod
     def of(config: TrackConfig, shape: Shape, control_period: float = 0.0, substeps: int = 1) -> "Track":
@@ -80,11 +60,6 @@ class Track:
         }
         return Track(numbers, shape, m, curves.get(config.reference))
 
-    @property
-    def episode_s(self) -> float | Array:
-        """Time limit, s."""
-        return self.config.episode_s
-
     def reference(self, key: PRNGKeyArray, n: int) -> Spline:
         """Draw a reference a vehicle."""
         c = self.config
@@ -109,43 +84,17 @@ class Track:
         )
         return state, Memory(reference, zero, zero)
 
-    def goal(self, memory: Memory, time: Float[Array, " n"]) -> Float[Array, "n 3"]:
-        """The reference point for now."""
-        return memory.reference.position(time[:, None])[:, 0]
-
-    def targets(self, memory: Memory, time: Float[Array, " n"]) -> Float[Array, "n k 3"]:
-        """The reference points for now and the second ahead."""
-        return memory.reference.position(time[:, None] + SPACING * jnp.arange(POINTS))
-
-    def observe(self, memory: Memory, time: Float[Array, " n"], state: State) -> Float[Array, "n 30"]:
-        """The same, minus position."""
-        return offsets(self.targets(memory, time), state)
+    def drawn(self, memory: Memory) -> dict[str, Array]:
+        """The phase of a circle or a lemniscate; the knots of a random polynomial."""
+        if isinstance(self.curve, Lissajous):
+            return {"phase_rad": self.curve.phase(self.config.centre, memory.reference.knots[:, 0])}
+        return {"knots": memory.reference.knots} if self.curve is None else {}
 
     def scene(self, memory: Memory) -> Scene:
         """Level ground."""
         return Scene.of({}, memory.steps.shape[0])
 
-    def flight_goal(self, memory: Any) -> ReferenceGoal:
-        """See `e2efly.validate.starts.goal_of`."""
-        return ReferenceGoal(memory.reference, float(self.config.fence))
-
     def desired_yaw(self, memory: Memory, state: State) -> Float[Array, " n"]:
         """Along world x."""
         del state
         return jnp.zeros_like(memory.steps)
-
-    def advance(
-        self, memory: Memory, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
-    ) -> tuple[Memory, Outcome]:
-        """Success: at the end of the episode the mean error since `settle_s` is small; never outside the fence."""
-        del before
-        c = self.config
-        error = jnp.linalg.norm(after.position - self.goal(memory, time), axis=-1)
-        counts = (time > c.settle_s).astype(error.dtype)
-        memory = Memory(memory.reference, memory.error_sum + counts * error, memory.steps + counts)
-        crashed = (error > c.fence) | touches_ground(self.shape, after)
-        mean = memory.error_sum / jnp.maximum(memory.steps, 1.0)
-        success = timed_out & ~crashed & (mean < c.mean_error)
-        return memory, Outcome(
-            terminated=crashed, success=success, arrived=jnp.zeros_like(crashed), crashed=crashed, error=error
-        )

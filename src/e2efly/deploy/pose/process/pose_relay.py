@@ -130,7 +130,7 @@ def relay_mocap(say: Callable[..., None], system: str, host: str, body: str) -> 
         if body in bodies:
             p, q = [float(x) for x in bodies[body].position], bodies[body].rotation
             say("pose", repr(received), json.dumps({"position": p, "quaternion": [q.w, q.x, q.y, q.z]}))
-        elif received - warned > 1:  # once a second is enough
+        elif received - warned > 1:  # once per second is enough
             warned = received
             say(
                 "problem",

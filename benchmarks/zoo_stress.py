@@ -1,0 +1,38 @@
+"""The zoo under stress, and beside it VIS-R's policies by BPTT's preset `nominal`, which have no memory.
+
+    python benchmarks/zoo_stress.py [--tasks hover land track race] [--json FILE]
+
+Percent of 1000 starts in each row, of the worst criterion. The zoo's figures are those of zoo.json, which
+`benchmarks/zoo.py` has measured; the others are trained here (seed 0).
+"""
+
+import tempfile
+from pathlib import Path
+
+from common import arguments, table, write
+
+import e2efly
+from e2efly.env.stress import ROWS
+from e2efly.stress import stress
+from e2efly.vehicles import vehicle_names
+from e2efly.zoo import contents
+
+
+def main() -> None:
+    """Train what has no memory, print the table, write the figures."""
+    options = arguments(__doc__ or "", tasks=["hover", "land", "track", "race"])
+    zoo, columns = contents(), {}
+    for task in options.tasks:
+        for vehicle in vehicle_names():
+            if "stress" in zoo[vehicle][task]:
+                columns[f"{task}, {vehicle}"] = zoo[vehicle][task]["stress"]
+        with tempfile.TemporaryDirectory() as folder:
+            e2efly.train(task, "bptt", preset_name="nominal", out=Path(folder) / "run")
+            columns[f"{task}, vis_r, preset nominal"] = stress(Path(folder) / "run").success
+    rows = [{"row": row} | {name: f"{100 * found[row]:.1f}" for name, found in columns.items()} for row in ROWS]
+    write("zoo_stress", options.json, {"table": rows, "success": columns})
+    print(table(rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,53 @@
+"""`e2efly list`."""
+
+from dataclasses import dataclass
+
+from rich.table import Table
+
+from e2efly import presets
+from e2efly.config import ALGORITHMS
+from e2efly.courses.tracks import track_names
+from e2efly.device import prepare
+from e2efly.registry import load_installed
+from e2efly.tasks import TASKS
+from e2efly.terminal import Terminal
+from e2efly.vehicles import load_vehicle, vehicle_names
+
+
+@dataclass(frozen=True)
+class List:
+    """What there is: tasks, algorithms, presets, vehicles, tracks, references, command modes, plants, reward terms."""
+
+
+def run(options: List) -> int:
+    """Print what there is."""
+    del options
+    load_installed()
+    prepare("cpu")
+    from e2efly.physics import COMMAND_MODES, INTEGRATORS
+    from e2efly.rewards import TERMS
+    from e2efly.validation.plants import PLANTS
+
+    console = Terminal()
+    for kind, names in (
+        ("tasks", TASKS),
+        ("algorithms", ALGORITHMS),
+        ("presets", presets.names()),
+        ("race tracks", track_names()),
+        ("references", ["polynomial", "circle", "lemniscate", "FILE.csv"]),
+        ("command modes", COMMAND_MODES),
+        ("integrators", INTEGRATORS),
+        ("plants", PLANTS),
+    ):
+        console.print(kind, style="bold", end=": ")
+        console.print(", ".join(names))
+    vehicles = Table("vehicle", "mass, kg", "thrust/weight", "latency, s", "hash", box=None, header_style="bold")
+    for name in vehicle_names():
+        v = load_vehicle(name)
+        vehicles.add_row(name, f"{v.mass:g}", f"{v.thrust_to_weight:.2f}", f"{v.latency:g}", v.hash)
+    console.print(vehicles)
+    terms = Table("reward term", "gradient", "what it is (unweighted)", box=None, header_style="bold")
+    for name, term in TERMS.items():
+        terms.add_row(name, term.kind, (term.function.__doc__ or "").split("\n")[0])
+    console.print(terms)
+    return 0

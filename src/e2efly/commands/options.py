@@ -1,0 +1,60 @@
+"""How options of a command are read."""
+
+from decimal import Decimal
+from pathlib import Path
+from typing import Any, TypeVar
+
+import tyro
+from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
+
+T = TypeVar("T")
+_TYPES = ConstructorRegistry()
+
+
+@_TYPES.primitive_rule
+def _whole_numbers(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[int] | None:
+    """Whole numbers may be written as 1e6, too."""
+    if info.type is not int:
+        return None
+    return PrimitiveConstructorSpec(
+        1, "INT", lambda texts: _whole(texts[0]), lambda value: isinstance(value, int), lambda value: [str(value)]
+    )
+
+
+def _whole(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        if not float(text).is_integer():
+            raise
+        return int(Decimal(text))
+
+
+def parse(options: type[T], command: str, arguments: list[str], **default: Any) -> T:
+    """The parsed options of a command. Where there is a path, there must be a file, a folder or nothing.
+
+    Args:
+        options: their dataclass.
+        command: its name, for help.
+        arguments: what follows it.
+        default: an instance, where the defaults are not those of the class.
+
+    Raises:
+        ValueError: for the path of a device or of a pipe: it may never end, and a report written there replaces it.
+    """
+    config = (tyro.conf.AvoidSubcommands,)
+    found = tyro.cli(options, args=arguments, prog=f"e2efly {command}", config=config, registry=_TYPES, **default)
+    for name, value in vars(found).items():
+        if isinstance(value, Path) and value.exists() and not (value.is_file() or value.is_dir()):
+            raise ValueError(f"{name} is {value}; accepted: the path of a file or of a folder")
+    return found
+
+
+def peek(arguments: list[str], flag: str, default: str) -> str:
+    """The value of a flag, before the rest is parsed: it decides which other flags there are."""
+    for i, argument in enumerate(arguments):
+        if argument.startswith(flag + "="):
+            return argument.split("=", 1)[1]
+        if argument == flag and i + 1 < len(arguments):
+            return arguments[i + 1]
+    return default

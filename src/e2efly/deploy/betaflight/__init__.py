@@ -1,0 +1,1 @@
+"""The flight controller: its protocol, its settings, its sticks, its watchdog."""

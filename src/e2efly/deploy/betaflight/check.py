@@ -1,0 +1,246 @@
+"""What of a flight controller's settings matters to a flight: what it is, what is needed, and what mends it."""
+
+from dataclasses import dataclass
+from math import degrees
+
+from e2efly.deploy.betaflight.controller import ControllerInfo
+from e2efly.deploy.betaflight.names import BOXES
+from e2efly.deploy.betaflight.settings import ModeRange
+from e2efly.deploy.betaflight.sticks import RATES_PULSE, angle_range
+from e2efly.deploy.betaflight.versions import RELEASES
+from e2efly.deploy.pilot.throttle_map import ThrottleMap
+from e2efly.deploy.policy.contract import Contract
+from e2efly.deploy.settings import FlightSettings
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+QUADX = 3
+"""Betaflight's number of the mixer of a quadrotor in X."""
+ANGLE_AUX = 2
+"""AUX channel, from 0, that the guide gives to ANGLE."""
+LARGEST_DEADBAND = 10
+"""Deadband that is still jumped over without harm, us."""
+LARGEST_BOOST = 5
+"""Throttle boost that was flown in rehearsals through the firmware: its default."""
+ATTITUDE_FIRST = ("LEGACY", "LINEAR", "DYNAMIC")
+"""Mixer types that give up collective thrust before torque. EZLANDING gives up torque while the throttle is low."""
+ALWAYS = (1000, 2000)
+"""A mode whose range holds all pulses between these is on wherever its switch is, us."""
+NOT_TOLD = "not told by this firmware"
+"""What stands for the value of a setting that cannot be read."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One setting."""
+
+    setting: str
+    """Its name in the controller's command line, or in words."""
+    value: str
+    """What it is."""
+    needed: str
+    """What the flight needs."""
+    good: bool
+    """Whether that is so."""
+    mend: str = ""
+    """Lines of the controller's command line that mend it."""
+    told: bool = True
+    """Whether the controller tells it. Where not, nothing is known: the pilot is to type `mend` himself."""
+
+    @property
+    def problem(self) -> str:
+        """What is wrong, in words."""
+        return f"{self.setting} is {self.value}; needed: {self.needed}" + (f" ({self.mend})" if self.mend else "")
+
+
+def examine(
+    info: ControllerInfo, vehicle: Vehicle, settings: FlightSettings, contract: Contract | None = None
+) -> tuple[Row, ...]:
+    """The table of `e2efly fly --check`.
+
+    Args:
+        info: as read from the controller.
+        vehicle: whose body rates are commanded.
+        settings: with the pilot's channels.
+        contract: of the policy; its body rates count where it commands them.
+    """
+    api = ".".join(map(str, info.api))
+    known = f"BTFL, {RELEASES[0].name} to {RELEASES[-1].name}"
+    rows = [
+        Row("firmware", f"{info.variant} {info.firmware}, MSP {api}, built {info.built.strip()}", known, True),
+        Row("craft_name", info.craft or "(none)", "any", True),
+        Row("map", info.rx_map.letters, "any: it is read", True),
+        *_rates(info, vehicle, contract),
+        *_throttle(info),
+        *_mixing(info),
+        *_modes(info),
+        *_hand_back(info, vehicle),
+        *_channels(info, settings),
+        *_by_name(info, settings),
+    ]
+    for axis, band in (("deadband", info.deadband.deadband), ("yaw_deadband", info.deadband.yaw_deadband)):
+        small = band <= LARGEST_DEADBAND
+        rows.append(Row(axis, f"{band} us", f"at most {LARGEST_DEADBAND} us", small, f"set {axis}=0"))
+    quad = info.mixer.mixer == QUADX
+    rows.append(Row("mixer", "QUADX" if quad else f"number {info.mixer.mixer}", "QUADX", quad, "mixer QUADX"))
+    rows.append(Row("feature 3D", _on("3D" in info.features), "off", "3D" not in info.features, "feature -3D"))
+    rows.append(
+        Row("rc_smoothing", _on(info.rx.smoothing), "off: it delays the policy", not info.rx.smoothing,
+            "set rc_smoothing=OFF")
+    )  # fmt: skip
+    rows.append(
+        Row("failsafe_procedure", info.failsafe.procedure, "DROP or AUTO-LAND", info.failsafe.procedure != "GPS-RESCUE",
+            "set failsafe_procedure=AUTO-LAND")
+    )  # fmt: skip
+    falls = info.failsafe.procedure == "AUTO-LAND" and info.failsafe.throttle <= info.rx.min_check
+    rows.append(
+        Row("failsafe_throttle", f"{info.failsafe.throttle} us", "with AUTO-LAND: a little under hovering, or it falls",
+            not falls, "set failsafe_throttle=... or set failsafe_procedure=DROP")
+    )  # fmt: skip
+    turned = [round(degrees(angle)) for angle in info.alignment.angles]
+    rows.append(Row("align_board", f"{turned} deg", "any: attitudes are compared before take-off", True))
+    return tuple(rows)
+
+
+def problems(rows: tuple[Row, ...]) -> tuple[str, ...]:
+    """What forbids a take-off."""
+    return tuple(row.problem for row in rows if not row.good)
+
+
+def _rates(info: ControllerInfo, vehicle: Vehicle, contract: Contract | None) -> list[Row]:
+    wanted = [float(rate) for rate in vehicle.body_rate_max]
+    if contract is not None and contract.action.mode == "ctbr":
+        wanted = [max(abs(a), abs(b)) for a, b in zip(contract.action.low[1:], contract.action.high[1:], strict=True)]
+    rows = [Row("rates_type", info.rates.rates_type, "any: its curve is inverted", True)]
+    for axis, have, need in zip(("roll", "pitch", "yaw"), info.rates.max_rate, wanted, strict=True):
+        enough = have >= need * (1 - 1e-6)
+        tens = -(-degrees(need) // 10)
+        mend = f"set rates_type=ACTUAL, set {axis}_rc_rate={tens:.0f}, set {axis}_srate={tens:.0f}, set {axis}_expo=0"
+        rows.append(
+            Row(f"{axis} rate at full stick", f"{degrees(have):.0f} deg/s", f"at least {degrees(need):.0f} deg/s",
+                enough, mend)
+        )  # fmt: skip
+    return rows
+
+
+def _throttle(info: ControllerInfo) -> list[Row]:
+    largest = info.throttle.largest
+    return [
+        Row("throttle_limit_type", f"largest throttle {largest:.0%}", "100 %: no limit", largest > 0.999,
+            "set throttle_limit_type=OFF"),
+        Row("min_check", f"{info.rx.min_check} us", "1010 to 1100 us: the throttle begins there",
+            1010 <= info.rx.min_check <= 1100, "set min_check=1050"),
+    ]  # fmt: skip
+
+
+def _mixing(info: ControllerInfo) -> list[Row]:
+    """What stands between throttle and torque and the motors: policies have learned to fly on attitude before thrust.
+
+    Without AIRMODE the firmware scales all torques down while the throttle is below half (4.3: clips each rotor).
+    """
+    air = "AIRMODE" in info.features
+    ranges = info.ranges("AIR MODE")
+    always = any(r.low <= ALWAYS[0] and r.high > ALWAYS[1] for r in ranges)
+    value = "on" if air else "off" + (f", mode AIR MODE on {_where(ranges)}" if ranges else "")
+    pid = info.pid_advanced
+    limit = pid.motor_output_limit
+    rows = [
+        Row("feature AIRMODE", value, "on: torque goes before thrust at any throttle", air or always,
+            "feature AIRMODE"),
+        Row("motor_output_limit", f"{limit} %", "100 %: no limit", limit == 100, "set motor_output_limit=100"),
+        Row("throttle_boost", str(pid.throttle_boost), f"at most {LARGEST_BOOST}: it overdoes what the policy commands",
+            pid.throttle_boost <= LARGEST_BOOST, "set throttle_boost=0"),
+    ]  # fmt: skip
+    for name, have in (("thrust_linear", pid.thrust_linear), ("vbat_sag_compensation", pid.vbat_sag_compensation)):
+        needed = "0: the bridge learns the throttle map itself"
+        rows.append(Row(name, str(have), needed, have == 0, f"set {name}=0"))
+    return rows
+
+
+def _by_name(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
+    """Settings that firmware before 2026.6 tells nobody: there the pilot is to look himself."""
+    c = settings.channels
+    used = max(n for n in (c.mission, c.roll, c.pitch, c.throttle, c.yaw) if n is not None)
+    asked = (
+        ("mixer_type", "LEGACY, LINEAR or DYNAMIC: torque goes before thrust", lambda v: v in ATTITUDE_FIRST, "LEGACY"),
+        ("msp_override_failsafe", "OFF, or not there: MSP must not hide a lost receiver", lambda v: v == "OFF", "OFF"),
+        ("max_aux_channels", f"at least {used - 4}: channels to {used} are read", lambda v: _least(v, used - 4), "14"),
+        ("serial_update_rate_hz", "at least 1000: or sticks queue up", lambda v: _least(v, 1000), "1000"),
+    )  # fmt: skip
+    rows = []
+    for name, needed, good, mend in asked:
+        value, line = info.named(name), f"set {name}={mend}"
+        if value is None:
+            rows.append(Row(name, NOT_TOLD, needed, True, line, told=False))
+        else:
+            rows.append(Row(name, value, needed, good(value), line))
+    return rows
+
+
+def _modes(info: ControllerInfo) -> list[Row]:
+    rows = []
+    for mode, hint in (("ARM", "aux 0 0 0 1700 2100 0 0"), ("MSP OVERRIDE", "aux 1 50 1 1700 2100 0 0")):
+        ranges = info.ranges(mode)
+        switched = bool(ranges) and all(r.low > 1000 or r.high < 2000 for r in ranges)
+        needed = "a switch of the pilot's, not always on"
+        rows.append(Row(f"switch of {mode}", _where(ranges), needed, switched, hint))
+    angle = angle_range(info)
+    place = ANGLE_AUX if angle is None else angle.aux
+    channel = info.rx_map.channel[4 + place] if 4 + place < len(info.rx_map.channel) else 4 + place
+    needed = f"925 to 2100 on a channel of its own: on, but for the {RATES_PULSE} us that the bridge sends there"
+    rows.append(
+        Row("range of ANGLE", _where(info.ranges("ANGLE")), needed, angle is not None,
+            f"aux 2 1 {ANGLE_AUX} 925 2100 0 0")
+    )  # fmt: skip
+    known = next(number for number, name in BOXES.items() if name == "MSP OVERRIDE") in info.box_ids
+    mask = 15 | 1 << channel
+    rows.append(
+        Row("msp_override_channels_mask", "set" if known else "0", f"{mask}: the sticks and AUX{place + 1} of ANGLE "
+            "(tried before arming)", known, f"set msp_override_channels_mask={mask}")
+    )  # fmt: skip
+    fail = info.rx_fail.channels[4 + place : 5 + place]
+    levels = not fail or (fail[0][0] == "SET" and angle is not None and angle.low <= fail[0][1] < angle.high)
+    value = f"{fail[0][0]} {fail[0][1]} us" if fail else "not told"
+    rows.append(
+        Row(f"rxfail of AUX{place + 1}", value, "SET within ANGLE's range: level without the receiver", levels,
+            f"rxfail {4 + place} s 2000")
+    )  # fmt: skip
+    return rows
+
+
+def _where(ranges: tuple[ModeRange, ...]) -> str:
+    return ", ".join(f"AUX{r.aux + 1} {r.low} to {r.high}" for r in ranges) or "none"
+
+
+def _hand_back(info: ControllerInfo, vehicle: Vehicle) -> list[Row]:
+    """What a dead link leaves: the receiver's sticks, level, and a throttle stick that rests in the middle."""
+    middle = info.throttle.throttle_of(info.rx.mid)
+    share = ThrottleMap.of(vehicle).nominal(middle) / GRAVITY
+    verb = "climbs" if share > 1 else "sinks"
+    taken = info.release.override_timeout is not None
+    mend = "set thr_hover=... (thr_mid before 2025.12) to just under hovering, or weigh the vehicle with its battery"
+    return [
+        Row("override without MSP", info.release.hand_back, "any: docs/hardware.md says what follows", True),
+        Row("throttle stick in its middle", f"{share:.2f} of the weight: {verb}",
+            "at most 1, where it is handed back by itself" if taken else "any: only the pilot's switch hands it back",
+            share <= 1 or not taken, mend),
+    ]  # fmt: skip
+
+
+def _channels(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
+    """The channels that the bridge reads must not be those of the controller's own switches."""
+    taken = {r.aux + 5: BOXES.get(r.box, str(r.box)) for r in info.modes}
+    c = settings.channels
+    used = {"mission": c.mission, "roll": c.roll, "pitch": c.pitch, "throttle": c.throttle, "yaw": c.yaw}
+    return [
+        Row(f"channel {channel} ({name})", taken.get(channel, "free"), "free of the controller's own modes",
+            channel not in taken, f"fly --flight.channels.{name} to another than {sorted(taken)}")
+        for name, channel in used.items() if channel is not None
+    ]  # fmt: skip
+
+
+def _least(value: str, least: int) -> bool:
+    return value.isdigit() and int(value) >= least
+
+
+def _on(flag: bool) -> str:
+    return "on" if flag else "off"

@@ -1,0 +1,127 @@
+"""What a flight controller is and how it is set: read once, before flight, into one frozen dataclass."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from e2efly.deploy.betaflight import messages, settings, settings_by_name
+from e2efly.deploy.betaflight.client import Client, ask
+from e2efly.deploy.betaflight.names import BOXES
+from e2efly.deploy.betaflight.rates import RateProfile
+from e2efly.deploy.betaflight.throttle_curve import ThrottleCurve
+from e2efly.deploy.betaflight.versions import Release, release_of, version_text
+from e2efly.deploy.clock import MONOTONIC, Clock
+
+VARIANT = "BTFL"
+"""The firmware that is known: Betaflight."""
+
+
+@dataclass(frozen=True)
+class ControllerInfo:
+    """A flight controller and its settings."""
+
+    variant: str
+    """`BTFL`."""
+    version: tuple[int, int, int]
+    """Of the firmware: the bytes of FC_VERSION."""
+    api: tuple[int, int]
+    """MSP version."""
+    built: str
+    """Day and time of the build, and its revision."""
+    craft: str
+    """Name of the craft; may be empty."""
+    features: frozenset[str]
+    """Features that are on."""
+    rate_profile: int
+    """Which rate profile is active, from 0."""
+    rates: RateProfile
+    """The active rate profile."""
+    throttle: ThrottleCurve
+    """The active throttle curve."""
+    rx: settings.RxConfig
+    """How channels are read."""
+    rx_map: settings.RxMap
+    """Which channel is for what."""
+    deadband: settings.RcDeadband
+    """Deadbands of the sticks."""
+    failsafe: settings.FailsafeConfig
+    """What it does when the receiver falls silent."""
+    rx_fail: settings.RxFailConfig
+    """What each channel becomes then."""
+    modes: tuple[settings.ModeRange, ...]
+    """Which switches make which modes active."""
+    box_ids: tuple[int, ...]
+    """Permanent ids of the modes that it knows, in the order of the bits of `StatusEx.boxes`."""
+    motor: settings.MotorConfig
+    """Motor outputs."""
+    advanced: settings.AdvancedConfig
+    """Loop and motor protocol."""
+    pid_advanced: settings.PidAdvanced
+    """What stands between throttle and motors."""
+    mixer: settings.MixerConfig
+    """Kind of vehicle."""
+    alignment: settings.BoardAlignment
+    """How it is turned in the airframe."""
+    by_name: tuple[tuple[str, str], ...] = ()
+    """(name, value) of the settings of `settings_by_name` that it tells."""
+
+    @property
+    def release(self) -> Release:
+        """What is known of its firmware; raises `ValueError` where nothing is."""
+        return release_of(self.api, self.version)
+
+    @property
+    def firmware(self) -> str:
+        """Its firmware's version as people write it: 2026.6.1."""
+        return version_text(self.version)
+
+    def named(self, setting: str) -> str | None:
+        """The value of a setting by its name in the command line; None: this controller does not tell it."""
+        return dict(self.by_name).get(setting)
+
+    def ranges(self, mode: str) -> tuple[settings.ModeRange, ...]:
+        """The switch ranges that make a mode of `BOXES` active, by name."""
+        return tuple(entry for entry in self.modes if BOXES.get(entry.box) == mode)
+
+
+def identify(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -> ControllerInfo:
+    """Read everything from a controller, waiting for it; not for flight.
+
+    Raises:
+        ValueError: for firmware that is not known, or settings that cannot be read.
+        TimeoutError: when an answer is missing after `timeout_s` seconds.
+    """
+
+    def get(kind: Any) -> Any:
+        return ask(client, kind.CODE, timeout_s, clock=clock)
+
+    variant = get(messages.FcVariant).variant
+    if variant != VARIANT:
+        raise ValueError(f"controller: the firmware is {variant!r}; accepted: {VARIANT!r} (Betaflight)")
+    api = get(messages.ApiVersion).version
+    version = get(messages.FcVersion)
+    release = release_of(api, version.version, version.text)
+    build, tuning, rx = get(messages.BuildInfo), get(settings.RcTuning), get(settings.RxConfig)
+    return ControllerInfo(
+        variant=variant,
+        version=version.version,
+        api=api,
+        built=f"{build.built} {build.revision}",
+        craft=get(messages.Name).name,
+        features=get(settings.FeatureConfig).features,
+        rate_profile=get(messages.StatusEx).rate_profile,
+        rates=tuning.rates,
+        throttle=replace(tuning.throttle, min_check=rx.min_check),
+        rx=rx,
+        rx_map=get(settings.RxMap),
+        deadband=get(settings.RcDeadband),
+        failsafe=get(settings.FailsafeConfig),
+        rx_fail=get(settings.RxFailConfig),
+        modes=get(settings.ModeRanges).ranges,
+        box_ids=get(settings.BoxIds).ids,
+        motor=get(settings.MotorConfig),
+        advanced=get(settings.AdvancedConfig),
+        pid_advanced=get(settings.PidAdvanced),
+        mixer=get(settings.MixerConfig),
+        alignment=get(settings.BoardAlignment),
+        by_name=settings_by_name.read(client, timeout_s, clock) if release.tells_settings else (),
+    )

@@ -1,0 +1,306 @@
+"""MSP messages that tell how a controller is set: payloads to frozen dataclasses in SI units. Pure; see `messages`."""
+
+import struct
+from dataclasses import dataclass
+from math import radians
+from typing import ClassVar
+
+from e2efly.deploy.betaflight.messages import unpack
+from e2efly.deploy.betaflight.names import (
+    FAILSAFE_PROCEDURES,
+    FAILSAFE_SWITCHES,
+    FEATURES,
+    MOTOR_PROTOCOLS,
+    RXFAIL_MODES,
+    bits,
+    named,
+)
+from e2efly.deploy.betaflight.rates import RATES_TYPES, RateProfile
+from e2efly.deploy.betaflight.throttle_curve import LIMIT_TYPES, ThrottleCurve
+
+FUNCTIONS = "AERT1234"
+"""What the eight mapped channels are for, in the controller's order: roll, pitch, yaw, throttle, AUX1 to AUX4."""
+
+
+@dataclass(frozen=True)
+class ModeRange:
+    """When a switch makes a mode active."""
+
+    box: int
+    """Permanent id of the mode: a key of `BOXES`."""
+    aux: int
+    """Which AUX channel, from 0."""
+    low: int
+    """Active from this pulse on, µs."""
+    high: int
+    """Active below this pulse, µs."""
+
+
+@dataclass(frozen=True)
+class ModeRanges:
+    """When switches make modes active."""
+
+    CODE: ClassVar[int] = 34
+    ranges: tuple[ModeRange, ...]
+    """Those that are in use."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "ModeRanges":
+        """Read a reply."""
+        entries = (payload[i : i + 4] for i in range(0, len(payload) - 3, 4))
+        used = (ModeRange(box, aux, 900 + 25 * low, 900 + 25 * high) for box, aux, low, high in entries if low < high)
+        return ModeRanges(tuple(used))
+
+
+@dataclass(frozen=True)
+class FeatureConfig:
+    """Features that are on."""
+
+    CODE: ClassVar[int] = 36
+    features: frozenset[str]
+    """Their names."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "FeatureConfig":
+        """Read a reply."""
+        return FeatureConfig(bits(unpack("FEATURE_CONFIG", "I", payload)[0], FEATURES))
+
+
+@dataclass(frozen=True)
+class BoardAlignment:
+    """How the controller is turned in the airframe."""
+
+    CODE: ClassVar[int] = 38
+    angles: tuple[float, float, float]
+    """`align_board_roll`, `_pitch`, `_yaw`, rad, in Betaflight's signs."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "BoardAlignment":
+        """Read a reply."""
+        roll, pitch, yaw = map(radians, unpack("BOARD_ALIGNMENT_CONFIG", "3h", payload))
+        return BoardAlignment((roll, pitch, yaw))
+
+
+@dataclass(frozen=True)
+class MixerConfig:
+    """Kind of vehicle."""
+
+    CODE: ClassVar[int] = 42
+    mixer: int
+    """`QUADX` for a quadrotor in X."""
+    yaw_motors_reversed: bool
+    """Props out rather than in."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "MixerConfig":
+        """Read a reply."""
+        mixer, reversed_ = unpack("MIXER_CONFIG", "BB", payload)
+        return MixerConfig(mixer, bool(reversed_))
+
+
+@dataclass(frozen=True)
+class RxConfig:
+    """How the receiver's channels are read."""
+
+    CODE: ClassVar[int] = 44
+    min_check: int
+    """Below it a stick is low, µs."""
+    mid: int
+    """Centre of the sticks, µs."""
+    max_check: int
+    """Above it a stick is high, µs."""
+    pulse_range: tuple[int, int]
+    """`rx_min_usec` and `rx_max_usec`: pulses outside are invalid, µs."""
+    airmode_threshold: int
+    """Throttle at which airmode starts to work, µs."""
+    fpv_angle: float
+    """`fpv_mix_degrees`: how far roll and yaw are mixed while FPV ANGLE MIX is on, rad."""
+    smoothing: bool
+    """RC smoothing is on: sticks are low-passed before they become rates."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "RxConfig":
+        """Read a reply."""
+        _, high, mid, low, _, least, most, _, _, air = unpack("RX_CONFIG", "BHHHBHHBBH", payload)
+        fpv, *_, smoothing = unpack("RX_CONFIG", "22xB8xB", payload)
+        return RxConfig(low, mid, high, (least, most), air, radians(fpv), bool(smoothing))
+
+
+@dataclass(frozen=True)
+class RxMap:
+    """Which of the receiver's channels is for what."""
+
+    CODE: ClassVar[int] = 64
+    channel: tuple[int, ...]
+    """(8,) index of the receiver's channel for roll, pitch, yaw, throttle, AUX1 to AUX4."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "RxMap":
+        """Read a reply."""
+        channel = unpack("RX_MAP", "8B", payload)
+        if sorted(channel) != list(range(8)):
+            raise ValueError(f"MSP RX_MAP: the map is {list(channel)}; accepted: each of 0 to 7 once")
+        return RxMap(channel)
+
+    @property
+    def letters(self) -> str:
+        """As the command line has it: `AETR1234` where roll comes first, pitch next, throttle, then yaw."""
+        return "".join(FUNCTIONS[self.channel.index(i)] for i in range(len(FUNCTIONS)))
+
+
+@dataclass(frozen=True)
+class FailsafeConfig:
+    """What the controller does when the receiver falls silent."""
+
+    CODE: ClassVar[int] = 75
+    delay: float
+    """How long it holds before stage 2, s."""
+    throttle: int
+    """Throttle channel while it lands, µs."""
+    switch: str
+    """What the switch does: one of `FAILSAFE_SWITCHES`."""
+    low_throttle_delay: float
+    """After the throttle was low for so long it disarms instead, s."""
+    procedure: str
+    """What stage 2 does: one of `FAILSAFE_PROCEDURES`."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "FailsafeConfig":
+        """Read a reply."""
+        # the second byte, how long it lands, counts 0.1 s in some firmware and 1 s in other, and does not say which
+        delay, _, throttle, switch, low, procedure = unpack("FAILSAFE_CONFIG", "BBHBHB", payload)
+        names = named(switch, FAILSAFE_SWITCHES), named(procedure, FAILSAFE_PROCEDURES)
+        return FailsafeConfig(delay / 10, throttle, names[0], low / 10, names[1])
+
+
+@dataclass(frozen=True)
+class RxFailConfig:
+    """What each channel becomes when the receiver falls silent."""
+
+    CODE: ClassVar[int] = 77
+    channels: tuple[tuple[str, int], ...]
+    """One of `RXFAIL_MODES` and, for SET, the pulse, µs: roll, pitch, yaw, throttle, AUX1, ..."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "RxFailConfig":
+        """Read a reply."""
+        entries = struct.iter_unpack("<BH", payload[: len(payload) // 3 * 3])
+        return RxFailConfig(tuple((named(mode, RXFAIL_MODES), pulse) for mode, pulse in entries))
+
+
+@dataclass(frozen=True)
+class AdvancedConfig:
+    """Loop and motor outputs."""
+
+    CODE: ClassVar[int] = 90
+    pid_denominator: int
+    """Gyro samples a PID loop."""
+    motor_protocol: str
+    """One of `MOTOR_PROTOCOLS`."""
+    motor_idle: float
+    """Output at zero throttle, 0 to 1."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "AdvancedConfig":
+        """Read a reply."""
+        _, denominator, _, protocol, _, idle = unpack("ADVANCED_CONFIG", "BBBBHH", payload)
+        return AdvancedConfig(denominator, named(protocol, MOTOR_PROTOCOLS), idle / 10000)
+
+
+@dataclass(frozen=True)
+class PidAdvanced:
+    """What stands between the throttle and the motors, in the active PID profile."""
+
+    CODE: ClassVar[int] = 94
+    throttle_boost: int
+    """How much a fast change of the throttle is overdone; 0: not at all."""
+    motor_output_limit: int
+    """Largest motor output, %."""
+    vbat_sag_compensation: int
+    """How much of the battery's sag the controller makes good by itself, %."""
+    thrust_linear: int
+    """How much it bends the motor outputs for a thrust that grows with their square, %."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "PidAdvanced":
+        """Read a reply."""
+        boost, limit, sag, linear = unpack("PID_ADVANCED", "30xB16xB7xBB", payload)
+        return PidAdvanced(boost, limit, sag, linear)
+
+
+@dataclass(frozen=True)
+class RcTuning:
+    """Rates and throttle curve."""
+
+    CODE: ClassVar[int] = 111
+    rates: RateProfile
+    """From stick to body rate."""
+    throttle: ThrottleCurve
+    """From throttle channel to throttle; its `min_check` is `RxConfig`'s to tell."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "RcTuning":
+        """Read a reply."""
+        v = unpack("RC_TUNING", "8BxxBBBBBB3HB", payload)
+        rc_roll, expo_roll, *rate, _, mid, expo = v[:8]
+        expo_yaw, rc_yaw, rc_pitch, expo_pitch, limit_type, limit, *rate_limit, kind = v[8:]
+        hover = payload[23] if len(payload) > 23 else None  # since 1.47, with another curve
+        rates = RateProfile(
+            named(kind, RATES_TYPES),
+            (rc_roll, rc_pitch, rc_yaw),
+            (rate[0], rate[1], rate[2]),
+            (expo_roll, expo_pitch, expo_yaw),
+            (rate_limit[0], rate_limit[1], rate_limit[2]),
+        )
+        return RcTuning(rates, ThrottleCurve(mid, expo, hover, named(limit_type, LIMIT_TYPES), limit))
+
+
+@dataclass(frozen=True)
+class BoxIds:
+    """The modes that the controller knows."""
+
+    CODE: ClassVar[int] = 119
+    ids: tuple[int, ...]
+    """Permanent ids, in the order of the bits of `StatusEx.boxes`."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "BoxIds":
+        """Read a reply."""
+        return BoxIds(tuple(payload))
+
+
+@dataclass(frozen=True)
+class RcDeadband:
+    """Deadbands of the sticks."""
+
+    CODE: ClassVar[int] = 125
+    deadband: int
+    """Of roll and pitch, µs each side."""
+    yaw_deadband: int
+    """Of yaw, µs each side."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "RcDeadband":
+        """Read a reply."""
+        return RcDeadband(*unpack("RC_DEADBAND", "BB", payload))
+
+
+@dataclass(frozen=True)
+class MotorConfig:
+    """Motor outputs."""
+
+    CODE: ClassVar[int] = 131
+    min_throttle: int | None
+    """Output at zero throttle, µs; None: firmware since MSP 1.47, which has `AdvancedConfig.motor_idle` alone."""
+    max_throttle: int
+    """Output at full throttle, µs."""
+    min_command: int
+    """Output of a stopped motor, µs."""
+    count: int
+    """Motors."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "MotorConfig":
+        """Read a reply."""
+        least, most, stopped, count = unpack("MOTOR_CONFIG", "HHHB", payload)
+        return MotorConfig(least or None, most, stopped, count)

@@ -1,0 +1,49 @@
+"""Settings that no message of its own tells: asked for by their names in the command line, where the firmware answers.
+
+A reply is the text `name = value`. The firmware makes it in a buffer as long as the request, so that a request is its
+name and zeros enough for the value. A request that contains `=` would change the setting: a name never does.
+"""
+
+from e2efly.deploy.betaflight.client import Client, ask
+from e2efly.deploy.betaflight.messages import text
+from e2efly.deploy.clock import MONOTONIC, Clock
+
+CODE = 0x3010
+"""Code of the message, of MSP version 2."""
+NAMES = ("mixer_type", "msp_override_failsafe", "max_aux_channels", "serial_update_rate_hz")
+"""The settings that matter to a flight and that no other message tells."""
+_ROOM = 32
+"""Bytes for ` = ` and the value."""
+
+
+def request(name: str) -> bytes:
+    """The payload that asks for a setting."""
+    return name.encode("ascii") + bytes(_ROOM)
+
+
+def value_of(name: str, payload: bytes) -> str:
+    """The value in a reply.
+
+    Raises:
+        ValueError: for a reply that is about another setting, or has no value.
+    """
+    said, _, value = text(payload).partition(" = ")
+    if said != name or not value:
+        raise ValueError(f"MSP CLI_SETTING: {text(payload)!r} answers for {name}; accepted: '{name} = ...'")
+    return value
+
+
+def read(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -> tuple[tuple[str, str], ...]:
+    """(name, value) of each of `NAMES` that the controller knows and tells.
+
+    Raises:
+        TimeoutError: when an answer is missing after `timeout_s` seconds.
+    """
+    return tuple(pair for name in NAMES for pair in _told(client, name, timeout_s, clock))
+
+
+def _told(client: Client, name: str, timeout_s: float, clock: Clock) -> list[tuple[str, str]]:
+    try:
+        return [(name, value_of(name, ask(client, CODE, timeout_s, request(name), clock)))]
+    except ValueError:  # the firmware was built without its command line, or without this setting
+        return []

@@ -1,0 +1,145 @@
+"""Collective throttle and body rates to receiver channels, through the controller's own settings, and back.
+
+Signs, for body FLU: roll rate positive is the roll stick above centre; pitch rate positive (nose down) is the pitch
+stick above centre; yaw rate positive (left) is the yaw stick *below* centre.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+from e2efly.deploy.betaflight.controller import ControllerInfo
+from e2efly.deploy.betaflight.names import BOXES
+from e2efly.deploy.betaflight.rates import (
+    AXES,
+    RateProfile,
+    channel_to_stick,
+    rate_to_stick,
+    stick_to_channel,
+    stick_to_rate,
+)
+from e2efly.deploy.betaflight.settings import ModeRange
+from e2efly.deploy.betaflight.throttle_curve import ThrottleCurve
+
+CHANNELS = (1000, 2000)
+"""Sticks stay within these, µs."""
+RATES_PULSE = 900
+"""What is sent on the AUX channel of ANGLE, µs: sticks are body rates only while the controller takes this."""
+TRANSMITTER = (988, 2012)
+"""Pulses between which the channels of a transmitter stay, µs."""
+_SIGNS = (1, 1, -1)
+_THROTTLE = 3
+_MAPPED = 8
+
+
+@dataclass(frozen=True)
+class StickCommand:
+    """What to send, and what of the command it cannot carry."""
+
+    channels: tuple[int, ...]
+    """µs, in the receiver's order: for `messages.set_raw_rc`."""
+    saturated: tuple[str, ...]
+    """Which of throttle, roll, pitch, yaw were asked for beyond what the sticks reach."""
+
+
+@dataclass(frozen=True)
+class Sticks:
+    """The way from commands to channels of one controller. Make it with `sticks_of`."""
+
+    rates: RateProfile
+    """Its rate profile."""
+    throttle: ThrottleCurve
+    """Its throttle curve."""
+    channel: tuple[int, ...]
+    """(8,) index of the channel for roll, pitch, yaw, throttle, AUX1 to AUX4."""
+    centre: int = 1500
+    """Centre of the sticks, µs."""
+    deadband: tuple[int, int, int] = (0, 0, 0)
+    """Of roll, pitch and yaw, µs each side."""
+    angle: int | None = None
+    """AUX channel, from 0, on which `RATES_PULSE` keeps ANGLE off; None: no channel does."""
+
+    def channels_of(self, throttle: float, body_rate: Sequence[float], aux: Sequence[int]) -> StickCommand:
+        """The channels that command a throttle and body rates.
+
+        Args:
+            throttle: what the controller's mixer shall get, 0 to 1.
+            body_rate: about body x, y, z, FLU, rad/s.
+            aux: AUX1, AUX2, ..., µs; of AUX1 to AUX4 those left out are centred, but that `angle` is `RATES_PULSE`.
+
+        Raises:
+            ValueError: naming the value, for one that is not finite or an AUX channel outside 1000 to 2000.
+        """
+        values = (throttle, *body_rate)
+        if len(values) != 4 or not all(map(isfinite, values)):
+            raise ValueError(f"stick command: throttle and body rate are {values!r}; accepted: four finite numbers")
+        saturated = ["throttle"] if not 0 <= throttle <= self.throttle.largest else []
+        pulses = [self.pulse(axis, rate) for axis, rate in enumerate(body_rate)]
+        for axis, rate in enumerate(body_rate):
+            at_end = pulses[axis] in CHANNELS and abs(self._rate(axis, pulses[axis])) < abs(rate)
+            if abs(rate) > self.rates.max_rate[axis] or at_end:
+                saturated.append(AXES[axis])
+        return StickCommand(self.arrange((*pulses, self.throttle.channel_for(throttle)), aux), tuple(saturated))
+
+    def pulse(self, axis: int, rate: float) -> int:
+        """The pulse of an axis (0 to 2), µs, that commands a body rate, FLU, rad/s; cut at `CHANNELS`."""
+        stick = rate_to_stick(self.rates, axis, rate) * _SIGNS[axis]
+        return min(max(stick_to_channel(stick, self.centre, self.deadband[axis]), CHANNELS[0]), CHANNELS[1])
+
+    def arrange(self, pulses: Sequence[int], aux: Sequence[int]) -> tuple[int, ...]:
+        """Pulses for roll, pitch, yaw, throttle and AUX1, AUX2, ... in the receiver's order, µs.
+
+        Raises:
+            ValueError: for an AUX channel that is no whole number from 1000 to 2000.
+        """
+        for i, value in enumerate(aux):
+            if not CHANNELS[0] <= value <= CHANNELS[1] or value != int(value):
+                raise ValueError(f"AUX{i + 1} is {value!r}; accepted: whole µs, {CHANNELS[0]} to {CHANNELS[1]}")
+        values = [*aux, *[self.centre] * (max(4, (self.angle or 0) + 1) - len(aux))]
+        if self.angle is not None and self.angle >= len(aux):
+            values[self.angle] = RATES_PULSE
+        mapped = [*pulses, *values[:4]]
+        channels = [0] * _MAPPED
+        for function, index in enumerate(self.channel):
+            channels[index] = int(mapped[function])
+        return (*channels, *map(int, values[4:]))
+
+    def received(self, channels: Sequence[int]) -> tuple[int, ...]:
+        """What `messages.Rc` reports when the controller has got these channels and the map is right, µs."""
+        return (*(channels[index] for index in self.channel), *channels[_MAPPED:])
+
+    def command_of(self, channels: Sequence[int]) -> tuple[float, tuple[float, float, float]]:
+        """The throttle, 0 to 1, and the body rates, FLU, rad/s, that channels in the receiver's order command."""
+        pulses = [channels[index] for index in self.channel[:4]]
+        roll, pitch, yaw = (self._rate(axis, pulses[axis]) for axis in range(3))
+        return self.throttle.throttle_of(pulses[_THROTTLE]), (roll, pitch, yaw)
+
+    def _rate(self, axis: int, pulse: int) -> float:
+        stick = channel_to_stick(pulse, self.centre, self.deadband[axis])
+        return stick_to_rate(self.rates, axis, stick * _SIGNS[axis])
+
+
+def sticks_of(info: ControllerInfo) -> Sticks:
+    """The sticks of a controller, from its own settings.
+
+    Raises:
+        ValueError: for settings with which sticks do not mean body rates and a throttle.
+    """
+    if "3D" in info.features:
+        raise ValueError("controller: feature 3D is on; accepted: off, as the throttle stick would also reverse motors")
+    bands = info.deadband.deadband, info.deadband.deadband, info.deadband.yaw_deadband
+    angle = angle_range(info)
+    aux = None if angle is None else angle.aux
+    return Sticks(info.rates, info.throttle, info.rx_map.channel, info.rx.mid, bands, aux)
+
+
+def angle_range(info: ControllerInfo) -> ModeRange | None:
+    """The range by which ANGLE is on wherever the transmitter leaves its channel, and off for `RATES_PULSE`.
+
+    With such a channel among the overridden ones, ANGLE is off only while the override counts: whoever takes the
+    sticks back, the pilot or a controller that hears no MSP any more, has a vehicle that levels itself.
+    """
+    others = {entry.aux for entry in info.modes if BOXES.get(entry.box) != "ANGLE"}
+    low, high = TRANSMITTER
+    fit = (r for r in info.ranges("ANGLE") if RATES_PULSE < r.low <= low and r.high > high and r.aux not in others)
+    return next(fit, None)

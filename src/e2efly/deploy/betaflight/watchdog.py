@@ -1,0 +1,340 @@
+"""A process of its own between bridge and flight controller, which lands the vehicle when the bridge dies or hangs.
+
+Under MSP override, Betaflight goes on with the last sticks it was sent: for ever, or for 0.3 s, after which the pilot's
+own count, which he may not hold. So the link belongs to this small process. It hands bytes through; when the bridge is
+gone, or silent for `TIMEOUT_S` in flight, it takes over for good: level by the controller's own attitude, a gentle
+descent by the throttle that the bridge had learned, then the throttle closed until the pilot disarms. It imports
+neither NumPy nor ONNX Runtime, and ends only with the bridge: no signal but SIGKILL stops it.
+"""
+
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from bisect import bisect_right
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from itertools import chain, pairwise
+from math import inf
+
+from e2efly.deploy.attitude import Attitude
+from e2efly.deploy.betaflight.codec import REPLY, Decoder, Frame, encode
+from e2efly.deploy.betaflight.lifeline import Lifeline, watch
+from e2efly.deploy.betaflight.link import MOST, Link, open_link
+from e2efly.deploy.betaflight.messages import CHANNEL_RANGE, MAX_CHANNELS, AttitudeReply, StatusEx, set_raw_rc
+
+TIMEOUT_S = 0.1
+"""Silence of the bridge in flight after which this process takes over, s."""
+PERIOD_S = 0.01
+"""Between two frames of a take-over, s."""
+STALL_S = 0.05
+"""A round of this process counts for no longer: if the whole machine stood still, the bridge may speak first, s."""
+STALE_S = 0.2
+"""A controller's attitude older than this is not levelled by, s."""
+DEAF_S = 10.0
+"""A controller that has not said for so long whether it is armed is given up after the descent, s."""
+ARM = 1
+"""Bit of the mode ARM in `StatusEx.boxes`: it is always the first."""
+LEVEL_GAIN = 4.0
+"""Body rate over tilt, 1/s."""
+LEVEL_RATE = 3.0
+"""Largest body rate of levelling, rad/s."""
+BYTES, PLAN, STATUS, TAKEN = b"B", b"P", b"S", b"T"
+"""First byte of a packet: bytes of the link; bridge's plan; state of the link; this process has taken over."""
+PACKETS = 64
+"""Packets that the bridge takes of this process at a time."""
+_PACKET = 1 << 17
+"""Longest packet: what a link hands over at a time, and more."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to do without the bridge, in pulses, so that nothing need be known of controller or vehicle.
+
+    Raises:
+        ValueError: naming the field, for what could not be flown by.
+    """
+
+    flying: bool
+    """Whether silence is to be answered at all."""
+    rates: tuple[float, ...]
+    """Body rates, rad/s, rising: where `pulses` are given."""
+    pulses: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
+    """us of the roll, pitch and yaw sticks at each of `rates`."""
+    places: tuple[int, int, int, int]
+    """Where roll, pitch, yaw and throttle stand in a frame of channels."""
+    throttle: tuple[tuple[float, int], ...]
+    """(s since the take-over, us), rising in time: the descent; the last holds."""
+    channels: tuple[int, ...]
+    """A frame to begin from, us."""
+
+    def __post_init__(self) -> None:
+        n, count = len(self.rates), len(self.channels)
+        times = [at for at, _ in self.throttle]
+        given = [*self.channels, *(pulse for _, pulse in self.throttle), *chain(*self.pulses)]
+        low, high = CHANNEL_RANGE
+        good = {
+            "rates": n >= 2 and all(a < b for a, b in pairwise(self.rates)),
+            "pulses": len(self.pulses) == 3 and all(len(row) == n for row in self.pulses),
+            "places": len(set(self.places)) == 4 and all(0 <= place < count for place in self.places),
+            "throttle": bool(times) and all(a <= b for a, b in pairwise(times)) and 0 <= times[0] <= times[-1] < inf,
+            "channels": 4 <= count <= MAX_CHANNELS and all(type(p) is int and low <= p <= high for p in given),
+        }
+        for name, fine in good.items():
+            if not fine:
+                raise ValueError(f"plan: {name} is {getattr(self, name)}; accepted: as documented, {low} to {high} us")
+
+
+def descent(plan: Plan, elapsed: float, attitude: Attitude | None) -> list[int]:
+    """The channels of a take-over, us.
+
+    Args:
+        plan: the bridge's last.
+        elapsed: since the take-over, s.
+        attitude: the controller's newest; None: its rates are set to zero instead.
+    """
+    wanted = [0.0, 0.0, 0.0]
+    if attitude is not None:
+        for i, angle in enumerate((attitude.roll, attitude.pitch)):
+            wanted[i] = max(-LEVEL_RATE, min(LEVEL_RATE, -LEVEL_GAIN * angle))
+    channels = list(plan.channels)
+    for place, rate, pulses in zip(plan.places, wanted, plan.pulses, strict=False):
+        channels[place] = round(_interpolate(plan.rates, pulses, rate))
+    times = [at for at, _ in plan.throttle]
+    channels[plan.places[3]] = plan.throttle[max(bisect_right(times, elapsed) - 1, 0)][1]
+    return channels
+
+
+def _interpolate(xs: tuple[float, ...], ys: tuple[int, ...], x: float) -> float:
+    i = min(max(bisect_right(xs, x) - 1, 0), len(xs) - 2)
+    share = min(max((x - xs[i]) / (xs[i + 1] - xs[i]), 0.0), 1.0)
+    return ys[i] + share * (ys[i + 1] - ys[i])
+
+
+class WatchedLink:
+    """The bridge's end: a `Link` through the watchdog process, for the life of the thread that makes it.
+
+    Raises:
+        ValueError: for a target that names no link.
+    """
+
+    def __init__(self, target: str, timeout: float = TIMEOUT_S) -> None:
+        """Start the process.
+
+        Args:
+            target: the link, as `open_link` takes it.
+            timeout: silence of the bridge in flight after which it takes over, s.
+        """
+        open_link(target)  # refuse a bad one here; it opens nothing before it is polled
+        self.connections, self.reason = 0, "not polled yet"
+        self.taken_over = ""
+        """Why the watchdog has taken over; empty: it has not."""
+        self._link_alive = False
+        mine, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        for end in (mine, other):
+            end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 20)
+        mine.setblocking(False)
+        self._lifeline: Lifeline | None = None
+        with suppress(OSError):  # elsewhere than on Linux the socket tells of the bridge's death, some ms later
+            self._lifeline = Lifeline()
+        given = [other.fileno(), *([self._lifeline.descriptor] if self._lifeline else [])]
+        with other:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "e2efly.deploy.betaflight.watchdog", target, str(timeout), *map(str, given)],
+                pass_fds=given,
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,  # Ctrl-C is for the bridge
+            )
+        self._socket = mine
+        self._received = bytearray()
+
+    @property
+    def alive(self) -> bool:
+        """The controller is connected and the bridge is still in charge."""
+        return self._link_alive and not self.taken_over
+
+    def poll(self, now: float) -> None:
+        """Take in what the watchdog says; it connects by itself."""
+        del now
+        for _ in range(PACKETS):
+            try:
+                packet = self._socket.recv(_PACKET)
+            except BlockingIOError:
+                return
+            except OSError as error:
+                packet, self.reason = b"", str(error)
+            if not packet:
+                self._link_alive = False
+                self.reason = self.taken_over or "the watchdog process has ended"
+                self._process.poll()
+                return
+            kind, content = packet[:1], packet[1:]
+            if kind == BYTES:
+                self._received += content
+            elif kind == STATUS:
+                self._link_alive, self.reason, self.connections = json.loads(content)
+            elif kind == TAKEN:
+                self.taken_over = self.reason = f"the watchdog has taken over: {content.decode()}"
+
+    def send(self, data: bytes) -> None:
+        """Bytes for the controller."""
+        self._hand(BYTES + data)
+
+    def receive(self) -> bytes:
+        """Bytes of the controller."""
+        self.poll(0.0)
+        data = bytes(self._received)
+        self._received.clear()
+        return data
+
+    def plan(self, plan: Plan) -> None:
+        """What to do should the bridge fall silent."""
+        self._hand(PLAN + json.dumps(asdict(plan)).encode())
+
+    def close(self) -> None:
+        """End the watchdog on the ground; in the air it takes this for the end of the bridge, and lands."""
+        self._socket.close()
+        if self._lifeline:
+            self._lifeline.close()
+        self._link_alive = False
+        with suppress(subprocess.TimeoutExpired):  # it is landing the vehicle
+            self._process.wait(2.0)
+
+    def _hand(self, packet: bytes) -> None:
+        try:
+            self._socket.send(packet)
+        except OSError as error:
+            self.reason = f"the watchdog process does not listen: {error}"
+
+
+def serve(bridge: socket.socket, died: socket.socket | None, link: Link, timeout: float = TIMEOUT_S) -> str:
+    """Hand bytes through until the bridge ends on the ground, or take over and land.
+
+    Args:
+        bridge: to the bridge; at its end the bridge is gone.
+        died: readable once the bridge has died, which is known before its socket closes (see `lifeline`).
+        link: to the controller.
+        timeout: silence of the bridge in flight after which it is as if gone, s.
+
+    Returns:
+        Why it has landed; empty if the bridge ended on the ground.
+    """
+    heard = [bridge] if died is None else [bridge, died]
+    plan: Plan | None = None
+    status: tuple[bool, str, int] | None = None
+    silence, before = 0.0, time.monotonic()
+    bridge.setblocking(False)
+    while True:
+        ready, _, _ = select.select(heard, [], [], 0.001)
+        now = time.monotonic()
+        silence, before = silence + min(now - before, STALL_S), now
+        link.poll(now)
+        packets, gone = _packets(bridge)
+        gone = gone or died in ready
+        for packet in packets:
+            silence = 0.0
+            if packet[:1] == BYTES:
+                link.send(packet[1:])
+            else:
+                plan = _plan(packet[1:]) or plan
+        flying = plan is not None and plan.flying
+        if gone and not flying:
+            link.close()
+            return ""
+        if plan is not None and flying and (gone or silence > timeout):
+            why = "the bridge has ended" if gone else f"the bridge was silent for {silence:.2f} s"
+            _hand(bridge, TAKEN + why.encode())
+            land(link, plan)
+            return f"{why}: landed"
+        if data := link.receive():
+            _hand(bridge, BYTES + data)
+        said = link.alive, link.reason, link.connections
+        if said != status and _hand(bridge, STATUS + json.dumps(said).encode()):
+            status = said
+
+
+def _packets(bridge: socket.socket) -> tuple[list[bytes], bool]:
+    """The packets that have come, and whether the bridge has ended."""
+    packets = []
+    while True:
+        try:
+            packet = bridge.recv(_PACKET)
+        except BlockingIOError:
+            return packets, False
+        except OSError:
+            packet = b""
+        if not packet:
+            return packets, True
+        packets.append(packet)
+
+
+def land(link: Link, plan: Plan) -> None:
+    """Level, descend, close the throttle, and keep it closed until the pilot has disarmed or nobody answers.
+
+    Where the controller hands an override back that it hears nothing of, the stick, which rests in the middle, would
+    have the motors.
+    """
+    decoder, attitude, heard, disarmed = Decoder(), None, 0.0, 0
+    began, down = time.monotonic(), plan.throttle[-1][0]
+    end = down + DEAF_S
+    while (elapsed := time.monotonic() - began) < end and (elapsed < down or disarmed < 2):
+        link.poll(time.monotonic())
+        for frame in decoder.feed(link.receive()[-MOST:]):
+            if frame.direction == REPLY and frame.code == AttitudeReply.CODE:
+                with suppress(ValueError):  # one that cannot be read is not heard
+                    attitude, heard = AttitudeReply.parse(frame.payload), elapsed
+            if frame.direction == REPLY and frame.code == StatusEx.CODE:
+                with suppress(ValueError):
+                    disarmed = 0 if StatusEx.parse(frame.payload).boxes & ARM else disarmed + 1
+                    end = max(down, elapsed) + DEAF_S
+        if elapsed - heard > STALE_S:
+            attitude = None
+        link.send(
+            encode(set_raw_rc(descent(plan, elapsed, attitude)))
+            + encode(Frame(AttitudeReply.CODE))
+            + encode(Frame(StatusEx.CODE))
+        )
+        time.sleep(PERIOD_S)
+    link.close()
+
+
+def _plan(content: bytes) -> Plan | None:
+    """The plan in a packet; None for what is none: a plan that cannot be read must not end this process."""
+    try:
+        x = json.loads(content)
+        roll, pitch, yaw = (tuple(pulses) for pulses in x["pulses"])
+        a, b, c, d = x["places"]
+        steps = tuple((at, pulse) for at, pulse in x["throttle"])
+        return Plan(x["flying"], tuple(x["rates"]), (roll, pitch, yaw), (a, b, c, d), steps, tuple(x["channels"]))
+    except (ValueError, TypeError, KeyError):
+        return None
+
+
+def _hand(bridge: socket.socket, packet: bytes) -> bool:
+    try:
+        bridge.send(packet)
+    except OSError:  # full or gone: bytes of the controller are lost, as on a bad line
+        return False
+    return True
+
+
+def main() -> None:
+    """Serve the bridge over the link that is named; given are descriptors of its socket and of its lifeline, if any."""
+    target, timeout, descriptor, *lifeline = sys.argv[1:]
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    with suppress(OSError, AttributeError):  # where it is not allowed to, it is light enough
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(20))  # a bridge that spins must not starve it
+    with socket.socket(fileno=int(descriptor)) as bridge:
+        died = watch(int(lifeline[0])) if lifeline else None
+        said = serve(bridge, died, open_link(target), float(timeout))
+    with suppress(OSError):  # perhaps nobody reads it: not before the vehicle has landed
+        sys.stderr.write(f"watchdog: {said}\n" if said else "")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,174 @@
+"""Read flight logs, finished or cut off by a crash, a power loss or a full disk."""
+
+import json
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from e2efly.deploy.log.channels import CHANNELS
+from e2efly.deploy.log.mcap_file import PROFILE
+
+
+@dataclass(frozen=True)
+class Series:
+    """The messages of one channel, in the order of their times."""
+
+    channel: str
+    """Its name."""
+    stamp: np.ndarray
+    """(n,) int64, ns since 1970 by the wall clock at the start and the monotonic clock since."""
+    time: np.ndarray
+    """(n,) s since the first message of the log."""
+    values: tuple[dict[str, Any], ...]
+    """The n messages as they were recorded."""
+
+    def __len__(self) -> int:
+        """How many messages there are."""
+        return len(self.time)
+
+    def numbers(self, field: str, size: int | None = None) -> np.ndarray:
+        """A field as float64, NaN where it is null, missing or of another length.
+
+        Args:
+            field: a field of numbers or flags.
+            size: entries of a message; None: one number, no list.
+
+        Returns:
+            Shape (n,) or (n, size).
+
+        Raises:
+            ValueError: naming channel and field where a message has no numbers there.
+        """
+        out = np.full((len(self),) if size is None else (len(self), size), np.nan)
+        for i, message in enumerate(self.values):
+            value = message.get(field)
+            if value is None or (size is not None and isinstance(value, list) and len(value) != size):
+                continue
+            try:
+                out[i] = np.array(value, np.float64) if size is None else [np.nan if v is None else v for v in value]
+            except (TypeError, ValueError):
+                kind = "a number" if size is None else f"{size} numbers"
+                raise ValueError(f"flight log: {self.channel}.{field} is {value!r}; accepted: {kind}") from None
+        return out
+
+    def width(self, field: str) -> int:
+        """Entries of the longest list in a field; 0 where there is none."""
+        return max((len(v) for m in self.values if isinstance(v := m.get(field), list)), default=0)
+
+    def texts(self, field: str) -> list[str]:
+        """A field as texts, empty where there is none."""
+        return ["" if m.get(field) is None else str(m[field]) for m in self.values]
+
+
+@dataclass(frozen=True)
+class FlightLog:
+    """A flight log in memory."""
+
+    path: Path
+    """The file."""
+    series: dict[str, Series]
+    """The channels that have messages, by name."""
+    meta: dict[str, str]
+    """What flew: the fields of the channel `meta`, later ones over earlier ones."""
+    cut_off: str
+    """Why the file ends early; empty where it was closed properly."""
+
+    def __getitem__(self, channel: str) -> Series:
+        """The messages of a channel, none where nothing was recorded.
+
+        Raises:
+            KeyError: for a channel that flight logs do not have.
+        """
+        if channel in self.series:
+            return self.series[channel]
+        CHANNELS[channel]
+        return Series(channel, np.zeros(0, np.int64), np.zeros(0), ())
+
+    @property
+    def start(self) -> int:
+        """Stamp of the first message, ns; 0 without any."""
+        return min((int(s.stamp[0]) for s in self.series.values()), default=0)
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last message, s."""
+        return max((float(s.time[-1]) for s in self.series.values()), default=0.0)
+
+
+def read_log(path: str | Path) -> FlightLog:
+    """Read all that is whole in a flight log.
+
+    Raises:
+        ValueError: where there is no such file, or it is no flight log at all; where a message is not JSON.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ValueError(f"flight log {str(path)!r} does not exist")
+    found: dict[str, list[tuple[int, int, dict[str, Any]]]] = {}
+    meta: dict[str, str] = {}
+    end = _End()
+    for channel, stamp, number, data in _messages(path, end):
+        try:
+            message = json.loads(data)
+        except ValueError as error:
+            raise ValueError(f"{path}: a message of channel {channel!r} is not JSON: {error}") from None
+        if not isinstance(message, dict):
+            raise ValueError(f"{path}: a message of channel {channel!r} is {message!r}; accepted: an object")
+        found.setdefault(channel, []).append((stamp, number, message))
+        if channel == "meta":
+            meta |= {k: v if isinstance(v, str) else json.dumps(v) for k, v in message.items() if v is not None}
+    start = min((stamp for messages in found.values() for stamp, _, _ in messages), default=0)
+    return FlightLog(path, {name: _series(name, found[name], start) for name in found}, meta, end.reason)
+
+
+def _series(channel: str, messages: list[tuple[int, int, dict[str, Any]]], start: int) -> Series:
+    messages.sort(key=lambda m: m[:2])
+    stamp = np.array([m[0] for m in messages], np.int64)
+    return Series(channel, stamp, (stamp - start) * 1e-9, tuple(m[2] for m in messages))
+
+
+class _End:
+    """Why reading ended early; empty at the proper end."""
+
+    reason = ""
+
+
+def _messages(path: Path, end: _End) -> Iterator[tuple[str, int, int, bytes]]:
+    """Channel, stamp, number and data of every message up to the end of the file or of what is whole in it."""
+    from mcap.exceptions import EndOfFile, McapError
+    from mcap.records import Channel, Chunk, Footer, Header, Message
+    from mcap.stream_reader import StreamReader, breakup_chunk
+
+    names: dict[int, str] = {}
+    header = False
+    with path.open("rb") as file:
+        try:
+            for record in StreamReader(file, emit_chunks=True, record_size_limit=path.stat().st_size).records:
+                if isinstance(record, Header):
+                    header = record.profile == PROFILE
+                    if not header:
+                        break
+                if isinstance(record, Footer):
+                    return
+                if not isinstance(record, Chunk):
+                    continue
+                for inner in breakup_chunk(record, validate_crc=True):
+                    if isinstance(inner, Channel):
+                        names[inner.id] = inner.topic
+                    elif isinstance(inner, Message):
+                        yield names[inner.channel_id], inner.log_time, inner.sequence, inner.data
+        except EndOfFile:
+            end.reason = "the end of the file is missing: it was not closed"
+        except (McapError, struct.error, ValueError, EOFError, MemoryError, KeyError, RuntimeError, OverflowError) as e:
+            end.reason = f"the file breaks off ({type(e).__name__}{f': {e}' if str(e) else ''})"
+        except Exception as error:  # of the decompressor, whose errors have no common class
+            if type(error).__module__.partition(".")[0] not in ("zstandard", "lz4"):
+                raise
+            end.reason = f"the file is damaged from here on ({error})"
+    if not header:
+        accepted = f"an MCAP file of profile {PROFILE!r}, as e2efly fly writes it"
+        raise ValueError(f"{path}: no flight log; accepted: {accepted}")

@@ -1,0 +1,119 @@
+"""What is kept of each control step: the messages of `e2efly.deploy.log.channels`."""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from e2efly.control import Ctbr
+from e2efly.deploy.betaflight.client import Client, Reply
+from e2efly.deploy.betaflight.controller import ControllerInfo
+from e2efly.deploy.betaflight.instruments import ARM
+from e2efly.deploy.betaflight.messages import AttitudeReply, BatteryState, Motor, RawImu, Rc, StatusEx
+from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.pilot.flight_state import Flight
+from e2efly.deploy.pilot.hover import rates_of
+from e2efly.deploy.pilot.throttle_map import ThrottleMap
+from e2efly.deploy.policy.runtime import Imu
+from e2efly.deploy.policy.worker import PolicyWorker
+
+
+class Log(Protocol):
+    """What keeps the flight's record; it never raises."""
+
+    def record(self, channel: str, time: float, values: dict[str, Any]) -> None:
+        """Keep a message of a channel."""
+        ...
+
+
+@dataclass(frozen=True)
+class Sent:
+    """What a control step sent."""
+
+    source: str
+    """Who asked for it."""
+    command: Ctbr | None
+    """None: the throttle is closed."""
+    throttle: float
+    """0 to 1."""
+    channels: tuple[int, ...]
+    """us."""
+    saturated: tuple[str, ...] = ()
+
+
+def record_mode(log: Log, now: float, before: Flight, flight: Flight) -> None:
+    """Keep a change of mode and its reasons."""
+    log.record("mode", now, {
+        "mode": str(flight.mode), "previous": str(before.mode), "reasons": [str(reason) for reason in flight.reasons],
+    })  # fmt: skip
+
+
+def record_policy(log: Log, now: float, worker: PolicyWorker) -> None:
+    """Keep what the policy saw and wants."""
+    d, state = worker.decision, worker.state
+    if d is not None:
+        log.record("policy", now, {
+            "observation": d.observation.tolist(), "action": d.action.tolist(), "inference_s": d.inference_s,
+            "step": state.steps if state is not None else 0,
+        })  # fmt: skip
+
+
+def record_odometry(log: Log, now: float, odometry: Odometry) -> None:
+    """Keep where the vehicle is."""
+    o = odometry
+    log.record("odometry", now, {
+        "time": o.time, "age": now - o.time, "position": o.position.tolist(), "velocity": o.velocity.tolist(),
+        "quaternion": o.quaternion.tolist(), "body_rate": o.body_rate.tolist(),
+    })  # fmt: skip
+
+
+def record_sent(log: Log, now: float, sent: Sent, mode: str, setpoint: list[float] | None, yaw: float | None) -> None:
+    """Keep what was sent, by whom, and where it is to lead: world, m; rad."""
+    command = sent.command
+    log.record("command", now, {
+        "source": f"{mode}: {sent.source}",
+        "collective_thrust": None if command is None else float(command.thrust),
+        "body_rate": None if command is None else rates_of(command),
+        "setpoint": setpoint, "yaw": yaw,
+    })  # fmt: skip
+    log.record("sticks", now, {
+        "channels": list(sent.channels), "throttle": sent.throttle, "saturated": bool(sent.saturated),
+    })  # fmt: skip
+
+
+def record_map(log: Log, now: float, throttle_map: ThrottleMap) -> None:
+    """Keep what has been learned of the throttle."""
+    log.record("throttle_map", now, {
+        "scale": throttle_map.scale * throttle_map.nominal(1.0), "voltage_gain": throttle_map.learned[1],
+        "residual": throttle_map.residual,
+    })  # fmt: skip
+
+
+def record_link(log: Log, now: float, client: Client) -> None:
+    """Keep how well the controller is heard."""
+    log.record("link", now, {
+        "requests": client.requests,
+        "replies": client.replies,
+        "timeouts": client.timeouts,
+        "errors": client.decoder.bad_checksums + client.decoder.skipped + client.run_together,
+        "reconnects": max(client.link.connections - 1, 0),
+        "round_trip": max((reply.latency for reply in client.latest.values()), default=None),
+    })  # fmt: skip
+
+
+def record_message(log: Log, info: ControllerInfo, code: int, reply: Reply, imu: Imu | None) -> None:
+    """Keep what the controller answered."""
+    m, at = reply.message, reply.time
+    if code == StatusEx.CODE:
+        log.record("status", at, {
+            "armed": ARM in m.active(info.box_ids), "modes": [str(box) for box in sorted(m.active(info.box_ids))],
+            "cpu_load": m.cpu_load, "arming_disabled": list(m.arming_disabled), "cycle_time": m.cycle_time,
+        })  # fmt: skip
+    elif code == Rc.CODE:
+        log.record("rc", at, {"channels": list(m.channels)})
+    elif code == Motor.CODE:
+        log.record("motors", at, {"values": list(m.throttle)})
+    elif code == BatteryState.CODE:
+        log.record("battery", at, {"voltage": m.voltage, "current": m.current, "cells": m.cells})
+    elif code == RawImu.CODE and imu is not None:
+        log.record("imu", at, {"gyro": list(m.body_rate), "specific_force": imu.accelerometer.tolist()})
+    elif code == AttitudeReply.CODE:
+        log.record("imu", at, {"attitude": [m.roll, m.pitch, m.yaw]})

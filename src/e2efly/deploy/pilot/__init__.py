@@ -1,0 +1,1 @@
+"""Who flies, and how: state machine, hover controller, fence, and flight without poses. Pure functions."""

@@ -1,0 +1,193 @@
+"""The vehicle's motion by poses and by the controller's sensors, and whether either can be flown by. Pure."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from e2efly.deploy.attitude import Attitude
+from e2efly.deploy.odometry import Odometry, Sample
+from e2efly.deploy.pilot import inertial
+from e2efly.deploy.pilot.delay_watch import Delay, DelayWatch, delay_of, delay_problem, felt, turned
+from e2efly.deploy.pilot.flight_state import GROUNDED, Flight, Mode
+from e2efly.deploy.pilot.heading_watch import HeadingWatch, watched
+from e2efly.deploy.pilot.hover import LIFTED, roll_pitch
+from e2efly.deploy.pilot.inertial import Inertial, Measurement
+from e2efly.deploy.pose.checks import Checks
+from e2efly.deploy.pose.pace import Pace, paced
+from e2efly.deploy.pose.tracking import Track, age, track
+
+RESTART_S = 1.0
+"""After so long without a good pose, on the ground, tracking starts anew, s."""
+OUTLIERS_S = 0.03
+"""Poses are refused for so long before the odometry counts as lost, s: one or two outliers end no flight."""
+LATE_S = 0.05
+"""Poses may be so much later than the latency for which the gains are, s."""
+FROZEN = "its numbers do not change"
+"""Reported of an accelerometer that does not even feel the rotors turn."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The vehicle's motion as far as it is known, and what was found wrong with poses and sensors."""
+
+    checks: Checks
+    """What a pose must satisfy."""
+    latest: float
+    """Largest accepted delay of poses, from the motion to their arrival, s."""
+    odometry: Odometry | None = None
+    """The newest that passed the checks."""
+    good_at: float = -math.inf
+    """When a pose passed the checks last, s."""
+    refused: str | None = None
+    """Why poses are refused now; None: they are not, or for less than `OUTLIERS_S`."""
+    stale: str | None = None
+    """Why the newest pose is too old; None: it is not."""
+    track: Track = Track()
+    """Memory of the checks on poses."""
+    pace: Pace = Pace()
+    """How often poses come."""
+    heading: HeadingWatch = HeadingWatch()
+    """Comparison of the poses' heading with the one that the flight shows."""
+    inertial: Inertial = Inertial()
+    """Accelerometer, gyroscope, and the velocity without poses."""
+    delays: DelayWatch = DelayWatch()
+    """Rotations by poses and gyroscope on the ground, by which the delay of the poses is measured."""
+    delay: Delay | None = None
+    """The delay of the poses; None: not measured."""
+    opposed: str | None = None
+    """How poses and sensors contradicted each other when the vehicle was carried, until they agree."""
+
+    @property
+    def pose_problem(self) -> str | None:
+        """Why there is no good pose now; None: there is one."""
+        return self.refused or self.stale
+
+    @property
+    def heading_error(self) -> float | None:
+        """The poses' heading minus the true one, rad; None: unknown, or there is no good pose."""
+        return None if self.pose_problem else self.heading.error
+
+    def attitude_error(self, attitude: Attitude | None) -> float | None:
+        """Larger difference of roll and of pitch between controller and poses, rad; None: one of them is unknown."""
+        if attitude is None or self.odometry is None:
+            return None
+        roll, pitch = roll_pitch(self.odometry.quaternion)
+        return max(abs(math.remainder(attitude.roll - roll, math.tau)), abs(attitude.pitch - pitch))
+
+    def accelerometer_problem(self, mode: Mode) -> str | None:
+        """Why the accelerometer cannot be flown by; a problem found in flight lasts until the landing."""
+        if mode in GROUNDED:
+            return self.inertial.rest_problem
+        if self.inertial.frozen:
+            return FROZEN
+        if mode is Mode.TAKEOFF:  # the throttle map is not known well enough to be another judge
+            return None
+        return self.inertial.watch.accelerometer_problem
+
+    def motion_problem(self, mode: Mode) -> str | None:
+        """How poses and sensors contradict each other, or how late the poses are; None: they agree."""
+        if mode in GROUNDED:
+            return self.opposed or delay_problem(self.delay, self.latest)
+        velocity = self.refused if (self.refused or "").startswith("velocity") else None
+        return self.inertial.watch.problem or velocity
+
+
+def height_of(odometry: Odometry | None, flight: Flight) -> float:
+    """Height over the place of take-off, m; 0 without odometry."""
+    return 0.0 if odometry is None else float(odometry.position[2]) - flight.home
+
+
+def see(
+    before: Estimate, samples: Iterable[Sample], flight: Flight, attitude: Attitude | None, now: float, said: str = ""
+) -> Estimate:
+    """The estimate after the poses of a control step.
+
+    Args:
+        before: the estimate so far.
+        samples: the poses that have come, oldest first; perhaps none.
+        flight: the state of the flight.
+        attitude: the controller's; None: unknown.
+        now: s.
+        said: the pose source's own problem; empty: none.
+    """
+    after = before
+    waited = before.refused and now - before.good_at > RESTART_S
+    if flight.mode in GROUNDED and (before.track.fault or waited):
+        after = replace(after, track=Track(), good_at=now)  # it may have been carried elsewhere, its clock set
+    for sample in samples:
+        tracked, odometry, refused = track(after.checks, after.track, sample)
+        after = replace(after, track=tracked, refused=refused)
+        if odometry is not None:
+            after = _accept(after, odometry, sample.received, flight, attitude, now)
+    frozen = (after.refused or "").startswith("frozen")  # which lasts already
+    if not after.track.fault and now - after.good_at < OUTLIERS_S and not frozen:
+        after = replace(after, refused=None)
+    old = age(after.track, now)
+    if after.refused is not None or old <= after.checks.max_age:
+        return replace(after, stale=None)
+    return replace(after, stale=f"the newest is {old:.2f} s old" + (f" ({said})" if said else ""))
+
+
+def _accept(
+    before: Estimate, odometry: Odometry, received: float, flight: Flight, attitude: Attitude | None, now: float
+) -> Estimate:
+    """The estimate after a pose that passed the checks."""
+    heading = before.heading
+    if attitude is not None:
+        lifted = height_of(odometry, flight) > LIFTED
+        heading = watched(heading, odometry, attitude) if lifted else HeadingWatch()
+    told = inertial.see(
+        before.inertial, odometry, now,
+        moved=before.track.same_since == odometry.time,  # or it may be frozen, and the motion has gone on
+        trusted=not flight.misled or flight.turned is not None, turned=flight.turned or 0.0, latest=before.latest,
+    )  # fmt: skip
+    return replace(
+        before, odometry=odometry, good_at=now, pace=paced(before.pace, odometry.time, received), heading=heading,
+        inertial=told, delays=turned(before.delays, odometry) if flight.mode is Mode.INIT else before.delays,
+    )  # fmt: skip
+
+
+def compare(before: Estimate, mode: Mode, *, measure_delay: bool) -> Estimate:
+    """On the ground: what was found while the vehicle was carried stays until it is carried again and agrees.
+
+    Args:
+        before: the estimate so far.
+        mode: of the flight; in the air nothing changes.
+        measure_delay: measure the delay of the poses, which takes a fraction of a millisecond.
+    """
+    if mode not in GROUNDED:
+        return before
+    watch, opposed, delay = before.inertial.watch, before.opposed, before.delay
+    if watch.opposed is not None:
+        opposed = f"{watch.opposed}, when it was carried; carry it again, once frames and axes are right"
+    elif watch.agrees:
+        opposed = None
+    if mode is Mode.INIT and measure_delay:
+        delay = delay_of(before.delays) or delay
+    return replace(before, opposed=opposed, delay=delay)
+
+
+def feel(before: Estimate, m: Measurement, turned_at: float, mode: Mode, now: float) -> Estimate:
+    """The estimate after an answer of the inertial sensors.
+
+    Args:
+        before: the estimate so far.
+        m: the answer.
+        turned_at: when its body rate was true, s.
+        mode: of the flight.
+        now: s.
+    """
+    x, y, z = m.gyro.tolist()
+    delays = felt(before.delays, turned_at, (x, y, z)) if mode is Mode.INIT else before.delays
+    return replace(before, delays=delays, inertial=inertial.measure(before.inertial, m, now))
+
+
+def enter(before: Estimate, flight_before: Flight, flight: Flight) -> Estimate:
+    """The estimate after a step of the state machine: what a new mode, or a landing without poses, begins anew."""
+    told, delays = before.inertial, before.delays
+    if flight.blind and not flight_before.blind and flight.turned is None:
+        told = inertial.alone(told, wrong=flight.misled is not None)
+    if flight.mode is not flight_before.mode:
+        told = told.at_rest() if flight.mode is Mode.TAKEOFF else replace(told, touch=told.touch.afresh())
+        delays = DelayWatch()
+    return replace(before, inertial=told, delays=delays)

@@ -1,0 +1,101 @@
+"""The commands of take-off, hover and landing, with odometry and without it. Pure.
+
+Each adds a trim to the thrust, which makes up for an error of the throttle map.
+"""
+
+import math
+
+import numpy as np
+
+from e2efly.control import Ctbr, Vec3
+from e2efly.deploy.attitude import Attitude
+from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.pilot import inertial, reckoning
+from e2efly.deploy.pilot.flight_state import Flight, Mode, Target
+from e2efly.deploy.pilot.hover import LIFTED, blind, controlled, rates_of
+from e2efly.deploy.pilot.inertial import Inertial
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+TRIM = (-3.0, 5.0)
+"""Bounds of the thrust that a take-off adds while the throttle map is still wrong, m/s^2."""
+TRIM_GAIN = 3.0
+"""Growth of the trim over the climb's speed error, 1/s."""
+TRIM_FADE = 1.0
+"""Time constant with which the trim fades as the map learns, s."""
+STEADY = 0.03
+"""Body rates of a hover below this are sent as zero, rad/s: should the link fall silent now, they are held for long."""
+OVERDUE = 0.3
+"""A blind descent whose height is reckoned so far under the ground feels for the ground, m, ..."""
+WEIGHT, LIGHTER, LIGHTEST = 0.97, 0.04, 0.6
+"""... and gives no more than this share of its weight, less with each metre, and the last at least."""
+
+
+def hover(
+    gentle: Vehicle, flight: Flight, target: Target, odometry: Odometry, trim: float, dt: float
+) -> tuple[Ctbr, float]:
+    """Fly to a target by odometry.
+
+    Args:
+        gentle: the vehicle with the gains of `flight_gains`.
+        flight: its mode and its home count.
+        target: where to be.
+        odometry: the motion now.
+        trim: so far, m/s^2.
+        dt: since the last control step, s.
+
+    Returns:
+        The command, and the trim, m/s^2.
+    """
+    x, y, z = target.position
+    taking_off, lifted = flight.mode is Mode.TAKEOFF, float(odometry.position[2]) - flight.home >= LIFTED
+    if taking_off:
+        behind = target.climb - float(odometry.velocity[2])
+        change = -trim * dt / TRIM_FADE if lifted else TRIM_GAIN * behind * dt
+        trim = min(max(trim + change, TRIM[0]), TRIM[1])
+    else:
+        trim *= math.exp(-dt / TRIM_FADE)
+    on_ground = taking_off and not lifted
+    if on_ground:  # no tilt before the feet are free
+        x, y = float(odometry.position[0]), float(odometry.position[1])
+    wanted = controlled(gentle, "velocity", odometry, _approach(gentle, (x, y, z), target, odometry))
+    rates = (0.0 if on_ground or abs(rate) < STEADY else rate for rate in rates_of(wanted))
+    return Ctbr(wanted.thrust + trim, Vec3(*rates)), trim
+
+
+def _approach(
+    gentle: Vehicle, point: tuple[float, float, float], target: Target, odometry: Odometry
+) -> tuple[float, ...]:
+    """The velocity towards a point, and with it where it moves, world, m/s; and the yaw, rad."""
+    wanted = gentle.position_gain * (np.array(point) - odometry.position) + np.array([0.0, 0.0, target.climb])
+    return (*np.clip(wanted, -gentle.speed_max, gentle.speed_max).tolist(), target.yaw)
+
+
+def descend(
+    flight: Flight, told: Inertial, attitude: Attitude | None, trim: float, now: float, dt: float
+) -> tuple[Ctbr, float, Inertial]:
+    """Descend without odometry, and feel for the ground.
+
+    Args:
+        flight: the state of the flight.
+        told: what the inertial sensors tell.
+        attitude: the controller's; None: unknown.
+        trim: so far, m/s^2.
+        now: s.
+        dt: since the last control step, s.
+
+    Returns:
+        The command; the trim, m/s^2; what the inertial sensors tell, with the ground being felt for.
+    """
+    reckoned, ground, overdue = told.reckoned, flight.home, True
+    if reckoned is None:
+        command = blind(attitude, now - flight.since, 0.0 if flight.lost is None else flight.lost[2])
+        thrust = float(command.thrust)
+    else:
+        trim = reckoning.trimmed(trim, reckoned, ground, dt)
+        command = reckoning.settle(attitude, reckoned, ground, trim)
+        under = ground - reckoned.height
+        overdue = under > OVERDUE
+        weight = GRAVITY * max(WEIGHT - LIGHTER * under, LIGHTEST)
+        thrust = min(float(command.thrust), weight) if overdue else float(command.thrust)
+    told = inertial.feel_for_ground(told, thrust, now, overdue=overdue)
+    return Ctbr(thrust * told.touch.factor(now), command.rate), trim, told

@@ -1,0 +1,114 @@
+"""The controllers that fly take-off, hover and landing, and turn a policy's commands into body rates."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from e2efly.control import CASCADE, Ctbr, Quat, Vec3
+from e2efly.deploy.attitude import Attitude
+from e2efly.deploy.odometry import Odometry
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+LEVEL_GAIN = 4.0
+"""Body rate over tilt of the blind descent, 1/s."""
+LEVEL_RATE = 3.0
+"""Largest body rate of it, rad/s."""
+SINK_SPEED, SINK_ACCELERATION = 0.55, 3.0
+"""A blind descent first goes to this speed, m/s, by this acceleration, m/s^2 ..."""
+SINK_TIME = SINK_SPEED / SINK_ACCELERATION
+"""... which takes so long from rest, s ..."""
+SINK_THRUST = 0.95
+"""... and goes on with this share of the weight: it must sink, whatever the throttle map's last error."""
+SINK_FASTER = 0.2
+"""By which the speed of sinking grows, m/s^2: more than what a throttle map is wrong by, so that it always sinks."""
+SLOWEST_SINK, SLOWEST_FASTER = 0.5, 0.07
+"""The slowest that it sinks, m/s, and by which that grows, m/s^2: by them the time to the ground is estimated."""
+LIFTED = 0.12
+"""The vehicle flies from this height over the ground on, m: below, nothing is learned and no tilt is asked."""
+
+
+@dataclass(frozen=True)
+class FlightMotion:
+    """Odometry taken apart, as the controllers take it."""
+
+    position: Vec3
+    velocity: Vec3
+    attitude: Quat
+
+    @staticmethod
+    def of(odometry: Odometry) -> "FlightMotion":
+        """Of an odometry."""
+        return FlightMotion(Vec3(*odometry.position), Vec3(*odometry.velocity), Quat(*odometry.quaternion))
+
+
+def flight_gains(vehicle: Vehicle, latency: float) -> Vehicle:
+    """The vehicle with gains that a latency allows.
+
+    In the simulator the attitude loop runs in the flight controller, without delay; here it is closed over the link.
+    A loop of bandwidth k behind a delay T loses k T of phase: the attitude loop keeps to half a radian of it, the
+    velocity loop to a third of the attitude loop's bandwidth, the position loop to 0.4 of the velocity loop's.
+
+    Args:
+        vehicle: as loaded.
+        latency: from the motion to the body-rate setpoint, s.
+    """
+    slowest = latency + 1 / float(np.min(vehicle.rate_gain[:2]))
+    attitude = np.minimum(vehicle.attitude_gain, 0.5 / slowest)
+    # up and down there is no attitude loop in between, only the motors, as slow as the rate loop
+    velocity = np.minimum(vehicle.velocity_gain, [attitude[0] / 3, attitude[0] / 3, 0.5 / slowest])
+    position = np.minimum(vehicle.position_gain, 0.4 * velocity)
+    return dataclasses.replace(vehicle, attitude_gain=attitude, velocity_gain=velocity, position_gain=position)
+
+
+def controlled(vehicle: Vehicle, mode: str, odometry: Odometry, command: tuple[float, ...] | np.ndarray) -> Ctbr:
+    """CTBR of a command of a command mode: the simulator's own cascade."""
+    a, b, c, d = (np.float64(x) for x in command)
+    return CASCADE[mode](vehicle, FlightMotion.of(odometry), (a, b, c, d))
+
+
+def blind(attitude: Attitude | None, elapsed: float, climb: float = 0.0) -> Ctbr:
+    """Level by the controller's own attitude, and sink; without any attitude the rates are held at zero.
+
+    Args:
+        attitude: the flight controller's.
+        elapsed: since the descent began, s.
+        climb: vertical speed when it began, m/s: a climb is ended and a fall is caught first.
+    """
+    thrust = SINK_THRUST * GRAVITY
+    if elapsed < sink_time(climb):
+        thrust = GRAVITY - math.copysign(SINK_ACCELERATION, climb + SINK_SPEED)
+    if attitude is None:
+        return Ctbr(thrust, Vec3(0.0, 0.0, 0.0))
+    tilt = max(math.cos(attitude.roll) * math.cos(attitude.pitch), 0.5)
+    return Ctbr(thrust / tilt, Vec3(_levelling(attitude.roll), _levelling(attitude.pitch), 0.0))
+
+
+def rates_of(command: Ctbr) -> list[float]:
+    """The body rates of a command, rad/s."""
+    return [float(rate) for rate in (command.rate.x, command.rate.y, command.rate.z)]
+
+
+def _levelling(angle: float) -> float:
+    return max(-LEVEL_RATE, min(LEVEL_RATE, -LEVEL_GAIN * angle))
+
+
+def sink_time(climb: float = 0.0) -> float:
+    """How long a blind descent that begins with a vertical speed, m/s, takes to reach its own, s."""
+    return abs(climb + SINK_SPEED) / SINK_ACCELERATION
+
+
+def blind_time(height: float, climb: float = 0.0) -> float:
+    """After how long a blind descent from a height, m, has surely ended, s; the throttle is closed then."""
+    up = max(climb, 0.0)
+    top = max(height, 0.0) + up**2 / (2 * SINK_ACCELERATION)
+    sinking = (math.sqrt(SLOWEST_SINK**2 + 2 * SLOWEST_FASTER * top) - SLOWEST_SINK) / SLOWEST_FASTER
+    return 1.8 + up / SINK_ACCELERATION + sinking
+
+
+def roll_pitch(quaternion: np.ndarray) -> tuple[float, float]:
+    """Roll and pitch, rad, of R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    w, x, y, z = (float(q) for q in quaternion)
+    pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
+    return math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), pitch

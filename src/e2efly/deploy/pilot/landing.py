@@ -1,0 +1,170 @@
+"""The landing: by odometry, without it, and while nothing is heard of the controller. Pure.
+
+It ends where the vehicle stands: at the height of its take-off by the odometry, higher up only where something is felt
+to carry it, without odometry where the ground is felt or by the clock; and never while the link is silent.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+
+from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.pilot.fence import stopping
+from e2efly.deploy.pilot.flight_state import Flight, Inputs, Mode, Reason, Target, to
+from e2efly.deploy.pilot.hover import blind_time
+from e2efly.deploy.settings import FlightSettings
+
+STANDING = 0.1
+"""A still vehicle this near to the height at which it stood before stands there again, m."""
+SLOW = 0.5
+"""Horizontal speed below which a landing sinks, m/s ..."""
+SLOWED_S = 3.0
+"""... or after so long: in a gust it may never be that slow, s."""
+UNHEARD_SINK = 0.35
+"""While the link is silent it sinks so slowly, m/s: the newest command may be held for long."""
+LEAD = 0.6
+"""How far the target of a landing may be under the vehicle, m: farther shows no more than that there is ground."""
+PRESSED = 0.5
+"""A still vehicle with its target so far under it stands on something, m."""
+PRESSING = 0.5
+"""One that is still in the air, by its height, is pressed down ever harder until it is felt that it stands, m/s."""
+FOUND_S = 0.5
+"""Odometry that was lost in a landing must be good for so long, s, to be flown by again: one that comes and goes must
+not begin the landing anew each time."""
+STAYS_S, AWAY_S = 1.0, 3.0
+"""A landing that stays at one place for so long has ended at home, s, and, sent down blindly, elsewhere, s."""
+RECENT_S = 0.5
+"""An odometry as old as this still tells that the vehicle stands, s."""
+
+
+def land(settings: FlightSettings, flight: Flight, inputs: Inputs, *reasons: str) -> Flight:
+    """Begin a landing for these reasons: by odometry where there is some, without it otherwise."""
+    if inputs.seen is None:
+        return _blindly(settings, flight, inputs, *reasons)
+    return to(flight, Mode.LAND, *reasons, target=_down_from(settings, inputs.seen))
+
+
+def _blindly(settings: FlightSettings, flight: Flight, inputs: Inputs, *reasons: str) -> Flight:
+    lost = _last_seen(settings, flight, inputs)
+    begun = dataclasses.replace(flight, lost=lost, found_since=None)
+    return to(begun, Mode.LAND, *reasons, blind=True)
+
+
+def _down_from(settings: FlightSettings, odometry: Odometry) -> Target:
+    """Where it can stop, but no higher than it is: what has nearly landed must not rise to the fence's floor."""
+    target = stopping(settings.fence, odometry)
+    x, y, z = target.position
+    return dataclasses.replace(target, position=(x, y, min(z, float(odometry.position[2]))))
+
+
+def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
+    """A landing after another control step of `dt` s."""
+    flight = _looked(flight, inputs)
+    if inputs.link_problem and inputs.silent:  # what it does meanwhile is not known: nothing counts as landed
+        return _unheard(settings, flight, inputs, dt)
+    if has_stood(settings, flight, inputs.odometry):
+        assert inputs.odometry is not None
+        return dataclasses.replace(to(flight, Mode.DONE, Reason.LANDED), home=float(inputs.odometry.position[2]))
+    odometry = inputs.seen
+    if odometry is None:
+        return _sinking(settings, flight, inputs)
+    if flight.blind:
+        found = flight.now if flight.found_since is None else flight.found_since
+        flight = dataclasses.replace(flight, found_since=found, lost=_last_seen(settings, flight, inputs))
+        return _sinking(settings, flight, inputs) if flight.now - found < FOUND_S else _see(settings, flight, odometry)
+    flight = _lowered(settings, flight, odometry, dt)
+    height = float(odometry.position[2])
+    low = height < flight.home + STANDING
+    still = flight.still_since is not None and flight.now - flight.still_since >= settings.land_settle
+    if still and (low or inputs.supported):
+        return dataclasses.replace(to(flight, Mode.DONE, Reason.LANDED), home=height)
+    return flight
+
+
+def _lowered(settings: FlightSettings, flight: Flight, odometry: Odometry, dt: float) -> Flight:
+    """The target sinks by another control step, and never far under the vehicle; since when that has been still."""
+    assert flight.target is not None
+    x, y, z = flight.target.position
+    height = float(odometry.position[2])
+    stopped = float(np.linalg.norm(odometry.velocity[:2])) < SLOW or flight.now - flight.since > SLOWED_S
+    sink = settings.land_speed if stopped else 0.0
+    still_for = 0.0 if flight.still_since is None else flight.now - flight.still_since
+    down = max(z - sink * dt, height - LEAD - PRESSING * max(still_for - settings.land_settle, 0.0))
+    still = float(np.linalg.norm(odometry.velocity)) < settings.still_speed and height - down > PRESSED
+    since = (flight.now if flight.still_since is None else flight.still_since) if still else None
+    return dataclasses.replace(flight, target=Target((x, y, down), flight.target.yaw, -sink), still_since=since)
+
+
+def _see(settings: FlightSettings, flight: Flight, odometry: Odometry) -> Flight:
+    """Land by odometry from where it is."""
+    return dataclasses.replace(
+        flight, blind=False, found_since=None, lost=None, target=_down_from(settings, odometry), still_since=None,
+        nearest=math.inf,
+    )  # fmt: skip
+
+
+def _unheard(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
+    """While the link is down: it goes on landing, as its commands may arrive, but no clock of the landing runs."""
+    if inputs.seen is None:
+        flight = dataclasses.replace(flight, still_since=None)
+        if not flight.blind or flight.lost is None:
+            return _blindly(settings, flight, inputs, *flight.reasons)
+        return dataclasses.replace(flight, lost=(flight.lost[0] + dt, *flight.lost[1:]))
+    flight = _see(settings, flight, inputs.seen) if flight.blind else flight
+    assert flight.target is not None
+    x, y, _ = flight.target.position
+    target = Target((x, y, float(inputs.seen.position[2])), flight.target.yaw, -UNHEARD_SINK)
+    return dataclasses.replace(flight, target=target, still_since=None)
+
+
+def _looked(flight: Flight, inputs: Inputs) -> Flight:
+    """In a landing: since when the newest odometry, good or lost just now, has stayed at one place."""
+    odometry = inputs.odometry
+    if odometry is None or flight.misled or flight.now - odometry.time > RECENT_S:
+        return dataclasses.replace(flight, standing_since=None, stood_at=None)
+    x, y, z = (float(p) for p in odometry.position)
+    if not math.isfinite(x + y + z):
+        return flight
+    if flight.stood_at is None or math.dist(flight.stood_at, (x, y, z)) > STANDING:
+        return dataclasses.replace(flight, standing_since=flight.now, stood_at=(x, y, z))
+    return flight
+
+
+def has_stood(settings: FlightSettings, flight: Flight, odometry: Odometry | None) -> bool:
+    """Whether a landing has stayed at one place for so long that it has ended there, by the newest odometry."""
+    if odometry is None or flight.standing_since is None:
+        return False
+    stayed = flight.now - flight.standing_since
+    if abs(float(odometry.position[2]) - flight.home) < STANDING:
+        return stayed >= max(settings.land_settle, STAYS_S)
+    return flight.blind and stayed >= AWAY_S
+
+
+def _last_seen(settings: FlightSettings, flight: Flight, inputs: Inputs) -> tuple[float, float, float]:
+    """Now, and the height over home, m, and the climb, m/s, that the newest odometry tells; mirrored, it is as high."""
+    o = inputs.odometry
+    height, climb = (math.nan, math.nan) if o is None else (float(o.position[2]) - flight.home, float(o.velocity[2]))
+    if not math.isfinite(height):
+        height = settings.fence.high[2] - flight.home
+    return flight.now, abs(height), abs(climb) if math.isfinite(climb) else 0.0
+
+
+def _sinking(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
+    """Landing without odometry ends with the ground felt, or by the clock: what has landed must not start up again."""
+    if not flight.blind:
+        return _blindly(settings, flight, inputs, inputs.blindness)
+    if inputs.touched:
+        return to(flight, Mode.DONE, Reason.TOUCHED)
+    if inputs.seen is None:
+        flight = dataclasses.replace(flight, found_since=None)
+    at, height, climb = flight.lost or _last_seen(settings, flight, inputs)
+    if flight.now - at > blind_time(height, climb) or inputs.buried:
+        return to(flight, Mode.DONE, f"{Reason.LANDED}: without odometry, after {flight.now - at:.0f} s")
+    return flight
+
+
+def stands(settings: FlightSettings, flight: Flight, odometry: Odometry) -> bool:
+    """Whether it is still, at the height of its take-off."""
+    still = float(np.linalg.norm(odometry.velocity)) < settings.still_speed
+    return still and abs(float(odometry.position[2]) - flight.home) < STANDING

@@ -1,0 +1,268 @@
+"""The flight's modes: a pure function from what is known to who flies, and why.
+
+    INIT -> TAKEOFF -> HOVER <-> POLICY
+              |          |          |
+              +--------> +-> LAND <-+ -> DONE -> INIT
+
+The pilot's switches and sticks always win: from any mode in the air, the override switch leads to PILOT, and back to
+HOVER (to LAND without odometry, to INIT on the ground); disarming leads to DONE. Each refusal and each change of mode
+carries its reasons.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+
+from e2efly.deploy.odometry import Odometry, tilt_of
+from e2efly.deploy.pilot.fence import here, moved, stopping
+from e2efly.deploy.pilot.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Reason, Target, to
+from e2efly.deploy.pilot.landing import SLOW, land, landing, stands
+from e2efly.deploy.pilot.refusals import ON_GROUND, battery_refusals, policy_refusals, take_off_refusals
+from e2efly.deploy.settings import FlightSettings
+
+LONGEST_STEP = 0.1
+"""A step counts for no longer than this, s, whatever the clock does."""
+SLOWING = 0.5
+"""Deceleration with which a take-off's target nears its height, m/s^2."""
+CLIMB_S = 5.0
+"""A take-off may last so much longer than its target's climb, s."""
+MISLED = "the vehicle does not go where it is sent (wrong heading?)"
+"""Said of odometry that is not the vehicle's own ..."""
+TURNED = "its heading is wrong"
+"""... and of odometry whose heading is not."""
+FALLEN, FALLEN_SPEED, FALLEN_S = math.radians(60), 0.3, 0.5
+"""Nothing flies so far from level, so slowly, m/s, for so long, s: gravity alone would have made it faster."""
+NEAR_GROUND = 0.3
+"""In a landing below this height the shock of the ground is not taken for a contradiction of poses and sensors, m."""
+
+
+def step(settings: FlightSettings, flight: Flight, inputs: Inputs, now: float) -> Flight:
+    """The machine's next state.
+
+    Args:
+        settings: what the flight may do.
+        flight: the state before.
+        inputs: what is known now.
+        now: s, never falling; a jump counts as one long step.
+    """
+    passed = now - flight.now if flight.now else 0.0
+    dt = min(max(passed, 0.0), LONGEST_STEP)
+    jump = passed - dt
+    policy = inputs.pilot is not None and inputs.pilot.mission is Mission.POLICY
+    flight = dataclasses.replace(
+        flight,
+        now=now,
+        since=flight.since + jump,
+        still_since=_moved(flight.still_since, jump),
+        fallen_since=_moved(flight.fallen_since, jump),
+        found_since=_moved(flight.found_since, jump),
+        standing_since=_moved(flight.standing_since, jump),
+        lost=None if flight.lost is None else (flight.lost[0] + jump, *flight.lost[1:]),
+        rearm=flight.rearm and not _mission_low(inputs),
+        lock=flight.lock and policy,
+    )
+    flight = _watched(settings, flight, inputs)
+    if flight.misled:
+        turned = flight.turned
+        problem = flight.misled if turned is None else f"{TURNED} by {math.degrees(turned):.0f} deg"
+        inputs = dataclasses.replace(inputs, odometry_problem=problem)
+    following = _common(flight, inputs) or _STEPS[flight.mode](settings, flight, inputs, dt)
+    if (following.mode, following.blind) == (flight.mode, flight.blind):
+        return following
+    return dataclasses.replace(following, since=now, still_since=None, fallen_since=None, nearest=math.inf)
+
+
+def _moved(moment: float | None, jump: float) -> float | None:
+    return None if moment is None else moment + jump
+
+
+def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
+    """Whether the odometry is the vehicle's own, and whether the vehicle has fallen over.
+
+    With a wrong heading the controller pushes to the wrong side, and the vehicle spirals outwards, ever faster. Nothing
+    on the ground shows it: the flight controller's own heading is not the odometry's. The flight shows it, and where it
+    does not, the distance from the target.
+    """
+    if flight.mode in (Mode.INIT, Mode.DONE):
+        return dataclasses.replace(flight, misled=None, turned=None, fallen_since=None)
+    if inputs.motion_problem and not flight.misled and not _nearly_landed(flight, inputs.odometry):
+        flight = dataclasses.replace(flight, misled=f"{Reason.MOTION}: {inputs.motion_problem}")
+    odometry, target = inputs.seen, flight.target
+    if odometry is None:
+        return dataclasses.replace(flight, fallen_since=None)
+    fallen = tilt_of(odometry.quaternion) > FALLEN and float(np.linalg.norm(odometry.velocity)) < FALLEN_SPEED
+    fallen_since = (flight.now if flight.fallen_since is None else flight.fallen_since) if fallen else None
+    flight = dataclasses.replace(flight, fallen_since=fallen_since)
+    error = inputs.heading_error
+    if flight.misled and flight.turned is not None and error is not None:
+        flight = dataclasses.replace(flight, turned=error)
+    if flight.mode is Mode.PILOT:
+        misled = None if stands(settings, flight, odometry) else flight.misled
+        return dataclasses.replace(flight, misled=misled, turned=flight.turned if misled else None)
+    if target is None:
+        return flight
+    if error is not None and abs(error) > settings.heading_agreement:
+        return dataclasses.replace(flight, misled=TURNED, turned=error)
+    off = math.hypot(*np.subtract(target.position[:2], odometry.position[:2]).tolist())
+    rests = math.isfinite(flight.nearest) or float(np.linalg.norm(odometry.velocity)) < SLOW
+    nearest = min(flight.nearest, off) if rests else math.inf
+    misled = flight.misled or (MISLED if off > nearest + settings.follow_distance else None)
+    return dataclasses.replace(flight, nearest=nearest, misled=misled)
+
+
+def _nearly_landed(flight: Flight, odometry: Odometry | None) -> bool:
+    if flight.mode is not Mode.LAND or flight.blind or odometry is None:
+        return False
+    return abs(float(odometry.position[2]) - flight.home) < NEAR_GROUND
+
+
+def _mission_low(inputs: Inputs) -> bool:
+    return inputs.pilot is not None and inputs.pilot.mission is Mission.LAND
+
+
+def _common(flight: Flight, inputs: Inputs) -> Flight | None:
+    """What holds in every mode: disarming ends a flight, and the override switch is the pilot's."""
+    if inputs.link_problem:
+        return None  # nothing is known of the controller; each mode decides
+    if not inputs.armed:
+        return None if flight.mode in (Mode.INIT, Mode.DONE) else to(flight, Mode.DONE, Reason.DISARMED)
+    if not inputs.override and (flight.mode in AIRBORNE or _left_the_ground(flight, inputs.seen)):
+        return to(flight, Mode.PILOT, Reason.OVERRIDE_OFF, target=_here(inputs))
+    if flight.mode in AIRBORNE and flight.fallen_since is not None and flight.now - flight.fallen_since >= FALLEN_S:
+        return to(flight, Mode.DONE, Reason.CRASHED)
+    return None
+
+
+def _left_the_ground(flight: Flight, odometry: Odometry | None) -> bool:
+    """Whether the pilot has taken off by hand: handed over, the vehicle must not be let fall."""
+    grounded = flight.mode in (Mode.INIT, Mode.DONE)
+    return grounded and odometry is not None and abs(float(odometry.position[2]) - flight.home) > ON_GROUND
+
+
+def _init(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
+    del dt
+    odometry = inputs.seen
+    if odometry is not None and not inputs.armed:
+        flight = dataclasses.replace(flight, home=float(odometry.position[2]))
+    if refusals := take_off_refusals(settings, flight, inputs):
+        # what else was wrong may come right by itself: only the mission switch may start a flight
+        return dataclasses.replace(flight, reasons=refusals, rearm=not _mission_low(inputs))
+    assert inputs.pilot is not None
+    assert odometry is not None
+    if inputs.pilot.mission is Mission.LAND:
+        return dataclasses.replace(flight, reasons=(Reason.WAITING,))
+    target = here(odometry)
+    flight = dataclasses.replace(flight, home=target.position[2], lock=inputs.pilot.mission is Mission.POLICY)
+    return to(flight, Mode.TAKEOFF, Reason.MISSION, target=target)
+
+
+def _lost(inputs: Inputs) -> tuple[str, ...]:
+    """What is missing that nobody but the pilot flies without."""
+    if inputs.seen is None:
+        return (inputs.blindness,)
+    if inputs.link_problem:
+        return (f"{Reason.LINK}: {inputs.link_problem}",)
+    return (Reason.NO_PILOT,) if inputs.pilot is None else ()
+
+
+def _must_land(settings: FlightSettings, inputs: Inputs) -> tuple[str, ...]:
+    """Why the hover controller must land now."""
+    if reasons := _lost(inputs):
+        return reasons
+    if _mission_low(inputs):
+        return (Reason.MISSION,)
+    if inputs.accelerometer_problem:
+        return (f"{Reason.ACCELEROMETER}: {inputs.accelerometer_problem}",)
+    return tuple(battery_refusals(settings, inputs)) if inputs.voltage is not None else ()
+
+
+def _here(inputs: Inputs) -> Target | None:
+    return None if inputs.seen is None else here(inputs.seen)
+
+
+def _take_off(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
+    if reasons := _must_land(settings, inputs):
+        return land(settings, flight, inputs, *reasons)
+    assert flight.target is not None
+    assert inputs.odometry is not None
+    height = float(inputs.odometry.position[2]) - flight.home
+    elapsed = flight.now - flight.since
+    if elapsed > settings.takeoff_height / settings.takeoff_speed + CLIMB_S:
+        return land(settings, flight, inputs, f"{Reason.NOT_CLIMBING}: {height:.2f} m after {elapsed:.0f} s")
+    x, y, z = flight.target.position
+    goal = flight.home + settings.takeoff_height
+    climb = min(settings.takeoff_speed, math.sqrt(2 * SLOWING * max(goal - z, 0.0)) + 0.02)
+    up = min(z + climb * dt, goal)
+    target = Target((x, y, up), flight.target.yaw, climb if up < goal else 0.0)
+    if settings.takeoff_height - height < 0.1 and up == goal:
+        return to(flight, Mode.HOVER, Reason.REACHED, target=target)
+    return dataclasses.replace(flight, target=target)
+
+
+def _hover(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
+    if reasons := _must_land(settings, inputs):
+        return land(settings, flight, inputs, *reasons)
+    assert flight.target is not None
+    assert inputs.odometry is not None
+    assert inputs.pilot is not None
+    if inputs.pilot.mission is Mission.POLICY:
+        refusals = policy_refusals(settings, flight, inputs, inputs.odometry)
+        if not refusals:
+            return to(flight, Mode.POLICY, Reason.MISSION)
+        flight = dataclasses.replace(flight, reasons=refusals)
+    assert flight.target is not None
+    target = moved(settings, flight.target, inputs.pilot, dt)
+    nearest = flight.nearest if target.position[:2] == flight.target.position[:2] else math.inf
+    return dataclasses.replace(flight, target=target, nearest=nearest)
+
+
+def _policy(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
+    del dt
+    if lost := _lost(inputs):
+        return land(settings, flight, inputs, *lost)
+    assert inputs.odometry is not None
+    assert inputs.pilot is not None
+    reasons: tuple[str, ...] = ()
+    if inputs.pilot.mission is not Mission.POLICY:
+        reasons = (Reason.MISSION,)
+    elif inputs.policy_done:
+        reasons = (Reason.POLICY_DONE,)
+        if float(inputs.odometry.position[2]) - settings.ground_height < ON_GROUND:
+            return land(settings, flight, inputs, *reasons)
+    else:
+        reasons = policy_refusals(settings, flight, inputs, inputs.odometry)
+    if reasons:
+        return to(flight, Mode.HOVER, *reasons, target=stopping(settings.fence, inputs.odometry), lock=True)
+    return flight
+
+
+def _with_pilot(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
+    """While the pilot flies, the hover controller stays ready at the place where the vehicle is."""
+    del dt
+    odometry = inputs.seen
+    if not inputs.override or inputs.link_problem:
+        return dataclasses.replace(flight, target=_here(inputs))
+    if odometry is None:
+        return land(settings, flight, inputs, Reason.OVERRIDE_ON, inputs.blindness)
+    if stands(settings, flight, odometry):
+        return to(flight, Mode.INIT, Reason.OVERRIDE_ON, rearm=True)
+    return to(flight, Mode.HOVER, Reason.OVERRIDE_ON, target=here(odometry), lock=True)
+
+
+def _done(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
+    del settings, dt
+    if inputs.armed or inputs.link_problem:
+        return flight
+    return to(flight, Mode.INIT, Reason.DISARMED, rearm=True)
+
+
+_STEPS = {
+    Mode.INIT: _init,
+    Mode.TAKEOFF: _take_off,
+    Mode.HOVER: _hover,
+    Mode.POLICY: _policy,
+    Mode.LAND: landing,
+    Mode.PILOT: _with_pilot,
+    Mode.DONE: _done,
+}

@@ -1,0 +1,246 @@
+"""From thrust to throttle: a map that learns in flight.
+
+The vehicle file gives its shape: rotor speed rises linearly with the throttle from idle to full, thrust by the
+vehicle's thrust map. What is learned is a factor on it, and how that falls with the battery's voltage, from the
+specific force along body z that was measured some 40 ms after each throttle (as in px4ctrl, which learns the one factor
+of a straight line by recursive least squares with forgetting). Forgetting would lose the voltage's part, which shows
+over minutes only: here both wander at random, each at its own pace, and a Kalman filter follows them.
+"""
+
+import dataclasses
+import json
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from e2efly.storage import finite, unique
+from e2efly.vehicles.tables import shown
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+SCALE_RANGE = (0.5, 2.0)
+"""Bounds of the learned factor."""
+GAIN_RANGE = (0.0, 4.0)
+"""Bounds of its relative change over the relative change of voltage: 2 where rotor speed follows the voltage."""
+SCALE_RATE, GAIN_RATE = 0.25, 0.5
+"""Largest changes of factor and voltage gain that are used, 1/s: they never jump."""
+LOWEST_FORCE = 0.3 * GRAVITY
+"""Measurements below are not learned from: drag and noise outweigh thrust."""
+BELIEVED = (0.25, 4.0)
+"""Measured over nominal force, between which a measurement is learned from."""
+VOLTAGE_BELIEVED = (0.6, 1.4)
+"""Voltage over that at which the factor holds, between which it is believed."""
+NOISE = 0.1
+"""Of the accelerometer and of what the map leaves out, standard deviation, gravities."""
+WANDER = np.diag([4e-6, 1e-5])
+"""Variance that factor and voltage gain gain a second: the factor is followed within 7 s, the gain within minutes."""
+START = ((0.05, 0.0), (0.0, 0.5))
+"""First covariance, and its bound: how far off the vehicle file may be (factor: 20 % rms; voltage gain: 0.7)."""
+BLOWN = 3.0
+"""Beyond this force across the body, m/s^2, the air pushes so hard that the force along it tells little of thrust."""
+THRUST_DELAY = (0.015, 0.075)
+"""How long before a measured force its throttle was sent, s: the link, the rate loop and the motors' lag."""
+_FIELDS = ("vehicle_hash", "voltage", "scale", "gain", "updates", "residual")
+
+
+@dataclass(frozen=True)
+class ThrottleMap:
+    """Throttle (0: idle, 1: full) against specific force along body z, m/s^2. Make it with `ThrottleMap.of`."""
+
+    vehicle_hash: str
+    """Of the vehicle that it is a map of."""
+    mass: float
+    """kg."""
+    thrust_map: tuple[float, float, float]
+    """Thrust of a rotor over its speed: k2, k1, k0."""
+    speed: tuple[float, float]
+    """Rotor speed at idle and at full throttle, rad/s."""
+    voltage: float
+    """Volts per cell at which the factor holds."""
+    scale: float = 1.0
+    """The factor in use: it follows `learned` slowly."""
+    gain: float = 2.0
+    """The voltage gain in use: it follows `learned` slowly."""
+    learned: tuple[float, float] = (1.0, 2.0)
+    """The factor at `voltage`, and its voltage gain, as the filter has them."""
+    covariance: tuple[tuple[float, float], tuple[float, float]] = START
+    """Of `learned`."""
+    last_voltage: float | None = None
+    """The last that was believed, V per cell; None: none yet."""
+    updates: int = 0
+    """Measurements learned from."""
+    residual: float = 0.0
+    """Smoothed root of the squared error of its predictions, m/s^2."""
+
+    @staticmethod
+    def of(vehicle: Vehicle, voltage: float = 3.9) -> "ThrottleMap":
+        """The vehicle file's map, taken to hold at `voltage` V per cell."""
+        k2, k1, k0 = (float(k) for k in vehicle.thrust_map)
+        top = vehicle.thrust_range[1]
+        full = (-k1 + math.sqrt(k1**2 + 4 * k2 * (top - k0))) / (2 * k2)
+        idle = float(vehicle.rotor_speed_min)
+        return ThrottleMap(vehicle.hash, float(vehicle.mass), (k2, k1, k0), (idle, full), voltage)
+
+    @property
+    def doubt(self) -> float:
+        """Share of the force by which the map may be wrong: two standard deviations, and what is not yet in use."""
+        scale, learned = self.scale, self.learned[0]
+        return (2 * math.sqrt(self.covariance[0][0]) + abs(learned - scale)) / scale
+
+    def nominal(self, throttle: float) -> float:
+        """Specific force, m/s^2, of a throttle by the vehicle file alone."""
+        k2, k1, k0 = self.thrust_map
+        idle, full = self.speed
+        speed = idle + throttle * (full - idle)
+        return 4 * max((k2 * speed + k1) * speed + k0, 0.0) / self.mass
+
+    def force(self, throttle: float, voltage: float | None = None) -> float:
+        """Specific force, m/s^2, of a throttle, as learned; voltage of a cell, None: the last that was known."""
+        return self.nominal(throttle) * self._factor(voltage)
+
+    def expected(self, throttle: float, voltage: float | None = None) -> tuple[float, float]:
+        """Specific force of a throttle, and how far it may be off, m/s^2."""
+        force = self.force(throttle, voltage)
+        return force, force * self.doubt
+
+    def throttle(self, force: float, voltage: float | None = None) -> float:
+        """The throttle in [0, 1] that gives a specific force, m/s^2: the inverse of `force`, saturating."""
+        k2, k1, k0 = self.thrust_map
+        idle, full = self.speed
+        thrust = max(force, 0.0) / self._factor(voltage) * self.mass / 4
+        inside = k1**2 + 4 * k2 * (thrust - k0)
+        speed = (-k1 + math.sqrt(max(inside, 0.0))) / (2 * k2)
+        return min(max((speed - idle) / (full - idle), 0.0), 1.0)
+
+    def change(self, voltage: float | None) -> float:
+        """Relative change of the voltage; one that cannot be counts as the last that could."""
+        believed = voltage if _believed(self, voltage) else self.last_voltage
+        return 0.0 if believed is None else believed / self.voltage - 1
+
+    def _factor(self, voltage: float | None) -> float:
+        factor = self.scale * (1 + self.gain * self.change(voltage))
+        return min(max(factor, SCALE_RANGE[0] / 2), SCALE_RANGE[1] * 2)
+
+
+def _believed(m: ThrottleMap, voltage: float | None) -> bool:
+    return voltage is not None and VOLTAGE_BELIEVED[0] < voltage / m.voltage < VOLTAGE_BELIEVED[1]
+
+
+def update(m: ThrottleMap, throttle: float, force: float, voltage: float | None, dt: float) -> ThrottleMap:
+    """Learn from the specific force, m/s^2, that a throttle gave; what cannot be is not learned from.
+
+    Args:
+        m: the map.
+        throttle: sent one delay before the measurement.
+        force: measured along body z.
+        voltage: of a cell, V; None: unknown, the last known one is taken.
+        dt: since the last update, s.
+    """
+    nominal = m.nominal(throttle)
+    believed = force >= LOWEST_FORCE <= nominal and BELIEVED[0] * nominal < force < BELIEVED[1] * nominal
+    if not (believed and 0 < dt < math.inf):  # true for NaN
+        return m
+    dt = min(dt, 0.1)
+    change, (scale, gain) = m.change(voltage), m.learned
+    row = np.array([1 + gain * change, scale * change]) * (nominal / GRAVITY)
+    error = (force - scale * nominal * (1 + gain * change)) / GRAVITY
+    covariance = np.array(m.covariance) + WANDER * dt
+    k = covariance @ row / (NOISE**2 + row @ covariance @ row)
+    covariance = covariance - np.outer(k, row @ covariance)
+    shrink = np.sqrt(np.minimum(np.diag(START) / np.diag(covariance), 1.0))
+    (a, b), (c, d) = (covariance * np.outer(shrink, shrink)).tolist()
+    scale = min(max(scale + float(k[0]) * error, SCALE_RANGE[0]), SCALE_RANGE[1])
+    gain = min(max(gain + float(k[1]) * error, GAIN_RANGE[0]), GAIN_RANGE[1])
+    return dataclasses.replace(
+        m,
+        scale=_towards(m.scale, scale, SCALE_RATE * dt),
+        gain=_towards(m.gain, gain, GAIN_RATE * dt),
+        learned=(scale, gain),
+        covariance=((a, b), (c, d)),
+        last_voltage=voltage if _believed(m, voltage) else m.last_voltage,
+        updates=m.updates + 1,
+        residual=math.sqrt(0.99 * m.residual**2 + 0.01 * (error * GRAVITY) ** 2),
+    )
+
+
+def learn(m: ThrottleMap, throttle: float, force: np.ndarray, voltage: float | None, dt: float) -> ThrottleMap:
+    """`update` by a specific force (3,), body FLU, m/s^2, unless the air pushes hard across the body."""
+    blown = math.hypot(force[0], force[1]) > BLOWN
+    return m if blown else update(m, throttle, float(force[2]), voltage, dt)
+
+
+def _towards(value: float, goal: float, reach: float) -> float:
+    return value + min(max(goal - value, -reach), reach)
+
+
+def as_json(m: ThrottleMap) -> str:
+    """What was learned, to be saved with the flight and offered to the next."""
+    values = (m.vehicle_hash, m.voltage, *m.learned, m.updates, m.residual)
+    return json.dumps(finite(dict(zip(_FIELDS, values, strict=True))), indent=2)
+
+
+def from_json(text: str, vehicle: Vehicle) -> ThrottleMap:
+    """The map of a vehicle with what an earlier flight learned, which this flight goes on from.
+
+    Raises:
+        ValueError: naming the field, the value and what is accepted; for the map of another vehicle.
+    """
+    try:
+        values = json.loads(text, object_pairs_hook=unique)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"throttle map: not JSON: {error}") from None
+    if not isinstance(values, dict) or set(values) != set(_FIELDS):
+        found = ", ".join(map(str, values)) if isinstance(values, dict) else type(values).__name__
+        raise ValueError(f"throttle map: it has {found}; accepted: an object with {', '.join(_FIELDS)}")
+    if values["vehicle_hash"] != vehicle.hash:
+        raise _refusal("vehicle_hash", values["vehicle_hash"], f"{vehicle.hash!r}, that of {vehicle.name!r}")
+    ranges = {"voltage": (2.0, 5.0), "scale": SCALE_RANGE, "gain": GAIN_RANGE, "residual": (0.0, 100.0)}
+    numbers = {}
+    for name, (low, high) in ranges.items():
+        value = values[name]
+        if type(value) not in (int, float) or not low <= value <= high:
+            raise _refusal(name, value, f"{low:g} to {high:g}")
+        numbers[name] = float(value)
+    if type(values["updates"]) is not int or values["updates"] < 0:
+        raise _refusal("updates", values["updates"], "a whole number, 0 or more")
+    learned = numbers["scale"], numbers["gain"]
+    fresh = ThrottleMap.of(vehicle, numbers.pop("voltage"))
+    return dataclasses.replace(fresh, **numbers, learned=learned, updates=values["updates"])
+
+
+def _refusal(name: str, value: Any, accepted: str) -> ValueError:
+    return ValueError(f"throttle map: {name} is {shown(value)}; accepted: {accepted}")
+
+
+class ThrottleHistory:
+    """The throttles that were sent, to be met with what they caused."""
+
+    def __init__(self, seconds: float = 5.0) -> None:
+        self._sent: deque[tuple[float, float]] = deque()
+        self._seconds = seconds
+
+    def add(self, time: float, throttle: float) -> None:
+        """A throttle was sent at `time`, s."""
+        self._sent.append((time, throttle))
+        while self._sent and self._sent[0][0] < time - self._seconds:
+            self._sent.popleft()
+
+    def felt(self, moment: float) -> float | None:
+        """The mean throttle that the force at a moment, s, is due to; None: not known."""
+        return self.between(moment - THRUST_DELAY[1], moment - THRUST_DELAY[0])
+
+    def between(self, start: float, end: float) -> float | None:
+        """The mean throttle in force from `start` to `end`, s; None: not known that far back."""
+        if not self._sent or self._sent[0][0] > start:
+            return None
+        total, until = 0.0, end
+        for time, throttle in reversed(self._sent):
+            begin = max(time, start)
+            if begin < until:
+                total += throttle * (until - begin)
+                until = begin
+            if time <= start:
+                break
+        return total / (end - start)

@@ -1,0 +1,1 @@
+"""A policy as a vehicle runs it: its file, its contract, its runtime."""

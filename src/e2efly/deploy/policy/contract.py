@@ -1,0 +1,222 @@
+"""The contract of an exported policy: what it sees, what it commands, and what it was trained for.
+
+It travels as JSON in the metadata of `policy.onnx` under the key `METADATA_KEY`. Imports no JAX and no simulator.
+"""
+
+import dataclasses
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+from typing import Any
+
+from e2efly.control.modes import COMMANDS
+from e2efly.deploy.policy import contract_json as read
+from e2efly.deploy.policy.images import Image
+from e2efly.observation import Field
+from e2efly.storage import unique
+from e2efly.vehicles.vehicle import GRAVITY
+
+CONTRACT_VERSION = 2
+"""Version of the meaning of these fields; a policy of another version is refused."""
+METADATA_KEY = "contract"
+"""Key of the contract in the metadata of the ONNX file."""
+ACTION_SIZE = 4
+"""Numbers of an action."""
+ACTION_LIMITS = (-1.0, 1.0)
+"""Smallest and largest entry of an action; what lies outside is clipped before it is mapped."""
+ACTION_MAPPING = "command = low + (action + 1) / 2 * (high - low)"
+"""From action to physical command, entry by entry."""
+RATES = (0.1, 10_000.0)
+"""Smallest and largest control rate, Hz."""
+FRAMES = ("world", "body", "world_body", "none")
+"""Frames of an observation field."""
+
+
+@dataclass(frozen=True)
+class Action:
+    """What the policy commands."""
+
+    mode: str
+    """A command mode: a key of `COMMANDS`."""
+    fields: tuple[str, ...]
+    """Names of the four commands."""
+    units: tuple[str, ...]
+    """Their units."""
+    low: tuple[float, ...]
+    """Command at action -1, the smallest that is ever sent, in `units`."""
+    high: tuple[float, ...]
+    """Command at action +1, the largest that is ever sent, in `units`."""
+    limits: tuple[float, ...] = ACTION_LIMITS
+    """Smallest and largest entry of an action."""
+    mapping: str = ACTION_MAPPING
+    """How an action becomes a command."""
+
+
+@dataclass(frozen=True)
+class Contract:
+    """Everything that whoever flies a policy must agree with."""
+
+    contract_version: int
+    """`CONTRACT_VERSION`."""
+    e2efly_version: str
+    """Version of the package that exported it, to be told to people; not compared."""
+    task: str
+    """Name of the task."""
+    vehicle: str
+    """Name of the vehicle."""
+    vehicle_hash: str
+    """Hash of the vehicle's parameters: 16 hex digits."""
+    control_rate_hz: float
+    """How often the policy is asked, Hz."""
+    latency_s: float
+    """Time from observation to command for which it is made, s: the vehicle's; the mean where training had others."""
+    latency_range_s: tuple[float, ...]
+    """Smallest and largest of it, s."""
+    observation_latency_range_s: tuple[float, ...]
+    """Smallest and largest age of the observed state in training, s."""
+    observation: tuple[Field, ...]
+    """What the policy is told, in order."""
+    images: tuple[Image, ...]
+    """What it sees besides, camera by camera."""
+    memory_size: int
+    """Numbers that it hands from one question to the next (the state of its GRU); 0: none."""
+    action: Action
+    """What it commands."""
+    hover_action: tuple[float, ...]
+    """The past actions that it is shown before it has acted; it hovers, where the command mode has a hover."""
+
+    @cached_property
+    def observation_size(self) -> int:
+        """Numbers of the observation."""
+        return sum(field.size for field in self.observation)
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Where each field lies in the observation, by name, in order."""
+        ends = list(accumulate(field.size for field in self.observation))
+        return {f.name: slice(end - f.size, end) for f, end in zip(self.observation, ends, strict=True)}
+
+    @cached_property
+    def attitude(self) -> str:
+        """Name of the field that is the attitude."""
+        return next(field.name for field in self.observation if field.frame == "world_body")
+
+    def to_json(self) -> str:
+        """The contract as JSON.
+
+        Raises:
+            ValueError: for a contract that `from_json` would refuse.
+        """
+        text = json.dumps(dataclasses.asdict(self), indent=2)
+        Contract.from_json(text)
+        return text
+
+    @staticmethod
+    def from_json(text: str) -> "Contract":
+        """Read a contract, checking every value.
+
+        Raises:
+            ValueError: naming the field, the value and what is accepted.
+        """
+        try:
+            content = json.loads(text, object_pairs_hook=unique)
+        except (ValueError, RecursionError) as error:
+            raise ValueError(f"contract: not JSON: {error}") from None
+        if isinstance(content, dict) and "contract_version" in content:  # first: other versions have other keys
+            version = content["contract_version"]
+            if type(version) is not int or version != CONTRACT_VERSION:
+                raise read.refusal("contract_version", version, f"{CONTRACT_VERSION}; export it again with this e2efly")
+        return _contract(read.table(content, "", Contract))
+
+
+def _contract(x: dict[str, Any]) -> Contract:
+    latency = read.seconds_range(x["latency_range_s"], "latency_range_s")
+    latency_s = read.number(x["latency_s"], "latency_s")
+    if not latency[0] <= latency_s <= latency[1]:
+        raise read.refusal("latency_s", latency_s, f"a number of seconds within latency_range_s, {list(latency)}")
+    rate = read.number(x["control_rate_hz"], "control_rate_hz")
+    if not RATES[0] <= rate <= RATES[1]:
+        raise read.refusal("control_rate_hz", rate, f"{RATES[0]:g} to {RATES[1]:g} Hz")
+    vehicle_hash = read.text(x["vehicle_hash"], "vehicle_hash")
+    if len(vehicle_hash) != 16 or set(vehicle_hash) - set("0123456789abcdef"):
+        raise read.refusal("vehicle_hash", vehicle_hash, "16 hex digits in lower case")
+    hover = read.numbers(x["hover_action"], "hover_action", ACTION_SIZE)
+    if not all(ACTION_LIMITS[0] <= value <= ACTION_LIMITS[1] for value in hover):
+        raise read.refusal("hover_action", list(hover), "four numbers in [-1, 1]")
+    return Contract(
+        contract_version=x["contract_version"],
+        e2efly_version=read.text(x["e2efly_version"], "e2efly_version"),
+        task=read.text(x["task"], "task"),
+        vehicle=read.text(x["vehicle"], "vehicle"),
+        vehicle_hash=vehicle_hash,
+        control_rate_hz=rate,
+        latency_s=latency_s,
+        latency_range_s=latency,
+        observation_latency_range_s=read.seconds_range(x["observation_latency_range_s"], "observation_latency_range_s"),
+        observation=_observation(x["observation"]),
+        images=_images(x["images"], rate),
+        memory_size=read.whole(x["memory_size"], "memory_size", 0),
+        action=_action(x["action"]),
+        hover_action=hover,
+    )
+
+
+def _observation(value: Any) -> tuple[Field, ...]:
+    entries = read.entries(value, "observation", None)
+    fields = tuple(_field(entry, f"observation[{i}]") for i, entry in enumerate(entries))
+    names = [field.name for field in fields]
+    if len(set(names)) != len(names):
+        raise read.refusal("observation", names, "fields of different names")
+    if sum(field.frame == "world_body" for field in fields) != 1:
+        raise read.refusal("observation", names, "fields with exactly one attitude (frame 'world_body')")
+    return fields
+
+
+def _field(value: Any, where: str) -> Field:
+    x = read.table(value, where, Field)
+    size, frame = read.whole(x["size"], f"{where}.size", 1), read.text(x["frame"], f"{where}.frame")
+    if frame not in FRAMES:
+        raise read.refusal(f"{where}.frame", frame, " or ".join(map(repr, FRAMES)))
+    if (frame == "world" and size % 3) or (frame == "world_body" and size != 4):
+        needed = "a multiple of 3, as its frame is 'world'" if frame == "world" else "4, as its frame is 'world_body'"
+        raise read.refusal(f"{where}.size", size, needed)
+    scale = read.number(x["scale"], f"{where}.scale")
+    if scale <= 0:
+        raise read.refusal(f"{where}.scale", scale, "a positive number")
+    name, unit, text = (read.text(x[key], f"{where}.{key}") for key in ("name", "unit", "description"))
+    return Field(name, size, frame, unit, scale, text)
+
+
+def _images(value: Any, rate: float) -> tuple[Image, ...]:
+    if not isinstance(value, list):
+        raise read.refusal("images", value, "a list of images, empty for a policy that sees none")
+    images = tuple(Image.of_json(entry, f"images[{i}]") for i, entry in enumerate(value))
+    names = [image.name for image in images]
+    if len(set(names)) != len(names):
+        raise read.refusal("images", names, "images of different names")
+    for i, image in enumerate(images):
+        if image.rate_hz > rate * (1 + 1e-6):
+            raise read.refusal(f"images[{i}].rate_hz", image.rate_hz, f"at most control_rate_hz, {rate:g}")
+    return images
+
+
+def _action(value: Any) -> Action:
+    x = read.table(value, "action", Action)
+    mode = read.text(x["mode"], "action.mode")
+    if mode not in COMMANDS:
+        raise read.refusal("action.mode", mode, " or ".join(map(repr, COMMANDS)))
+    for key, accepted in zip(("fields", "units"), COMMANDS[mode], strict=True):
+        if x[key] != list(accepted):
+            raise read.refusal(f"action.{key}", x[key], f"{list(accepted)}, as action.mode is {mode!r}")
+    if read.numbers(x["limits"], "action.limits", 2) != ACTION_LIMITS:
+        raise read.refusal("action.limits", x["limits"], f"{list(ACTION_LIMITS)}")
+    if x["mapping"] != ACTION_MAPPING:
+        raise read.refusal("action.mapping", x["mapping"], repr(ACTION_MAPPING))
+    low, high = (read.numbers(x[key], f"action.{key}", ACTION_SIZE) for key in ("low", "high"))
+    if not all(a < b for a, b in zip(low, high, strict=True)):
+        raise read.refusal("action.low", list(low), f"four numbers below action.high, {list(high)}")
+    if COMMANDS[mode][0][0] == "collective_thrust" and not 0 <= low[0] < GRAVITY < high[0]:
+        accepted = f"from 0 or more, below {GRAVITY} m/s^2, to more than it, which hovers"
+        raise read.refusal("action.low[0] to action.high[0], the collective thrust,", [low[0], high[0]], accepted)
+    return Action(mode, *COMMANDS[mode], low, high)

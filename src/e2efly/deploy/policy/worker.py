@@ -1,0 +1,101 @@
+"""Ask the policy in a thread of its own, so that a slow or stuck policy never holds up the control loop."""
+
+import os
+import threading
+import time
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as Late
+from contextlib import suppress
+from queue import SimpleQueue
+from typing import Any
+
+from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.policy.runtime import Decision, Imu, Runtime, RuntimeState, act, begin, due, outside
+
+
+class PolicyWorker:
+    """The policy of a flight. None of its methods raises for what the policy does."""
+
+    def __init__(self, runtime: Runtime, timeout: float) -> None:
+        self.runtime, self.timeout = runtime, timeout
+        """The policy with its goal; how long a step waits for it, s."""
+        self.state: RuntimeState | None = None
+        """Of the flight under way."""
+        self.last: RuntimeState | None = None
+        """The newest of the flight under way, or of the last one."""
+        self.decision: Decision | None = None
+        """The last one: it is flown until the next is due."""
+        self.problem: str | None = None
+        """Why the policy failed in this flight."""
+        self._questions: SimpleQueue[tuple[Future, tuple[Any, ...]] | None] = SimpleQueue()
+        self._running: Future | None = None
+        # a daemon: not even a policy that never answers keeps the program from ending
+        self._thread = threading.Thread(target=self._answer, name="policy", daemon=True)
+        self._thread.start()
+
+    @property
+    def native_id(self) -> int:
+        """Of its thread, as the operating system knows it."""
+        assert self._thread.native_id is not None
+        return self._thread.native_id
+
+    @property
+    def done(self) -> bool:
+        """Its task is over."""
+        return self.state is not None and self.state.done
+
+    def readiness(self, odometry: Odometry, now: float) -> str | None:
+        """Why it must not take over now; None: it may."""
+        if self._busy:
+            return "it is still busy with an earlier question"
+        return "; ".join(outside(self.runtime, odometry, now)) or None
+
+    def start(self, odometry: Odometry, now: float) -> None:
+        """It takes over."""
+        self.problem = self.decision = None
+        self.state = begin(self.runtime, odometry, now)
+
+    def stop(self) -> None:
+        """It flies no more."""
+        self.state = self.decision = None
+
+    def step(self, odometry: Odometry, now: float, slack: float, imu: Imu | None) -> bool:
+        """Ask it, where it is due within `slack` s; whether it has decided anew. What goes wrong is in `problem`."""
+        state = self.state
+        if state is None or now + slack < due(self.runtime, state):
+            return False
+        if self._busy:
+            self.problem = "late: it is still busy with an earlier question"
+            return False
+        started = time.perf_counter()
+        self._running = Future()
+        self._questions.put((self._running, (self.runtime, state, odometry, now, imu)))
+        try:
+            state, self.decision = self._running.result(self.timeout)
+        except Late:
+            self.problem = f"late: no answer within {1e3 * (time.perf_counter() - started):.0f} ms"
+            with suppress(OSError, AttributeError):  # should it never come back, others must run
+                os.sched_setscheduler(self.native_id, os.SCHED_OTHER, os.sched_param(0))
+        except Exception as error:  # whatever a policy does, the vehicle goes on flying
+            self.problem = str(error) or type(error).__name__
+        else:
+            self.state = self.last = state
+            self.problem = state.failure or None
+            return True
+        return False
+
+    def close(self) -> None:
+        """End the thread, once the policy lets it."""
+        self._questions.put(None)
+
+    @property
+    def _busy(self) -> bool:
+        return self._running is not None and not self._running.done()
+
+    def _answer(self) -> None:
+        while (question := self._questions.get()) is not None:
+            future, asked = question
+            try:
+                future.set_result(act(*asked))
+            except Exception as error:  # told to whoever waits for it
+                future.set_exception(error)

@@ -1,0 +1,31 @@
+"""Motion capture systems, by the package `motioncapture`."""
+
+import sys
+
+from e2efly.deploy.pose.registry import part_of, register
+from e2efly.deploy.pose.relay import RelaySource, open_relay
+
+SYSTEMS = ("vrpn", "optitrack", "vicon", "qualisys", "nokov", "fzmotion", "mock")
+"""Systems that `motioncapture` may be built for; it says itself which ones it is."""
+ADVICE = (
+    "install the package motioncapture (pip install motioncapture), and check that the system streams to this machine"
+)
+"""What to do when it does not open."""
+
+
+@register("mocap", "mocap:TYPE:HOST:RIGID_BODY")
+def open_mocap(where: str) -> RelaySource:
+    """Follow one rigid body.
+
+    Args:
+        where: one of `SYSTEMS`, the address of the machine that streams, and the name of the rigid body there.
+
+    Raises:
+        ValueError: for an unknown system, a package that is not installed, a system that does not answer.
+    """
+    system, _, rest = where.partition(":")
+    host, _, body = rest.partition(":")
+    system, host, body = part_of(system), part_of(host), part_of(body)
+    if system not in SYSTEMS:
+        raise ValueError(f"pose source mocap: type is {system!r}; accepted: {', '.join(SYSTEMS)}")
+    return open_relay(f"mocap:{system}:{host}:{body}", [sys.executable], ADVICE, "mocap", system, host, body)

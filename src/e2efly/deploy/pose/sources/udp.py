@@ -1,0 +1,100 @@
+"""Poses in UDP datagrams, one JSON object per datagram."""
+
+import contextlib
+import socket
+import struct
+import time
+
+from e2efly.deploy.odometry import Sample
+from e2efly.deploy.pose.json_source import LONGEST, parse_pose
+from e2efly.deploy.pose.registry import port_of, register
+from e2efly.deploy.pose.source import Inbox
+
+BUFFER = 32 << 10
+"""Bytes that the kernel is asked to keep between two reads, some 80 poses. It keeps the oldest: the less, the newer."""
+DRAIN = 128
+"""Most datagrams that one `read` takes, which is more than the buffer holds; most are thrown away unread."""
+_TIMESTAMP = 35  # SO_TIMESTAMPNS of Linux, which Python's socket module does not name
+
+
+@register("udp", "udp:PORT or udp:HOST:PORT, with HOST an address of this machine; without it 127.0.0.1")
+def open_udp(where: str) -> "UdpSource":
+    """Listen at [HOST:]PORT."""
+    host, _, port = where.rpartition(":")
+    return UdpSource(host or "127.0.0.1", port_of(port))
+
+
+class UdpSource:
+    """One JSON object per datagram; bound to an address of this machine."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Bind.
+
+        Args:
+            host: address of this machine; 0.0.0.0 listens to the whole network.
+            port: 0 takes a free one.
+
+        Raises:
+            ValueError: when it cannot be bound.
+        """
+        self._inbox = Inbox(parse_pose)
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+        with contextlib.suppress(OSError):  # elsewhere than on Linux `now` has to do
+            self._socket.setsockopt(socket.SOL_SOCKET, _TIMESTAMP, 1)
+        try:
+            self._socket.bind((host, port))
+        except OSError as error:
+            self._socket.close()
+            raise ValueError(
+                f"pose source udp:{host}:{port} cannot be bound: {error.strerror}; accepted: an address of this "
+                "machine and a port that no other program listens to"
+            ) from None
+        self.address: tuple[str, int] = self._socket.getsockname()
+
+    @property
+    def refused(self) -> int:
+        """Datagrams that were malformed or too many."""
+        return self._inbox.refused
+
+    @property
+    def problem(self) -> str | None:
+        """What was wrong last."""
+        return self._inbox.problem
+
+    def read(self, now: float) -> list[Sample]:
+        """Datagrams since the last call; `received` is when the kernel took them, not when they were read."""
+        del now
+        for _ in range(DRAIN):
+            try:
+                message, extra, flags, _ = self._socket.recvmsg(LONGEST, 64)
+            except BlockingIOError:
+                break
+            except OSError as error:
+                self._inbox.refuse(f"{self.describe()}: {error.strerror or error}")
+                break
+            if flags & socket.MSG_TRUNC:
+                self._inbox.refuse(f"pose: a datagram of more than {LONGEST} bytes; accepted: at most {LONGEST}")
+            else:
+                # not `now`: this process may have been held up since, and a time too early would spoil the clock map
+                self._inbox.put(message, time.monotonic() - _waited(extra))
+        return self._inbox.take()
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+    def describe(self) -> str:
+        """The address that it listens to."""
+        return f"udp:{self.address[0]}:{self.address[1]}"
+
+
+def _waited(extra: list[tuple[int, int, bytes]]) -> float:
+    """How long ago the kernel took a datagram, s, from the time stamp it gives along (wall clock); 0 without one."""
+    for level, kind, data in extra:
+        if level == socket.SOL_SOCKET and kind == _TIMESTAMP and len(data) == struct.calcsize("@ll"):
+            seconds, nanoseconds = struct.unpack("@ll", data)
+            waited = time.time() - seconds - nanoseconds * 1e-9
+            return waited if 0 < waited < 1 else 0.0  # the wall clock may have been set meanwhile
+    return 0.0

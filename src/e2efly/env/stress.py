@@ -1,0 +1,218 @@
+"""Vehicles, air and sensors that are not those of a policy's training: one fixed set of rows, and what they draw.
+
+The flight controller believes in the policy's own vehicle in every row. A row is numbers of the episodes, so that one
+compiled program flies all of them.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import jax
+import numpy as np
+
+from e2efly.config import NoiseConfig
+from e2efly.env.disturbance import Disturbance
+from e2efly.env.environment import Env
+from e2efly.env.state import EnvState
+from e2efly.sensors import latency
+from e2efly.vehicles.names import unknown
+from e2efly.vehicles.vehicle import Vehicle
+
+ALL = "all at once"
+"""The row in which each vehicle draws everything."""
+LATEST = 0.04
+"""Largest delay that a row adds, s."""
+MOCAP = NoiseConfig(position=0.005, velocity=0.05, attitude=0.005, body_rate=0.02)
+VIO = NoiseConfig(position=0.02, velocity=0.1, attitude=0.01, body_rate=0.02)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One way in which reality differs."""
+
+    name: str
+    factors: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    """Of fields of the vehicle."""
+    latency: float = 0.0
+    """Added to the vehicle's time from observation to command, s; the sum is at least 0."""
+    wind: float = 0.0
+    """Steady wind, m/s, from a random horizontal direction."""
+    gust: float = 0.0
+    """Standard deviation of gusts, m/s per axis."""
+    sag: float = 0.0
+    """Share of the thrust that is lost by the end of the episode."""
+    rotor: float = 0.0
+    """Share of its thrust that one rotor, a random one, lacks."""
+    centre_of_mass: float = 0.0
+    """Offset of the centre of mass, m, in a random direction of the rotors' plane."""
+    plain_mixer: bool = False
+    """Whether the mixer clips each rotor by itself."""
+    noise: NoiseConfig = NoiseConfig()
+    """White noise of the observed state."""
+    drift: float = 0.0
+    """Random walk of the observed position after one second, m per axis."""
+
+    @property
+    def alters(self) -> frozenset[str]:
+        """What a plant has to change for it behind the flight controller's back: `e2efly.validation.plant.EVERYTHING`.
+
+        Delay, noise and drift lie between plant and policy: every plant can be flown with them.
+        """
+        if self.name == ALL:
+            return frozenset().union(*(row.alters for row in ROWS.values() if row.name != ALL)) - {"plain_mixer"}
+        beside = {
+            "rotor_position": self.centre_of_mass,
+            "wind": self.wind or self.gust,
+            "rotor_share": self.sag or self.rotor,
+            "plain_mixer": self.plain_mixer,
+        }
+        return frozenset(self.factors) | {name for name, there in beside.items() if there}
+
+
+def _factor(what: str, factor: float, *fields: str) -> Row:
+    return Row(f"{what} x{factor:g}", dict.fromkeys(fields, factor))
+
+
+ROWS: dict[str, Row] = {
+    row.name: row
+    for row in (
+        Row("nominal"),
+        *(_factor("mass", x, "mass") for x in (0.8, 1.25)),
+        *(_factor("thrust", x, "thrust_map") for x in (0.8, 1.15)),
+        *(_factor("inertia", x, "inertia") for x in (0.6, 1.5)),
+        *(_factor("motor lag", x, "motor_time_constant") for x in (0.5, 2.0)),
+        *(Row(f"delay {1e3 * x:+.0f} ms", latency=x) for x in (-0.03, 0.02, LATEST)),
+        *(_factor("drag", x, "drag_linear", "drag_quadratic") for x in (0.0, 2.0)),
+        *(_factor("torque ratio", x, "torque_ratio") for x in (0.7, 1.3)),
+        *(_factor("rate loop", x, "rate_gain") for x in (0.5, 2.0)),
+        Row("thrust falls by 15 %", sag=0.15),
+        Row("one rotor 10 % weaker", rotor=0.1),
+        Row("centre of mass 5 mm off", centre_of_mass=0.005),
+        Row("wind 3 m/s", wind=3.0),
+        Row("gusts 1.5 m/s", gust=1.5),
+        Row("mixer clips each rotor", plain_mixer=True),
+        Row("noise of motion capture", noise=MOCAP),
+        Row("noise and drift of a VIO", noise=VIO, drift=0.005),
+        Row(ALL),
+    )
+}
+"""The rows by name, in the order of the tables."""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """The numbers of a row for n episodes."""
+
+    plant: dict[str, np.ndarray]
+    """Fields of the vehicle, (n, ...)."""
+    latency: np.ndarray
+    """(n,), from observation to command, s."""
+    wind: np.ndarray
+    """(n, 3), m/s."""
+    disturbance: Disturbance
+    plain_mixer: np.ndarray
+    """(n,)."""
+    noise: NoiseConfig
+    """Of (n, 1)."""
+
+    @staticmethod
+    def of(row: Row, vehicle: Vehicle, rng: np.random.Generator, n: int) -> "Draw":
+        """Draw n episodes of a row for a nominal vehicle; `ALL` draws every strength between the rows' extremes."""
+        rows, everything = tuple(ROWS.values()), row.name == ALL
+
+        def strength(name: str) -> np.ndarray:
+            if not everything:
+                return np.full(n, getattr(row, name))
+            values = [getattr(r, name) for r in rows]
+            return rng.uniform(min(values), max(values), n)
+
+        drag = "drag_linear", "drag_quadratic"
+        plant, factors = {}, {}
+        for name in dict.fromkeys(name for r in rows for name in r.factors):
+            known = [r.factors[name] for r in rows if name in r.factors]
+            if not everything:
+                factors[name] = np.full(n, row.factors.get(name, 1.0))
+            elif name == drag[1]:
+                factors[name] = factors[drag[0]]
+            else:
+                factors[name] = rng.uniform(min(known), max(known), n)
+            value = np.asarray(getattr(vehicle, name))
+            plant[name] = value * factors[name].reshape(n, *[1] * value.ndim)
+        angle, side = rng.uniform(-math.pi, math.pi, (2, n))
+        direction = np.stack([np.cos(side), np.sin(side)], axis=1)
+        plant["rotor_position"] = vehicle.rotor_position - (strength("centre_of_mass")[:, None] * direction)[:, None]
+        share = np.ones((n, 4))
+        share[np.arange(n), rng.integers(0, 4, n)] -= strength("rotor")
+        gust = strength("gust")
+        zero = np.zeros(n)
+        heard = {f.name: max(getattr(r.noise, f.name) for r in rows) for f in dataclasses.fields(NoiseConfig)}
+        share_of_noise = rng.uniform(0, 1, n)
+        noise = {
+            name: (share_of_noise * largest if everything else zero + getattr(row.noise, name))[:, None]
+            for name, largest in heard.items()
+        }
+        return Draw(
+            plant=plant,
+            latency=np.maximum(vehicle.latency + strength("latency"), 0.0),
+            wind=strength("wind")[:, None] * np.stack([np.cos(angle), np.sin(angle), zero], axis=1),
+            disturbance=Disturbance(
+                gust_speed=gust,
+                gust_time=np.ones(n),
+                gust=gust[:, None] * rng.standard_normal((n, 3)),
+                rotor_share=share,
+                sag=strength("sag"),
+                drift_rate=strength("drift"),
+                drift=np.zeros((n, 3)),
+            ),
+            plain_mixer=zero + row.plain_mixer,
+            noise=NoiseConfig(**noise),  # type: ignore[arg-type]
+        )
+
+    def vehicle(self, nominal: Vehicle, i: int) -> Vehicle:
+        """The body of an episode. What the rotors' thrust is multiplied by goes for its maximum, too."""
+        body = dataclasses.replace(nominal, **{name: _number(value[i]) for name, value in self.plant.items()})
+        stronger = float(body.thrust_map[0] / nominal.thrust_map[0])
+        return dataclasses.replace(body, rotor_thrust_max=nominal.rotor_thrust_max * stronger)
+
+    def env(self, env: Env) -> Env:
+        """The environment with what a row changes of it."""
+        mixer = dataclasses.replace(env.physics.mixer, plain=self.plain_mixer)
+        return dataclasses.replace(env, physics=dataclasses.replace(env.physics, mixer=mixer), noise=self.noise)
+
+    def state(self, state: EnvState) -> EnvState:
+        """The beginning of the episodes with what a row changes of it."""
+        return dataclasses.replace(
+            state,
+            plant=self.plant,
+            wind=self.wind,
+            disturbance=self.disturbance,
+            action_latency=self.latency,
+        )
+
+
+jax.tree_util.register_dataclass(Draw, data_fields=[f.name for f in dataclasses.fields(Draw)], meta_fields=[])
+
+
+def with_longer_queue(env: Env) -> Env:
+    """The environment with room in its queue for the largest delay of the rows; the policy sees as many actions."""
+    latest = latency.frames(float(env.physics.nominal.latency) + LATEST, env.control_period)
+    return dataclasses.replace(env, queue=max(env.queue, latest + 1))
+
+
+def check_rows(rows: tuple[str, ...]) -> None:
+    """Refuse a row that there is not.
+
+    Raises:
+        ValueError: naming it, with the nearest and all there are.
+    """
+    for name in rows:
+        if name not in ROWS:
+            raise ValueError(unknown("stress", name, tuple(ROWS)))
+
+
+def _number(value: np.ndarray) -> Any:
+    return value if value.ndim else float(value)

@@ -1,0 +1,402 @@
+"""Fly a policy's file from unseen starts of its task: what `e2efly.evaluate` and `e2efly eval` do, and validation."""
+
+import dataclasses
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from e2efly import presets
+from e2efly.budget import FASTEST, check_memory, check_time
+from e2efly.config import CameraConfig, EnvConfig, ImuConfig, RewardConfig, TaskConfig
+from e2efly.config.changes import changed, differing
+from e2efly.deploy.policy.images import NONE, Image
+from e2efly.deploy.policy.loader import Policy, load_policy
+from e2efly.device import prepare, wide_vectors
+from e2efly.env import UNSEEN, Env, random_key
+from e2efly.episodes import Act, Episodes, rows, run_episodes, summary
+from e2efly.learn.rundir import RunDirectory, run_of
+from e2efly.physics import State
+from e2efly.vehicles import Controller, Flown, load_vehicle, vehicle_names
+from e2efly.zoo import policy_file
+
+SEED = 1_000_000
+"""Seed of the starts unless told."""
+BATCH = 250
+"""Starts that are flown at once."""
+FIXED = ("vehicle", "command_mode", "control_rate", "past_actions", "position_range", "imu.observed", "cameras")
+"""Options of the environment that the contract fixes."""
+FIXED_OF_CAMERAS = ("sees", "of", "width", "height", "projection", "encoding", "reach")
+"""The same, of a camera: what its numbers mean, and how many there are."""
+FIGURES, ROW = 200, 3000
+"""Bytes that the figures of a start take, and its row of the report."""
+UNITS = {
+    "duration": "s", "final_error": "m", "mean_error": "m", "top_speed": "m/s", "top_rate": "rad/s",
+    "roughness": "mean |change of action| per step, action in [-1, 1]",
+    "start": "position m, velocity m/s (world), quaternion wxyz (body to world), body_rate rad/s",
+    "knots": "one each 0.5 s: position m, velocity m/s, acceleration m/s^2 (world)",
+}  # fmt: skip
+"""Units of a start's row of a report."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A policy's file with the task and the environment that it is judged in."""
+
+    file: Path
+    """The policy.onnx."""
+    policy: Policy
+    """As loaded."""
+    task: TaskConfig
+    """Of its run, or of its contract."""
+    env: EnvConfig
+    """The same; with the vehicle that the policy was trained on."""
+    run: RunDirectory | None
+    """Its run, where the file lies in one."""
+    vehicle: str
+    """What flies: a name or a .toml file."""
+    controller: Controller = "policy"
+    """The vehicle that the flight controller believes in."""
+    changes: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
+    """Where `env` is not what the run or the contract says: that and what flies, by dotted name."""
+
+    @cached_property
+    def flown(self) -> Flown:
+        """What flies, and what its flight controller takes it for.
+
+        Raises:
+            ValueError: for a vehicle or a controller that there is not.
+        """
+        return Flown.of(load_vehicle(self.env.vehicle), load_vehicle(self.vehicle), self.controller)
+
+    @property
+    def at_home(self) -> "Candidate":
+        """The same on the vehicle that it was trained on."""
+        return dataclasses.replace(self, vehicle=self.env.vehicle, controller="policy")
+
+    @property
+    def notes(self) -> list[str]:
+        """In which ways it does not fly what its run or its contract says, in words."""
+        contract, notes = self.policy.contract, []
+        if load_vehicle(self.vehicle).hash != contract.vehicle_hash:
+            told = "is tuned to it" if self.controller == "plant" else f"believes in the {contract.vehicle}"
+            notes.append(
+                f"What flies is {self.vehicle}, by the policy of a {contract.vehicle}; the flight controller {told}."
+            )
+        if self.changes:
+            changes = (f"env.{name} {value} (not {own})" for name, (own, value) in self.changes.items())
+            notes.append(f"Flown under {', '.join(changes)}.")
+        return notes
+
+    def environment(self, suite: TaskConfig) -> Env:
+        """The environment of a criterion; its reward judges nothing.
+
+        Raises:
+            ValueError: when the policy expects another observation or other images.
+        """
+        env = Env.of(suite, RewardConfig({"prog2": 1.0}), self.env, flown=self.flown)
+        check_observation(self.policy, env)
+        return env
+
+
+def candidate(
+    policy: str | os.PathLike[str],
+    vehicle: str | None = None,
+    controller: Controller = "policy",
+    env: Mapping[str, Any] | None = None,
+) -> Candidate:
+    """Find a policy, and what it is judged in.
+
+    Args:
+        policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
+        vehicle: what flies, a name or a .toml file; left out: the policy's own vehicle.
+        controller: the vehicle that the flight controller believes in: the policy's own, whatever flies (policy), or
+            the one that flies (plant).
+        env: values that are to be changed in what the run or the contract says of the environment, by dotted name.
+
+    Raises:
+        ValueError: when there is none; for changes that the contract does not allow; when the vehicle that it was
+            trained on cannot be found.
+    """
+    file = policy_file(policy, vehicle)
+    loaded, run = load_policy(file), run_of(file)
+    if run is None:
+        task, own = config_from_contract(loaded, vehicle)
+    else:
+        config = run.config(names_vehicle=vehicle is not None)
+        task, own = config.task, config.env
+    if vehicle is None and (known := load_vehicle(own.vehicle)).hash != (trained := loaded.contract.vehicle_hash):
+        raise ValueError(
+            f"vehicle_hash is {trained} in {file}, but vehicle {own.vehicle} is {known.hash}; accepted: "
+            "the vehicle that the policy was trained on, or --vehicle"
+        )
+    own = pinned(own, loaded) if env else own
+    flies = with_changes(own, env or {})
+    found = Candidate(file, loaded, task, flies, run, vehicle or own.vehicle, controller, differing(own, flies))
+    _ = found.flown  # a name that there is not is refused here
+    return found
+
+
+def with_changes(own: EnvConfig, changes: Mapping[str, Any]) -> EnvConfig:
+    """The environment of a policy with changes that leave its observation, its images and its commands what they are.
+
+    Args:
+        own: as its run or its contract says.
+        changes: the new values, by dotted name.
+
+    Raises:
+        ValueError: naming the field, its value and what is accepted.
+    """
+    flies = changed(own, changes, "env")
+    for name, (fixed, value) in differing(own, flies).items():
+        if name in FIXED or (name.startswith("cameras.") and name.split(".", 2)[-1] in FIXED_OF_CAMERAS):
+            way = "what flies is --vehicle" if name == "vehicle" else "train another policy to change it"
+            raise ValueError(f"env.{name} is {value!r}; accepted: {fixed!r}, which the policy's contract fixes; {way}")
+    if "latency_spread" in changes and "action_latency" not in changes:
+        flies = dataclasses.replace(flies, action_latency=None)  # it lies about the vehicle's own
+    return flies
+
+
+def pinned(env: EnvConfig, policy: Policy) -> EnvConfig:
+    """The same environment, which keeps rate and past actions whatever else of it changes."""
+    c = policy.contract
+    seen = {f.name: f.size for f in c.observation}
+    return dataclasses.replace(env, control_rate=c.control_rate_hz, past_actions=seen.get("past_actions", 0) // 4)
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """How a policy did on each criterion of its task."""
+
+    candidate: Candidate
+    """What flew."""
+    seed: int
+    """Of the starts."""
+    flown: dict[str, Episodes]
+    """By criterion; NumPy arrays."""
+    starts: dict[str, State]
+    """What each episode began from, by criterion; NumPy arrays."""
+    drawn: dict[str, dict[str, np.ndarray]]
+    """What else each episode has of its own, by criterion: `Goal.drawn`."""
+
+    def __repr__(self) -> str:
+        """The success rate of each criterion."""
+        told = ", ".join(f"{name} {np.mean(e.success):.1%} of {len(e.success)}" for name, e in self.flown.items())
+        return f"Evaluation({told})"
+
+    @property
+    def success(self) -> float:
+        """The success rate of the worst criterion."""
+        return min(float(np.mean(e.success)) for e in self.flown.values())
+
+    def as_json(self) -> dict[str, Any]:
+        """The report that `e2efly eval --json` writes: by criterion a summary, and a row for every start."""
+        return {
+            "policy": str(self.candidate.file),
+            "task": self.candidate.policy.contract.task,
+            "vehicle": self.candidate.vehicle,
+            "controller": self.candidate.controller,
+            "changed": {f"env.{name}": value for name, (_, value) in self.candidate.changes.items()},
+            "env": dataclasses.asdict(self.candidate.env),
+            "seed": self.seed,
+            "units": UNITS,
+            "criteria": {name: summary(e) | {"starts": self._rows(name)} for name, e in self.flown.items()},
+        }
+
+    def _rows(self, name: str) -> list[dict[str, Any]]:
+        start, suite = self.starts[name], self.candidate.task.criteria()[name]
+        begun = {f: getattr(start, f).round(6).tolist() for f in ("position", "velocity", "quaternion", "body_rate")}
+        courses = course_rows(suite, self.drawn[name], len(start.position))
+        return [
+            row | {"start": {f: x[i] for f, x in begun.items()}} | courses[i]
+            for i, row in enumerate(rows(self.flown[name]))
+        ]
+
+
+def course_rows(suite: TaskConfig, drawn: Mapping[str, np.ndarray], n: int) -> list[dict[str, Any]]:
+    """What each of n episodes of a criterion was to fly, as JSON: an object with `course`, or an empty one."""
+    shared, columns = suite.course(), {name: np.asarray(x).round(6).tolist() for name, x in drawn.items()}
+    if not (shared or columns):
+        return [{}] * n
+    return [{"course": shared | {name: column[i] for name, column in columns.items()}} for i in range(n)]
+
+
+def drawn_by(task: Any, memory: Any) -> dict[str, Any]:
+    """What episodes of a task draw beside their starts; a task of one's own need not say."""
+    return task.drawn(memory) if hasattr(task, "drawn") else {}
+
+
+def evaluate(
+    policy: str | os.PathLike[str],
+    episodes: int = 1000,
+    *,
+    vehicle: str | None = None,
+    controller: Controller = "policy",
+    env: Mapping[str, Any] | None = None,
+    seed: int = SEED,
+    device: str | None = None,
+    kept: int = 0,
+) -> Evaluation:
+    """Fly a policy's file from unseen starts of its task, in the training simulator.
+
+    Args:
+        policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
+        episodes: starts of each criterion.
+        vehicle: what flies, a name or a .toml file; left out: the policy's own vehicle.
+        controller: policy: the flight controller believes in the policy's own vehicle, whatever flies; plant: it is
+            tuned to the vehicle that flies. Neither changes the policy.
+        env: options of `EnvConfig` by dotted name, in place of what the policy's run or contract says:
+            {"wind": 3.0, "randomize": {"mass": 0.2}, "disturbance.gust": 1.0}.
+        seed: of the starts.
+        device: cpu or gpu.
+        kept: bytes that the caller keeps of every start (`ROW` for a report), for the check of the memory.
+
+    Raises:
+        ValueError: naming the field or the option, its value and what is accepted.
+    """
+    if episodes <= 0:
+        raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
+    prepare(device)
+    found = candidate(policy, vehicle, controller, env)
+    return Evaluation(found, seed, *fly_criteria(found, episodes, seed, kept))
+
+
+def fly_criteria(
+    found: Candidate, episodes: int, seed: int, kept: int = 0
+) -> tuple[dict[str, Episodes], dict[str, State], dict[str, dict[str, np.ndarray]]]:
+    """Fly `episodes` starts of every criterion of a task.
+
+    Args:
+        found: the policy, its task and environment.
+        episodes: starts of each criterion.
+        seed: of the starts.
+        kept: bytes that the caller keeps of every start, beside the figures.
+
+    Returns:
+        By the criterion's name: how each episode went, where it started, and what else it drew; NumPy arrays.
+
+    Raises:
+        ValueError: for more starts than fit into the machine's memory, or than anybody can wait for.
+    """
+    flown, starts, drawn = {}, {}, {}
+
+    @partial(jax.jit, static_argnums=2, compiler_options=wide_vectors(BATCH))
+    def program(env: Env, key: Any, steps: int, settle: float) -> Any:
+        begun = env.reset(key, BATCH)[0]
+        told = drawn_by(env.task, begun.memory)
+        return run_episodes(env, act_of(found.policy), key, BATCH, steps, settle), begun.vehicle, told
+
+    suites = found.task.criteria()
+    envs = {name: found.environment(suite) for name, suite in suites.items()}
+    asked = f"--episodes is {episodes}"
+    check_memory({asked: float(episodes) * len(suites) * (FIGURES + kept)})
+    check_time({asked: sum(episode_steps(suites[name], envs[name]) for name in suites) * float(episodes) / FASTEST})
+    for name, suite in suites.items():
+        steps, settle = episode_steps(suite, envs[name]), settling(suite)
+        keys = [random_key(seed, UNSEEN, i) for i in range(-(-episodes // BATCH))]
+        parts = [jax.tree.map(np.asarray, program(envs[name], key, steps, settle)) for key in keys]
+        flown[name], starts[name], drawn[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
+    return flown, starts, drawn
+
+
+def settling(suite: TaskConfig) -> float:
+    """Seconds of a criterion before the mean error counts."""
+    return float(getattr(suite, "settle_s", 0.0))
+
+
+def act_of(policy: Policy) -> Act:
+    """A policy's ONNX graph, for compiled programs."""
+    size = policy.contract.memory_size
+
+    def act(observation: Any, images: Any, memory: Any) -> Any:
+        n = observation.shape[0]
+        shapes = jax.ShapeDtypeStruct((n, 4), jnp.float32), jax.ShapeDtypeStruct((n, size), jnp.float32)
+        return jax.pure_callback(onnx, shapes, observation, images, memory)
+
+    def onnx(observation: Any, images: Any, memory: Any) -> Any:
+        return policy.act(np.asarray(observation), [np.asarray(x) for x in images], np.asarray(memory))
+
+    return Act(act, lambda n: jnp.zeros((n, size)))
+
+
+def episode_steps(task: TaskConfig, env: Any) -> int:
+    """Control steps of the longest episode."""
+    return int(np.ceil(float(task.episode_s) / env.control_period - 1e-6))
+
+
+def check_observation(policy: Policy, env: Any) -> None:
+    """Refuse a policy whose observation or images are not the environment's.
+
+    Raises:
+        ValueError: naming the field or the image, and what either side has.
+    """
+    wanted = [(f.name, f.size, f.frame, f.unit) for f in policy.contract.observation]
+    offered = [(f.name, f.size, f.frame, f.unit) for f in env.fields]
+    if wanted != offered:
+        odd = [f for f in wanted if f not in offered] + [f for f in offered if f not in wanted]
+        raise ValueError(
+            f"observation: the policy wants {wanted}, the environment gives {offered}; they differ in {odd}"
+        )
+    seen = [(i.sees, i.of, i.height, i.width) for i in policy.contract.images]
+    shown = [(c.sees, c.of if c.sees == "mask" else NONE, c.height, c.width) for c in env.cameras]
+    if seen != shown:
+        raise ValueError(f"images: the policy wants {seen}, the cameras of the environment give {shown}")
+
+
+def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[TaskConfig, EnvConfig]:
+    """Task and environment as the contract of a lone policy.onnx says; the task's options are those of its preset.
+
+    Args:
+        policy: as loaded.
+        vehicle: what it is to fly; may be the file of the vehicle that it was trained on.
+
+    Raises:
+        ValueError: when the vehicle that it was trained on cannot be found.
+    """
+    c = policy.contract
+    name = c.vehicle
+    if vehicle is not None and load_vehicle(vehicle).hash == c.vehicle_hash:
+        name = vehicle
+    findable = name == vehicle or name in vehicle_names()
+    known = load_vehicle(name).hash if findable else "no vehicle that comes with the package"
+    if known != c.vehicle_hash:
+        raise ValueError(
+            f"vehicle_hash is {c.vehicle_hash} in the contract, but vehicle {c.vehicle!r} is {known}: it was trained "
+            "on other parameters; accepted: the file of that vehicle with --vehicle FILE.toml, or its run's folder"
+        )
+    counts = {f.name: f.size for f in c.observation}
+    config = EnvConfig(
+        vehicle=name,
+        command_mode=c.action.mode,
+        control_rate=c.control_rate_hz,
+        action_latency=(c.latency_range_s[0], c.latency_range_s[1]),
+        observation_latency=(c.observation_latency_range_s[0], c.observation_latency_range_s[1]),
+        past_actions=counts.get("past_actions", 0) // 4,
+        imu=ImuConfig(observed="gyroscope" in counts),
+        cameras=tuple(_camera(image) for image in c.images),
+    )
+    return presets.preset(c.task, "ppo").task, config
+
+
+def _camera(image: Image) -> CameraConfig:
+    """The camera of a contract's image."""
+    known: dict[str, Any] = {"sees": image.sees, "projection": image.projection}
+    known |= {"of": image.of} if image.of != NONE else {}
+    known |= {"encoding": image.encoding} if image.encoding != NONE else {}
+    return CameraConfig(
+        width=image.width,
+        height=image.height,
+        fov=(image.fov_rad[0], image.fov_rad[1]),
+        position=(image.position_m[0], image.position_m[1], image.position_m[2]),
+        pitch=image.pitch_rad,
+        reach=(image.reach_m[0], image.reach_m[1]),
+        rate=image.rate_hz,
+        latency=(image.latency_range_s[0], image.latency_range_s[1]),
+        **known,
+    )

@@ -1,0 +1,130 @@
+"""A training that begins with what another one has learned: the weights of a policy.onnx that e2efly has written."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+import onnx
+from onnx import numpy_helper
+
+from e2efly.config import ALGORITHMS
+from e2efly.deploy.policy.contract import Contract
+from e2efly.deploy.policy.loader import OUTPUT, load_policy
+from e2efly.learn.checkpoint import read_arrays
+from e2efly.learn.export import contract_of
+from e2efly.learn.graph import OPERATORS
+from e2efly.learn.networks import Actor, Gru, Layers, Weights
+from e2efly.learn.rundir import run_of
+from e2efly.learn.setup import Setup
+
+
+def started_from(parameters: Any, path: Path, setup: Setup) -> Any:
+    """Parameters of an algorithm whose policy is that of a file.
+
+    Where the file is the policy.onnx of a run of the same algorithm, the rest (critics, noise of the actions) is what
+    that run ended with. Otherwise it is as `init` makes it. Optimisers always begin anew.
+
+    Args:
+        parameters: as the algorithm's `init` makes them; every copy of the policy in them is replaced.
+        path: a policy.onnx.
+        setup: the run that is to learn.
+
+    Raises:
+        ValueError: for a policy that cannot be loaded, that sees other fields or images or commands otherwise, or whose
+            network has other sizes: naming the file, what it has and what is accepted.
+    """
+    has, wanted = _shape(load_policy(path).contract), _shape(contract_of(setup.env, setup.config))
+    for name, accepted in wanted.items():
+        if (value := has.get(name)) != accepted:
+            hint = "; did you mean --preset robust?" if name == "memory_size" and value and not accepted else ""
+            raise ValueError(
+                f"start_from {path}: its {name} is {value}; accepted: {accepted}, as this run's policy has{hint}"
+            )
+    weights = _weights(path, parameters.policy, setup.actor)
+    copies = {
+        field.name: weights
+        for field in dataclasses.fields(parameters)
+        if _same(getattr(parameters, field.name), parameters.policy)
+    }
+    return dataclasses.replace(_of_run(parameters, path, setup), **copies)
+
+
+def _of_run(parameters: Any, path: Path, setup: Setup) -> Any:
+    """What the run that a file is the policy of ended with; `parameters` where there is none, or of another shape."""
+    run = run_of(path)
+    if run is None or not run.checkpoint.is_file():
+        return parameters
+    if run.read_json("config.json").get("algo_name") != ALGORITHMS.reference(type(setup.config.algo)):
+        return parameters
+    arrays = read_arrays(run.checkpoint)
+    leaves, structure = jax.tree_util.tree_flatten_with_path(parameters)
+    found = [arrays.get(f"['state'].parameters{jax.tree_util.keystr(where)}") for where, _ in leaves]
+    if any(x is None or x.shape[1:] != np.shape(leaf) for x, (_, leaf) in zip(found, leaves, strict=True)):
+        return parameters
+    return jax.tree_util.tree_unflatten(structure, [x[0] for x in found if x is not None])  # every device has the same
+
+
+def _weights(path: Path, like: Weights, actor: Actor) -> Weights:
+    """What `e2efly.learn.graph.policy_graph` has written, read again."""
+    graph = onnx.load(str(path)).graph
+    constants = {x.name: numpy_helper.to_array(x) for x in graph.initializer}
+    operators = {node.output[0]: node.op_type for node in graph.node}
+    for output, wanted in (("hidden_1", OPERATORS[actor.network.activation]), (OUTPUT, "Tanh")):
+        if operators.get(output) != wanted:
+            raise ValueError(
+                f"start_from {path}: {output} comes of {operators.get(output)}; accepted: {wanted}, as in a policy "
+                f"that was trained by e2efly with network.activation {actor.network.activation}"
+            )
+
+    def taken(name: str, wanted: Any) -> np.ndarray:
+        found = constants.get(name)
+        if found is None or found.shape != np.shape(wanted):
+            has = "is missing" if found is None else f"has shape {found.shape}"
+            raise ValueError(f"start_from {path}: {name} {has}; accepted: {np.shape(wanted)}: use its network's sizes")
+        return found
+
+    def layers(like: Layers, prefix: str = "") -> Layers:
+        return [
+            (taken(f"{prefix}weight_{i}", weight), taken(f"{prefix}bias_{i}", bias))
+            for i, (weight, bias) in enumerate(like)
+        ]
+
+    encoders = []
+    for number, (view, each) in enumerate(zip(actor.features.views, like.encoders, strict=True)):
+        kernels, channels = [], view.channels
+        for i, (side, (weight, bias)) in enumerate(zip(view.patches, each, strict=False)):
+            wider = np.shape(weight)[1]
+            kernel = taken(f"image_{number}_kernel_{i}", np.empty((wider, channels, side, side)))
+            flat = kernel.transpose(2, 3, 1, 0).reshape(np.shape(weight))
+            kernels.append((flat, taken(f"image_{number}_kernel_bias_{i}", bias)))
+            channels = wider
+        encoders.append(kernels + layers(each[len(view.patches) :], f"image_{number}_"))
+    cell = None
+    if like.cell is not None:
+        cell = Gru(**{name: taken(f"gru_{name}", value) for name, value in vars(like.cell).items()})
+    head = layers(like.head)
+    if f"weight_{len(head)}" in constants:
+        raise ValueError(f"start_from {path}: it has more layers than {len(head)}; accepted: network.hidden as its own")
+    return Weights(tuple(encoders), cell, head)
+
+
+def _same(a: Any, b: Any) -> bool:
+    if type(a) is not type(b):
+        return False
+    (these, shape), (those, other) = jax.tree.flatten(a), jax.tree.flatten(b)
+    return shape == other and all(np.array_equal(x, y) for x, y in zip(these, those, strict=True))
+
+
+def _shape(contract: Contract) -> dict[str, Any]:
+    """What of a contract a network and its normalisation depend on, by name; a camera may sit elsewhere."""
+    found: dict[str, Any] = {"observation": [field.name for field in contract.observation]}
+    found |= {"number of images": len(contract.images), "memory_size": contract.memory_size}
+    found["command mode"] = contract.action.mode
+    for parts, names in (
+        (contract.observation, ("size", "frame", "scale")),
+        (contract.images, ("sees", "of", "width", "height", "encoding", "pool", "preprocessing")),
+    ):
+        found |= {f"{part.name} {name}": getattr(part, name) for part in parts for name in names}
+    return found

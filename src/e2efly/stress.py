@@ -1,0 +1,121 @@
+"""How a policy does in the rows of the stress, through one compiled program."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import jax
+import numpy as np
+
+from e2efly.device import prepare, wide_vectors
+from e2efly.env import UNSEEN, Env, random_key
+from e2efly.env.stress import ROWS, Draw, Row, check_rows, with_longer_queue
+from e2efly.episodes import Episodes, run_episodes, summary
+from e2efly.evaluation import BATCH, SEED, Candidate, act_of, candidate, episode_steps, settling
+from e2efly.vehicles import Controller
+from e2efly.vehicles.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class Report:
+    """How a policy did in each row."""
+
+    candidate: Candidate
+    seed: int
+    flown: dict[str, dict[str, Any]]
+    """By row and criterion: `Episodes`, or the verdicts on a plant; NumPy arrays."""
+    plant: str = "training"
+    """Where: the training simulator, or a plant."""
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    """Rows that the plant cannot be given, and what it cannot change."""
+
+    @property
+    def success(self) -> dict[str, float]:
+        """The success rate of the worst criterion, by row."""
+        return {row: min(float(np.mean(e.success)) for e in criteria.values()) for row, criteria in self.flown.items()}
+
+    @property
+    def worst(self) -> str:
+        """The row with the smallest success."""
+        return min(self.success, key=lambda row: self.success[row])
+
+    def as_json(self) -> dict[str, Any]:
+        """The report that `--stress --json` writes: a summary by row and criterion."""
+        return {
+            "policy": str(self.candidate.file),
+            "task": self.candidate.policy.contract.task,
+            "vehicle": self.candidate.vehicle,
+            "controller": self.candidate.controller,
+            "plant": self.plant,
+            "seed": self.seed,
+            "left_out": dict(self.left_out),
+            "stress": {row: {name: summary(e) for name, e in found.items()} for row, found in self.flown.items()},
+        }
+
+
+def stress(
+    policy: str | os.PathLike[str],
+    episodes: int = 1000,
+    *,
+    rows: tuple[str, ...] = (),
+    vehicle: str | None = None,
+    controller: Controller = "policy",
+    seed: int = SEED,
+    device: str | None = None,
+) -> Report:
+    """Fly a policy's file in every row of `ROWS`, from the unseen starts of `evaluate`.
+
+    Args:
+        policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
+        episodes: starts per row and criterion.
+        rows: names of rows; empty: all.
+        vehicle: what flies in the nominal row, and what the other rows change; left out: the policy's own vehicle.
+        controller: the vehicle that the flight controller believes in, in every row: policy or plant.
+        seed: of the starts.
+        device: cpu or gpu.
+
+    Raises:
+        ValueError: naming the option, its value and what is accepted.
+    """
+    if episodes <= 0:
+        raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
+    check_rows(rows)
+    prepare(device)
+    found = candidate(policy, vehicle, controller)
+    return Report(found, seed, fly_rows(found, rows or tuple(ROWS), episodes, seed))
+
+
+def fly_rows(found: Candidate, rows: tuple[str, ...], episodes: int, seed: int) -> dict[str, dict[str, Episodes]]:
+    """Fly `episodes` starts per row and criterion."""
+
+    @partial(jax.jit, static_argnums=3, compiler_options=wide_vectors(BATCH))
+    def program(env: Env, key: Any, draw: Draw, steps: int, settle: float) -> Episodes:
+        return run_episodes(
+            draw.env(env), act_of(found.policy), key, BATCH, steps, settle, altered=lambda state: draw.state(state)
+        )
+
+    flown: dict[str, dict[str, Episodes]] = {row: {} for row in rows}
+    batches = range(-(-episodes // BATCH))
+    for name, suite in found.task.criteria().items():
+        env = with_longer_queue(found.environment(suite))
+        steps, settle = episode_steps(suite, env), settling(suite)
+        for row in rows:
+            parts = []
+            for i in batches:
+                draw = Draw.of(ROWS[row], env.physics.flown, _generator(ROWS[row], seed, i), BATCH)
+                draw = jax.tree.map(lambda x: np.asarray(x, np.float32), draw)
+                parts.append(jax.tree.map(np.asarray, program(env, random_key(seed, UNSEEN, i), draw, steps, settle)))
+            flown[row][name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
+    return flown
+
+
+def draws(row: Row, vehicle: Vehicle, seed: int, n: int) -> Draw:
+    """The first n episodes of a row by the seed of the starts, whatever their number."""
+    batches = [Draw.of(row, vehicle, _generator(row, seed, i), BATCH) for i in range(-(-n // BATCH))]
+    return jax.tree.map(lambda *x: np.concatenate(x)[:n], *batches)
+
+
+def _generator(row: Row, seed: int, batch: int) -> np.random.Generator:
+    return np.random.default_rng([seed, UNSEEN, batch, list(ROWS).index(row.name)])

@@ -1,0 +1,101 @@
+"""High-speed obstacle avoidance: the goal, and where it is flown. Imports no JAX."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from e2efly.config import number
+from e2efly.control.vectors import Array, namespace
+from e2efly.goal import Course, Goal, Outcome, Shape
+from e2efly.observation import Field
+from e2efly.tasks.avoid import AvoidConfig
+from e2efly.tasks.route import Route
+
+BEYOND = 10.0
+"""The vehicle is sent to a point this far behind the end of the forest, m."""
+CLIMB = 1.0
+"""Largest commanded vertical speed, m/s."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """How fast to fly."""
+
+    speed: Array
+    """(n,) m/s."""
+
+
+@dataclass(frozen=True)
+class AvoidGoal(Goal):
+    """Through a lane from the origin along world x."""
+
+    config: AvoidConfig
+    shape: Shape
+    control_period: float
+    checks: int
+    """How often a control step is checked for collisions."""
+
+    @classmethod
+    def state(cls, memory: Any) -> Memory:
+        """Without what only cameras see."""
+        return Memory(**{part.name: getattr(memory, part.name) for part in dataclasses.fields(Memory)})
+
+    def goal(self, memory: Memory, time: Array) -> Array:
+        """Behind the end of the forest."""
+        del time
+        c, zero = self.config, 0.0 * memory.speed
+        return namespace(zero).stack([zero + c.forest.length + BEYOND, zero, zero + c.altitude], axis=-1)
+
+    def desired_velocity(self, memory: Memory, time: Array, body: Any) -> Array:
+        """(n, 3) level towards the goal at the commanded speed, and to the altitude, m/s."""
+        xp, away = namespace(body.position), self.goal(memory, time) - body.position
+        level = away[:, :2] / xp.linalg.norm(away[:, :2], axis=-1, keepdims=True)
+        return xp.concatenate([memory.speed[:, None] * level, xp.clip(away[:, 2:], -CLIMB, CLIMB)], axis=-1)
+
+    def height(self, memory: Memory, time: Array, body: Any) -> Array:
+        """Of the centre of mass over the ground."""
+        del memory, time
+        return body.position[:, 2:]
+
+    observation = (
+        (
+            Field("desired_velocity", 3, "world", "m/s", 4.0, "velocity to fly at, if nothing stood in the way"),
+            desired_velocity,
+        ),
+        (Field("height", 1, "none", "m", 1.0, "height of the centre of mass over the ground"), height),
+    )
+
+    def advance(self, memory: Any, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Any, Outcome]:
+        """The verdict of one that cannot know what stands in the way."""
+        del timed_out
+        return self.verdict(memory, before, after, time, False)
+
+    def verdict(self, memory: Any, before: Any, after: Any, time: Array, hit: Array | bool) -> tuple[Any, Outcome]:
+        """Success: past the end of the forest, without touching anything or leaving the lane; `hit`: a tree."""
+        del before, time
+        c, position = self.config, after.position
+        x, y, z = position[:, 0], position[:, 1], position[:, 2]
+        left = (abs(y) > c.forest.width / 2) | (z > c.ceiling) | (z < self.shape.feet_height) | (x < -5.0)
+        crashed = left | hit
+        success = (x >= c.forest.length) & ~crashed
+        ends = left | (hit & (c.collisions_end > 0)) | (x >= c.forest.length)
+        error = (c.forest.length - x).clip(0.0)
+        return memory, Outcome(terminated=ends, success=success, arrived=success, crashed=crashed, error=error)
+
+
+@dataclass(frozen=True)
+class AvoidRoute(Route):
+    """How fast to fly through the lane; it begins at the origin."""
+
+    longest_s: ClassVar = 20.0
+
+    speed: float = number(5.0, above=0)
+    """Commanded speed, m/s."""
+
+    def course(self, shape: Shape, control_period: float) -> Course:
+        """The lane, in its direction."""
+        config = AvoidConfig()
+        goal, start = AvoidGoal(config, shape, control_period, 1), np.array([0.0, 0.0, config.altitude])
+        return Course(goal, Memory(np.array([self.speed])), start, heading=0.0, lowest=config.altitude)

@@ -1,0 +1,185 @@
+"""Narrow gap: the goal, and where it is flown. Imports no JAX.
+
+The slit's frame: origin in the middle of the opening, x the way through, y along the long side, z across the short one.
+"""
+
+import dataclasses
+import functools
+import operator
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from e2efly.config import number
+from e2efly.control.vectors import Array, Quat, namespace
+from e2efly.goal import Course, Goal, Outcome, Shape
+from e2efly.observation import Field
+from e2efly.tasks.gap import GapConfig
+from e2efly.tasks.route import Route, place, turned
+from e2efly.tasks.verdicts import distance, offsets, rotate, unrotate
+
+WALL_WIDTH = 3.0
+"""The wall reaches this far around the opening, m."""
+RIM = 8
+"""Points on each of the two rims of the vehicle's body that must not touch the wall."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """The slit of each vehicle, and whether it is through."""
+
+    centre: Array
+    """(n, 3) world, m."""
+    quaternion: Array
+    """(n, 4) slit's frame to world."""
+    passed: Array
+    """(n,) bool."""
+
+
+@dataclass(frozen=True)
+class GapGoal(Goal):
+    """Through the slit. The vehicle counts as a flat cylinder: `radius`, and `feet_height` up and down."""
+
+    config: GapConfig
+    shape: Shape
+    control_period: float
+    checks: int
+    """How often a control step is checked for collisions."""
+
+    def targets(self, memory: Memory) -> Array:
+        """(n, 2, 3) the middle of the slit and the point behind it, world, m."""
+        through = self.axes(memory)[:, 0]
+        return namespace(through).stack([memory.centre, memory.centre + self.config.beyond * through], axis=1)
+
+    def axes(self, memory: Memory) -> Array:
+        """(n, 2, 3) unit vectors in the world: the way through, and across the short side."""
+        xp = namespace(memory.centre)
+        return rotate(memory.quaternion[:, None], xp.asarray(np.eye(3, dtype=np.float32)[[0, 2]]))
+
+    def goal(self, memory: Memory, time: Array) -> Array:
+        """The slit; once through, the point behind it."""
+        del time
+        both = self.targets(memory)
+        return namespace(both).where(memory.passed[:, None], both[:, 1], both[:, 0])
+
+    def target_offsets(self, memory: Memory, time: Array, body: Any) -> Array:
+        """Both targets minus position."""
+        del time
+        return offsets(self.targets(memory), body)
+
+    def flat_axes(self, memory: Memory, time: Array, body: Any) -> Array:
+        """Both axes."""
+        del time
+        return self.axes(memory).reshape(body.position.shape[0], 6)
+
+    observation = (
+        (
+            Field("gap", 6, "world", "m", 2.0, "middle of the slit and the point behind it minus vehicle position"),
+            target_offsets,
+        ),
+        (
+            Field("gap_axes", 6, "world", "1", 1.0, "unit vectors: the way through the slit, across its short side"),
+            flat_axes,
+        ),
+    )
+
+    def touched(self, memory: Memory, before: Any, after: Any) -> Array:
+        """(n,) whether one of the points on the body's two rims was in the wall or the ground during the step.
+
+        Each is checked `checks` times, on the cubic through its positions and velocities at both ends.
+        """
+        xp = namespace(before.position)
+        points = xp.asarray(rims(self.shape))
+        s, h = (1 + np.arange(self.checks)) / self.checks, self.control_period
+        weights = ((1 + 2 * s) * (1 - s) ** 2, h * s * (1 - s) ** 2, s**2 * (3 - 2 * s), h * s**2 * (s - 1))
+
+        def ends(body: Any) -> tuple[Array, Array]:
+            turn = body.quaternion[:, None]
+            swept = xp.cross(body.body_rate[:, None], points)
+            return body.position[:, None] + rotate(turn, points), body.velocity[:, None] + rotate(turn, swept)
+
+        parts = (*ends(before), *ends(after))
+        rows = [xp.asarray(w, parts[0].dtype)[:, None, None, None] for w in weights]
+        path = functools.reduce(operator.add, map(operator.mul, rows, parts))
+        local = xp.abs(unrotate(memory.quaternion[:, None], path - memory.centre[:, None]))  # (checks, n, points, 3)
+        half = xp.asarray(self.config.opening) / 2
+        across, opened = local[..., 1:] < half + WALL_WIDTH, local[..., 1:] < half
+        inside = (local[..., 0] < self.config.thickness / 2) & across.all(-1) & ~opened.all(-1)
+        return (inside | (path[..., 2] < 0)).any((0, 2))
+
+    def advance(self, memory: Memory, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Memory, Outcome]:
+        """Success: through the slit to the point behind it, without touching anything.
+
+        The centre of mass goes through where the straight line of the step crosses the wall's middle forward inside
+        the opening; crossing it forward elsewhere is a failure, round the wall, too.
+        """
+        del timed_out
+        c, xp = self.config, namespace(after.position)
+        a, b = (unrotate(memory.quaternion, body.position - memory.centre) for body in (before, after))
+        share = a[:, 0] / xp.where(a[:, 0] == b[:, 0], 1.0, a[:, 0] - b[:, 0])
+        y, z = (xp.abs(a[:, i] + share * (b[:, i] - a[:, i])) for i in (1, 2))
+        forward = (a[:, 0] < 0) & (b[:, 0] >= 0) & ~memory.passed
+        inside = (y < c.opening[0] / 2) & (z < c.opening[1] / 2)
+        moved = dataclasses.replace(memory, passed=memory.passed | (forward & inside))
+        error = distance(after.position, self.goal(moved, time))
+        hit = self.touched(memory, before, after)
+        missed = forward & ~inside
+        lost = missed | (error > c.fence)
+        reached = moved.passed & (error < c.radius) & ~lost
+        crashed = hit | lost
+        success = reached & ~crashed
+        ends = lost | reached | (hit & (c.collisions_end > 0))
+        return moved, Outcome(
+            terminated=ends, success=success, arrived=(forward & inside) | success, crashed=crashed, error=error,
+            signals={
+                "missed": missed, "struck": hit,
+                "approaching": (b[:, 0] > -c.approach) & (b[:, 0] < c.thickness / 2 + self.shape.radius),
+            },
+        )  # fmt: skip
+
+    def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
+        """When it was through the slit."""
+        del mean_error, final_error
+        return f"through after {arrivals[0]:.2f} s, then {speed:.1f} m/s" if arrivals else "not through"
+
+    def failure(self, memory: Memory, outcome: Outcome) -> str:
+        """Whether the slit was missed or the wall struck."""
+        if outcome.signals["missed"][0]:
+            return "the slit was missed"
+        return "wall or ground struck" if outcome.signals["struck"][0] else super().failure(memory, outcome)
+
+
+def rims(shape: Shape) -> Array:
+    """(2 * RIM, 3) points on the upper and lower rim of the vehicle's body, body frame, m."""
+    angle = 2 * np.pi * np.arange(RIM) / RIM
+    around = np.stack([np.cos(angle), np.sin(angle), np.zeros(RIM)], axis=-1).astype(np.float32)
+    up = np.array([0.0, 0.0, 1.0], np.float32)
+    xp = namespace(shape.radius, shape.feet_height)
+    return xp.concatenate([shape.radius * around + side * shape.feet_height * up for side in (1, -1)])
+
+
+@dataclass(frozen=True)
+class GapRoute(Route):
+    """Where the slit is, and how it is turned."""
+
+    height: ClassVar = "slit"
+
+    slit: tuple[float, float, float] = place((0.0, 0.0, 2.0))
+    """Middle of the slit, m."""
+    slit_yaw: float = place(0.0)
+    """Heading of the way through, rad."""
+    slit_roll: float = place(0.6)
+    """Tilt of the slit about the way through, rad; positive: its left end is up."""
+    before: float = number(3.0, above=0)
+    """From where the policy takes over to the slit, m."""
+
+    def course(self, shape: Shape, control_period: float) -> Course:
+        """From a point straight before the slit to the one behind it, once."""
+        goal = GapGoal(GapConfig(), shape, control_period, checks=4)
+        turn = Quat.of_euler(np.array([self.slit_roll]), np.zeros(1), np.array([self.slit_yaw])).stack()
+        memory = Memory(np.array([self.slit]), turn, np.zeros(1, bool))
+        start = np.asarray(self.slit) - self.before * turned(self.slit_yaw)
+        lowest = self.slit[2] - goal.config.opening[0] / 2
+        return Course(goal, memory, start, heading=self.slit_yaw, lowest=lowest, clearance=0.0)

@@ -1,0 +1,65 @@
+"""Hovering: the goal, and where it is flown. Imports no JAX."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from e2efly.control.vectors import Array, namespace
+from e2efly.courses import defaults
+from e2efly.goal import Course, Goal, Outcome, Shape
+from e2efly.observation import Field
+from e2efly.tasks.hover import HoverConfig
+from e2efly.tasks.route import Route, beside, place
+from e2efly.tasks.verdicts import distance, held_longer, touches_ground
+
+
+@dataclass(frozen=True)
+class HoverGoal(Goal):
+    """A point to fly to and stay at. The task's state is how long the vehicle has been within the radius, (n,) s."""
+
+    config: HoverConfig
+    shape: Shape
+    control_period: float | Array
+
+    def goal(self, memory: Array, time: Array) -> Array:
+        """The target."""
+        xp = namespace(time, memory)
+        return xp.broadcast_to(xp.asarray(self.config.target), (*memory.shape, 3))
+
+    def position_error(self, memory: Array, time: Array, body: Any) -> Array:
+        """Target minus position."""
+        return self.goal(memory, time) - body.position
+
+    observation = (
+        (Field("position_error", 3, "world", "m", 1.0, "target position minus vehicle position"), position_error),
+    )
+
+    def advance(self, memory: Array, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Array, Outcome]:
+        """Success: within the radius for the last `hold_s` of the episode, never outside the fence or on the ground."""
+        del before
+        c = self.config
+        error = distance(after.position, self.goal(memory, time))
+        held = held_longer(memory, error < c.radius, self.control_period)
+        crashed = (error > c.fence) | touches_ground(self.shape, after)
+        arrived = (held > 0) & (memory == 0)
+        success = timed_out & ~crashed & (held >= c.hold_s - 1e-4)
+        return held, Outcome(terminated=crashed, success=success, arrived=arrived, crashed=crashed, error=error)
+
+
+@dataclass(frozen=True)
+class HoverRoute(Route):
+    """Where to hover."""
+
+    longest_s: ClassVar = 8.0
+
+    target: tuple[float, float, float] = place(defaults.TARGET)
+    """Where to, m."""
+
+    def course(self, shape: Shape, control_period: float) -> Course:
+        """The target; it has no end."""
+        goal = HoverGoal(dataclasses.replace(HoverConfig(), target=self.target), shape, control_period)
+        start = beside(self.target, (1.0, -0.5, -1.0))
+        return Course(goal, np.zeros(1), start, duration=math.inf, lowest=self.target[2])

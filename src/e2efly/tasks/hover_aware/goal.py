@@ -1,0 +1,134 @@
+"""Perception-aware hovering: the goal, and where it is flown. Imports no JAX."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from e2efly.config import number
+from e2efly.control.vectors import Array, Quat, namespace
+from e2efly.courses import defaults
+from e2efly.goal import Course, Goal, Outcome, Shape
+from e2efly.observation import Field
+from e2efly.tasks.hover_aware import HoverAwareConfig
+from e2efly.tasks.route import Route, beside, place
+from e2efly.tasks.verdicts import distance, held_longer, touches_ground, unrotate
+
+OUTSIDE = 10.0
+"""Pixels end here, in halves of the image; what is behind the camera is here, too."""
+NEAREST = 1e-3
+"""What is nearer along the optical axis than this counts as behind the camera, m."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What to look at, a ball on a circle, and for how long all has been well."""
+
+    centre: Array
+    """(n, 3) of the circle, world, m."""
+    away: Array
+    """(n,) its radius, m."""
+    angle: Array
+    """(n,) where the ball was at the start, rad."""
+    rate: Array
+    """(n,) of its angle, rad/s."""
+    time: Array
+    """(n,) of the last step's end, s."""
+    held: Array
+    """(n,) s."""
+
+
+@dataclass(frozen=True)
+class HoverAwareGoal(Goal):
+    """The camera is the task's own, which nobody has to render; its pixels are in halves of the image."""
+
+    config: HoverAwareConfig
+    shape: Shape
+    control_period: float | Array
+
+    def goal(self, memory: Memory, time: Array) -> Array:
+        """Where to hover."""
+        del time
+        xp = namespace(memory.held)
+        return xp.broadcast_to(xp.asarray(self.config.target), (*memory.held.shape, 3))
+
+    def look_at(self, memory: Memory, time: Array) -> Array:
+        """(n, 3) where what to look at is, world, m."""
+        xp, angle = namespace(memory.away), memory.angle + memory.rate * time
+        circle = xp.stack([memory.away * xp.cos(angle), memory.away * xp.sin(angle), 0.0 * angle], axis=-1)
+        return memory.centre + circle
+
+    def position_error(self, memory: Memory, time: Array, body: Any) -> Array:
+        """Where to hover, minus position."""
+        return self.goal(memory, time) - body.position
+
+    def look_at_offset(self, memory: Memory, time: Array, body: Any) -> Array:
+        """What to look at, minus position."""
+        return self.look_at(memory, time) - body.position
+
+    observation = (
+        (Field("position_error", 3, "world", "m", 1.0, "target position minus vehicle position"), position_error),
+        (Field("look_at", 3, "world", "m", 4.0, "position of what to look at minus vehicle position"), look_at_offset),
+    )
+
+    def pixel(self, position: Array, quaternion: Array, point: Array) -> Array:
+        """(n, 2) where the camera of a vehicle sees a point: right and down from the middle, in halves of the image.
+
+        Up to `OUTSIDE` either way; a point behind the camera is there, too.
+        """
+        c, xp = self.config, namespace(position)
+        mounted = unrotate(quaternion, point - position) - xp.asarray(c.camera_position)
+        zero = 0.0 * position[:, 0]
+        seen = unrotate(Quat.of_euler(zero, zero + c.camera_pitch, zero).stack(), mounted)
+        ahead, edge = seen[:, :1], xp.tan(xp.asarray(c.fov) / 2)
+        front = ahead > NEAREST
+        inside = xp.clip(-seen[:, 1:] / edge / xp.where(front, ahead, 1.0), -OUTSIDE, OUTSIDE)
+        return xp.where(front, inside, OUTSIDE)
+
+    def advance(self, memory: Memory, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Memory, Outcome]:
+        """Success: for the last `hold_s` of the episode within the radius, and what to look at in the image's middle.
+
+        Leaving the fence, touching the ground or what to look at fails.
+        """
+        del before
+        c, ball = self.config, self.look_at(memory, time)
+        error = distance(after.position, self.goal(memory, time))
+        pixel = self.pixel(after.position, after.quaternion, ball)
+        well = (error < c.radius) & (abs(pixel) < c.centred).all(-1)
+        held = held_longer(memory.held, well, self.control_period)
+        near = distance(after.position, ball) < c.size + self.shape.radius
+        crashed = (error > c.fence) | touches_ground(self.shape, after) | near
+        success = timed_out & ~crashed & (held >= c.hold_s - 1e-4)
+        arrived = (held > 0) & (memory.held == 0)
+        return dataclasses.replace(memory, time=time, held=held), Outcome(
+            terminated=crashed, success=success, arrived=arrived, crashed=crashed, error=error, signals={"pixel": pixel}
+        )
+
+
+@dataclass(frozen=True)
+class HoverAwareRoute(Route):
+    """Where to hover, and what to look at."""
+
+    longest_s: ClassVar = 8.0
+
+    target: tuple[float, float, float] = place(defaults.TARGET)
+    """Where to hover, m."""
+    look_at: tuple[float, float, float] = place((5.0, 0.0, 3.0))
+    """What to look at, when the policy takes over, m."""
+    turn_rate: float = place(0.0)
+    """It circles around the target at this rate, rad/s."""
+    size: float = number(0.2, above=0)
+    """Radius of what to look at, m."""
+
+    def course(self, shape: Shape, control_period: float) -> Course:
+        """The target; it has no end."""
+        x, y, z = np.subtract(self.look_at, self.target)
+        config = dataclasses.replace(HoverAwareConfig(), target=self.target, size=self.size)
+        memory = Memory(
+            centre=np.array([[*self.target[:2], self.target[2] + z]]), away=np.array([math.hypot(x, y)]),
+            angle=np.array([math.atan2(y, x)]), rate=np.array([self.turn_rate]), time=np.zeros(1), held=np.zeros(1),
+        )  # fmt: skip
+        start = beside(self.target, (0.5, -0.5, -0.5))
+        return Course(HoverAwareGoal(config, shape, control_period), memory, start, lowest=self.target[2])

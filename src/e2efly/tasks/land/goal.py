@@ -1,0 +1,106 @@
+"""Landing: the goal, and where it is flown. Imports no JAX."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from e2efly.control.vectors import Array, namespace
+from e2efly.courses.origin import Origin
+from e2efly.goal import Course, Goal, Outcome, Shape
+from e2efly.observation import Field
+from e2efly.tasks.land import LandConfig
+from e2efly.tasks.route import Route, place
+from e2efly.tasks.verdicts import touches_ground, upright
+
+
+class Landing(Goal):
+    """A goal that ends on the ground."""
+
+    lands: ClassVar = True
+
+    def done(self, outcome: Outcome) -> bool:
+        """At the first touch, well or badly: what has touched the ground must not climb again."""
+        return bool(outcome.signals["touched"][0])
+
+    def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
+        """Where it touched, and how fast."""
+        del arrivals, mean_error
+        return f"touched {100 * final_error:.1f} cm off at {speed:.2f} m/s"
+
+
+@dataclass(frozen=True)
+class LandGoal(Landing):
+    """A pad at the world's origin to stand on. The task's state is empty: an array of shape (n, 0)."""
+
+    config: LandConfig
+    shape: Shape
+
+    def goal(self, memory: Array, time: Array) -> Array:
+        """The centre of mass of a vehicle that stands on the pad."""
+        del memory
+        zero = 0.0 * time
+        return namespace(time).stack([zero, zero, zero + self.shape.feet_height], axis=-1)
+
+    def position_error(self, memory: Array, time: Array, body: Any) -> Array:
+        """Goal minus position."""
+        return self.goal(memory, time) - body.position
+
+    observation = (
+        (
+            Field(
+                "position_error", 3, "world", "m", 1.0, "where the centre of mass is after landing, minus where it is"
+            ),
+            position_error,
+        ),
+    )
+
+    def advance(self, memory: Array, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Array, Outcome]:
+        """The episode ends at the first touch; success: near the centre, slow, upright. Judged at the step's end."""
+        del before, timed_out
+        return memory, touchdown(self.config, after, self.goal(memory, time), touches_ground(self.shape, after))
+
+
+def touchdown(config: Any, body: Any, goal: Array, touched: Array) -> Outcome:
+    """The verdict on a landing.
+
+    Args:
+        config: with `radius`, `height_error`, `speed` and `tilt` at touch, and the `fence`.
+        body: of the vehicles at the end of the step.
+        goal: (n, 3) their place when they have landed.
+        touched: (n,) whether they touch pad or ground.
+    """
+    xp = namespace(body.position)
+    offset = body.position - goal
+    sideways = xp.linalg.norm(offset[:, :2], axis=-1)
+    success = (
+        touched
+        & (sideways < config.radius)
+        & (xp.abs(offset[:, 2]) < config.height_error)
+        & (xp.linalg.norm(body.velocity, axis=-1) < config.speed)
+        & upright(body, config.tilt)
+    )
+    lost = (sideways > config.fence) | (offset[:, 2] > config.fence)
+    return Outcome(
+        terminated=touched | lost, success=success, arrived=success, crashed=(touched & ~success) | lost,
+        error=sideways, signals={"touched": touched},
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LandRoute(Route):
+    """Where to land."""
+
+    longest_s: ClassVar = 15.0
+
+    pad: tuple[float, float, float] = place((0.0, 0.0, 0.0))
+    """The point of the ground to land on, m."""
+
+    def course(self, shape: Shape, control_period: float) -> Course:
+        """The pad, which is the origin of the task's world."""
+        del control_period
+        start = np.array([1.0, 0.5, 2.0])
+        goal, pad = LandGoal(LandConfig(), shape), Origin(self.pad)
+        return Course(goal, np.zeros((1, 0)), start, lowest=math.inf, origin=pad)

@@ -1,0 +1,153 @@
+"""Where a policy is to fly: options of `e2efly fly`, and the course that they make. Imports no JAX."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from e2efly.config import TaskConfig, check_numbers, number
+from e2efly.courses.origin import Origin
+from e2efly.deploy.policy.contract import Contract
+from e2efly.goal import Course, Goal, Shape
+from e2efly.observation import Field
+from e2efly.registry import load
+from e2efly.tasks.registry import TASKS
+from e2efly.vehicles import Vehicle
+from e2efly.vehicles.tables import LARGEST
+
+_ORIGIN = ("origin", "origin_yaw")
+
+
+def place(default: Any) -> Any:
+    """A field of places, angles or rates, which may be negative."""
+    return number(default, low=-LARGEST, high=LARGEST)
+
+
+@dataclass(frozen=True)
+class Route:
+    """Where a policy is to fly. The defaults are the training's."""
+
+    longest_s: ClassVar[float] = 10.0
+    """How long a rehearsal lets the policy fly, s."""
+    height: ClassVar[str] = "target"
+    """The option that sets the height of the course."""
+    whole: ClassVar[dict[str, Any]] = {}
+    """What a rehearsal flies in place of the defaults."""
+
+    origin: tuple[float, float, float] = place((0.0, 0.0, 0.0))
+    """Where the origin of the task's world lies in the room (the world of the pose source), m."""
+    origin_yaw: float = place(0.0)
+    """By how much its x axis is turned from the room's about up, rad."""
+
+    def course(self, shape: Shape, control_period: float) -> Course:
+        """The course, for a vehicle of this shape, at this control period in s.
+
+        Raises:
+            ValueError: naming the option, its value and what is accepted.
+        """
+        raise NotImplementedError
+
+    def unused(self) -> tuple[str, ...]:
+        """Names of the options that have no effect, as another option is set."""
+        return ()
+
+
+def route_of(contract: Contract) -> type[Route]:
+    """The options of the task of a policy.
+
+    Raises:
+        ValueError: for a task that cannot be found, or one that says nowhere to fly.
+    """
+    task = TASKS.find(contract.task)
+    route = _of_its_world(task, "route")
+    if route is None:
+        able = ", ".join(name for name, options in TASKS.items() if options.route is not None)
+        raise ValueError(f"task {contract.task!r} of the policy has no route; accepted: {able}, or a task with a route")
+    return route
+
+
+def goal_of(task: type[TaskConfig]) -> type[Goal]:
+    """The class that shows a policy what to do and judges it, without JAX where the task is written so."""
+    return _of_its_world(task, "goal_class") or _of_its_world(task, "world")
+
+
+def _of_its_world(task: type[TaskConfig], name: str) -> Any:
+    """A class variable, or what its reference names; None where it is of a task whose world this one replaces."""
+    parents = task.__mro__
+    world, there = (next(i for i, kind in enumerate(parents) if n in vars(kind)) for n in ("world", name))
+    found = getattr(task, name) if there <= world else None
+    return load(found) if isinstance(found, str) else found
+
+
+def fields_of(contract: Contract) -> tuple[Field, ...]:
+    """The task's own fields of the observation of a policy.
+
+    Raises:
+        ValueError: for a task that cannot be found.
+    """
+    goal = goal_of(TASKS.find(contract.task))
+    return tuple(shown for shown, _ in goal.observation) or goal.fields  # type: ignore[return-value]
+
+
+def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None) -> Course:
+    """The course that a policy was trained to fly, where the options say.
+
+    Args:
+        contract: the policy's; its task decides which options there are.
+        vehicle: that flies: its feet and its size count.
+        route: where to fly; left out: where the training was.
+
+    Raises:
+        ValueError: naming the option, its value and what is accepted: a number out of range, an option that has no
+            effect, a goal under the ground, a course that does not exist or is broken.
+    """
+    kind = route_of(contract)
+    route = kind() if route is None else route
+    if not isinstance(route, kind):
+        raise ValueError(f"goal is a {type(route).__name__}; accepted: a {kind.__name__}, for task {contract.task!r}")
+    check_numbers("goal", route)
+    _check_use(contract, route)
+    shape = Shape(vehicle.feet_height, vehicle.radius)
+    course = route.course(shape, 1 / contract.control_rate_hz)
+    origin = Origin(route.origin, route.origin_yaw)
+    placed = dataclasses.replace(course, origin=origin.at(course.origin))
+    least = vehicle.feet_height if course.clearance is None else course.clearance
+    height = course.lowest + placed.origin.position[2]
+    if height < least:
+        raise ValueError(
+            f"goal.{route.height}: its lowest point is {height:.3f} m over the ground of the room, with goal.origin; "
+            f"accepted: at least {least:g} m"
+        )
+    return placed
+
+
+def _check_use(contract: Contract, route: Route) -> None:
+    """Refuse options that have no effect, and frame changes that a command in the world's axes would not follow."""
+    changed = {f.name: getattr(route, f.name) for f in dataclasses.fields(route) if getattr(route, f.name) != f.default}
+    useless = route.unused()
+    usable = sorted(f.name for f in dataclasses.fields(route) if f.name not in useless)
+    for name, value in changed.items():
+        if name in useless:
+            raise ValueError(f"goal.{name} is {value!r}, but has no effect here; accepted: {', '.join(usable)}")
+    # a policy sees where it is from its goal alone: commands in the world's axes are those of its training's world
+    mode = contract.action.mode
+    fixed = {"ctbr": (), "attitude": ("origin_yaw",), "position": ("origin", "origin_yaw", "pad")}
+    for name in fixed.get(mode, ("origin_yaw",)):
+        if name in changed:
+            default = type(route).__dataclass_fields__[name].default
+            raise ValueError(
+                f"goal.{name} is {changed[name]!r}; accepted: {default!r}, as the policy commands {mode} in the world "
+                "of its training: give the pose source that origin instead"
+            )
+
+
+def beside(centre: tuple[float, float, float], away: tuple[float, float, float]) -> np.ndarray:
+    """A point (3,) at some offset from another, m."""
+    return np.add(np.asarray(centre, np.float64), away)
+
+
+def turned(yaw: float) -> np.ndarray:
+    """The unit vector (3,) of a heading, rad."""
+    return np.array([math.cos(yaw), math.sin(yaw), 0.0])

@@ -1,0 +1,147 @@
+"""Tracking: the goal, and where it is flown. Imports no JAX."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from e2efly.config import number
+from e2efly.control.vectors import Array
+from e2efly.courses import defaults
+from e2efly.courses.references import (
+    LONGEST,
+    POINTS,
+    SPACING,
+    Lissajous,
+    Spline,
+    knot_count,
+    read_csv,
+    through_points,
+)
+from e2efly.goal import Course, Goal, Outcome, Shape
+from e2efly.observation import Field
+from e2efly.tasks.route import Route, place
+from e2efly.tasks.track import TrackConfig
+from e2efly.tasks.verdicts import distance, offsets, touches_ground
+from e2efly.vehicles.names import unknown
+
+SMALLEST = 1e-3
+"""Smallest radius, speed and duration of circle and lemniscate, in their units."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """The reference, and the error summed since it counts."""
+
+    reference: Spline
+    error_sum: Array
+    """(n,) sum of the distance to the reference over the counted steps, m."""
+    steps: Array
+    """(n,) counted steps."""
+
+
+@dataclass(frozen=True)
+class TrackGoal(Goal):
+    """Follow a reference."""
+
+    config: TrackConfig
+    shape: Shape
+
+    def goal(self, memory: Memory, time: Array) -> Array:
+        """The reference point for now."""
+        return memory.reference.position(time[:, None])[:, 0]
+
+    def targets(self, memory: Memory, time: Array) -> Array:
+        """(n, k, 3) the reference points for now and the second ahead, world, m."""
+        return memory.reference.position(time[:, None] + SPACING * np.arange(POINTS, dtype=np.float32))
+
+    def target_offsets(self, memory: Memory, time: Array, body: Any) -> Array:
+        """The same, minus position."""
+        return offsets(self.targets(memory, time), body)
+
+    observation = (
+        (
+            Field(
+                "reference", 3 * POINTS, "world", "m", 1.0,
+                f"{POINTS} reference points minus vehicle position, {SPACING} s apart, the first for now",
+            ),
+            target_offsets,
+        ),
+    )  # fmt: skip
+
+    def advance(self, memory: Memory, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Memory, Outcome]:
+        """Success: at the end of the episode the mean error since `settle_s` is small; never outside the fence."""
+        del before
+        c = self.config
+        error = distance(after.position, self.goal(memory, time))
+        counts = (time > c.settle_s).astype(error.dtype)
+        memory = Memory(memory.reference, memory.error_sum + counts * error, memory.steps + counts)
+        crashed = (error > c.fence) | touches_ground(self.shape, after)
+        mean = memory.error_sum / memory.steps.clip(1.0)
+        success = timed_out & ~crashed & (mean < c.mean_error)
+        return memory, Outcome(
+            terminated=crashed, success=success, arrived=crashed & ~crashed, crashed=crashed, error=error
+        )
+
+
+_CURVE = ("centre", "radius", "phase", "duration")
+_OPTIONS = {
+    "circle": ("circle_rate", *_CURVE),
+    "lemniscate": ("lemniscate_speed", *_CURVE),
+}
+"""The options of each kind of reference but a file."""
+
+
+@dataclass(frozen=True)
+class TrackRoute(Route):
+    """What to follow."""
+
+    height: ClassVar = "reference"
+    longest_s: ClassVar = 12.0
+
+    reference: str = "circle"
+    """circle, lemniscate, or the path of a .csv file with columns t, x, y, z."""
+    centre: tuple[float, float, float] = place(defaults.CENTRE)
+    """Centre of circle and lemniscate, m."""
+    radius: float = number(defaults.RADIUS, low=SMALLEST)
+    """Radius of the circle, half the length of the lemniscate, m."""
+    circle_rate: float = place(defaults.CIRCLE_RATE)
+    """Angular rate of the circle, rad/s; negative: clockwise."""
+    lemniscate_speed: float = number(defaults.LEMNISCATE_SPEED, low=SMALLEST)
+    """Top speed of the lemniscate, m/s."""
+    phase: float = place(0.0)
+    """Where on circle or lemniscate to begin, rad."""
+    duration: float = number(20.0, low=SMALLEST, high=LONGEST)
+    """How long circle and lemniscate go on, s; then their end is held."""
+
+    def course(self, shape: Shape, control_period: float) -> Course:
+        """The reference, from its first point to its end."""
+        del control_period
+        spline = self._spline()
+        start = np.array(spline.position(np.zeros((1, 1)))[0, 0], np.float64)
+        memory = Memory(spline, np.zeros(1), np.zeros(1))
+        lowest = float(spline.knots[0, :, 0, 2].min())
+        return Course(TrackGoal(TrackConfig(), shape), memory, start, duration=spline.duration, lowest=lowest)
+
+    def unused(self) -> tuple[str, ...]:
+        """Options of other kinds of reference."""
+        used = _OPTIONS.get(self.reference, ())
+        return tuple(name for names in _OPTIONS.values() for name in names if name not in used)
+
+    def _spline(self) -> Spline:
+        if self.circle_rate == 0:
+            raise ValueError("goal.circle_rate is 0.0; accepted: any rate but 0, rad/s")
+        if self.reference.endswith(".csv"):
+            return through_points(read_csv(self.reference))
+        if self.reference not in _OPTIONS:
+            raise ValueError(unknown("reference", self.reference, _OPTIONS) + ", or the path of a .csv file")
+        circle = self.reference == "circle"
+        curve = (
+            Lissajous.circle(self.radius, self.circle_rate)
+            if circle
+            else Lissajous.lemniscate(self.radius, self.lemniscate_speed)
+        )
+        spline = curve.spline(self.centre, np.array([self.phase]), knot_count(self.duration))
+        return dataclasses.replace(spline, end=min(self.duration, math.inf))

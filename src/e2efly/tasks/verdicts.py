@@ -1,0 +1,41 @@
+"""What verdicts are made of: in the arrays' own library, NumPy's or JAX's, so that flight and training judge alike."""
+
+from typing import Any
+
+from e2efly.control.vectors import Array, Quat, Vec3, namespace
+from e2efly.goal import Shape
+
+
+def distance(a: Array, b: Array) -> Array:
+    """(n,) between points (n, 3), m."""
+    return namespace(a, b).linalg.norm(a - b, axis=-1)
+
+
+def offsets(targets: Array, body: Any) -> Array:
+    """(n, 3 k) targets (n, k, 3) minus the vehicle's position, world, m, target after target."""
+    return (targets - body.position[:, None]).reshape(targets.shape[0], -1)
+
+
+def touches_ground(shape: Shape, body: Any) -> Array:
+    """Touching: the feet, `feet_height` below the centre of mass, at or under the ground z = 0."""
+    return body.position[:, 2] <= shape.feet_height
+
+
+def held_longer(held: Array, well: Array, period: float | Array) -> Array:
+    """For how long all has been well, (n,) s: a control step more, or 0 from now on."""
+    return namespace(held, well).where(well, held + period, 0.0)
+
+
+def upright(body: Any, tilt: float | Array) -> Array:
+    """Whether the vehicle is tilted by less than `tilt`, rad."""
+    return Quat.of(body.quaternion).z_axis().z > namespace(body.quaternion).cos(tilt)
+
+
+def rotate(quaternion: Array, vector: Array) -> Array:
+    """Body to world: vectors (..., 3) by quaternions (..., 4)."""
+    return Quat.of(quaternion).rotate(Vec3.of(vector)).stack()
+
+
+def unrotate(quaternion: Array, vector: Array) -> Array:
+    """World to body: vectors (..., 3) by quaternions (..., 4)."""
+    return Quat.of(quaternion).unrotate(Vec3.of(vector)).stack()

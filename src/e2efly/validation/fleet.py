@@ -1,0 +1,119 @@
+"""Fly many starts on one kind of plant, over all cores where the plant allows. Imports no JAX."""
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from e2efly.deploy.policy.loader import load_policy
+from e2efly.deploy.policy.runtime import Runtime
+from e2efly.device import cores
+from e2efly.goal import Course
+from e2efly.tasks import TASKS
+from e2efly.validation.flight import Trajectory, fly
+from e2efly.validation.plant import RigidState
+from e2efly.validation.plants import find_plant
+from e2efly.validation.reality import Reality, check_realities
+from e2efly.vehicles import Vehicle
+
+WORTH = 20
+"""Flights below which processes of their own, which take a second to start, do not pay."""
+CHUNK = 5
+"""Flights that a process is handed at once."""
+
+
+@dataclass(frozen=True)
+class Mission:
+    """What all flights share."""
+
+    policy: Path
+    """The policy.onnx."""
+    plant: str
+    """A name or a reference of a plant."""
+    trained: Vehicle
+    """The vehicle that the policy was trained on: the runtime refuses any other."""
+    believed: Vehicle
+    """The vehicle that the plant's flight controller believes in."""
+    duration: float
+    """Longest flight, s."""
+
+
+@dataclass(frozen=True)
+class Flight:
+    """One flight of a mission."""
+
+    start: RigidState
+    """Where from."""
+    course: Course
+    """What to fly."""
+    reality: Reality
+    """What it meets."""
+
+
+def fly_all(
+    mission: Mission,
+    flights: Sequence[Flight],
+    done: Callable[[int], None] = lambda count: None,
+    processes: int | None = None,
+) -> list[Trajectory]:
+    """Fly every start, in order.
+
+    Args:
+        mission: what they share.
+        flights: the starts and their courses.
+        done: told the number of flights that are over.
+        processes: at once; left out: one a core, or none but this one where that does not pay.
+
+    Raises:
+        ValueError: for a policy or a plant that cannot be had, for a plant that cannot fly the realities, and for
+            `processes` below 1.
+    """
+    if processes is not None and processes < 1:
+        raise ValueError(f"processes is {processes}; accepted: 1 or more")
+    check_realities(find_plant(mission.plant), mission.believed, [flight.reality for flight in flights])
+    count = processes or (cores() if len(flights) >= WORTH else 1)
+    if not find_plant(mission.plant).parallel or count == 1:
+        return _collect(_fly(mission, flights), done)
+    chunks = [flights[i : i + CHUNK] for i in range(0, len(flights), CHUNK)]
+    context = multiprocessing.get_context("spawn")  # a fork would copy JAX's threads in an unknown state
+    pool = ProcessPoolExecutor(min(count, len(chunks)), context, _prepare, (load_policy(mission.policy).contract.task,))
+    try:
+        pending = [pool.submit(_fly_chunk, mission, chunk) for chunk in chunks]
+        return _collect((trajectory for each in pending for trajectory in each.result()), done)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _collect(flown: Iterator[Trajectory], done: Callable[[int], None]) -> list[Trajectory]:
+    trajectories = []
+    for trajectory in flown:
+        trajectories.append(trajectory)
+        done(len(trajectories))
+    return trajectories
+
+
+def _fly_chunk(mission: Mission, flights: Sequence[Flight]) -> list[Trajectory]:
+    return list(_fly(mission, flights))
+
+
+def _fly(mission: Mission, flights: Sequence[Flight]) -> Iterator[Trajectory]:
+    policy, kind = load_policy(mission.policy), find_plant(mission.plant)
+    with closing(kind.of(mission.believed, policy.contract)) as plant:
+        met = mission.believed.hash, False
+        for flight in flights:
+            reality = flight.reality
+            if met != (meets := (reality.body.hash, reality.plain_mixer)):
+                plant.meet(reality.body, reality.plain_mixer)
+                met = meets
+            runtime = Runtime.of(policy, flight.course, mission.trained)
+            latency = max(reality.latency - kind.latency, 0.0)
+            yield fly(runtime, plant, flight.start, mission.duration, latency, reality.air)
+
+
+def _prepare(task: str) -> None:
+    """Import the task, whose file may be the user's own; leave Ctrl-C to the parent."""
+    TASKS.find(task)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,109 @@
+"""Fly a policy on a plant, and record it. Imports no JAX."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from e2efly.deploy.policy.runtime import Runtime, act, begin, judged
+from e2efly.validation.plant import Delay, Plant, RigidState
+from e2efly.validation.reality import Air
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A flight: `t` control steps, float64. Step k leads from row k of the states to row k + 1."""
+
+    time: np.ndarray
+    """(t+1,) since the start, s."""
+    position: np.ndarray
+    """(t+1, 3) world, m."""
+    velocity: np.ndarray
+    """(t+1, 3) world, m/s."""
+    quaternion: np.ndarray
+    """(t+1, 4) wxyz, body to world."""
+    body_rate: np.ndarray
+    """(t+1, 3) body, rad/s."""
+    observation: np.ndarray
+    """(t, o) what the policy saw."""
+    action: np.ndarray
+    """(t, 4) what it answered, in [-1, 1]."""
+    command: np.ndarray
+    """(t, 4) the same in the units of the command mode; it acts a latency later."""
+    goal: np.ndarray
+    """(t, 3) where to be, world, m."""
+    success: bool = False
+    """The task's verdict, by the runtime."""
+    failure: str = ""
+    """Why the task failed in flight; empty: it did not."""
+    fault: str = ""
+    """Why the flight broke off before its time, where the policy or the plant refused to go on."""
+
+
+def fly(
+    runtime: Runtime,
+    plant: Plant,
+    start: RigidState,
+    duration: float,
+    latency: float,
+    air: Air | None = None,
+) -> Trajectory:
+    """Fly one start until the time is out, or the task is done or has failed.
+
+    Args:
+        runtime: policy, contract and course.
+        plant: what to fly.
+        start: where from.
+        duration: seconds of the flight, in whole control periods.
+        latency: seconds from observation to command.
+        air: wind, thrust and what the policy sees from step to step; None: still, full, and the truth.
+
+    Returns:
+        The flight. A policy that refuses its observation, or a plant that fails, ends it with a `fault`.
+
+    Raises:
+        ValueError: for a start, duration or latency that is not to be flown.
+    """
+    contract = runtime.policy.contract
+    period = 1 / contract.control_rate_hz
+    steps = math.ceil(duration / period - 1e-6) if math.isfinite(duration) else 0
+    if steps < 1:
+        raise ValueError(f"duration is {duration} s; accepted: one control period or more, {period:.4g} s")
+    disturbed = air is not None and air.disturbs
+    delay = Delay.of(latency, runtime.policy.command(np.array(contract.hover_action)))
+    plant.reset(start)
+    states, decisions, fault = [plant.state], [], ""
+    memory = begin(runtime, states[0].odometry(0.0), 0.0)
+    for k in range(steps):
+        now, then = k * period, (k + 1) * period
+        try:
+            truth = states[-1].odometry(now)
+            memory, decision = act(runtime, memory, truth, now, seen=None if air is None else air.seen(k, truth))
+            if memory.done or memory.failure:
+                break
+            delay, parts = delay.send(decision.command, now).until(now, then)
+            if disturbed and air is not None:
+                plant.disturb(air.wind[k], air.rotor_share[k])
+            for command, seconds in parts:
+                plant.step(command, seconds)
+            reached = RigidState.of(plant.state)
+        except (ValueError, OSError) as error:
+            fault = f"after {now:.2f} s: {error}"
+            break
+        decisions.append(decision)
+        states.append(reached)
+    if not (memory.done or memory.failure):
+        memory = judged(runtime, memory, states[-1].odometry(period * len(decisions)), period * len(decisions))
+    return Trajectory(
+        period * np.arange(len(states)),
+        *(np.array([getattr(s, name) for s in states]) for name in ("position", "velocity", "quaternion", "body_rate")),
+        *(_rows(decisions, name, size) for name, size in
+          (("observation", contract.observation_size), ("action", 4), ("command", 4), ("position", 3))),
+        success=memory.outcome is not None and bool(memory.outcome.success[0]),
+        failure=memory.failure,
+        fault=fault,
+    )  # fmt: skip
+
+
+def _rows(decisions: list, name: str, size: int) -> np.ndarray:
+    return np.array([getattr(d, name) for d in decisions], np.float64).reshape(len(decisions), size)

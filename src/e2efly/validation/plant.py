@@ -1,0 +1,194 @@
+"""What flies: one small interface over every physics, and the delay of commands that all of them share.
+
+Imports no JAX and no simulator: a plant imports its own when it is made.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.policy.contract import COMMANDS, Contract
+from e2efly.vehicles import Vehicle, unknown
+from e2efly.vehicles.vehicle import quantities
+
+BESIDE = frozenset({"wind", "rotor_share", "plain_mixer"})
+"""What a flight may meet beside another body."""
+EVERYTHING = BESIDE | {f.name for f in quantities()}
+"""All that can be changed without the flight controller's knowledge."""
+MOMENT = 1e-9
+"""Seconds below which two times are one: rounding of sums of periods."""
+
+
+@dataclass(frozen=True)
+class RigidState:
+    """Where a vehicle is and how it moves; float64. World ENU, body FLU."""
+
+    position: np.ndarray
+    """(3,) centre of mass, world, m."""
+    velocity: np.ndarray
+    """(3,) world, m/s."""
+    quaternion: np.ndarray
+    """(4,) unit, wxyz, body to world."""
+    body_rate: np.ndarray
+    """(3,) about body x, y, z, rad/s."""
+
+    @staticmethod
+    def of(state: object) -> "RigidState":
+        """The same fields of anything that has them, as float64 copies.
+
+        Raises:
+            ValueError: naming the field, for a wrong shape, a number that is not finite or a quaternion that is not
+                unit.
+        """
+        fields = {name: np.array(getattr(state, name), np.float64) for name in _SHAPES}
+        for name, shape in _SHAPES.items():
+            if fields[name].shape != shape or not np.isfinite(fields[name]).all():
+                raise ValueError(f"{name} is {fields[name].tolist()}; accepted: {shape[0]} finite numbers")
+        if abs(np.linalg.norm(fields["quaternion"]) - 1) > 1e-3:
+            raise ValueError(f"quaternion is {fields['quaternion'].tolist()}; accepted: a unit quaternion wxyz")
+        return RigidState(**fields)
+
+    def odometry(self, time: float) -> Odometry:
+        """What a perfect pose source says of it at `time`, s."""
+        return Odometry(time, self.position, self.velocity, self.quaternion, self.body_rate)
+
+
+_SHAPES = {"position": (3,), "velocity": (3,), "quaternion": (4,), "body_rate": (3,)}
+
+
+class Plant(ABC):
+    """A vehicle with its flight controller, in some physics. Commands act at once: latency is the `Delay`'s.
+
+    A plant extends this, is made by `Plant(vehicle, command_mode)`, and registers itself by `register`. The vehicle
+    that it is made for is the one that its flight controller believes in; `meet` gives it another body.
+    """
+
+    name: ClassVar[str] = ""
+    """By which it is registered; tables call it so."""
+    needs: ClassVar[Mapping[str, str]] = {}
+    """Packages that it imports, and what to give to `pip install` for each."""
+    parallel: ClassVar[bool] = True
+    """Whether several may run at once, each in a process of its own."""
+    latency: ClassVar[float] = 0.0
+    """Seconds that the plant itself takes from command to rate loop; the `Delay` adds only the rest."""
+    episodes: ClassVar[int] = 200
+    """Starts of each criterion that `validate` flies unless told."""
+    whole_flights: ClassVar[bool] = False
+    """Whether `e2efly validate` also flies whole flights through the real firmware."""
+    alters: ClassVar[frozenset[str]] = frozenset()
+    """What `meet` and `disturb` can change without the flight controller's knowledge: fields of the vehicle, and
+    names of `BESIDE`."""
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, contract: Contract) -> Self:
+        """The plant for a vehicle, and for the policy of a contract.
+
+        Raises:
+            ValueError: for what it cannot simulate.
+            OSError: when it cannot be started.
+        """
+        return cls(vehicle, contract.action.mode)  # type: ignore[call-arg]
+
+    @property
+    @abstractmethod
+    def state(self) -> RigidState:
+        """The vehicle now."""
+
+    @abstractmethod
+    def reset(self, state: RigidState) -> None:
+        """Put the vehicle there, the rotors at hover speed."""
+
+    @abstractmethod
+    def step(self, command: np.ndarray, dt: float) -> None:
+        """Hold a command for `dt` s.
+
+        Args:
+            command: (4,) in the units of the command mode that the plant was made for (`COMMANDS`); for `ctbr`
+                collective thrust over mass, m/s^2, and body rates, rad/s.
+            dt: seconds, above zero.
+        """
+
+    def meet(self, body: Vehicle, plain_mixer: bool = False) -> None:
+        """Fly another body from the next `reset` on; the flight controller goes on believing in the plant's vehicle.
+
+        Args:
+            body: differs from the plant's vehicle in fields that `alters` names. Its `rate_gain` is the rate loop's.
+            plain_mixer: the mixer clips each rotor by itself, instead of attitude before thrust.
+
+        Raises:
+            NotImplementedError: where `alters` promises what this plant does not do.
+        """
+        raise NotImplementedError(f"plant {self.name!r} has no method meet")
+
+    def disturb(self, wind: np.ndarray, rotor_share: np.ndarray) -> None:
+        """What holds until the next `disturb` or `reset`: at first still air and full thrust.
+
+        Args:
+            wind: (3,) velocity of the air, world, m/s.
+            rotor_share: (4,) thrust of each rotor over that of the body's thrust map.
+
+        Raises:
+            NotImplementedError: where `alters` promises what this plant does not do.
+        """
+        raise NotImplementedError(f"plant {self.name!r} has no method disturb")
+
+    def close(self) -> None:  # noqa: B027
+        """Let go of what it holds (processes, sockets); it is not used again."""
+
+
+@dataclass(frozen=True)
+class Delay:
+    """Commands under way: each acts a latency after it was sent, until the next one does."""
+
+    latency: float
+    """Seconds from sending to acting."""
+    acting: np.ndarray
+    """(4,) what acts now."""
+    coming: tuple[tuple[float, np.ndarray], ...] = ()
+    """When each command on its way will act, s, in order, and the command."""
+
+    @staticmethod
+    def of(latency: float, acting: np.ndarray) -> "Delay":
+        """Nothing under way.
+
+        Raises:
+            ValueError: for a latency that is negative or not finite.
+        """
+        if not (math.isfinite(latency) and latency >= 0):
+            raise ValueError(f"latency is {latency}; accepted: a finite number of seconds, 0 or more")
+        return Delay(latency, acting)
+
+    def send(self, command: np.ndarray, now: float) -> "Delay":
+        """Send a command, (4,), at `now`, s."""
+        return replace(self, coming=(*self.coming, (now + self.latency, command)))
+
+    def until(self, now: float, end: float) -> tuple["Delay", list[tuple[np.ndarray, float]]]:
+        """Let time pass from `now` to `end`, s.
+
+        Returns:
+            The delay then, and what acts meanwhile: commands with the seconds for which each is held.
+        """
+        acting, coming, parts = self.acting, self.coming, []
+        while coming and coming[0][0] < end - MOMENT:
+            due, command = coming[0]
+            if due > now + MOMENT:
+                parts.append((acting, due - now))
+                now = due
+            acting, coming = command, coming[1:]
+        parts.append((acting, end - now))
+        return replace(self, acting=acting, coming=coming), parts
+
+
+def check_mode(mode: str, plant: str) -> None:
+    """Refuse an unknown command mode.
+
+    Raises:
+        ValueError: naming the plant, the mode and all there are.
+    """
+    if mode not in COMMANDS:
+        raise ValueError(f"plant {plant!r}: " + unknown("command mode", mode, COMMANDS))

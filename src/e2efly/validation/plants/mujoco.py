@@ -1,0 +1,230 @@
+"""The same vehicle in MuJoCo: another engine, another integrator, a ground to stand on; nothing of our own physics.
+
+MuJoCo integrates everything that moves together, by RK4: the rigid body and its gyroscopic torque, the lag of the
+rotors, where they push and twist, the drag, the contact of the feet with the ground. The flight controller (rate loop
+and mixer, float64) runs before every step of at most 1 ms. Two things need a word:
+
+- The activation of a motor is its rotor's *speed* (`dyntype` filter, driven by the commanded speed), as the lag is one
+  of speed. MuJoCo's actuators push in proportion to their activation, so each step is given the tangent of the thrust
+  map at the speed that it starts from: within it the error is k2 (change of speed)^2, 0.005 N in the hardest spin-up.
+- MuJoCo's fluid models take their drag from a body's box or ellipsoid and have no coefficients per axis. So each axis
+  has an actuator without an input that pushes back by its own velocity, -(k1 + k2 |v|) v, with |v| as of the last step;
+  wind is taken off that velocity, turned into the body's frame as of the last step.
+"""
+
+import importlib
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from e2efly.control import CASCADE, Quat, Vec3
+from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
+from e2efly.validation.plants.registry import register
+from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import GRAVITY, allocation_matrix
+
+STEP = 1e-3
+"""Longest step of MuJoCo and of the rate loop, s."""
+FOOT = 0.005
+"""Radius of the balls under the rotors on which the vehicle stands, m."""
+_CALM = Vec3(0.0, 0.0, 0.0)
+
+
+def vehicle_xml(vehicle: Vehicle) -> str:
+    """The vehicle over a ground plane as MJCF: a free body, four rotors, four feet, the drag.
+
+    Thrust map and drag are those of hovering; `MujocoPlant` moves them along.
+    """
+    k2, k1, k0 = vehicle.thrust_map
+    hover, lag, ratio = vehicle.hover_rotor_speed, vehicle.motor_time_constant, vehicle.torque_ratio
+    sites, feet, actuators = ['<site name="centre"/>'], [], []
+    for i, ((x, y), spin) in enumerate(zip(vehicle.rotor_position, vehicle.rotor_spin, strict=True)):
+        sites.append(f'<site name="rotor_{i}" pos="{x} {y} 0"/>')
+        feet.append(f'<geom name="foot_{i}" type="sphere" size="{FOOT}" pos="{x} {y} {FOOT - vehicle.feet_height}"/>')
+        actuators.append(
+            f'<general name="motor_{i}" site="rotor_{i}" gear="0 0 1 0 0 {spin * ratio}" dyntype="filter" '
+            f'dynprm="{lag}" gainprm="{2 * k2 * hover + k1}" biastype="affine" biasprm="{k0 - k2 * hover**2}"/>'
+        )
+    for axis, gear, drag in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), vehicle.drag_linear, strict=True):
+        actuators.append(
+            f'<general name="drag_{axis}" site="centre" gear="{gear} 0 0 0" gainprm="0" biastype="affine" '
+            f'biasprm="0 0 {-drag}"/>'
+        )
+    inertia = " ".join(str(x) for x in vehicle.inertia)
+    line = "\n      "
+    return f"""<mujoco model="{vehicle.name}">
+  <compiler inertiafromgeom="false"/>
+  <option timestep="{STEP}" integrator="RK4" gravity="0 0 -{GRAVITY}" density="0" viscosity="0">
+    <flag autoreset="disable"/>
+  </option>
+  <worldbody>
+    <light pos="0 0 10"/>
+    <geom name="ground" type="plane" size="20 20 1"/>
+    <body name="vehicle" pos="0 0 {vehicle.feet_height}">
+      <freejoint/>
+      <inertial pos="0 0 0" mass="{vehicle.mass}" diaginertia="{inertia}"/>
+      {line.join(sites)}
+      {line.join(feet)}
+    </body>
+  </worldbody>
+  <actuator>
+      {line.join(actuators)}
+  </actuator>
+</mujoco>
+"""
+
+
+@register("mujoco")
+class MujocoPlant(Plant):
+    """A vehicle in MuJoCo."""
+
+    needs = {"mujoco": "e2efly[mujoco]"}
+    alters = EVERYTHING
+
+    def __init__(self, vehicle: Vehicle, command_mode: str = "ctbr", largest_step: float = STEP) -> None:
+        """Make the plant, standing on the ground.
+
+        Args:
+            vehicle: as loaded; the flight controller believes in it.
+            command_mode: what `step` is given: a name of `COMMANDS`. Modes above `ctbr` go through the bridge's own
+                controllers before each step.
+            largest_step: of MuJoCo and the rate loop, s.
+
+        Raises:
+            ValueError: for an unknown command mode, or a step that is not positive.
+        """
+        check_mode(command_mode, self.name)
+        if not (math.isfinite(largest_step) and largest_step > 0):
+            raise ValueError(f"largest_step is {largest_step}; accepted: a positive number of seconds")
+        self._mujoco: Any = importlib.import_module("mujoco")  # here: the plant is known where it is not installed
+        self._believed, self._mode, self._largest_step = vehicle, command_mode, largest_step
+        self.meet(vehicle)
+        self.reset(RigidState(np.array([0.0, 0.0, vehicle.feet_height]), np.zeros(3), np.eye(4)[0], np.zeros(3)))
+
+    def meet(self, body: Vehicle, plain_mixer: bool = False) -> None:
+        """Fly another body from the next `reset` on, of which the flight controller is not told."""
+        self.model = self._mujoco.MjModel.from_xml_string(vehicle_xml(body))
+        self.data = self._mujoco.MjData(self.model)
+        self._body = body
+        self._law = control_law(self._believed.under(body, "rate_gain"), self._mode, plain_mixer)
+        self._full_speed = body.full_rotor_speed
+
+    def disturb(self, wind: np.ndarray, rotor_share: np.ndarray) -> None:
+        """Wind and shares of thrust from now on."""
+        self._wind, self._share = Vec3(*wind.tolist()), rotor_share
+
+    @property
+    def state(self) -> RigidState:
+        """The vehicle now."""
+        pose, motion = self.data.qpos.copy(), self.data.qvel.copy()  # a free joint turns in the body's own frame
+        return RigidState(pose[:3], motion[:3], pose[3:] / np.linalg.norm(pose[3:]), motion[3:])
+
+    @property
+    def rotor_speed(self) -> np.ndarray:
+        """(4,) rear right, front right, rear left, front left, rad/s."""
+        return self.data.act.copy()
+
+    def reset(self, state: RigidState) -> None:
+        """Put the vehicle there, the rotors at hover speed."""
+        self._mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:] = np.concatenate([state.position, state.quaternion])
+        self.data.qvel[:] = np.concatenate([state.velocity, state.body_rate])
+        self.data.act[:] = self._body.hover_rotor_speed
+        self._wind, self._share = _CALM, np.ones(4)
+        self._mujoco.mj_forward(self.model, self.data)  # the velocities that the drag starts from
+
+    def step(self, command: np.ndarray, dt: float) -> None:
+        """Hold a command, (4,), for `dt` s, in equal steps."""
+        count = math.ceil((dt - MOMENT) / self._largest_step)
+        model, data, wanted = self.model, self.data, command.tolist()
+        told, (k2, k1, k0) = self._believed.thrust_map.tolist(), self._body.thrust_map.tolist()
+        linear, quadratic, share = self._body.drag_linear, self._body.drag_quadratic, self._share
+        for _ in range(count):
+            model.opt.timestep = dt / count
+            thrusts = self._law(wanted, data.qpos.tolist(), data.qvel.tolist())
+            data.ctrl[:4] = np.minimum(rotor_speed_of(told, thrusts), self._full_speed)
+            speed = data.act.copy()
+            model.actuator_gainprm[:4, 0] = share * (2 * k2 * speed + k1)
+            model.actuator_biasprm[:4, 0] = share * (k0 - k2 * speed * speed)
+            wind = self._wind if self._wind == _CALM else Quat(*data.qpos[3:].tolist()).unrotate(self._wind)
+            air = np.array([wind.x, wind.y, wind.z])
+            drag = linear + quadratic * np.abs(data.actuator_velocity[4:] - air)
+            model.actuator_biasprm[4:, 0] = drag * air
+            model.actuator_biasprm[4:, 2] = -drag
+            self._mujoco.mj_step(model, data)
+
+
+Law = Callable[[Sequence[float], Sequence[float], Sequence[float]], list[float]]
+"""(command, pose: position and quaternion, motion: velocity in the world and body rates) -> rotor thrusts, N."""
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """What the controllers know of the vehicle."""
+
+    position: Vec3
+    velocity: Vec3
+    attitude: Quat
+
+
+def control_law(vehicle: Vehicle, command_mode: str, plain_mixer: bool = False) -> Law:
+    """The flight controller of a command mode, for the vehicle that it knows; `plain_mixer` as for `rate_loop`.
+
+    Raises:
+        KeyError: for an unknown command mode.
+    """
+    if command_mode == "rotor_thrust":
+        low, high = vehicle.thrust_range
+        return lambda command, pose, motion: [min(max(f, low), high) for f in command]
+    rates = rate_loop(vehicle, plain_mixer)
+    if command_mode == "ctbr":
+        return lambda command, pose, motion: rates(command, motion[3:])
+    controller = CASCADE[command_mode]
+
+    def law(command: Sequence[float], pose: Sequence[float], motion: Sequence[float]) -> list[float]:
+        known = _Motion(Vec3(*pose[:3]), Vec3(*motion[:3]), Quat(*pose[3:]))
+        wanted = controller(vehicle, known, (command[0], command[1], command[2], command[3]))
+        ctbr = (wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z)
+        return rates([float(x) for x in ctbr], motion[3:])
+
+    return law
+
+
+def rate_loop(vehicle: Vehicle, plain_mixer: bool = False) -> Callable[[Sequence[float], Sequence[float]], list[float]]:
+    """The rate loop and the mixer: collective thrust over mass, m/s^2, and body rates, rad/s, to rotor thrusts.
+
+    torque = J K (wanted - w) + w x J w, mixed with attitude before thrust: when the torque asks for more span than a
+    rotor has, all of it is scaled down; then the collective is shifted until every rotor is inside its limits. A plain
+    mixer clips each rotor by itself instead. On plain numbers, which at a thousand times a second is four times as fast
+    as on arrays of three.
+    """
+    mass, (jx, jy, jz) = float(vehicle.mass), vehicle.inertia.tolist()
+    stiffness, limits = (vehicle.inertia * vehicle.rate_gain).tolist(), vehicle.body_rate_max.tolist()
+    rows = np.linalg.inv(allocation_matrix(vehicle)).tolist()
+    low, high = vehicle.thrust_range
+
+    def thrusts(command: Sequence[float], body_rate: Sequence[float]) -> list[float]:
+        p, q, r = body_rate
+        gyroscopic = (jz - jy) * q * r, (jx - jz) * r * p, (jy - jx) * p * q
+        x, y, z = (
+            k * (min(max(wanted, -limit), limit) - rate) + g
+            for k, wanted, limit, rate, g in zip(stiffness, command[1:], limits, body_rate, gyroscopic, strict=True)
+        )
+        spread = [row[1] * x + row[2] * y + row[3] * z for row in rows]
+        if plain_mixer:
+            return [min(max(row[0] * mass * command[0] + s, low), high) for row, s in zip(rows, spread, strict=True)]
+        scale = (high - low) / max(max(spread) - min(spread), high - low)
+        asked = [row[0] * mass * command[0] + scale * s for row, s in zip(rows, spread, strict=True)]
+        shift = max(low - min(asked), 0.0) - max(max(asked) - high, 0.0)
+        return [min(max(f + shift, low), high) for f in asked]
+
+    return thrusts
+
+
+def rotor_speed_of(thrust_map: Sequence[float], thrusts: Sequence[float]) -> list[float]:
+    """The rotor speeds, rad/s, that give thrusts, N: the rising branch of the map k2 W^2 + k1 W + k0."""
+    k2, k1, k0 = thrust_map
+    return [(math.sqrt(k1 * k1 + 4 * k2 * (f - k0)) - k1) / (2 * k2) for f in thrusts]

@@ -1,0 +1,95 @@
+"""The simulator that policies are trained in, as a plant."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from e2efly.deploy.policy.contract import Contract
+from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
+from e2efly.validation.plants.registry import register
+from e2efly.vehicles import Vehicle
+
+_STILL = None, None
+"""No wind, and all of the thrust."""
+
+
+@register("simulator")
+class SimulatorPlant(Plant):
+    """Physics steps of the same length as in training; it moves on when one of them is full.
+
+    A command that takes over inside a physics step acts in proportion, as in training: the step is taken under the
+    mean of what was commanded over it. At the ends of control periods no step is half full.
+    """
+
+    alters = EVERYTHING
+
+    def __init__(self, vehicle: Vehicle, command_mode: str = "ctbr", control_rate: float | None = None) -> None:
+        """Make the plant.
+
+        Args:
+            vehicle: as loaded; the flight controller believes in it.
+            command_mode: what `step` is given.
+            control_rate: Hz, which physics steps divide evenly; the vehicle's own when left out.
+
+        Raises:
+            ValueError: for an unknown command mode, or a rate that is not positive.
+        """
+        check_mode(command_mode, self.name)
+        import jax
+
+        from e2efly.physics import Physics
+
+        physics = Physics.of(vehicle, command_mode, control_rate=control_rate)
+        self._step = physics.control_period / physics.substeps
+        self._physics = dataclasses.replace(physics, control_period=self._step, substeps=1)
+        self._advance, self._hover = jax.jit(_advance), vehicle.hover_rotor_speed
+        self._made, self._air = self._physics, _STILL
+        self.reset(RigidState(np.zeros(3), np.zeros(3), np.eye(4)[0], np.zeros(3)))
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, contract: Contract) -> "SimulatorPlant":
+        """The plant with the control rate of a contract, too."""
+        return cls(vehicle, contract.action.mode, contract.control_rate_hz)
+
+    def meet(self, body: Vehicle, plain_mixer: bool = False) -> None:
+        """Fly another body from the next `reset` on, of which the flight controller is not told."""
+        mixer = dataclasses.replace(self._made.mixer, plain=np.float32(plain_mixer))
+        self._physics = dataclasses.replace(self._made, mixer=mixer).flying(body)
+        self._hover = body.hover_rotor_speed
+
+    def disturb(self, wind: np.ndarray, rotor_share: np.ndarray) -> None:
+        """Wind and shares of thrust from now on."""
+        self._air = wind.astype(np.float32), rotor_share.astype(np.float32)
+
+    @property
+    def state(self) -> RigidState:
+        """The vehicle at the end of the last full physics step."""
+        return RigidState.of(self._state)
+
+    def reset(self, state: RigidState) -> None:
+        """Put the vehicle there, the rotors at hover speed."""
+        import jax.numpy as jnp
+
+        from e2efly.physics import State
+
+        arrays = (state.position, state.velocity, state.quaternion, state.body_rate, np.full(4, self._hover))
+        self._state = State(*(jnp.asarray(x, jnp.float32) for x in arrays))
+        self._filled, self._mean, self._air = 0.0, np.zeros(4), _STILL
+
+    def step(self, command: np.ndarray, dt: float) -> None:
+        """Hold a command, (4,), for `dt` s."""
+        while dt > MOMENT:
+            part = min(dt, self._step - self._filled)
+            self._mean = self._mean + command * (part / self._step)
+            self._filled += part
+            dt -= part
+            if self._filled > self._step - MOMENT:
+                self._state = self._advance(self._physics, self._state, self._mean.astype(np.float32), *self._air)
+                self._filled, self._mean = 0.0, np.zeros(4)
+
+
+def _advance(physics: Any, state: Any, command: Any, wind: Any, rotor_share: Any) -> Any:
+    from e2efly.physics import step
+
+    return step(physics, physics.flown, state, command, wind=wind, rotor_share=rotor_share)

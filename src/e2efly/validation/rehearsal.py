@@ -1,0 +1,185 @@
+"""Whole flights through the real firmware: take-off, hover, policy, landing, with a pilot who only moves switches."""
+
+import math
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from e2efly.deploy.log.record import Log
+from e2efly.deploy.pilot.flight_state import Mode, Reason
+from e2efly.deploy.policy.loader import Policy
+from e2efly.deploy.policy.runtime import RuntimeState
+from e2efly.goal import Course, Outcome
+from e2efly.tasks.route import course_for, route_of
+from e2efly.validation.firmware import Firmware
+from e2efly.validation.rig import Rig
+from e2efly.validation.session import Flown, Session, rehearsal_settings
+from e2efly.vehicles.vehicle import Vehicle
+
+PARKED = 0.3
+"""The vehicle stands within this of where the policy's course begins, m per axis."""
+ASKEW = 0.05
+"""How far a race's heading at the start is off, rad."""
+LAST_S = 0.25
+"""What counts as the end of a policy's flight, s: the poses tell of a touch so much later."""
+LINK_S = 0.01
+"""What link and firmware take from a pose to the rate loop's setpoint on the rig, s; the poses are late by the rest."""
+
+
+@dataclass(frozen=True)
+class Rehearsal:
+    """A whole flight."""
+
+    modes: tuple[str, ...]
+    """The modes in order."""
+    reasons: tuple[str, ...]
+    """Why each began."""
+    complete: bool
+    """Took off, hovered, gave the policy its whole time, landed and was disarmed, without anybody's help."""
+    hover_error: float
+    """Mean distance of the hover before the policy to its target, m."""
+    done: bool
+    """The policy did its task, or was still at it when its time was over."""
+    success: bool
+    """The task's verdict at the end of the policy's flight: for a task without an end, that of an episode so long."""
+    mean_error: float
+    """The task's error over the second half of the policy's flight, m; NaN."""
+    final_error: float
+    """The task's error at its end, m; NaN."""
+    final_speed: float
+    """Largest true speed over its last `LAST_S`, m/s; of a landing, that of the touch; NaN."""
+    top_speed: float
+    """Of the policy, m/s."""
+    arrivals: tuple[float, ...]
+    """When it reached a goal, such as a gate, s from its start."""
+    told: str
+    """How the policy did, in words."""
+    flown: Flown
+    """The flight."""
+
+
+def whole_course(policy: Policy, vehicle: Vehicle) -> Course:
+    """What a policy flies in a rehearsal."""
+    kind = route_of(policy.contract)
+    return course_for(policy.contract, vehicle, kind(**kind.whole))
+
+
+def rehearse(
+    firmware: Firmware,
+    policy: Policy,
+    vehicle: Vehicle,
+    *,
+    course: Course | None = None,
+    seed: int = 0,
+    log: Log | None = None,
+    folder: Path | None = None,
+) -> Rehearsal:
+    """One whole flight.
+
+    Args:
+        firmware: the built firmware.
+        policy: as loaded.
+        vehicle: of the world and of the bridge.
+        course: where it flies; left out: where the training was.
+        seed: of where it stands and of the poses' noise.
+        log: keeps the flight's record.
+        folder: of the firmware's files; left out: a temporary one.
+    """
+    course = whole_course(policy, vehicle) if course is None else course
+    with tempfile.TemporaryDirectory(prefix="e2efly-") as temporary:
+        latency = max(policy.contract.latency_s - LINK_S, 0.0)
+        with Rig(firmware, folder or Path(temporary), vehicle, latency=latency, seed=seed) as rig:
+            return _fly(rig, policy, course, seed, log)
+
+
+def _fly(rig: Rig, policy: Policy, course: Course, seed: int, log: Log | None) -> Rehearsal:
+    random = np.random.default_rng(seed)
+    first = course.origin.points(course.start)
+    x, y = first[:2] + random.uniform(-PARKED, PARKED, 2)
+    rig.state = rig.world.at_rest(x, y, _heading(course, random))
+    rig.sleep(0.5)
+    settings = rehearsal_settings(first[2] - rig.world.vehicle.feet_height)
+    session = Session(rig, settings, policy=policy, course=course, log=log)
+    try:
+        up = session.take_off(3.0)
+        rig.set(mission="policy")
+        bridge, worker = session.bridge, session.worker
+        assert worker is not None
+        begun = session.fly(0.5, session.in_mode(Mode.POLICY))
+        end = rig.now() + route_of(policy.contract).longest_s
+        judged: dict[int, tuple[float, Outcome]] = {}
+        while begun and rig.now() < end and bridge.flight.mode is Mode.POLICY:
+            session.step()
+            state = worker.last
+            if state is not None and state.outcome is not None:
+                judged[state.steps] = (state.judged, state.outcome)
+        done = Reason.POLICY_DONE in bridge.flight.reasons or bridge.flight.mode is Mode.POLICY
+        ended = worker.last
+        if not course.goal.lands:
+            rig.set(mission="hover")
+            session.fly(3.0)
+        landed = session.land()
+        return _report(course, session.flown, up, begun, done, landed, list(judged.values()), ended)
+    finally:
+        session.close()
+
+
+def _report(
+    course: Course,
+    flown: Flown,
+    up: bool,
+    begun: bool,
+    done: bool,
+    landed: bool,
+    judged: list[tuple[float, Outcome]],
+    ended: RuntimeState | None,
+) -> Rehearsal:
+    errors = np.array([float(outcome.error[0]) for _, outcome in judged])
+    arrivals = tuple(time for time, outcome in judged if outcome.arrived[0])
+    speeds = [float(np.linalg.norm(flown.velocity[i])) for i in flown.where(Mode.POLICY)]
+    mean = float(errors[len(errors) // 2 :].mean()) if len(errors) else math.nan
+    final = float(errors[-1]) if len(errors) else math.nan
+    times = np.array(flown.time)[flown.where(Mode.POLICY)]
+    speed = max((v for at, v in zip(times, speeds, strict=True) if at >= times[-1] - LAST_S), default=math.nan)
+    return Rehearsal(
+        modes=tuple(mode for _, mode, _ in flown.changes),
+        reasons=tuple("; ".join(reasons) for _, _, reasons in flown.changes),
+        complete=up and begun and done and landed,
+        hover_error=_hover_error(flown),
+        done=done,
+        success=ended is not None and _success(course, ended),
+        mean_error=mean,
+        final_error=final,
+        final_speed=speed,
+        top_speed=max(speeds, default=0.0),
+        arrivals=arrivals,
+        told=course.goal.told(arrivals, mean, final, speed) if judged else "none",
+        flown=flown,
+    )
+
+
+def _success(course: Course, ended: RuntimeState) -> bool:
+    """The verdict at the end; a task without an end is asked as if its time were out now."""
+    if ended.outcome is None or ended.outcome.terminated[0]:
+        return ended.outcome is not None and bool(ended.outcome.success[0])
+    now, body = np.array([ended.judged]), ended.odometry.batch
+    _, outcome = course.goal.advance(ended.task, body, body, now, np.array([True]))
+    return bool(outcome.success[0])
+
+
+def _heading(course: Course, random: np.random.Generator) -> float:
+    """In which the vehicle is put down, rad: any, unless the course has one."""
+    if course.heading is None:
+        return random.uniform(-np.pi, np.pi)
+    return course.heading + course.origin.yaw + random.uniform(-ASKEW, ASKEW)
+
+
+def _hover_error(flown: Flown) -> float:
+    """Mean error over the last second of the hover before the policy, m."""
+    end = next((at for at, mode, _ in flown.changes if mode == Mode.POLICY), flown.time[-1])
+    rows = zip(flown.time, flown.mode, flown.position, flown.goal, strict=True)
+    last = [(p, g) for at, mode, p, g in rows if mode == Mode.HOVER and end - 1.0 <= at < end]
+    errors = [float(np.linalg.norm(p - g)) for p, g in last if g is not None]
+    return float(np.mean(errors)) if errors else math.nan

@@ -1,0 +1,314 @@
+"""The firmware on a test rig: its world, a pilot with a transmitter, and a pose source.
+
+With virtual time the rig is a clock: sleeping on it lets world and firmware run.
+"""
+
+import dataclasses
+import hashlib
+import shutil
+import socket
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from e2efly.deploy.odometry import Sample
+from e2efly.device import compute_at_once, one_core
+from e2efly.validation.firmware import Firmware
+from e2efly.validation.sitl import FirmwareState, Sitl
+from e2efly.validation.world import Body, World
+from e2efly.vehicles.vehicle import Vehicle
+
+STEP_S = 0.002
+"""How often the firmware's sensors are told a new state, s."""
+LONGEST_LAG_S = 0.2
+"""In real time, the longest by which a busy machine may hold up world and firmware and that they make up for, s."""
+RC_PERIOD_S = 0.02
+"""How often the pilot's receiver speaks, s."""
+CALIBRATION_S = 6.0
+"""The firmware stands still for so long before it can be armed, s."""
+POSE_NOISE = (0.0005, 0.01, 0.02, 0.001)
+"""Of position, m; velocity, m/s; body rate, rad/s; attitude, rad: a motion capture system's, standard deviations."""
+VIBRATION = 0.3
+"""Of the force that the accelerometer feels while the rotors turn, before the firmware's own filter, m/s^2: a standard
+deviation as of a small quadrotor with good propellers."""
+LOST_CHANNEL = 13
+"""AUX9: the receiver's own, by which firmware that does not hear its silence is told of it."""
+LANDING_S = 10
+"""After so long a failsafe landing stops the motors, s."""
+SETTINGS = (
+    "aux 0 0 0 1700 2100 0 0",  # arm: AUX1
+    "aux 1 50 1 1700 2100 0 0",  # MSP override: AUX2
+    "aux 2 1 2 925 2100 0 0",  # angle: AUX3, wherever the pilot leaves it; the bridge sends 900 there
+    "set msp_override_channels_mask=79",
+    "rxfail 3 s 1575",  # without the receiver: a throttle that just sinks ...
+    "rxfail 6 s 2000",  # ... and angle
+    "aux 3 27 8 1700 2100 0 0",  # FAILSAFE: AUX9, where the firmware takes silence for the last frame
+    "set failsafe_procedure=AUTO-LAND",
+    "set failsafe_throttle=1575",
+    "set failsafe_delay=5",
+    "set max_aux_channels=14",  # or the copies of throttle and yaw on channels 11 and 12 are not read
+    "set rates_type=ACTUAL",
+    *(f"set {axis}_rc_rate=67" for axis in ("roll", "pitch", "yaw")),
+    *(f"set {axis}_srate=67" for axis in ("roll", "pitch", "yaw")),
+    *(f"set {axis}_expo=0" for axis in ("roll", "pitch", "yaw")),
+    "set rc_smoothing=OFF",
+    "set feedforward_transition=0",
+    *(f"set f_{axis}=0" for axis in ("roll", "pitch", "yaw")),  # noise of the setpoint is not to be amplified
+    *(f"set p_{axis}={p}" for axis, p in (("roll", 40), ("pitch", 42), ("yaw", 120))),  # tuned: 63 % of a step in
+    *(f"set i_{axis}={i}" for axis, i in (("roll", 40), ("pitch", 40), ("yaw", 20))),  # 45 ms, a fifth too far
+    *(f"set d_{axis}={d}" for axis, d in (("roll", 50), ("pitch", 55), ("yaw", 100))),
+    "set iterm_relax=RPY",
+    "set small_angle=180",
+    "set acc_calibration=0,0,0,1",
+    "set serial_update_rate_hz=1000",
+    "set deadband=0",
+    "set yaw_deadband=0",
+)
+"""What the firmware is set to, as lines of its own command line: what docs/hardware asks of a real controller."""
+
+
+@dataclass(frozen=True)
+class Transmitter:
+    """The pilot's hands. Sticks -1 to 1."""
+
+    armed: bool = False
+    override: bool = False
+    mission: str = "land"
+    """land, hover or policy."""
+    roll: float = 0.0
+    pitch: float = 0.0
+    throttle: float = -1.0
+    """What the controller gets without override: it rests in the middle in flight. Its copy to the bridge is `lift`."""
+    yaw: float = 0.0
+    lift: float = 0.0
+    """The copy of the throttle stick."""
+
+    def channels(self) -> np.ndarray:
+        """The receiver's 16 channels, us: roll, pitch, throttle, yaw; arm, override, none, mission; copies; rest."""
+        sticks = [self.roll, self.pitch, self.throttle, self.yaw]
+        switches = [1.0 if on else -1.0 for on in (self.armed, self.override)]
+        mission = {"land": -1.0, "hover": 0.0, "policy": 1.0}[self.mission]
+        copies = [self.roll, self.pitch, self.lift, self.yaw]
+        return np.round(1500 + 500 * np.array([*sticks, *switches, -1.0, mission, *copies, 0, 0, 0, 0])).astype(int)
+
+
+class Rig:
+    """One firmware in its world. Use it as a context manager: inside, the thread and the firmware share one core.
+
+    Time is virtual; with `real_time` it keeps pace with the machine's clock, as for a bridge in another process.
+    """
+
+    def __init__(
+        self,
+        firmware: Firmware,
+        folder: Path,
+        vehicle: Vehicle,
+        *,
+        real_time: bool = False,
+        pose_rate: float = 200.0,
+        latency: float = 0.0,
+        seed: int = 0,
+    ) -> None:
+        compute_at_once()
+        self.sitl = Sitl(firmware, folder)
+        self.thrust_shares = np.ones(4)
+        """Thrust of each rotor over that of the vehicle's thrust map."""
+        self.carry(vehicle)
+        self.state: Body = self.world.at_rest()
+        self.transmitter = Transmitter()
+        self.latency = latency
+        """Age of the poses when they are delivered, s."""
+        self.wind = np.zeros(3)
+        self.held = False
+        """The body is held where it is; the rotors turn nothing."""
+        self.shares = np.ones(4)
+        """Share of each motor's output that its rotor follows: below 1 for a flat battery or a weak motor."""
+        self.felt: Callable[[FirmwareState], FirmwareState] | None = None
+        """What the firmware's sensors make of the truth; None: the truth."""
+        self.heard = True
+        """Whether the pilot's receiver hears the transmitter."""
+        self._pose_period = 1 / pose_rate
+        self._poses: deque[Sample] = deque()
+        self._next_pose = self._next_rc = 0.0
+        self._left = 0.0
+        self._real_time = real_time
+        self._epoch = 0.0
+        self._on = True
+        self._noise, self._shaking = np.random.default_rng(seed), np.random.default_rng([seed, 1])
+        self._open = ExitStack()
+
+    def carry(self, vehicle: Vehicle) -> None:
+        """Put a vehicle under the firmware; its state stays."""
+        self.world = World(vehicle)
+        self.world.advance(self.world.at_rest(), np.ones(4), STEP_S)  # compiled while it has all cores
+
+    def __enter__(self) -> "Rig":
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def start(self) -> None:
+        """Start the firmware with `SETTINGS` and wait until it can be armed; `close`, in the same thread, ends it."""
+        with ExitStack() as opened:
+            opened.callback(self.sitl.close)
+            opened.enter_context(one_core())
+            self._boot()
+            self._open = opened.pop_all()
+
+    def close(self) -> None:
+        """End the firmware."""
+        self._open.close()
+        self.sitl.close()
+
+    def _boot(self) -> None:
+        prepare(self.sitl)
+        self.sitl.start()
+        self._next_pose = self._next_rc = self.now()
+        self._run(CALIBRATION_S)  # nobody is there yet for whom it would have to be in real time
+        self._poses.clear()
+        self._epoch = time.monotonic() - self.now()
+
+    def now(self) -> float:
+        """Seconds of the firmware's time."""
+        return self.sitl.now
+
+    def machine_time(self, moment: float) -> float:
+        """When a moment of the firmware's time, s, was on the machine's monotonic clock; with `real_time` only."""
+        return self._epoch + moment
+
+    def sleep(self, seconds: float) -> None:
+        """Let the world and the firmware run."""
+        if self._real_time:
+            end = time.monotonic() + seconds
+            while (now := time.monotonic()) < end:
+                self._epoch = max(self._epoch, now - LONGEST_LAG_S - self.now())
+                while self.now() + STEP_S <= now - self._epoch:
+                    self.step(STEP_S)
+                time.sleep(min(end - now, STEP_S))
+        else:
+            self._run(seconds)
+
+    def _run(self, seconds: float) -> None:
+        """Steps for so long, as fast as they go."""
+        self.sitl.exchange()
+        self._left += seconds
+        while self._left > STEP_S / 2:
+            self.step(STEP_S)
+            self._left -= STEP_S
+        self.sitl.exchange()
+
+    def step(self, dt: float) -> None:
+        """One step of the world and of the firmware."""
+        motors = self.sitl.motors() if self._on else np.zeros(4)
+        after = self.state if self.held else self._moved(motors, dt)
+        if self._on:
+            sensed = self._shaken(self.world.sensed(self.state, after, dt), after)
+            self.sitl.send_state(sensed if self.felt is None else self.felt(sensed))
+        self.sitl.advance(dt)
+        self.state = after
+        now = self.now()
+        if now >= self._next_rc:
+            self._next_rc += RC_PERIOD_S
+            self._receive()
+        if now >= self._next_pose:
+            self._next_pose += self._pose_period
+            self._poses.append(self._sample(now))
+
+    def _moved(self, motors: np.ndarray, dt: float) -> Body:
+        return self.world.advance(self.state, motors * self.shares, dt, self.wind, self.thrust_shares)
+
+    def _shaken(self, sensed: FirmwareState, after: Body) -> FirmwareState:
+        if not after.rotor_speed.any():
+            return sensed
+        noise = VIBRATION * self._shaking.standard_normal(3)
+        return dataclasses.replace(sensed, specific_force=sensed.specific_force + noise)
+
+    def _receive(self) -> None:
+        """A frame of the pilot's receiver; one that hears nothing sends none, or the switch that stands for it."""
+        channels = self.transmitter.channels()
+        if not self.heard:
+            if self.sitl.firmware.layout.hears_silence:
+                return
+            channels[LOST_CHANNEL - 1] = 2000
+        self.sitl.send_rc(channels)
+
+    def poses(self, now: float) -> list[Sample]:
+        """The poses that have come since the last call, `latency` s old."""
+        ready = []
+        while self._poses and self._poses[0].received + self.latency <= now:
+            sample = self._poses.popleft()
+            ready.append(dataclasses.replace(sample, received=now))
+        return ready
+
+    def set(self, **changes: object) -> None:
+        """Move the pilot's sticks and switches: fields of `Transmitter`."""
+        self.transmitter = dataclasses.replace(self.transmitter, **changes)  # type: ignore[arg-type]
+
+    def power(self, on: bool) -> None:
+        """Cut the controller's power, at which the motors stop, or give it back, at which it boots."""
+        if on and not self._on:
+            self.sitl.start()
+            self._epoch = time.monotonic() - self.now()
+        elif not on:
+            self.sitl.stop()
+        self._on = on
+
+    def _sample(self, now: float) -> Sample:
+        s, noise = self.state, self._noise
+        position, velocity, rate = (
+            np.asarray(x) + sigma * noise.normal(size=3)
+            for x, sigma in zip((s.position, s.velocity, s.body_rate), POSE_NOISE[:3], strict=True)
+        )
+        quaternion = np.asarray(s.quaternion) + POSE_NOISE[3] / 2 * noise.normal(size=4)
+        return Sample(now, position, quaternion / np.linalg.norm(quaternion), now, velocity, rate)
+
+
+def prepare(sitl: Sitl, settings: tuple[str, ...] = SETTINGS) -> None:
+    """Put settings into the folder of a firmware that is not running; they are kept, as typing them takes a while."""
+    firmware = sitl.firmware
+    stops, steps = firmware.release.landing_time
+    settings = (*settings, f"set {stops}={LANDING_S * steps}", *firmware.layout.settings)
+    name = hashlib.sha256("\n".join(settings).encode()).hexdigest()[:12]
+    kept = firmware.program.parent / f"settings-{name}.bin"
+    mine = sitl.folder / "eeprom.bin"
+    if kept.is_file():
+        shutil.copy(kept, mine)
+        return
+    mine.unlink(missing_ok=True)
+    sitl.start()
+    try:
+        _type(sitl, settings)
+    finally:
+        sitl.stop()
+    draft = kept.with_suffix(f".{sitl.base}")
+    shutil.copy(mine, draft)
+    draft.replace(kept)
+
+
+def _type(sitl: Sitl, settings: tuple[str, ...]) -> None:
+    """Type lines into the firmware's command line, then `save`, at which it ends.
+
+    Raises:
+        ValueError: when it refuses a line, with its words.
+    """
+    sitl.idle(1.0)
+    with socket.create_connection(("127.0.0.1", sitl.base + 4), timeout=5.0) as line:
+        line.setblocking(False)
+        sitl.idle(0.2)
+        for text in ("#", *(f"{setting}\n" for setting in settings)):
+            line.sendall(text.encode())
+            sitl.idle(0.3)
+            answer = line.recv(65536).decode(errors="replace")
+            if "#" not in answer or "ERROR" in answer.upper() or "INVALID" in answer.upper():
+                raise ValueError(f"the firmware refuses {text!r}: {answer!r}")
+        line.sendall(b"save\n")
+        end = time.monotonic() + 20
+        while sitl.alive and time.monotonic() < end:
+            sitl.idle(0.1)

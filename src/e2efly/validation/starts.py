@@ -1,0 +1,77 @@
+"""Starts that a task draws, and the courses that a policy flies from them."""
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Array
+
+from e2efly.config import TaskConfig
+from e2efly.env import UNSEEN, Env, random_key
+from e2efly.evaluation import drawn_by
+from e2efly.goal import Course
+from e2efly.physics import State
+from e2efly.tasks.route import goal_of
+from e2efly.tasks.task import Task
+from e2efly.validation.plant import RigidState
+
+BATCH = 250
+"""Starts that are drawn at once: as `e2efly eval` does, so that they are the same."""
+
+
+@dataclass(frozen=True)
+class Starts:
+    """`n` starts of a task."""
+
+    states: tuple[RigidState, ...]
+    """Where each begins."""
+    courses: tuple[Course, ...]
+    """What each is to fly, for the runtime."""
+    memory: Any
+    """The task's own state, each leaf (n, ...), for the judge: the references drawn, for instance."""
+    drawn: dict[str, np.ndarray] = field(default_factory=dict)
+    """What the episodes have of their own beside where they begin, for reports: columns (n, ...)."""
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+    def of(self, rows: list[int]) -> "Starts":
+        """Some of them, in the order named."""
+        memory = jax.tree.map(lambda x: x[np.array(rows)], self.memory)
+        return Starts(tuple(self.states[i] for i in rows), tuple(self.courses[i] for i in rows if self.courses), memory)
+
+
+def draw_starts(env: Env, n: int, seed: int) -> Starts:
+    """The first `n` starts of a seed: those of `e2efly eval`."""
+    drawn = [_draw(env, random_key(seed, UNSEEN, i)) for i in range(-(-n // BATCH))]
+    vehicle, memory = jax.tree.map(lambda *x: np.concatenate(x)[:n], *drawn)
+    fields = (vehicle.position, vehicle.velocity, vehicle.quaternion, vehicle.body_rate)
+    states = tuple(RigidState(*(x[i].astype(np.float64) for x in fields)) for i in range(n))
+    every = Starts(states, (), memory)
+    courses = tuple(course_of(env.task, every.of([i]).memory, states[i].position) for i in range(n))
+    drawn = jax.tree.map(np.asarray, drawn_by(env.task, memory))
+    return Starts(states, courses, memory, drawn)
+
+
+@jax.jit
+def _draw(env: Env, key: Array) -> tuple[State, Any]:
+    state = env.reset(key, BATCH)[0]
+    return state.vehicle, state.memory
+
+
+def course_of(task: Task, memory: Any, start: np.ndarray) -> Course:
+    """The course of one episode of a task, for the runtime: its goal without the part that trains, in NumPy.
+
+    Args:
+        task: of the environment.
+        memory: its state at the start of that episode, NumPy leaves (1, ...).
+        start: (3,) where it begins, m.
+    """
+    options = getattr(task, "config", None)
+    lean: Any = goal_of(type(options)) if isinstance(options, TaskConfig) else type(task)
+    if lean is type(task):
+        return Course(jax.tree.map(np.asarray, task), memory, start, duration=float(task.episode_s))
+    parts = {f.name: jax.tree.map(np.asarray, getattr(task, f.name)) for f in dataclasses.fields(lean)}
+    return Course(lean(**parts), lean.state(memory), start, duration=float(task.episode_s))

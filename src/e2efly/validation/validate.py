@@ -1,0 +1,207 @@
+"""Fly a policy by the bridge's runtime on another plant: what `e2efly.validate` and `e2efly validate` do."""
+
+import dataclasses
+import math
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from e2efly.config import TaskConfig
+from e2efly.deploy.policy.runtime import check
+from e2efly.device import compute_at_once, prepare
+from e2efly.episodes import Episodes, rows, summary
+from e2efly.evaluation import ROW, SEED, UNITS, Candidate, candidate, course_rows, fly_criteria, settling
+from e2efly.tasks.route import fields_of
+from e2efly.validation.fleet import Flight, Mission, fly_all
+from e2efly.validation.flight import Trajectory
+from e2efly.validation.judge import Verdicts, judge
+from e2efly.validation.plant import Plant
+from e2efly.validation.plants import PLANTS, find_plant
+from e2efly.validation.reality import Reality, check_realities
+from e2efly.validation.starts import Starts, draw_starts
+from e2efly.vehicles import Controller, Vehicle, load_vehicle
+
+SAMPLE = 136
+"""Bytes of a control step of a flight on a plant, of which all are kept."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How a policy did on one criterion, in two places from the same starts."""
+
+    trained: Episodes
+    """In the training simulator, as `evaluate` flies them; NumPy arrays."""
+    flown: Verdicts
+    """On the plant."""
+    starts: Starts
+    """What both began from."""
+    flights: list[Trajectory]
+    """The flight of each start on the plant."""
+
+    @property
+    def drop(self) -> float:
+        """Points of success that the plant costs."""
+        return 100 * float(np.mean(self.trained.success) - np.mean(self.flown.success))
+
+    def as_json(self, plant: str, suite: TaskConfig) -> dict[str, Any]:
+        """A summary of either place, and a row for every start on the plant."""
+        faults = sum(bool(flight.fault) for flight in self.flights)
+        courses = course_rows(suite, self.starts.drawn, len(self.starts))
+        places = zip(self.trained.success, rows(self.flown), self.flights, self.starts.states, courses, strict=True)
+        starts = [
+            {"trained_success": bool(trained), **row, "fault": flight.fault}
+            | {"start": {f.name: getattr(start, f.name).round(6).tolist() for f in dataclasses.fields(start)}}
+            | course
+            for trained, row, flight, start, course in places
+        ]
+        flown = summary(self.flown) | {"faults": faults}
+        return {"drop": self.drop, "training": summary(self.trained), plant: flown, "starts": starts}
+
+
+@dataclass(frozen=True)
+class Validation:
+    """How a policy did on a plant, beside the training simulator."""
+
+    candidate: Candidate
+    """What flew."""
+    plant: type[Plant]
+    """Where."""
+    seed: int
+    """Of the starts."""
+    max_drop: float
+    """Points of success by which the plant may lie under the training simulator."""
+    criteria: dict[str, Comparison]
+    """By name."""
+
+    @property
+    def worst(self) -> str:
+        """The criterion whose success drops most."""
+        return max(self.criteria, key=lambda name: self.criteria[name].drop)
+
+    @property
+    def passed(self) -> bool:
+        """Whether success drops by no more than `max_drop` in any criterion."""
+        return self.criteria[self.worst].drop <= self.max_drop + 1e-9
+
+    def notes(self) -> list[str]:
+        """What the training simulator has and the plant does not, and the other way round."""
+        policy, env, notes = self.candidate.policy.contract, self.candidate.env, []
+        random = {
+            "randomised vehicles": bool(env.randomize),
+            "wind": env.wind > 0,
+            "noise": env.noise != type(env.noise)(),
+            "late observations": policy.observation_latency_range_s[1] > 0,
+        }
+        if any(random.values()):
+            there = ", ".join(name for name, has in random.items() if has)
+            notes.append(f"Trained with {there}: there in `training`, not on the plant.")
+        low, high = policy.latency_range_s
+        if low < high:
+            notes.append(
+                f"Trained with a latency of {low:g} to {high:g} s; the plant flies with {policy.latency_s:g} s."
+            )
+        if (own := self.plant.latency) > policy.latency_s:
+            notes.append(f"The plant itself takes {own:g} s from command to rate loop, longer than that.")
+        return notes + self.candidate.notes
+
+    def as_json(self) -> dict[str, Any]:
+        """The report that `e2efly validate --json` writes."""
+        contract, plant, suites = self.candidate.policy.contract, self.plant.name, self.candidate.task.criteria()
+        drop = "points of success: percent of the training simulator less percent of the plant"
+        return {
+            "policy": str(self.candidate.file),
+            "task": contract.task,
+            "vehicle": self.candidate.vehicle,
+            "controller": self.candidate.controller,
+            "plant": plant,
+            "latency_s": contract.latency_s,
+            "seed": self.seed,
+            "max_drop": self.max_drop,
+            "units": UNITS | {"drop": drop},
+            "criteria": {name: each.as_json(plant, suites[name]) for name, each in self.criteria.items()},
+        }
+
+
+def validate(
+    policy: str | os.PathLike[str],
+    plant: str | type[Plant] = "mujoco",
+    episodes: int | None = None,
+    *,
+    vehicle: str | None = None,
+    controller: Controller = "policy",
+    seed: int = SEED,
+    max_drop: float = 2.0,
+    progress: Callable[[str, int, int], None] = lambda criterion, done, total: None,
+) -> Validation:
+    """Fly a policy by the bridge's runtime on another plant, from the starts of `evaluate`.
+
+    Many flights share the cores in processes of their own: a script calls this behind `if __name__ == "__main__":`.
+
+    Args:
+        policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
+        plant: its name, its reference `path/to/file.py:Name` or `module:Name`, or a registered class.
+        episodes: starts of each criterion; left out: the plant's `episodes`.
+        vehicle: what the plant flies, a name or a .toml file; left out: the policy's own vehicle.
+        controller: policy: the plant's flight controller believes in the policy's own vehicle, whatever flies; plant:
+            it is tuned to the vehicle that flies. Neither changes the policy.
+        seed: of the starts.
+        max_drop: points of success by which the plant may lie under the training simulator.
+        progress: (criterion, flights that are over, of how many).
+
+    Raises:
+        ValueError: naming the option or the field, what it is and what is accepted.
+        OSError: when the plant cannot be started.
+    """
+    name = plant_name(plant)
+    kind = find_plant(name)
+    episodes = kind.episodes if episodes is None else episodes
+    if episodes <= 0:
+        raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
+    if not (math.isfinite(max_drop) and max_drop >= 0):
+        raise ValueError(f"--max-drop is {max_drop}; accepted: 0 or more points of success")
+    compute_at_once()
+    prepare("cpu")  # the plants compute there, one vehicle at a time
+    found, kind, own = flyable(policy, plant, vehicle, controller)
+    reality = Reality(found.flown.body, found.policy.contract.latency_s)
+    check_realities(kind, found.flown.believed, [reality])
+    suites = found.task.criteria()
+    longest = max(float(suite.episode_s) for suite in suites.values())
+    kept = ROW + SAMPLE * int(longest * found.policy.contract.control_rate_hz)
+    trained, _, _ = fly_criteria(found.at_home, episodes, seed, kept)
+    criteria = {}
+    for criterion, suite in suites.items():
+        env = found.environment(suite)
+        starts = draw_starts(env, episodes, seed)
+        mission = Mission(found.file, name, own, found.flown.believed, float(suite.episode_s))
+        asked = [Flight(*start, reality) for start in zip(starts.states, starts.courses, strict=True)]
+        flights = fly_all(mission, asked, lambda done: progress(criterion, done, episodes))  # noqa: B023
+        verdicts = judge(env, starts, flights, settling(suite))
+        criteria[criterion] = Comparison(trained[criterion], verdicts, starts, flights)
+    return Validation(found, kind, seed, max_drop, criteria)
+
+
+def plant_name(plant: str | type[Plant]) -> str:
+    """The name or reference of a plant, by which other processes find it.
+
+    Raises:
+        ValueError: for a class that is not registered.
+    """
+    return plant if isinstance(plant, str) else PLANTS.reference(plant)
+
+
+def flyable(
+    policy: str | os.PathLike[str], plant: str | type[Plant], vehicle: str | None, controller: Controller
+) -> tuple[Candidate, type[Plant], Vehicle]:
+    """A policy that the runtime can fly, the plant, and the vehicle that the policy was trained on.
+
+    Raises:
+        ValueError: naming what does not fit.
+    """
+    kind, found = find_plant(plant_name(plant)), candidate(policy, vehicle, controller)
+    own = load_vehicle(found.env.vehicle)
+    if reasons := check(found.policy.contract, own, fields_of(found.policy.contract)):
+        raise ValueError("\n".join(reasons))
+    return found, kind, own

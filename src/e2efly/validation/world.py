@@ -1,0 +1,129 @@
+"""The world of a flight controller under test: our rigid body, the ground, and an IMU.
+
+The firmware's motor outputs turn the rotors; the body's motion is what its sensors are told.
+"""
+
+from dataclasses import dataclass
+from dataclasses import fields as fields_of
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from e2efly.control.vectors import Quat, Vec3
+from e2efly.physics import State
+from e2efly.physics.integrate import rk4
+from e2efly.physics.plant import Plant
+from e2efly.physics.state import Parts
+from e2efly.validation.sitl import FirmwareState
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+STEP_S = 0.001
+"""Length of a step of the rigid body, s."""
+_PROGRAMS: dict[str, Any] = {}
+"""By the vehicle's hash: compiling takes a second, which the next world of the same vehicle need not wait for."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """The rigid body's state: the fields of `physics.State`, NumPy, one vehicle."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    quaternion: np.ndarray
+    body_rate: np.ndarray
+    rotor_speed: np.ndarray
+
+
+@dataclass(frozen=True)
+class World:
+    """The rigid body of a vehicle over flat ground; pure: `advance` returns what comes next."""
+
+    vehicle: Vehicle
+    """The plant; loaded."""
+
+    @cached_property
+    def full_speed(self) -> float:
+        """Rotor speed at full motor output, rad/s."""
+        return self.vehicle.full_rotor_speed
+
+    def at_rest(self, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Body:
+        """On the ground, rotors still."""
+        zero = np.zeros(3)
+        position = np.array([x, y, self.vehicle.feet_height])
+        return Body(position, zero, np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), zero, np.zeros(4))
+
+    def advance(
+        self,
+        state: Body,
+        motors: np.ndarray,
+        dt: float,
+        wind: np.ndarray | None = None,
+        rotor_share: np.ndarray | None = None,
+    ) -> Body:
+        """The state after `dt` s under constant motor outputs.
+
+        Args:
+            state: before.
+            motors: (4,) in [0, 1], Betaflight's order; rotor speed is proportional to it.
+            dt: a whole number of `STEP_S`.
+            wind: (3,) world, m/s.
+            rotor_share: (4,) thrust of each rotor over that of the vehicle's thrust map.
+        """
+        standing = state.position[2] <= self.vehicle.feet_height and not (state.velocity.any() or state.body_rate.any())
+        if standing and not (motors.any() or state.rotor_speed.any()):
+            return state  # as it is for seconds after each boot
+        steps = max(round(dt / STEP_S), 1)
+        air, share = np.zeros(3) if wind is None else wind, np.ones(4) if rotor_share is None else rotor_share
+        parts = (getattr(state, f.name) for f in fields_of(Body))
+        row = np.concatenate([*parts, np.asarray(motors) * self.full_speed, air, share]).astype(np.float32)
+        after = np.asarray(self._steps(row, steps), np.float64)  # one array in, one out: handing over costs most
+        return Body(after[:3], after[3:6], after[6:10], after[10:13], after[13:])
+
+    @cached_property
+    def _steps(self) -> Any:
+        """(row of state, rotor commands, wind, shares; steps) -> row of state, with the vehicle's numbers built in."""
+        vehicle = self.vehicle
+
+        def run(row: Any, steps: int) -> Any:
+            state = State(row[:3], row[3:6], row[6:10], row[10:13], row[13:17])
+            command, air, plant = tuple(row[17:21]), Vec3.of(row[21:24]), Plant.of(vehicle, STEP_S, row[24:28])
+
+            def step(parts: Parts, _: None) -> tuple[Parts, None]:
+                free = rk4(plant, parts, command, air, STEP_S)  # type: ignore[arg-type]
+                return _stand(vehicle, free), None
+
+            after = jax.lax.scan(step, Parts.of(state), None, length=steps)[0].join()
+            return jnp.concatenate(
+                [after.position, after.velocity, after.quaternion, after.body_rate, after.rotor_speed]
+            )
+
+        return _PROGRAMS.setdefault(vehicle.hash, jax.jit(run, static_argnums=1))
+
+    def sensed(self, before: Body, after: Body, dt: float) -> FirmwareState:
+        """What gyroscope and accelerometer say after a step of `dt` s."""
+        felt = (after.velocity - before.velocity) / dt + np.array([0, 0, GRAVITY])
+        attitude = Quat(*after.quaternion)
+        force = attitude.unrotate(Vec3(*felt))
+        return FirmwareState(after.body_rate, np.array([force.x, force.y, force.z]), after.quaternion, after.velocity,
+                             after.position)  # fmt: skip
+
+
+def _stand(vehicle: Vehicle, free: Parts) -> Parts:
+    """Hold what touches the ground: it does not sink, slide or turn, and stands upright on its feet."""
+    down = free.position.z <= vehicle.feet_height
+    keep = jnp.where(down, 0.0, 1.0)
+    q = free.attitude
+    upright = Quat(q.w, q.x * keep, q.y * keep, q.z).normalized()
+    return Parts(
+        position=Vec3(free.position.x, free.position.y, jnp.maximum(free.position.z, vehicle.feet_height)),
+        velocity=Vec3(
+            free.velocity.x * keep, free.velocity.y * keep,
+            jnp.where(down, jnp.maximum(free.velocity.z, 0.0), free.velocity.z),
+        ),
+        attitude=upright,
+        body_rate=free.body_rate * keep,
+        rotor_speed=free.rotor_speed,
+    )  # fmt: skip

@@ -1,0 +1,83 @@
+"""The plots of an evaluation."""
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import jax
+
+from e2efly.env import UNSEEN, Env, random_key
+from e2efly.episodes import Episodes
+from e2efly.evaluation import Evaluation, act_of, episode_steps
+from e2efly.learn.judge import REPORTED
+from e2efly.learn.networks import Weights
+from e2efly.learn.programs import acting
+from e2efly.learn.rundir import RunDirectory
+from e2efly.learn.setup import Setup
+from e2efly.view import plots
+from e2efly.view.flights import Flights
+from e2efly.view.worlds import plot_flights_in_worlds
+
+DRAWN = 12
+"""Flights of each criterion that are drawn."""
+
+
+def plot_evaluation(found: Evaluation, folder: Path) -> None:
+    """Draw flights of each criterion, all errors and, where the policy lies in its run, how it was learned.
+
+    Raises:
+        OSError: when the folder cannot be made.
+    """
+    _make(folder)
+    flew = found.candidate
+    contract, suites = flew.policy.contract, flew.task.criteria()
+    title, key = f"{contract.task} on {contract.vehicle}", random_key(found.seed, UNSEEN, 0)
+    for name, suite in suites.items():
+        env, tag = flew.environment(suite), f"{title}: {name}" if len(suites) > 1 else title
+        flights = plots.fly(env, act_of(flew.policy), key, DRAWN, episode_steps(suite, env))
+        _flights(flights, suite, env, key, folder, name, tag)
+    plots.plot_errors(found.flown, folder / "errors.png", title, plots.limits(suites))
+    if flew.run:
+        _learned(flew.run, folder, title)
+
+
+def plot_run(run: Path, setup: Setup, weights: Weights, flown: dict[str, Episodes]) -> None:
+    """Draw the same of a run that has just ended, into its folder: what was flown is not flown again.
+
+    Raises:
+        OSError: when the folder cannot be made.
+    """
+    folder, config = run / "plots", setup.config
+    title = f"{config.task.name} on {setup.env.physics.nominal.name}"
+    _make(folder)
+    suites = config.task.criteria()
+    for name, env in (setup.nominal or setup.judges).items():
+        tag = f"{title}: {name}" if len(suites) > 1 else title
+        act, key = partial(acting, setup.actor), random_key(0, REPORTED, 0)
+        steps = episode_steps(suites[name], env)
+        _flights(plots.fly(env, act, key, DRAWN, steps, weights), suites[name], env, key, folder, name, tag)
+    plots.plot_errors(flown, folder / "errors.png", title, plots.limits(suites))
+    _learned(RunDirectory(run), folder, title)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"cannot make the folder of the plots {folder}: {error.strerror}") from error
+
+
+def _flights(flights: Flights, suite: Any, env: Env, key: Any, folder: Path, name: str, title: str) -> None:
+    if env.cameras:  # every flight has a world of its own
+        begun = jax.jit(Env.reset, static_argnums=2)(env, key, DRAWN)[0]
+        plot_flights_in_worlds(flights, env.task.scene(begun.memory), folder / f"flights_{name}.png", title)
+    else:
+        plots.plot_flights(suite, flights, folder / f"flights_{name}.png", title)
+    plots.plot_time(flights, 0, folder / f"time_{name}.png", title)
+
+
+def _learned(run: RunDirectory, folder: Path, title: str) -> None:
+    if rows := run.rows():
+        shipped = run.read_json("summary.json").get("shipped") if (run.path / "summary.json").exists() else None
+        update = shipped.get("update") if isinstance(shipped, dict) else None
+        plots.plot_learning(rows, folder / "learning.png", title, best_update=update)

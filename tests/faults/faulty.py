@@ -1,0 +1,187 @@
+"""Parts that misbehave on demand: a link, a pose source, a policy's network. Between bridge and real firmware."""
+
+import dataclasses
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from e2efly.deploy.betaflight.codec import REPLY, Decoder, Frame, encode
+from e2efly.deploy.betaflight.link import Link
+from e2efly.deploy.odometry import Sample
+from e2efly.deploy.pose.source import PoseSource
+
+GARBAGE = 40
+"""Longest burst of random bytes, bytes."""
+
+
+class FaultyLink:
+    """A `Link` around another; each attribute below is a fault, and all may be changed at any time."""
+
+    def __init__(self, opened: Callable[[], Link], random: np.random.Generator) -> None:
+        """Open the inner link by `opened`, now and after each `gone`."""
+        self.silent = False
+        """The wires are cut: bytes vanish both ways and nothing tells so."""
+        self.garbage = 0.0
+        """Share of frames, both ways, that come behind a burst of random bytes."""
+        self.spoilt = 0.0
+        """Share of the controller's frames that arrive as nothing but random bytes."""
+        self.halved = 0.0
+        """Share of the controller's frames of which only the first half arrives."""
+        self.delay = 0.0
+        """By how much frames come late, each way, s."""
+        self.rewrites: dict[int, Callable[[bytes], bytes]] = {}
+        """By code: what the payloads of its replies are turned into."""
+        self._opened, self._random = opened, random
+        self._inner, self._gone, self._before = opened(), False, 0
+        self._decoder = Decoder()
+        self._out: deque[tuple[float, bytes]] = deque()
+        self._back: deque[tuple[float, bytes]] = deque()
+        self._now = 0.0
+
+    @property
+    def gone(self) -> bool:
+        """The port has disappeared, as a plug that is pulled."""
+        return self._gone
+
+    @gone.setter
+    def gone(self, gone: bool) -> None:
+        if gone and not self._gone:
+            self._inner.close()
+        elif self._gone and not gone:
+            self._before += self._inner.connections
+            self._inner, self._decoder = self._opened(), Decoder()
+        self._gone = gone
+
+    def heal(self) -> None:
+        """End all faults."""
+        self.gone = self.silent = False
+        self.garbage = self.spoilt = self.halved = self.delay = 0.0
+        self.rewrites.clear()
+
+    @property
+    def alive(self) -> bool:
+        """As the inner link says."""
+        return not self._gone and self._inner.alive
+
+    @property
+    def reason(self) -> str:
+        """As the inner link says."""
+        return "the port has gone" if self._gone else self._inner.reason
+
+    @property
+    def connections(self) -> int:
+        """Of all the inner links so far."""
+        return self._before + self._inner.connections
+
+    def poll(self, now: float) -> None:
+        """Poll the inner link, and let go of what was held back."""
+        self._now = now
+        if self._gone:
+            return
+        self._inner.poll(now)
+        while self._out and self._out[0][0] <= now:
+            self._inner.send(self._out.popleft()[1])
+
+    def send(self, data: bytes) -> None:
+        """One frame to the controller."""
+        if not self._gone and not self.silent:
+            self._out.append((self._now + self.delay, self._burst(self.garbage) + data))
+            self.poll(self._now)
+
+    def receive(self) -> bytes:
+        """The controller's frames, after their treatment."""
+        if self._gone:
+            return b""
+        frames = self._decoder.feed(self._inner.receive())
+        if not self.silent:
+            self._back += [(self._now + self.delay, self._treated(frame)) for frame in frames]
+        arrived = bytearray()
+        while self._back and self._back[0][0] <= self._now:
+            arrived += self._back.popleft()[1]
+        return bytes(arrived)
+
+    def close(self) -> None:
+        """Close the inner link."""
+        self._inner.close()
+
+    def _treated(self, frame: Frame) -> bytes:
+        rewrite = self.rewrites.get(frame.code)
+        if rewrite is not None and frame.direction == REPLY:
+            frame = Frame(frame.code, rewrite(frame.payload), frame.direction, frame.version, frame.flags)
+        data = encode(frame)
+        if self._random.random() < self.spoilt:
+            return self._random.bytes(len(data))
+        if self._random.random() < self.halved:
+            return data[: len(data) // 2]
+        return self._burst(self.garbage) + data
+
+    def _burst(self, share: float) -> bytes:
+        return self._random.bytes(int(self._random.integers(1, GARBAGE))) if self._random.random() < share else b""
+
+
+class FaultyPoses:
+    """A `PoseSource` around another: `alter` turns each sample into another, or into none."""
+
+    def __init__(self, inner: PoseSource) -> None:
+        """Let all through."""
+        self.alter: Callable[[Sample], Sample | None] | None = None
+        self.newest: Sample | None = None
+        """The last one that was let through as it was."""
+        self.delay = 0.0
+        """By how much samples come late, s; their stamps stay."""
+        self._inner = inner
+        self._held: deque[tuple[float, Sample]] = deque()
+
+    @property
+    def refused(self) -> int:
+        """As the inner source says."""
+        return self._inner.refused
+
+    @property
+    def problem(self) -> str | None:
+        """As the inner source says."""
+        return self._inner.problem
+
+    def read(self, now: float) -> list[Sample]:
+        """What the inner source has, late and altered."""
+        self._held += [(now + self.delay, sample) for sample in self._inner.read(now)]
+        samples = []
+        while self._held and self._held[0][0] <= now:
+            due, sample = self._held.popleft()
+            samples.append(dataclasses.replace(sample, received=max(sample.received, due)))
+        if self.alter is None:
+            self.newest = samples[-1] if samples else self.newest
+            return samples
+        return [altered for sample in samples if self.alter and (altered := self.alter(sample)) is not None]
+
+    def close(self) -> None:
+        """Close the inner source."""
+        self._inner.close()
+
+    def describe(self) -> str:
+        """As the inner source says."""
+        return self._inner.describe()
+
+
+class FaultyNetwork:
+    """An ONNX Runtime session around another."""
+
+    def __init__(self, inner: Any) -> None:
+        """Let it work."""
+        self.fault = ""
+        """nan, raise or late; empty: none."""
+        self.late = 0.0
+        """How long it takes when it is late, s of real time."""
+        self._inner = inner
+
+    def run(self, outputs: list[str], inputs: dict[str, np.ndarray]) -> list[Any]:
+        """What the inner session says, or what the fault makes of it."""
+        if self.fault == "raise":
+            raise RuntimeError("the network broke")
+        answer = self._inner.run(outputs, inputs)
+        if self.fault == "late":
+            time.sleep(self.late)
+        return [np.full_like(a, np.nan) for a in answer] if self.fault == "nan" else answer

@@ -1,0 +1,88 @@
+"""What a fault of a campaign is: what it alters while it lasts, its parameters by chance, and who can help."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from e2efly.deploy.odometry import Sample
+from e2efly.validation.sitl import FirmwareState
+
+Parameters = dict[str, Any]
+
+
+class Rule(StrEnum):
+    """What a flight is held to; each member is what is said of one that breaks it."""
+
+    OFF = "motors off"
+    """High over the ground."""
+    CLIMB = "climb"
+    """Far above where the faults found it."""
+    TOUCH = "touch"
+    """Fast, from low."""
+    ARMED = "armed on the ground"
+    """With open throttle."""
+    ENDLESS = "does not end"
+    """Landed or not, it goes on for as long as it was watched."""
+
+
+@dataclass(frozen=True)
+class Excuse:
+    """Which rules nothing on the companion computer can keep while a fault lasts."""
+
+    why: str
+    rules: tuple[Rule, ...] = tuple(Rule)
+    for_good: bool = False
+    """After the fault is over, too."""
+
+
+def _nothing() -> None:
+    """What an injection does that is done by its alterations alone."""
+
+
+@dataclass(frozen=True)
+class Injection:
+    """One fault at work. What it alters goes through those that began before it first."""
+
+    pose: Callable[[Sample], Sample | None] | None = None
+    """A sample of the pose source, or none."""
+    reply: tuple[int, Callable[[bytes], bytes]] | None = None
+    """A message's code, and what becomes of the payloads in which the controller reports it."""
+    felt: Callable[[FirmwareState], FirmwareState] | None = None
+    """What the controller's own sensors feel."""
+    each: Callable[[], None] = _nothing
+    """Done before each control step."""
+    end: Callable[[], None] = _nothing
+    """Done when it is over."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of fault."""
+
+    begin: Callable[..., Injection]
+    """(stage, **parameters) -> what is at work from now on."""
+    draw: Callable[[np.random.Generator], Parameters] = lambda random: {}
+    """Parameters by chance."""
+    excuse: Excuse | None = None
+    """What nothing on the companion computer can help; None: the bridge is to cope with it."""
+    limited: tuple[float, float] | None = None
+    """Shortest and longest time that it lasts, s; None: it stays."""
+
+
+def uniform(name: str, low: float, high: float, digits: int = 3) -> Callable[[np.random.Generator], Parameters]:
+    """One parameter, anywhere between two bounds."""
+    return lambda random: {name: round(float(random.uniform(low, high)), digits)}
+
+
+def one_of(name: str, *values: Any) -> Callable[[np.random.Generator], Parameters]:
+    """One parameter, one of some values."""
+    return lambda random: {name: values[int(random.integers(len(values)))]}
+
+
+def vector(random: np.random.Generator, length: float, digits: int = 3) -> list[float]:
+    """A length in any direction."""
+    way = random.normal(size=3)
+    return [round(float(x), digits) for x in length * way / np.linalg.norm(way)]

@@ -1,0 +1,155 @@
+"""The rig as a process of its own, in real time: for what needs a bridge in another process, which can be killed.
+
+    python -m tests.faults.rig_process --pose-port PORT [--vehicle NAME] [--folder FOLDER] [--seed N]
+
+It prints one line of JSON: `{"link": "tcp:127.0.0.1:PORT", "control": PORT}`, the firmware's MSP address and the port
+of the rig's control on the loopback interface. Poses go to UDP 127.0.0.1:POSE_PORT as docs/pose-sources.md has them.
+A control connection takes lines of JSON, objects whose keys are fields of `rig.Transmitter`, and answers each with a
+line that tells the true state: see `State`. The process ends with that connection, or with its standard input.
+"""
+
+import argparse
+import json
+import os
+import select
+import socket
+import sys
+import tempfile
+from contextlib import suppress
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from e2efly.deploy.odometry import tilt_of
+from e2efly.validation.firmware import chosen
+from e2efly.validation.rig import Rig, Transmitter
+from e2efly.vehicles import load_vehicle
+
+ROUND_S = 0.004
+"""Between two looks at the control connection, s."""
+
+
+@dataclass(frozen=True)
+class State:
+    """The true state, and what has happened since the process began."""
+
+    time: float
+    """Of the firmware, s."""
+    position: tuple[float, float, float]
+    """World, m."""
+    velocity: tuple[float, float, float]
+    """World, m/s."""
+    tilt: float
+    """rad."""
+    motors: tuple[float, ...]
+    """(4,) the firmware's outputs, 0 to 1."""
+    standing: bool
+    """On the ground."""
+    largest_tilt: float
+    """rad."""
+    touches: tuple[tuple[float, float], ...]
+    """Speed, m/s, and tilt, rad, just before each touch of the ground."""
+
+
+class _Watch:
+    """What has happened so far."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig, self.largest_tilt, self.touches = rig, 0.0, []
+        self._feet = rig.world.vehicle.feet_height + 1e-3
+        self._before = rig.state
+
+    def look(self) -> None:
+        state, before = self.rig.state, self._before
+        self.largest_tilt = max(self.largest_tilt, tilt_of(state.quaternion))
+        if state.position[2] <= self._feet < before.position[2]:
+            self.touches.append((float(np.linalg.norm(before.velocity)), tilt_of(before.quaternion)))
+        self._before = state
+
+    def state(self) -> State:
+        rig = self.rig
+        s = rig.state
+        (x, y, z), (u, v, w) = s.position.tolist(), s.velocity.tolist()
+        return State(
+            rig.now(), (x, y, z), (u, v, w), tilt_of(s.quaternion), tuple(rig.sitl.motors().tolist()),
+            z <= self._feet, self.largest_tilt, tuple(self.touches),
+        )  # fmt: skip
+
+
+def changes_of(line: bytes) -> dict[str, Any]:
+    """The changes of the transmitter that a line asks for.
+
+    Raises:
+        ValueError: naming what is no field of `Transmitter`.
+    """
+    known = {field.name for field in fields(Transmitter)}
+    content = json.loads(line)
+    wrong = sorted(content.keys() - known) if isinstance(content, dict) else [content]
+    if wrong:
+        raise ValueError(f"control: {wrong}; accepted: {sorted(known)}")
+    return content
+
+
+def serve(rig: Rig, poses: int, listener: socket.socket) -> None:
+    """Run the rig until the control connection or standard input ends.
+
+    Args:
+        rig: started, in real time.
+        poses: UDP port of the loopback interface.
+        listener: where the control connection comes.
+    """
+    watch, sender = _Watch(rig), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    control: socket.socket | None = None
+    pending = b""
+    with sender:
+        while True:
+            rig.sleep(ROUND_S)
+            watch.look()
+            for sample in rig.poses(rig.now()):
+                pose = {
+                    name: getattr(sample, name).tolist() for name in ("position", "quaternion", "velocity", "body_rate")
+                }
+                stamp = rig.machine_time(sample.stamp or sample.received)
+                sender.sendto(json.dumps({**pose, "stamp": stamp}).encode(), ("127.0.0.1", poses))
+            readable, _, _ = select.select([control or listener, sys.stdin], [], [], 0)
+            if sys.stdin in readable and not os.read(sys.stdin.fileno(), 1):
+                return
+            if not {control, listener} & set(readable):
+                continue
+            if control is None:
+                control, _ = listener.accept()
+                continue
+            data = control.recv(65536)
+            if not data:
+                control.close()
+                return
+            *lines, pending = (pending + data).split(b"\n")
+            for line in lines:
+                rig.set(**changes_of(line))
+                control.sendall(json.dumps(asdict(watch.state())).encode() + b"\n")
+
+
+def main() -> None:
+    """Start the rig and serve."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--pose-port", type=int, required=True, help="UDP port on 127.0.0.1 that takes the poses")
+    parser.add_argument("--vehicle", default="vis_r", help="a shipped vehicle or a .toml file")
+    parser.add_argument("--folder", type=Path, default=None, help="of the firmware's files; left out: a temporary one")
+    parser.add_argument("--seed", type=int, default=0, help="of the poses' noise")
+    options = parser.parse_args()
+    with suppress(OSError):  # the world must not wait; where it is not allowed to, it is as good as others
+        os.nice(-15)
+    with (
+        tempfile.TemporaryDirectory(prefix="e2efly-") as temporary,
+        socket.create_server(("127.0.0.1", 0)) as listener,
+        Rig(chosen(), options.folder or Path(temporary), load_vehicle(options.vehicle), real_time=True,
+            seed=options.seed) as rig,
+    ):  # fmt: skip
+        print(json.dumps({"link": rig.sitl.msp, "control": listener.getsockname()[1]}), flush=True)
+        serve(rig, options.pose_port, listener)
+
+
+if __name__ == "__main__":
+    main()

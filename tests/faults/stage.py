@@ -1,0 +1,228 @@
+"""Where faults are injected: firmware on its rig, bridge, policy, a scripted pilot, and parts that misbehave."""
+
+import dataclasses
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from e2efly.deploy.betaflight.check import examine, problems
+from e2efly.deploy.betaflight.link import open_link
+from e2efly.deploy.odometry import tilt_of
+from e2efly.deploy.pilot.flight_state import Mode, Reason
+from e2efly.deploy.policy.loader import Policy
+from e2efly.deploy.pose.source import PlantSource
+from e2efly.deploy.settings import Fence, FlightSettings
+from e2efly.goal import Course
+from e2efly.validation.rig import Rig
+from e2efly.validation.session import Session, run
+from e2efly.vehicles.vehicle import GRAVITY
+from tests.faults.faulty import FaultyLink, FaultyNetwork, FaultyPoses
+
+FENCE = Fence(low=(-3.0, -3.0, 0.1), high=(3.0, 3.0, 3.0))
+"""Of all flights with faults."""
+TARGET = (0.6, -0.4, 1.0)
+"""Where the hovering policy is to fly, m."""
+HEIGHT = 0.7
+"""Of the hover, m."""
+SETTINGS = FlightSettings(
+    takeoff_height=HEIGHT, takeoff_speed=1.0, land_speed=0.6, land_settle=0.3, battery_unknown=True, fence=FENCE
+)
+"""The firmware on the rig has no battery."""
+POSE_S, LATENCY_S = 0.005, 0.02
+"""Between two poses, and their age when they arrive, s."""
+PATIENCE_S = 60.0
+"""How long a step waits for the policy, s of real time: how busy the machine is must not matter."""
+SINK_SPEED = 0.5
+"""Of a pilot who lands, m/s."""
+
+
+@dataclass
+class Trace:
+    """What the world saw at each control step."""
+
+    time: list[float] = field(default_factory=list)
+    position: list[np.ndarray] = field(default_factory=list)
+    velocity: list[np.ndarray] = field(default_factory=list)
+    tilt: list[float] = field(default_factory=list)
+    armed: list[bool] = field(default_factory=list)
+    throttle: list[float] = field(default_factory=list)
+    """The bridge's."""
+    motor: list[float] = field(default_factory=list)
+    """Mean output of the firmware's motors, 0 to 1."""
+
+
+class Stage:
+    """A rig that has been started, and the bridge on it. Close it with `close`."""
+
+    def __init__(
+        self, rig: Rig, policy: Policy, course: Course, seed: int = 0, settings: FlightSettings = SETTINGS
+    ) -> None:
+        self.settings = settings
+        self.rig, self.random = rig, np.random.default_rng(seed)
+        self.network = FaultyNetwork(policy.session)
+        self.link: FaultyLink
+        self.poses: FaultyPoses
+        self.session: Session
+        self.pilot: Callable[[], None] | None = None
+        """The pilot's hands, before each control step."""
+        self.each: Callable[[], None] | None = None
+        """What else happens before each control step."""
+        self.undo = ExitStack()
+        """Ends what a fault has changed elsewhere."""
+        self._policy, self._course = dataclasses.replace(policy, session=self.network), course
+        self.trace = Trace()
+        self.renew()
+        self.open()
+
+    def renew(self) -> None:
+        """New link and pose source, without faults."""
+        self.link = FaultyLink(lambda: open_link(self.rig.sitl.msp), self.random)
+        self.poses = FaultyPoses(PlantSource(self.rig.poses, "rig"))
+
+    def open(self) -> None:
+        """Identify the controller and begin to fly it, as `e2efly fly` does.
+
+        Raises:
+            ValueError: for a controller that is refused outright.
+        """
+        try:
+            session = Session(
+                self.rig, self.settings, policy=self._policy, course=self._course, link=self.link, source=self.poses
+            )
+        except ValueError:
+            self.link.close()
+            raise
+        vehicle, contract = self.rig.world.vehicle, self._policy.contract
+        session.bridge.settings_problems = problems(examine(session.info, vehicle, self.settings, contract))
+        self.session = session
+        self.patience(PATIENCE_S)
+
+    def reopen(self) -> None:
+        """The same with new link and pose source, after `close`."""
+        self.renew()
+        self.open()
+
+    def close(self) -> None:
+        """End the bridge."""
+        self.undo.close()
+        self.session.close()
+        self.rig.sleep(0.1)  # the firmware takes the next connection once it has seen the end of this one
+
+    @property
+    def mode(self) -> Mode:
+        """The bridge's."""
+        return self.session.bridge.flight.mode
+
+    @property
+    def policy_period(self) -> float:
+        """Between two questions to the policy, s."""
+        return 1 / self._policy.contract.control_rate_hz
+
+    def patience(self, seconds: float) -> None:
+        """How long the bridge waits for the policy, real time."""
+        assert self.session.worker is not None
+        self.session.worker.timeout = seconds
+
+    def step(self) -> None:
+        """One control step."""
+        for act in (self.pilot, self.each):
+            if act is not None:
+                act()
+        self.session.step()
+        state, trace = self.rig.state, self.trace
+        trace.time.append(self.rig.now())
+        trace.position.append(np.array(state.position))
+        trace.velocity.append(np.array(state.velocity))
+        trace.tilt.append(tilt_of(state.quaternion))
+        trace.armed.append(self.session.bridge.inputs.armed)
+        trace.throttle.append(self.session.bridge.sent.throttle)
+        trace.motor.append(float(self.rig.sitl.motors().mean()))
+
+    def fly(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
+        """Control steps for so long, or until something holds; whether it did."""
+        return run(self.rig, self.step, seconds, until)
+
+    def ready(self, mode: Mode) -> None:
+        """Bring the flight into INIT, HOVER or POLICY, at a moment of chance.
+
+        Raises:
+            RuntimeError: when it does not come to that: the fault before has left something behind.
+        """
+        if mode is Mode.INIT:
+            self._ground()
+            return
+        if self.mode is not Mode.HOVER:
+            self._take_off()
+        self.rig.set(mission="hover")
+        turn = self.random.uniform(-1, 1, 2)
+        self.rig.set(roll=float(turn[0]), pitch=float(turn[1]))
+        self.fly(0.6)
+        self.rig.set(roll=0.0, pitch=0.0)
+        self.fly(0.3)
+        if mode is Mode.POLICY:
+            self.rig.set(mission="policy")
+            self._expect(2.0, Mode.POLICY)
+        self.fly(self.random.uniform(0.2, 0.8))
+        self._expect(0.0, mode)
+
+    def heal(self) -> None:
+        """End every fault, and put the pilot's hands back."""
+        self.undo.close()
+        self.pilot = self.each = None
+        self.poses.alter, self.poses.delay, self.network.fault = None, 0.0, ""
+        self.link.heal()
+        self.rig.wind, self.rig.shares, self.rig.felt, self.rig.heard = np.zeros(3), np.ones(4), None, True
+        self.rig.power(True)
+        self.patience(PATIENCE_S)
+        mission = "hover" if self.mode in (Mode.HOVER, Mode.POLICY, Mode.PILOT) else "land"
+        armed = self.mode not in (Mode.DONE, Mode.INIT) and not self.standing
+        self.rig.set(roll=0.0, pitch=0.0, mission=mission, override=True, throttle=0.0, armed=armed)
+        self.fly(0.3)
+
+    @property
+    def standing(self) -> bool:
+        """On the ground."""
+        return float(self.rig.state.position[2]) < self.rig.world.vehicle.feet_height + 0.01
+
+    def pilot_holds(self) -> None:
+        """The pilot takes over: level, holding the height."""
+        self._by_hand(0.0)
+
+    def pilot_lands(self) -> None:
+        """The pilot takes over: level, sinking; on the ground the throttle is closed and the vehicle disarmed."""
+        if self.standing:
+            self.rig.set(throttle=-1.0, armed=False)
+        else:
+            self._by_hand(-SINK_SPEED)
+
+    def _by_hand(self, climb: float) -> None:
+        bridge = self.session.bridge
+        thrust = GRAVITY + 2.0 * (climb - float(self.rig.state.velocity[2]))
+        curve = bridge.sticks.throttle
+        pulse = curve.channel_for(min(bridge.map.throttle(thrust, None), curve.largest))
+        self.rig.set(override=False, roll=0.0, pitch=0.0, throttle=(pulse - 1500) / 500)
+
+    def _take_off(self) -> None:
+        self._ground()
+        self.rig.set(override=True, throttle=0.0)
+        self.fly(0.2)
+        self.rig.set(armed=True)
+        self.fly(5.0, lambda: self.session.bridge.flight.reasons == (Reason.WAITING,))
+        self.rig.set(mission="hover")
+        self._expect(self.settings.takeoff_height / self.settings.takeoff_speed + 6.0, Mode.HOVER)
+
+    def _ground(self) -> None:
+        self.rig.set(mission="land")
+        if self.mode not in (Mode.INIT, Mode.DONE):
+            self._expect(15.0, Mode.DONE)
+        self.rig.set(armed=False)
+        self._expect(1.0, Mode.INIT)
+        self.fly(1.0, lambda: Reason.MISSION_NOT_LOW not in self.session.bridge.flight.reasons)
+
+    def _expect(self, seconds: float, mode: Mode) -> None:
+        if self.mode is not mode and not self.fly(seconds, lambda: self.mode is mode):
+            flight = self.session.bridge.flight
+            came = [f"{m} ({'; '.join(why)})" for _, m, why in self.session.flown.changes[-4:]]
+            raise RuntimeError(f"the flight is in {flight.mode} rather than in {mode}, by way of {', '.join(came)}")

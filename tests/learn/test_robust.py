@@ -1,0 +1,115 @@
+"""The preset for vehicles that are not the file's."""
+
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import e2efly
+from e2efly import presets
+from e2efly.cli import run
+from e2efly.commands.train import parse
+from e2efly.env import Env
+from e2efly.learn.judge import reported
+from e2efly.learn.setup import Setup
+from e2efly.tasks import TASKS
+from e2efly.vehicles import load_vehicle, vehicle_file
+
+ROBUST = [name for name, task in TASKS.items() if task.robust and task.__module__.startswith("e2efly.")]
+
+
+def test_the_tasks_that_have_it_change_the_vehicle_and_remember() -> None:
+    assert ROBUST == ["hover", "land", "race", "track"]
+    for task in ROBUST:
+        nominal, robust = (e2efly.preset(task, "bptt", name) for name in ("nominal", "robust"))
+        assert nominal.network.recurrent == 0 < robust.network.recurrent
+        assert robust.env == presets.OTHERS
+        assert robust.task == nominal.task
+        assert robust.reward.weights.keys() >= nominal.reward.weights.keys()
+    nominal, robust = (e2efly.preset("hover", "ppo", name) for name in ("nominal", "robust"))
+    assert (robust.env, robust.reward) == (presets.OTHERS, nominal.reward)
+
+
+@pytest.mark.parametrize(("task", "algo"), [("avoid", "bptt"), ("race", "ppo")])
+def test_others_are_refused_by_name(task: str, algo: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["train", task, "--algo", algo, "--preset", "robust"]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert (
+        "preset 'robust': accepted for hover by bptt or ppo, land by bptt, race by bptt, track by bptt or ppo" in said
+    )
+    assert f"not for {task} by {algo}" in said
+
+
+def test_a_robust_policy_is_made_for_its_vehicle_and_says_what_it_has_seen(tmp_path: Path) -> None:
+    e2efly.train("hover", "bptt", preset_name="robust", out=tmp_path, steps=12_288, chunk=1, eval_episodes=10)
+    contract, vehicle = e2efly.load_policy(tmp_path).contract, load_vehicle("vis_r")
+    assert contract.memory_size == 64
+    assert contract.latency_s == vehicle.latency
+    assert contract.latency_range_s == pytest.approx((vehicle.latency - 0.04, vehicle.latency + 0.05))
+
+
+@pytest.mark.parametrize("spread", [(-0.1, 0.0), (0.0, 1.5), (0.0, float("nan"))])
+def test_a_spread_that_makes_no_sense_is_named(spread: tuple[float, float]) -> None:
+    with pytest.raises(ValueError, match=r"env.latency_spread is .*; accepted: two numbers of seconds in \[0, 1\]"):
+        e2efly.make_env("hover", latency_spread=spread)
+
+
+def test_robust_is_what_a_task_is_learned_by_where_it_can_be(tmp_path: Path) -> None:
+    wanted = {("hover", "bptt"): "robust", ("hover", "ppo"): "robust", ("race", "ppo"): "nominal",
+              ("avoid", "bptt"): "nominal"}  # fmt: skip
+    for (task, algo), name in wanted.items():
+        config = e2efly.preset(task, algo, name)
+        assert e2efly.preset(task, algo) == config
+        assert parse([task, "--algo", algo]).config == config
+    assert parse(["hover"]).config == e2efly.preset("hover") == e2efly.preset("hover", "bptt", "robust")
+
+
+def test_options_change_what_the_preset_draws_and_take_it_out() -> None:
+    robust = e2efly.preset("hover").env
+    drawn = parse(["hover", "--env.randomize", "mass", "0.1", "inertia", "0", "--env.wind", "1"]).config.env
+    assert drawn.randomize == {**{k: v for k, v in robust.randomize.items() if k != "inertia"}, "mass": 0.1}
+    assert (drawn.wind, drawn.disturbance) == (1.0, robust.disturbance)
+
+
+def test_a_run_says_how_its_policy_flies_the_file_s_vehicle(tmp_path: Path) -> None:
+    """On the vehicle of the file the same starts end nearer than on the others; and as in the nominal environment."""
+    config = e2efly.preset("hover")
+    setup = Setup.of(config)
+    nominal = Env.of(config.task, config.reward)
+    env = setup.nominal["hover"]
+    assert set(setup.nominal) == set(setup.judges)
+    assert Setup.of(e2efly.preset("hover", "bptt", "nominal")).nominal == {}
+    key, still = jax.random.key(0), jnp.broadcast_to(nominal.hover, (50, 4))
+    reached = []
+    for one in (env, nominal):
+        state, _ = one.reset(key, 50)
+        for _ in range(20):
+            state, _ = one.step(state, still)
+        reached.append(state.vehicle.position)
+    np.testing.assert_array_equal(*reached)
+    summary = e2efly.train("hover", start_from="hover", out=tmp_path, steps=6144, chunk=1, eval_episodes=50)
+    assert summary["nominal"]["hover"]["success"] > 0.98
+    assert summary["nominal"]["hover"]["final_error_m"] < 0.8 * summary["shipped"]["hover"]["final_error_m"]
+    assert summary["stress"]["hover"]["success"] > 0.9
+    assert summary["stress"]["hover"]["final_error_m"] > 2 * summary["nominal"]["hover"]["final_error_m"]
+    assert reported(summary) == summary["nominal"]["hover"]["success"]
+
+
+def test_a_weak_vehicle_draws_others_that_can_still_hover(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = vehicle_file("vis_r").read_text()
+    weak, strong = tmp_path / "weak.toml", tmp_path / "strong.toml"
+    weak.write_text(text.replace("value = 0.75\n", "value = 1.05\n", 1))
+    strong.write_text(text)
+    assert load_vehicle(str(weak)).thrust_to_weight < 2
+    for file, share in ((weak, 0.85), (strong, 1.0)):
+        env = parse(["hover", "--vehicle", str(file)]).config.env
+        assert load_vehicle(str(file)).thrust_to_weight * env.weakest >= 1
+        assert env.randomize["mass"] <= share * presets.OTHERS.randomize["mass"]
+        assert env.randomize["inertia"] == presets.OTHERS.randomize["inertia"]
+    assert parse(["hover", "--vehicle", str(strong)]).config.env.disturbance == presets.OTHERS.disturbance
+    assert run(["train", "hover", "--env.disturbance.thrust", "0.5", "--out", str(tmp_path / "run")]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "thrust 0.5, rotor 0.1, sag 0.2: the weakest vehicle of these cannot hover (thrust to weight 0.80" in said
+    assert "accepted: draws that leave at least 1" in said

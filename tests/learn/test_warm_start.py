@@ -1,0 +1,112 @@
+"""A run that begins with another policy's weights."""
+
+import hashlib
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import e2efly
+from e2efly.cli import run
+from e2efly.config import NetworkConfig
+from e2efly.learn.checkpoint import read_arrays
+from e2efly.learn.export import random_images, random_observations
+from e2efly.learn.setup import Setup
+from e2efly.learn.warm_start import started_from
+from e2efly.zoo import policy_file
+
+SMALL = {"steps": 4096, "chunk": 1, "eval_episodes": 10}
+
+
+@pytest.mark.parametrize("task", ["hover", "land_visual", "avoid"])
+def test_what_is_read_acts_as_the_file(task: str) -> None:
+    config = e2efly.preset(task, "bptt", "robust" if task == "hover" else "nominal")
+    setup = Setup.of(config)
+    parameters = started_from(setup.algorithm.init(setup.env, config.algo, 0), policy_file(task), setup)
+    policy, rng = e2efly.load_policy(task), np.random.default_rng(0)
+    observation = random_observations(rng, setup.env.fields, 50)
+    images = [random_images(rng, image, 50) for image in policy.contract.images]
+    memory = rng.uniform(-1, 1, (50, config.network.recurrent)).astype(np.float32)
+    features = setup.actor.features(observation, images)
+    wanted = policy.act(observation, images, memory)
+    found = setup.actor(parameters.policy, features, memory)
+    np.testing.assert_allclose(found[0], wanted[0], atol=1e-5)
+    np.testing.assert_allclose(found[1], wanted[1], atol=1e-5)
+
+
+@pytest.mark.parametrize("algo", ["ppo", "bptt"])
+def test_a_run_begins_where_the_policy_was(algo: str, tmp_path: Path) -> None:
+    options = {**SMALL, "vehicle": "crazyflie", "preset_name": "nominal"}
+    begun = e2efly.train("hover", algo, out=tmp_path / "run", start_from="hover", **options)
+    assert begun["shipped"]["hover"]["success"] > 0.9
+    more = e2efly.train("hover", algo, out=tmp_path / "more", start_from=tmp_path / "run", **options)
+    assert more["shipped"]["hover"]["success"] > 0.9
+    assert e2efly.train("hover", algo, out=tmp_path / "fresh", **options)["shipped"]["hover"]["success"] < 0.5
+
+
+def test_what_does_not_fit_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    small = ["--steps", "4096", "--no-plots"]
+    assert run(["train", "hover", "--from", "race", "--out", str(tmp_path / "a"), *small]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "race.onnx: its observation is ['gates', " in said
+    assert "accepted: ['position_error', " in said
+    assert run(["train", "hover", "--from", "hower", "--out", str(tmp_path / "b"), *small]) == 2
+    assert "unknown policy 'hower'; did you mean 'hover'" in capsys.readouterr().err
+    assert run(["train", "hover", "--from", "hover", "--out", str(tmp_path / "c"), *small, "--preset", "nominal"]) == 2
+    assert "memory_size is 64; accepted: 0" in " ".join(capsys.readouterr().err.split())
+    config = e2efly.preset("hover_aware")
+    own = config.network.activation
+    for changes, message in (
+        ({"network": NetworkConfig((32, 64))}, r"weight_0 has shape \(23, 64\); accepted: \(23, 32\)"),
+        ({"network": NetworkConfig((64, 64, 64))}, "weight_2 has shape"),
+        ({"network": NetworkConfig(activation="relu" if own != "relu" else "tanh")}, "accepted: .* network.activation"),
+        ({"env": replace(config.env, command_mode="rotor_thrust")}, "command mode is ctbr; accepted: rotor_thrust"),
+    ):
+        setup = Setup.of(replace(config, **changes))
+        parameters = setup.algorithm.init(setup.env, config.algo, 0)
+        with pytest.raises(ValueError, match=message):
+            started_from(parameters, policy_file("hover_aware"), setup)
+
+
+def test_a_camera_may_sit_elsewhere_but_must_be_encoded_alike() -> None:
+    config = e2efly.preset("avoid")
+
+    def begun(**changes: Any) -> Any:
+        cameras = (replace(config.env.cameras[0], **changes),)
+        setup = Setup.of(replace(config, env=replace(config.env, cameras=cameras)))
+        fresh = setup.algorithm.init(setup.env, config.algo, 0)
+        return started_from(fresh, policy_file("avoid"), setup), fresh
+
+    weights, fresh = begun(pitch=0.2)
+    assert not np.array_equal(weights.policy.head[0][0], fresh.policy.head[0][0])
+    with pytest.raises(ValueError, match="its image_0 encoding is inverse; accepted: linear"):
+        begun(encoding="linear")
+
+
+def test_a_run_hands_on_what_its_algorithm_has_beside_the_policy(tmp_path: Path) -> None:
+    e2efly.train("hover", "ppo", out=tmp_path / "run", **SMALL)
+    arrays = read_arrays(tmp_path / "run" / "checkpoint.safetensors")
+    for algo, handed in (("ppo", True), ("foppo", False)):
+        setup = Setup.of(e2efly.preset("hover", algo))
+        fresh = setup.algorithm.init(setup.env, setup.config.algo, 0)
+        begun = started_from(fresh, tmp_path / "run" / "policy.onnx", setup)
+        assert np.array_equal(begun.log_std, arrays["['state'].parameters.log_std"][0]) == handed
+        assert np.array_equal(begun.critic[0][0], arrays["['state'].parameters.critic[0][0]"][0]) == handed
+        assert np.array_equal(begun.critic[0][0], fresh.critic[0][0]) != handed
+
+
+def test_the_file_is_recorded_and_may_go_away(tmp_path: Path) -> None:
+    first, more = tmp_path / "run", tmp_path / "more"
+    e2efly.train("hover", "ppo", out=first, **SMALL)
+    digest = hashlib.sha256((first / "policy.onnx").read_bytes()).hexdigest()
+    e2efly.train("hover", "ppo", out=more, start_from=first, **SMALL)
+    assert json.loads((more / "config.json").read_text())["start_from"] == str(first / "policy.onnx")
+    assert json.loads((more / "inputs.json").read_text())["start_from"]["sha256"] == digest
+    shutil.rmtree(first)
+    assert run(["train", "--resume", str(more), "--no-plots"]) == 0
+    e2efly.train("hover", "ppo", out=more, start_from=more, overwrite=True, **SMALL)  # takes more steps in its place
+    assert json.loads((more / "inputs.json").read_text())["start_from"]["sha256"] != digest

@@ -1,0 +1,161 @@
+"""What a vehicle file does not know: gusts, uneven rotors, sag, an offset centre of mass, drifting poses."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from e2efly.config import DisturbanceConfig, EnvConfig, RewardConfig
+from e2efly.env import Env, EnvState, random_key
+from e2efly.env.disturbance import Disturbance, advance, draw
+from e2efly.tasks.hover import HoverConfig
+from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.vehicle import GRAVITY
+from tests.gradients import central, reverse
+
+STILL = HoverConfig(position=0.0, velocity=0.0, tilt=0.0, body_rate=0.0)
+
+
+def make(**config: Any) -> Env:
+    return Env.of(STILL, RewardConfig({"prog2": 1.0}), EnvConfig(action_latency=(0.0, 0.0), **config))
+
+
+def disturbed(**largest: float) -> Env:
+    return make(disturbance=DisturbanceConfig(**largest))
+
+
+def flown(env: Env, steps: int, n: int = 4) -> EnvState:
+    """Hovering without feedback, the throttle at the nominal vehicle's hover."""
+
+    def run(state: EnvState) -> EnvState:
+        hover = jnp.broadcast_to(env.hover, (n, 4))
+        return jax.lax.scan(lambda s, _: (env.step(s, hover, restart=False)[0], None), state, length=steps)[0]
+
+    return jax.jit(run)(env.reset(random_key(0), n)[0])
+
+
+def test_nothing_is_drawn_where_nothing_is_asked_for() -> None:
+    assert make().reset(random_key(0), 2)[0].disturbance is None
+
+
+def test_each_episode_draws_within_what_is_asked_for() -> None:
+    config = DisturbanceConfig(gust=2.0, rotor=0.1, sag=0.2, drift=0.05)
+    d = draw(config, random_key(0), 20_000)
+    for drawn, low, high in (
+        (d.gust_speed, 0, 2.0), (d.rotor_share, 0.9, 1.1), (d.sag, 0, 0.2), (d.drift_rate, 0, 0.05)
+    ):  # fmt: skip
+        assert low <= float(drawn.min()) < low + 0.02 * (high - low)
+        assert high - 0.02 * (high - low) < float(drawn.max()) <= high + 1e-6
+
+
+def test_gusts_keep_their_strength_and_forget_within_their_time() -> None:
+    n, dt = 50_000, 0.1
+    d = draw(DisturbanceConfig(gust=3.0, gust_time=0.5), random_key(1), n)
+    later = advance(d, random_key(2), dt)
+    strength = np.asarray(d.gust_speed)[:, None]
+    before, after = np.asarray(d.gust) / strength, np.asarray(later.gust) / strength
+    assert before.std() == pytest.approx(1.0, abs=0.02)
+    assert after.std() == pytest.approx(1.0, abs=0.02)
+    assert np.mean(before * after) == pytest.approx(np.exp(-dt / 0.5), abs=0.02)
+
+
+def test_poses_drift_as_a_random_walk_and_the_vehicle_does_not() -> None:
+    d = Disturbance.none(20_000)
+    d = Disturbance(**{**vars(d), "drift_rate": jnp.full(20_000, 0.05)})
+    for i in range(40):
+        d = advance(d, random_key(3, i), 0.1)
+    assert float(d.drift.std()) == pytest.approx(0.05 * 2.0, rel=0.03)  # after 4 s
+    env = disturbed(drift=0.1)
+    state = flown(env, 30)
+    clean = flown(make(), 30)
+    np.testing.assert_allclose(state.vehicle.position, clean.vehicle.position, atol=1e-6)
+    assert state.disturbance is not None
+    shown = env.step(state, jnp.broadcast_to(env.hover, (4, 4)), restart=False)[1].observation
+    true = make().step(clean, jnp.broadcast_to(env.hover, (4, 4)), restart=False)[1].observation
+    assert np.abs(shown - true)[:, :3].max() > 1e-3
+    np.testing.assert_allclose(shown[:, 3:], true[:, 3:], atol=1e-5)
+
+
+def test_a_sagging_battery_lets_the_vehicle_sink_more_and_more() -> None:
+    """At hover throttle the acceleration is -g times the share that is lost."""
+    env = disturbed(sag=0.2)
+    state, seconds = flown(env, 60), 2.0
+    assert state.disturbance is not None
+    lost = np.asarray(state.disturbance.sag) / float(env.task.episode_s)  # per second
+    fallen = np.asarray(state.vehicle.position)[:, 2] - STILL.target[2]
+    np.testing.assert_allclose(fallen, -GRAVITY * lost * seconds**3 / 6, rtol=0.06)
+
+
+def test_an_offset_centre_of_mass_and_a_weak_rotor_turn_the_vehicle() -> None:
+    """Against a rate loop that holds its rates by an error: J K w = the torque of the thrust."""
+    vehicle = load_vehicle("vis_r")
+    state = flown(disturbed(centre_of_mass=0.005), 30)
+    offset = np.asarray(vehicle.rotor_position - state.plant["rotor_position"])[:, 0]
+    assert np.abs(offset).max() <= 0.005
+    weight = vehicle.mass * GRAVITY
+    torque = np.stack([-offset[:, 1], offset[:, 0]], axis=1) * weight
+    rate = np.asarray(state.vehicle.body_rate)[:, :2]
+    np.testing.assert_allclose(rate, torque / (vehicle.inertia * vehicle.rate_gain)[:2], rtol=0.15, atol=2e-3)
+    weak = flown(disturbed(rotor=0.1), 30)
+    assert weak.disturbance is not None
+    lift = (np.asarray(weak.disturbance.rotor_share) - 1) * weight / 4
+    roll = lift @ np.asarray(vehicle.rotor_position)[:, 1]
+    found = np.asarray(weak.vehicle.body_rate)[:, 0] * (vehicle.inertia * vehicle.rate_gain)[0]
+    np.testing.assert_allclose(found, roll, rtol=0.15, atol=3e-3)
+
+
+def test_the_rate_loop_is_the_plants_and_the_rest_of_the_controller_is_nominal() -> None:
+    """A rate command answers with the time constants of the loop: half the gain, half as fast at first."""
+    rates = {}
+    for name, width in (("slow", 0.5), ("nominal", 0.0)):
+        env = make(randomize={"rate_gain": width})
+        state = env.reset(random_key(0), 1)[0]
+        gain = np.asarray(load_vehicle("vis_r").rate_gain) * (1 - width)
+        state.plant["rate_gain"] = jnp.asarray(gain, jnp.float32)[None]
+        state = env.step(state, env.hover + jnp.array([[0.0, 0.2, 0.0, 0.0]]), restart=False)[0]
+        rates[name] = float(state.vehicle.body_rate[0, 0])
+    assert rates["slow"] == pytest.approx(0.5 * rates["nominal"], rel=0.15)
+
+
+@pytest.mark.usefixtures("x64")
+@pytest.mark.parametrize("what", ["gust", "rotor_share", "sag", "drift"])
+def test_gradients_reach_through_each_disturbance(what: str) -> None:
+    """Of the observation two steps later, against central differences."""
+    config = EnvConfig(action_latency=(0.0, 0.0), disturbance=DisturbanceConfig(gust=1.0, sag=0.1))
+    env = Env.of(HoverConfig(), RewardConfig({"prog2": 1.0}), config, np.float64)
+    state = env.reset(random_key(0), 1)[0]
+    state = jax.tree.map(lambda x: x.astype(np.float64) if x.dtype == np.float32 else x, state)
+    state = EnvState(**{**vars(state), "time": state.time + 2.0})  # a battery that has sagged
+    assert state.disturbance is not None
+    values = getattr(state.disturbance, what)
+
+    def shown(x: jax.Array) -> jax.Array:
+        def one(row: jax.Array) -> jax.Array:
+            changed = Disturbance(**{**vars(state.disturbance), what: row.reshape(values.shape)})
+            s, out = EnvState(**{**vars(state), "disturbance": changed}), None
+            for _ in range(2):
+                s, out = env.step(s, env.hover[None], restart=False)
+            return out.observation[0]  # type: ignore[union-attr]
+
+        return jax.vmap(one)(x)
+
+    x = values.reshape(1, -1)
+    exact = np.asarray(reverse(shown, x, env.observation_size))
+    np.testing.assert_allclose(exact, central(shown, x), rtol=1e-5, atol=1e-7)
+    assert np.abs(exact).max() > 1e-4
+
+
+@pytest.mark.parametrize(
+    ("largest", "message"),
+    [
+        ({"gust": -1.0}, "env.disturbance.gust is -1.0; accepted: 0 or more"),
+        ({"sag": 1.0}, "env.disturbance.sag is 1.0; accepted: 0 to 0.9"),
+        ({"rotor": float("nan")}, "env.disturbance.rotor is nan; accepted: 0 to 0.9"),
+        ({"gust_time": 0.0}, "env.disturbance.gust_time is 0.0; accepted: more than 0"),
+    ],
+)
+def test_bad_numbers_are_named(largest: dict[str, float], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        disturbed(**largest)

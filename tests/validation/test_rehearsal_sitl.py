@@ -1,0 +1,31 @@
+"""A whole flight through the real firmware."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from e2efly.deploy.log.flight_log import read_log
+from e2efly.deploy.log.telemetry import Telemetry
+from e2efly.deploy.policy.loader import load_policy
+from e2efly.validation import firmware
+from e2efly.validation.rehearsal import rehearse
+from e2efly.vehicles import load_vehicle
+
+
+def test_take_off_hover_policy_hover_land_by_switches_alone(policy_of: Callable[..., Path], tmp_path: Path) -> None:
+    vehicle, policy = load_vehicle("vis_r"), load_policy(policy_of("hover"))
+    with Telemetry(tmp_path / "flight.mcap") as log:
+        flight = rehearse(firmware.chosen(), policy, vehicle, seed=3, log=log)
+    assert flight.modes == ("init", "takeoff", "hover", "policy", "hover", "land", "done", "init")
+    assert flight.complete
+    assert flight.hover_error < 0.10
+    assert flight.mean_error < 0.10
+    assert flight.success
+    assert flight.told == f"{100 * flight.mean_error:.1f} cm off"
+    assert 0.5 < flight.top_speed < 6.0
+    read = read_log(tmp_path / "flight.mcap")
+    assert read.cut_off == ""
+    assert tuple(m["mode"] for m in read["mode"].values) == flight.modes[1:]
+    begins, ends = (read["mode"].stamp[i] / 1e9 for i in (2, 3))
+    assert len(read["policy"]) == pytest.approx((ends - begins) * policy.contract.control_rate_hz, abs=2)
