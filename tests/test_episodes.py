@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from e2efly.config import EnvConfig, ImuConfig, NoiseConfig, RewardConfig, TaskConfig
+from e2efly.control import COMMAND_MODES
 from e2efly.env import Env, EnvState, Step, random_key
-from e2efly.physics import COMMAND_MODES
 from e2efly.tasks import TASKS
 from e2efly.tasks.hover import HoverConfig
 

@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from e2efly.deploy.policy.contract import ACTION_MAPPING, COMMANDS, Contract
-from e2efly.physics import COMMAND_MODES
+from e2efly.deploy.policy.contract import ACTION_MAPPING, Contract
 
 Path = tuple[str | int, ...]
 
@@ -117,10 +116,6 @@ def test_layout() -> None:
     assert contract.observation_size == 13
     assert contract.slices == {"goal": slice(0, 6), "attitude": slice(6, 10), "body_rate": slice(10, 13)}
     assert contract.attitude == "attitude"
-
-
-def test_commands_are_the_simulators() -> None:
-    assert {name: (mode.fields, mode.units) for name, mode in COMMAND_MODES.items()} == COMMANDS
 
 
 def test_the_mapping_is_written_as_it_is_computed() -> None:

@@ -8,7 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.physics import COMMAND_MODES, Physics, State, command_limits, rotation
+from e2efly.control import COMMAND_MODES, command_limits
+from e2efly.physics import Physics, State, rotation
 from e2efly.physics.body import rotor_thrust
 from e2efly.physics.plant import Plant
 from e2efly.physics.state import split4

@@ -12,8 +12,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from e2efly.control import COMMAND_MODES, command_limits
 from e2efly.control.vectors import Vec3
-from e2efly.physics import COMMAND_MODES, Physics, State, command_limits, step
+from e2efly.physics import Physics, State, step
 from e2efly.physics.integrate import INTEGRATORS
 from e2efly.physics.plant import Plant, Rotors
 from e2efly.physics.state import Parts

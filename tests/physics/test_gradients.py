@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
 
-from e2efly.physics import COMMAND_MODES, INTEGRATORS, Physics, State, rotation, step
+from e2efly.control import COMMAND_MODES
+from e2efly.physics import INTEGRATORS, Physics, State, rotation, step
 from e2efly.vehicles import Vehicle
 from tests.gradients import central, reverse
 

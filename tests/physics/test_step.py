@@ -8,7 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.physics import COMMAND_MODES, INTEGRATORS, Physics, State, step
+from e2efly.control import COMMAND_MODES
+from e2efly.physics import INTEGRATORS, Physics, State, step
 from e2efly.vehicles import Vehicle
 
 N = 6

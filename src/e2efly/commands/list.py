@@ -24,7 +24,8 @@ def run(options: List) -> int:
     del options
     load_installed()
     prepare("cpu")
-    from e2efly.physics import COMMAND_MODES, INTEGRATORS
+    from e2efly.control import COMMAND_MODES
+    from e2efly.physics import INTEGRATORS
     from e2efly.rewards import TERMS
     from e2efly.validation.plants import PLANTS
 

@@ -1,7 +1,7 @@
-"""Controllers: from a command of four numbers to collective thrust and body rates (CTBR), by one cascade.
+"""The cascade of controllers down to collective thrust and body rates (CTBR).
 
-position + yaw -> velocity + yaw -> acceleration + yaw -> attitude + thrust -> CTBR. A command enters at its own level.
-The simulator's command modes and the flight bridge run these same functions, on JAX and on NumPy arrays.
+velocity + yaw -> acceleration + yaw -> attitude + thrust -> CTBR. A command mode (`control/modes.py`) enters at its own
+level. The simulator and the flight bridge run these same functions, on JAX and on NumPy arrays.
 """
 
 from collections.abc import Callable
@@ -47,52 +47,14 @@ Controller = Callable[[Vehicle, Motion, Command], Ctbr]
 """(nominal vehicle, motion, command) -> CTBR."""
 
 
-def ctbr(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
-    """Command: collective thrust over mass, m/s^2, and body rates, rad/s."""
-    del motion
-    return _limited(vehicle, command[0], Vec3(*command[1:]))
-
-
-def attitude(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
-    """Command: collective thrust over mass, m/s^2; roll, pitch, yaw, rad (R = Rz Ry Rx)."""
-    thrust, roll, pitch, yaw = command
-    return _turn(vehicle, motion, thrust, Quat.of_euler(roll, pitch, yaw))
-
-
-def acceleration(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
-    """Command: acceleration in the world, m/s^2, and yaw, rad."""
-    return _accelerate(vehicle, motion, Vec3(*command[:3]), command[3])
-
-
-def velocity(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
-    """Command: velocity in the world, m/s, and yaw, rad."""
-    return _reach(vehicle, motion, Vec3(*command[:3]), command[3])
-
-
-def position(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
-    """Command: position in the world, m, and yaw, rad."""
-    error = Vec3(*command[:3]) - motion.position
-    wanted = error.times(Vec3.of(vehicle.position_gain)).clip(Vec3.of(vehicle.speed_max))
-    return _reach(vehicle, motion, wanted, command[3])
-
-
-CASCADE: dict[str, Controller] = {
-    "ctbr": ctbr,
-    "attitude": attitude,
-    "acceleration": acceleration,
-    "velocity": velocity,
-    "position": position,
-}
-"""Controllers by the name of their command mode."""
-
-
-def _reach(vehicle: Vehicle, motion: Motion, wanted: Vec3, yaw: Array) -> Ctbr:
+def reach(vehicle: Vehicle, motion: Motion, wanted: Vec3, yaw: Array) -> Ctbr:
+    """Towards a velocity in the world, m/s, and a yaw, rad."""
     error = wanted - motion.velocity
-    return _accelerate(vehicle, motion, error.times(Vec3.of(vehicle.velocity_gain)), yaw)
+    return accelerate(vehicle, motion, error.times(Vec3.of(vehicle.velocity_gain)), yaw)
 
 
-def _accelerate(vehicle: Vehicle, motion: Motion, wanted: Vec3, yaw: Array) -> Ctbr:
-    """Point the thrust along the wanted acceleration less gravity, within the tilt limit."""
+def accelerate(vehicle: Vehicle, motion: Motion, wanted: Vec3, yaw: Array) -> Ctbr:
+    """Point the thrust along the wanted acceleration, world, m/s^2, less gravity, within the tilt limit; yaw, rad."""
     wanted = wanted.clip(Vec3.of(vehicle.acceleration_max))
     xp = namespace(wanted.z, yaw)
     up = xp.maximum(wanted.z + GRAVITY, 0.1 * GRAVITY)  # the rotors push up: a steeper fall is not commanded
@@ -108,19 +70,23 @@ def _accelerate(vehicle: Vehicle, motion: Motion, wanted: Vec3, yaw: Array) -> C
     tilt = Quat(half, -axis.y / (2 * half), axis.x / (2 * half), zero)
     wanted_attitude = tilt.compose(Quat(xp.cos(yaw / 2), zero, zero, xp.sin(yaw / 2)))
     along = motion.attitude.z_axis().dot(force)  # thrust for the acceleration along the axis as it is now
-    return _turn(vehicle, motion, xp.maximum(along, 0.0), wanted_attitude)
+    return turn(vehicle, motion, xp.maximum(along, 0.0), wanted_attitude)
 
 
-def _turn(vehicle: Vehicle, motion: Motion, thrust: Array, wanted: Quat) -> Ctbr:
-    """Tilt-prioritised law (Brescianini and D'Andrea, Tilt-prioritized quadrocopter attitude control, 2018)."""
+def turn(vehicle: Vehicle, motion: Motion, thrust: Array, wanted: Quat) -> Ctbr:
+    """Towards an attitude, tilt first.
+
+    Brescianini and D'Andrea, Tilt-prioritized quadrocopter attitude control, 2018.
+    """
     e = motion.attitude.conjugate().compose(wanted)
     xp = namespace(e.w)
     n = xp.sqrt(e.w**2 + e.z**2 + 1e-12)
     sign = xp.where(e.w >= 0, 1.0, -1.0)
     tilt, yaw = 2 * vehicle.attitude_gain[..., 0] / n, 2 * vehicle.attitude_gain[..., 1] / n
     rate = Vec3(tilt * (e.w * e.x - e.y * e.z), tilt * (e.w * e.y + e.x * e.z), yaw * sign * e.z)
-    return _limited(vehicle, thrust, rate)
+    return limited(vehicle, thrust, rate)
 
 
-def _limited(vehicle: Vehicle, thrust: Array, rate: Vec3) -> Ctbr:
+def limited(vehicle: Vehicle, thrust: Array, rate: Vec3) -> Ctbr:
+    """CTBR with the body rates, rad/s, within the vehicle's `body_rate_max`."""
     return Ctbr(thrust, rate.clip(Vec3.of(vehicle.body_rate_max)))

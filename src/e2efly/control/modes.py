@@ -1,11 +1,121 @@
-"""What the four numbers of a command are, in each command mode. No JAX."""
+"""Command modes: what the four numbers of a command are, how far they reach, and how they become CTBR. No JAX.
 
-COMMANDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "rotor_thrust": (("rear_right", "front_right", "rear_left", "front_left"), ("N",) * 4),
-    "ctbr": (("collective_thrust", "roll_rate", "pitch_rate", "yaw_rate"), ("m/s^2", "rad/s", "rad/s", "rad/s")),
-    "attitude": (("collective_thrust", "roll", "pitch", "yaw"), ("m/s^2", "rad", "rad", "rad")),
-    "acceleration": (("x", "y", "z", "yaw"), ("m/s^2", "m/s^2", "m/s^2", "rad")),
-    "velocity": (("x", "y", "z", "yaw"), ("m/s", "m/s", "m/s", "rad")),
-    "position": (("x", "y", "z", "yaw"), ("m", "m", "m", "rad")),
-}
-"""Names and units of the four commands of each command mode, for simulator, contract and flight."""
+A mode is one entry of `COMMAND_MODES`. Simulator, contract, bridge and other plants know it by that entry alone.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from e2efly.control.cascade import Command, Controller, Ctbr, Motion, accelerate, limited, reach, turn
+from e2efly.control.vectors import Quat, Vec3
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+Four = tuple[float, float, float, float]
+Limits = tuple[list[float], list[float]]
+THRUST, RATES = "collective_thrust", ("rad/s", "rad/s", "rad/s")
+
+
+@dataclass(frozen=True)
+class CommandMode:
+    """A command mode."""
+
+    name: str
+    fields: tuple[str, str, str, str]
+    """Names of the four numbers."""
+    units: tuple[str, str, str, str]
+    """Their units."""
+    limits: Callable[[Vehicle, float], Limits]
+    """(nominal vehicle, reach of positions in m) -> smallest and largest command."""
+    controller: Controller | None
+    """How a command becomes CTBR; None: it is the thrusts of the rotors."""
+    hover: Callable[[Vehicle], Four] = lambda vehicle: (0.0, 0.0, 0.0, 0.0)
+    """The command that hovers a level vehicle, where the mode has one."""
+    fixed: tuple[str, ...] = ("origin_yaw",)
+    """Options of a goal that would move the world under the command: those of its axes, which no policy sees."""
+
+
+def ctbr(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
+    """Command: collective thrust over mass, m/s^2, and body rates, rad/s."""
+    del motion
+    return limited(vehicle, command[0], Vec3(*command[1:]))
+
+
+def attitude(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
+    """Command: collective thrust over mass, m/s^2; roll, pitch, yaw, rad (R = Rz Ry Rx)."""
+    thrust, roll, pitch, yaw = command
+    return turn(vehicle, motion, thrust, Quat.of_euler(roll, pitch, yaw))
+
+
+def acceleration(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
+    """Command: acceleration in the world, m/s^2, and yaw, rad."""
+    return accelerate(vehicle, motion, Vec3(*command[:3]), command[3])
+
+
+def velocity(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
+    """Command: velocity in the world, m/s, and yaw, rad."""
+    return reach(vehicle, motion, Vec3(*command[:3]), command[3])
+
+
+def position(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
+    """Command: position in the world, m, and yaw, rad."""
+    error = Vec3(*command[:3]) - motion.position
+    wanted = error.times(Vec3.of(vehicle.position_gain)).clip(Vec3.of(vehicle.speed_max))
+    return reach(vehicle, motion, wanted, command[3])
+
+
+def _symmetric(*limits: float) -> Limits:
+    return [-float(x) for x in limits], [float(x) for x in limits]
+
+
+def _rotors(vehicle: Vehicle, _: float) -> Limits:
+    low, high = vehicle.thrust_range
+    return [low] * 4, [high] * 4
+
+
+def _with_thrust(vehicle: Vehicle, *limits: float) -> Limits:
+    """Of a collective thrust, which is never negative, and of three other numbers."""
+    low, high = _symmetric(*limits)
+    return [0.0, *low], [4 * vehicle.thrust_range[1] / vehicle.mass, *high]
+
+
+def _weight(vehicle: Vehicle) -> Four:
+    return (vehicle.mass * GRAVITY / 4,) * 4
+
+
+COMMAND_MODES: dict[str, CommandMode] = {
+    mode.name: mode
+    for mode in (
+        CommandMode(
+            "rotor_thrust", ("rear_right", "front_right", "rear_left", "front_left"), ("N", "N", "N", "N"),
+            _rotors, None, hover=_weight,
+        ),
+        CommandMode(
+            "ctbr", (THRUST, "roll_rate", "pitch_rate", "yaw_rate"), ("m/s^2", *RATES),
+            lambda v, _: _with_thrust(v, *v.body_rate_max), ctbr, lambda v: (GRAVITY, 0.0, 0.0, 0.0), fixed=(),
+        ),
+        CommandMode(
+            "attitude", (THRUST, "roll", "pitch", "yaw"), ("m/s^2", "rad", "rad", "rad"),
+            lambda v, _: _with_thrust(v, v.tilt_max, v.tilt_max, np.pi), attitude, lambda v: (GRAVITY, 0.0, 0.0, 0.0),
+        ),
+        CommandMode(
+            "acceleration", ("x", "y", "z", "yaw"), ("m/s^2", "m/s^2", "m/s^2", "rad"),
+            lambda v, _: _symmetric(*v.acceleration_max, np.pi), acceleration,
+        ),
+        CommandMode(
+            "velocity", ("x", "y", "z", "yaw"), ("m/s", "m/s", "m/s", "rad"),
+            lambda v, _: _symmetric(*v.speed_max, np.pi), velocity,
+        ),
+        CommandMode(
+            "position", ("x", "y", "z", "yaw"), ("m", "m", "m", "rad"),
+            lambda _, reach: _symmetric(reach, reach, reach, np.pi), position, fixed=("origin", "origin_yaw", "pad"),
+        ),
+    )
+}  # fmt: skip
+"""Command modes by name."""
+
+
+def command_limits(mode: CommandMode, vehicle: Vehicle, position_range: float = 5.0) -> np.ndarray:
+    """Smallest and largest command, (2, 4), of the nominal (loaded) vehicle."""
+    return np.asarray(mode.limits(vehicle, position_range), np.float64)

@@ -26,11 +26,12 @@ from e2efly.config import (
     RewardConfig,
     TaskConfig,
 )
+from e2efly.control import COMMAND_MODES, command_limits
 from e2efly.env import disturbance
 from e2efly.env.check import check
 from e2efly.env.state import EnvState, Step
 from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field, past_actions
-from e2efly.physics import COMMAND_MODES, Physics, State, command_limits, step
+from e2efly.physics import Physics, State, step
 from e2efly.physics.body import hover_rotor_speed
 from e2efly.physics.rotation import from_euler, unrotate, yaw
 from e2efly.scenes import scene as scenes
@@ -39,7 +40,6 @@ from e2efly.sensors.eyes import Eye, image_shape, see
 from e2efly.sensors.noise import add_noise
 from e2efly.tasks.task import Shape, Task, into_ball, make_task, uniform
 from e2efly.vehicles import Flown, Vehicle, load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
 
 LEADS = (0.0, 0.25, 0.5, 1.0, 1.5)
 """How far ahead a critic is told the clearance, s."""
@@ -125,7 +125,8 @@ class Env:
         late = config.action_latency or (max(vehicle.latency - sooner, 0.0), vehicle.latency + later)
         frames = latency.frames(late[1], period)
         seen = frames if config.past_actions is None else config.past_actions
-        low, high = command_limits(COMMAND_MODES[config.command_mode], vehicle, config.position_range)
+        mode = COMMAND_MODES[config.command_mode]
+        low, high = command_limits(mode, vehicle, config.position_range)
         noisy = config.noise != NoiseConfig()
         shape = Shape(body.feet_height, body.radius)
         oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
@@ -136,7 +137,7 @@ class Env:
             parameters=dict(reward.parameters),
             center=((low + high) / 2).astype(dtype),
             half=((high - low) / 2).astype(dtype),
-            hover=((_hover_command(config.command_mode, vehicle) - low) / (high - low) * 2 - 1).astype(dtype),
+            hover=((np.asarray(mode.hover(vehicle)) - low) / (high - low) * 2 - 1).astype(dtype),
             latency_range=np.asarray(late, dtype),
             observation_latency_range=np.asarray(config.observation_latency, dtype),
             randomize=dict(config.randomize),
@@ -462,12 +463,6 @@ def _perturbed(key: PRNGKeyArray, n: int, nominal: Vehicle, widths: dict[str, An
         factor = drawn[:, end - value.size : end].reshape(n, *value.shape).astype(value.dtype)
         plant[name] = value * (1 + widths[name] * factor)
     return plant
-
-
-def _hover_command(mode: str, vehicle: Vehicle) -> np.ndarray:
-    each = vehicle.mass * GRAVITY / 4
-    level = {"ctbr": (GRAVITY, 0, 0, 0), "attitude": (GRAVITY, 0, 0, 0), "rotor_thrust": (each,) * 4}
-    return np.asarray(level.get(mode, (0, 0, 0, 0)), np.float64)
 
 
 def _wrap(angle: Array) -> Array:

@@ -10,6 +10,7 @@ from onnx import helper
 
 from e2efly import __version__
 from e2efly.config import TrainConfig
+from e2efly.control import COMMAND_MODES, command_limits
 from e2efly.deploy.policy.contract import CONTRACT_VERSION, METADATA_KEY, Action, Contract
 from e2efly.deploy.policy.images import NONE, Image
 from e2efly.deploy.policy.loader import load_policy
@@ -18,7 +19,6 @@ from e2efly.env import Env
 from e2efly.learn.graph import OPERATORS, policy_graph
 from e2efly.learn.networks import FAINTEST, NEAREST, Actor, View, Weights
 from e2efly.observation import Field
-from e2efly.physics import COMMAND_MODES, command_limits
 from e2efly.storage import write_atomically
 from e2efly.tasks import TASKS
 from e2efly.vehicles import load_vehicle

@@ -1,18 +1,14 @@
-"""Command modes: from a command of four numbers to rotor speed commands, by one cascade.
+"""From a command to rotor speed commands: the law of each command mode.
 
-position + yaw -> ... -> collective thrust and body rates (`e2efly.control`) -> rotor thrusts -> rotor speeds. A mode
-enters the cascade at its own level; every level below runs at every physics sub-step. All laws use the nominal
-vehicle: the flight controller does not know what was randomised.
+A command enters the cascade at its own level (`e2efly.control`); every level below runs at every physics sub-step, down
+to rotor thrusts and speeds. All laws use the nominal vehicle: the flight controller does not know what was randomised.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
-import numpy as np
 from jax import Array
 
-from e2efly.control import CASCADE, Ctbr, Vec3
-from e2efly.control.modes import COMMANDS
+from e2efly.control import CommandMode, Ctbr, Vec3
 from e2efly.physics.body import gyroscopic_torque, rotor_speed_for
 from e2efly.physics.mixer import Mixer
 from e2efly.physics.plant import Rotors
@@ -24,17 +20,13 @@ Law = Callable[[Vehicle, Mixer, Parts, Command], Rotors]
 """(nominal vehicle, its mixer, state, command) -> rotor speed commands, rad/s."""
 
 
-def rotor_thrust_law(vehicle: Vehicle, mixer: Mixer, parts: Parts, command: Command) -> Rotors:
-    """Command: thrust of each rotor, N."""
-    del parts
-    return rotor_speed_for(vehicle, mixer.limit(command))
-
-
-def _law(name: str) -> Law:
-    """The law of a controller of the cascade: its body rates held by the rate loop."""
-    controller = CASCADE[name]
+def control_law(mode: CommandMode) -> Law:
+    """The law of a command mode: rotor thrusts within their limits, or body rates held by the rate loop."""
+    controller = mode.controller
 
     def law(vehicle: Vehicle, mixer: Mixer, parts: Parts, command: Command) -> Rotors:
+        if controller is None:
+            return rotor_speed_for(vehicle, mixer.limit(command))
         return _rates(vehicle, mixer, parts, controller(vehicle, parts, command))
 
     return law
@@ -46,62 +38,3 @@ def _rates(vehicle: Vehicle, mixer: Mixer, parts: Parts, wanted: Ctbr) -> Rotors
     held = gyroscopic_torque(Vec3.of(vehicle.inertia), parts.body_rate)
     torque = stiffness.times(wanted.rate - parts.body_rate) + held
     return rotor_speed_for(vehicle, mixer.thrusts(vehicle.mass * wanted.thrust, torque))
-
-
-@dataclass(frozen=True)
-class CommandMode:
-    """A command mode: its law, and what its four numbers are."""
-
-    name: str
-    law: Law
-    limits: Callable[[Vehicle, float], tuple[list[float], list[float]]]
-    """(nominal vehicle, position range in m) -> smallest and largest command."""
-
-    @property
-    def fields(self) -> tuple[str, ...]:
-        """Names of the four numbers."""
-        return COMMANDS[self.name][0]
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Their units."""
-        return COMMANDS[self.name][1]
-
-
-def _symmetric(*limit: float) -> tuple[list[float], list[float]]:
-    return [-float(x) for x in limit], [float(x) for x in limit]
-
-
-def _collective_max(vehicle: Vehicle) -> float:
-    return 4 * vehicle.thrust_range[1] / vehicle.mass
-
-
-def _ctbr_limits(vehicle: Vehicle, _: float) -> tuple[list[float], list[float]]:
-    low, high = _symmetric(*vehicle.body_rate_max)
-    return [0.0, *low], [_collective_max(vehicle), *high]
-
-
-def _attitude_limits(vehicle: Vehicle, _: float) -> tuple[list[float], list[float]]:
-    low, high = _symmetric(vehicle.tilt_max, vehicle.tilt_max, np.pi)
-    return [0.0, *low], [_collective_max(vehicle), *high]
-
-
-_LIMITS: dict[str, Callable[[Vehicle, float], tuple[list[float], list[float]]]] = {
-    "rotor_thrust": lambda v, _: ([v.thrust_range[0]] * 4, [v.thrust_range[1]] * 4),
-    "ctbr": _ctbr_limits,
-    "attitude": _attitude_limits,
-    "acceleration": lambda v, _: _symmetric(*v.acceleration_max, np.pi),
-    "velocity": lambda v, _: _symmetric(*v.speed_max, np.pi),
-    "position": lambda _, reach: _symmetric(reach, reach, reach, np.pi),
-}
-
-COMMAND_MODES: dict[str, CommandMode] = {
-    name: CommandMode(name, rotor_thrust_law if name == "rotor_thrust" else _law(name), limits)
-    for name, limits in _LIMITS.items()
-}
-"""Command modes by name."""
-
-
-def command_limits(mode: CommandMode, vehicle: Vehicle, position_range: float = 5.0) -> np.ndarray:
-    """Smallest and largest command, (2, 4), of the nominal (loaded) vehicle."""
-    return np.asarray(mode.limits(vehicle, position_range), np.float64)

@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from e2efly.control.vectors import Vec3
-from e2efly.physics.control import COMMAND_MODES, Command
+from e2efly.control import COMMAND_MODES, Vec3
+from e2efly.physics.control import Command, control_law
 from e2efly.physics.integrate import INTEGRATORS
 from e2efly.physics.mixer import Mixer
 from e2efly.physics.plant import Plant
@@ -116,7 +116,7 @@ def step(
         wind: velocity of the air in the world, m/s.
         rotor_share: thrust of each rotor over that of the vehicle's thrust map; None: 1.
     """
-    law = COMMAND_MODES[physics.command_mode].law
+    law = control_law(COMMAND_MODES[physics.command_mode])
     integrate = INTEGRATORS[physics.integrator]
     dt = physics.control_period / physics.substeps
     plant = Plant.of(vehicle, dt, rotor_share)

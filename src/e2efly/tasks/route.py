@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from e2efly.config import TaskConfig, check_numbers, number
+from e2efly.control import COMMAND_MODES
 from e2efly.courses.origin import Origin
 from e2efly.deploy.policy.contract import Contract
 from e2efly.goal import Course, Goal, Shape
@@ -133,8 +134,7 @@ def _check_use(contract: Contract, route: Route) -> None:
             raise ValueError(f"goal.{name} is {value!r}, but has no effect here; accepted: {', '.join(usable)}")
     # a policy sees where it is from its goal alone: commands in the world's axes are those of its training's world
     mode = contract.action.mode
-    fixed = {"ctbr": (), "attitude": ("origin_yaw",), "position": ("origin", "origin_yaw", "pad")}
-    for name in fixed.get(mode, ("origin_yaw",)):
+    for name in COMMAND_MODES[mode].fixed:
         if name in changed:
             default = type(route).__dataclass_fields__[name].default
             raise ValueError(

@@ -11,8 +11,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from e2efly.control import COMMAND_MODES
 from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.policy.contract import COMMANDS, Contract
+from e2efly.deploy.policy.contract import Contract
 from e2efly.vehicles import Vehicle, unknown
 from e2efly.vehicles.vehicle import quantities
 
@@ -108,7 +109,7 @@ class Plant(ABC):
         """Hold a command for `dt` s.
 
         Args:
-            command: (4,) in the units of the command mode that the plant was made for (`COMMANDS`); for `ctbr`
+            command: (4,) in the units of the command mode that the plant was made for (`COMMAND_MODES`); for `ctbr`
                 collective thrust over mass, m/s^2, and body rates, rad/s.
             dt: seconds, above zero.
         """
@@ -190,5 +191,5 @@ def check_mode(mode: str, plant: str) -> None:
     Raises:
         ValueError: naming the plant, the mode and all there are.
     """
-    if mode not in COMMANDS:
-        raise ValueError(f"plant {plant!r}: " + unknown("command mode", mode, COMMANDS))
+    if mode not in COMMAND_MODES:
+        raise ValueError(f"plant {plant!r}: " + unknown("command mode", mode, COMMAND_MODES))

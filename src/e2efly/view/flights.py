@@ -38,7 +38,7 @@ class Flights:
     success: Bool[np.ndarray, " n"]
     """Whether it ended well."""
     command_mode: str = "ctbr"
-    """A name of `e2efly.physics.COMMAND_MODES`: what `command` is."""
+    """A name of `e2efly.control.COMMAND_MODES`: what `command` is."""
 
     @property
     def speed(self) -> Float[np.ndarray, "t n"]:

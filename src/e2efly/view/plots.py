@@ -12,9 +12,9 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from e2efly.config import TaskConfig
+from e2efly.control import COMMAND_MODES
 from e2efly.drawing import INK
 from e2efly.episodes import Episodes, wilson
-from e2efly.physics.control import COMMAND_MODES
 from e2efly.vehicles.vehicle import GRAVITY
 from e2efly.view.flights import Flights, fly
 from e2efly.view.space import plot_flights

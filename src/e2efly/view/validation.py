@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
+from e2efly.control import COMMAND_MODES
 from e2efly.deploy.policy.loader import Policy
 from e2efly.drawing import INK, Face, Line, Thing
-from e2efly.physics.control import COMMAND_MODES
 from e2efly.validation.fleet import Flight, Mission, fly_all
 from e2efly.validation.judge import judge
 from e2efly.validation.reality import Reality

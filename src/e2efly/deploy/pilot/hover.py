@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from e2efly.control import CASCADE, Ctbr, Quat, Vec3
+from e2efly.control import COMMAND_MODES, Ctbr, Quat, Vec3
 from e2efly.deploy.attitude import Attitude
 from e2efly.deploy.odometry import Odometry
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
@@ -63,9 +63,11 @@ def flight_gains(vehicle: Vehicle, latency: float) -> Vehicle:
 
 
 def controlled(vehicle: Vehicle, mode: str, odometry: Odometry, command: tuple[float, ...] | np.ndarray) -> Ctbr:
-    """CTBR of a command of a command mode: the simulator's own cascade."""
+    """CTBR of a command of a command mode that has a controller: the simulator's own cascade."""
     a, b, c, d = (np.float64(x) for x in command)
-    return CASCADE[mode](vehicle, FlightMotion.of(odometry), (a, b, c, d))
+    controller = COMMAND_MODES[mode].controller
+    assert controller is not None
+    return controller(vehicle, FlightMotion.of(odometry), (a, b, c, d))
 
 
 def blind(attitude: Attitude | None, elapsed: float, climb: float = 0.0) -> Ctbr:

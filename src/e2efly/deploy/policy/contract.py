@@ -10,7 +10,8 @@ from functools import cached_property
 from itertools import accumulate
 from typing import Any
 
-from e2efly.control.modes import COMMANDS
+from e2efly.control import COMMAND_MODES
+from e2efly.control.modes import THRUST
 from e2efly.deploy.policy import contract_json as read
 from e2efly.deploy.policy.images import Image
 from e2efly.observation import Field
@@ -38,7 +39,7 @@ class Action:
     """What the policy commands."""
 
     mode: str
-    """A command mode: a key of `COMMANDS`."""
+    """A command mode: a name of `COMMAND_MODES`."""
     fields: tuple[str, ...]
     """Names of the four commands."""
     units: tuple[str, ...]
@@ -204,9 +205,10 @@ def _images(value: Any, rate: float) -> tuple[Image, ...]:
 def _action(value: Any) -> Action:
     x = read.table(value, "action", Action)
     mode = read.text(x["mode"], "action.mode")
-    if mode not in COMMANDS:
-        raise read.refusal("action.mode", mode, " or ".join(map(repr, COMMANDS)))
-    for key, accepted in zip(("fields", "units"), COMMANDS[mode], strict=True):
+    if mode not in COMMAND_MODES:
+        raise read.refusal("action.mode", mode, " or ".join(map(repr, COMMAND_MODES)))
+    fields, units = COMMAND_MODES[mode].fields, COMMAND_MODES[mode].units
+    for key, accepted in (("fields", fields), ("units", units)):
         if x[key] != list(accepted):
             raise read.refusal(f"action.{key}", x[key], f"{list(accepted)}, as action.mode is {mode!r}")
     if read.numbers(x["limits"], "action.limits", 2) != ACTION_LIMITS:
@@ -216,7 +218,7 @@ def _action(value: Any) -> Action:
     low, high = (read.numbers(x[key], f"action.{key}", ACTION_SIZE) for key in ("low", "high"))
     if not all(a < b for a, b in zip(low, high, strict=True)):
         raise read.refusal("action.low", list(low), f"four numbers below action.high, {list(high)}")
-    if COMMANDS[mode][0][0] == "collective_thrust" and not 0 <= low[0] < GRAVITY < high[0]:
+    if fields[0] == THRUST and not 0 <= low[0] < GRAVITY < high[0]:
         accepted = f"from 0 or more, below {GRAVITY} m/s^2, to more than it, which hovers"
         raise read.refusal("action.low[0] to action.high[0], the collective thrust,", [low[0], high[0]], accepted)
-    return Action(mode, *COMMANDS[mode], low, high)
+    return Action(mode, fields, units, low, high)

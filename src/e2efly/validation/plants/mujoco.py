@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.control import CASCADE, Quat, Vec3
+from e2efly.control import COMMAND_MODES, Quat, Vec3
 from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle
@@ -89,8 +89,8 @@ class MujocoPlant(Plant):
 
         Args:
             vehicle: as loaded; the flight controller believes in it.
-            command_mode: what `step` is given: a name of `COMMANDS`. Modes above `ctbr` go through the bridge's own
-                controllers before each step.
+            command_mode: what `step` is given: a name of `COMMAND_MODES`. Modes above `ctbr` go through the bridge's
+                own controllers before each step.
             largest_step: of MuJoCo and the rate loop, s.
 
         Raises:
@@ -176,13 +176,13 @@ def control_law(vehicle: Vehicle, command_mode: str, plain_mixer: bool = False) 
     Raises:
         KeyError: for an unknown command mode.
     """
-    if command_mode == "rotor_thrust":
+    controller = COMMAND_MODES[command_mode].controller
+    if controller is None:
         low, high = vehicle.thrust_range
         return lambda command, pose, motion: [min(max(f, low), high) for f in command]
     rates = rate_loop(vehicle, plain_mixer)
     if command_mode == "ctbr":
         return lambda command, pose, motion: rates(command, motion[3:])
-    controller = CASCADE[command_mode]
 
     def law(command: Sequence[float], pose: Sequence[float], motion: Sequence[float]) -> list[float]:
         known = _Motion(Vec3(*pose[:3]), Vec3(*motion[:3]), Quat(*pose[3:]))
