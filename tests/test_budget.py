@@ -23,10 +23,22 @@ SMALL = presets.preset("hover", "ppo")
             "train hover --algo ppo --preset nominal --steps 10" + 12 * "0",
             "accepted: at most 8796093018112: int32 counts updates and samples",
         ),
-        ("train hover --algo.envs 1000000000000", "algo.envs is 1000000000000, algo.horizon 64, with 21 observed numb"),
-        ("train hover --algo.horizon 1000000000000", "algo.envs is 64, algo.horizon 1000000000000, with 21 observed"),
-        ("train hover --algo.epochs 1000000000000", "chunk 20, algo.epochs 1000000000000: about 805 years, even"),
-        ("train hover --network.hidden 200000 200000", "network.hidden is (200000, 200000), recurrent 0, encoder"),
+        (
+            "train hover --algo ppo --preset nominal --algo.envs 1000000000000",
+            "algo.envs is 1000000000000, algo.horizon 64, with 21 observed numb",
+        ),
+        (
+            "train hover --algo ppo --preset nominal --algo.horizon 1000000000000",
+            "algo.envs is 64, algo.horizon 1000000000000, with 21 observed",
+        ),
+        (
+            "train hover --algo ppo --preset nominal --algo.epochs 1000000000000",
+            "chunk 20, algo.epochs 1000000000000: about 805 years, even",
+        ),
+        (
+            "train hover --algo ppo --preset nominal --network.hidden 200000 200000",
+            "network.hidden is (200000, 200000), recurrent 0, encoder",
+        ),
         ("train hover --network.recurrent 1000000000", "recurrent 1000000000, encoder (64,), convolution ()"),
         ("train hover --env.past-actions 10000000", "with 40000013 observed numbers, env.past_actions 10000000: about"),
         ("train hover --env.control-rate 1e9", "control_rate is 1000000000.0; accepted: a positive number, 0.1 to 10"),
@@ -35,7 +47,10 @@ SMALL = presets.preset("hover", "ppo")
         ("train hover --task.episode-s 1e12", "task.episode_s is 1000000000000.0; accepted: at most 559241 s, as far"),
         ("train hover --task.judged-s 1e12", "task.judged_s is 1000000000000.0; accepted: at most 559241 s, as far"),
         ("train hover --chunk 1000000000", "chunk is 1000000000: about 4 TB of memory; accepted: what fits into the"),
-        ("train hover --eval-episodes 1000000000", "eval_episodes is 1000000000, with 21 observed numbers: about 1.1"),
+        (
+            "train hover --algo ppo --preset nominal --eval-episodes 1000000000",
+            "eval_episodes is 1000000000, with 21 observed numbers: about 1.1",
+        ),
         ("train hover --algo abpt --algo.buffer 1000000000000000", "algo.buffer is 1000000000000000: about"),
         (
             "train hover --algo abpt --algo.fits 1000000000000000",

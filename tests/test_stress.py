@@ -11,7 +11,7 @@ from e2efly.cli import run
 from e2efly.config import NoiseConfig
 from e2efly.env.stress import ALL, ROWS, Draw
 from e2efly.stress import stress
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles import load_vehicle, vehicle_file
 
 VIS_R = load_vehicle("vis_r")
 N = 4000

@@ -43,7 +43,7 @@ def test_models_of_stable_baselines3(algorithm: Any, tmp_path: Path) -> None:
 
 
 def test_the_contract_is_that_of_our_own_policies(tmp_path: Path) -> None:
-    e2efly.train("hover", "ppo", out=tmp_path / "own", steps=4096, chunk=1, eval_episodes=10)
+    e2efly.train("hover", "ppo", preset_name="nominal", out=tmp_path / "own", steps=4096, chunk=1, eval_episodes=10)
     exported = e2efly.export(sequence(20), tmp_path / "policy.onnx", TorchEnv("hover", 2))
     assert e2efly.load_policy(exported).contract == e2efly.load_policy(tmp_path / "own").contract
 

@@ -23,7 +23,20 @@ def request(*vary: str, seeds: int = 1) -> Sweep:
 
 
 def sweep(cwd: Path, *flags: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "e2efly", "sweep", "hover", "--algo", "ppo", "--out", "sweep", *flags]
+    command = [
+        sys.executable,
+        "-m",
+        "e2efly",
+        "sweep",
+        "hover",
+        "--algo",
+        "ppo",
+        "--preset",
+        "nominal",
+        "--out",
+        "sweep",
+        *flags,
+    ]
     return subprocess.Popen(command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 

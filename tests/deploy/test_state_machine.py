@@ -389,6 +389,16 @@ def test_odometry_that_leads_astray_is_not_believed_again_before_the_vehicle_sta
     assert not flown(flown(astray, BLIND, blind_time(1.1) + 0.1), BLIND).misled
 
 
+def test_what_drifts_while_the_link_is_silent_is_seen_and_braked_once_it_is_heard() -> None:
+    """Its commands did not arrive: that it did not go where it was sent is no fault of the odometry."""
+    silent = having(UP, link_problem="no answer within 0.25 s", silent=True)
+    drifting = flown(flown(hovering(), silent, 0.5), having(silent, odometry=at(1.05, x=1.6, velocity=(2.0, 0, 0))))
+    assert drifting.mode is Mode.LAND and not drifting.misled and not drifting.blind
+    heard = flown(drifting, having(UP, odometry=at(1.05, x=1.6, velocity=(2.0, 0, 0))))
+    assert not heard.blind and heard.target is not None
+    assert heard.target.position[2] == pytest.approx(1.05, abs=0.01)  # first it stops, then it sinks
+
+
 def test_a_heading_that_the_flight_shows_to_be_wrong_ends_it() -> None:
     wrong = having(UP, heading_error=-1.6)
     for flight in (taking_off(), hovering()):

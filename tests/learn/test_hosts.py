@@ -21,7 +21,7 @@ BPTT = [*SMALL, "--algo", "bptt"]
 
 
 def start(cwd: Path, out: str, *flags: str, devices: int, told: str = "output.txt") -> Process:
-    command = [sys.executable, "-m", "e2efly", "train", "hover", *flags, "--out", out]
+    command = [sys.executable, "-m", "e2efly", "train", "hover", "--preset", "nominal", *flags, "--out", out]
     with (cwd / told).open("ab") as output:
         environment = os.environ | {"JAX_NUM_CPU_DEVICES": str(devices), "XLA_FLAGS": QUICK}
         return subprocess.Popen(command, cwd=cwd, stdout=output, stderr=output, env=environment)

@@ -40,12 +40,12 @@ def test_what_is_read_acts_as_the_file(task: str) -> None:
 
 @pytest.mark.parametrize("algo", ["ppo", "bptt"])
 def test_a_run_begins_where_the_policy_was(algo: str, tmp_path: Path) -> None:
-    options = {**SMALL, "vehicle": "crazyflie", "preset_name": "nominal"}
-    begun = e2efly.train("hover", algo, out=tmp_path / "run", start_from="hover", **options)
-    assert begun["shipped"]["hover"]["success"] > 0.9
-    more = e2efly.train("hover", algo, out=tmp_path / "more", start_from=tmp_path / "run", **options)
-    assert more["shipped"]["hover"]["success"] > 0.9
-    assert e2efly.train("hover", algo, out=tmp_path / "fresh", **options)["shipped"]["hover"]["success"] < 0.5
+    task, options = "hover_aware", {**SMALL, "vehicle": "crazyflie"}
+    begun = e2efly.train(task, algo, out=tmp_path / "run", start_from=task, **options)
+    assert begun["shipped"][task]["success"] > 0.9
+    more = e2efly.train(task, algo, out=tmp_path / "more", start_from=tmp_path / "run", **options)
+    assert more["shipped"][task]["success"] > 0.9
+    assert e2efly.train(task, algo, out=tmp_path / "fresh", **options)["shipped"][task]["success"] < 0.5
 
 
 def test_what_does_not_fit_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -88,10 +88,10 @@ def test_a_camera_may_sit_elsewhere_but_must_be_encoded_alike() -> None:
 
 
 def test_a_run_hands_on_what_its_algorithm_has_beside_the_policy(tmp_path: Path) -> None:
-    e2efly.train("hover", "ppo", out=tmp_path / "run", **SMALL)
+    e2efly.train("hover", "ppo", out=tmp_path / "run", preset_name="nominal", **SMALL)
     arrays = read_arrays(tmp_path / "run" / "checkpoint.safetensors")
     for algo, handed in (("ppo", True), ("foppo", False)):
-        setup = Setup.of(e2efly.preset("hover", algo))
+        setup = Setup.of(e2efly.preset("hover", algo, "nominal"))
         fresh = setup.algorithm.init(setup.env, setup.config.algo, 0)
         begun = started_from(fresh, tmp_path / "run" / "policy.onnx", setup)
         assert np.array_equal(begun.log_std, arrays["['state'].parameters.log_std"][0]) == handed

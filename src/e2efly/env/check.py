@@ -39,13 +39,6 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
     if not (math.isfinite(config.wind) and config.wind >= 0):
         raise ValueError(f"env.wind is {config.wind}; accepted: 0 or more, m/s")
     vehicle = load_vehicle(config.vehicle)
-    d, drawn = config.disturbance, vehicle.thrust_to_weight * config.weakest
-    if drawn < 1:
-        raise ValueError(
-            f"env.randomize is {dict(config.randomize)} and env.disturbance has thrust {d.thrust:g}, "
-            f"rotor {d.rotor:g}, sag {d.sag:g}: the weakest vehicle of these cannot hover (thrust to weight "
-            f"{drawn:.2f}; {config.vehicle} has {vehicle.thrust_to_weight:.2f}); accepted: draws that leave at least 1"
-        )
     if config.action_latency is None and vehicle.latency + config.latency_spread[1] > LATEST:
         raise ValueError(
             f"latency of vehicle {vehicle.name} is {vehicle.latency} s, env.latency_spread {config.latency_spread}; "
@@ -80,6 +73,13 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
         ("env.imu", config.imu),
     ):
         check_numbers(prefix, part)
+    d, drawn = config.disturbance, vehicle.thrust_to_weight * config.weakest
+    if drawn < 1:
+        raise ValueError(
+            f"env.randomize is {dict(config.randomize)} and env.disturbance has thrust {d.thrust:g}, "
+            f"rotor {d.rotor:g}, sag {d.sag:g}: the weakest vehicle of these cannot hover (thrust to weight "
+            f"{drawn:.2f}; {config.vehicle} has {vehicle.thrust_to_weight:.2f}); accepted: draws that leave at least 1"
+        )
     for name, part in vars(task).items():
         if hasattr(part, "check"):
             part.check(f"task.{name}")

@@ -104,6 +104,8 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
         return flight
     if error is not None and abs(error) > settings.heading_agreement:
         return dataclasses.replace(flight, misled=TURNED, turned=error)
+    if inputs.silent:  # what is sent may not arrive: where the vehicle goes tells nothing of the odometry
+        return dataclasses.replace(flight, nearest=math.inf)
     off = math.hypot(*np.subtract(target.position[:2], odometry.position[:2]).tolist())
     rests = math.isfinite(flight.nearest) or float(np.linalg.norm(odometry.velocity)) < SLOW
     nearest = min(flight.nearest, off) if rests else math.inf

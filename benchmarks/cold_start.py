@@ -1,0 +1,138 @@
+"""Where `e2efly train` spends its time: seconds of each part, from the start of a process to its end.
+
+    python benchmarks/cold_start.py [--tasks hover race race_clutter] [--seeds 3] [--steps N] [--json FILE]
+
+Cold: an empty compilation cache. Later: the same command with the cache that the cold one left. Each command is a
+process of its own, which this script times from outside, too. A part is the wall-clock time of the main thread:
+compiling is the wait for XLA beside tracing. Rows that are not measured anew stay.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from common import arguments, median, table, with_earlier, write
+
+PARTS = ("imports", "tracing", "compiling", "learning", "evaluating", "report", "export", "plots", "end")
+"""What a training does, one after the other; learning and evaluating take turns."""
+
+
+def watched(arguments: list[str]) -> dict[str, float]:
+    """Run a training in this process, the time of its parts taken by functions put around them."""
+    from e2efly.learn.clock import since_process_start
+
+    seconds = dict.fromkeys(PARTS, 0.0)
+
+    def around(module: Any, name: str, part: str, less: tuple[str, ...] = ()) -> None:
+        inner = getattr(module, name)
+
+        def timed(*args: Any, **kwargs: Any) -> Any:
+            began, before = time.perf_counter(), sum(seconds[other] for other in less)
+            out = inner(*args, **kwargs)
+            seconds[part] += time.perf_counter() - began - (sum(seconds[other] for other in less) - before)
+            return out
+
+        setattr(module, name, staticmethod(timed) if isinstance(module, type) else timed)
+
+    import e2efly.learn.runner as runner
+    from e2efly.cli import run
+    from e2efly.device import prepare
+
+    with suppress(ValueError):
+        prepare("cpu")
+    import jax
+
+    from e2efly.learn import export
+    from e2efly.view import evaluation
+
+    def traced(event: str, duration: float, **_: Any) -> None:
+        if event in ("/jax/core/compile/jaxpr_trace_duration", "/jax/core/compile/jaxpr_to_mlir_module_duration"):
+            seconds["tracing"] += duration * compiling
+
+    compiling = 0.0
+    jax.monitoring.register_event_duration_secs_listener(traced)
+    inner: Callable[..., Any] = runner.Programs.compile
+
+    def compile_all(*args: Any, **kwargs: Any) -> Any:
+        nonlocal compiling
+        seconds["imports"] = since_process_start()
+        began, compiling = time.perf_counter(), 1.0
+        out = inner(*args, **kwargs)
+        compiling = 0.0
+        seconds["compiling"] = time.perf_counter() - began - seconds["tracing"]
+        return out
+
+    runner.Programs.compile = staticmethod(compile_all)  # type: ignore[method-assign]
+    around(export, "export_policy", "export")
+    around(evaluation, "plot_run", "plots")
+    around(runner, "_finish", "report", ("export",))
+    judge = runner.judge
+
+    def judged(*args: Any, **kwargs: Any) -> Any:
+        began, out = time.perf_counter(), judge(*args, **kwargs)
+        seconds["evaluating"] += (time.perf_counter() - began) * looping
+        return out
+
+    looping, loop = 0.0, runner._loop
+
+    def looped(*args: Any, **kwargs: Any) -> Any:
+        nonlocal looping
+        began, looping = time.perf_counter(), 1.0
+        out = loop(*args, **kwargs)
+        looping = 0.0
+        seconds["learning"] = time.perf_counter() - began - seconds["evaluating"]
+        return out
+
+    runner.judge, runner._loop = judged, looped
+    status = run(arguments)
+    if status:
+        raise SystemExit(status)
+    return seconds
+
+
+def once(task: str, seed: int, steps: int, cache: Path) -> dict[str, float]:
+    """One command in a process of its own: seconds of each part; `end` is what its user waits besides."""
+    with tempfile.TemporaryDirectory() as folder:
+        told = Path(folder) / "parts.json"
+        more = ["--steps", str(steps)] if steps else []
+        command = [sys.executable, __file__, "--watch", str(told), "train", task, "--seed", str(seed)]
+        command += ["--out", str(Path(folder) / "run"), "--device", "cpu", *more]
+        began = time.perf_counter()
+        subprocess.run(command, env={**os.environ, "XDG_CACHE_HOME": str(cache)}, stdout=subprocess.DEVNULL, check=True)
+        whole = time.perf_counter() - began
+        seconds = json.loads(told.read_text())
+    seconds["end"] = whole - sum(seconds[part] for part in PARTS if part != "end")
+    return {**seconds, "whole": whole}
+
+
+def main() -> None:
+    """Measure, print a table, write JSON."""
+    if sys.argv[1:2] == ["--watch"]:
+        Path(sys.argv[2]).write_text(json.dumps(watched(sys.argv[3:])))
+        return
+    options = arguments(__doc__ or "", tasks=["hover", "race", "race_clutter"], seeds=3, steps=0)
+    rows: list[dict[str, Any]] = []
+    for task in options.tasks:
+        found: dict[str, list[dict[str, float]]] = {"cold": [], "later": []}
+        for seed in range(options.seeds):
+            with tempfile.TemporaryDirectory() as cache:
+                for when in found:
+                    found[when].append(once(task, seed, options.steps, Path(cache)))
+        for when, runs in found.items():
+            parts = {part: f"{median([one[part] for one in runs]):.1f}" for part in (*PARTS, "whole")}
+            rows.append({"task": task, "when": when, **parts})
+            print(rows[-1], flush=True)
+        whole = with_earlier("cold_start", options.json, "table", ("task", "when"), rows)
+        write("cold_start", options.json, {"table": whole})
+    print(table(whole))
+
+
+if __name__ == "__main__":
+    main()
