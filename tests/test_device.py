@@ -33,6 +33,21 @@ def test_the_gradient_of_a_few_vehicles_compiles_in_little_memory(tmp_path: Path
     assert done.returncode == 0, done.stderr
 
 
+BEGUN = """
+import jax.numpy as jnp
+jnp.zeros(3) + 1
+import e2efly
+state, _ = e2efly.make_env("hover").reset(__import__("jax").random.key(0), 2)
+from e2efly.device import prepare
+prepare()
+"""
+
+
+def test_who_has_computed_with_jax_before_goes_on_with_the_devices_there_are() -> None:
+    done = subprocess.run([sys.executable, "-c", BEGUN], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 DAMAGED = """
 import sys
 from pathlib import Path

@@ -5,7 +5,7 @@ import platform
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -72,7 +72,8 @@ def set_xla_options() -> None:
     wanted = [f"--{name}={value}" for name, value in XLA_OPTIONS.items() if name not in flags]
     os.environ["XLA_FLAGS"] = " ".join([*flags.split(), *wanted])
     if "xla_force_host_platform_device_count" not in flags:
-        _configure("jax_num_cpu_devices", cores())
+        with suppress(RuntimeError):  # JAX computes already: the devices stay as they are
+            _configure("jax_num_cpu_devices", cores())
 
 
 @cache

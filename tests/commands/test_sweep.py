@@ -105,7 +105,7 @@ def test_a_sweep_trains_on_ray_on_this_machine_alone_and_nothing_twice(tmp_path:
 
 
 def test_a_run_that_was_cut_goes_on_and_a_lost_worker_is_replaced(tmp_path: Path) -> None:
-    flags = [item if not item.startswith("steps") else "steps=300000" for item in SMALL]
+    flags = [item if not item.startswith("steps") else "steps=80000" for item in SMALL]
     folder = tmp_path / "sweep/seed-0"
 
     def training() -> Path:
@@ -128,7 +128,7 @@ def test_a_run_that_was_cut_goes_on_and_a_lost_worker_is_replaced(tmp_path: Path
     os.kill(worker, signal.SIGKILL)
     told, _ = second.communicate()
     assert second.returncode == 0, told
-    assert json.loads((folder / "summary.json").read_text())["env_steps"] >= 300_000
+    assert json.loads((folder / "summary.json").read_text())["env_steps"] >= 80_000
     assert (folder / "config.json").stat().st_mtime_ns == began
     updates = [int(line.split(",")[0]) for line in (folder / "metrics.csv").read_text().splitlines()[1:]]
     assert updates == list(range(1, len(updates) + 1))

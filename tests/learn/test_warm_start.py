@@ -19,7 +19,7 @@ from e2efly.learn.setup import Setup
 from e2efly.learn.warm_start import started_from
 from e2efly.zoo import policy_file
 
-SMALL = {"steps": 4096, "chunk": 1, "eval_episodes": 10}
+SMALL = {"steps": 4096, "chunk": 1, "eval_episodes": 10, "preset_name": "nominal"}
 
 
 @pytest.mark.parametrize("task", ["hover", "land_visual", "avoid"])
@@ -88,7 +88,7 @@ def test_a_camera_may_sit_elsewhere_but_must_be_encoded_alike() -> None:
 
 
 def test_a_run_hands_on_what_its_algorithm_has_beside_the_policy(tmp_path: Path) -> None:
-    e2efly.train("hover", "ppo", out=tmp_path / "run", preset_name="nominal", **SMALL)
+    e2efly.train("hover", "ppo", out=tmp_path / "run", **SMALL)
     arrays = read_arrays(tmp_path / "run" / "checkpoint.safetensors")
     for algo, handed in (("ppo", True), ("foppo", False)):
         setup = Setup.of(e2efly.preset("hover", algo, "nominal"))
