@@ -1,11 +1,14 @@
 """Every example runs, and every piece of Python in the docs."""
 
+import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from tests.conftest import QUICK
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
@@ -16,12 +19,16 @@ SNIPPETS = [
 ]
 
 
+def started(arguments: list[str], cwd: Path) -> "subprocess.CompletedProcess[str]":
+    environment = os.environ | {"XLA_FLAGS": QUICK}
+    command = [sys.executable, *arguments]
+    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_example(path: Path, tmp_path: Path) -> None:
     arguments = ["20000"] if path.stem in ("04_train", "06_own_task", "08_own_algorithm") else []
-    done = subprocess.run(
-        [sys.executable, str(path), *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = started([str(path), *arguments], tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout
 
@@ -32,7 +39,7 @@ def test_there_are_examples() -> None:
 
 @pytest.mark.parametrize("code", SNIPPETS)
 def test_snippet_of_the_docs(code: str, tmp_path: Path) -> None:
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = started(["-c", code], tmp_path)
     assert done.returncode == 0, done.stderr
 
 

@@ -20,7 +20,19 @@ from e2efly.tasks import TASKS
 from e2efly.tasks.route import course_for, route_of
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "06_own_task.py"
-SMALL = ["--steps", "4096", "--algo.envs", "32", "--algo.horizon", "32", "--eval-episodes", "32", "--no-plots"]
+SMALL = [
+    "--preset",
+    "nominal",
+    "--steps",
+    "4096",
+    "--algo.envs",
+    "32",
+    "--algo.horizon",
+    "32",
+    "--eval-episodes",
+    "32",
+    "--no-plots",
+]
 
 
 @pytest.fixture(autouse=True)

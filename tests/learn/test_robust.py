@@ -42,14 +42,6 @@ def test_others_are_refused_by_name(task: str, algo: str, capsys: pytest.Capture
     assert f"not for {task} by {algo}" in said
 
 
-def test_a_robust_policy_is_made_for_its_vehicle_and_says_what_it_has_seen(tmp_path: Path) -> None:
-    e2efly.train("hover", "bptt", preset_name="robust", out=tmp_path, steps=12_288, chunk=1, eval_episodes=10)
-    contract, vehicle = e2efly.load_policy(tmp_path).contract, load_vehicle("vis_r")
-    assert contract.memory_size == 64
-    assert contract.latency_s == vehicle.latency
-    assert contract.latency_range_s == pytest.approx((vehicle.latency - 0.04, vehicle.latency + 0.05))
-
-
 @pytest.mark.parametrize("spread", [(-0.1, 0.0), (0.0, 1.5), (0.0, float("nan"))])
 def test_a_spread_that_makes_no_sense_is_named(spread: tuple[float, float]) -> None:
     with pytest.raises(ValueError, match=r"env.latency_spread is .*; accepted: two numbers of seconds in \[0, 1\]"):
@@ -95,6 +87,11 @@ def test_a_run_says_how_its_policy_flies_the_file_s_vehicle(tmp_path: Path) -> N
     assert summary["stress"]["hover"]["success"] > 0.9
     assert summary["stress"]["hover"]["final_error_m"] > 2 * summary["nominal"]["hover"]["final_error_m"]
     assert reported(summary) == summary["nominal"]["hover"]["success"]
+    # the file says for which vehicle it is, and which delays it has seen
+    contract, vehicle = e2efly.load_policy(tmp_path).contract, load_vehicle("vis_r")
+    assert contract.memory_size == 64
+    assert contract.latency_s == vehicle.latency
+    assert contract.latency_range_s == pytest.approx((vehicle.latency - 0.04, vehicle.latency + 0.05))
 
 
 def test_a_weak_vehicle_draws_others_that_can_still_hover(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
