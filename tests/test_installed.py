@@ -7,6 +7,8 @@ import pytest
 
 import e2efly
 from e2efly.cli import run
+from e2efly.deploy.pose.registry import SOURCES
+from e2efly.deploy.pose.sources import open_source
 from e2efly.tasks import TASKS
 from e2efly.validation.plants import PLANTS
 
@@ -18,6 +20,14 @@ from dataclasses import dataclass
 @e2efly.register_task("patrol")
 @dataclass(frozen=True)
 class Patrol(HoverConfig): ...
+
+@e2efly.register_pose_source("beacon", "beacon:HEIGHT")
+class Beacon:
+    def __init__(self, where):
+        self.height, self.problem, self.refused = float(where), None, 0
+    def read(self, now): return []
+    def close(self): ...
+    def describe(self): return f"a beacon at {self.height} m"
 
 @e2efly.register_plant("tunnel")
 class Tunnel(e2efly.Plant):
@@ -38,7 +48,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     module = tmp_path / "my_lab_of_the_test.py"
     module.write_text(MODULE)
     monkeypatch.syspath_prepend(tmp_path)
-    for registry in (TASKS, PLANTS):
+    for registry in (TASKS, PLANTS, SOURCES):
         monkeypatch.setattr(registry, "_known", dict(registry._known))
     monkeypatch.delitem(sys.modules, module.stem, raising=False)
     return module
@@ -49,6 +59,7 @@ def test_a_name_that_is_unknown_is_looked_for_in_installed_packages(installed: P
     assert installed.stem not in sys.modules  # nobody asked for more
     assert e2efly.preset("patrol", "ppo").task.name == "patrol"
     assert PLANTS.find("tunnel").name == "tunnel"
+    assert open_source("beacon:2").describe() == "a beacon at 2.0 m"
     assert TASKS.reference(TASKS["patrol"]) == f"{installed.stem}:Patrol"
     sys.modules.pop(installed.stem)
 

@@ -6,7 +6,7 @@ import re
 
 from e2efly.deploy.pose.registry import SOURCES, Kind, opened
 from e2efly.deploy.pose.source import PoseSource
-from e2efly.registry import load
+from e2efly.registry import load, load_installed
 
 for _file in pkgutil.iter_modules(__path__, f"{__name__}."):
     importlib.import_module(_file.name)
@@ -18,7 +18,7 @@ def open_source(text: str) -> PoseSource:
     """Open a pose source.
 
     Args:
-        text: NAME:... of a registered kind, written as its form says; or the reference of a class or a function,
+        text: NAME:... of a registered kind (of an installed package, too), written as its form says; or the reference of a class or a function,
             path/to/file.py:Name or module:Name, and behind another colon what it is given.
 
     Raises:
@@ -26,6 +26,8 @@ def open_source(text: str) -> PoseSource:
             package that is not installed or a peer that does not answer, with what to do.
     """
     name, _, where = text.partition(":")
+    if name not in SOURCES and name.isidentifier():
+        load_installed()
     if name in SOURCES:
         return opened(SOURCES[name], text, where)
     if (found := _REFERENCE.fullmatch(text)) and ("." in name or ".py:" in text):
