@@ -4,15 +4,20 @@ import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from e2efly.config import ImuConfig
 from e2efly.courses.gates import Gates
 from e2efly.courses.references import through_points
 from e2efly.courses.tracks import RaceTrack
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.deploy.policy.runtime import Runtime
 from e2efly.goal import Course, Shape
+from e2efly.physics import State
+from e2efly.sensors.imu import ImuState, measure
 from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.land.goal import LandRoute
 from e2efly.tasks.race import RaceConfig
@@ -23,6 +28,7 @@ from e2efly.validation.fleet import Flight, Mission, fly_all
 from e2efly.validation.flight import fly
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plants.mujoco import MujocoPlant
+from e2efly.validation.plants.simulator import SimulatorPlant
 from e2efly.validation.reality import Reality
 from e2efly.vehicles import load_vehicle
 
@@ -162,3 +168,21 @@ def test_processes_fly_what_one_process_flies(policy_of: Callable[..., Path]) ->
         np.testing.assert_array_equal(a.command, b.command)
     with pytest.raises(ValueError, match="processes is 0; accepted: 1 or more"):
         fly_all(mission, flights, processes=0)
+
+
+def test_a_policy_that_sees_an_imu_is_shown_what_training_would_measure(policy_of: Callable[..., Path]) -> None:
+    still = ImuConfig(observed=True, gyro_noise=0.0, gyro_bias=0.0, accel_noise=0.0, accel_bias=0.0)
+    policy, vehicle = load_policy(policy_of("hover", imu=still)), load_vehicle("vis_r")
+    runtime = Runtime.of(policy, GOAL, vehicle, imu=True)
+    flight = fly(runtime, SimulatorPlant(vehicle), START, 2.0, policy.contract.latency_s)
+    assert flight.fault == ""
+    parts = (flight.position, flight.velocity, flight.quaternion, flight.body_rate)
+    at = [State(*(jnp.asarray(x[k], jnp.float32) for x in parts), jnp.zeros(4)) for k in range(len(flight.time))]
+    rows = policy.contract.slices
+    for k, row in enumerate(flight.observation):
+        measured = ImuState.at(at[0])
+        if k:
+            measured = measure(still, jax.random.key(0), measured, at[k - 1], at[k], PERIOD)
+        np.testing.assert_allclose(row[rows["gyroscope"]], measured.gyroscope, atol=1e-4)
+        np.testing.assert_allclose(row[rows["accelerometer"]], measured.accelerometer, atol=2e-3)
+    assert np.ptp(flight.observation[:, rows["accelerometer"]][:, 2]) > 0.3

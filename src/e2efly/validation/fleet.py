@@ -108,7 +108,7 @@ def _fly(mission: Mission, flights: Sequence[Flight]) -> Iterator[Trajectory]:
             if met != (meets := (reality.body.hash, reality.plain_mixer)):
                 plant.meet(reality.body, reality.plain_mixer)
                 met = meets
-            runtime = Runtime.of(policy, flight.course, mission.trained)
+            runtime = Runtime.of(policy, flight.course, mission.trained, imu=True)
             latency = max(reality.latency - kind.latency, 0.0)
             yield fly(runtime, plant, flight.start, mission.duration, latency, reality.air)
 

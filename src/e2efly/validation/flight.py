@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from e2efly.deploy.policy.runtime import Runtime, act, begin, judged
+from e2efly.control.vectors import Quat, Vec3
+from e2efly.deploy.policy.runtime import Imu, Runtime, act, begin, judged
 from e2efly.validation.plant import Delay, Plant, RigidState
 from e2efly.validation.reality import Air
+from e2efly.vehicles.vehicle import GRAVITY
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,9 @@ def fly(
         now, then = k * period, (k + 1) * period
         try:
             truth = states[-1].odometry(now)
-            memory, decision = act(runtime, memory, truth, now, seen=None if air is None else air.seen(k, truth))
+            measured = imu_of(states[max(k - 1, 0)], states[k], period)
+            seen = None if air is None else air.seen(k, truth)
+            memory, decision = act(runtime, memory, truth, now, measured, seen=seen)
             if memory.done or memory.failure:
                 break
             delay, parts = delay.send(decision.command, now).until(now, then)
@@ -103,6 +107,15 @@ def fly(
         failure=memory.failure,
         fault=fault,
     )  # fmt: skip
+
+
+def imu_of(before: RigidState, after: RigidState, dt: float) -> Imu:
+    """What a perfect IMU measures, as in training (`e2efly.sensors.imu`): the body rate, and the mean specific force of
+    the last `dt` s in the axes of now. A vehicle that has just been placed does not accelerate.
+    """
+    pull = Vec3.of((after.velocity - before.velocity) / dt + np.array([0.0, 0.0, GRAVITY]))
+    force = Quat.of(after.quaternion).unrotate(pull)
+    return Imu(after.body_rate, np.array([force.x, force.y, force.z]))
 
 
 def _rows(decisions: list, name: str, size: int) -> np.ndarray:

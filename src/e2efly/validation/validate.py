@@ -202,6 +202,6 @@ def flyable(
     """
     kind, found = find_plant(plant_name(plant)), candidate(policy, vehicle, controller)
     own = load_vehicle(found.env.vehicle)
-    if reasons := check(found.policy.contract, own, fields_of(found.policy.contract)):
+    if reasons := check(found.policy.contract, own, fields_of(found.policy.contract), imu=True):
         raise ValueError("\n".join(reasons))
     return found, kind, own

@@ -18,8 +18,8 @@ def open_source(text: str) -> PoseSource:
     """Open a pose source.
 
     Args:
-        text: NAME:... of a registered kind (of an installed package, too), written as its form says; or the reference of a class or a function,
-            path/to/file.py:Name or module:Name, and behind another colon what it is given.
+        text: NAME:... of a registered kind (of an installed package, too), written as its form says; or the reference
+            of a class or a function, path/to/file.py:Name or module:Name, and behind another colon what it is given.
 
     Raises:
         ValueError: naming the text and what is accepted; for a port that is taken or a host without an address; for a
