@@ -2,7 +2,10 @@
 
 import dataclasses
 import json
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -104,12 +107,10 @@ def test_changes_by_dotted_name_name_what_is_wrong() -> None:
             changed(env, changes, "env")
 
 
-@pytest.mark.parametrize("command", [["eval", "--plots"], ["validate", "--plant", "simulator", "--out"]])
-def test_the_reference_of_a_row_can_be_made_again(command: list[str], tmp_path: Path) -> None:
+@pytest.mark.parametrize("flown", [e2efly.evaluate, partial(e2efly.validate, plant="simulator")], ids=["eval", "plant"])
+def test_the_reference_of_a_row_can_be_made_again(flown: Callable[..., Any]) -> None:
     """From the report's numbers alone: where the reference is at any time."""
-    report, (name, *rest) = tmp_path / "report.json", command
-    run([name, "track", "--episodes", "3", "--json", str(report), *rest, str(tmp_path)])
-    said = json.loads(report.read_text())["criteria"]
+    said = flown("track", episodes=3).as_json()["criteria"]
     found = candidate("track")
     time = np.linspace(0, 9, 40)[None].repeat(3, 0)
     for criterion, suite in found.task.criteria().items():
