@@ -12,6 +12,7 @@ import pytest
 from e2efly.config import EnvConfig, ImuConfig, NoiseConfig, RewardConfig, TaskConfig
 from e2efly.control import COMMAND_MODES
 from e2efly.env import Env, EnvState, Step, random_key
+from e2efly.episodes import Act, run_episodes, run_stepwise
 from e2efly.tasks import TASKS
 from e2efly.tasks.hover import HoverConfig
 
@@ -234,3 +235,23 @@ def test_a_broken_task_or_reward() -> None:
         make(reward=RewardConfig({"prog22": 1.0}))
     with pytest.raises(ValueError, match="unknown reward parameter 'vzmin'; did you mean 'vz_min'"):
         make(reward=RewardConfig({"vz": 1.0}, {"vzmin": 1.0}))
+
+
+def test_step_by_step_they_go_as_in_one_program_and_stop_when_all_have_ended() -> None:
+    """Of a policy that is no function of JAX, and with what is to be altered at the start."""
+    env, asked = make(TASKS["race"](laps=1)), []
+
+    def act(observation: Any, images: Any, memory: Any) -> Any:
+        if isinstance(observation, np.ndarray):
+            asked.append(len(observation))
+        return 0.3 + 0.1 * observation[:, :4], memory
+
+    def later(state: EnvState) -> EnvState:
+        return dataclasses.replace(state, action_latency=0 * state.action_latency + 0.1)
+
+    one = run_episodes(env, Act(act), random_key(1), 8, 120, 0.5, altered=later)
+    other, begun = run_stepwise(env, Act(act), random_key(1), 8, 120, 0.5, altered=later)
+    for name, value in vars(one).items():
+        np.testing.assert_allclose(getattr(other, name), value, rtol=1e-4, atol=1e-4, err_msg=name)
+    assert set(asked) == {8} and len(asked) < 120  # all have crashed before
+    np.testing.assert_allclose(begun.action_latency, 0.1)

@@ -54,6 +54,17 @@ def wide_vectors(vehicles: int) -> dict[str, Any]:
     return {"xla_cpu_prefer_vector_width": 512} if many else {}
 
 
+FAST_COMPILE: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
+"""XLA options that halve the time of compilation on a CPU."""
+
+
+def fast_compile() -> dict[str, Any]:
+    """Options of XLA for a program that runs for seconds only."""
+    import jax
+
+    return unless_said(FAST_COMPILE) if jax.default_backend() == "cpu" else {}
+
+
 def unless_said(options: dict[str, Any]) -> dict[str, Any]:
     """Options of XLA, without those that the user's XLA_FLAGS name: what they say stays."""
     said = {flag.removeprefix("--").partition("=")[0] for flag in os.environ.get("XLA_FLAGS", "").split()}

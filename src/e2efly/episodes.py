@@ -4,6 +4,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import jax
@@ -11,17 +12,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
+from e2efly.device import fast_compile, wide_vectors
 from e2efly.env import Env, EnvState, Step
 from e2efly.physics import State
 
 
 @dataclass(frozen=True)
 class Act:
-    """A policy, as a function that JAX can compile."""
+    """A policy, as a function: JAX can compile it, or not (`run_stepwise`, `trace`)."""
 
-    act: Callable[[Float[Array, "n o"], tuple[Array, ...], Array], tuple[Float[Array, "n 4"], Array]]
-    """(observation, images, memory) -> (action, next memory)."""
-    begin: Callable[[int], Array] = lambda n: jnp.zeros((n, 0))
+    act: Callable[[Any, tuple[Any, ...], Any], tuple[Any, Any]]
+    """(observation (n, o), images, memory (n, k)) -> (action (n, 4), next memory)."""
+    begin: Callable[[int], Any] = lambda n: jnp.zeros((n, 0))
     """How many -> their memory at the start of an episode, (n, k)."""
 
     @staticmethod
@@ -54,38 +56,31 @@ class Episodes:
     """Ended for ill before time was out."""
 
 
-def run_episodes(
-    env: Env,
-    act: Act,
-    key: PRNGKeyArray,
-    n: int,
-    steps: int,
-    settle: float = 0.0,
-    part: tuple[Array | int, int] = (0, 1),
-    altered: Callable[[EnvState], EnvState] = lambda state: state,
-) -> Episodes:
-    """Fly episodes of at most `steps` control steps; each stands still once it has ended.
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class UnderWay:
+    """Where n episodes are between two control steps, and how they went so far."""
 
-    Args:
-        env: the environment.
-        act: the policy.
-        key: decides the starts.
-        n: how many.
-        steps: control steps of the longest.
-        settle: seconds before the mean error counts.
-        part: which of how many equal parts of the episodes to fly. All parts together, in order, are the `n` episodes
-            of the one part (0, 1), whatever their number; where it does not divide `n`, the last ends with repetitions.
-        altered: what is to be different from what the environment draws for an episode.
-    """
-    state, observation = env.reset(key, n)
-    state, observation = part_of(altered(state), observation, part)
-    n = observation.shape[0]
-    zero, no = jnp.zeros(n), jnp.zeros(n, bool)
-    first = (state, observation, act.begin(n), no, Episodes(no, zero, zero, zero, zero, zero, zero, zero, no), zero)
+    state: EnvState
+    observation: Float[Array, "n o"]
+    over: Bool[Array, " n"]
+    """Which have ended; they fly on, and count no more."""
+    so_far: Episodes
+    """With the sums of the mean error and of the roughness."""
+    counted: Float[Array, " n"]
+    """Control steps that the mean error counts."""
 
-    def step(carry: tuple, _: None) -> tuple[tuple, None]:
-        state, observation, memory, over, e, counted = carry
-        action, memory = act.act(observation, state.images, memory)
+    @staticmethod
+    def of(state: EnvState, observation: Float[Array, "n o"]) -> "UnderWay":
+        """At their start."""
+        n = observation.shape[0]
+        zero, no = jnp.zeros(n), jnp.zeros(n, bool)
+        none = Episodes(no, zero, zero, zero, zero, zero, zero, zero, no)
+        return UnderWay(state, observation, no, none, zero)
+
+    def after(self, env: Env, action: Float[Array, "n 4"], settle: Any) -> "UnderWay":
+        """A control step later; the mean error counts from `settle` s on."""
+        state, over, e = self.state, self.over, self.so_far
         reached, out = env.step(state, action, restart=False)
         live = 1.0 - over
         counts = live * (reached.time > settle)
@@ -103,11 +98,99 @@ def run_episodes(
             reward=e.reward + live * out.reward,
             crashed=e.crashed | (out.terminated & ~out.success & ~over),
         )
-        return (reached, out.final_observation, memory, over | out.done, e, counted + counts), None
+        return UnderWay(reached, out.final_observation, over | out.done, e, self.counted + counts)
 
-    (*_, e, counted), _ = jax.lax.scan(step, first, None, length=steps)
-    flown = jnp.maximum(e.duration / env.control_period, 1.0)
-    return dataclasses.replace(e, mean_error=e.mean_error / jnp.maximum(counted, 1.0), roughness=e.roughness / flown)
+    def episodes(self, env: Env) -> Episodes:
+        """How they went."""
+        e = self.so_far
+        flown = jnp.maximum(e.duration / env.control_period, 1.0)
+        mean_error = e.mean_error / jnp.maximum(self.counted, 1.0)
+        return dataclasses.replace(e, mean_error=mean_error, roughness=e.roughness / flown)
+
+
+def run_episodes(
+    env: Env,
+    act: Act,
+    key: PRNGKeyArray,
+    n: int,
+    steps: int,
+    settle: float = 0.0,
+    part: tuple[Array | int, int] = (0, 1),
+    altered: Callable[[EnvState], EnvState] = lambda state: state,
+) -> Episodes:
+    """Fly episodes of at most `steps` control steps; each stands still once it has ended.
+
+    Args:
+        env: the environment.
+        act: the policy, which JAX can compile.
+        key: decides the starts.
+        n: how many.
+        steps: control steps of the longest.
+        settle: seconds before the mean error counts.
+        part: which of how many equal parts of the episodes to fly. All parts together, in order, are the `n` episodes
+            of the one part (0, 1), whatever their number; where it does not divide `n`, the last ends with repetitions.
+        altered: what is to be different from what the environment draws for an episode.
+    """
+    state, observation = env.reset(key, n)
+    state, observation = part_of(altered(state), observation, part)
+
+    def step(carry: tuple[UnderWay, Array], _: None) -> tuple[tuple[UnderWay, Array], None]:
+        flight, memory = carry
+        action, memory = act.act(flight.observation, flight.state.images, memory)
+        return (flight.after(env, action, settle), memory), None
+
+    first = UnderWay.of(state, observation), act.begin(observation.shape[0])
+    (flight, _), _ = jax.lax.scan(step, first, None, length=steps)
+    return flight.episodes(env)
+
+
+def run_stepwise(
+    env: Env,
+    act: Act,
+    key: PRNGKeyArray,
+    n: int,
+    steps: int,
+    settle: float = 0.0,
+    altered: Callable[[EnvState], EnvState] = lambda state: state,
+) -> tuple[Episodes, EnvState]:
+    """`run_episodes` of a policy that JAX need not compile, one control step after the other until all have ended.
+
+    The programs know nothing of the policy: each environment's are compiled once, and found again by later processes.
+
+    Returns:
+        How the episodes went, NumPy arrays; and where they began.
+    """
+    begin, after, _ = _programs(n, bool(env.cameras))
+    state, observation = begin(env, key)
+    first = altered(state)
+    flight, memory = UnderWay.of(first, observation), act.begin(n)
+    for _ in range(steps):
+        action, memory = _asked(act, flight.observation, flight.state, memory)
+        flight = after(env, flight, action, settle)
+        if np.all(flight.over):
+            break
+    return jax.tree.map(np.asarray, flight.episodes(env)), first
+
+
+def _asked(act: Act, observation: Array, state: EnvState, memory: Array) -> tuple[Array, Array]:
+    return act.act(np.asarray(observation), tuple(np.asarray(image) for image in state.images), memory)
+
+
+@cache
+def _programs(n: int, seeing: bool) -> tuple[Callable, Callable, Callable]:
+    """Compiled for n episodes: their start; a step that judges; a step that shows, see `trace`.
+
+    Where there are cameras, drawing what they see takes longer than compiling how.
+    """
+
+    def shown(env: Env, state: EnvState, action: Array) -> tuple[EnvState, Step, Array, Array]:
+        reached, out = env.step(state, action, restart=False)
+        return reached, out, env.command(action), env.task.goal(reached.memory, reached.time)
+
+    options = wide_vectors(n) | ({} if seeing else fast_compile())
+    programs = (lambda env, key: env.reset(key, n), lambda env, flight, *told: flight.after(env, *told), shown)
+    begin, after, show = (jax.jit(program, compiler_options=options) for program in programs)
+    return begin, after, show
 
 
 def part_of(state: EnvState, observation: Array, part: tuple[Array | int, int]) -> tuple[EnvState, Array]:
@@ -126,23 +209,21 @@ def part_of(state: EnvState, observation: Array, part: tuple[Array | int, int]) 
 
 def trace(
     env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int
-) -> tuple[State, Float[Array, "t n 4"], Float[Array, "t n 3"], Step]:
-    """`n` episodes step by step, without new starts.
+) -> tuple[State, Float[np.ndarray, "t n 4"], Float[np.ndarray, "t n 3"], Step]:
+    """`n` episodes step by step, without new starts, of a policy that JAX need not compile.
 
     Returns:
         Of every control step, each leaf (steps, n, ...): the state reached, the command in physical units, where to be
-        then, and the outcome. An episode goes on after its end: `Step.done` tells where that was.
+        then, and the outcome; NumPy arrays. An episode goes on after its end: `Step.done` tells where that was.
     """
-    state, observation = env.reset(key, n)
-
-    def step(carry: tuple[EnvState, Array, Array], _: None) -> tuple[tuple[EnvState, Array, Array], Any]:
-        state, observation, memory = carry
-        action, memory = act.act(observation, state.images, memory)
-        reached, out = env.step(state, action, restart=False)
-        goal = env.task.goal(reached.memory, reached.time)
-        return (reached, out.final_observation, memory), (reached.vehicle, env.command(action), goal, out)
-
-    return jax.lax.scan(step, (state, observation, act.begin(n)), None, length=steps)[1]
+    begin, _, shown = _programs(n, bool(env.cameras))
+    (state, observation), memory, rows = begin(env, key), act.begin(n), []
+    for _ in range(steps):
+        action, memory = _asked(act, observation, state, memory)
+        state, out, command, goal = shown(env, state, action)
+        observation = out.final_observation
+        rows.append((state.vehicle, command, goal, out))
+    return jax.tree.map(lambda *x: np.stack(x), *rows)
 
 
 def wilson(successes: int, n: int, z: float = 1.96) -> tuple[float, float]:

@@ -4,12 +4,11 @@ import dataclasses
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from e2efly import presets
@@ -18,9 +17,9 @@ from e2efly.config import CameraConfig, EnvConfig, ImuConfig, RewardConfig, Task
 from e2efly.config.changes import changed, differing
 from e2efly.deploy.policy.images import NONE, Image
 from e2efly.deploy.policy.loader import Policy, load_policy
-from e2efly.device import prepare, wide_vectors
+from e2efly.device import prepare
 from e2efly.env import UNSEEN, Env, random_key
-from e2efly.episodes import Act, Episodes, rows, run_episodes, summary
+from e2efly.episodes import Act, Episodes, rows, run_stepwise, summary
 from e2efly.learn.rundir import RunDirectory, run_of
 from e2efly.physics import State
 from e2efly.vehicles import Controller, Flown, load_vehicle, vehicle_names
@@ -285,13 +284,6 @@ def fly_criteria(
         ValueError: for more starts than fit into the machine's memory, or than anybody can wait for.
     """
     flown, starts, drawn = {}, {}, {}
-
-    @partial(jax.jit, static_argnums=2, compiler_options=wide_vectors(BATCH))
-    def program(env: Env, key: Any, steps: int, settle: float) -> Any:
-        begun = env.reset(key, BATCH)[0]
-        told = drawn_by(env.task, begun.memory)
-        return run_episodes(env, act_of(found.policy), key, BATCH, steps, settle), begun.vehicle, told
-
     suites = found.task.criteria()
     envs = {name: found.environment(suite) for name, suite in suites.items()}
     asked = f"--episodes is {episodes}"
@@ -300,7 +292,11 @@ def fly_criteria(
     for name, suite in suites.items():
         steps, settle = episode_steps(suite, envs[name]), settling(suite)
         keys = [random_key(seed, UNSEEN, i) for i in range(-(-episodes // BATCH))]
-        parts = [jax.tree.map(np.asarray, program(envs[name], key, steps, settle)) for key in keys]
+        parts = []
+        for key in keys:
+            went, begun = run_stepwise(envs[name], act_of(found.policy), key, BATCH, steps, settle)
+            told = begun.vehicle, drawn_by(envs[name].task, begun.memory)
+            parts.append((went, *jax.tree.map(np.asarray, told)))
         flown[name], starts[name], drawn[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
     return flown, starts, drawn
 
@@ -311,18 +307,8 @@ def settling(suite: TaskConfig) -> float:
 
 
 def act_of(policy: Policy) -> Act:
-    """A policy's ONNX graph, for compiled programs."""
-    size = policy.contract.memory_size
-
-    def act(observation: Any, images: Any, memory: Any) -> Any:
-        n = observation.shape[0]
-        shapes = jax.ShapeDtypeStruct((n, 4), jnp.float32), jax.ShapeDtypeStruct((n, size), jnp.float32)
-        return jax.pure_callback(onnx, shapes, observation, images, memory)
-
-    def onnx(observation: Any, images: Any, memory: Any) -> Any:
-        return policy.act(np.asarray(observation), [np.asarray(x) for x in images], np.asarray(memory))
-
-    return Act(act, lambda n: jnp.zeros((n, size)))
+    """A policy's ONNX graph, asked outside of JAX."""
+    return Act(policy.act, lambda n: np.zeros((n, policy.contract.memory_size), np.float32))
 
 
 def episode_steps(task: TaskConfig, env: Any) -> int:

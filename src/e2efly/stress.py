@@ -3,16 +3,15 @@
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import jax
 import numpy as np
 
-from e2efly.device import prepare, wide_vectors
-from e2efly.env import UNSEEN, Env, random_key
+from e2efly.device import prepare
+from e2efly.env import UNSEEN, random_key
 from e2efly.env.stress import ROWS, Draw, Row, check_rows, with_longer_queue
-from e2efly.episodes import Episodes, run_episodes, summary
+from e2efly.episodes import Episodes, run_stepwise, summary
 from e2efly.evaluation import BATCH, SEED, Candidate, act_of, candidate, episode_steps, settling
 from e2efly.vehicles import Controller
 from e2efly.vehicles.vehicle import Vehicle
@@ -89,13 +88,6 @@ def stress(
 
 def fly_rows(found: Candidate, rows: tuple[str, ...], episodes: int, seed: int) -> dict[str, dict[str, Episodes]]:
     """Fly `episodes` starts per row and criterion."""
-
-    @partial(jax.jit, static_argnums=3, compiler_options=wide_vectors(BATCH))
-    def program(env: Env, key: Any, draw: Draw, steps: int, settle: float) -> Episodes:
-        return run_episodes(
-            draw.env(env), act_of(found.policy), key, BATCH, steps, settle, altered=lambda state: draw.state(state)
-        )
-
     flown: dict[str, dict[str, Episodes]] = {row: {} for row in rows}
     batches = range(-(-episodes // BATCH))
     for name, suite in found.task.criteria().items():
@@ -106,7 +98,8 @@ def fly_rows(found: Candidate, rows: tuple[str, ...], episodes: int, seed: int) 
             for i in batches:
                 draw = Draw.of(ROWS[row], env.physics.flown, _generator(ROWS[row], seed, i), BATCH)
                 draw = jax.tree.map(lambda x: np.asarray(x, np.float32), draw)
-                parts.append(jax.tree.map(np.asarray, program(env, random_key(seed, UNSEEN, i), draw, steps, settle)))
+                key, act = random_key(seed, UNSEEN, i), act_of(found.policy)
+                parts.append(run_stepwise(draw.env(env), act, key, BATCH, steps, settle, draw.state)[0])
             flown[row][name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
     return flown
 

@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from e2efly.config import RewardConfig, TaskConfig
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.deploy.policy.runtime import Runtime
 from e2efly.env import UNSEEN, Env, random_key
-from e2efly.episodes import Episodes, run_episodes
+from e2efly.episodes import run_stepwise
 from e2efly.evaluation import BATCH as EVAL_BATCH
 from e2efly.evaluation import act_of, episode_steps
 from e2efly.tasks import TASKS
@@ -59,13 +58,9 @@ def test_flights_of_the_runtime_are_judged_as_episodes(
     starts = draw_starts(env, N, SEED)
     verdicts = judge(env, starts, flown(path, env, starts, float(suite.episode_s)), settle)
 
-    @partial(jax.jit, static_argnums=2)
-    def episodes(env: Env, key: Any, steps: int) -> Episodes:
-        return run_episodes(env, act_of(load_policy(path)), key, EVAL_BATCH, steps, settle)
-
-    wanted = jax.tree.map(
-        lambda x: np.asarray(x)[:N], episodes(env, random_key(SEED, UNSEEN, 0), episode_steps(suite, env))
-    )
+    key, steps = random_key(SEED, UNSEEN, 0), episode_steps(suite, env)
+    found, _ = run_stepwise(env, act_of(load_policy(path)), key, EVAL_BATCH, steps, settle)
+    wanted = jax.tree.map(lambda x: x[:N], found)
     np.testing.assert_array_equal(verdicts.success, wanted.success)
     np.testing.assert_array_equal(verdicts.crashed, wanted.crashed)
     assert verdicts.success.sum() >= good

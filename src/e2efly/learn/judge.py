@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from e2efly.config import TaskConfig
-from e2efly.device import wide_vectors
+from e2efly.device import fast_compile, wide_vectors
 from e2efly.env import Env, random_key
 from e2efly.env.stress import ALL, ROWS, Draw, with_longer_queue
 from e2efly.episodes import Episodes, run_episodes
@@ -43,7 +43,7 @@ def stressed(setup: Setup, weights: Weights, episodes: int) -> dict[str, Episode
     """
     rng, flown = np.random.default_rng(REPORTED), {}
 
-    @partial(jax.jit, compiler_options=wide_vectors(episodes))
+    @partial(jax.jit, compiler_options=fast_compile() | wide_vectors(episodes))
     def program(env: Env, weights: Weights, key: Any, draw: Draw) -> Episodes:
         act, steps = acting(setup.actor, weights), setup.episode_steps
         return run_episodes(draw.env(env), act, key, episodes, steps, setup.settle, altered=draw.state)

@@ -24,7 +24,7 @@ from jax import export
 
 from e2efly.compiled import opened, sealed
 from e2efly.config import TrainConfig
-from e2efly.device import cache_folder, unless_said, wide_vectors
+from e2efly.device import cache_folder, fast_compile, wide_vectors
 from e2efly.env import Env, random_key
 from e2efly.episodes import Act, Episodes, run_episodes
 from e2efly.learn.algorithm import TrainState, begin
@@ -34,9 +34,6 @@ from e2efly.learn.setup import Setup
 from e2efly.registry import is_shipped
 from e2efly.rewards import TERMS
 from e2efly.storage import write_atomically
-
-FAST_COMPILE: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
-"""XLA options for programs that run for seconds only."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +59,7 @@ class Programs:
                 nothing of the package was replaced.
         """
         config, env = setup.config, setup.env
-        options = unless_said(FAST_COMPILE) if config.fast_compile and jax.default_backend() == "cpu" else {}
+        options = fast_compile() if config.fast_compile else {}
         key = random_key(config.seed)
         started = start_program(setup).trace(env, parameters, key)
         state = started.out_info

@@ -50,8 +50,8 @@ class Reporter(Protocol):
         """
         ...
 
-    def ended(self, setup: Setup, weights: Weights, flown: dict[str, Episodes], /) -> None:
-        """The run, its best policy, and how that flew unseen starts of each criterion: nominal, where there is that."""
+    def ended(self, setup: Setup, flown: dict[str, Episodes], /) -> None:
+        """The run, and how its best policy flew unseen starts of each criterion: nominal, where there is that."""
         ...
 
 
@@ -236,7 +236,8 @@ def _finish(
         return {name: summary_of(e) for name, e in flown.items()}
 
     by_best = flown(best, setup.judges)
-
+    is_last = progress.best_update == progress.update
+    by_last = by_best if is_last else flown(policy_of(state), setup.judges)
     summary = {
         "task": config.task.name,
         "algorithm": config.algo.name,
@@ -249,7 +250,7 @@ def _finish(
         "reached_criterion": progress.reached,
         "peak_memory_gb": round(peak_memory() / 1e9, 3),
         "shipped": {"update": progress.best_update, **told(by_best)},
-        "last": {"update": progress.update, **told(flown(policy_of(state), setup.judges))},
+        "last": {"update": progress.update, **told(by_last)},
         "episodes": REPORT_EPISODES,
         "versions": versions(),
     }
@@ -259,7 +260,7 @@ def _finish(
     if hosts.first():
         export_policy(run.policy, best, setup.actor, contract_of(setup.env, config))
         run.write_json("summary.json", summary)
-    reporter.ended(setup, best, by_best)
+    reporter.ended(setup, by_best)
     return summary
 
 

@@ -1,17 +1,15 @@
 """The plots of an evaluation."""
 
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import jax
 
+from e2efly.deploy.policy.loader import load_policy
 from e2efly.env import UNSEEN, Env, random_key
 from e2efly.episodes import Episodes
 from e2efly.evaluation import Evaluation, act_of, episode_steps
 from e2efly.learn.judge import REPORTED
-from e2efly.learn.networks import Weights
-from e2efly.learn.programs import acting
 from e2efly.learn.rundir import RunDirectory
 from e2efly.learn.setup import Setup
 from e2efly.view import plots
@@ -41,7 +39,7 @@ def plot_evaluation(found: Evaluation, folder: Path) -> None:
         _learned(flew.run, folder, title)
 
 
-def plot_run(run: Path, setup: Setup, weights: Weights, flown: dict[str, Episodes]) -> None:
+def plot_run(run: Path, setup: Setup, flown: dict[str, Episodes]) -> None:
     """Draw the same of a run that has just ended, into its folder: what was flown is not flown again.
 
     Raises:
@@ -50,12 +48,11 @@ def plot_run(run: Path, setup: Setup, weights: Weights, flown: dict[str, Episode
     folder, config = run / "plots", setup.config
     title = f"{config.task.name} on {setup.env.physics.nominal.name}"
     _make(folder)
-    suites = config.task.criteria()
+    suites, act = config.task.criteria(), act_of(load_policy(RunDirectory(run).policy))
     for name, env in (setup.nominal or setup.judges).items():
         tag = f"{title}: {name}" if len(suites) > 1 else title
-        act, key = partial(acting, setup.actor), random_key(0, REPORTED, 0)
-        steps = episode_steps(suites[name], env)
-        _flights(plots.fly(env, act, key, DRAWN, steps, weights), suites[name], env, key, folder, name, tag)
+        key, steps = random_key(0, REPORTED, 0), episode_steps(suites[name], env)
+        _flights(plots.fly(env, act, key, DRAWN, steps), suites[name], env, key, folder, name, tag)
     plots.plot_errors(flown, folder / "errors.png", title, plots.limits(suites))
     _learned(RunDirectory(run), folder, title)
 

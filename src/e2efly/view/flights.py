@@ -1,12 +1,9 @@
 """Flights of a policy as NumPy arrays: what the plots draw."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
-import jax
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+from jaxtyping import Bool, Float, Int, PRNGKeyArray
 
 from e2efly.control import Quat
 from e2efly.env import Env
@@ -57,28 +54,20 @@ class Flights:
         return Quat.of(self.quaternion).yaw()
 
 
-def fly(
-    env: Env, act: Act | Callable[[Any], Act], key: PRNGKeyArray, n: int, steps: int, weights: Any = None
-) -> Flights:
+def fly(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int) -> Flights:
     """Fly `n` episodes of at most `steps` control steps.
 
     Args:
         env: the environment.
-        act: the policy; with `weights`, what makes it of them.
+        act: the policy.
         key: decides the starts and all noise.
         n: episodes, side by side.
         steps: control steps; an episode that is longer is cut.
-        weights: of the policy: given apart, so that the compiled program is found again for other weights.
     """
-
-    @jax.jit
-    def program(env: Env, key: PRNGKeyArray, weights: Any) -> tuple[Array, ...]:
-        policy = act if isinstance(act, Act) else act(weights)
-        state, command, goal, out = trace(env, policy, key, n, steps)
-        s = (state.position, state.velocity, state.quaternion, state.body_rate, state.rotor_speed)
-        return *s, command, goal, out.done, out.success
-
-    *arrays, done, success = (np.asarray(x) for x in program(env, key, weights))
+    reached, command, goal, out = trace(env, act, key, n, steps)
+    parts = (reached.position, reached.velocity, reached.quaternion, reached.body_rate, reached.rotor_speed)
+    arrays = (np.asarray(x) for x in (*parts, command, goal))
+    done, success = np.asarray(out.done), np.asarray(out.success)
     length = np.where(done.any(axis=0), done.argmax(axis=0) + 1, steps)
     return Flights(
         env.control_period * np.arange(1, steps + 1),
