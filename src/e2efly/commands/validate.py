@@ -154,7 +154,7 @@ def _whole_flights(found: "Validation", count: int, console: Console) -> bool:
     from e2efly.vehicles import load_vehicle
 
     body, policy = load_vehicle(found.candidate.vehicle), found.candidate.policy
-    if not found.plant.whole_flights or not count or body.hash != policy.contract.vehicle_hash:
+    if not found.plant.whole_flights or not count or policy.contract.refusals(body):
         return True
     flights = fly_whole(policy, body, count, console)
     console.print(flights_table(flights))

@@ -109,6 +109,8 @@ class TaskConfig:
     charge for a crash."""
     robust: ClassVar[Mapping[str, Robust]] = {}
     """How it is learned for vehicles that are not the file's, by algorithm: those have the preset `robust`."""
+    family: ClassVar[Mapping[str, Robust]] = {}
+    """How it is learned for all vehicles of a family together, by algorithm."""
     cameras: ClassVar[tuple[CameraConfig, ...]] = ()
     """What its policies see."""
     curriculum: ClassVar[tuple["StageConfig", ...]] = ()

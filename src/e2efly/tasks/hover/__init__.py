@@ -33,6 +33,13 @@ class HoverConfig(TaskConfig):
         ),
         "ppo": Robust(steps=6_000_000, recurrent=96),
     }
+    family: ClassVar = {
+        "bptt": Robust(
+            weights={"prog2": 1.0, "near": 0.3, "v1": 0.1, "anglev_sq": 0.06, "act2_sq": 0.05},
+            algo={"horizon": 96, "learning_rate": 8e-3},
+            steps=4_000_000,
+        ),
+    }
     paper: ClassVar = Paper(
         weights={"prog2": 0.01, "ori2": 0.0001, "v1": 0.002, "anglev": 0.002},
         ppo={"act3": 1.0, "goal": 1.0, "crash": 1.0},
