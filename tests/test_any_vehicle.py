@@ -97,7 +97,7 @@ def test_without_disturbances_vehicles_and_delays_are_drawn_still() -> None:
 
 
 def test_a_mode_whose_commands_differ_from_vehicle_to_vehicle_is_refused() -> None:
-    with pytest.raises(ValueError, match="env.command_mode is 'rotor_thrust'; accepted for vehicle 'any': 'ctbr'"):
+    with pytest.raises(ValueError, match=r"env.command_mode is 'rotor_thrust'; accepted for vehicle 'any': 'ctbr'"):
         environment(command_mode="rotor_thrust")
 
 
@@ -127,7 +127,7 @@ def test_any_vehicle_within_loads_and_others_are_named(trained: Path, tmp_path: 
     for name in ("vis_r", "vis_h", "crazyflie"):
         e2efly.load_policy(trained, vehicle=name)
     heavy = dataclasses.replace(load_vehicle("vis_r"), mass=13.0)
-    with pytest.raises(ValueError, match="mass of vehicle 'vis_r' is 13; accepted: 0.025 to 12 kg"):
+    with pytest.raises(ValueError, match=r"mass of vehicle 'vis_r' is 13; accepted: 0.025 to 12 kg"):
         e2efly.load_policy(trained / "policy.onnx", vehicle=heavy)
 
 

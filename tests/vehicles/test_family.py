@@ -89,8 +89,8 @@ def test_a_flight_controller_that_takes_faster_rates_is_no_reason() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
-        ("thrust_to_weight", "[0.8, 6.0]", r"thrust_to_weight is \[0.8, 6.0\] 1; accepted: two rising numbers above 1.05, "
-         "at most 20: no other vehicle can hover"),
+        ("thrust_to_weight", "[0.8, 6.0]", r"thrust_to_weight is \[0.8, 6.0\] 1; accepted: two rising numbers above "
+         "1.05, at most 20: no other vehicle can hover"),
         ("mass", "[12.0, 0.03]", r"mass is \[12.0, 0.03\] kg; accepted: two rising numbers above 0"),
         ("latency", "[0.0, 2.0]", r"latency is \[0.0, 2.0\] s; accepted: two rising numbers of at least 0, at most 1"),
         ("arm", "0.3", r"arm.value is 0.3; accepted: numbers of shape \(2,\)"),
