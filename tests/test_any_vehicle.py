@@ -97,7 +97,9 @@ def test_without_disturbances_vehicles_and_delays_are_drawn_still() -> None:
 
 
 def test_a_mode_whose_commands_differ_from_vehicle_to_vehicle_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"env.command_mode is 'rotor_thrust'; accepted for vehicle 'any': 'ctbr'"):
+    with pytest.raises(
+        ValueError, match=r"env.command_mode is 'rotor_thrust'; accepted for vehicle 'any': 'ctbr' or 'rotor_share'"
+    ):
         environment(command_mode="rotor_thrust")
 
 

@@ -17,7 +17,6 @@ from e2efly.config import (
     EnvConfig,
     PPOConfig,
     RewardConfig,
-    Robust,
     TaskConfig,
     TrainConfig,
 )
@@ -109,25 +108,13 @@ def _robust(task: type[TaskConfig], config: TrainConfig) -> TrainConfig:
         raise ValueError(
             f"preset 'robust': accepted for {_having('robust')}; not for {task.name} by {config.algo.name}"
         )
-    return _learned(dataclasses.replace(config, env=OTHERS), given)
+    return given.into(dataclasses.replace(config, env=OTHERS))
 
 
 def _having(recipes: str) -> str:
     """The tasks that have a recipe, and by which algorithms."""
     found = {name: getattr(known, recipes) for name, known in TASKS.items()}
     return ", ".join(f"{name} by {' or '.join(by)}" for name, by in found.items() if by)
-
-
-def _learned(config: TrainConfig, given: Robust) -> TrainConfig:
-    """A configuration that learns as a recipe says."""
-    return dataclasses.replace(
-        config,
-        network=dataclasses.replace(config.network, recurrent=given.recurrent, hidden=given.hidden),
-        algo=dataclasses.replace(config.algo, **given.algo),
-        reward=config.reward if given.weights is None else RewardConfig(dict(given.weights), config.reward.parameters),
-        steps=given.steps,
-        chunk=given.chunk,
-    )
 
 
 def _paper(task: type[TaskConfig], algo: str) -> TrainConfig:
@@ -178,7 +165,7 @@ def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
                 f"--vehicle is {vehicle}, a family; accepted by preset 'robust' for {_having('family')}; not for "
                 f"{config.task.name} by {config.algo.name}"
             )
-        return _learned(dataclasses.replace(config, env=dataclasses.replace(BESIDE_FAMILY, vehicle=vehicle)), given)
+        return given.into(dataclasses.replace(config, env=dataclasses.replace(BESIDE_FAMILY, vehicle=vehicle)))
     if robust:
         margin = load_vehicle(vehicle).thrust_to_weight
         shares = (_narrower(percent / 100) for percent in range(100, -1, -1))

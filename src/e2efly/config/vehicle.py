@@ -148,7 +148,8 @@ class EnvConfig:
     vehicle: str = "vis_r"
     """A shipped vehicle's name, or the path of a .toml file."""
     command_mode: str = "ctbr"
-    """What the policy commands: rotor_thrust, ctbr, attitude, acceleration, velocity or position (sets the program)."""
+    """What the policy commands: rotor_thrust (N), rotor_share (of the largest), ctbr, attitude, acceleration, velocity
+    or position (sets the program)."""
     integrator: str = "rk3"
     """euler, semi_implicit, rk3 or rk4 (sets the program)."""
     control_rate: float | None = None

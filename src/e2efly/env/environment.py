@@ -126,8 +126,7 @@ class Env:
         check(config, task)
         rewards.check(reward.weights, reward.parameters)
         late = config.action_latency or _latencies(config, body, family if flown is None else None)
-        longest = late[1] if family is None else max(late[1], family.ranges.latency[1])
-        frames = latency.frames(longest, period)
+        frames = latency.frames(late[1], period)
         seen = frames if config.past_actions is None else config.past_actions
         low, high = limits_of(config)
         noisy = config.noise != NoiseConfig()
@@ -506,7 +505,10 @@ def _latencies(config: EnvConfig, vehicle: Vehicle, family: Family | None) -> tu
 
 def _hover_command(mode: str, vehicle: Vehicle) -> np.ndarray:
     each = vehicle.mass * GRAVITY / 4
-    level = {"ctbr": (GRAVITY, 0, 0, 0), "attitude": (GRAVITY, 0, 0, 0), "rotor_thrust": (each,) * 4}
+    level = {
+        "ctbr": (GRAVITY, 0, 0, 0), "attitude": (GRAVITY, 0, 0, 0), "rotor_thrust": (each,) * 4,
+        "rotor_share": (1 / vehicle.thrust_to_weight,) * 4,
+    }  # fmt: skip
     return np.asarray(level.get(mode, (0, 0, 0, 0)), np.float64)
 
 

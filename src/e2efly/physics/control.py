@@ -30,6 +30,12 @@ def rotor_thrust_law(vehicle: Vehicle, mixer: Mixer, parts: Parts, command: Comm
     return rotor_speed_for(vehicle, mixer.limit(command))
 
 
+def rotor_share_law(vehicle: Vehicle, mixer: Mixer, parts: Parts, command: Command) -> Rotors:
+    """Command: thrust of each rotor as a share of its largest."""
+    a, b, c, d = (share * mixer.thrust_max for share in command)
+    return rotor_thrust_law(vehicle, mixer, parts, (a, b, c, d))
+
+
 def _law(name: str) -> Law:
     """The law of a controller of the cascade: its body rates held by the rate loop."""
     controller = CASCADE[name]
@@ -88,6 +94,7 @@ def _attitude_limits(vehicle: Vehicle, _: float) -> tuple[list[float], list[floa
 
 _LIMITS: dict[str, Callable[[Vehicle, float], tuple[list[float], list[float]]]] = {
     "rotor_thrust": lambda v, _: ([v.thrust_range[0]] * 4, [v.thrust_range[1]] * 4),
+    "rotor_share": lambda v, _: ([0.0] * 4, [1.0] * 4),
     "ctbr": _ctbr_limits,
     "attitude": _attitude_limits,
     "acceleration": lambda v, _: _symmetric(*v.acceleration_max, np.pi),
@@ -95,9 +102,9 @@ _LIMITS: dict[str, Callable[[Vehicle, float], tuple[list[float], list[float]]]] 
     "position": lambda _, reach: _symmetric(reach, reach, reach, np.pi),
 }
 
+_OF_ROTORS = {"rotor_thrust": rotor_thrust_law, "rotor_share": rotor_share_law}
 COMMAND_MODES: dict[str, CommandMode] = {
-    name: CommandMode(name, rotor_thrust_law if name == "rotor_thrust" else _law(name), limits)
-    for name, limits in _LIMITS.items()
+    name: CommandMode(name, _OF_ROTORS.get(name) or _law(name), limits) for name, limits in _LIMITS.items()
 }
 """Command modes by name."""
 

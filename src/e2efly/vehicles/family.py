@@ -261,7 +261,11 @@ class Family:
         if command_mode == "ctbr":
             rates = [r.roll_rate_max[1], r.roll_rate_max[1], r.yaw_rate_max[1]]
             return [0.0, *(-x for x in rates)], [r.thrust_to_weight[1] * GRAVITY, *rates]
-        raise ValueError(f"env.command_mode is {command_mode!r}; accepted for vehicle {self.name!r}: 'ctbr'")
+        if command_mode == "rotor_share":
+            return [0.0] * 4, [1.0] * 4
+        raise ValueError(
+            f"env.command_mode is {command_mode!r}; accepted for vehicle {self.name!r}: 'ctbr' or 'rotor_share'"
+        )
 
 
 def _between(u: Any, bounds: Range) -> Any:

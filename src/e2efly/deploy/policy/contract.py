@@ -92,10 +92,11 @@ class Contract:
     def refusals(self, vehicle: Vehicle) -> tuple[str, ...]:
         """Why the policy does not fly a (loaded) vehicle, in words; empty: it does.
 
-        It flies the vehicle that it was trained on, or all within its ranges.
+        It flies the vehicle that it was trained on, or all within its ranges, with the delays of its training.
         """
         if self.vehicle_ranges is not None:
-            return self.vehicle_ranges.outside(vehicle)
+            late = self.latency_range_s
+            return dataclasses.replace(self.vehicle_ranges, latency=(late[0], late[1])).outside(vehicle)
         if vehicle.hash == self.vehicle_hash:
             return ()
         return (

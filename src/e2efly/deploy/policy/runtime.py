@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.control.modes import OF_ROTORS
 from e2efly.deploy.odometry import Odometry, tilt_of, yaw_of
 from e2efly.deploy.policy.contract import ACTION_SIZE, COMMANDS, Contract
 from e2efly.deploy.policy.loader import Policy
@@ -19,7 +20,7 @@ from e2efly.goal import Course, Outcome
 from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field
 from e2efly.vehicles import Vehicle
 
-MODES = tuple(mode for mode in COMMANDS if mode != "rotor_thrust")
+MODES = tuple(mode for mode in COMMANDS if mode not in OF_ROTORS)
 """Command modes that become collective thrust and body rates; a flight controller takes no rotor thrusts."""
 PAST_ACTIONS = "past_actions"
 """The observation field of the policy's last actions."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from e2efly.control import Vec3
+from e2efly.control.modes import OF_ROTORS
 from e2efly.deploy.betaflight.messages import set_raw_rc
 from e2efly.deploy.betaflight.sticks import Sticks
 from e2efly.deploy.pilot.hover import controlled
@@ -42,8 +43,8 @@ class BetaflightPlant(Plant):
             OSError: when the firmware cannot be built or started, or does not take off.
         """
         check_mode(mode, self.name)
-        if mode == "rotor_thrust":
-            raise ValueError("plant 'betaflight' takes no 'rotor_thrust' commands; accepted: policies of other modes")
+        if mode in OF_ROTORS:
+            raise ValueError(f"plant 'betaflight' takes no {mode!r} commands; accepted: policies of other modes")
         from e2efly.validation import firmware
         from e2efly.validation.rig import Rig
         from e2efly.validation.session import Session, rehearsal_settings

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.control import CASCADE, Quat, Vec3
+from e2efly.control.modes import OF_ROTORS
 from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle
@@ -176,9 +177,10 @@ def control_law(vehicle: Vehicle, command_mode: str, plain_mixer: bool = False) 
     Raises:
         KeyError: for an unknown command mode.
     """
-    if command_mode == "rotor_thrust":
+    if command_mode in OF_ROTORS:
         low, high = vehicle.thrust_range
-        return lambda command, pose, motion: [min(max(f, low), high) for f in command]
+        unit = high if command_mode == "rotor_share" else 1.0
+        return lambda command, pose, motion: [min(max(unit * f, low), high) for f in command]
     rates = rate_loop(vehicle, plain_mixer)
     if command_mode == "ctbr":
         return lambda command, pose, motion: rates(command, motion[3:])
