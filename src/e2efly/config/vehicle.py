@@ -146,7 +146,7 @@ class EnvConfig:
     """The vehicle, its controller, and what is random about them."""
 
     vehicle: str = "vis_r"
-    """A shipped vehicle's name, or the path of a .toml file."""
+    """A shipped vehicle's name, `any`, or the path of a .toml file: of a vehicle, or of ranges of many (a family)."""
     command_mode: str = "ctbr"
     """What the policy commands: rotor_thrust (N), rotor_share (of the largest), ctbr, attitude, acceleration, velocity
     or position (sets the program)."""
