@@ -369,7 +369,10 @@ class Env:
             disturbed_key, mass_key = jax.random.split(jax.random.fold_in(plant_key, 1))
             disturbed = disturbance.draw(self.disturbance, disturbed_key, n)
             rotors: Any = plant.get("rotor_position", flown.rotor_position)
-            plant["rotor_position"] = rotors - self.disturbance.centre_of_mass * uniform(mass_key, n, 2)[:, None]
+            offset = self.disturbance.centre_of_mass * uniform(mass_key, n, 2)[:, None]
+            if self.family is not None:  # in proportion to the size
+                offset = offset * jnp.abs(flown.rotor_position / self.physics.flown.rotor_position)
+            plant["rotor_position"] = rotors - offset
         dtype = self.center.dtype
         vehicle, memory = self.task.start(task_key, n)
         rotor_speed = jnp.broadcast_to(jnp.asarray(hover_rotor_speed(flown))[..., None], (n, 4))
