@@ -17,7 +17,7 @@ from e2efly.budget import FASTEST, check_memory, check_time
 from e2efly.config import CameraConfig, EnvConfig, ImuConfig, RewardConfig, TaskConfig
 from e2efly.config.changes import changed, differing
 from e2efly.deploy.policy.images import NONE, Image
-from e2efly.deploy.policy.loader import Policy, load_policy
+from e2efly.deploy.policy.loader import Policy, level_and_still, load_policy
 from e2efly.device import prepare, wide_vectors
 from e2efly.env import UNSEEN, Env, random_key
 from e2efly.episodes import Act, Episodes, rows, run_episodes, summary
@@ -362,7 +362,11 @@ def act_of(policy: Policy) -> Act:
         return jax.pure_callback(onnx, shapes, observation, images, memory)
 
     def onnx(observation: Any, images: Any, memory: Any) -> Any:
-        return policy.act(np.asarray(observation), [np.asarray(x) for x in images], np.asarray(memory))
+        seen = np.asarray(observation)
+        finite = np.isfinite(seen).all(axis=-1, keepdims=True)
+        if not finite.all():  # an episode that is over goes on: what tumbles without a rate loop leaves all numbers
+            seen = np.where(finite, seen, level_and_still(policy.contract))
+        return policy.act(seen, [np.asarray(x) for x in images], np.asarray(memory))
 
     return Act(act, lambda n: jnp.zeros((n, size)))
 

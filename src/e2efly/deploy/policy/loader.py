@@ -197,13 +197,13 @@ def _policy(where: str, content: bytes) -> Policy:
     _check_graph(where, session, contract)
     policy = Policy(contract, session)
     try:  # also warms the session up
-        policy.act(_level_and_still(contract), [np.zeros(image.shape, np.float32) for image in contract.images])
+        policy.act(level_and_still(contract), [np.zeros(image.shape, np.float32) for image in contract.images])
     except Exception as error:  # ONNX Runtime's errors share no other base
         raise ValueError(f"{where}: does not run on the observation of a level, still vehicle: {error}") from None
     return policy
 
 
-def _level_and_still(contract: Contract) -> np.ndarray:
+def level_and_still(contract: Contract) -> np.ndarray:
     """An observation, shape (o,): the level attitude, heading along world x, and zeros."""
     observation = np.zeros(contract.observation_size, np.float32)
     observation[contract.slices[contract.attitude].start] = 1.0

@@ -72,8 +72,9 @@ class HoverConfig(TaskConfig):
     """... for this last part of the episode, s."""
     fence: float = number(defaults.HOVER_FENCE, above=0, endless=True)
     """Farther than this from the target the episode fails, m."""
-    spin: float = number(math.inf, above=0, endless=True)
-    """Turning faster than this the episode fails, rad/s: without a rate loop nothing else ends a tumble."""
+    spin: float = number(35.0, above=0, endless=True)
+    """Turning faster than this the episode fails, rad/s: gyroscopes measure up to 2000 degrees per second. Without a
+    rate loop nothing else ends a tumble."""
 
     def criteria(self) -> dict[str, TaskConfig]:
         """Episodes of `judged_s`, where that is not 0."""
@@ -110,7 +111,7 @@ class HoverConfig(TaskConfig):
             if not isinstance(config.algo, BPTTConfig):
                 raise ValueError(f"preset 'rotors': accepted for hover by bptt; not by {config.algo.name}")
             env = EnvConfig(command_mode="rotor_share", control_rate=100.0, action_latency=(0.0, 0.03))
-            return cls.rotors.into(dataclasses.replace(config, env=env, task=cls(spin=30.0)))
+            return cls.rotors.into(dataclasses.replace(config, env=env))
         thrown = cls(
             episode_s=3.0, judged_s=10.0, target=(0.0, 0.0, 5.0), velocity=3.0, tilt=math.pi, body_rate=6.0, fence=10.0
         )
