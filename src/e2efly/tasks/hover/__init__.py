@@ -43,8 +43,9 @@ class HoverConfig(TaskConfig):
     }
     rotors: ClassVar = Robust(
         weights={"prog2": 1.0, "near": 0.3, "v1": 0.1, "anglev_sq": 0.03, "act2_sq": 0.05},
-        algo={"horizon": 160, "learning_rate": 6e-3},
-        steps=8_000_000,
+        algo={"horizon": 160, "learning_rate": 6e-3, "average": 0.99},
+        steps=30_000_000,
+        chunk=150,
     )
     paper: ClassVar = Paper(
         weights={"prog2": 0.01, "ori2": 0.0001, "v1": 0.002, "anglev": 0.002},
@@ -105,12 +106,12 @@ class HoverConfig(TaskConfig):
         Training has short episodes: what is to be learned is in their first seconds. The target is 5 m up: from 3 m
         some starts hit the ground whatever is done (docs/tasks.md).
 
-        `rotors`: hover by the thrusts of the rotors, 100 times a second, with a memory; delays of up to 30 ms.
+        `rotors`: hover by the thrusts of the rotors, 100 times a second, with a memory; delays of up to 34 ms.
         """
         if preset == "rotors":
             if not isinstance(config.algo, BPTTConfig):
                 raise ValueError(f"preset 'rotors': accepted for hover by bptt; not by {config.algo.name}")
-            env = EnvConfig(command_mode="rotor_share", control_rate=100.0, action_latency=(0.0, 0.03))
+            env = EnvConfig(command_mode="rotor_share", control_rate=100.0, action_latency=(0.0, 0.034))
             return cls.rotors.into(dataclasses.replace(config, env=env))
         thrown = cls(
             episode_s=3.0, judged_s=10.0, target=(0.0, 0.0, 5.0), velocity=3.0, tilt=math.pi, body_rate=6.0, fence=10.0
