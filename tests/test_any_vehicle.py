@@ -13,9 +13,11 @@ import e2efly
 from e2efly import presets
 from e2efly.cli import run
 from e2efly.commands.train import parse
-from e2efly.config import BPTTConfig, NetworkConfig
+from e2efly.config import BPTTConfig, DisturbanceConfig, NetworkConfig
 from e2efly.deploy.policy.contract import Contract
+from e2efly.deploy.policy.loader import level_and_still
 from e2efly.env import Env, random_key
+from e2efly.evaluation import act_of
 from e2efly.physics import Physics, step
 from e2efly.stress import stress
 from e2efly.vehicles import Vehicle, load_family, load_vehicle, vehicle_file
@@ -47,9 +49,10 @@ def environment(**options: object) -> Env:
     return Env.of(config.task, config.reward, dataclasses.replace(config.env, vehicle="any", **options))
 
 
-def test_every_episode_flies_as_a_simulation_of_its_vehicle_alone() -> None:
+@pytest.mark.parametrize("mode", ["ctbr", "rotor_share"])
+def test_every_episode_flies_as_a_simulation_of_its_vehicle_alone(mode: str) -> None:
     """Plant, mixer and rate loop of each are those of the vehicle that was drawn."""
-    env, rng = environment(), np.random.default_rng(0)
+    env, rng = environment(command_mode=mode), np.random.default_rng(0)
     state, _ = env.reset(random_key(1), 5)
     action = rng.uniform(-1, 1, (3, 5, 4)).astype(np.float32)
     assert state.family is not None
@@ -58,7 +61,7 @@ def test_every_episode_flies_as_a_simulation_of_its_vehicle_alone() -> None:
     for a in action:
         flown = together(flown, jnp.asarray(a))
     for i, vehicle in enumerate(drawn):
-        physics, alone = Physics.of(vehicle), jax.tree.map(lambda x: x[i], state.vehicle)  # noqa: B023
+        physics, alone = Physics.of(vehicle, mode), jax.tree.map(lambda x: x[i], state.vehicle)  # noqa: B023
         queue = [np.asarray(env.hover)] * 5
         for a in action[:, i]:
             queue = [a, *queue][:5]
@@ -70,6 +73,18 @@ def test_every_episode_flies_as_a_simulation_of_its_vehicle_alone() -> None:
         for name in ("position", "velocity", "quaternion", "body_rate", "rotor_speed"):
             wanted = np.asarray(getattr(alone, name))
             np.testing.assert_allclose(getattr(flown.vehicle, name)[i], wanted, rtol=2e-3, atol=2e-3)
+
+
+def test_the_centre_of_mass_is_off_in_proportion_to_the_arm() -> None:
+    env = environment(disturbance=DisturbanceConfig(centre_of_mass=0.01))
+    state, _ = env.reset(random_key(0), 200)
+    assert state.family is not None
+    own = np.asarray(family().draw(np.asarray(state.family, np.float64)).rotor_position)
+    share = np.abs(np.asarray(state.plant["rotor_position"]) - own) / np.abs(own)
+    largest = 0.01 / np.abs(family().middle.rotor_position).max()
+    assert share.max() <= largest * (1 + 1e-4)
+    small, large = (share[rows].max() for rows in (own[:, 0, 1] > -0.04, own[:, 0, 1] < -0.15))
+    assert min(small, large) > 0.9 * largest
 
 
 def test_a_new_episode_has_another_vehicle_and_delay() -> None:
@@ -90,7 +105,7 @@ def test_without_disturbances_vehicles_and_delays_are_drawn_still() -> None:
     env = Env.of(config.task, config.reward, config.env)
     assert env.is_disturbed
     calm = env.undisturbed()
-    assert (calm.wind, calm.disturbance) == (0, presets.DisturbanceConfig())
+    assert (calm.wind, calm.disturbance) == (0, DisturbanceConfig())
     state, _ = calm.reset(random_key(0), 50)
     assert np.ptp(np.asarray(state.action_latency)) > 0.08
     assert np.ptp(np.asarray(state.family)) > 0.9
@@ -107,6 +122,33 @@ def test_a_task_without_a_recipe_for_families_is_refused(capsys: pytest.CaptureF
     assert run(["train", "land", "--vehicle", "any"]) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert "--vehicle is any, a family; accepted by preset 'robust' for hover by bptt" in said
+
+
+def test_hover_by_rotors_is_learned_with_a_memory_and_by_gradients(capsys: pytest.CaptureFixture[str]) -> None:
+    config = parse(["hover", "--vehicle", "any", "--preset", "rotors"]).config
+    assert (config.env.vehicle, config.env.command_mode, config.env.control_rate) == ("any", "rotor_share", 100.0)
+    assert config.network.recurrent > 0
+    assert run(["train", "hover", "--preset", "rotors", "--algo", "ppo"]) == 2
+    assert "preset 'rotors': accepted for hover by bptt; not by ppo" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_tumble_ends_a_hover() -> None:
+    config = presets.preset("hover", "bptt")
+    task = dataclasses.replace(config.task, spin=2.0, body_rate=3.0, episode_s=1.0)
+    env = Env.of(task, config.reward)
+    state, _ = env.reset(random_key(0), 64)
+    fast = np.linalg.norm(np.asarray(state.vehicle.body_rate), axis=1)
+    _, out = jax.jit(lambda state: env.step(state, jnp.broadcast_to(env.hover, (64, 4))))(state)
+    assert np.asarray(out.terminated)[fast > 4.5].all()
+    assert not np.asarray(out.terminated)[fast < 1.0].any()
+
+
+def test_an_episode_that_has_left_all_numbers_is_not_asked_about(trained: Path) -> None:
+    policy = e2efly.load_policy(trained)
+    seen = np.tile(level_and_still(policy.contract), (2, 1))
+    seen[1] = np.nan
+    action, _ = act_of(policy).act(jnp.asarray(seen), (), jnp.zeros((2, policy.contract.memory_size)))
+    np.testing.assert_array_equal(action[0], action[1])
 
 
 def test_the_contract_has_ranges_instead_of_a_hash(trained: Path) -> None:
