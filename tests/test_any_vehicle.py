@@ -181,6 +181,8 @@ def test_it_is_evaluated_on_drawn_vehicles_and_on_one(trained: Path) -> None:
     one = e2efly.evaluate(trained / "policy.onnx", 4, vehicle="crazyflie")
     assert one.candidate.flown.believed.mass == 0.027
     assert one.candidate.latency == 0.02
+    (suite,) = one.candidate.task.criteria().values()
+    np.testing.assert_allclose(one.candidate.environment(suite).latency_range, 0.02)
     with pytest.raises(ValueError, match="is left out; accepted with --stress: one vehicle within the ranges of any"):
         stress(trained, 4)
 

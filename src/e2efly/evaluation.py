@@ -417,11 +417,13 @@ def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[Ta
             "on other parameters; accepted: the file of that vehicle with --vehicle FILE.toml, or its run's folder"
         )
     counts = {f.name: f.size for f in c.observation}
+    latency = c.latency_range_s[0], c.latency_range_s[1]
+    one = c.vehicle_ranges is not None and name != vehicle and vehicle is not None
     config = EnvConfig(
         vehicle=name,
         command_mode=c.action.mode,
         control_rate=c.control_rate_hz,
-        action_latency=(c.latency_range_s[0], c.latency_range_s[1]),
+        action_latency=None if one else latency,  # one vehicle of a family has its own
         observation_latency=(c.observation_latency_range_s[0], c.observation_latency_range_s[1]),
         past_actions=counts.get("past_actions", 0) // 4,
         imu=ImuConfig(observed="gyroscope" in counts),
