@@ -52,7 +52,7 @@ UNITS = 16
 """Of RAPTOR's GRU."""
 
 
-def raptor(curve: np.ndarray, clip: float) -> Act:
+def raptor(curve: Any, clip: float) -> Act:
     """RAPTOR on vehicles whose thrust is a share `curve` linear in the rotor speed, and else quadratic."""
     sys.path.append(str(packages(*NEEDS)))
     from foundation_policy import Raptor  # type: ignore[import-not-found]
@@ -87,7 +87,7 @@ def raptor(curve: np.ndarray, clip: float) -> Act:
     return Act(act, lambda n: jnp.tile(jnp.asarray(first), (n, 1)))
 
 
-def fly(env: Env, act_for: Callable[[np.ndarray], Act], drawn: np.ndarray, task: HoverConfig) -> Episodes:
+def fly(env: Env, act_for: Callable[[Any], Act], drawn: np.ndarray, task: HoverConfig) -> Episodes:
     """An episode of each vehicle."""
 
     def altered(u: Any, state: EnvState) -> EnvState:
@@ -100,16 +100,14 @@ def fly(env: Env, act_for: Callable[[np.ndarray], Act], drawn: np.ndarray, task:
             state, family=u, vehicle=dataclasses.replace(begun, rotor_speed=speed, quaternion=level)
         )
 
+    @partial(jax.jit, compiler_options=wide_vectors(BATCH))
+    def program(env: Env, key: Any, u: Any) -> Episodes:
+        return run_episodes(env, act_for(u), key, BATCH, episode_steps(task, env), altered=lambda s: altered(u, s))
+
     parts = []
     for i in range(0, len(drawn), BATCH):
         u = drawn[i : i + BATCH].astype(np.float32)
-        acts = act_for(u)
-
-        @partial(jax.jit, compiler_options=wide_vectors(BATCH))
-        def program(env: Env, key: Any, acts: Any = acts, u: Any = u) -> Episodes:
-            return run_episodes(env, acts, key, BATCH, episode_steps(task, env), altered=lambda s: altered(u, s))
-
-        parts.append(jax.tree.map(np.asarray, program(env, random_key(SEED, UNSEEN, i))))
+        parts.append(jax.tree.map(np.asarray, program(env, random_key(SEED, UNSEEN, i), u)))
     return jax.tree.map(lambda *x: np.concatenate(x), *parts)
 
 
@@ -167,12 +165,12 @@ def main() -> None:
     write("raptor", options.json, {"table": rows, "vehicles": options.vehicles})
 
 
-def curve_of(u: np.ndarray) -> np.ndarray:
+def curve_of(u: Any) -> Any:
     """The share of the thrust at full speed that grows linearly with it, of each vehicle."""
     family = load_family("any")
     assert family is not None
-    v = family.draw(u.astype(np.float64))
-    return np.asarray(v.thrust_map[:, 1] * v.rotor_speed_max / v.rotor_thrust_max, np.float32)
+    v = family.draw(u)
+    return v.thrust_map[:, 1] * v.rotor_speed_max / v.rotor_thrust_max
 
 
 if __name__ == "__main__":
