@@ -65,6 +65,9 @@ def test_a_task_is_the_name_of_its_policy(tmp_path: Path) -> None:
     assert policy_file("hover", "crazyflie") == FOLDER / "crazyflie" / "hover.onnx"
     assert policy_file(tmp_path) == tmp_path / "policy.onnx"
     assert policy_file("runs/mine") == Path("runs/mine")
+    for whatever in (None, "vis_r", "any"):  # a policy of any vehicle goes by its family's name
+        assert policy_file("any/hover", whatever) == FOLDER / "any" / "hover.onnx"
+    assert policy_file("hover", "any") == FOLDER / "any" / "hover.onnx"
     with pytest.raises(ValueError, match=r"unknown policy 'hovr'.*hover"):
         policy_file("hovr")
     with pytest.raises(ValueError, match=r"no policy 'avoid' of vehicle 'crazyflie'; accepted: vis_r"):

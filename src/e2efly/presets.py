@@ -40,7 +40,7 @@ BESIDE_FAMILY = EnvConfig(
     latency_spread=(0.0, 0.012),
     randomize={"inertia": 0.2, "motor_time_constant": 0.2, "rate_gain": 0.2},
     wind=2.0,
-    disturbance=DisturbanceConfig(gust=0.3, thrust=0.1, rotor=0.03, sag=0.1, centre_of_mass=0.004),
+    disturbance=DisturbanceConfig(gust=0.3, thrust=0.1, rotor=0.03, sag=0.1),
 )
 """What the preset `robust` draws of a family beside its vehicles: what their files do not know."""
 

@@ -95,7 +95,7 @@ def test_a_flight_controller_that_takes_faster_rates_is_no_reason() -> None:
         ("latency", "[0.0, 2.0]", r"latency is \[0.0, 2.0\] s; accepted: two rising numbers of at least 0, at most 1"),
         ("arm", "0.3", r"arm.value is 0.3; accepted: numbers of shape \(2,\)"),
         ("control_rate", "[30.0, 100.0]", r"control_rate is \[30.0, 100.0\] Hz; accepted: one rate, twice"),
-        ("rate_gain", "[80.0, 120.0]", r"rate_gain begins at 80.0 1/s .* product of at most 6"),
+        ("rate_gain", "[80.0, 120.0]", r"rate_gain begins at 80.0 1/s .* product of at most 4"),
     ],
 )  # fmt: skip
 def test_ranges_that_no_vehicle_can_meet_are_refused(tmp_path: Path, name: str, value: str, said: str) -> None:

@@ -35,8 +35,8 @@ _ARM_OF_KILOGRAM = 0.12
 """Arm of a quadrotor of 1 kg in the middle, m: the cube root of the mass through Crazyflie and 5-inch racers."""
 _ARM_SPREAD = 1.7
 """Largest factor on it, and one over the smallest."""
-_RINGING = 6.0
-"""Largest rate gain times motor lag that is drawn: a damping ratio of 1 / (2 sqrt(6)) = 0.2."""
+_RINGING = 4.0
+"""Largest rate gain times motor lag that is drawn: a damping ratio of 1 / (2 sqrt(4)) = 0.25."""
 _AIR = 1.225
 """Density, kg/m^3: the standard atmosphere at sea level."""
 _SPIN = (1.0, -1.0, -1.0, 1.0)
