@@ -28,6 +28,18 @@ def interpreter(peer: str) -> Path:
     return python
 
 
+def packages(*needs: str) -> Path:
+    """The folder of packages of a virtual environment that has what is needed, for this Python to import them from."""
+    folder = cache_folder() / needs[0].replace("==", "-")
+    python = folder / "bin" / "python"
+    if not (folder / ".ready").exists():
+        subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
+        subprocess.run([str(python), "-m", "pip", "install", "--quiet", *needs], check=True)
+        (folder / ".ready").touch()
+    where = [str(python), "-c", "import sysconfig; print(sysconfig.get_path('platlib'))"]
+    return Path(subprocess.run(where, capture_output=True, text=True, check=True).stdout.strip())
+
+
 def physics_steps(peer: str, vehicles: int) -> float:
     """A peer's physics steps/s: the best of its numbers of devices."""
     script, counts, _ = PEERS[peer]

@@ -23,6 +23,8 @@ TITLES = {
     "success": "Success over 1000 unseen starts, full presets",
     "ablation": "The reward ablation, from process start, empty cache",
     "robust": "The preset robust: seconds from process start, cold, and success under stress",
+    "any_vehicle": "One policy for any quadrotor: 1000 unseen vehicles, by delay, and the vehicles that ship",
+    "raptor": "One policy for any quadrotor, beside RAPTOR: 1000 unseen vehicles, by delay",
     "zoo_stress": "The zoo under stress: vehicles, air and sensors that are not those of the training",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
@@ -59,6 +61,21 @@ def noise() -> None:
         small.save(path, optimize=True)
 
 
+def families() -> None:
+    """docs/any_vehicle.png: what the ranges of `any` draw."""
+    from PIL import Image
+
+    from e2efly.vehicles import load_family
+    from e2efly.view.family import plot_family
+
+    family, path = load_family("any"), DOCS / "any_vehicle.png"
+    assert family is not None
+    plot_family(family, path)
+    with Image.open(path) as picture:
+        small = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    small.save(path, optimize=True)
+
+
 def thrown() -> None:
     """docs/thrown.png: success while learning to catch a thrown vehicle, by environment steps and by seconds."""
     import numpy as np
@@ -89,7 +106,7 @@ def thrown() -> None:
 
 
 def main() -> None:
-    """Write docs/benchmarks.md and thrown.png; with `--noise` draw docs/noise.md; with `--pictures` the racer, too."""
+    """Write docs/benchmarks.md and pictures; with `--noise` draw docs/noise.md; with `--pictures` the racer, too."""
     source = "Written by `make docs` from `benchmarks/results/*.json`; measured by the scripts in `benchmarks/`."
     lines = ["# Benchmarks", "", source, ""]
     for name, title in TITLES.items():
@@ -104,6 +121,7 @@ def main() -> None:
             lines += [f"## {title}", "", about, "", *markdown(content["table"]), ""]
     (DOCS / "benchmarks.md").write_text("\n".join(lines))
     thrown()
+    families()
     if "--noise" in sys.argv or "--pictures" in sys.argv:
         noise()
     if "--pictures" in sys.argv:

@@ -16,7 +16,7 @@ from e2efly.device import wide_vectors
 from e2efly.env.stress import ROWS
 from e2efly.stress import stress
 from e2efly.tasks import TASKS
-from e2efly.vehicles import vehicle_file, vehicle_names
+from e2efly.vehicles import family_names, vehicle_file, vehicle_names
 from e2efly.zoo import FOLDER, USUAL, beside, contents, policy_file
 from tests.conftest import QUICK, NetworkTrace
 
@@ -56,7 +56,7 @@ def test_robust_policies_fly_vehicles_that_are_not_theirs() -> None:
 
 def test_it_has_every_task_for_the_usual_vehicle_and_none_is_large() -> None:
     assert set(contents()[USUAL]) == set(TASKS)
-    assert set(contents()) == set(vehicle_names())
+    assert set(contents()) == {*vehicle_names(), *family_names()}
     assert {file.stem for file in FOLDER.glob("*/*.onnx")} == set(TASKS)
     assert max(file.stat().st_size for file in FOLDER.glob("*/*.onnx")) < 1_000_000
 
@@ -66,6 +66,9 @@ def test_a_task_is_the_name_of_its_policy(tmp_path: Path) -> None:
     assert policy_file("hover", "crazyflie") == FOLDER / "crazyflie" / "hover.onnx"
     assert policy_file(tmp_path) == tmp_path / "policy.onnx"
     assert policy_file("runs/mine") == Path("runs/mine")
+    for whatever in (None, "vis_r", "any"):  # a policy of any vehicle goes by its family's name
+        assert policy_file("any/hover", whatever) == FOLDER / "any" / "hover.onnx"
+    assert policy_file("hover", "any") == FOLDER / "any" / "hover.onnx"
     with pytest.raises(ValueError, match=r"unknown policy 'hovr'.*hover"):
         policy_file("hovr")
     with pytest.raises(ValueError, match=r"no policy 'avoid' of vehicle 'crazyflie'; accepted: vis_r"):

@@ -91,12 +91,13 @@ def train(
     """
     config = preset(task, algo, preset_name)
     config = config if start_from is None else presets.gentle(config)
+    if vehicle is not None:
+        config = presets.for_vehicle(config, vehicle)
+        env = env and dataclasses.replace(env, vehicle=vehicle)
     given = {"env": env, "network": network, "algo": options} | changes
     if reward is not None:
         given["reward"] = reward if isinstance(reward, RewardConfig) else RewardConfig(reward, config.reward.parameters)
     config = dataclasses.replace(config, **{name: value for name, value in given.items() if value is not None})
-    if vehicle is not None:
-        config = presets.for_vehicle(config, vehicle)
     if start_from is not None:
         config = dataclasses.replace(config, start_from=str(policy_file(start_from, vehicle).absolute()))
     prepare(device)

@@ -2,7 +2,7 @@
 
 import dataclasses
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -16,13 +16,13 @@ from e2efly.budget import FASTEST, check_memory, check_time
 from e2efly.config import CameraConfig, EnvConfig, ImuConfig, RewardConfig, TaskConfig
 from e2efly.config.changes import changed, differing
 from e2efly.deploy.policy.images import NONE, Image
-from e2efly.deploy.policy.loader import Policy, load_policy
+from e2efly.deploy.policy.loader import Policy, level_and_still, load_policy
 from e2efly.device import prepare
 from e2efly.env import UNSEEN, Env, random_key
 from e2efly.episodes import Act, Episodes, rows, run_stepwise, summary
 from e2efly.learn.rundir import RunDirectory, run_of
 from e2efly.physics import State
-from e2efly.vehicles import Controller, Flown, load_vehicle, vehicle_names
+from e2efly.vehicles import Controller, Flown, family_names, load_family, load_vehicle, vehicle_names
 from e2efly.zoo import policy_file
 
 SEED = 1_000_000
@@ -65,25 +65,48 @@ class Candidate:
     changes: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
     """Where `env` is not what the run or the contract says: that and what flies, by dotted name."""
 
+    @property
+    def draws(self) -> bool:
+        """Whether every episode flies another vehicle, of the family that the policy was trained on."""
+        return load_family(self.vehicle) is not None
+
     @cached_property
     def flown(self) -> Flown:
-        """What flies, and what its flight controller takes it for.
+        """What flies, and what its flight controller takes it for: of a family's policy, the vehicle as it is.
 
         Raises:
-            ValueError: for a vehicle or a controller that there is not.
+            ValueError: for a vehicle or a controller that there is not, or that is none of the policy's family; where
+                every episode flies another vehicle.
         """
-        return Flown.of(load_vehicle(self.env.vehicle), load_vehicle(self.vehicle), self.controller)
+        vehicle = load_vehicle(self.vehicle)
+        if load_family(self.env.vehicle) is None:
+            return Flown.of(load_vehicle(self.env.vehicle), vehicle, self.controller)
+        if reasons := self.policy.contract.refusals(vehicle):
+            raise ValueError("\n".join(reasons))
+        tuned = dataclasses.replace(vehicle, control_rate=self.policy.contract.control_rate_hz)
+        return Flown(tuned, tuned)
+
+    @property
+    def latency(self) -> float:
+        """Seconds from observation to command with which one vehicle flies."""
+        return self.policy.contract.latency_of(self.flown.body)
 
     @property
     def at_home(self) -> "Candidate":
-        """The same on the vehicle that it was trained on."""
+        """The same on the vehicle that it was trained on; of a family's policy, on the one that it flies."""
+        if load_family(self.env.vehicle) is not None:
+            return self
         return dataclasses.replace(self, vehicle=self.env.vehicle, controller="policy")
 
     @property
     def notes(self) -> list[str]:
         """In which ways it does not fly what its run or its contract says, in words."""
         contract, notes = self.policy.contract, []
-        if load_vehicle(self.vehicle).hash != contract.vehicle_hash:
+        if contract.vehicle_ranges is not None:
+            every = f"Every episode flies another vehicle of {contract.vehicle}"
+            one = f"What flies is {self.vehicle}, by a policy of {contract.vehicle}"
+            notes.append(f"{every if self.draws else one}; the flight controller is tuned to it.")
+        elif load_vehicle(self.vehicle).hash != contract.vehicle_hash:
             told = "is tuned to it" if self.controller == "plant" else f"believes in the {contract.vehicle}"
             notes.append(
                 f"What flies is {self.vehicle}, by the policy of a {contract.vehicle}; the flight controller {told}."
@@ -99,7 +122,7 @@ class Candidate:
         Raises:
             ValueError: when the policy expects another observation or other images.
         """
-        env = Env.of(suite, RewardConfig({"prog2": 1.0}), self.env, flown=self.flown)
+        env = Env.of(suite, RewardConfig({"prog2": 1.0}), self.env, flown=None if self.draws else self.flown)
         check_observation(self.policy, env)
         return env
 
@@ -130,16 +153,35 @@ def candidate(
     else:
         config = run.config(names_vehicle=vehicle is not None)
         task, own = config.task, config.env
-    if vehicle is None and (known := load_vehicle(own.vehicle)).hash != (trained := loaded.contract.vehicle_hash):
+    trained = _trained_on(loaded)
+    if vehicle is None and (known := _hash(own.vehicle)) != trained:
         raise ValueError(
-            f"vehicle_hash is {trained} in {file}, but vehicle {own.vehicle} is {known.hash}; accepted: "
+            f"vehicle_hash is {trained} in {file}, but vehicle {own.vehicle} is {known}; accepted: "
             "the vehicle that the policy was trained on, or --vehicle"
         )
-    own = pinned(own, loaded) if env else own
+    own = pinned(own, loaded) if env or loaded.contract.vehicle_ranges else own
     flies = with_changes(own, env or {})
     found = Candidate(file, loaded, task, flies, run, vehicle or own.vehicle, controller, differing(own, flies))
-    _ = found.flown  # a name that there is not is refused here
+    if not found.draws or loaded.contract.vehicle_ranges is None:
+        _ = found.flown  # a name that there is not is refused here
+    elif _hash(found.vehicle) != trained:
+        raise ValueError(
+            f"--vehicle is {found.vehicle}, ranges that are not the policy's; accepted: {own.vehicle}, or one vehicle "
+            "within its ranges"
+        )
     return found
+
+
+def _hash(vehicle: str) -> str:
+    """Of a vehicle or a family."""
+    family = load_family(vehicle)
+    return load_vehicle(vehicle).hash if family is None else family.hash
+
+
+def _trained_on(policy: Policy) -> str | None:
+    """The hash of the vehicle or the family that a policy was trained on."""
+    c = policy.contract
+    return c.vehicle_hash if c.vehicle_ranges is None else c.vehicle_ranges.hash
 
 
 def with_changes(own: EnvConfig, changes: Mapping[str, Any]) -> EnvConfig:
@@ -308,7 +350,15 @@ def settling(suite: TaskConfig) -> float:
 
 def act_of(policy: Policy) -> Act:
     """A policy's ONNX graph, asked outside of JAX."""
-    return Act(policy.act, lambda n: np.zeros((n, policy.contract.memory_size), np.float32))
+    contract = policy.contract
+
+    def act(observation: np.ndarray, images: Sequence[np.ndarray], memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        finite = np.isfinite(observation).all(axis=-1, keepdims=True)
+        if not finite.all():  # an episode that is over goes on: what tumbles without a rate loop leaves all numbers
+            observation = np.where(finite, observation, level_and_still(contract))
+        return policy.act(observation, images, memory)
+
+    return Act(act, lambda n: np.zeros((n, contract.memory_size), np.float32))
 
 
 def episode_steps(task: TaskConfig, env: Any) -> int:
@@ -345,23 +395,25 @@ def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[Ta
     Raises:
         ValueError: when the vehicle that it was trained on cannot be found.
     """
-    c = policy.contract
+    c, trained = policy.contract, _trained_on(policy)
     name = c.vehicle
-    if vehicle is not None and load_vehicle(vehicle).hash == c.vehicle_hash:
+    if vehicle is not None and _hash(vehicle) == trained:
         name = vehicle
-    findable = name == vehicle or name in vehicle_names()
-    known = load_vehicle(name).hash if findable else "no vehicle that comes with the package"
-    if known != c.vehicle_hash:
+    findable = name == vehicle or name in (*vehicle_names(), *family_names())
+    known = _hash(name) if findable else "no vehicle that comes with the package"
+    if known != trained:
         raise ValueError(
-            f"vehicle_hash is {c.vehicle_hash} in the contract, but vehicle {c.vehicle!r} is {known}: it was trained "
+            f"vehicle_hash is {trained} in the contract, but vehicle {c.vehicle!r} is {known}: it was trained "
             "on other parameters; accepted: the file of that vehicle with --vehicle FILE.toml, or its run's folder"
         )
     counts = {f.name: f.size for f in c.observation}
+    latency = c.latency_range_s[0], c.latency_range_s[1]
+    one = c.vehicle_ranges is not None and name != vehicle and vehicle is not None
     config = EnvConfig(
         vehicle=name,
         command_mode=c.action.mode,
         control_rate=c.control_rate_hz,
-        action_latency=(c.latency_range_s[0], c.latency_range_s[1]),
+        action_latency=None if one else latency,  # one vehicle of a family has its own
         observation_latency=(c.observation_latency_range_s[0], c.observation_latency_range_s[1]),
         past_actions=counts.get("past_actions", 0) // 4,
         imu=ImuConfig(observed="gyroscope" in counts),

@@ -22,7 +22,7 @@ from e2efly.config import (
 )
 from e2efly.registry import is_shipped
 from e2efly.tasks import TASKS
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles import load_family, load_vehicle
 from e2efly.vehicles.names import unknown
 
 ROBUST, NOMINAL, PAPER = "robust", "nominal", "paper"
@@ -36,6 +36,13 @@ OTHERS = EnvConfig(
     disturbance=DisturbanceConfig(gust=1.0, thrust=0.25, rotor=0.1, sag=0.2, centre_of_mass=0.006),
 )  # fmt: skip
 """The vehicles of the preset `robust`."""
+BESIDE_FAMILY = EnvConfig(
+    latency_spread=(0.0, 0.012),
+    randomize={"inertia": 0.2, "motor_time_constant": 0.2, "rate_gain": 0.2},
+    wind=2.0,
+    disturbance=DisturbanceConfig(gust=0.3, thrust=0.1, rotor=0.03, sag=0.1),
+)
+"""What the preset `robust` draws of a family beside its vehicles: what their files do not know."""
 
 
 def names() -> tuple[str, ...]:
@@ -99,17 +106,16 @@ def _robust(task: type[TaskConfig], config: TrainConfig) -> TrainConfig:
     """Other vehicles in every episode, and a policy with a memory by which it feels them."""
     given = task.robust.get(config.algo.name)
     if given is None:
-        having = ", ".join(f"{name} by {' or '.join(known.robust)}" for name, known in TASKS.items() if known.robust)
-        raise ValueError(f"preset 'robust': accepted for {having}; not for {task.name} by {config.algo.name}")
-    return dataclasses.replace(
-        config,
-        env=OTHERS,
-        network=dataclasses.replace(config.network, recurrent=given.recurrent, hidden=given.hidden),
-        algo=dataclasses.replace(config.algo, **given.algo),
-        reward=config.reward if given.weights is None else RewardConfig(dict(given.weights), config.reward.parameters),
-        steps=given.steps,
-        chunk=given.chunk,
-    )
+        raise ValueError(
+            f"preset 'robust': accepted for {_having('robust')}; not for {task.name} by {config.algo.name}"
+        )
+    return given.into(dataclasses.replace(config, env=OTHERS))
+
+
+def _having(recipes: str) -> str:
+    """The tasks that have a recipe, and by which algorithms."""
+    found = {name: getattr(known, recipes) for name, known in TASKS.items()}
+    return ", ".join(f"{name} by {' or '.join(by)}" for name, by in found.items() if by)
 
 
 def _paper(task: type[TaskConfig], algo: str) -> TrainConfig:
@@ -143,16 +149,25 @@ def _paper(task: type[TaskConfig], algo: str) -> TrainConfig:
 
 
 def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
-    """A configuration for another vehicle, a name or a .toml file.
+    """A configuration for another vehicle or a family, a name or a .toml file.
 
     What the preset `robust` draws of mass and thrust becomes narrower, all in the same share, where its weakest vehicle
-    could not hover.
+    could not hover. For a family it draws `BESIDE_FAMILY`, and learns as the task says of families.
 
     Raises:
         ValueError: for a vehicle that there is not.
     """
     env = dataclasses.replace(config.env, vehicle=vehicle)
-    if (env.randomize, env.disturbance) == (OTHERS.randomize, OTHERS.disturbance):
+    robust = (env.randomize, env.disturbance) == (OTHERS.randomize, OTHERS.disturbance)
+    if robust and load_family(vehicle) is not None:
+        given = config.task.family.get(config.algo.name)
+        if given is None:
+            raise ValueError(
+                f"--vehicle is {vehicle}, a family; accepted by preset 'robust' for {_having('family')}; not for "
+                f"{config.task.name} by {config.algo.name}"
+            )
+        return given.into(dataclasses.replace(config, env=dataclasses.replace(BESIDE_FAMILY, vehicle=vehicle)))
+    if robust:
         margin = load_vehicle(vehicle).thrust_to_weight
         shares = (_narrower(percent / 100) for percent in range(100, -1, -1))
         drawn = next(drawn for drawn in shares if margin * drawn.weakest >= 1)

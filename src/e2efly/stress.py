@@ -83,6 +83,11 @@ def stress(
     check_rows(rows)
     prepare(device)
     found = candidate(policy, vehicle, controller)
+    if found.draws:
+        raise ValueError(
+            f"--vehicle is {vehicle or 'left out'}; accepted with --stress: one vehicle within the ranges of "
+            f"{found.vehicle}, about which the rows lie"
+        )
     return Report(found, seed, fly_rows(found, rows or tuple(ROWS), episodes, seed))
 
 

@@ -133,6 +133,7 @@ def test_command_limits_of_the_paper(vis_r: Vehicle) -> None:
     top = 4 * 5.12 / 0.75
     expected = {
         "rotor_thrust": ([vis_r.thrust_range[0]] * 4, [5.12] * 4),
+        "rotor_share": ([0] * 4, [1] * 4),
         "ctbr": ([0, -10, -10, -4], [top, 10, 10, 4]),
         "attitude": ([0, -0.8, -0.8, -np.pi], [top, 0.8, 0.8, np.pi]),
         "acceleration": ([-8, -8, -8, -np.pi], [8, 8, 8, np.pi]),

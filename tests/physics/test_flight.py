@@ -128,6 +128,7 @@ def test_wind_is_a_moving_frame(
 
 COMMANDS = {
     "rotor_thrust": (1.9, 1.7, 2.0, 1.8),
+    "rotor_share": (0.37, 0.33, 0.39, 0.35),
     "ctbr": (11.0, 1.0, -2.0, 0.7),
     "attitude": (10.0, 0.3, -0.2, 0.5),
     "acceleration": (1.0, -2.0, 0.5, 0.6),
@@ -162,6 +163,7 @@ def test_mirrored_flight(mode: str, vis_r: Vehicle, gentle: State, fly: Callable
     physics, command = physics_of(vis_r, mode), np.array(COMMANDS[mode])
     mirrored = {
         "rotor_thrust": command[[2, 3, 0, 1]],
+        "rotor_share": command[[2, 3, 0, 1]],
         "ctbr": command * [1, -1, 1, -1],
         "attitude": command * [1, -1, 1, -1],
     }.get(mode, command * [1, -1, 1, -1])
@@ -186,7 +188,12 @@ def test_no_compass_direction_is_special(mode: str, vis_r: Vehicle, gentle: Stat
 
     physics, command = physics_of(vis_r, mode), jnp.asarray(COMMANDS[mode])
     level = jnp.append(rotation.rotate(turn, command[:3]), command[3] + angle)
-    other = {"rotor_thrust": command, "ctbr": command, "attitude": command.at[3].add(angle)}.get(mode, level)
+    other = {
+        "rotor_thrust": command,
+        "rotor_share": command,
+        "ctbr": command,
+        "attitude": command.at[3].add(angle),
+    }.get(mode, level)
     path = fly(physics, vis_r, gentle, jnp.broadcast_to(command, (15, 4)))
     expected = fly(physics, vis_r, turned(gentle), jnp.broadcast_to(other, (15, 4)))
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, atol=1e-9), turned(path), expected)

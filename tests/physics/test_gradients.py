@@ -29,9 +29,13 @@ SHAPES = {
 }
 """The vehicle's parameters that move the plant."""
 KRAD = 1000.0
-HOVER = {"rotor_thrust": [0.75 * 9.81 / 4] * 4, "ctbr": [9.81, 0, 0, 0], "attitude": [9.81, 0, 0, 0]}
+HOVER = {
+    "rotor_thrust": [0.75 * 9.81 / 4] * 4, "rotor_share": [0.75 * 9.81 / 4 / 5.12] * 4, "ctbr": [9.81, 0, 0, 0],
+    "attitude": [9.81, 0, 0, 0],
+}  # fmt: skip
 COMMANDS = {
     "rotor_thrust": [1.9, 1.7, 2.0, 1.8],
+    "rotor_share": [0.37, 0.33, 0.39, 0.35],
     "ctbr": [11.0, 1.0, -2.0, 0.7],
     "attitude": [10.0, 0.3, -0.2, 0.5],
     "acceleration": [1.0, -2.0, 0.5, 0.6],
@@ -40,6 +44,7 @@ COMMANDS = {
 }
 EXTREME = {
     "rotor_thrust": [9.0, -1.0, 9.0, 8.0],
+    "rotor_share": [1.8, -0.2, 1.8, 1.6],
     "ctbr": [80.0, 9.0, -20.0, 3.0],
     "attitude": [70.0, 1.5, -1.5, 2.0],
     "acceleration": [50.0, -60.0, 40.0, 0.6],

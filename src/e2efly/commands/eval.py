@@ -29,7 +29,7 @@ class Eval:
 
     policy: tyro.conf.Positional[Path]
     """A run directory, a policy.onnx, or a task: the zoo's policy of it. That is --vehicle's where the zoo has such a
-    vehicle, and else VIS-R's."""
+    vehicle, and else VIS-R's; `any/hover` is that of any vehicle."""
     episodes: int = 1000
     """Starts of each criterion."""
     json: Path | None = None
@@ -39,7 +39,8 @@ class Eval:
     seed: int = 1_000_000
     """Seed of the starts."""
     vehicle: str | None = None
-    """What flies, a name or a .toml file; left out: the policy's own vehicle. The policy is not changed."""
+    """What flies, a name or a .toml file; left out: the policy's own vehicle, or of a family another one in every
+    episode. The policy is not changed."""
     controller: Controller = "policy"
     """The vehicle that the flight controller believes in: the policy's own, whatever flies (policy), or the one that
     flies (plant)."""

@@ -121,6 +121,11 @@ def run(options: Fly) -> int:
     loaded = None if policy is None else load_policy(policy)
     if loaded is None and options.vehicle is None:
         raise ValueError("--vehicle is left out; accepted: a vehicle's name or .toml file, as no policy names one")
+    if loaded is not None and loaded.contract.vehicle_ranges is not None and options.vehicle is None:
+        raise ValueError(
+            f"--vehicle is left out; accepted: a name or .toml file, as the policy flies any vehicle within the ranges "
+            f"of {loaded.contract.vehicle!r}"
+        )
     body = load_vehicle(options.vehicle or _own_vehicle(policy, loaded))
     runtime = None
     if loaded is not None:

@@ -11,7 +11,7 @@ from e2efly.device import prepare
 from e2efly.registry import load_installed
 from e2efly.tasks import TASKS
 from e2efly.terminal import Terminal
-from e2efly.vehicles import load_vehicle, vehicle_names
+from e2efly.vehicles import family_names, load_family, load_vehicle, vehicle_names
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,14 @@ def run(options: List) -> int:
         v = load_vehicle(name)
         vehicles.add_row(name, f"{v.mass:g}", f"{v.thrust_to_weight:.2f}", f"{v.latency:g}", v.hash)
     console.print(vehicles)
+    families = Table("family", "mass, kg", "thrust/weight", "latency, s", "hash", box=None, header_style="bold")
+    for name in family_names():
+        family = load_family(name)
+        assert family is not None
+        r = family.ranges
+        spans = ("{:g} to {:g}".format(*pair) for pair in (r.mass, r.thrust_to_weight, r.latency))
+        families.add_row(name, *spans, r.hash)
+    console.print(families)
     terms = Table("reward term", "gradient", "what it is (unweighted)", box=None, header_style="bold")
     for name, term in TERMS.items():
         terms.add_row(name, term.kind, (term.function.__doc__ or "").split("\n")[0])

@@ -153,7 +153,10 @@ def _options(config: TrainConfig, preset: str) -> tuple[type, Any]:
         ("task_name", tyro.conf.Positional[_help(str, f"What to learn: {_join(TASKS)}; or {_OWN}.", metavar="TASK")]),
         ("algo_name", _help(str, f"Algorithm: {_join(ALGORITHMS)}; or {_OWN}.", name="algo")),
         ("preset", _help(str, f"Where the defaults come from: {_join(presets.names())}.")),
-        ("vehicle", _help(str, "A shipped vehicle, or the path of a .toml file.")),
+        (
+            "vehicle",
+            _help(str, "A shipped vehicle, `any` for a family of vehicles, or the path of a .toml file of either."),
+        ),
         ("seed", _help(int, "Seed of everything random.")),
         ("out", _help(Path | None, "Run directory; left out: runs/TASK-ALGO-SEED, or runs/TASK-ALGO-VEHICLE-SEED.")),
         ("resume", _help(bool, "Go on with the run in --out. `e2efly train --resume DIR` is enough.")),

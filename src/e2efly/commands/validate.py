@@ -33,7 +33,7 @@ class Validate:
 
     policy: tyro.conf.Positional[Path]
     """A run directory, a policy.onnx, or a task: the zoo's policy of it. That is --vehicle's where the zoo has such a
-    vehicle, and else VIS-R's."""
+    vehicle, and else VIS-R's; `any/hover` is that of any vehicle."""
     plant: str = "mujoco"
     """What flies: simulator (our own, by the bridge's runtime), mujoco, betaflight (the real firmware over our rigid
     body), or one of your own: path/to/plant.py:Name."""
@@ -154,7 +154,7 @@ def _whole_flights(found: "Validation", count: int, console: Console) -> bool:
     from e2efly.vehicles import load_vehicle
 
     body, policy = load_vehicle(found.candidate.vehicle), found.candidate.policy
-    if not found.plant.whole_flights or not count or body.hash != policy.contract.vehicle_hash:
+    if not found.plant.whole_flights or not count or policy.contract.refusals(body):
         return True
     flights = fly_whole(policy, body, count, console)
     console.print(flights_table(flights))

@@ -1,7 +1,7 @@
 """Options of a run: all of the others, and how to learn."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 from e2efly.config.algorithms import ALGORITHMS, AlgorithmConfig
@@ -80,6 +80,18 @@ class Robust:
     hidden: tuple[int, ...] = (64, 64)
     """Units of the hidden layers."""
 
+    def into(self, config: "TrainConfig") -> "TrainConfig":
+        """A configuration that learns so."""
+        given = config.reward.parameters
+        return replace(
+            config,
+            network=replace(config.network, recurrent=self.recurrent, hidden=self.hidden),
+            algo=replace(config.algo, **self.algo),
+            reward=config.reward if self.weights is None else RewardConfig(dict(self.weights), given),
+            steps=self.steps,
+            chunk=self.chunk,
+        )
+
 
 @dataclass(frozen=True)
 class TaskConfig:
@@ -109,6 +121,8 @@ class TaskConfig:
     charge for a crash."""
     robust: ClassVar[Mapping[str, Robust]] = {}
     """How it is learned for vehicles that are not the file's, by algorithm: those have the preset `robust`."""
+    family: ClassVar[Mapping[str, Robust]] = {}
+    """How it is learned for all vehicles of a family together, by algorithm."""
     cameras: ClassVar[tuple[CameraConfig, ...]] = ()
     """What its policies see."""
     curriculum: ClassVar[tuple["StageConfig", ...]] = ()

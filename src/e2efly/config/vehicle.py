@@ -36,7 +36,8 @@ class DisturbanceConfig:
     sag: float = number(0.0, high=0.9)
     """Share of the thrust that is lost, evenly, by the end of the episode, as by a battery that empties."""
     centre_of_mass: float = 0.0
-    """Half-width of the offset of the centre of mass, forward and left, m per axis."""
+    """Half-width of the offset of the centre of mass, forward and left, m per axis; of a family: of its middle vehicle,
+    and of the others in proportion to their arms."""
     drift: float = 0.0
     """Standard deviation of the observed position's random walk after one second, m per axis."""
 
@@ -146,7 +147,7 @@ class EnvConfig:
     """The vehicle, its controller, and what is random about them."""
 
     vehicle: str = "vis_r"
-    """A shipped vehicle's name, or the path of a .toml file."""
+    """A shipped vehicle's name, `any`, or the path of a .toml file: of a vehicle, or of ranges of many (a family)."""
     command_mode: str = "ctbr"
     """What the policy commands: a command mode of `e2efly list` (sets the program)."""
     integrator: str = "rk3"

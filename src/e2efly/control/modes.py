@@ -14,6 +14,7 @@ from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 Four = tuple[float, float, float, float]
 Limits = tuple[list[float], list[float]]
+ROTORS = ("rear_right", "front_right", "rear_left", "front_left")
 THRUST, RATES = "collective_thrust", ("rad/s", "rad/s", "rad/s")
 
 
@@ -29,11 +30,13 @@ class CommandMode:
     limits: Callable[[Vehicle, float], Limits]
     """(nominal vehicle, reach of positions in m) -> smallest and largest command."""
     controller: Controller | None
-    """How a command becomes CTBR; None: it is the thrusts of the rotors."""
+    """How a command becomes CTBR; None: it is the thrusts of the rotors, below the flight controller's rate loop."""
     hover: Callable[[Vehicle], Four] = lambda vehicle: (0.0, 0.0, 0.0, 0.0)
     """The command that hovers a level vehicle, where the mode has one."""
     fixed: tuple[str, ...] = ("origin_yaw",)
     """Options of a goal that would move the world under the command: those of its axes, which no policy sees."""
+    of_largest: bool = False
+    """Whether thrusts of rotors are shares of the largest; else they are N."""
 
 
 def ctbr(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
@@ -80,16 +83,19 @@ def _with_thrust(vehicle: Vehicle, *limits: float) -> Limits:
     return [0.0, *low], [4 * vehicle.thrust_range[1] / vehicle.mass, *high]
 
 
-def _weight(vehicle: Vehicle) -> Four:
-    return (vehicle.mass * GRAVITY / 4,) * 4
+def _each(x: float) -> Four:
+    return x, x, x, x
 
 
 COMMAND_MODES: dict[str, CommandMode] = {
     mode.name: mode
     for mode in (
         CommandMode(
-            "rotor_thrust", ("rear_right", "front_right", "rear_left", "front_left"), ("N", "N", "N", "N"),
-            _rotors, None, hover=_weight,
+            "rotor_thrust", ROTORS, ("N", "N", "N", "N"), _rotors, None, hover=lambda v: _each(v.mass * GRAVITY / 4),
+        ),
+        CommandMode(
+            "rotor_share", ROTORS, ("1", "1", "1", "1"), lambda v, _: ([0.0] * 4, [1.0] * 4), None,
+            hover=lambda v: _each(1 / v.thrust_to_weight), of_largest=True,
         ),
         CommandMode(
             "ctbr", (THRUST, "roll_rate", "pitch_rate", "yaw_rate"), ("m/s^2", *RATES),

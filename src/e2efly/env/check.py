@@ -6,7 +6,7 @@ from e2efly.config import EnvConfig, TaskConfig, check_numbers
 from e2efly.deploy.policy.contract_json import LATEST
 from e2efly.scenes.camera import check as check_camera
 from e2efly.sensors.image_noise import check as check_noise
-from e2efly.vehicles import load_vehicle, unknown
+from e2efly.vehicles import load_family, nominal_vehicle, unknown
 from e2efly.vehicles.vehicle import quantities
 
 COUNTED = 2**24
@@ -38,10 +38,11 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
         raise ValueError(f"env.past_actions is {config.past_actions}; accepted: 0 or more")
     if not (math.isfinite(config.wind) and config.wind >= 0):
         raise ValueError(f"env.wind is {config.wind}; accepted: 0 or more, m/s")
-    vehicle = load_vehicle(config.vehicle)
-    if config.action_latency is None and vehicle.latency + config.latency_spread[1] > LATEST:
+    vehicle, family = nominal_vehicle(config.vehicle), load_family(config.vehicle)
+    latest = vehicle.latency if family is None else family.ranges.latency[1]
+    if config.action_latency is None and latest + config.latency_spread[1] > LATEST:
         raise ValueError(
-            f"latency of vehicle {vehicle.name} is {vehicle.latency} s, env.latency_spread {config.latency_spread}; "
+            f"latency of vehicle {vehicle.name} is {latest} s, env.latency_spread {config.latency_spread}; "
             f"accepted: at most {LATEST:g} s together"
         )
     rate = vehicle.control_rate if config.control_rate is None else config.control_rate
@@ -73,12 +74,13 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
         ("env.imu", config.imu),
     ):
         check_numbers(prefix, part)
-    d, drawn = config.disturbance, vehicle.thrust_to_weight * config.weakest
+    margin = vehicle.thrust_to_weight if family is None else family.ranges.thrust_to_weight[0]
+    d, drawn = config.disturbance, margin * config.weakest
     if drawn < 1:
         raise ValueError(
             f"env.randomize is {dict(config.randomize)} and env.disturbance has thrust {d.thrust:g}, "
             f"rotor {d.rotor:g}, sag {d.sag:g}: the weakest vehicle of these cannot hover (thrust to weight "
-            f"{drawn:.2f}; {config.vehicle} has {vehicle.thrust_to_weight:.2f}); accepted: draws that leave at least 1"
+            f"{drawn:.2f}; {config.vehicle} has {margin:.2f}); accepted: draws that leave at least 1"
         )
     for name, part in vars(task).items():
         if hasattr(part, "check"):

@@ -39,7 +39,8 @@ from e2efly.sensors import imu, latency
 from e2efly.sensors.eyes import Eye, image_shape, see
 from e2efly.sensors.noise import add_noise
 from e2efly.tasks.task import Shape, Task, into_ball, make_task, uniform
-from e2efly.vehicles import Flown, Vehicle, load_vehicle
+from e2efly.vehicles import Family, Flown, Vehicle, load_family, nominal_vehicle
+from e2efly.vehicles.family import DRAWN
 
 LEADS = (0.0, 0.25, 0.5, 1.0, 1.5)
 """How far ahead a critic is told the clearance, s."""
@@ -55,7 +56,7 @@ DEFAULT = EnvConfig()
         "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range",
         "observation_latency_range", "randomize", "wind", "disturbance", "noise", "imu", "cameras",
     ],
-    meta_fields=["queue", "seen_actions", "past"],
+    meta_fields=["queue", "seen_actions", "past", "family"],
 )  # fmt: skip
 @dataclass(frozen=True)
 class Env:
@@ -87,6 +88,8 @@ class Env:
     """Past actions in the observation."""
     past: int
     """States that are kept for late observations and images; 0: none."""
+    family: Family | None = None
+    """Where every episode has another vehicle, of which its flight controller knows; `physics` has the middle one."""
 
     @staticmethod
     def of(
@@ -103,12 +106,13 @@ class Env:
             reward: what it pays for.
             config: its vehicle gives the limits of the commands, the control rate and the latency.
             dtype: of all numbers.
-            flown: what flies, and what the flight controller takes it for; None: both are the configuration's vehicle.
+            flown: what flies, and what the flight controller takes it for; None: both are the configuration's vehicle,
+                or, where that is a family, every episode draws one.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.
         """
-        vehicle = load_vehicle(config.vehicle)
+        vehicle, family = nominal_vehicle(config.vehicle), load_family(config.vehicle)
         physics = Physics.of(
             vehicle, config.command_mode, config.integrator, config.control_rate, config.largest_step, dtype
         )
@@ -121,12 +125,10 @@ class Env:
             physics = physics if flown.as_believed else physics.flying(body, dtype)
         check(config, task)
         rewards.check(reward.weights, reward.parameters)
-        sooner, later = config.latency_spread
-        late = config.action_latency or (max(vehicle.latency - sooner, 0.0), vehicle.latency + later)
+        late = config.action_latency or _latencies(config, body, family if flown is None else None)
         frames = latency.frames(late[1], period)
         seen = frames if config.past_actions is None else config.past_actions
-        mode = COMMAND_MODES[config.command_mode]
-        low, high = command_limits(mode, vehicle, config.position_range)
+        mode, (low, high) = COMMAND_MODES[config.command_mode], limits_of(config)
         noisy = config.noise != NoiseConfig()
         shape = Shape(body.feet_height, body.radius)
         oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
@@ -149,23 +151,24 @@ class Env:
             queue=max(frames + 1, seen, 2),
             seen_actions=seen,
             past=latency.frames(oldest, period) + 1 if oldest else 0,
+            family=family if flown is None else None,
         )
 
     @property
     def is_disturbed(self) -> bool:
         """Whether episodes have vehicles, delays or air that are not those of the vehicle's file."""
         sooner, later = self.latency_range
-        spread = sooner != later
+        spread = sooner != later and self.family is None
         return bool(spread or any(self.randomize.values()) or self.wind or self.disturbance)
 
     def undisturbed(self) -> "Env":
-        """The environment with the vehicle of the file, its delay and still air. Numbers alone differ, so that the
-        same compiled programs take it.
+        """The environment with the vehicle of the file, its delay and still air; of a family, with its vehicles and
+        their delays. Numbers alone differ, so that the same compiled programs take it.
         """
         nominal = np.clip(np.asarray(self.physics.nominal.latency, self.latency_range.dtype), *self.latency_range)
         return dataclasses.replace(
             self,
-            latency_range=np.stack([nominal, nominal]),
+            latency_range=np.stack([nominal, nominal]) if self.family is None else self.latency_range,
             randomize={name: 0 * width for name, width in self.randomize.items()},
             wind=self.wind and 0 * self.wind,
             disturbance=self.disturbance and DisturbanceConfig(),
@@ -287,15 +290,15 @@ class Env:
         period = self.control_period
         actions = jnp.concatenate([action[:, None], state.actions[:, :-1]], axis=1)
         old, new, switch = latency.acting_commands(self.command(actions), state.action_latency, period)
-        before = state.vehicle
-        plant = dataclasses.replace(self.physics.flown, **state.plant)
+        before, physics = state.vehicle, self._physics(state.family)
+        plant = dataclasses.replace(physics.flown, **state.plant)
         wind, share, disturbed = state.wind, None, state.disturbance
         if disturbed is not None:
             gust = jnp.asarray(disturbed.gust)
             wind = gust if wind is None else wind + gust
             share = disturbed.share(state.time / self.task.episode_s)
             disturbed = disturbance.advance(disturbed, _key(state, DISTURBED), period)
-        after = step(self.physics, plant, before, new, previous=old, switch_time=switch, wind=wind, rotor_share=share)
+        after = step(physics, plant, before, new, previous=old, switch_time=switch, wind=wind, rotor_share=share)
 
         time = (jnp.round(state.time / period) + 1) * period  # whole periods: float32 sums drift
         late = time >= self.task.episode_s - 1e-3 * period
@@ -312,6 +315,7 @@ class Env:
             action_latency=state.action_latency,
             plant=state.plant,
             wind=state.wind,
+            family=state.family,
             disturbance=disturbed,
             past=None if state.past is None else _push(state.past, after),
             observation_latency=state.observation_latency,
@@ -356,15 +360,22 @@ class Env:
 
     def _start(self, key: PRNGKeyArray, n: int, tick: Int[Array, ""]) -> EnvState:
         task_key, plant_key, wind_key, action_key, observation_key, eyes_key, onward = jax.random.split(key, 7)
-        disturbed, plant = None, _perturbed(plant_key, n, self.physics.flown, self.randomize)
+        family = None
+        if self.family is not None:
+            family = jax.random.uniform(jax.random.fold_in(plant_key, 2), (n, DRAWN), self.center.dtype)
+        flown = self._physics(family).flown
+        disturbed, plant = None, _perturbed(plant_key, n, self.physics.flown, self.randomize, flown)
         if self.disturbance is not None:
             disturbed_key, mass_key = jax.random.split(jax.random.fold_in(plant_key, 1))
             disturbed = disturbance.draw(self.disturbance, disturbed_key, n)
-            rotors: Any = plant.get("rotor_position", self.physics.flown.rotor_position)
-            plant["rotor_position"] = rotors - self.disturbance.centre_of_mass * uniform(mass_key, n, 2)[:, None]
+            rotors: Any = plant.get("rotor_position", flown.rotor_position)
+            offset = self.disturbance.centre_of_mass * uniform(mass_key, n, 2)[:, None]
+            if self.family is not None:  # in proportion to the size
+                offset = offset * jnp.abs(flown.rotor_position / self.physics.flown.rotor_position)
+            plant["rotor_position"] = rotors - offset
         dtype = self.center.dtype
         vehicle, memory = self.task.start(task_key, n)
-        rotor_speed = jnp.broadcast_to(hover_rotor_speed(self.physics.flown), (n, 4))
+        rotor_speed = jnp.broadcast_to(jnp.asarray(hover_rotor_speed(flown))[..., None], (n, 4))
         vehicle = dataclasses.replace(vehicle, rotor_speed=rotor_speed)
         vehicle = jax.tree.map(lambda x: x.astype(dtype), vehicle)
         past = None
@@ -378,6 +389,7 @@ class Env:
             action_latency=_between(action_key, n, self.latency_range),
             plant=plant,
             wind=None if self.wind is None else self.wind * into_ball(uniform(wind_key, n, 3)),
+            family=family,
             disturbance=disturbed,
             past=past,
             observation_latency=_between(observation_key, n, self.observation_latency_range),
@@ -387,6 +399,12 @@ class Env:
             key=onward,
             tick=tick,
         )
+
+    def _physics(self, family: Float[Array, "n u"] | None) -> Physics:
+        """The physics of each episode's vehicle."""
+        if self.family is None or family is None:
+            return self.physics
+        return self.physics.of_each(self.family.draw(family))
 
     def _reads(self, *signals: str) -> bool:
         """Whether a term of the reward reads one of them."""
@@ -452,8 +470,11 @@ def _between(key: PRNGKeyArray, n: int, bounds: Float[Array | np.ndarray, "2"]) 
     return bounds[0] + (bounds[1] - bounds[0]) * jax.random.uniform(key, (n,), jnp.asarray(bounds).dtype)
 
 
-def _perturbed(key: PRNGKeyArray, n: int, nominal: Vehicle, widths: dict[str, Any]) -> dict[str, Array]:
-    """Each named parameter times a uniform factor in 1 +- its width, entry by entry."""
+def _perturbed(key: PRNGKeyArray, n: int, nominal: Vehicle, widths: dict[str, Any], flown: Vehicle) -> dict[str, Array]:
+    """Each named parameter of what flies times a uniform factor in 1 +- its width, entry by entry.
+
+    `nominal` has the same fields without the axis of the batch that `flown` may have.
+    """
     values = {name: jnp.asarray(getattr(nominal, name)) for name in sorted(widths)}
     ends = np.cumsum([value.size for value in values.values()])
     # one draw of all: on a CPU a dozen small ones take several times as long
@@ -461,8 +482,28 @@ def _perturbed(key: PRNGKeyArray, n: int, nominal: Vehicle, widths: dict[str, An
     plant = {}
     for (name, value), end in zip(values.items(), ends, strict=True):
         factor = drawn[:, end - value.size : end].reshape(n, *value.shape).astype(value.dtype)
-        plant[name] = value * (1 + widths[name] * factor)
+        plant[name] = getattr(flown, name) * (1 + widths[name] * factor)
     return plant
+
+
+def limits_of(config: EnvConfig) -> np.ndarray:
+    """Smallest and largest command, (2, 4): of the nominal vehicle, or all vehicles of a family together.
+
+    Raises:
+        ValueError: for a family in a command mode that its vehicles do not share.
+    """
+    family = load_family(config.vehicle)
+    if family is not None:
+        return np.asarray(family.limits(config.command_mode), np.float64)
+    mode = COMMAND_MODES[config.command_mode]
+    return command_limits(mode, nominal_vehicle(config.vehicle), config.position_range)
+
+
+def _latencies(config: EnvConfig, vehicle: Vehicle, family: Family | None) -> tuple[float, float]:
+    """Seconds from observation to command where the configuration does not say."""
+    low, high = (vehicle.latency,) * 2 if family is None else family.ranges.latency
+    sooner, later = config.latency_spread
+    return max(low - sooner, 0.0), high + later
 
 
 def _wrap(angle: Array) -> Array:

@@ -30,6 +30,8 @@ class EnvState:
     """The randomised vehicle parameters."""
     wind: Float[Array, "n 3"] | None
     """World, m/s."""
+    family: Float[Array, "n u"] | None
+    """The uniform numbers that make each episode's vehicle, where that is of a family."""
     disturbance: Disturbance | None
     """Gusts, rotors, sag and drift."""
     past: State | None

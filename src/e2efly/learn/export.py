@@ -10,18 +10,19 @@ from onnx import helper
 
 from e2efly import __version__
 from e2efly.config import TrainConfig
-from e2efly.control import COMMAND_MODES, command_limits
+from e2efly.control import COMMAND_MODES
 from e2efly.deploy.policy.contract import CONTRACT_VERSION, METADATA_KEY, Action, Contract
 from e2efly.deploy.policy.images import NONE, Image
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.deploy.policy.onnx_file import sealed
 from e2efly.env import Env
+from e2efly.env.environment import limits_of
 from e2efly.learn.graph import OPERATORS, policy_graph
 from e2efly.learn.networks import FAINTEST, NEAREST, Actor, View, Weights
 from e2efly.observation import Field
 from e2efly.storage import write_atomically
 from e2efly.tasks import TASKS
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles import load_family, nominal_vehicle
 from e2efly.vehicles.vehicle import quantities
 
 OPSET, IR_VERSION = 17, 8
@@ -39,15 +40,21 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         ValueError: when `env` was not built from `config.env` and the vehicle as it is now, naming the field.
     """
     about, physics = config.env, env.physics
-    vehicle, mode = load_vehicle(about.vehicle), COMMAND_MODES[about.command_mode]
+    vehicle, mode, family = (
+        nominal_vehicle(about.vehicle),
+        COMMAND_MODES[about.command_mode],
+        load_family(about.vehicle),
+    )
     rate = vehicle.control_rate if about.control_rate is None else about.control_rate
-    low, high = command_limits(mode, vehicle, about.position_range)
+    low, high = limits_of(about)
     _same("command_mode", physics.command_mode, mode.name)
     _same("control_period", physics.control_period, 1 / rate)
     for name in (field.name for field in quantities()):
         _same(f"vehicle {vehicle.name}: {name}", getattr(physics.nominal, name), getattr(vehicle, name))
     _same("position_range (centre of the commands)", env.center, (low + high) / 2)
     _same("position_range (half range of the commands)", env.half, (high - low) / 2)
+    if env.family != family:
+        raise ValueError(f"family of the environment is {env.family}; its configuration says {family}")
     if env.cameras != about.cameras:
         raise ValueError(f"cameras of the environment are {env.cameras}; its configuration says {about.cameras}")
     actor = Actor.of(env.fields, env.cameras, config.network)
@@ -58,7 +65,8 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         e2efly_version=__version__,
         task=TASKS.reference(type(config.task)),
         vehicle=vehicle.name,
-        vehicle_hash=vehicle.hash,
+        vehicle_hash=vehicle.hash if family is None else None,
+        vehicle_ranges=None if family is None else family.ranges,
         control_rate_hz=float(rate),
         latency_s=float(vehicle.latency) if latency[0] <= vehicle.latency <= latency[1] else sum(latency) / 2,
         latency_range_s=latency,

@@ -26,6 +26,9 @@ def control_law(mode: CommandMode) -> Law:
 
     def law(vehicle: Vehicle, mixer: Mixer, parts: Parts, command: Command) -> Rotors:
         if controller is None:
+            if mode.of_largest:
+                a, b, c, d = (share * mixer.thrust_max for share in command)
+                command = a, b, c, d
             return rotor_speed_for(vehicle, mixer.limit(command))
         return _rates(vehicle, mixer, parts, controller(vehicle, parts, command))
 

@@ -18,7 +18,7 @@ class Mixer:
     """The inverse of the rotor geometry, and the thrust limits, of the nominal vehicle."""
 
     matrix: np.ndarray | Array
-    """(4, 4): rotor thrusts, N, from [collective, N; roll, pitch, yaw torque, N*m]."""
+    """(*n, 4, 4): rotor thrusts, N, from [collective, N; roll, pitch, yaw torque, N*m]."""
     thrust_min: float | Array
     """Thrust of a rotor at idle, N."""
     thrust_max: float | Array
@@ -32,6 +32,20 @@ class Mixer:
         low, high = vehicle.thrust_range
         return Mixer(np.linalg.inv(allocation_matrix(vehicle)).astype(dtype), dtype(low), dtype(high))
 
+    @staticmethod
+    def of_each(vehicle: Vehicle) -> "Mixer":
+        """The mixers of a batch of vehicles whose rotors lie symmetrically to both axes, as a family draws them.
+
+        There the rows of the allocation are orthogonal, and its inverse is its transpose over their squares.
+        """
+        x, y = vehicle.rotor_position[..., 0], vehicle.rotor_position[..., 1]
+        yaw = vehicle.rotor_spin * vehicle.torque_ratio[..., None]
+        rows = [jnp.ones_like(x), y, -x, yaw]
+        matrix = jnp.stack([row / jnp.sum(row**2, axis=-1, keepdims=True) for row in rows], axis=-1)
+        k2, k1, k0 = (vehicle.thrust_map[..., i] for i in range(3))
+        idle = vehicle.rotor_speed_min
+        return Mixer(matrix, (k2 * idle + k1) * idle + k0, vehicle.rotor_thrust_max)
+
     def limit(self, thrust: Rotors) -> Rotors:
         """Each rotor's thrust clipped to what it can give."""
         a, b, c, d = (jnp.clip(f, self.thrust_min, self.thrust_max) for f in thrust)
@@ -44,13 +58,13 @@ class Mixer:
         until every rotor is inside its limits.
         """
         m = self.matrix
-        spread = [m[i, 1] * torque.x + m[i, 2] * torque.y + m[i, 3] * torque.z for i in range(4)]
+        spread = [m[..., i, 1] * torque.x + m[..., i, 2] * torque.y + m[..., i, 3] * torque.z for i in range(4)]
         span = _max4(spread) - _min4(spread)
         available = self.thrust_max - self.thrust_min
         scale = available / jnp.maximum(span, available)
         if self.plain is not None:
             scale = scale + (1 - scale) * self.plain
-        asked = [m[i, 0] * collective + scale * spread[i] for i in range(4)]
+        asked = [m[..., i, 0] * collective + scale * spread[i] for i in range(4)]
         shift = jnp.maximum(self.thrust_min - _min4(asked), 0.0) - jnp.maximum(_max4(asked) - self.thrust_max, 0.0)
         if self.plain is not None:
             shift = shift * (1 - self.plain)

@@ -61,6 +61,10 @@ class Physics:
         moved = jax.tree.map(lambda x: np.asarray(x, dtype), body)
         return dataclasses.replace(self, body=moved, full_speed=dtype(body.full_rotor_speed))
 
+    def of_each(self, vehicle: Vehicle) -> "Physics":
+        """The same for a batch of vehicles of a family, of each of which its own flight controller knows."""
+        return dataclasses.replace(self, nominal=vehicle, mixer=Mixer.of_each(vehicle))
+
     @staticmethod
     def of(
         vehicle: Vehicle,

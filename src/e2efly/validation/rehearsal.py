@@ -89,7 +89,7 @@ def rehearse(
     """
     course = whole_course(policy, vehicle) if course is None else course
     with tempfile.TemporaryDirectory(prefix="e2efly-") as temporary:
-        latency = max(policy.contract.latency_s - LINK_S, 0.0)
+        latency = max(policy.contract.latency_of(vehicle) - LINK_S, 0.0)
         with Rig(firmware, folder or Path(temporary), vehicle, latency=latency, seed=seed) as rig:
             return _fly(rig, policy, course, seed, log)
 

@@ -100,10 +100,9 @@ class Validation:
             notes.append(f"Trained with {there}: there in `training`, not on the plant.")
         low, high = policy.latency_range_s
         if low < high:
-            notes.append(
-                f"Trained with a latency of {low:g} to {high:g} s; the plant flies with {policy.latency_s:g} s."
-            )
-        if (own := self.plant.latency) > policy.latency_s:
+            flies = self.candidate.latency
+            notes.append(f"Trained with a latency of {low:g} to {high:g} s; the plant flies with {flies:g} s.")
+        if (own := self.plant.latency) > self.candidate.latency:
             notes.append(f"The plant itself takes {own:g} s from command to rate loop, longer than that.")
         return notes + self.candidate.notes
 
@@ -117,7 +116,7 @@ class Validation:
             "vehicle": self.candidate.vehicle,
             "controller": self.candidate.controller,
             "plant": plant,
-            "latency_s": contract.latency_s,
+            "latency_s": self.candidate.latency,
             "seed": self.seed,
             "max_drop": self.max_drop,
             "units": UNITS | {"drop": drop},
@@ -165,7 +164,7 @@ def validate(
     compute_at_once()
     prepare("cpu")  # the plants compute there, one vehicle at a time
     found, kind, own = flyable(policy, plant, vehicle, controller)
-    reality = Reality(found.flown.body, found.policy.contract.latency_s)
+    reality = Reality(found.flown.body, found.latency)
     check_realities(kind, found.flown.believed, [reality])
     suites = found.task.criteria()
     longest = max(float(suite.episode_s) for suite in suites.values())
@@ -195,13 +194,20 @@ def plant_name(plant: str | type[Plant]) -> str:
 def flyable(
     policy: str | os.PathLike[str], plant: str | type[Plant], vehicle: str | None, controller: Controller
 ) -> tuple[Candidate, type[Plant], Vehicle]:
-    """A policy that the runtime can fly, the plant, and the vehicle that the policy was trained on.
+    """A policy that the runtime can fly, the plant, and the vehicle that the policy was trained on; of a family's
+    policy, the one that it flies.
 
     Raises:
         ValueError: naming what does not fit.
     """
     kind, found = find_plant(plant_name(plant)), candidate(policy, vehicle, controller)
-    own = load_vehicle(found.env.vehicle)
-    if reasons := check(found.policy.contract, own, fields_of(found.policy.contract), imu=True):
+    contract = found.policy.contract
+    if found.draws:
+        raise ValueError(
+            f"--vehicle is {vehicle or 'left out'}; accepted: one vehicle within the ranges of {contract.vehicle!r}, "
+            "as a plant has one flight controller"
+        )
+    own = load_vehicle(found.env.vehicle) if contract.vehicle_ranges is None else found.flown.body
+    if reasons := check(contract, own, fields_of(contract), imu=True):
         raise ValueError("\n".join(reasons))
     return found, kind, own

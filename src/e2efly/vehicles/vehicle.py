@@ -6,6 +6,7 @@ Rotor order is Betaflight's: rear right, front right, rear left, front left. Bod
 import dataclasses
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -21,6 +22,10 @@ GRAVITY = 9.81
 """Standard gravity of the paper, m/s^2."""
 
 _HERE = Path(__file__).parent
+FAMILIES = _HERE / "families"
+"""The files of the families that the package ships."""
+OF_FAMILIES = "thrust_to_weight"
+"""A key that files of families alone have."""
 
 Controller = Literal["policy", "plant"]
 """The vehicle that the flight controller believes in: the policy's own, or the one that flies."""
@@ -189,18 +194,21 @@ def vehicle_names() -> list[str]:
 
 
 def vehicle_file(name_or_path: str | Path) -> Path:
-    """The TOML file of a shipped vehicle, by its name, or of any vehicle, by its path.
+    """The TOML file of a shipped vehicle or family, by its name, or of any other, by its path.
 
     Raises:
         ValueError: when there is none.
     """
     text = str(name_or_path)
-    path = Path(text) if text.endswith(".toml") else _HERE / f"{text.lower().replace('-', '_')}.toml"
-    if not path.is_file():
-        if text.endswith(".toml"):
+    if text.endswith(".toml"):
+        if not Path(text).is_file():
             raise ValueError(f"vehicle file {text!r} does not exist")
+        return Path(text)
+    name = f"{text.lower().replace('-', '_')}.toml"
+    found = next((path for path in (_HERE / name, FAMILIES / name) if path.is_file()), None)
+    if found is None:
         raise ValueError(unknown("vehicle", text, vehicle_names()) + ", or the path of a .toml file")
-    return path
+    return found
 
 
 def load_vehicle(name_or_path: str | Path) -> Vehicle:
@@ -210,11 +218,24 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
         ValueError: naming the file, the key, the value and what is accepted.
     """
     path = vehicle_file(name_or_path)
-    return _from_table(path.stem, read_table(path), str(path))
+    table, where = read_table(path), str(path)
+    if OF_FAMILIES in table:
+        raise ValueError(
+            f"vehicle {path.stem!r} is a family, the ranges of many vehicles; accepted here: one vehicle: "
+            f"{', '.join(vehicle_names())}, or the path of a .toml file"
+        )
+    vehicle = Vehicle(name=path.stem, **read_values(table, quantities(), where))
+    check(vehicle, where)
+    return vehicle
 
 
-def _from_table(name: str, table: dict[str, Any], where: str) -> Vehicle:
-    known = {f.name: f for f in quantities()}
+def read_values(table: dict[str, Any], fields: Sequence[dataclasses.Field], where: str) -> dict[str, Any]:
+    """The values of a file that has an entry for each of these fields, made as those of `Vehicle`, and no others.
+
+    Raises:
+        ValueError: naming the file, the key, the value and what is accepted.
+    """
+    known = {f.name: f for f in fields}
     for key in table:
         if key not in known:
             guess = nearest(key, known)
@@ -222,10 +243,7 @@ def _from_table(name: str, table: dict[str, Any], where: str) -> Vehicle:
             raise ValueError(f"{where}: unknown key {key!r}{hint}")
     if missing := [key for key in known if key not in table]:
         raise ValueError(f"{where}: missing key {', '.join(map(repr, missing))}")
-    values = {key: _read(where, f, table[key]) for key, f in known.items()}
-    vehicle = Vehicle(name=name, **values)
-    check(vehicle, where)
-    return vehicle
+    return {key: _read(where, f, table[key]) for key, f in known.items()}
 
 
 def _read(where: str, f: dataclasses.Field, entry: Any) -> Any:

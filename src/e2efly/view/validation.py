@@ -114,11 +114,12 @@ def plot_validation(found: Validation, folder: Path) -> None:
     except OSError as error:
         raise OSError(f"cannot make the folder of the plots {folder}: {error.strerror}") from error
     flew, plant = found.candidate, found.plant.name
-    contract, nominal = flew.policy.contract, load_vehicle(flew.env.vehicle)
+    contract = flew.policy.contract
+    nominal = flew.flown.body if contract.vehicle_ranges else load_vehicle(flew.env.vehicle)
     for name, suite in flew.task.criteria().items():
         v = found.criteria[name]
         shown = [int(i) for i in np.argsort(v.flown.success, kind="stable")[:DRAWN]]  # failures first
-        home = Reality(nominal, contract.latency_s)
+        home = Reality(nominal, contract.latency_of(nominal))
         asked = [Flight(v.starts.states[i], v.starts.courses[i], home) for i in shown]
         mission = Mission(flew.file, "simulator", nominal, nominal, float(suite.episode_s))
         again = fly_all(mission, asked, processes=1)

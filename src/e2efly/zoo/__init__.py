@@ -6,7 +6,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-from e2efly.vehicles import load_vehicle, unknown, vehicle_file
+from e2efly.vehicles import load_family, load_vehicle, unknown, vehicle_file
+from e2efly.vehicles.vehicle import FAMILIES
 
 FOLDER = Path(__file__).parent
 USUAL = "vis_r"
@@ -33,7 +34,8 @@ def policy_file(policy: str | os.PathLike[str], vehicle: str | Path | None = Non
     """The file of a policy: every command and function that takes a policy finds it by this.
 
     Args:
-        policy: a policy.onnx, a run directory (its policy.onnx), or the name of a task (the zoo's policy of it).
+        policy: a policy.onnx, a run directory (its policy.onnx), the name of a task (the zoo's policy of it), or a
+            vehicle of the zoo and a task, as in `any/hover`, whatever flies.
         vehicle: whose policy, of the zoo's: a shipped name, or a file: that of the shipped vehicle with the same
             values, or else of the same name, and of `USUAL` for any other file, and when left out.
 
@@ -43,8 +45,12 @@ def policy_file(policy: str | os.PathLike[str], vehicle: str | Path | None = Non
     path = Path(policy)
     if path.is_dir():
         return path / "policy.onnx"
-    if path.exists() or len(path.parts) > 1 or path.suffix:
+    if path.exists() or path.suffix or len(path.parts) > 2:
         return path
+    if len(path.parts) == 2:
+        if path.parts[1] not in contents().get(path.parts[0], {}):
+            return path
+        path, vehicle = Path(path.parts[1]), path.parts[0]
     zoo, task = contents(), str(path)
     if not any(task in tasks for tasks in zoo.values()):
         tasks = sorted({task for tasks in zoo.values() for task in tasks})
@@ -62,8 +68,9 @@ def policy_file(policy: str | os.PathLike[str], vehicle: str | Path | None = Non
 
 def _whose(body: Path, having: list[str]) -> str:
     """The shipped vehicle whose policy flies the vehicle of a file, where these have one."""
-    if body.parent == vehicle_file(USUAL).parent:
+    if body.parent in (vehicle_file(USUAL).parent, FAMILIES) or load_family(body) is not None:
         return body.stem
+    having = [name for name in having if load_family(name) is None]
     found = load_vehicle(body).hash
     same = [name for name in having if load_vehicle(name).hash == found]
     return next((name for name in (*same, body.stem) if name in having), USUAL)

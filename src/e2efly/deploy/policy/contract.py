@@ -16,6 +16,7 @@ from e2efly.deploy.policy import contract_json as read
 from e2efly.deploy.policy.images import Image
 from e2efly.observation import Field
 from e2efly.storage import unique
+from e2efly.vehicles import Ranges, Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
 CONTRACT_VERSION = 2
@@ -65,9 +66,9 @@ class Contract:
     task: str
     """Name of the task."""
     vehicle: str
-    """Name of the vehicle."""
-    vehicle_hash: str
-    """Hash of the vehicle's parameters: 16 hex digits."""
+    """Name of the vehicle, or of the family of vehicles."""
+    vehicle_hash: str | None
+    """Hash of the vehicle's parameters: 16 hex digits. None, and no key of the JSON: there are ranges."""
     control_rate_hz: float
     """How often the policy is asked, Hz."""
     latency_s: float
@@ -86,6 +87,27 @@ class Contract:
     """What it commands."""
     hover_action: tuple[float, ...]
     """The past actions that it is shown before it has acted; it hovers, where the command mode has a hover."""
+    vehicle_ranges: Ranges | None = None
+    """Of the vehicles that it flies, all of the family. None, and no key of the JSON: one vehicle, that of the hash."""
+
+    def refusals(self, vehicle: Vehicle) -> tuple[str, ...]:
+        """Why the policy does not fly a (loaded) vehicle, in words; empty: it does.
+
+        It flies the vehicle that it was trained on, or all within its ranges, with the delays of its training.
+        """
+        if self.vehicle_ranges is not None:
+            late = self.latency_range_s
+            return dataclasses.replace(self.vehicle_ranges, latency=(late[0], late[1])).outside(vehicle)
+        if vehicle.hash == self.vehicle_hash:
+            return ()
+        return (
+            f"vehicle {vehicle.name!r} has hash {vehicle.hash}; accepted: {self.vehicle_hash}, that of "
+            f"{self.vehicle!r} as the policy was trained on it: load that one, or train the policy again",
+        )
+
+    def latency_of(self, vehicle: Vehicle) -> float:
+        """Seconds from observation to command with which a vehicle flies: of one of a family its own."""
+        return self.latency_s if self.vehicle_ranges is None else float(vehicle.latency)
 
     @cached_property
     def observation_size(self) -> int:
@@ -109,7 +131,9 @@ class Contract:
         Raises:
             ValueError: for a contract that `from_json` would refuse.
         """
-        text = json.dumps(dataclasses.asdict(self), indent=2)
+        left_out = "vehicle_ranges" if self.vehicle_ranges is None else "vehicle_hash"
+        content = {key: value for key, value in dataclasses.asdict(self).items() if key != left_out}
+        text = json.dumps(content, indent=2)
         Contract.from_json(text)
         return text
 
@@ -128,6 +152,11 @@ class Contract:
             version = content["contract_version"]
             if type(version) is not int or version != CONTRACT_VERSION:
                 raise read.refusal("contract_version", version, f"{CONTRACT_VERSION}; export it again with this e2efly")
+        if isinstance(content, dict):
+            absent = "vehicle_hash" if "vehicle_ranges" in content else "vehicle_ranges"
+            if absent in content:
+                raise read.refusal(absent, content[absent], "one of vehicle_hash and vehicle_ranges, not both")
+            content = content | {absent: None}
         return _contract(read.table(content, "", Contract))
 
 
@@ -139,8 +168,8 @@ def _contract(x: dict[str, Any]) -> Contract:
     rate = read.number(x["control_rate_hz"], "control_rate_hz")
     if not RATES[0] <= rate <= RATES[1]:
         raise read.refusal("control_rate_hz", rate, f"{RATES[0]:g} to {RATES[1]:g} Hz")
-    vehicle_hash = read.text(x["vehicle_hash"], "vehicle_hash")
-    if len(vehicle_hash) != 16 or set(vehicle_hash) - set("0123456789abcdef"):
+    vehicle_hash = None if x["vehicle_ranges"] is not None else read.text(x["vehicle_hash"], "vehicle_hash")
+    if vehicle_hash is not None and (len(vehicle_hash) != 16 or set(vehicle_hash) - set("0123456789abcdef")):
         raise read.refusal("vehicle_hash", vehicle_hash, "16 hex digits in lower case")
     hover = read.numbers(x["hover_action"], "hover_action", ACTION_SIZE)
     if not all(ACTION_LIMITS[0] <= value <= ACTION_LIMITS[1] for value in hover):
@@ -160,7 +189,16 @@ def _contract(x: dict[str, Any]) -> Contract:
         memory_size=read.whole(x["memory_size"], "memory_size", 0),
         action=_action(x["action"]),
         hover_action=hover,
+        vehicle_ranges=None if vehicle_hash is not None else _ranges(x["vehicle_ranges"]),
     )
+
+
+def _ranges(value: Any) -> Ranges:
+    x = read.table(value, "vehicle_ranges", Ranges)
+    bounds = {name: read.numbers(pair, f"vehicle_ranges.{name}", 2) for name, pair in x.items()}
+    ranges = Ranges(**{name: (pair[0], pair[1]) for name, pair in bounds.items()})
+    ranges.check("contract: vehicle_ranges")
+    return ranges
 
 
 def _observation(value: Any) -> tuple[Field, ...]:

@@ -197,13 +197,13 @@ def _policy(where: str, content: bytes) -> Policy:
     _check_graph(where, session, contract)
     policy = Policy(contract, session)
     try:  # also warms the session up
-        policy.act(_level_and_still(contract), [np.zeros(image.shape, np.float32) for image in contract.images])
+        policy.act(level_and_still(contract), [np.zeros(image.shape, np.float32) for image in contract.images])
     except Exception as error:  # ONNX Runtime's errors share no other base
         raise ValueError(f"{where}: does not run on the observation of a level, still vehicle: {error}") from None
     return policy
 
 
-def _level_and_still(contract: Contract) -> np.ndarray:
+def level_and_still(contract: Contract) -> np.ndarray:
     """An observation, shape (o,): the level attitude, heading along world x, and zeros."""
     observation = np.zeros(contract.observation_size, np.float32)
     observation[contract.slices[contract.attitude].start] = 1.0
@@ -263,10 +263,13 @@ def _check_use(
     """What the policy was trained for against what it is going to fly."""
     if task is not None and task != contract.task:
         raise _mismatch(where, "task", contract.task, task, "load a policy that was trained for this task")
-    if vehicle is not None and vehicle.name != contract.vehicle:
+    if vehicle is not None and contract.vehicle_ranges is not None:
+        if reasons := contract.refusals(vehicle):
+            raise ValueError(f"{where}: {'; '.join(reasons)}")
+    elif vehicle is not None and vehicle.name != contract.vehicle:
         remedy = "load a policy that was trained for this vehicle, or name the vehicle that it was trained for"
         raise _mismatch(where, "vehicle", contract.vehicle, vehicle.name, remedy)
-    if vehicle is not None and vehicle.hash != contract.vehicle_hash:
+    elif vehicle is not None and vehicle.hash != contract.vehicle_hash:
         remedy = f"the parameters of {vehicle.name!r} have changed since: restore its file, or train the policy again"
         raise _mismatch(where, "vehicle_hash", contract.vehicle_hash, vehicle.hash, remedy)
     if control_rate_hz is not None and not abs(control_rate_hz - contract.control_rate_hz) <= 1e-6 * control_rate_hz:

@@ -175,12 +175,7 @@ def check(
         control_rate: at which the policy will be asked, Hz; None: as it was trained.
         imu: whether there are measurements of an IMU.
     """
-    reasons = []
-    if vehicle.hash != contract.vehicle_hash:
-        reasons.append(
-            f"vehicle {vehicle.name!r} has hash {vehicle.hash}; accepted: {contract.vehicle_hash}, that of "
-            f"{contract.vehicle!r} as the policy was trained on it: load that one, or train the policy again"
-        )
+    reasons = list(contract.refusals(vehicle))
     rate = contract.control_rate_hz
     if control_rate is not None and not abs(control_rate - rate) <= 1e-6 * rate:
         reasons.append(f"control_rate is {control_rate} Hz; accepted: {rate:g} Hz, at which the policy was trained")

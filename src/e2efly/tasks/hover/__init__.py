@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from e2efly.config import BPTTConfig, Paper, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
+from e2efly.config import BPTTConfig, EnvConfig, Paper, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
 from e2efly.courses import defaults
 from e2efly.drawing import INK, Line, Mark, Thing, circle
 from e2efly.tasks.registry import register
@@ -22,7 +22,7 @@ class HoverConfig(TaskConfig):
     goal_class: ClassVar[str] = "e2efly.tasks.hover.goal:HoverGoal"
     route: ClassVar[str] = "e2efly.tasks.hover.goal:HoverRoute"
     shows_error: ClassVar = True
-    variants: ClassVar = ("thrown",)
+    variants: ClassVar = ("thrown", "rotors")
     smooth: ClassVar = {"near": 1.0, "prog2": 0.2, "v1": 0.02, "anglev_sq": 0.002, "act2_sq": 0.02, "crash": 10.0}
     best: ClassVar = "bptt"
     robust: ClassVar = {
@@ -33,6 +33,20 @@ class HoverConfig(TaskConfig):
         ),
         "ppo": Robust(steps=6_000_000, recurrent=96),
     }
+    family: ClassVar = {
+        "bptt": Robust(
+            weights={"prog2": 1.0, "near": 0.3, "v1": 0.1, "anglev_sq": 0.06, "act2_sq": 0.05},
+            algo={"horizon": 96, "learning_rate": 8e-3, "average": 0.99},
+            steps=14_000_000,
+            chunk=60,
+        ),
+    }
+    rotors: ClassVar = Robust(
+        weights={"prog2": 1.0, "near": 0.3, "v1": 0.1, "anglev_sq": 0.03, "act2_sq": 0.05},
+        algo={"horizon": 160, "learning_rate": 6e-3, "average": 0.99},
+        steps=30_000_000,
+        chunk=150,
+    )
     paper: ClassVar = Paper(
         weights={"prog2": 0.01, "ori2": 0.0001, "v1": 0.002, "anglev": 0.002},
         ppo={"act3": 1.0, "goal": 1.0, "crash": 1.0},
@@ -59,6 +73,9 @@ class HoverConfig(TaskConfig):
     """... for this last part of the episode, s."""
     fence: float = number(defaults.HOVER_FENCE, above=0, endless=True)
     """Farther than this from the target the episode fails, m."""
+    spin: float = number(35.0, above=0, endless=True)
+    """Turning faster than this the episode fails, rad/s: gyroscopes measure up to 2000 degrees per second. Without a
+    rate loop nothing else ends a tumble."""
 
     def criteria(self) -> dict[str, TaskConfig]:
         """Episodes of `judged_s`, where that is not 0."""
@@ -88,8 +105,14 @@ class HoverConfig(TaskConfig):
 
         Training has short episodes: what is to be learned is in their first seconds. The target is 5 m up: from 3 m
         some starts hit the ground whatever is done (docs/tasks.md).
+
+        `rotors`: hover by the thrusts of the rotors, 100 times a second, with a memory; delays of up to 34 ms.
         """
-        del preset
+        if preset == "rotors":
+            if not isinstance(config.algo, BPTTConfig):
+                raise ValueError(f"preset 'rotors': accepted for hover by bptt; not by {config.algo.name}")
+            env = EnvConfig(command_mode="rotor_share", control_rate=100.0, action_latency=(0.0, 0.034))
+            return cls.rotors.into(dataclasses.replace(config, env=env))
         thrown = cls(
             episode_s=3.0, judged_s=10.0, target=(0.0, 0.0, 5.0), velocity=3.0, tilt=math.pi, body_rate=6.0, fence=10.0
         )

@@ -43,7 +43,9 @@ class HoverGoal(Goal):
         c = self.config
         error = distance(after.position, self.goal(memory, time))
         held = held_longer(memory, error < c.radius, self.control_period)
-        crashed = (error > c.fence) | touches_ground(self.shape, after)
+        xp = namespace(error)
+        tumbles = xp.sum(after.body_rate**2, axis=-1) > c.spin**2
+        crashed = (error > c.fence) | touches_ground(self.shape, after) | tumbles
         arrived = (held > 0) & (memory == 0)
         success = timed_out & ~crashed & (held >= c.hold_s - 1e-4)
         return held, Outcome(terminated=crashed, success=success, arrived=arrived, crashed=crashed, error=error)

@@ -42,6 +42,14 @@ class TrackConfig(TaskConfig):
         ),
         "ppo": Robust(algo={"horizon": 64, "learning_rate": 2e-3, "gamma": 0.96}, steps=6_000_000, recurrent=96),
     }
+    family: ClassVar = {
+        "bptt": Robust(
+            weights={"prog2": 1.0, "anglev_sq": 0.02, "act2_sq": 0.03},
+            algo={"horizon": 96, "learning_rate": 6e-3, "average": 0.99},
+            steps=12_000_000,
+            chunk=60,
+        ),
+    }
     paper: ClassVar = Paper(
         weights={"prog2": 0.02, "ori2": 0.001, "v1": 0.002, "anglev": 0.002},
         ppo={"act3": 1.0, "crash": 1.0},

@@ -176,10 +176,12 @@ def control_law(vehicle: Vehicle, command_mode: str, plain_mixer: bool = False) 
     Raises:
         KeyError: for an unknown command mode.
     """
-    controller = COMMAND_MODES[command_mode].controller
+    mode = COMMAND_MODES[command_mode]
+    controller = mode.controller
     if controller is None:
         low, high = vehicle.thrust_range
-        return lambda command, pose, motion: [min(max(f, low), high) for f in command]
+        unit = high if mode.of_largest else 1.0
+        return lambda command, pose, motion: [min(max(unit * f, low), high) for f in command]
     rates = rate_loop(vehicle, plain_mixer)
     if command_mode == "ctbr":
         return lambda command, pose, motion: rates(command, motion[3:])

@@ -1,0 +1,79 @@
+"""The zoo's policies of any vehicle: 1000 unseen vehicles, with the delays that they draw and with each delay, and the
+vehicles that ship, which they were never told of; how long a question takes.
+
+    python benchmarks/any_vehicle.py [--policies any/hover ...] [--vehicles 1000]
+"""
+
+import json
+import time
+from typing import Any
+
+import numpy as np
+from common import arguments, table, write
+
+import e2efly
+from e2efly.evaluation import Evaluation
+from e2efly.vehicles import vehicle_names
+from e2efly.zoo import FOLDER
+
+DELAYS = (0.0, 0.03, 0.06, 0.09, 0.12)
+"""s."""
+ASKED = 5000
+
+
+def rows_of(found: Evaluation, what: str, delay: str) -> list[dict[str, Any]]:
+    """A row for each criterion."""
+    return [
+        {
+            "task": name,
+            "vehicles": what,
+            "delay": delay,
+            "success, %": round(100 * float(np.mean(e.success)), 1),
+            "median error, cm": round(100 * float(np.median(error(name, e))), 2),
+            "90 % below, cm": round(100 * float(np.quantile(error(name, e), 0.9)), 2),
+        }
+        for name, e in found.flown.items()
+    ]
+
+
+def error(criterion: str, e: Any) -> np.ndarray:
+    """At the end of a hover; the mean along a reference."""
+    return e.final_error if criterion == "hover" else e.mean_error
+
+
+def question(policy: str) -> float:
+    """Median time of a question, with its checks, on one core, us."""
+    loaded = e2efly.load_policy(policy)
+    observation = np.zeros(loaded.contract.observation_size, np.float32)
+    observation[loaded.contract.slices[loaded.contract.attitude].start] = 1.0
+    memory, taken = None, []
+    for _ in range(ASKED):
+        began = time.perf_counter()
+        _, memory = loaded.act(observation, memory=memory)
+        taken.append(time.perf_counter() - began)
+    return 1e6 * float(np.median(taken))
+
+
+def main() -> None:
+    """Fly all of them; write the table."""
+    zoo = json.loads((FOLDER / "zoo.json").read_text(encoding="utf-8"))
+    known = [f"any/{task}" for task in zoo.get("any", {})]
+    options = arguments(__doc__ or "", policies=known, vehicles=1000)
+    rows: list[dict[str, Any]] = []
+    asked = {}
+    for policy in options.policies:
+        asked[policy] = round(question(policy), 1)
+        rows += rows_of(e2efly.evaluate(policy, options.vehicles, vehicle="any"), "unseen", "0 to 120 ms")
+        for delay in DELAYS:
+            env = {"action_latency": (delay, delay)}
+            found = e2efly.evaluate(policy, options.vehicles, vehicle="any", env=env)
+            rows += rows_of(found, "unseen", f"{1e3 * delay:.0f} ms")
+        for name in vehicle_names():
+            rows += rows_of(e2efly.evaluate(policy, options.vehicles, vehicle=name), name, "its own")
+        print(table(rows), flush=True)
+    print(asked)
+    write("any_vehicle", options.json, {"table": rows, "question_us": asked})
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,316 @@
+"""Many vehicles: ranges, read from a TOML file, and the laws by which vehicles are drawn within them. Imports no JAX.
+
+The laws are one function from uniform numbers to a `Vehicle`, in the library of the numbers: of NumPy one vehicle for
+a file or a test, of JAX a batch for the episodes of a training. Their formulae and sources: docs/any-vehicle.md.
+"""
+
+import dataclasses
+import hashlib
+import json
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from e2efly.vehicles.tables import read_table
+from e2efly.vehicles.vehicle import (
+    FAMILIES,
+    GRAVITY,
+    OF_FAMILIES,
+    Vehicle,
+    load_vehicle,
+    quantities,
+    read_values,
+    vehicle_file,
+)
+
+DRAWN = 20
+"""Uniform numbers that make a vehicle."""
+Range = tuple[float, float]
+
+_ARM_OF_KILOGRAM = 0.12
+"""Arm of a quadrotor of 1 kg in the middle, m: the cube root of the mass through Crazyflie and 5-inch racers."""
+_ARM_SPREAD = 1.7
+"""Largest factor on it, and one over the smallest."""
+_RINGING = 4.0
+"""Largest rate gain times motor lag that is drawn: a damping ratio of 1 / (2 sqrt(4)) = 0.25."""
+_AIR = 1.225
+"""Density, kg/m^3: the standard atmosphere at sea level."""
+_SPIN = (1.0, -1.0, -1.0, 1.0)
+_BESIDE = 1e-6
+"""Relative rounding within which a number is still in its range."""
+
+
+def _range(unit: str, at_least: float | None = None, above: float | None = None, high: float = math.inf) -> Any:
+    """Smallest and largest of a quantity, with the rule that both keep."""
+    entry = {"unit": unit, "shape": (2,), "at_least": None, "above": None}
+    return dataclasses.field(metadata=entry | {"from": at_least, "beyond": above, "high": high})
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """Between which numbers the vehicles of a family lie: smallest and largest of each."""
+
+    mass: Range = _range("kg", above=0.0)
+    """Mass."""
+    arm: Range = _range("m", above=0.0)
+    """Largest distance of a rotor from the centre of mass."""
+    thrust_to_weight: Range = _range("1", above=1.05, high=20.0)
+    """Largest collective thrust over weight; with less nothing hovers."""
+    motor_time_constant: Range = _range("s", above=0.0)
+    """Time constant of the rotors."""
+    rate_gain: Range = _range("1/s", above=0.0)
+    """Rate loop of roll and pitch."""
+    yaw_gain: Range = _range("1/s", above=0.0)
+    """Rate loop of yaw."""
+    roll_rate_max: Range = _range("rad/s", above=0.0)
+    """Largest roll and pitch rate that the flight controller takes. A policy commands no more than the second number,
+    whoever takes more."""
+    yaw_rate_max: Range = _range("rad/s", above=0.0)
+    """The same of yaw."""
+    latency: Range = _range("s", at_least=0.0, high=1.0)
+    """From the observation to the rate loop."""
+    inertia_ratio: Range = _range("1", above=0.0)
+    """Roll and pitch inertia over mass times squared arm."""
+    torque_ratio: Range = _range("1", above=0.0)
+    """Yaw torque of a rotor over its thrust and the arm."""
+    drag_linear: Range = _range("1/s", at_least=0.0)
+    """Linear drag over mass, each axis."""
+    drag_quadratic: Range = _range("1/m", at_least=0.0)
+    """Quadratic drag over mass, each axis."""
+    control_rate: Range = _range("Hz", at_least=0.1, high=10_000.0)
+    """At which the policy is asked: one number, twice."""
+
+    @property
+    def hash(self) -> str:
+        """First 16 hex digits of the SHA-256 of all ranges."""
+        return hashlib.sha256(json.dumps(dataclasses.asdict(self), sort_keys=True).encode()).hexdigest()[:16]
+
+    def check(self, where: str) -> None:
+        """Check each range, and that vehicles can be drawn within all of them.
+
+        Raises:
+            ValueError: naming the range, its values and what is accepted.
+        """
+        for known in dataclasses.fields(self):
+            low, high = getattr(self, known.name)
+            least, above, most = (known.metadata[key] for key in ("from", "beyond", "high"))
+            if not ((low >= least if above is None else low > above) and low <= high <= most):  # also of NaN
+                bottom = f"of at least {least:g}" if above is None else f"above {above:g}"
+                top = f", at most {most:g}" if math.isfinite(most) else ""
+                hovers = ": no other vehicle can hover" if known.name == OF_FAMILIES else ""
+                raise ValueError(
+                    f"{where}: {known.name} is {[low, high]} {known.metadata['unit']}; accepted: two rising numbers "
+                    f"{bottom}{top}{hovers}"
+                )
+        if self.control_rate[0] != self.control_rate[1]:
+            raise ValueError(f"{where}: control_rate is {list(self.control_rate)} Hz; accepted: one rate, twice")
+        if self.rate_gain[0] * self.motor_time_constant[1] > _RINGING:
+            raise ValueError(
+                f"{where}: rate_gain begins at {self.rate_gain[0]} 1/s and motor_time_constant ends at "
+                f"{self.motor_time_constant[1]} s; accepted: a product of at most {_RINGING:g}, above which such a "
+                "rate loop rings"
+            )
+
+    def outside(self, vehicle: Vehicle) -> tuple[str, ...]:
+        """In which quantities a vehicle lies outside, in words: the quantity, its value and what is accepted."""
+        found = []
+        for known in dataclasses.fields(self):
+            low, high = getattr(self, known.name)
+            for value in measured(vehicle).get(known.name, ()):
+                value = min(value, high) if known.name.endswith("rate_max") else value
+                if not low * (1 - _BESIDE) <= value <= high * (1 + _BESIDE):
+                    accepted = f"{low:g} to {high:g} {known.metadata['unit']}".removesuffix(" 1")
+                    found.append(f"{known.name} of vehicle {vehicle.name!r} is {value:.4g}; accepted: {accepted}")
+                    break
+        return tuple(found)
+
+
+def measured(vehicle: Vehicle) -> dict[str, tuple[float, ...]]:
+    """The quantities of `Ranges` of a loaded vehicle, but for the control rate, which is the policy's."""
+    v = vehicle
+    arm = float(np.linalg.norm(v.rotor_position, axis=1).max())
+    return {
+        "mass": (v.mass,),
+        "arm": (arm,),
+        "thrust_to_weight": (v.thrust_to_weight,),
+        "motor_time_constant": (v.motor_time_constant,),
+        "rate_gain": (float(v.rate_gain[0]), float(v.rate_gain[1])),
+        "yaw_gain": (float(v.rate_gain[2]),),
+        "roll_rate_max": (float(v.body_rate_max[0]), float(v.body_rate_max[1])),
+        "yaw_rate_max": (float(v.body_rate_max[2]),),
+        "latency": (v.latency,),
+        "inertia_ratio": tuple(float(j) / (v.mass * arm**2) for j in v.inertia[:2]),
+        "torque_ratio": (v.torque_ratio / arm,),
+        "drag_linear": tuple(float(k) / v.mass for k in v.drag_linear),
+        "drag_quadratic": tuple(float(k) / v.mass for k in v.drag_quadratic),
+    }
+
+
+@dataclass(frozen=True)
+class Family:
+    """Vehicles that a policy is trained for together."""
+
+    name: str
+    """The stem of its file."""
+    ranges: Ranges
+
+    @property
+    def hash(self) -> str:
+        """That of its ranges: the laws are the same for all families."""
+        return self.ranges.hash
+
+    @cached_property
+    def middle(self) -> Vehicle:
+        """The vehicle in the middle of all draws, float64, as if loaded. Its latency is the middle of the range."""
+        return _loaded(self.draw(np.full(DRAWN, 0.5)), self.name)
+
+    def sample(self, count: int, seed: int) -> list[Vehicle]:
+        """So many vehicles, each as if loaded from a file of its own, float64."""
+        drawn = np.random.default_rng(seed).random((count, DRAWN))
+        return [_loaded(self.draw(u), f"{self.name}_{i}") for i, u in enumerate(drawn)]
+
+    def draw(self, u: Any) -> Vehicle:
+        """A vehicle of uniform numbers.
+
+        Args:
+            u: (*n, `DRAWN`) uniform in [0, 1), of NumPy or JAX.
+
+        Returns:
+            The vehicle, each field with the leading axes *n. Largest rates that a vehicle is commanded are within the
+            ranges; its gains above the rate loop, which a policy by rates does not use, follow from that loop.
+        """
+        r, xp = self.ranges, u.__array_namespace__() if hasattr(u, "__array_namespace__") else np
+        (
+            mass, spread, corner, strong, lag, quick, yaw_quick, turn, yaw_turn, late, heavy, slim, flat, size, torque,
+            tip, curve, linear, quadratic, upright,
+        ) = (u[..., i] for i in range(DRAWN))  # fmt: skip
+        m = _log(xp, mass, r.mass)
+        # mass goes with the cube of the size: V. Kumar and N. Michael, Opportunities and challenges with autonomous
+        # micro aerial vehicles, 2012
+        arm = _ARM_OF_KILOGRAM * xp.cbrt(m) * _log(xp, spread, (1 / _ARM_SPREAD, _ARM_SPREAD))
+        arm = xp.clip(arm, *r.arm)
+        angle = _between(corner, (math.radians(35), math.radians(55)))
+        forward, left = arm * xp.cos(angle), arm * xp.sin(angle)
+        places = xp.stack(
+            [xp.stack([x * forward, y * left], axis=-1) for x, y in ((-1, -1), (1, -1), (-1, 1), (1, 1))], axis=-2
+        )
+        # a propeller's radius: neighbours sit at most 1.41 arms apart; its tip moves at Mach 0.2 to 0.5
+        radius = arm * _between(size, (0.35, 0.68))
+        full = _between(tip, (60.0, 180.0)) / radius
+        top = _between(strong, r.thrust_to_weight) * m * GRAVITY / 4
+        share = _between(curve, (0.1, 0.3))  # of the thrust at full speed that grows linearly
+        thrust_map = xp.stack([(1 - share) * top / full**2, share * top / full, 0 * top], axis=-1)
+        time = _log(xp, lag, r.motor_time_constant)
+        fastest = xp.clip(_RINGING / time, r.rate_gain[0], r.rate_gain[1])
+        gain = r.rate_gain[0] * (fastest / r.rate_gain[0]) ** quick
+        yaw_gain = xp.clip(gain * _between(yaw_quick, (0.25, 1.0)), *r.yaw_gain)
+        rate, yaw_rate = _between(turn, r.roll_rate_max), _between(yaw_turn, r.yaw_rate_max)
+        # all mass at the rotors would have 0.5, a body alone in the middle has next to nothing
+        roll = _log(xp, heavy, r.inertia_ratio)
+        pitch = xp.clip(roll * _log(xp, slim, (0.8, 1.25)), *r.inertia_ratio)
+        inertia = xp.stack([roll, pitch, (roll + pitch) * _between(flat, (0.6, 0.98))], axis=-1)
+        inertia = inertia * (m * arm**2)[..., None]
+        # blade flapping and induced drag: M. Faessler et al., Differential flatness of quadrotor dynamics subject to
+        # rotor drag, 2018; form drag of 0 to 1.5 squared arms
+        one = xp.ones_like(m)
+        level = xp.stack([one, one, _between(upright, (1.0, 3.0))], axis=-1)
+        form = xp.clip((0.75 * _AIR * quadratic * arm**2 / m)[..., None] * level, *r.drag_quadratic)
+        flapping = xp.stack([one, one, _between(upright, (1.0, 1.3))], axis=-1)
+        flapping = xp.clip(_between(linear, r.drag_linear)[..., None] * flapping, *r.drag_linear)
+        three = xp.ones_like(inertia)
+        slow = gain / 3
+        return Vehicle(
+            name=self.name,
+            mass=m,
+            inertia=inertia,
+            rotor_position=places,
+            rotor_spin=xp.ones_like(places[..., 0]) * xp.asarray(_SPIN, places.dtype),
+            thrust_map=thrust_map,
+            torque_ratio=arm * _log(xp, torque, r.torque_ratio),
+            rotor_thrust_max=top,
+            rotor_speed_max=full,
+            rotor_speed_min=full * 0.08,
+            motor_time_constant=time,
+            drag_linear=flapping * m[..., None],
+            drag_quadratic=form * m[..., None],
+            body_rate_max=xp.stack([rate, rate, yaw_rate], axis=-1),
+            rate_gain=xp.stack([gain, gain, yaw_gain], axis=-1),
+            attitude_gain=xp.stack([slow, yaw_gain / 4], axis=-1),
+            velocity_gain=three * (slow / 3)[..., None],
+            position_gain=three * (slow / 9)[..., None],
+            tilt_max=0.8 * one,
+            acceleration_max=6.0 * three,
+            speed_max=3.0 * three,
+            control_rate=r.control_rate[0] * one,
+            latency=_between(late, r.latency),
+            feet_height=0.5 * arm,
+            radius=arm + radius,
+        )
+
+    def limits(self, command_mode: str) -> tuple[list[float], list[float]]:
+        """Smallest and largest command, the same for every vehicle of the family; a vehicle does what it can of it.
+
+        Raises:
+            ValueError: for a command mode whose commands are not the same to different vehicles.
+        """
+        r = self.ranges
+        if command_mode == "ctbr":
+            rates = [r.roll_rate_max[1], r.roll_rate_max[1], r.yaw_rate_max[1]]
+            return [0.0, *(-x for x in rates)], [r.thrust_to_weight[1] * GRAVITY, *rates]
+        if command_mode == "rotor_share":
+            return [0.0] * 4, [1.0] * 4
+        raise ValueError(
+            f"env.command_mode is {command_mode!r}; accepted for vehicle {self.name!r}: 'ctbr' or 'rotor_share'"
+        )
+
+
+def _between(u: Any, bounds: Range) -> Any:
+    """Uniform."""
+    return bounds[0] + (bounds[1] - bounds[0]) * u
+
+
+def _log(xp: Any, u: Any, bounds: Range) -> Any:
+    """Uniform in the logarithm."""
+    low, high = math.log(bounds[0]), math.log(bounds[1])
+    return xp.exp(low + (high - low) * u)
+
+
+def _loaded(vehicle: Vehicle, name: str) -> Vehicle:
+    """A vehicle without leading axes as one that was read from a file: numbers, not arrays without axes."""
+    values = {f.name: getattr(vehicle, f.name) for f in quantities()}
+    return Vehicle(name=name, **{key: value if np.ndim(value) else float(value) for key, value in values.items()})
+
+
+def family_names() -> list[str]:
+    """The families that the package ships."""
+    return sorted(path.stem for path in FAMILIES.glob("*.toml"))
+
+
+def load_family(name_or_path: str | Path) -> Family | None:
+    """The family of a shipped name, or of the path of its TOML file; None where that is one vehicle's.
+
+    Raises:
+        ValueError: naming the file, the range, its value and what is accepted; when there is no such file.
+    """
+    path = vehicle_file(name_or_path)
+    table, where = read_table(path), str(path)
+    if OF_FAMILIES not in table:
+        return None
+    values = read_values(table, dataclasses.fields(Ranges), where)
+    ranges = Ranges(**{key: (float(low), float(high)) for key, (low, high) in values.items()})
+    ranges.check(where)
+    return Family(path.stem, ranges)
+
+
+def nominal_vehicle(name_or_path: str | Path) -> Vehicle:
+    """The vehicle of a name or a file; of a family, the one in the middle of all draws.
+
+    Raises:
+        ValueError: as `load_family` and `load_vehicle`.
+    """
+    family = load_family(name_or_path)
+    return load_vehicle(name_or_path) if family is None else family.middle
