@@ -64,7 +64,8 @@ class Candidate:
     controller: Controller = "policy"
     """The vehicle that the flight controller believes in."""
     changes: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
-    """Where `env` is not what the run or the contract says: that and what flies, by dotted name."""
+    """Where task and environment are not what the run or the contract says: that and what flies, by dotted name
+    (`env.wind`, `task.track`)."""
 
     @cached_property
     def flown(self) -> Flown:
@@ -90,7 +91,7 @@ class Candidate:
                 f"What flies is {self.vehicle}, by the policy of a {contract.vehicle}; the flight controller {told}."
             )
         if self.changes:
-            changes = (f"env.{name} {value} (not {own})" for name, (own, value) in self.changes.items())
+            changes = (f"{name} {value} (not {own})" for name, (own, value) in self.changes.items())
             notes.append(f"Flown under {', '.join(changes)}.")
         return notes
 
@@ -110,6 +111,7 @@ def candidate(
     vehicle: str | None = None,
     controller: Controller = "policy",
     env: Mapping[str, Any] | None = None,
+    task: Mapping[str, Any] | None = None,
 ) -> Candidate:
     """Find a policy, and what it is judged in.
 
@@ -119,6 +121,7 @@ def candidate(
         controller: the vehicle that the flight controller believes in: the policy's own, whatever flies (policy), or
             the one that flies (plant).
         env: values that are to be changed in what the run or the contract says of the environment, by dotted name.
+        task: the same of its task, where another was meant to be flown: {"track": "four_gates"}.
 
     Raises:
         ValueError: when there is none; for changes that the contract does not allow; when the vehicle that it was
@@ -127,18 +130,20 @@ def candidate(
     file = policy_file(policy, vehicle)
     loaded, run = load_policy(file), run_of(file)
     if run is None:
-        task, own = config_from_contract(loaded, vehicle)
+        learned, own = config_from_contract(loaded, vehicle)
     else:
         config = run.config(names_vehicle=vehicle is not None)
-        task, own = config.task, config.env
+        learned, own = config.task, config.env
+    learned = learned.showing([shown.name for shown in loaded.contract.observation])
     if vehicle is None and (known := load_vehicle(own.vehicle)).hash != (trained := loaded.contract.vehicle_hash):
         raise ValueError(
             f"vehicle_hash is {trained} in {file}, but vehicle {own.vehicle} is {known.hash}; accepted: "
             "the vehicle that the policy was trained on, or --vehicle"
         )
     own = pinned(own, loaded) if env else own
-    flies = with_changes(own, env or {})
-    found = Candidate(file, loaded, task, flies, run, vehicle or own.vehicle, controller, differing(own, flies))
+    flies, flown = with_changes(own, env or {}), changed(learned, task or {}, "task")
+    changes = differing(own, flies, "env") | differing(learned, flown, "task")
+    found = Candidate(file, loaded, flown, flies, run, vehicle or own.vehicle, controller, changes)
     _ = found.flown  # a name that there is not is refused here
     return found
 
@@ -202,7 +207,7 @@ class Evaluation:
             "task": self.candidate.policy.contract.task,
             "vehicle": self.candidate.vehicle,
             "controller": self.candidate.controller,
-            "changed": {f"env.{name}": value for name, (_, value) in self.candidate.changes.items()},
+            "changed": {name: value for name, (_, value) in self.candidate.changes.items()},
             "env": dataclasses.asdict(self.candidate.env),
             "seed": self.seed,
             "units": UNITS,
@@ -239,6 +244,7 @@ def evaluate(
     vehicle: str | None = None,
     controller: Controller = "policy",
     env: Mapping[str, Any] | None = None,
+    task: Mapping[str, Any] | None = None,
     seed: int = SEED,
     device: str | None = None,
     kept: int = 0,
@@ -253,6 +259,7 @@ def evaluate(
             tuned to the vehicle that flies. Neither changes the policy.
         env: options of `EnvConfig` by dotted name, in place of what the policy's run or contract says:
             {"wind": 3.0, "randomize": {"mass": 0.2}, "disturbance.gust": 1.0}.
+        task: options of its task by dotted name, likewise: {"track": "four_gates"}.
         seed: of the starts.
         device: cpu or gpu.
         kept: bytes that the caller keeps of every start (`ROW` for a report), for the check of the memory.
@@ -263,7 +270,7 @@ def evaluate(
     if episodes <= 0:
         raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
     prepare(device)
-    found = candidate(policy, vehicle, controller, env)
+    found = candidate(policy, vehicle, controller, env, task)
     return Evaluation(found, seed, *fly_criteria(found, episodes, seed, kept))
 
 

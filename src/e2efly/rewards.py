@@ -62,6 +62,11 @@ def progz(offset: Vector) -> Scalar:
     return -jnp.abs(offset[..., 2])
 
 
+def progway(way: Scalar, previous_way: Scalar) -> Scalar:
+    """What was gained in this step of a way to the goal that need not be straight, m. Ours."""
+    return previous_way - way
+
+
 def act1(action: Float[Array, "*n 4"]) -> Scalar:
     """Minus the length of the action (Eq. act1, with the sign it has in act3)."""
     return -norm(action)
@@ -271,7 +276,7 @@ class Term:
 _KINDS: dict[Kind, tuple[Callable[..., Array], ...]] = {
     "differentiable": (
         prog1, prog2, progxy, progx, progy, progz, act1, act2, act3, ori1, ori3, v1, v2, v3, anglev, near,
-        anglev_sq, act2_sq, upright, vel, overspeed,
+        anglev_sq, act2_sq, upright, vel, overspeed, progway,
     ),
     "partly": (ori2, ori4, vz, avoid1, avoid2, avoid, descent, fit),
     "sparse": (goal, crash),

@@ -1,0 +1,117 @@
+"""Racing on any track: every episode another one, at random (`courses/random_tracks.py`), or a given one."""
+
+import dataclasses
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
+
+from e2efly.courses.gates import Tracks
+from e2efly.courses.random_tracks import CANDIDATES, MOST, NUMBERS, random_tracks
+from e2efly.courses.tracks import load_track
+from e2efly.goal import Outcome, Shape
+from e2efly.physics import State
+from e2efly.physics.rotation import from_euler
+from e2efly.rewards import norm
+from e2efly.scenes.course import frames
+from e2efly.scenes.scene import Scene
+from e2efly.scenes.shapes import FAR
+from e2efly.tasks.race import ANY, RaceConfig
+from e2efly.tasks.race.any_goal import Ahead, AnyRaceGoal, Memory
+from e2efly.tasks.task import at_rest, into_ball, uniform
+
+LOWEST_START = 0.3
+"""Starts are drawn at least this high over the feet, m."""
+AROUND = 3.0
+"""The way to a gate from behind it leads through a point at most so far before it, m."""
+PASSING = 1.5
+"""Within this of its plane a vehicle should be in line with a gate's opening, m."""
+
+jax.tree_util.register_dataclass(Memory, data_fields=["tracks", "passed"], meta_fields=[])
+jax.tree_util.register_dataclass(Tracks, data_fields=["gates", "count", "closed"], meta_fields=[])
+
+
+@partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "given"], meta_fields=[])
+@dataclass(frozen=True)
+class AnyRace(AnyRaceGoal):
+    """Make it with `AnyRace.of`."""
+
+    given: Tracks | None
+    """The track of every episode (n = 1); None: another one in each."""
+
+    @staticmethod
+    def of(config: RaceConfig, shape: Shape) -> "AnyRace":
+        """Load the track, where one is named.
+
+        Raises:
+            ValueError: for an unknown or broken track.
+        """
+        given = None if config.track == ANY else load_track(config.track)
+        if given is not None and config.laps > 1 and not given.closed:
+            raise ValueError(f"laps is {config.laps}; accepted: 0 or 1, as track {given.name!r} is not closed")
+        numbers = dataclasses.replace(config, track="")  # resolved here: tracks share a compiled program
+        return AnyRace(numbers, shape, None if given is None else Tracks.of(given, MOST))
+
+    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Memory]:
+        """At rest and level in a ball about the start of each one's track, heading as it says."""
+        track_key, state_key = jax.random.split(key)
+        if self.given is None:
+            size = CANDIDATES * NUMBERS
+            u = jax.random.uniform(track_key, (n, size)).reshape(n, CANDIDATES, NUMBERS)
+            tracks = random_tracks(u)
+        else:
+            tracks = jax.tree.map(lambda x: jnp.broadcast_to(jnp.asarray(x), (n, *x.shape[1:])), self.given)
+        g = tracks.gates
+        state = begun(state_key, n, self.config.position, self.shape, g.start, g.start_yaw)
+        return state, Memory(tracks, jnp.zeros(n, jnp.int32))
+
+    def scene(self, memory: Memory) -> Scene:
+        """The gates over level ground."""
+        n, tracks = memory.passed.shape[0], memory.tracks
+        there = jnp.arange(tracks.gates.count) < tracks.count[:, None]
+        return Scene.of({"gate": frames(tracks.gates, n, active=there)}, n)
+
+    def desired_yaw(self, memory: Memory, state: State) -> Float[Array, " n"]:
+        """Towards the next gate."""
+        d = self.goal(memory, memory.passed) - state.position
+        return jnp.arctan2(d[:, 1], d[:, 0] + 1e-6)
+
+    def advance(
+        self, memory: Memory, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
+    ) -> tuple[Memory, Outcome]:
+        """The goal's verdict, with signals for the reward: `way`, `previous_way` and `overhang`."""
+        moved, outcome = super().advance(memory, before, after, time, timed_out)
+        ahead = Ahead.of(memory)
+        axis, half = ahead.axis[:, 0], ahead.half[:, 0]
+        was, now = (_local(s.position - ahead.centre[:, 0], axis) for s in (before, after))
+        forward = jnp.sum(after.velocity * axis, axis=-1) > 0
+        near = forward & (now[:, 0] > -PASSING) & (now[:, 0] < PASSING / 3)
+        out = jnp.where(near[:, None], jnp.abs(now[:, 1:]) - half + self.shape.radius, -FAR)
+        signals = outcome.signals | {"way": _way(now), "previous_way": _way(was), "overhang": out}
+        return moved, dataclasses.replace(outcome, signals=signals)
+
+
+def _local(d: Float[Array, "n 3"], axis: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
+    """Offsets from a gate in its frame: along its axis, to the left, up."""
+    x = d[:, 0] * axis[:, 0] + d[:, 1] * axis[:, 1]
+    return jnp.stack([x, d[:, 1] * axis[:, 0] - d[:, 0] * axis[:, 1], d[:, 2]], axis=-1)
+
+
+def _way(local: Float[Array, "n 3"]) -> Float[Array, " n"]:
+    """How far it is to fly to a gate's centre and through it forward, m: before it straight, from behind it around.
+
+    The way around leads by a point before the gate, the farther before it the farther behind it the vehicle is.
+    """
+    back = jnp.clip(local[:, 0], 0.0, AROUND)
+    return norm(local.at[:, 0].add(back)) + back
+
+
+def begun(key: PRNGKeyArray, n: int, radius: Any, shape: Shape, place: Any, heading: Any) -> State:
+    """At rest and level in a ball about a place (3,) or (n, 3), with a heading, rad, a number or (n,)."""
+    position = jnp.asarray(place) + radius * into_ball(uniform(key, n, 3))
+    position = position.at[:, 2].max(shape.feet_height + LOWEST_START)
+    zero = jnp.zeros(n)
+    return dataclasses.replace(at_rest(position), quaternion=from_euler(zero, zero, zero + heading))
