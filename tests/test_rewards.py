@@ -72,6 +72,7 @@ BY_HAND = {
     "overspeed": -1,
     "avoid": -(0.5**2 + 0.5 * np.log1p(np.exp(-16 * 0.3))) * 2.5 - (0.2**2 + 0.5 * np.log1p(np.exp(-16 * 0.6))) * 5,
     "fit": -(0.03 + 0.1),
+    "fitlog": -np.log(1 + 0.05 / 0.02) - np.log(1 + 0.11 / 0.02) - np.log(1 + 0.2 / 0.02),
 }
 SINGULAR: dict[str, Any] = {
     **SIGNALS,

@@ -185,8 +185,38 @@ def test_the_way_is_straight_before_a_gate_and_leads_around_from_behind_it() -> 
     _, memory = race.start(random_key(0), 5)
     places = jnp.asarray([[1.0, 1.0, 1.5], [4.0, 3.0, 1.5], [5.0, 1.0, 1.5], [4.001, 3.0, 1.5], [14.0, 1.0, 1.5]])
     _, out = race.advance(memory, at_rest(places), at_rest(places), jnp.zeros(5), jnp.zeros(5, bool))
-    np.testing.assert_allclose(out.signals["way"], [3.0, 2.0, 3.0, 2.001, 16.0], atol=2e-3)
+    np.testing.assert_allclose(out.signals["way"], [3.0, 2.0, 2.0, 2.0005, 13.0], atol=2e-3)
     np.testing.assert_allclose(out.signals["way"], out.signals["previous_way"], atol=1e-6)
+
+
+def test_no_step_of_the_way_is_charged_for_passing_a_gate() -> None:
+    """What is gained from the start to the last gate is the length of the way, wherever steps end."""
+    race = task("s_shaped")
+    track = load_track("s_shaped")
+    places = [track.position[0] - [3.1, 0.0, 0.0]]
+    for gate in track.position:  # straight to each gate and 0.35 m through it
+        places += [gate - np.array([0.25, 0.0, 0.0]), gate + np.array([0.35, 0.0, 0.0])]
+    _, memory = race.start(random_key(0), 1)
+    gained, last = 0.0, len(places) - 1
+    for i in range(last):
+        before, after = (at_rest(jnp.asarray(x[None], jnp.float32)) for x in places[i : i + 2])
+        memory, out = race.advance(memory, before, after, jnp.zeros(1), jnp.zeros(1, bool))
+        gained += float(out.signals["previous_way"][0] - out.signals["way"][0])
+    legs = np.linalg.norm(np.diff(track.position, axis=0), axis=-1).sum()
+    assert bool(out.success[0])
+    # off by what the straight lines above cut or add at each corner, and by the way behind the last gate
+    assert gained == pytest.approx(3.1 + legs + 0.35, abs=0.1)
+
+
+def test_what_stands_out_is_measured_where_the_plane_is_crossed() -> None:
+    race = task("s_shaped")  # gate 0 at (4, 1, 1.5) along x, opening 1 m, sphere 0.12 m
+    _, memory = race.start(random_key(0), 4)
+    before = jnp.asarray([[3.9, 1.2, 1.5], [3.5, 0.4, 1.5], [3.0, 1.0, 1.5], [4.1, 1.0, 1.5]])
+    after = jnp.asarray([[4.1, 1.2, 1.5], [4.5, 1.4, 2.5], [3.5, 1.0, 1.5], [3.9, 1.0, 1.5]])
+    _, out = race.advance(memory, at_rest(before), at_rest(after), jnp.zeros(4), jnp.zeros(4, bool))
+    over = np.asarray(out.signals["overhang"])
+    np.testing.assert_allclose(over[:2], [[0.2 - 0.38, -0.38], [0.1 - 0.38, 0.5 - 0.38]], atol=1e-4)
+    assert over[2:].max() < -10  # neither before the plane nor backward
 
 
 @pytest.fixture(scope="module")

@@ -27,6 +27,8 @@ whose gates keep `CLEAR` from the straight lines between others; where none does
 import math
 from typing import Any
 
+import numpy as np
+
 from e2efly.courses.gates import BURIED, Gates, Tracks
 
 FEWEST, MOST = 3, 12
@@ -44,6 +46,8 @@ CANDIDATES = 4
 HEAD, EACH = 11, 8
 NUMBERS = HEAD + MOST * EACH
 """Uniform numbers that a candidate takes."""
+FAR = 1e6
+"""Squared distance of what does not count, m^2."""
 LOWEST = 0.3
 """The lower edge of an opening is at least so high over the ground, m."""
 
@@ -157,25 +161,22 @@ def _around(leg: Any, count: Any, whole: list[Any], stretch: Any, lie: Any, bend
 
 def _clearance(tracks: Tracks) -> Any:
     """(n, CANDIDATES) least distance of a gate from a line between others, and between two in a row, m."""
-    g = tracks.gates
-    xp = g.position.__array_namespace__()
-    gates, count, index = g.position[..., :-1, :], tracks.count[..., None], xp.arange(MOST)
-    first = gates[..., :1, :]
-    begins = xp.concatenate([g.start[..., None, :], gates], axis=-2)  # of the line that leads to each gate, and home
-    ends = xp.concatenate([gates, first], axis=-2)
-    home = xp.where(tracks.closed[..., None], count - 1, -1)
-    lines = xp.arange(MOST + 1)
-    last = xp.take_along_axis(gates, (count - 1)[..., None], axis=-2)
-    begins = xp.where((lines == MOST)[:, None], last, begins)
-    leads = xp.concatenate([xp.broadcast_to(index < count, (*home.shape[:-1], MOST)), home >= 0], axis=-1)
-    along, away = ends - begins, gates[..., None, :, :] - begins[..., None, :]
-    length = xp.maximum((along * along).sum(-1), 1e-6)
-    share = xp.clip((away * along[..., None, :]).sum(-1) / length[..., None], 0.0, 1.0)
-    off = away - share[..., None] * along[..., None, :]
-    gap = xp.sqrt((off * off).sum(-1))  # (..., lines, gates)
-    own = (index == lines[:, None]) | (index + 1 == lines[:, None])
-    of_home = (lines[:, None] == MOST) & ((index == 0) | (index == home[..., None]))
-    own = xp.where(lines[:, None] == MOST, of_home, own)
-    counts = leads[..., None] & (index < count)[..., None, :] & ~own
-    clear = xp.where(counts, gap, xp.inf).min(axis=(-1, -2))
-    return xp.minimum(clear, xp.sqrt(xp.where(leads, length, xp.inf).min(axis=-1)))
+    g, lines, index = tracks.gates, np.arange(MOST + 1)[:, None], np.arange(MOST)
+    xp, count = g.position.__array_namespace__(), tracks.count[..., None]
+    homeward = tracks.closed[..., None] & (index == count - 1)  # the gate from which the last line leads home
+    leads = xp.concatenate([index < count, tracks.closed[..., None]], axis=-1)
+    square, product, length = 0.0, 0.0, 0.0
+    for k in range(3):  # component by component, which a CPU does several times as fast as rows of three
+        gates = g.position[..., :-1, k]
+        last = xp.where(homeward, gates, 0.0).sum(axis=-1, keepdims=True)
+        begins = xp.concatenate([g.start[..., k : k + 1], gates[..., :-1], last], axis=-1)
+        ends = xp.concatenate([gates, gates[..., :1]], axis=-1)
+        along, away = ends - begins, gates[..., None, :] - begins[..., None]  # (..., lines, gates)
+        square, product = square + away * away, product + away * along[..., None]
+        length = length + along * along
+    share = xp.clip(product / xp.maximum(length, 1e-6)[..., None], 0.0, 1.0)
+    gap = square - 2 * share * product + share * share * length[..., None]
+    own = (index == lines) | ((index == lines - 1) & (lines < MOST)) | ((lines == MOST) & (index == 0))
+    counts = leads[..., None] & (index < count)[..., None, :] & ~own & ~((lines == MOST) & homeward[..., None, :])
+    clear = xp.where(counts, gap, FAR).min(axis=(-1, -2))
+    return xp.sqrt(xp.maximum(xp.minimum(clear, xp.where(leads, length, FAR).min(axis=-1)), 0.0))

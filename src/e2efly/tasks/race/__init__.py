@@ -121,21 +121,22 @@ class RaceConfig(TaskConfig):
 
     @classmethod
     def variant(cls, preset: str, config: TrainConfig) -> TrainConfig:
-        """`any_track`: another track in every episode."""
+        """`any_track`: another track in every episode; the way to a gate leads around from behind it."""
         del preset
-        weights = {"progway": 1.0, "fit": 1.0, "anglev_sq": 0.0005, "act2_sq": 0.005}
-        parameters = {"fit_margin": 0.15, "fit_limit": 1.0}
-        settings = BPTTConfig(
-            envs=128, learning_rate=4e-3, learning_rate_end=2e-4, max_grad_norm=1.0, gradient_decay=1.0, average=0.99
-        )
+        weights = {"progway" if name == "prog1" else name: weight for name, weight in config.reward.weights.items()}
+        weights = {name: weight for name, weight in weights.items() if name != "near"} | {"fitlog": 1.0}
+        algo: Any = config.algo
+        if isinstance(algo, BPTTConfig):
+            weights["fitlog"] = 20.0  # to its gradient, nothing else speaks against missing a gate
+            algo = dataclasses.replace(algo, learning_rate=4e-3, learning_rate_end=1e-4, average=0.99)
         return dataclasses.replace(
             config,
             task=cls(track=ANY, shows_more=True, episode_s=LONGEST, laps=0),
-            algo=settings,
-            reward=RewardConfig(weights, parameters),
+            algo=algo,
+            reward=RewardConfig(weights, {"fitlog_margin": 0.12}),
             network=NetworkConfig((128, 128)),
             steps=30_000_000,
-            chunk=100,
+            chunk=200,
         )
 
     @classmethod

@@ -25,10 +25,10 @@ from e2efly.tasks.task import at_rest, into_ball, uniform
 
 LOWEST_START = 0.3
 """Starts are drawn at least this high over the feet, m."""
-AROUND = 3.0
-"""The way to a gate from behind it leads through a point at most so far before it, m."""
-PASSING = 1.5
-"""Within this of its plane a vehicle should be in line with a gate's opening, m."""
+AROUND = 1.5
+"""The way to a gate from behind it leads through a point at most so far before it, m ..."""
+DETOUR = 0.5
+"""... and so far for each metre that the vehicle is behind it."""
 
 jax.tree_util.register_dataclass(Memory, data_fields=["tracks", "passed"], meta_fields=[])
 jax.tree_util.register_dataclass(Tracks, data_fields=["gates", "count", "closed"], meta_fields=[])
@@ -82,16 +82,31 @@ class AnyRace(AnyRaceGoal):
     def advance(
         self, memory: Memory, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
     ) -> tuple[Memory, Outcome]:
-        """The goal's verdict, with signals for the reward: `way`, `previous_way` and `overhang`."""
+        """The goal's verdict, with signals for the reward: `way`, `previous_way` and `overhang`.
+
+        The way is that to the next gate. In the step that passes it, it is what was flown of the way from there to the
+        gate after it, negative: so that no step charges for being fast through a gate.
+        """
         moved, outcome = super().advance(memory, before, after, time, timed_out)
         ahead = Ahead.of(memory)
-        axis, half = ahead.axis[:, 0], ahead.half[:, 0]
-        was, now = (_local(s.position - ahead.centre[:, 0], axis) for s in (before, after))
-        forward = jnp.sum(after.velocity * axis, axis=-1) > 0
-        near = forward & (now[:, 0] > -PASSING) & (now[:, 0] < PASSING / 3)
-        out = jnp.where(near[:, None], jnp.abs(now[:, 1:]) - half + self.shape.radius, -FAR)
-        signals = outcome.signals | {"way": _way(now), "previous_way": _way(was), "overhang": out}
-        return moved, dataclasses.replace(outcome, signals=signals)
+        centre, axis = (ahead.centre[:, i] for i in (0, 1)), (ahead.axis[:, i] for i in (0, 1))
+        (here, there), (along, onward) = centre, axis
+        was, now = (_local(s.position - here, along) for s in (before, after))
+        beyond = _way(_local(after.position - there, onward)) - _way(_local(here - there, onward))
+        way = jnp.where(outcome.arrived, beyond, _way(now))
+        signals = {"way": way, "previous_way": _way(was), "overhang": self._overhang(was, now, ahead.half[:, 0])}
+        return moved, dataclasses.replace(outcome, signals=outcome.signals | signals)
+
+    def _overhang(
+        self, was: Float[Array, "n 3"], now: Float[Array, "n 3"], half: Float[Array, "n 2"]
+    ) -> Float[Array, "n 2"]:
+        """How far the vehicle's sphere stands out of the opening, sideways and up, where it crosses its plane forward,
+        m; `-FAR` in steps that do not cross it.
+        """
+        crossing = (was[:, 0] < 0) & (now[:, 0] >= 0)
+        share = jax.lax.stop_gradient(was[:, 0] / jnp.minimum(was[:, 0] - now[:, 0], -1e-6))
+        there = was[:, 1:] + jnp.clip(share, 0.0, 1.0)[:, None] * (now[:, 1:] - was[:, 1:])
+        return jnp.where(crossing[:, None], jnp.abs(there) - half + self.shape.radius, -FAR)
 
 
 def _local(d: Float[Array, "n 3"], axis: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
@@ -105,7 +120,7 @@ def _way(local: Float[Array, "n 3"]) -> Float[Array, " n"]:
 
     The way around leads by a point before the gate, the farther before it the farther behind it the vehicle is.
     """
-    back = jnp.clip(local[:, 0], 0.0, AROUND)
+    back = jnp.clip(DETOUR * local[:, 0], 0.0, AROUND)
     return norm(local.at[:, 0].add(back)) + back
 
 
