@@ -3,9 +3,10 @@
     python benchmarks/any_track.py [--policy race_any] [--specialists 50] [--json FILE]
 
 Unseen tracks are those of `courses/random_tracks.py` from seeds that training does not draw. Those of another sampler
-walk from gate to gate as `elsewhere` below says. A specialist is trained by the nominal preset of the race, from
-nothing, on one of the unseen tracks alone; it is shown what the one policy is shown, and all of them share a compiled
-program. Its best policy is kept as `train` keeps it. Times are compared over the starts from which both succeed.
+walk from gate to gate as `elsewhere` below says. A specialist is trained from nothing on one of the unseen tracks
+alone, in as many steps as the nominal preset of a race takes, by the rewards and options and with the network of the
+one policy; all of them share a compiled program. Its best policy is kept as `train` keeps it. Times are compared over
+the starts from which both succeed.
 """
 
 import dataclasses
@@ -32,13 +33,15 @@ from e2efly.env import UNSEEN, Env, random_key  # noqa: E402
 from e2efly.episodes import Act, Episodes, run_episodes, wilson  # noqa: E402
 from e2efly.evaluation import act_of, candidate, episode_steps, evaluate  # noqa: E402
 from e2efly.learn.judge import judge, score  # noqa: E402
-from e2efly.learn.networks import Weights  # noqa: E402
+from e2efly.learn.networks import Actor, Weights  # noqa: E402
 from e2efly.learn.programs import Programs, acting  # noqa: E402
 from e2efly.learn.runner import policy_of  # noqa: E402
 from e2efly.learn.setup import Setup  # noqa: E402
 
 STARTS = 100
 """Of a track, where times are compared."""
+EVERY = 62
+"""Updates of a specialist between two evaluations."""
 FEW = 10
 """Of a track of the other sampler."""
 
@@ -107,12 +110,13 @@ def told(case: str, flown: Episodes, tracks: int) -> dict[str, Any]:
     }
 
 
-def specialists(tracks: Tracks) -> Iterator[tuple[Weights, Setup, float, float]]:
-    """The best policy of each track, what it is judged by, and the seconds that its training took, by itself."""
-    config = presets.preset("race", "bptt", presets.NOMINAL)
-    general = presets.preset("race", "bptt", "any_track").task
-    config = dataclasses.replace(config, task=dataclasses.replace(general, track=track_names()[0]))
-    setup = Setup.of(config)
+def specialists(tracks: Tracks) -> Iterator[tuple[Weights, Setup, float]]:
+    """The best policy of each track, the setup of all, and the seconds that its training took, without compilation."""
+    config = presets.preset("race", "bptt", "any_track")
+    steps = presets.preset("race", "bptt", presets.NOMINAL).steps
+    task = dataclasses.replace(config.task, track=track_names()[0])
+    setup = Setup.of(dataclasses.replace(config, task=task, steps=steps, chunk=EVERY))
+    config = setup.config
     programs = Programs.compile(setup, setup.algorithm.init(setup.env, config.algo, 0))
     for world in range(len(tracks.count)):
         began, track = time.perf_counter(), one(tracks, world)
@@ -125,7 +129,7 @@ def specialists(tracks: Tracks) -> Iterator[tuple[Weights, Setup, float, float]]
             flown = judge(setup, programs.evaluate, policy_of(state), 1, config.eval_episodes, judges)
             if (now := score(config.task, flown)) > highest:
                 best, highest = policy_of(state), now
-        yield best, setup, time.perf_counter() - began, highest
+        yield best, setup, time.perf_counter() - began
 
 
 def beside(policy: str, tracks: Tracks) -> list[dict[str, Any]]:
@@ -137,14 +141,15 @@ def beside(policy: str, tracks: Tracks) -> list[dict[str, Any]]:
     ours = flier(act_of(found.policy), STARTS, steps)
     rows = []
 
-    @partial(jax.jit, compiler_options=wide_vectors(STARTS))
-    def theirs(env: Env, weights: Weights, key: Any) -> Episodes:
+    @partial(jax.jit, static_argnums=0, compiler_options=wide_vectors(STARTS))
+    def theirs(actor: Actor, env: Env, weights: Weights, key: Any) -> Episodes:
         return run_episodes(env, acting(actor, weights), key, STARTS, steps)
 
-    for world, (weights, setup, seconds, _) in enumerate(specialists(tracks)):
-        actor, track = setup.actor, one(tracks, world)
+    for world, (weights, setup, seconds) in enumerate(specialists(tracks)):
+        track = one(tracks, world)
         judged = on(next(iter(setup.judges.values())), track)
-        a, b = (jax.tree.map(np.asarray, x) for x in (ours(on(env, track), key), theirs(judged, weights, key)))
+        flown = ours(on(env, track), key), theirs(setup.actor, judged, weights, key)
+        a, b = (jax.tree.map(np.asarray, x) for x in flown)
         both = a.success & b.success
         row = {
             "track": world,

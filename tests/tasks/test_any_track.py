@@ -215,8 +215,9 @@ def test_what_stands_out_is_measured_where_the_plane_is_crossed() -> None:
     after = jnp.asarray([[4.1, 1.2, 1.5], [4.5, 1.4, 2.5], [3.5, 1.0, 1.5], [3.9, 1.0, 1.5]])
     _, out = race.advance(memory, at_rest(before), at_rest(after), jnp.zeros(4), jnp.zeros(4, bool))
     over = np.asarray(out.signals["overhang"])
-    np.testing.assert_allclose(over[:2], [[0.2 - 0.38, -0.38], [0.1 - 0.38, 0.5 - 0.38]], atol=1e-4)
-    assert over[2:].max() < -10  # neither before the plane nor backward
+    np.testing.assert_allclose(over[:2, :2], [[0.2 - 0.38, -0.38], [0.1 - 0.38, 0.5 - 0.38]], atol=1e-4)
+    assert over[2:, :2].max() < -10  # neither before the plane nor backward
+    np.testing.assert_allclose(over[:, 2], 0.25 - np.asarray(after)[:, 2], atol=1e-6)  # and the ground
 
 
 @pytest.fixture(scope="module")

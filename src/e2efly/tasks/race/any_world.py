@@ -30,6 +30,11 @@ AROUND = 1.5
 DETOUR = 0.5
 """... and so far for each metre that the vehicle is behind it."""
 
+SHORTEST = 0.01
+"""Keeps the gradient of where a gate's plane is crossed finite, m: a step that crosses it is longer than this."""
+LOW = 0.2
+"""With the feet lower than this over the ground a vehicle stands out of where it should be, m."""
+
 jax.tree_util.register_dataclass(Memory, data_fields=["tracks", "passed"], meta_fields=[])
 jax.tree_util.register_dataclass(Tracks, data_fields=["gates", "count", "closed"], meta_fields=[])
 
@@ -84,6 +89,8 @@ class AnyRace(AnyRaceGoal):
     ) -> tuple[Memory, Outcome]:
         """The goal's verdict, with signals for the reward: `way`, `previous_way` and `overhang`.
 
+        What stands out of an opening, sideways and up, is followed by what is too near to the ground.
+
         The way is that to the next gate. In the step that passes it, it is what was flown of the way from there to the
         gate after it, negative: so that no step charges for being fast through a gate.
         """
@@ -94,7 +101,9 @@ class AnyRace(AnyRaceGoal):
         was, now = (_local(s.position - here, along) for s in (before, after))
         beyond = _way(_local(after.position - there, onward)) - _way(_local(here - there, onward))
         way = jnp.where(outcome.arrived, beyond, _way(now))
-        signals = {"way": way, "previous_way": _way(was), "overhang": self._overhang(was, now, ahead.half[:, 0])}
+        low = self.shape.feet_height + LOW - after.position[:, 2:]
+        out = jnp.concatenate([self._overhang(was, now, ahead.half[:, 0]), low], axis=-1)
+        signals = {"way": way, "previous_way": _way(was), "overhang": out}
         return moved, dataclasses.replace(outcome, signals=outcome.signals | signals)
 
     def _overhang(
@@ -104,8 +113,9 @@ class AnyRace(AnyRaceGoal):
         m; `-FAR` in steps that do not cross it.
         """
         crossing = (was[:, 0] < 0) & (now[:, 0] >= 0)
-        share = jax.lax.stop_gradient(was[:, 0] / jnp.minimum(was[:, 0] - now[:, 0], -1e-6))
-        there = was[:, 1:] + jnp.clip(share, 0.0, 1.0)[:, None] * (now[:, 1:] - was[:, 1:])
+        step = jnp.where(crossing, jnp.minimum(was[:, 0] - now[:, 0], -SHORTEST), -1.0)
+        share = jnp.where(crossing, was[:, 0], -1.0) / step
+        there = was[:, 1:] + share[:, None] * (now[:, 1:] - was[:, 1:])
         return jnp.where(crossing[:, None], jnp.abs(there) - half + self.shape.radius, -FAR)
 
 
