@@ -1,22 +1,25 @@
 """One policy for any track: 1000 unseen ones, those that are shipped, another sampler's, and specialists beside it.
 
-    python benchmarks/any_track.py [--policy race_any] [--specialists 50] [--json FILE]
+    python benchmarks/any_track.py [--policy race_any] [--specialists 50] [--parts flights specialists] [--json FILE]
 
 Unseen tracks are those of `courses/random_tracks.py` from seeds that training does not draw. Those of another sampler
-walk from gate to gate as `elsewhere` below says. A specialist is trained from nothing on one of the unseen tracks
-alone, in as many steps as the nominal preset of a race takes, by the rewards and options and with the network of the
-one policy; all of them share a compiled program. Its best policy is kept as `train` keeps it. Times are compared over
-the starts from which both succeed.
+walk from gate to gate as `elsewhere` below says. A specialist begins as the one policy and goes on to learn on one of
+the unseen tracks alone, in as many steps as the nominal preset of a race takes, by the rewards and options of the one
+policy; all of them share a compiled program. Its best policy is kept as `train` keeps it. Times are compared over the
+starts from which both succeed. Specialists that begin from nothing fly few of these tracks after so few steps.
+
+What is not measured anew stays in the file.
 """
 
 import dataclasses
+import json
 import math
 import time
 from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
-from common import arguments, table, write
+from common import RESULTS, arguments, table, write
 
 from e2efly.device import prepare, wide_vectors
 
@@ -37,9 +40,13 @@ from e2efly.learn.networks import Actor, Weights  # noqa: E402
 from e2efly.learn.programs import Programs, acting  # noqa: E402
 from e2efly.learn.runner import policy_of  # noqa: E402
 from e2efly.learn.setup import Setup  # noqa: E402
+from e2efly.learn.warm_start import started_from  # noqa: E402
+from e2efly.zoo import policy_file  # noqa: E402
 
 STARTS = 100
 """Of a track, where times are compared."""
+RATE = 1e-3
+"""Adam's step at the start of a specialist's training."""
 EVERY = 62
 """Updates of a specialist between two evaluations."""
 FEW = 10
@@ -110,20 +117,21 @@ def told(case: str, flown: Episodes, tracks: int) -> dict[str, Any]:
     }
 
 
-def specialists(tracks: Tracks) -> Iterator[tuple[Weights, Setup, float]]:
+def specialists(policy: str, tracks: Tracks) -> Iterator[tuple[Weights, Setup, float]]:
     """The best policy of each track, the setup of all, and the seconds that its training took, without compilation."""
     config = presets.preset("race", "bptt", "any_track")
     steps = presets.preset("race", "bptt", presets.NOMINAL).steps
     task = dataclasses.replace(config.task, track=track_names()[0])
-    setup = Setup.of(dataclasses.replace(config, task=task, steps=steps, chunk=EVERY))
+    algo = dataclasses.replace(config.algo, learning_rate=RATE)
+    setup = Setup.of(dataclasses.replace(config, task=task, algo=algo, steps=steps, chunk=EVERY))
     config = setup.config
-    programs = Programs.compile(setup, setup.algorithm.init(setup.env, config.algo, 0))
+    first = started_from(setup.algorithm.init(setup.env, config.algo, 0), policy_file(policy), setup)
+    programs = Programs.compile(setup, first)
     for world in range(len(tracks.count)):
         began, track = time.perf_counter(), one(tracks, world)
         env = on(setup.env, track)
         judges = {name: on(judged, track) for name, judged in setup.judges.items()}
-        parameters = setup.algorithm.init(env, config.algo, world)
-        state, best, highest = programs.begin(env, parameters, random_key(world)), parameters.policy, -math.inf
+        state, best, highest = programs.begin(env, first, random_key(world)), first.policy, -math.inf
         for update in range(0, setup.updates, config.chunk):
             state, _ = programs.chunk(env, config.algo, state, update, setup.updates)
             flown = judge(setup, programs.evaluate, policy_of(state), 1, config.eval_episodes, judges)
@@ -145,7 +153,7 @@ def beside(policy: str, tracks: Tracks) -> list[dict[str, Any]]:
     def theirs(actor: Actor, env: Env, weights: Weights, key: Any) -> Episodes:
         return run_episodes(env, acting(actor, weights), key, STARTS, steps)
 
-    for world, (weights, setup, seconds) in enumerate(specialists(tracks)):
+    for world, (weights, setup, seconds) in enumerate(specialists(policy, tracks)):
         track = one(tracks, world)
         judged = on(next(iter(setup.judges.values())), track)
         flown = ours(on(env, track), key), theirs(setup.actor, judged, weights, key)
@@ -181,29 +189,37 @@ def compared(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def main() -> None:
-    """Fly, train the specialists, print tables, write JSON."""
-    options = arguments(__doc__ or "", policy="race_any", specialists=50)
-    found = evaluate(options.policy, 1000)
-    rows = [told("unseen, of the sampler that it was trained with", found.flown["race"], 1000)]
+def flights(policy: str) -> list[dict[str, Any]]:
+    """Rows of the table: unseen tracks, those that are shipped, another sampler's."""
+    rows = [told("unseen, of the sampler that it was trained with", evaluate(policy, 1000).flown["race"], 1000)]
     print(rows[-1], flush=True)
     for name in track_names():
-        rows.append(told(name, evaluate(options.policy, 1000, task={"track": name}).flown["race"], 1))
+        rows.append(told(name, evaluate(policy, 1000, task={"track": name}).flown["race"], 1))
         print(rows[-1], flush=True)
-    single = candidate(options.policy, task={"track": track_names()[0]})
+    single = candidate(policy, task={"track": track_names()[0]})
     (suite,) = single.task.criteria().values()
     env, rng = single.environment(suite), np.random.default_rng(0)
     fly = flier(act_of(single.policy), FEW, episode_steps(suite, env))
     each = [fly(on(env, Tracks.of(elsewhere(rng), MOST)), random_key(i, UNSEEN)) for i in range(100)]
     rows.append(told("of another sampler", jax.tree.map(lambda *x: np.concatenate(x), *each), len(each)))
     print(rows[-1], flush=True)
-    races = beside(options.policy, drawn(options.specialists, 1_000_000)) if options.specialists else []
-    content: dict[str, Any] = {"table": rows, "specialists": races}
-    if races:
-        content["compared"] = compared(races)
+    return rows
+
+
+def main() -> None:
+    """Fly, train the specialists, print tables, write JSON."""
+    options = arguments(__doc__ or "", policy="race_any", specialists=50, parts=["flights", "specialists"])
+    path = options.json or RESULTS / "any_track.json"
+    content = json.loads(path.read_text()) if path.exists() else {}
+    if "flights" in options.parts:
+        content["table"] = flights(options.policy)
+        write("any_track", path, content)
+    if "specialists" in options.parts:
+        races = beside(options.policy, drawn(options.specialists, 1_000_000))
+        content |= {"specialists": races, "compared": compared(races)}
         print(content["compared"])
-    write("any_track", options.json, content)
-    print(table(rows))
+        write("any_track", path, content)
+    print(table(content["table"]))
 
 
 if __name__ == "__main__":

@@ -226,10 +226,16 @@ class Evaluation:
 
 def course_rows(suite: TaskConfig, drawn: Mapping[str, np.ndarray], n: int) -> list[dict[str, Any]]:
     """What each of n episodes of a criterion was to fly, as JSON: an object with `course`, or an empty one."""
-    shared, columns = suite.course(), {name: np.asarray(x).round(6).tolist() for name, x in drawn.items()}
+    shared, columns = suite.course(), {name: _rounded(x) for name, x in drawn.items()}
     if not (shared or columns):
         return [{}] * n
     return [{"course": shared | {name: column[i] for name, column in columns.items()}} for i in range(n)]
+
+
+def _rounded(column: np.ndarray) -> list[Any]:
+    """Numbers as JSON; what is true or false, or counted, as it is."""
+    values = np.asarray(column)
+    return (values.round(6) if np.issubdtype(values.dtype, np.floating) else values).tolist()
 
 
 def drawn_by(task: Any, memory: Any) -> dict[str, Any]:

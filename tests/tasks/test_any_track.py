@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import json
 from pathlib import Path
 
 import jax
@@ -253,10 +254,19 @@ def test_starts_of_validation_have_tracks_of_their_own() -> None:
     assert len({float(t.gates.position[0, 0, 0]) for t in tracks}) == 3
     assert isinstance(tracks[0].gates.position, np.ndarray)
     np.testing.assert_array_equal(starts.drawn["count"], [t.count[0] for t in tracks])
+    rows = json.loads(json.dumps(evaluation.course_rows(ANY.task, starts.drawn, 3)))  # as a report says them
+    for row, track in zip(rows, tracks, strict=True):
+        said, count = row["course"], int(track.count[0])
+        assert (said["count"], said["closed"]) == (count, bool(track.closed[0]))
+        wanted = track.track(0)
+        np.testing.assert_allclose(said["position"][:count], wanted.position, atol=1e-5)
+        np.testing.assert_allclose(said["opening"][:count], wanted.opening, atol=1e-5)
 
 
 def test_the_command_line_finds_the_preset_by_the_track() -> None:
     assert parse_train(["race", "--task.track", "any"]).config == ANY
+    ppo = parse_train(["race", "--task.track", "any", "--algo", "ppo"]).config
+    assert (ppo.algo.name, ppo.task) == ("ppo", ANY.task)
     usual = parse_train(["race"]).config
     assert isinstance(usual.task, RaceConfig)
     assert usual.task.track == "four_gates"

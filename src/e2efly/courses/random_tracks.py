@@ -165,7 +165,9 @@ def _clearance(tracks: Tracks) -> Any:
     xp, count = g.position.__array_namespace__(), tracks.count[..., None]
     homeward = tracks.closed[..., None] & (index == count - 1)  # the gate from which the last line leads home
     leads = xp.concatenate([index < count, tracks.closed[..., None]], axis=-1)
-    square, product, length = 0.0, 0.0, 0.0
+    square: Any = 0.0
+    product: Any = 0.0
+    length: Any = 0.0
     for k in range(3):  # component by component, which a CPU does several times as fast as rows of three
         gates = g.position[..., :-1, k]
         last = xp.where(homeward, gates, 0.0).sum(axis=-1, keepdims=True)

@@ -127,7 +127,7 @@ class RaceConfig(TaskConfig):
         weights = {name: weight for name, weight in weights.items() if name != "near"} | {"fitlog": 1.0}
         algo: Any = config.algo
         if isinstance(algo, BPTTConfig):
-            weights["fitlog"] = 12.0  # to its gradient, nothing else speaks against missing a gate
+            weights["fitlog"] = 40.0  # to its gradient, nothing else speaks against missing a gate
             algo = dataclasses.replace(
                 algo, learning_rate=4e-3, learning_rate_end=1e-4, gradient_decay=0.3, average=0.99
             )
@@ -137,7 +137,7 @@ class RaceConfig(TaskConfig):
             algo=algo,
             reward=RewardConfig(weights, {"fitlog_margin": 0.12}),
             network=NetworkConfig((128, 128)),
-            steps=20_000_000,
+            steps=30_000_000,
             chunk=200,
         )
 
