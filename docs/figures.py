@@ -20,6 +20,7 @@ TITLES = {
     "thrown": "Catching a thrown vehicle: success over 1000 unseen starts, full presets",
     "thrown_starts": "Thrown starts that nothing saves",
     "stable_baselines3_ppo": "Time to the hover criterion, Stable-Baselines3 on the same environment, at most 200 s",
+    "any_track": "One policy for any track",
     "success": "Success over 1000 unseen starts, full presets",
     "ablation": "The reward ablation, from process start, empty cache",
     "robust": "The preset robust: seconds from process start, cold, and success under stress",
@@ -105,8 +106,50 @@ def thrown() -> None:
         axes[1].legend(loc="lower right")
 
 
+def any_track() -> None:
+    """docs/any_track.png: the first tracks that the sampler draws from a seed, from above."""
+    import numpy as np
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    from e2efly.courses.random_tracks import CANDIDATES, NUMBERS, random_tracks
+    from e2efly.view.style import GREY, PALE, SPEED, START, figure
+
+    tracks = random_tracks(np.random.default_rng(7).random((15, CANDIDATES, NUMBERS), np.float32))
+    notes = [
+        "from above; gates as wide as their openings, coloured by height; arrows: flown through that way",
+        "numbers: order of the gates; circle: start; grey: straight from gate to gate",
+    ]
+    height = Normalize(0.5, 7.0)
+    path = DOCS / "any_track.png"
+    with figure(path, "Tracks by chance", 7.2, notes) as fig:
+        axes = fig.subplots(3, 5)
+        for world, ax in enumerate(axes.ravel()):
+            t = tracks.track(world)
+            way = np.vstack([t.start, t.position, *([t.position[:1]] if t.closed else [])])
+            ax.plot(way[:, 0], way[:, 1], color=PALE, linewidth=1.0)
+            ax.plot(*t.start[:2, None], **START)
+            along = np.stack([np.cos(t.yaw), np.sin(t.yaw)], axis=-1)
+            left = t.opening[:, :1] / 2 * np.stack([-along[:, 1], along[:, 0]], axis=-1)
+            size = np.ptp(way[:, :2], axis=0).max()
+            for i, (place, a, half) in enumerate(zip(t.position, along, left, strict=True)):
+                color = SPEED(height(place[2]))
+                ends = np.stack([place[:2] - half, place[:2] + half])
+                ax.plot(*ends.T, color=color, linewidth=3)
+                tip = place[:2] + 0.14 * size * a
+                ax.annotate("", tip, place[:2], arrowprops={"arrowstyle": "->", "color": color, "linewidth": 1.2})
+                off = place[:2] + (0.05 + 0.035 * (i % 2)) * size * np.array([-a[1], a[0]])
+                ax.text(*off, str(i + 1), size=7, ha="center", va="center", color=GREY)
+            ax.set_aspect("equal", adjustable="datalim")
+            ax.margins(0.1)
+            ax.tick_params(labelsize=7)
+        fig.colorbar(ScalarMappable(height, SPEED), ax=axes, shrink=0.5, aspect=40, label="height of a gate (m)")
+
+
 def main() -> None:
-    """Write docs/benchmarks.md and pictures; with `--noise` draw docs/noise.md; with `--pictures` the racer, too."""
+    """Write docs/benchmarks.md and pictures; with `--noise` draw docs/noise.md, with `--tracks` any_track.png; with
+    `--pictures` the racer, too.
+    """
     source = "Written by `make docs` from `benchmarks/results/*.json`; measured by the scripts in `benchmarks/`."
     lines = ["# Benchmarks", "", source, ""]
     for name, title in TITLES.items():
@@ -124,6 +167,8 @@ def main() -> None:
     families()
     if "--noise" in sys.argv or "--pictures" in sys.argv:
         noise()
+    if "--tracks" in sys.argv or "--pictures" in sys.argv:
+        any_track()
     if "--pictures" in sys.argv:
         with tempfile.TemporaryDirectory() as folder:
             run = Path(folder) / "run"

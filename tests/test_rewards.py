@@ -13,6 +13,8 @@ from e2efly.rewards import TERMS, reward
 SIGNALS: dict[str, Any] = {
     "offset": [3.0, 4.0, 12.0],
     "previous_offset": [0.0, 0.0, 15.0],
+    "way": 6.5,
+    "previous_way": 7.0,
     "velocity": [2.0, -3.0, -6.0],
     "body_rate": [1.0, 2.0, -2.0],
     "action": [0.6, 0.0, 0.0, 0.8],
@@ -40,6 +42,7 @@ DETACHED = {("avoid", "closing")}
 BY_HAND = {
     "prog1": 15 - 13,
     "prog2": -13,
+    "progway": 0.5,
     "progxy": -5,
     "progx": -3,
     "progy": -4,
@@ -69,6 +72,7 @@ BY_HAND = {
     "overspeed": -1,
     "avoid": -(0.5**2 + 0.5 * np.log1p(np.exp(-16 * 0.3))) * 2.5 - (0.2**2 + 0.5 * np.log1p(np.exp(-16 * 0.6))) * 5,
     "fit": -(0.03 + 0.1),
+    "fitlog": -np.log(1 + 0.05 / 0.02) - np.log(1 + 0.11 / 0.02) - np.log(1 + 0.2 / 0.02),
 }
 SINGULAR: dict[str, Any] = {
     **SIGNALS,

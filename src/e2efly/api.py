@@ -40,7 +40,8 @@ def preset(task: TaskLike, algo: AlgoLike | None = None, name: str | None = None
     kind = TASKS.find(task)
     algo = algo or kind.best
     algo = algo if isinstance(algo, str) else ALGORITHMS.reference(algo)
-    config = presets.preset(task, algo, presets.default(kind, ALGORITHMS.find(algo)) if name is None else name)
+    usual = presets.default(kind, ALGORITHMS.find(algo), lambda option: getattr(options, option, None))
+    config = presets.preset(task, algo, usual if name is None else name)
     return config if options is None else dataclasses.replace(config, task=options)
 
 

@@ -63,7 +63,8 @@ class Candidate:
     controller: Controller = "policy"
     """The vehicle that the flight controller believes in."""
     changes: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
-    """Where `env` is not what the run or the contract says: that and what flies, by dotted name."""
+    """Where task and environment are not what the run or the contract says: that and what flies, by dotted name
+    (`env.wind`, `task.track`)."""
 
     @property
     def draws(self) -> bool:
@@ -112,7 +113,7 @@ class Candidate:
                 f"What flies is {self.vehicle}, by the policy of a {contract.vehicle}; the flight controller {told}."
             )
         if self.changes:
-            changes = (f"env.{name} {value} (not {own})" for name, (own, value) in self.changes.items())
+            changes = (f"{name} {value} (not {own})" for name, (own, value) in self.changes.items())
             notes.append(f"Flown under {', '.join(changes)}.")
         return notes
 
@@ -132,6 +133,7 @@ def candidate(
     vehicle: str | None = None,
     controller: Controller = "policy",
     env: Mapping[str, Any] | None = None,
+    task: Mapping[str, Any] | None = None,
 ) -> Candidate:
     """Find a policy, and what it is judged in.
 
@@ -141,6 +143,7 @@ def candidate(
         controller: the vehicle that the flight controller believes in: the policy's own, whatever flies (policy), or
             the one that flies (plant).
         env: values that are to be changed in what the run or the contract says of the environment, by dotted name.
+        task: the same of its task, where another was meant to be flown: {"track": "four_gates"}.
 
     Raises:
         ValueError: when there is none; for changes that the contract does not allow; when the vehicle that it was
@@ -149,10 +152,11 @@ def candidate(
     file = policy_file(policy, vehicle)
     loaded, run = load_policy(file), run_of(file)
     if run is None:
-        task, own = config_from_contract(loaded, vehicle)
+        learned, own = config_from_contract(loaded, vehicle)
     else:
         config = run.config(names_vehicle=vehicle is not None)
-        task, own = config.task, config.env
+        learned, own = config.task, config.env
+    learned = learned.showing([shown.name for shown in loaded.contract.observation])
     trained = _trained_on(loaded)
     if vehicle is None and (known := _hash(own.vehicle)) != trained:
         raise ValueError(
@@ -160,8 +164,9 @@ def candidate(
             "the vehicle that the policy was trained on, or --vehicle"
         )
     own = pinned(own, loaded) if env or loaded.contract.vehicle_ranges else own
-    flies = with_changes(own, env or {})
-    found = Candidate(file, loaded, task, flies, run, vehicle or own.vehicle, controller, differing(own, flies))
+    flies, flown = with_changes(own, env or {}), changed(learned, task or {}, "task")
+    changes = differing(own, flies, "env") | differing(learned, flown, "task")
+    found = Candidate(file, loaded, flown, flies, run, vehicle or own.vehicle, controller, changes)
     if not found.draws or loaded.contract.vehicle_ranges is None:
         _ = found.flown  # a name that there is not is refused here
     elif _hash(found.vehicle) != trained:
@@ -243,7 +248,7 @@ class Evaluation:
             "task": self.candidate.policy.contract.task,
             "vehicle": self.candidate.vehicle,
             "controller": self.candidate.controller,
-            "changed": {f"env.{name}": value for name, (_, value) in self.candidate.changes.items()},
+            "changed": {name: value for name, (_, value) in self.candidate.changes.items()},
             "env": dataclasses.asdict(self.candidate.env),
             "seed": self.seed,
             "units": UNITS,
@@ -262,10 +267,16 @@ class Evaluation:
 
 def course_rows(suite: TaskConfig, drawn: Mapping[str, np.ndarray], n: int) -> list[dict[str, Any]]:
     """What each of n episodes of a criterion was to fly, as JSON: an object with `course`, or an empty one."""
-    shared, columns = suite.course(), {name: np.asarray(x).round(6).tolist() for name, x in drawn.items()}
+    shared, columns = suite.course(), {name: _rounded(x) for name, x in drawn.items()}
     if not (shared or columns):
         return [{}] * n
     return [{"course": shared | {name: column[i] for name, column in columns.items()}} for i in range(n)]
+
+
+def _rounded(column: np.ndarray) -> list[Any]:
+    """Numbers as JSON; what is true or false, or counted, as it is."""
+    values = np.asarray(column)
+    return (values.round(6) if np.issubdtype(values.dtype, np.floating) else values).tolist()
 
 
 def drawn_by(task: Any, memory: Any) -> dict[str, Any]:
@@ -280,6 +291,7 @@ def evaluate(
     vehicle: str | None = None,
     controller: Controller = "policy",
     env: Mapping[str, Any] | None = None,
+    task: Mapping[str, Any] | None = None,
     seed: int = SEED,
     device: str | None = None,
     kept: int = 0,
@@ -294,6 +306,7 @@ def evaluate(
             tuned to the vehicle that flies. Neither changes the policy.
         env: options of `EnvConfig` by dotted name, in place of what the policy's run or contract says:
             {"wind": 3.0, "randomize": {"mass": 0.2}, "disturbance.gust": 1.0}.
+        task: options of its task by dotted name, likewise: {"track": "four_gates"}.
         seed: of the starts.
         device: cpu or gpu.
         kept: bytes that the caller keeps of every start (`ROW` for a report), for the check of the memory.
@@ -304,7 +317,7 @@ def evaluate(
     if episodes <= 0:
         raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
     prepare(device)
-    found = candidate(policy, vehicle, controller, env)
+    found = candidate(policy, vehicle, controller, env, task)
     return Evaluation(found, seed, *fly_criteria(found, episodes, seed, kept))
 
 

@@ -88,6 +88,12 @@ class Goal:
         """Time limit of an episode, s."""
         return self.config.episode_s
 
+    @classmethod
+    def showing(cls, names: Sequence[str]) -> "type[Goal]":
+        """The class whose fields of the observation have these names among them, where the task has several."""
+        del names
+        return cls
+
     @property
     def fields(self) -> tuple[Field, ...]:
         """The task's own fields of the observation."""

@@ -5,7 +5,7 @@ A preset is a `TrainConfig`; a variant of one is `dataclasses.replace`.
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from e2efly.config import (
@@ -50,8 +50,19 @@ def names() -> tuple[str, ...]:
     return ROBUST, NOMINAL, PAPER, *dict.fromkeys(name for task in TASKS.values() for name in task.variants)
 
 
-def default(task: type[TaskConfig], learner: type[AlgorithmConfig]) -> str:
-    """The preset that a task is learned by where none is named: robust, where the algorithm has a recipe for that."""
+def default(
+    task: type[TaskConfig], learner: type[AlgorithmConfig], given: Callable[[str], Any] = lambda name: None
+) -> str:
+    """The preset that a task is learned by where none is named: robust, where the algorithm has a recipe for that.
+
+    Args:
+        task: the class of its options.
+        learner: the class of the algorithm's.
+        given: the value of an option of the task, by its name; some ask for presets of their own.
+    """
+    for (name, value), asked in task.asked.items():
+        if given(name) == value:
+            return asked
     return ROBUST if learner.name in task.robust else NOMINAL
 
 

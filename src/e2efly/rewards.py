@@ -62,6 +62,11 @@ def progz(offset: Vector) -> Scalar:
     return -jnp.abs(offset[..., 2])
 
 
+def progway(way: Scalar, previous_way: Scalar) -> Scalar:
+    """What was gained in this step of a way to the goal that need not be straight, m. Ours."""
+    return previous_way - way
+
+
 def act1(action: Float[Array, "*n 4"]) -> Scalar:
     """Minus the length of the action (Eq. act1, with the sign it has in act3)."""
     return -norm(action)
@@ -245,6 +250,17 @@ def fit(overhang: Float[Array, "*n k"], fit_margin: float | Array = 0.02, fit_li
     return -jnp.sum(jnp.clip(overhang + fit_margin, 0.0, fit_limit), axis=-1)
 
 
+def fitlog(
+    overhang: Float[Array, "*n k"], fitlog_margin: float | Array = 0.1, fitlog_scale: float | Array = 0.02
+) -> Scalar:
+    """-log(1 + o / scale), o how far parts stand out of the opening and of a margin in it, m: steep near fitting. Ours.
+
+    What stands far out still costs more than what stands out less, but never so much that turning back is better.
+    """
+    out = jnp.maximum(overhang + fitlog_margin, 0.0)
+    return -jnp.sum(jnp.log1p(out / fitlog_scale), axis=-1)
+
+
 Kind = Literal["differentiable", "partly", "sparse"]
 
 
@@ -271,9 +287,9 @@ class Term:
 _KINDS: dict[Kind, tuple[Callable[..., Array], ...]] = {
     "differentiable": (
         prog1, prog2, progxy, progx, progy, progz, act1, act2, act3, ori1, ori3, v1, v2, v3, anglev, near,
-        anglev_sq, act2_sq, upright, vel, overspeed,
+        anglev_sq, act2_sq, upright, vel, overspeed, progway,
     ),
-    "partly": (ori2, ori4, vz, avoid1, avoid2, avoid, descent, fit),
+    "partly": (ori2, ori4, vz, avoid1, avoid2, avoid, descent, fit, fitlog),
     "sparse": (goal, crash),
 }  # fmt: skip
 TERMS: Registry[Term] = Registry("reward term", source=lambda term: term.function)

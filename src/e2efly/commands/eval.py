@@ -10,10 +10,9 @@ import tyro
 from rich.table import Table
 
 from e2efly.commands.options import parse as parse_options
-from e2efly.commands.options import peek
+from e2efly.commands.policies import named_first, values, with_task
 from e2efly.commands.rows import check_stress, report_stress
-from e2efly.config import EnvConfig
-from e2efly.config.changes import differing
+from e2efly.config import EnvConfig, TaskConfig
 from e2efly.storage import write_json
 from e2efly.terminal import Terminal, seconds
 from e2efly.vehicles import Controller
@@ -52,6 +51,9 @@ class Eval:
     """Exit status 1 when a row of --stress succeeds less often than this, such as 0.97."""
     device: Literal["cpu", "gpu"] | None = None
     """Where to compute."""
+    task: TaskConfig = TaskConfig()
+    """What the policy is to fly, in place of what its run or its contract says: options of its task, as `train` has
+    them (--task.track four_gates)."""
     env: EnvConfig = EnvConfig()
     """What the policy meets, in place of what its run or its contract says; not with --stress. What the contract fixes
     is refused: the vehicle (see --vehicle), commands, rate, past actions, what the cameras' images are."""
@@ -65,32 +67,32 @@ class Asked:
     """As given."""
     env: dict[str, Any]
     """Values of `--env`, by dotted name, that are not the policy's own."""
+    task: dict[str, Any]
+    """The same of `--task`."""
 
 
 def parse(arguments: list[str]) -> Asked:
-    """The options of `eval`; the defaults of `--env` are what the policy's run or contract says.
+    """The options of `eval`; the defaults of `--env` and `--task` are what the policy's run or contract says.
 
     Raises:
         ValueError: for unknown names, and for a policy that is not there.
     """
-    given = [argument for argument in arguments if argument.startswith("--env.")]
+    given = [argument for argument in arguments if argument.startswith(("--env.", "--task."))]
     if not given or "--help" in arguments:
-        return Asked(parse_options(Eval, "eval", arguments), {})
-    if arguments[0].startswith("-"):
-        raise ValueError(f"eval begins with {arguments[0]}; accepted: the policy first, where --env.* is given")
-    from e2efly.evaluation import candidate, pinned
+        return Asked(parse_options(Eval, "eval", arguments), {}, {})
+    found = named_first("eval", arguments, given[0])
+    from e2efly.evaluation import pinned
 
-    found = candidate(arguments[0], peek(arguments, "--vehicle", "") or None)
     own = pinned(found.env, found.policy)
     empty = dataclasses.replace(own, randomize={})  # a filled dictionary would take no new names
-    default = Eval(tyro.MISSING, env=empty)
-    options = parse_options(Eval, "eval", arguments, default=default)
+    kind = with_task(Eval, found.task)
+    options = parse_options(kind, "eval", arguments, default=kind(tyro.MISSING, env=empty, task=found.task))
     if options.stress:
         raise ValueError(f"{given[0]} is given with --stress; accepted: one of them, as the rows say what is met")
     env = options.env
     if not any(argument.startswith("--env.randomize") for argument in given):
         env = dataclasses.replace(env, randomize=own.randomize)
-    return Asked(options, {name: value for name, (_, value) in differing(own, env).items()})
+    return Asked(options, values(own, env), values(found.task, options.task))
 
 
 def run(asked: Asked) -> int:
@@ -108,7 +110,7 @@ def run(asked: Asked) -> int:
 
     o, console = options, Terminal()
     flies = {"vehicle": o.vehicle, "controller": o.controller, "seed": o.seed, "device": o.device}
-    found = evaluate(o.policy, o.episodes, env=asked.env, **flies, kept=ROW if o.json else 0)
+    found = evaluate(o.policy, o.episodes, env=asked.env, task=asked.task, **flies, kept=ROW if o.json else 0)
     for note in found.candidate.notes:
         console.print(note, style="dim")
     console.print(_table(found.flown, o.episodes))

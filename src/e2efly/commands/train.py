@@ -227,7 +227,8 @@ def _parsed(arguments: list[str]) -> tuple[Any, TrainConfig]:
         return _parsed_of_run(arguments)
     task = next((a for a in arguments[:1] if not a.startswith("-")), "hover")
     algo = peek(arguments, "--algo", TASKS.find(task).best)
-    preset = peek(arguments, "--preset", presets.default(TASKS.find(task), ALGORITHMS.find(algo)))
+    usual = presets.default(TASKS.find(task), ALGORITHMS.find(algo), lambda name: peek(arguments, f"--task.{name}", ""))
+    preset = peek(arguments, "--preset", usual)
     config = presets.preset(task, algo, preset)
     if vehicle := _vehicle(arguments):
         config = presets.for_vehicle(config, vehicle)

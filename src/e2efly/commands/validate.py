@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import tyro
 from rich.console import Console
@@ -13,7 +13,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 
 from e2efly.budget import check_time
+from e2efly.commands.options import parse as parse_options
+from e2efly.commands.policies import named_first, values, with_task
 from e2efly.commands.rows import check_stress, report_stress
+from e2efly.config import TaskConfig
 from e2efly.storage import write_json
 from e2efly.terminal import Terminal, seconds
 from e2efly.vehicles import Controller
@@ -54,6 +57,9 @@ class Validate:
     controller: Controller = "policy"
     """The vehicle that the flight controller believes in: the policy's own, whatever flies (policy), or the one that
     flies (plant)."""
+    task: TaskConfig = TaskConfig()
+    """What the policy is to fly, in place of what its run or its contract says: options of its task, as `train` has
+    them (--task.track four_gates); not with --stress."""
     stress: bool = False
     """Fly the rows of `eval --stress` on the plant: vehicles, air and sensors that are not those of the training. Rows
     that the plant cannot be given are named; see docs/robustness.md."""
@@ -63,13 +69,41 @@ class Validate:
     """Exit status 1 when a row of --stress succeeds less often than this, such as 0.9."""
 
 
-def run(options: Validate) -> int:
+@dataclass(frozen=True)
+class Asked:
+    """What `e2efly validate` is asked to do."""
+
+    options: Validate
+    """As given."""
+    task: dict[str, Any]
+    """Values of `--task`, by dotted name, that are not the policy's own."""
+
+
+def parse(arguments: list[str]) -> Asked:
+    """The options of `validate`; the defaults of `--task` are what the policy's run or contract says.
+
+    Raises:
+        ValueError: for unknown names, and for a policy that is not there.
+    """
+    given = [argument for argument in arguments if argument.startswith("--task.")]
+    if not given or "--help" in arguments:
+        return Asked(parse_options(Validate, "validate", arguments), {})
+    found = named_first("validate", arguments, given[0])
+    kind = with_task(Validate, found.task)
+    options = parse_options(kind, "validate", arguments, default=kind(tyro.MISSING, task=found.task))
+    if options.stress:
+        raise ValueError(f"{given[0]} is given with --stress; accepted: one of them")
+    return Asked(options, values(found.task, options.task))
+
+
+def run(asked: Asked) -> int:
     """Fly policy.onnx by the bridge's runtime on another plant; print a table, write the report and the plots.
 
     Returns:
         0, or 1 when success drops by more than `max_drop` in any criterion, or a whole flight is not complete, or a row
         of the stress succeeds less often than `least`.
     """
+    options = asked.options
     check_stress(options.stress, options.rows, options.least)
     if options.stress:
         return _stress(options)
@@ -87,6 +121,7 @@ def run(options: Validate) -> int:
             o.episodes,
             vehicle=o.vehicle,
             controller=o.controller,
+            task=asked.task,
             seed=o.seed,
             max_drop=o.max_drop,
             progress=progress,

@@ -1,6 +1,6 @@
 """Options of a run: all of the others, and how to learn."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
@@ -135,6 +135,8 @@ class TaskConfig:
     """Whether the curves of an ablation show its error, as in the paper; else they show success."""
     variants: ClassVar[tuple[str, ...]] = ()
     """Presets of its own, beside `robust`, `nominal` and `paper`."""
+    asked: ClassVar[Mapping[tuple[str, str], str]] = {}
+    """Of its own presets, those that the value of an option asks for where none is named."""
 
     episode_s: float = 10.0
     """Length of an episode, s."""
@@ -155,6 +157,16 @@ class TaskConfig:
     def limits(self) -> dict[str, float]:
         """The largest values, by field of `Episodes`, with which an episode still succeeds, for plots."""
         return {}
+
+    @property
+    def own_worlds(self) -> bool:
+        """Whether each episode has a world of its own, for plots."""
+        return False
+
+    def showing(self, names: Sequence[str]) -> "TaskConfig":
+        """These options for a policy whose observation has fields of these names, where a task has several."""
+        del names
+        return self
 
     def drawing(self) -> list[Thing] | None:
         """What it has in space, for plots; None: nothing but its goal."""

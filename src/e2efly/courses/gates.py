@@ -16,6 +16,8 @@ FRAME = 0.1
 """Width of a gate's frame around its opening, m."""
 STRAIGHT_ON = 3.0
 """Behind the last gate of an open track lies a point this far straight on, m."""
+BURIED = -1000.0
+"""Height of gates that a track of fewer gates has not, m: nobody meets them."""
 
 
 @dataclass(frozen=True)
@@ -23,9 +25,9 @@ class Gates:
     """The gates of a track as arrays."""
 
     start: Any
-    """(3,) where a race begins, world, m."""
+    """(3,) or, each world its own, (n, 3): where a race begins, world, m."""
     start_yaw: Any
-    """Heading there, rad."""
+    """Heading there, rad; a number or (n,)."""
     position: Any
     """(g + 1, 3) or, each world its own, (n, g + 1, 3): centres, world, m. The last row is what the policy is shown
     behind the last gate."""
@@ -34,7 +36,7 @@ class Gates:
     sin: Any
     """(g,) or (n, g) sine of each yaw."""
     half: Any
-    """(g, 2) half of the opening's width and height, m."""
+    """(g, 2) or (n, g, 2) half of the opening's width and height, m."""
 
     @staticmethod
     def of(track: RaceTrack) -> "Gates":
@@ -77,10 +79,50 @@ class Gates:
         y, z = xp.abs(y0 + t * (y1 - y0)), xp.abs(z0 + t * (z1 - z0))
         forward, crossing = (x0 < 0) & (x1 >= 0), (x0 < 0) != (x1 < 0)
         half = self.half
-        inside = (y < half[:, 0] - radius) & (z < half[:, 1] - radius)
-        outside = (y > half[:, 0] + FRAME + radius) | (z > half[:, 1] + FRAME + radius)
+        wide, high = half[..., 0], half[..., 1]
+        inside = (y < wide - radius) & (z < high - radius)
+        outside = (y > wide + FRAME + radius) | (z > high + FRAME + radius)
         mine = index[:, None] == xp.arange(self.count)
         passed = xp.any(mine & forward & inside, axis=-1)
         missed = xp.any(mine & forward & ~inside, axis=-1)
         struck = xp.any(crossing & ~inside & ~outside, axis=-1)
         return passed, missed, struck
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """The tracks of n worlds, which have room for the same number of gates."""
+
+    gates: Gates
+    """Each with a leading axis n. Gates beyond `count` are `BURIED`."""
+    count: Any
+    """(n,) gates that there are."""
+    closed: Any
+    """(n,) whether the first gate follows the last."""
+
+    @staticmethod
+    def of(track: RaceTrack, room: int = 0) -> "Tracks":
+        """One world (n = 1) with a loaded track, with room for so many gates, or for as many as it has."""
+        gates = Gates.of(track)
+        more = max(room - gates.count, 0)
+        buried = np.tile(np.array([0.0, 0.0, BURIED], np.float32), (more, 1))
+        position = np.vstack([gates.position[:-1], buried, gates.position[-1:]])
+        filled = (
+            np.concatenate([x, np.ones((more, *x.shape[1:]), x.dtype)]) for x in (gates.cos, gates.sin, gates.half)
+        )
+        parts = (gates.start, np.float32(gates.start_yaw), position, *filled)
+        every = Gates(*(np.asarray(x)[None] for x in parts))
+        return Tracks(every, np.array([gates.count], np.int32), np.array([track.closed]))
+
+    def track(self, world: int, name: str = "any") -> RaceTrack:
+        """The track of a world as data."""
+        g, k = self.gates, int(self.count[world])
+        return RaceTrack(
+            name=name,
+            closed=bool(self.closed[world]),
+            start=np.asarray(g.start[world], float),
+            start_yaw=float(g.start_yaw[world]),
+            position=np.asarray(g.position[world, :k], float),
+            yaw=np.arctan2(np.asarray(g.sin[world, :k], float), np.asarray(g.cos[world, :k], float)),
+            opening=2 * np.asarray(g.half[world, :k], float),
+        )

@@ -23,7 +23,7 @@ def input_files(config: TrainConfig) -> dict[str, Path]:
         ValueError: for a vehicle or track that does not exist.
     """
     found = {"env.vehicle": vehicle_file(config.env.vehicle)}
-    if track := getattr(config.task, "track", ""):
+    if (track := getattr(config.task, "track", "")) and not config.task.own_worlds:
         found["task.track"] = track_file(track)
     if config.start_from is not None:
         found["start_from"] = Path(config.start_from)

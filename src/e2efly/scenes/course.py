@@ -13,10 +13,10 @@ HALF_DEPTH = 0.05
 """Half the depth of a gate's bars, m."""
 
 
-def frames(gates: Gates, n: int, bar: float | Array = FRAME) -> Solids:
-    """The gates' frames, the same in each of n worlds or each world's own."""
+def frames(gates: Gates, n: int, bar: float | Array = FRAME, active: bool | Array = True) -> Solids:
+    """The gates' frames, the same in each of n worlds or each world's own; those that are there are active."""
     half = jnp.asarray(gates.half)
-    size = jnp.concatenate([half, jnp.full_like(half[:, :1], bar), jnp.full_like(half[:, :1], HALF_DEPTH)], axis=-1)
+    size = jnp.concatenate([half, jnp.full_like(half[..., :1], bar), jnp.full_like(half[..., :1], HALF_DEPTH)], axis=-1)
     centre = jnp.asarray(gates.position)[..., :-1, :]
     yaw = jnp.arctan2(jnp.asarray(gates.sin), jnp.asarray(gates.cos))
-    return Solids.of("gate", jnp.broadcast_to(centre, (n, *centre.shape[-2:])), size, yaw=yaw)
+    return Solids.of("gate", jnp.broadcast_to(centre, (n, *centre.shape[-2:])), size, yaw=yaw, active=active)

@@ -50,6 +50,10 @@ class Route:
         """
         raise NotImplementedError
 
+    def course_of(self, contract: Contract, shape: Shape) -> Course:
+        """The course for a policy; for a task that shows its policies different things, what this one is shown."""
+        return self.course(shape, 1 / contract.control_rate_hz)
+
     def unused(self) -> tuple[str, ...]:
         """Names of the options that have no effect, as another option is set."""
         return ()
@@ -89,6 +93,7 @@ def fields_of(contract: Contract) -> tuple[Field, ...]:
         ValueError: for a task that cannot be found.
     """
     goal = goal_of(TASKS.find(contract.task))
+    goal = goal.showing([field.name for field in contract.observation]) if hasattr(goal, "showing") else goal
     return tuple(shown for shown, _ in goal.observation) or goal.fields  # type: ignore[return-value]
 
 
@@ -111,7 +116,7 @@ def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None)
     check_numbers("goal", route)
     _check_use(contract, route)
     shape = Shape(vehicle.feet_height, vehicle.radius)
-    course = route.course(shape, 1 / contract.control_rate_hz)
+    course = route.course_of(contract, shape)
     origin = Origin(route.origin, route.origin_yaw)
     placed = dataclasses.replace(course, origin=origin.at(course.origin))
     least = vehicle.feet_height if course.clearance is None else course.clearance

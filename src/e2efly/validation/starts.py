@@ -71,6 +71,8 @@ def course_of(task: Task, memory: Any, start: np.ndarray) -> Course:
     """
     options = getattr(task, "config", None)
     lean: Any = goal_of(type(options)) if isinstance(options, TaskConfig) else type(task)
+    if hasattr(lean, "showing"):
+        lean = lean.showing([field.name for field in task.fields])
     if lean is type(task):
         return Course(jax.tree.map(np.asarray, task), memory, start, duration=float(task.episode_s))
     parts = {f.name: jax.tree.map(np.asarray, getattr(task, f.name)) for f in dataclasses.fields(lean)}

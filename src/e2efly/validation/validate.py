@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -131,6 +131,7 @@ def validate(
     *,
     vehicle: str | None = None,
     controller: Controller = "policy",
+    task: Mapping[str, Any] | None = None,
     seed: int = SEED,
     max_drop: float = 2.0,
     progress: Callable[[str, int, int], None] = lambda criterion, done, total: None,
@@ -146,6 +147,8 @@ def validate(
         vehicle: what the plant flies, a name or a .toml file; left out: the policy's own vehicle.
         controller: policy: the plant's flight controller believes in the policy's own vehicle, whatever flies; plant:
             it is tuned to the vehicle that flies. Neither changes the policy.
+        task: options of its task by dotted name, in place of what the policy's run or contract says:
+            {"track": "four_gates"}.
         seed: of the starts.
         max_drop: points of success by which the plant may lie under the training simulator.
         progress: (criterion, flights that are over, of how many).
@@ -163,7 +166,7 @@ def validate(
         raise ValueError(f"--max-drop is {max_drop}; accepted: 0 or more points of success")
     compute_at_once()
     prepare("cpu")  # the plants compute there, one vehicle at a time
-    found, kind, own = flyable(policy, plant, vehicle, controller)
+    found, kind, own = flyable(policy, plant, vehicle, controller, task)
     reality = Reality(found.flown.body, found.latency)
     check_realities(kind, found.flown.believed, [reality])
     suites = found.task.criteria()
@@ -192,7 +195,11 @@ def plant_name(plant: str | type[Plant]) -> str:
 
 
 def flyable(
-    policy: str | os.PathLike[str], plant: str | type[Plant], vehicle: str | None, controller: Controller
+    policy: str | os.PathLike[str],
+    plant: str | type[Plant],
+    vehicle: str | None,
+    controller: Controller,
+    task: Mapping[str, Any] | None = None,
 ) -> tuple[Candidate, type[Plant], Vehicle]:
     """A policy that the runtime can fly, the plant, and the vehicle that the policy was trained on; of a family's
     policy, the one that it flies.
@@ -200,7 +207,7 @@ def flyable(
     Raises:
         ValueError: naming what does not fit.
     """
-    kind, found = find_plant(plant_name(plant)), candidate(policy, vehicle, controller)
+    kind, found = find_plant(plant_name(plant)), candidate(policy, vehicle, controller, task=task)
     contract = found.policy.contract
     if found.draws:
         raise ValueError(

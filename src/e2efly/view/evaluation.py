@@ -65,7 +65,7 @@ def _make(folder: Path) -> None:
 
 
 def _flights(flights: Flights, suite: Any, env: Env, key: Any, folder: Path, name: str, title: str) -> None:
-    if env.cameras:  # every flight has a world of its own
+    if env.cameras or suite.own_worlds:  # every flight has a world of its own
         begun = jax.jit(Env.reset, static_argnums=2)(env, key, DRAWN)[0]
         plot_flights_in_worlds(flights, env.task.scene(begun.memory), folder / f"flights_{name}.png", title)
     else:

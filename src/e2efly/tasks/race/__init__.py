@@ -1,6 +1,7 @@
 """Options and recipes: fly through gates in order."""
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -9,6 +10,7 @@ import numpy as np
 from e2efly.config import (
     AlgorithmConfig,
     BPTTConfig,
+    NetworkConfig,
     Paper,
     PPOConfig,
     RewardConfig,
@@ -23,6 +25,13 @@ from e2efly.courses.gates import FRAME, Gates
 from e2efly.courses.tracks import load_track
 from e2efly.drawing import ORANGE, Face, Mark, Thing
 from e2efly.tasks.registry import register
+
+ANY = "any"
+"""The name of a track that is another one in every episode."""
+ANY_TRACK = "any_track"
+"""The preset for that."""
+LONGEST = 30.0
+"""Length of its episodes, s."""
 
 
 @register("race")
@@ -45,6 +54,8 @@ class RaceConfig(TaskConfig):
             hidden=(96, 96),
         )
     }
+    variants: ClassVar = (ANY_TRACK,)
+    asked: ClassVar = {("track", ANY): ANY_TRACK}
     paper: ClassVar = Paper(
         weights={"prog1": 0.9, "ori2": 0.001, "v1": 0.002, "anglev": 0.002},
         ppo={"act3": 1.0, "goal": 5.0, "crash": 4.0},
@@ -54,13 +65,23 @@ class RaceConfig(TaskConfig):
     episode_s: float = 12.0
     """Length of an episode, s."""
     track: str = shape(defaults.TRACK)
-    """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file (its gate count sets shapes)."""
+    """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file (its gate count sets shapes); any: every
+    episode another one, at random."""
     position: float = 1.0
     """Start within this ball about the track's start, m."""
     laps: int = 1
     """Laps that end the episode with success; 0: fly on until time is out."""
     fence: float = number(defaults.RACE_FENCE, above=0, endless=True)
-    """Farther than this from the next gate the episode fails, m."""
+    """Farther than this from the next gate the episode fails, m; where more is shown, by so much farther than the gate
+    before it."""
+    shows_more: bool = shape(False)
+    """Whether the policy is shown what any track needs: the next three gates with axes and openings, and the height
+    over the ground; with track any it always is."""
+
+    @property
+    def any_track(self) -> bool:
+        """Whether the policy is shown what any track needs."""
+        return self.shows_more or self.track == ANY
 
     @classmethod
     def training(cls) -> "RaceConfig":
@@ -71,9 +92,21 @@ class RaceConfig(TaskConfig):
         """One lap, or as many as are asked for."""
         return {self.name: dataclasses.replace(self, laps=max(self.laps, 1))}
 
-    def drawing(self) -> list[Thing]:
+    @property
+    def own_worlds(self) -> bool:
+        """With any track."""
+        return self.track == ANY
+
+    def showing(self, names: Sequence[str]) -> "RaceConfig":
+        """For a policy that is shown axes of gates: any track, where none else is named."""
+        if "gate_axes" not in names:
+            return self
+        other = {} if self.any_track else {"track": ANY, "episode_s": LONGEST}
+        return dataclasses.replace(self, shows_more=True, **other)
+
+    def drawing(self) -> list[Thing] | None:
         """The gates with their numbers."""
-        return _frames(Gates.of(load_track(self.track)))
+        return None if self.own_worlds else _frames(Gates.of(load_track(self.track)))
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
@@ -85,6 +118,28 @@ class RaceConfig(TaskConfig):
         weights = {"prog1": 1.0, "near": 0.2, "anglev_sq": 0.0005, "act2_sq": 0.005}
         settings = BPTTConfig(learning_rate=8e-3, max_grad_norm=1.0, gradient_decay=1.0)
         return TrainConfig(cls.training(), settings, RewardConfig(weights), steps=2_500_000, chunk=15)
+
+    @classmethod
+    def variant(cls, preset: str, config: TrainConfig) -> TrainConfig:
+        """`any_track`: another track in every episode; the way to a gate leads around from behind it."""
+        del preset
+        weights = {"progway" if name == "prog1" else name: weight for name, weight in config.reward.weights.items()}
+        weights = {name: weight for name, weight in weights.items() if name != "near"} | {"fitlog": 1.0}
+        algo: Any = config.algo
+        if isinstance(algo, BPTTConfig):
+            weights["fitlog"] = 40.0  # to its gradient, nothing else speaks against missing a gate
+            algo = dataclasses.replace(
+                algo, learning_rate=4e-3, learning_rate_end=1e-4, gradient_decay=0.3, average=0.99
+            )
+        return dataclasses.replace(
+            config,
+            task=cls(track=ANY, shows_more=True, episode_s=LONGEST, laps=0),
+            algo=algo,
+            reward=RewardConfig(weights, {"fitlog_margin": 0.12}),
+            network=NetworkConfig((128, 128)),
+            steps=30_000_000,
+            chunk=200,
+        )
 
     @classmethod
     def with_critic(cls, algo: str) -> dict[str, Any]:

@@ -10,8 +10,9 @@ import numpy as np
 from e2efly.config import number
 from e2efly.control.vectors import Array, namespace
 from e2efly.courses import defaults
-from e2efly.courses.gates import Gates
-from e2efly.courses.tracks import load_track
+from e2efly.courses.gates import Gates, Tracks
+from e2efly.courses.tracks import RaceTrack, load_track
+from e2efly.deploy.policy.contract import Contract
 from e2efly.goal import Course, Goal, Outcome, Shape
 from e2efly.observation import Field
 from e2efly.tasks.race import RaceConfig
@@ -20,8 +21,52 @@ from e2efly.tasks.verdicts import distance, offsets, touches_ground
 from e2efly.vehicles.tables import LARGEST
 
 
+class Racing(Goal):
+    """Gates to fly through in order."""
+
+    config: RaceConfig
+    shape: Shape
+
+    def place(self, memory: Any) -> tuple[int, int]:
+        """Of a single flight (n = 1): the next gate and the lap, both counted from 1."""
+        raise NotImplementedError
+
+    def verdict(
+        self, memory: Any, before: Any, after: Any, gates: Gates, index: Array, end: Array, fence: Array
+    ) -> tuple[Array, Outcome]:
+        """What a step came to, and which vehicles have passed a gate in it.
+
+        Args:
+            memory: the task's state before the step.
+            before: the vehicles at the start of the step.
+            after: the vehicles at its end.
+            gates: the track, or each world's.
+            index: (n,) the next gate, counted from 0 within a lap.
+            end: (n,) whether a vehicle is done that passes it.
+            fence: farther than this from it is too far, m.
+        """
+        passed, missed, struck = gates.judge(index, before.position, after.position, self.shape.radius)
+        error = distance(after.position, self.goal(memory, index))
+        crashed = missed | struck | (error > fence) | touches_ground(self.shape, after)
+        passed = passed & ~crashed
+        finished = passed & end
+        return passed, Outcome(
+            terminated=crashed | finished, success=finished, arrived=passed, crashed=crashed, error=error,
+            signals={"missed": missed, "struck": struck},
+        )  # fmt: skip
+
+    def failure(self, memory: Any, outcome: Outcome) -> str:
+        """Which gate was missed or struck, if that is why."""
+        where = "gate {} of lap {}".format(*self.place(memory))
+        if outcome.signals["missed"][0]:
+            return f"{where} missed"
+        if outcome.signals["struck"][0]:
+            return f"frame struck on the way to {where}"
+        return f"{super().failure(memory, outcome)}, {where}"
+
+
 @dataclass(frozen=True)
-class RaceGoal(Goal):
+class RaceGoal(Racing):
     """Gates to fly through in order. The task's state is the number of gates passed, (n,)."""
 
     config: RaceConfig
@@ -30,10 +75,23 @@ class RaceGoal(Goal):
     closed: bool
     """Whether the first gate follows the last."""
 
+    @classmethod
+    def showing(cls, names: Sequence[str]) -> type[Goal]:
+        """Another one where the axes of gates are shown."""
+        if "gate_axes" not in names:
+            return cls
+        from e2efly.tasks.race.any_goal import AnyRaceGoal  # which extends this module's
+
+        return AnyRaceGoal
+
     @property
     def count(self) -> int:
         """Gates of the track."""
         return self.gates.count
+
+    def place(self, memory: Array) -> tuple[int, int]:
+        """See `Racing.place`."""
+        return int(memory[0]) % self.count + 1, int(memory[0]) // self.count + 1
 
     def goal(self, memory: Array, time: Array) -> Array:
         """The next gate's centre."""
@@ -56,20 +114,11 @@ class RaceGoal(Goal):
 
     def advance(self, memory: Array, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Array, Outcome]:
         """Success: the last gate of the last lap passed. Crossings are judged on the straight line of the step."""
-        del timed_out
-        passed, missed, struck = self.gates.judge(
-            memory % self.count, before.position, after.position, self.shape.radius
-        )
-        error = distance(after.position, self.goal(memory, time))
-        crashed = missed | struck | (error > self.config.fence) | touches_ground(self.shape, after)
-        passed = passed & ~crashed
-        memory = memory + passed
+        del time, timed_out
         laps = self.config.laps if self.closed else 1
-        finished = passed & (laps > 0) & (memory >= laps * self.count)
-        return memory, Outcome(
-            terminated=crashed | finished, success=finished, arrived=passed, crashed=crashed, error=error,
-            signals={"missed": missed, "struck": struck},
-        )  # fmt: skip
+        end = (laps > 0) & (memory + 1 >= laps * self.count)
+        passed, outcome = self.verdict(memory, before, after, self.gates, memory % self.count, end, self.config.fence)
+        return memory + passed, outcome
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
         """Laps, and the mean time of one."""
@@ -77,15 +126,6 @@ class RaceGoal(Goal):
         laps = len(arrivals) // self.count
         each = f", {arrivals[laps * self.count - 1] / laps:.2f} s each" if laps else ""
         return f"{len(arrivals) / self.count:g} laps{each}"
-
-    def failure(self, memory: Array, outcome: Outcome) -> str:
-        """Which gate was missed or struck, if that is why."""
-        where = f"gate {int(memory[0]) % self.count + 1} of lap {int(memory[0]) // self.count + 1}"
-        if outcome.signals["missed"][0]:
-            return f"{where} missed"
-        if outcome.signals["struck"][0]:
-            return f"frame struck on the way to {where}"
-        return f"{super().failure(memory, outcome)}, {where}"
 
 
 @dataclass(frozen=True)
@@ -104,12 +144,29 @@ class RaceRoute(Route):
     def course(self, shape: Shape, control_period: float) -> Course:
         """The track, from its start in its heading."""
         del control_period
+        track = self._track()
+        gates = Gates.of(track)
+        return self._placed(RaceGoal(self._options(), shape, gates, track.closed), np.zeros(1, int), track)
+
+    def course_of(self, contract: Contract, shape: Shape) -> Course:
+        """The same, for a policy that is shown what any track needs, too."""
+        if "gate_axes" not in (field.name for field in contract.observation):
+            return super().course_of(contract, shape)
+        from e2efly.tasks.race.any_goal import AnyRaceGoal, Memory  # which extend this module's
+
+        track = self._track()
+        return self._placed(AnyRaceGoal(self._options(), shape), Memory(Tracks.of(track), np.zeros(1, int)), track)
+
+    def _track(self) -> RaceTrack:
         track = load_track(self.track)
         if self.laps > 1 and not track.closed:
             raise ValueError(f"goal.laps is {self.laps}; accepted: 0 or 1, as track {track.name!r} is not closed")
-        gates, config = Gates.of(track), dataclasses.replace(RaceConfig(), laps=self.laps)
+        return track
+
+    def _options(self) -> RaceConfig:
+        return dataclasses.replace(RaceConfig(), laps=self.laps)
+
+    def _placed(self, goal: Racing, memory: Any, track: RaceTrack) -> Course:
         lowest = float((track.position[:, 2] - track.opening[:, 1] / 2).min())
-        return Course(
-            RaceGoal(config, shape, gates, track.closed), np.zeros(1, int), np.asarray(gates.start, np.float64),
-            heading=float(gates.start_yaw), lowest=lowest, clearance=0.0,
-        )  # fmt: skip
+        start = track.start.astype(np.float32).astype(np.float64)
+        return Course(goal, memory, start, heading=float(track.start_yaw), lowest=lowest, clearance=0.0)

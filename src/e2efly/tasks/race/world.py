@@ -12,15 +12,11 @@ from e2efly.courses.gates import Gates
 from e2efly.courses.tracks import load_track
 from e2efly.goal import Shape
 from e2efly.physics import State
-from e2efly.physics.rotation import from_euler
 from e2efly.scenes.course import frames
 from e2efly.scenes.scene import Scene
 from e2efly.tasks.race import RaceConfig
+from e2efly.tasks.race.any_world import AnyRace, begun
 from e2efly.tasks.race.goal import RaceGoal
-from e2efly.tasks.task import at_rest, into_ball, uniform
-
-LOWEST_START = 0.3
-"""Starts are drawn at least this high over the feet, m."""
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "gates"], meta_fields=["closed"])
@@ -29,13 +25,15 @@ class Race(RaceGoal):
     """Make it with `Race.of`."""
 
     @staticmethod
-    def of(config: RaceConfig, shape: Shape, control_period: float = 0.0, substeps: int = 1) -> "Race":
-        """Load the track.
+    def of(config: RaceConfig, shape: Shape, control_period: float = 0.0, substeps: int = 1) -> "Race | AnyRace":
+        """Load the track; `AnyRace` where more is shown of it.
 
         Raises:
             ValueError: for an unknown or broken track.
         """
         del control_period, substeps
+        if config.any_track:
+            return AnyRace.of(config, shape)
         track = load_track(config.track)
         if config.laps > 1 and not track.closed:
             raise ValueError(f"laps is {config.laps}; accepted: 0 or 1, as track {track.name!r} is not closed")
@@ -44,15 +42,8 @@ class Race(RaceGoal):
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Int[Array, " n"]]:
         """At rest and level in a ball about the start, heading as the track says."""
-        u = uniform(key, n, 3)
-        position = jnp.asarray(self.gates.start) + self.config.position * into_ball(u)
-        lowest = self.shape.feet_height + LOWEST_START
-        position = position.at[:, 2].max(lowest)
-        zero = jnp.zeros(n)
-        state = at_rest(position)
-        return dataclasses.replace(state, quaternion=from_euler(zero, zero, zero + self.gates.start_yaw)), jnp.zeros(
-            n, jnp.int32
-        )
+        state = begun(key, n, self.config.position, self.shape, self.gates.start, self.gates.start_yaw)
+        return state, jnp.zeros(n, jnp.int32)
 
     def scene(self, memory: Int[Array, " n"]) -> Scene:
         """The gates over level ground."""

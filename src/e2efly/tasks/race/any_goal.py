@@ -1,0 +1,146 @@
+"""Racing on any track: the goal of policies that are shown enough of it. Imports no JAX."""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from e2efly.control.vectors import Array, namespace
+from e2efly.courses.gates import STRAIGHT_ON, Tracks
+from e2efly.goal import Outcome, Shape
+from e2efly.observation import Field
+from e2efly.tasks.race import RaceConfig
+from e2efly.tasks.race.goal import Racing
+from e2efly.tasks.verdicts import distance, offsets
+
+SHOWN = 3
+"""Gates that the policy is shown."""
+HIGHEST = 3.0
+"""Higher over the ground than this the policy is told this, m."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """The track of each vehicle, and how far it is."""
+
+    tracks: Tracks
+    passed: Array
+    """(n,) gates."""
+
+    @property
+    def index(self) -> Array:
+        """(n,) the next gate, counted from 0 within a lap."""
+        return self.passed % self.tracks.count
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """The next `SHOWN` gates of n vehicles. Behind the last gate of an open track others follow straight on."""
+
+    centre: Array
+    """(n, s, 3) world, m."""
+    axis: Array
+    """(n, s, 3) unit vectors along which they are flown through, world."""
+    half: Array
+    """(n, s, 2) half of the openings' width and height, m."""
+
+    @staticmethod
+    def of(memory: Memory) -> "Ahead":
+        """Those that follow the gates passed."""
+        tracks, index = memory.tracks, memory.index
+        g, xp = tracks.gates, namespace(memory.passed)
+        count, closed = tracks.count[:, None], tracks.closed[:, None]
+        onward = index[:, None] + xp.arange(SHOWN)
+        row = xp.where(closed, onward % count, xp.minimum(onward, count - 1))
+        beyond = xp.where(closed, 0, onward - row)
+        table = xp.concatenate([g.position[:, :-1], g.cos[..., None], g.sin[..., None], g.half], axis=-1)
+        found = xp.take_along_axis(table, row[..., None], axis=1)
+        axis = xp.concatenate([found[..., 3:5], xp.zeros_like(found[..., :1])], axis=-1)
+        return Ahead(found[..., :3] + STRAIGHT_ON * beyond[..., None] * axis, axis, found[..., 5:])
+
+
+@dataclass(frozen=True)
+class AnyRaceGoal(Racing):
+    """Gates to fly through in order, on a track of each vehicle's own."""
+
+    config: RaceConfig
+    shape: Shape
+
+    def place(self, memory: Memory) -> tuple[int, int]:
+        """See `Racing.place`."""
+        return int(memory.index[0]) + 1, int(memory.passed[0] // memory.tracks.count[0]) + 1
+
+    def goal(self, memory: Memory, time: Array) -> Array:
+        """The next gate's centre."""
+        del time
+        return Ahead.of(memory).centre[:, 0]
+
+    def target_offsets(self, memory: Memory, time: Array, body: Any) -> Array:
+        """The centres of the next gates minus position."""
+        del time
+        return offsets(Ahead.of(memory).centre, body)
+
+    def axes(self, memory: Memory, time: Array, body: Any) -> Array:
+        """The directions of the next gates."""
+        del time
+        return Ahead.of(memory).axis.reshape(body.position.shape[0], -1)
+
+    def openings(self, memory: Memory, time: Array, body: Any) -> Array:
+        """Width and height of the next gates."""
+        del time
+        return 2 * Ahead.of(memory).half.reshape(body.position.shape[0], -1)
+
+    def height(self, memory: Memory, time: Array, body: Any) -> Array:
+        """Over the ground."""
+        del memory, time
+        return namespace(body.position).clip(body.position[:, 2:], 0.0, HIGHEST)
+
+    observation = (
+        (
+            Field("gates", 3 * SHOWN, "world", "m", 4.0, "centres of the next three gates minus vehicle position"),
+            target_offsets,
+        ),
+        (
+            Field(
+                "gate_axes", 3 * SHOWN, "world", "1", 1.0,
+                "unit vectors along which the next three gates are flown through",
+            ),
+            axes,
+        ),
+        (
+            Field("gate_openings", 2 * SHOWN, "none", "m", 1.0, "inner width and height of the next three gates"),
+            openings,
+        ),
+        (Field("height", 1, "none", "m", 2.0, "height over the ground, 3 where it is more"), height),
+    )  # fmt: skip
+
+    def fence(self, memory: Memory) -> Array:
+        """(n,) farther than this from the next gate is too far, m: the fence beside the way from the last one."""
+        g, index, xp = memory.tracks.gates, memory.index, namespace(memory.passed)
+        before = (index - 1) % memory.tracks.count
+        here, there = (xp.take_along_axis(g.position, i[:, None, None], axis=1)[:, 0] for i in (before, index))
+        here = xp.where(memory.passed[:, None] == 0, g.start, here)
+        return self.config.fence + distance(here, there)
+
+    def advance(self, memory: Memory, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Memory, Outcome]:
+        """Success: the last gate of the last lap passed. Crossings are judged on the straight line of the step."""
+        del time, timed_out
+        tracks, xp = memory.tracks, namespace(memory.passed)
+        laps = xp.where(tracks.closed, self.config.laps, 1)
+        end = (laps > 0) & (memory.passed + 1 >= laps * tracks.count)
+        passed, outcome = self.verdict(memory, before, after, tracks.gates, memory.index, end, self.fence(memory))
+        return dataclasses.replace(memory, passed=memory.passed + passed), outcome
+
+    def drawn(self, memory: Memory) -> dict[str, Array]:
+        """The track: where it begins, its gates (rows beyond `count` are none), and whether it is closed."""
+        t = memory.tracks
+        yaw = namespace(memory.passed).arctan2(t.gates.sin, t.gates.cos)
+        return {
+            "start": t.gates.start, "start_yaw": t.gates.start_yaw, "position": t.gates.position[:, :-1], "yaw": yaw,
+            "opening": 2 * t.gates.half, "count": t.count, "closed": t.closed,
+        }  # fmt: skip
+
+    def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
+        """Gates, and when the last was passed."""
+        del mean_error, final_error, speed
+        return f"{len(arrivals)} gates" + (f" in {arrivals[-1]:.2f} s" if arrivals else "")
