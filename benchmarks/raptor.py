@@ -8,9 +8,9 @@ shipped network, a hundred questions a second. It commands the rotors: its comma
 2 of the rotor's full speed, which is the quadratic thrust curve that it was trained with. Ours by rotors is the preset
 `rotors` of hover, trained here unless `--rotors` names its run; ours by collective thrust and body rates is the zoo's.
 
-Vehicles are drawn by `e2efly.vehicles.family` with seed 7. Starts: those of hover, heading along x, to which RAPTOR
-turns;
-for RAPTOR also starts within 0.5 m of the target, level and at rest. With `clip` it is shown at most 0.5 m of error per
+Vehicles are drawn by `e2efly.vehicles.family` with seed 7; "of RAPTOR's kind" are those within the ranges that it was
+trained on, as far as mass, thrust and roll say it. Starts: those of hover, heading along x, to which RAPTOR turns; for
+RAPTOR also starts within 0.5 m of the target, level and at rest. With `clip` it is shown at most 0.5 m of error per
 axis. Success: within 0.1 m for the last second of 8 s.
 """
 
@@ -39,6 +39,7 @@ from e2efly.physics.rotation import from_euler, multiply, yaw
 from e2efly.tasks.hover import HoverConfig
 from e2efly.vehicles import load_family
 from e2efly.vehicles.family import DRAWN
+from e2efly.vehicles.vehicle import GRAVITY
 
 NEEDS = "foundation-policy==1.0.2", "numpy"
 SEED, BATCH = 7, 250
@@ -111,13 +112,24 @@ def fly(env: Env, act_for: Callable[[Any], Act], drawn: np.ndarray, task: HoverC
     return jax.tree.map(lambda *x: np.concatenate(x), *parts)
 
 
-def row(name: str, starts: str, delay: float, e: Episodes) -> dict[str, Any]:
-    """Of the table."""
+def alike(drawn: np.ndarray) -> np.ndarray:
+    """Which vehicles RAPTOR was trained for: up to 5 kg and 5 times the weight, 40 to 1200 rad/s^2 of roll."""
+    family = load_family("any")
+    assert family is not None
+    v = family.draw(drawn)
+    roll = 2 * v.rotor_thrust_max * np.abs(v.rotor_position[:, 0, 1]) / v.inertia[:, 0]
+    strong = 4 * v.rotor_thrust_max / (v.mass * GRAVITY)
+    return (v.mass < 5) & (strong < 5) & (roll > 40) & (roll < 1200)
+
+
+def row(name: str, starts: str, delay: float, e: Episodes, known: np.ndarray) -> dict[str, Any]:
+    """Of the table; `known`: which vehicles are of RAPTOR's training."""
     return {
         "policy": name,
         "starts": starts,
         "delay": f"{1e3 * delay:.0f} ms",
         "success, %": round(100 * float(np.mean(e.success)), 1),
+        "of RAPTOR's kind, %": round(100 * float(np.mean(e.success[known])), 1),
         "median error, cm": round(100 * float(np.median(e.final_error)), 2),
         "90 % below, cm": round(100 * float(np.quantile(e.final_error, 0.9)), 2),
     }
@@ -130,7 +142,7 @@ def main() -> None:
     family = load_family("any")
     assert family is not None
     drawn = np.random.default_rng(SEED).random((options.vehicles, DRAWN))
-    rows = []
+    rows, known = [], alike(drawn)
     with tempfile.TemporaryDirectory() as folder:
         run = options.rotors or str(Path(folder) / "rotors")
         if not options.rotors:
@@ -149,7 +161,7 @@ def main() -> None:
                 task = HoverConfig()
                 env = Env.of(task, RewardConfig({"prog2": 1.0}), config)
                 flown = fly(env, lambda u: act_of(found.policy), drawn, task)  # noqa: B023
-                rows.append(row(name, "hover's", delay, flown))
+                rows.append(row(name, "hover's", delay, flown, known))
                 print(rows[-1], flush=True)
     for starts, task, clip in (("within 0.5 m", NEAR, np.inf), ("hover's", HoverConfig(), 0.5)):
         for delay in ROTORS:
@@ -159,7 +171,7 @@ def main() -> None:
             )  # fmt: skip
             env = Env.of(task, RewardConfig({"prog2": 1.0}), config)
             flown = fly(env, lambda u: raptor(curve_of(u), clip), drawn, task)  # noqa: B023
-            rows.append(row("RAPTOR", starts if clip > 1 else f"{starts}, clip", delay, flown))
+            rows.append(row("RAPTOR", starts if clip > 1 else f"{starts}, clip", delay, flown, known))
             print(rows[-1], flush=True)
     print(table(rows))
     write("raptor", options.json, {"table": rows, "vehicles": options.vehicles})
