@@ -125,20 +125,21 @@ def test_what_ends_a_race_badly() -> None:
     race = task()
     _, memory = race.start(random_key(4), 30)
     tracks, zero, none = memory.tracks, jnp.zeros(30), jnp.zeros(30, bool)
-    half = np.asarray(tracks.gates.half[:, 0])
+    half, gates = np.asarray(tracks.gates.half[:, 0]), tracks.gates
+    advance = jax.jit(race.advance)
 
     def outcome(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        moved, out = race.advance(memory, *(at_rest(jnp.asarray(x, jnp.float32)) for x in (before, after)), zero, none)
+        moved, out = advance(memory, *(at_rest(jnp.asarray(x, jnp.float32)) for x in (before, after)), zero, none)
         return np.asarray(moved.passed), np.asarray(out.crashed)
 
-    up = np.stack([0 * half[:, 1], 0 * half[:, 1], half[:, 1]], axis=-1)
     before, after = (np.asarray(shift(tracks, 0, by)) for by in (-0.2, 0.2))
-    inside = (half[:, 1:] - 0.13) / half[:, 1:]
-    assert outcome(before + inside * up, after + inside * up)[0].all()
-    for edge in (half[:, 1:] - 0.11, half[:, 1:] + 0.05, half[:, 1:] + 0.5):  # frame, frame, over it
-        passed, crashed = outcome(before + edge / half[:, 1:] * up, after + edge / half[:, 1:] * up)
-        assert crashed.all()
-        assert not passed.any()
+    left = np.stack([-gates.sin[:, 0], gates.cos[:, 0], 0 * half[:, 0]], axis=-1)
+    for size, way in ((half[:, :1], left), (half[:, 1:], np.array([0.0, 0.0, 1.0]))):
+        assert outcome(before + (size - 0.13) * way, after + (size - 0.13) * way)[0].all()
+        for edge in (size - 0.11, size + 0.05, size + 0.5):  # frame, frame, beside it
+            passed, crashed = outcome(before + edge * way, after + edge * way)
+            assert crashed.all()
+            assert not passed.any()
     passed, crashed = outcome(after, before)  # backward through the opening
     assert not passed.any()
     assert not crashed.any()
@@ -232,6 +233,7 @@ def test_flight_is_shown_and_judged_as_training_is(contract: Contract, track: st
     assert course.goal.fields == fields_of(contract) == contract.observation[:4]
     race, rng = task(track), np.random.default_rng(0)
     _, memory = race.start(random_key(0), 1)
+    advance, observe = jax.jit(race.advance), jax.jit(race.observe)
     here, at = course.memory, [course.start, *load_track(track).position]
     for a, b in itertools.pairwise(at):
         for _ in range(20):
@@ -239,8 +241,8 @@ def test_flight_is_shown_and_judged_as_training_is(contract: Contract, track: st
             steps = [at_rest(jnp.asarray(x[None], jnp.float32)) for x in (before, after)]
             bodies = [jax.tree.map(lambda x: np.asarray(x, float), step) for step in steps]
             shown = course.goal.observe(here, np.zeros(1), bodies[0])
-            np.testing.assert_allclose(race.observe(memory, jnp.zeros(1), steps[0]), shown, atol=1e-5)
-            memory, wanted = race.advance(memory, *steps, jnp.zeros(1), jnp.zeros(1, bool))
+            np.testing.assert_allclose(observe(memory, jnp.zeros(1), steps[0]), shown, atol=1e-5)
+            memory, wanted = advance(memory, *steps, jnp.zeros(1), jnp.zeros(1, bool))
             here, found = course.goal.advance(here, *bodies, np.zeros(1), np.zeros(1, bool))
             np.testing.assert_array_equal(here.passed, memory.passed)
             np.testing.assert_array_equal(found.crashed, wanted.crashed)

@@ -46,7 +46,7 @@ class TrackConfig(TaskConfig):
         "bptt": Robust(
             weights={"prog2": 1.0, "anglev_sq": 0.02, "act2_sq": 0.03},
             algo={"horizon": 96, "learning_rate": 6e-3, "average": 0.99},
-            steps=12_000_000,
+            steps=4_000_000,
             chunk=60,
         ),
     }
