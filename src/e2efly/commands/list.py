@@ -27,6 +27,7 @@ def run(options: List) -> int:
     from e2efly.control import COMMAND_MODES
     from e2efly.physics import INTEGRATORS
     from e2efly.rewards import TERMS
+    from e2efly.tasks.race import ANY
     from e2efly.validation.plants import PLANTS
 
     console = Terminal()
@@ -34,7 +35,7 @@ def run(options: List) -> int:
         ("tasks", TASKS),
         ("algorithms", ALGORITHMS),
         ("presets", presets.names()),
-        ("race tracks", track_names()),
+        ("race tracks", [*track_names(), f"{ANY} (another in every episode)"]),
         ("references", ["polynomial", "circle", "lemniscate", "FILE.csv"]),
         ("command modes", COMMAND_MODES),
         ("integrators", INTEGRATORS),
