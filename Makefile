@@ -26,7 +26,7 @@ REAL_TIME := tests/validation/test_process_faults_sitl.py
 
 test: $(TEST_READY)
 	@$(FIRMWARE) & $(MAKE) --no-print-directory lint && wait
-	$(BIN)/python -m pytest -n 2 --max-worker-restart 0 --dist loadfile --no-loadscope-reorder --ignore=$(REAL_TIME)
+	$(BIN)/python -m pytest -n 2 --max-worker-restart 0 --durations 25 --dist loadfile --no-loadscope-reorder --ignore=$(REAL_TIME)
 	$(BIN)/python -m pytest $(REAL_TIME)
 
 lint: $(TEST_READY)
