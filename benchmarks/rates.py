@@ -46,7 +46,7 @@ def main() -> None:
             "hover", "bptt", wide=True
         ),
     }
-    rows = [{"what": name, "a second": f"{value:,.0f}"} for name, value in figures.items()]
+    rows = [{"what": name, "per second": f"{value:,.0f}"} for name, value in figures.items()]
     ratios = {
         "physics over the best of the others": substeps / peer,
         "physics, parameters as constants over each its own": substeps / own,
@@ -54,7 +54,7 @@ def main() -> None:
         "BPTT training, parameters as constants over each its own": bptt[0] / bptt[1],
         "environment over Crazyflow's bare control steps": env / bare,
     }
-    rows += [{"what": f"ratio, {name}", "a second": f"{value:.2f}"} for name, value in ratios.items()]
+    rows += [{"what": f"ratio, {name}", "per second": f"{value:.2f}"} for name, value in ratios.items()]
     rounds = {"e2efly": ours, "general": general, "environment": steps, **theirs}
     write("rates", options.json, {"table": rows, "figures": figures, "ratios": ratios, "rounds": rounds})
     print(table(rows))
