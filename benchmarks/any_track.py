@@ -33,7 +33,7 @@ from e2efly.courses.gates import Tracks  # noqa: E402
 from e2efly.courses.random_tracks import CANDIDATES, MOST, NUMBERS, OPENING, random_tracks  # noqa: E402
 from e2efly.courses.tracks import RaceTrack, track_names  # noqa: E402
 from e2efly.env import UNSEEN, Env, random_key  # noqa: E402
-from e2efly.episodes import Act, Episodes, run_episodes, wilson  # noqa: E402
+from e2efly.episodes import Act, Episodes, run_episodes, run_stepwise, wilson  # noqa: E402
 from e2efly.evaluation import act_of, candidate, episode_steps, evaluate  # noqa: E402
 from e2efly.learn.judge import judge, score  # noqa: E402
 from e2efly.learn.networks import Actor, Weights  # noqa: E402
@@ -96,8 +96,8 @@ def on(env: Env, track: Tracks) -> Env:
 
 
 def flier(act: Act, n: int, steps: int) -> Any:
-    """The program (environment, key) -> episodes from n starts."""
-    return jax.jit(lambda env, key: run_episodes(env, act, key, n, steps), compiler_options=wide_vectors(n))
+    """(environment, key) -> episodes from n starts."""
+    return lambda env, key: run_stepwise(env, act, key, n, steps)[0]
 
 
 def told(case: str, flown: Episodes, tracks: int) -> dict[str, Any]:

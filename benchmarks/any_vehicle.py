@@ -63,7 +63,9 @@ def main() -> None:
     asked = {}
     for policy in options.policies:
         asked[policy] = round(question(policy), 1)
-        rows += rows_of(e2efly.evaluate(policy, options.vehicles, vehicle="any"), "unseen", "0 to 120 ms")
+        found = e2efly.evaluate(policy, options.vehicles, vehicle="any")
+        low, high = found.candidate.policy.contract.latency_range_s
+        rows += rows_of(found, "unseen", f"{1e3 * low:.0f} to {1e3 * high:.0f} ms")
         for delay in DELAYS:
             env = {"action_latency": (delay, delay)}
             found = e2efly.evaluate(policy, options.vehicles, vehicle="any", env=env)

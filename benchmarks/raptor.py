@@ -30,9 +30,9 @@ from common import arguments, table, write
 from peers import packages
 
 from e2efly.config import EnvConfig, RewardConfig
-from e2efly.device import prepare, wide_vectors
+from e2efly.device import prepare
 from e2efly.env import UNSEEN, Env, EnvState, random_key
-from e2efly.episodes import Act, Episodes, run_episodes
+from e2efly.episodes import Act, Episodes, run_stepwise
 from e2efly.evaluation import act_of, candidate, episode_steps
 from e2efly.physics.body import hover_rotor_speed
 from e2efly.physics.rotation import from_euler, multiply, yaw
@@ -101,14 +101,11 @@ def fly(env: Env, act_for: Callable[[Any], Act], drawn: np.ndarray, task: HoverC
             state, family=u, vehicle=dataclasses.replace(begun, rotor_speed=speed, quaternion=level)
         )
 
-    @partial(jax.jit, compiler_options=wide_vectors(BATCH))
-    def program(env: Env, key: Any, u: Any) -> Episodes:
-        return run_episodes(env, act_for(u), key, BATCH, episode_steps(task, env), altered=lambda s: altered(u, s))
-
     parts = []
     for i in range(0, len(drawn), BATCH):
         u = drawn[i : i + BATCH].astype(np.float32)
-        parts.append(jax.tree.map(np.asarray, program(env, random_key(SEED, UNSEEN, i), u)))
+        key, steps = random_key(SEED, UNSEEN, i), episode_steps(task, env)
+        parts.append(run_stepwise(env, act_for(u), key, BATCH, steps, altered=partial(altered, u))[0])
     return jax.tree.map(lambda *x: np.concatenate(x), *parts)
 
 

