@@ -38,8 +38,9 @@ TITLES = {
     "msp_fuzz": "MSP codec under fuzzing",
 }
 
-FIRST = """Rates and times below that are older than 2026-11-24 were measured with the first-order integrator, which was the
-default until then. The default of today takes three times as long per physics sub-step ([physics](physics.md))."""
+FIRST = """
+Rates and times below that are older than 2026-11-24 were measured with the first-order integrator, which
+was the default until then. The default of today takes three times as long per physics sub-step ([physics](physics.md))."""
 """What stands over all tables."""
 NOTES = {
     "any_track": """
@@ -181,7 +182,7 @@ def main() -> None:
     `--pictures` the racer, too.
     """
     source = "Written by `make docs` from `benchmarks/results/*.json`; measured by the scripts in `benchmarks/`."
-    lines = ["# Benchmarks", "", source, "", FIRST, ""]
+    lines = ["# Benchmarks", "", source, "", FIRST.strip(), ""]
     for name, title in TITLES.items():
         path = RESULTS / f"{name}.json"
         if path.exists():
