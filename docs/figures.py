@@ -40,7 +40,8 @@ TITLES = {
 
 FIRST = """
 Rates and times below that are older than 2026-11-24 were measured with the first-order integrator, which
-was the default until then. The default of today takes three times as long per physics sub-step ([physics](physics.md))."""
+was the default until then. The default of today takes three times as long per physics sub-step
+([physics](physics.md))."""
 """What stands over all tables."""
 NOTES = {
     "any_track": """
