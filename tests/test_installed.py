@@ -21,7 +21,7 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Patrol(HoverConfig): ...
 
-@e2efly.register_pose_source("beacon", "beacon:HEIGHT")
+@e2efly.register_pose_source("lighthouse", "lighthouse:HEIGHT")
 class Beacon:
     def __init__(self, where):
         self.height, self.problem, self.refused = float(where), None, 0
@@ -59,7 +59,7 @@ def test_a_name_that_is_unknown_is_looked_for_in_installed_packages(installed: P
     assert installed.stem not in sys.modules  # nobody asked for more
     assert e2efly.preset("patrol", "ppo").task.name == "patrol"
     assert PLANTS.find("tunnel").name == "tunnel"
-    assert open_source("beacon:2").describe() == "a beacon at 2.0 m"
+    assert open_source("lighthouse:2").describe() == "a beacon at 2.0 m"
     assert TASKS.reference(TASKS["patrol"]) == f"{installed.stem}:Patrol"
     sys.modules.pop(installed.stem)
 

@@ -2,7 +2,8 @@
 
 import dataclasses
 import math
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,24 @@ from e2efly.config import NetworkConfig
 from e2efly.env import Env
 from e2efly.learn.export import contract_of, export_policy
 from e2efly.learn.networks import Actor, Features, Layers, Weights
+from e2efly.registry import is_shipped
+from e2efly.validation.plants import PLANTS
 from e2efly.vehicles.vehicle import GRAVITY
 
 POSITION, VELOCITY, ATTITUDE = 2.0, 2.4, 6.0
 """Gains: 1/s^2, 1/s, 1/s."""
+
+
+@pytest.fixture(autouse=True)
+def _own_files_are_read_anew(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A file is imported once, and registers its plant then: each test finds neither, and leaves neither."""
+    monkeypatch.setattr(PLANTS, "_known", {name: known for name, known in PLANTS.items() if is_shipped(known)})
+    own = "e2efly_file_"
+    for name in [name for name in sys.modules if name.startswith(own)]:
+        monkeypatch.delitem(sys.modules, name)
+    yield
+    for name in [name for name in sys.modules if name.startswith(own)]:
+        del sys.modules[name]
 
 
 def controller(env: Env, sink: float = 0.0) -> Layers:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from e2efly.commands.validate import Validate, run
+from e2efly.commands.validate import Asked, Validate, run
 from e2efly.config import ImuConfig
 from e2efly.validation.validate import validate
 from e2efly.vehicles import load_vehicle, vehicle
@@ -17,7 +17,8 @@ def test_hover_in_mujoco_is_as_in_training(
     policy_of: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     report = tmp_path / "report.json"
-    assert run(Validate(policy_of("hover"), "mujoco", 5, out=tmp_path / "plots", json=report)) == 0
+    asked = Validate(policy_of("hover"), "mujoco", 5, out=tmp_path / "plots", json=report)
+    assert run(Asked(asked, {})) == 0
     out = capsys.readouterr().out
     assert "training" in out
     assert "mujoco" in out
@@ -40,7 +41,7 @@ def test_success_that_drops_too_far_is_told_by_the_exit_status(
     slow.write_text(text.replace("value = 0.035", "value = 0.35"))
     assert load_vehicle(slow).motor_time_constant == 0.35
     options: dict[str, Any] = {"episodes": 3, "out": tmp_path / "plots", "vehicle": str(slow)}
-    assert run(Validate(policy_of("hover"), "mujoco", **options)) == 1
+    assert run(Asked(Validate(policy_of("hover"), "mujoco", **options), {})) == 1
     assert "hover: success drops by 100.0 points, 2 are allowed" in " ".join(capsys.readouterr().out.split())
     assert validate(policy_of("hover"), "mujoco", 3, vehicle=str(slow), max_drop=100.0).passed
 
