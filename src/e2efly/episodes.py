@@ -46,6 +46,8 @@ class Episodes:
     """Mean error over the episode after `settle`, m."""
     top_speed: Float[Array, " n"]
     """m/s."""
+    mean_speed: Float[Array, " n"]
+    """Along the path, m/s."""
     top_rate: Float[Array, " n"]
     """Largest body rate, rad/s."""
     roughness: Float[Array, " n"]
@@ -66,7 +68,7 @@ class UnderWay:
     over: Bool[Array, " n"]
     """Which have ended; they fly on, and count no more."""
     so_far: Episodes
-    """With the sums of the mean error and of the roughness."""
+    """With the sums of the mean error, of the mean speed and of the roughness."""
     counted: Float[Array, " n"]
     """Control steps that the mean error counts."""
 
@@ -75,7 +77,7 @@ class UnderWay:
         """At their start."""
         n = observation.shape[0]
         zero, no = jnp.zeros(n), jnp.zeros(n, bool)
-        none = Episodes(no, zero, zero, zero, zero, zero, zero, zero, no)
+        none = Episodes(no, zero, zero, zero, zero, zero, zero, zero, zero, no)
         return UnderWay(state, observation, no, none, zero)
 
     def after(self, env: Env, action: Float[Array, "n 4"], settle: Any) -> "UnderWay":
@@ -93,6 +95,7 @@ class UnderWay:
             final_error=jnp.where(over, e.final_error, out.error),
             mean_error=e.mean_error + counts * out.error,
             top_speed=jnp.maximum(e.top_speed, live * speed),
+            mean_speed=e.mean_speed + live * speed,
             top_rate=jnp.maximum(e.top_rate, live * turn),
             roughness=e.roughness + live * change,
             reward=e.reward + live * out.reward,
@@ -105,7 +108,9 @@ class UnderWay:
         e = self.so_far
         flown = jnp.maximum(e.duration / env.control_period, 1.0)
         mean_error = e.mean_error / jnp.maximum(self.counted, 1.0)
-        return dataclasses.replace(e, mean_error=mean_error, roughness=e.roughness / flown)
+        return dataclasses.replace(
+            e, mean_error=mean_error, mean_speed=e.mean_speed / flown, roughness=e.roughness / flown
+        )
 
 
 def run_episodes(
@@ -249,7 +254,8 @@ def summary(e: Any) -> dict[str, Any]:
 
     Returns:
         The number of episodes, the rate of success with its 95 % interval by Wilson, how many crashed; means of the
-        errors and the roughness, the mean time of a success (None without any), the largest speed and body rate.
+        errors and the roughness, the mean time of a success and its mean speed along the path (None without any), the
+        largest speed and body rate.
     """
     ok = np.asarray(e.success)
 
@@ -264,6 +270,7 @@ def summary(e: Any) -> dict[str, Any]:
         "final_error_m": rounded(np.mean(e.final_error)),
         "mean_error_m": rounded(np.mean(e.mean_error)),
         "seconds_of_success": rounded(np.mean(np.asarray(e.duration)[ok])) if ok.any() else None,
+        "mean_speed_m_s": rounded(np.mean(np.asarray(e.mean_speed)[ok])) if ok.any() else None,
         "top_speed_m_s": rounded(np.max(e.top_speed)),
         "top_rate_rad_s": rounded(np.max(e.top_rate)),
         "roughness": rounded(np.mean(e.roughness)),

@@ -36,6 +36,10 @@ OTHERS = EnvConfig(
     disturbance=DisturbanceConfig(gust=1.0, thrust=0.25, rotor=0.1, sag=0.2, centre_of_mass=0.006),
 )  # fmt: skip
 """The vehicles of the preset `robust`."""
+BESIDE_CAMERA = {"angle_spread": 0.06, "position_spread": 0.012, "fov_spread": 0.04}
+"""What the preset `robust` draws of cameras beside what the task says of them ..."""
+OLDER = 0.05
+"""... and how much older than the task says images are at most, s."""
 BESIDE_FAMILY = EnvConfig(
     latency_spread=(0.0, 0.012),
     randomize={"inertia": 0.2, "motor_time_constant": 0.2, "rate_gain": 0.2},
@@ -120,7 +124,11 @@ def _robust(task: type[TaskConfig], config: TrainConfig) -> TrainConfig:
         raise ValueError(
             f"preset 'robust': accepted for {_having('robust')}; not for {task.name} by {config.algo.name}"
         )
-    return given.into(dataclasses.replace(config, env=OTHERS))
+    cameras = tuple(
+        dataclasses.replace(c, latency=(c.latency[0], c.latency[1] + OLDER), **BESIDE_CAMERA)
+        for c in config.env.cameras
+    )
+    return given.into(dataclasses.replace(config, env=dataclasses.replace(OTHERS, cameras=cameras)))
 
 
 def _having(recipes: str) -> str:

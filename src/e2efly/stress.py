@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import jax
@@ -10,7 +11,7 @@ import numpy as np
 
 from e2efly.device import prepare
 from e2efly.env import UNSEEN, random_key
-from e2efly.env.stress import ROWS, Draw, Row, check_rows, with_longer_queue
+from e2efly.env.stress import ROWS, Draw, Row, check_rows, check_seen, rows_for, with_longer_queue
 from e2efly.episodes import Episodes, run_stepwise, summary
 from e2efly.evaluation import BATCH, SEED, Candidate, act_of, candidate, episode_steps, settling
 from e2efly.vehicles import Controller
@@ -69,7 +70,7 @@ def stress(
     Args:
         policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
         episodes: starts per row and criterion.
-        rows: names of rows; empty: all.
+        rows: names of rows; empty: all, those of cameras where the policy has some.
         vehicle: what flies in the nominal row, and what the other rows change; left out: the policy's own vehicle.
         controller: the vehicle that the flight controller believes in, in every row: policy or plant.
         seed: of the starts.
@@ -88,7 +89,8 @@ def stress(
             f"--vehicle is {vehicle or 'left out'}; accepted with --stress: one vehicle within the ranges of "
             f"{found.vehicle}, about which the rows lie"
         )
-    return Report(found, seed, fly_rows(found, rows or tuple(ROWS), episodes, seed))
+    check_seen(rows, found.env.cameras)
+    return Report(found, seed, fly_rows(found, rows or rows_for(found.env.cameras), episodes, seed))
 
 
 def fly_rows(found: Candidate, rows: tuple[str, ...], episodes: int, seed: int) -> dict[str, dict[str, Episodes]]:
@@ -104,7 +106,8 @@ def fly_rows(found: Candidate, rows: tuple[str, ...], episodes: int, seed: int) 
                 draw = Draw.of(ROWS[row], env.physics.flown, _generator(ROWS[row], seed, i), BATCH)
                 draw = jax.tree.map(lambda x: np.asarray(x, np.float32), draw)
                 key, act = random_key(seed, UNSEEN, i), act_of(found.policy)
-                parts.append(run_stepwise(draw.env(env), act, key, BATCH, steps, settle, draw.state)[0])
+                altered = partial(draw.state, env)
+                parts.append(run_stepwise(draw.env(env), act, key, BATCH, steps, settle, altered)[0])
             flown[row][name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
     return flown
 

@@ -8,6 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from e2efly.courses.gates import Tracks
+from e2efly.courses.tracks import load_track
 from e2efly.env import random_key
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
@@ -16,6 +18,8 @@ from e2efly.scenes.shapes import DISC, SQUARE, TRIANGLE
 from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.land_visual import LandVisualConfig
 from e2efly.tasks.race_clutter import RaceClutterConfig
+from e2efly.tasks.race_clutter.goal import drawn_larger
+from e2efly.tasks.race_clutter.world import World, _path
 from e2efly.tasks.task import Outcome, Shape, at_rest, make_task, struck
 
 SHAPE = Shape(0.05, 0.15)
@@ -114,31 +118,66 @@ def test_a_forest_is_as_dense_as_asked_and_clear_of_the_start() -> None:
     assert len(np.unique(np.asarray(memory.trees.centre[:, 0, 0]))) == 300
 
 
-@pytest.mark.parametrize("track", ["s_shaped", "circle_3d", "j_shaped"])
-def test_clutter_leaves_gates_and_start_free(track: str) -> None:
-    task = make_task(RaceClutterConfig(track=track), SHAPE, PERIOD, 7)
+TRACKS = RaceClutterConfig().track
+
+
+@pytest.mark.parametrize("only", [-1, 0, 1, 2])
+def test_clutter_leaves_gates_and_start_free(only: int) -> None:
+    task = make_task(RaceClutterConfig(only=only), SHAPE, PERIOD, 7)
     n = 200
     state, memory = jax.jit(task.start, static_argnums=1)(random_key(3), n)
     scene, zero = task.scene(memory), jnp.zeros(n)
     assert np.asarray(clearance(scene, state.position, zero)).min() > SHAPE.radius
     obstacles = dataclasses.replace(scene, solids=memory.obstacles)
-    for gate in range(task.count):
-        assert np.asarray(clearance(obstacles, memory.gates.position[:, gate], zero)).min() > 0.7
-    moved = np.asarray(memory.gates.position - task.gates.position)
-    assert 0.25 < np.abs(moved).max() <= 0.3 + 1e-6
-    turned = np.arctan2(memory.gates.sin, memory.gates.cos) - np.arctan2(task.gates.sin, task.gates.cos)
+    tracks, gates = memory.tracks, memory.tracks.gates
+    for gate in range(gates.count):
+        there = gate < np.asarray(tracks.count)
+        assert np.asarray(clearance(obstacles, gates.position[:, gate], zero))[there].min(initial=1.0) > 0.7
+    second = gates.position[:, None, 1] - task.given.gates.position[None, :, 1]
+    which = np.linalg.norm(second, axis=-1).argmin(axis=1)  # their second gates tell the tracks apart
+    assert set(which) == ({0, 1, 2} if only < 0 else {only})
+    given = jax.tree.map(lambda x: x[which], task.given)
+    np.testing.assert_array_equal(tracks.count, given.count)
+    assert {int(k) for k in given.count} <= {4, 5, 6}
+    assert 0.25 < np.abs(np.asarray(gates.position - given.gates.position)).max() <= 0.3 + 1e-6
+    turned = np.arctan2(gates.sin, gates.cos) - np.arctan2(given.gates.sin, given.gates.cos)
     turned = np.arctan2(np.sin(turned), np.cos(turned))
     assert 0.17 < np.abs(turned).max() <= 0.2 + 1e-5
 
 
-def test_a_lap_in_clutter_is_the_gates_in_order_without_a_touch() -> None:
-    task = make_task(
-        RaceClutterConfig(clutter=dataclasses.replace(RaceClutterConfig().clutter, obstacles=0.0)), SHAPE, PERIOD, 7
-    )
+@pytest.mark.parametrize("track", TRACKS)
+def test_one_of_several_tracks_is_the_track_alone(track: str) -> None:
+    """Worlds with room for more gates than the track has differ in nothing that is seen, asked for or judged."""
+    alone = make_task(RaceClutterConfig(track=(track,)), SHAPE, PERIOD, 7)
+    among = make_task(RaceClutterConfig(only=TRACKS.index(track)), SHAPE, PERIOD, 7)
+    own = Tracks.of(drawn_larger(load_track(track), 2.0))
+    wide = Tracks.of(drawn_larger(load_track(track), 2.0), 6)
+    place = at(own.gates.start[0] + np.array([1.0, 0.5, 0.0]), (3.0, 0.0, 0.0))
+    count = int(own.count[0])
+    for passed in range(count):
+        seen = []
+        for task, tracks in ((alone, own), (among, wide)):
+            tracks = jax.tree.map(jnp.asarray, tracks)
+            memory = World(tracks, jnp.array([passed]), jnp.array([6.0]), {})
+            seen.append(np.asarray(task.observe(memory, jnp.zeros(1), place)))
+            assert np.asarray(task.scene(memory).solids["gate"].active).sum() == count
+        np.testing.assert_array_equal(*seen)
+    paths = [
+        np.asarray(_path(jax.tree.map(jnp.asarray, tracks), place.position)[0])[0, : count + 2 - (not own.closed[0])]
+        for tracks in (own, wide)
+    ]
+    np.testing.assert_array_equal(*paths)
+
+
+@pytest.mark.parametrize("only", [0, 1])
+def test_a_lap_in_clutter_is_the_gates_in_order_without_a_touch(only: int) -> None:
+    empty = dataclasses.replace(RaceClutterConfig().clutter, obstacles=0.0)
+    task = make_task(RaceClutterConfig(clutter=empty, only=only), SHAPE, PERIOD, 7)
     _, memory = task.start(random_key(4), 1)
-    for gate in range(task.count):
-        centre = np.asarray(memory.gates.position[0, gate])
-        axis = np.array([memory.gates.cos[0, gate], memory.gates.sin[0, gate], 0.0])
+    gates, count = memory.tracks.gates, int(memory.tracks.count[0])
+    for gate in range(count):
+        centre = np.asarray(gates.position[0, gate])
+        axis = np.array([gates.cos[0, gate], gates.sin[0, gate], 0.0])
         np.testing.assert_allclose(task.goal(memory, jnp.zeros(1))[0], centre, atol=1e-5)
         np.testing.assert_allclose(task.axes(memory)[0, 0], axis, atol=1e-6)
         beside = [at(centre + 0.1 * s * axis + np.array([0.0, 0.0, 0.9]), 6 * axis) for s in (-1, 1)]
@@ -146,20 +185,20 @@ def test_a_lap_in_clutter_is_the_gates_in_order_without_a_touch() -> None:
         assert lost.terminated[0] and lost.crashed[0] and not lost.arrived[0]
         through = [at(centre + 0.1 * s * axis, 6 * axis) for s in (-1, 1)]
         memory, out = task.advance(memory, *through, jnp.ones(1), jnp.zeros(1, bool))
-        assert out.arrived[0] and not out.crashed[0] and bool(out.success[0]) == (gate == task.count - 1)
+        assert out.arrived[0] and not out.crashed[0] and bool(out.success[0]) == (gate == count - 1)
 
 
 def test_a_racer_is_to_look_at_its_gate_and_near_it_round_the_corner() -> None:
-    task = make_task(RaceClutterConfig(track="j_shaped"), SHAPE, PERIOD, 7)
+    task = make_task(RaceClutterConfig(track=("j_shaped",)), SHAPE, PERIOD, 7)
     _, memory = task.start(random_key(5), 1)
     memory = dataclasses.replace(memory, passed=jnp.array([2]))
-    here, there = (np.asarray(memory.gates.position[0, i]) for i in (2, 3))
+    here, there = (np.asarray(memory.tracks.gates.position[0, i]) for i in (2, 3))
     for away, towards in ((6.0, here), (1.0, here + (there - here) * 4.0 / np.linalg.norm(there - here))):
         place = here - [away, 0.0, 0.0]
         wanted = np.arctan2(*(towards - place)[1::-1])
         assert float(task.desired_yaw(memory, at(place))[0]) == pytest.approx(wanted, abs=0.02)
-    last = dataclasses.replace(memory, passed=jnp.array([task.count - 1]))  # an open track has no gate behind it
-    assert np.isfinite(task.desired_yaw(last, at(np.asarray(memory.gates.position[0, task.count - 1])))).all()
+    last = dataclasses.replace(memory, passed=jnp.array([4]))  # an open track has no gate behind it
+    assert np.isfinite(task.desired_yaw(last, at(np.asarray(memory.tracks.gates.position[0, 4])))).all()
 
 
 def test_the_open_way_through_a_forest_is_flown_at_the_commanded_speed() -> None:

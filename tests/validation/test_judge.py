@@ -64,7 +64,7 @@ def test_flights_of_the_runtime_are_judged_as_episodes(
     np.testing.assert_array_equal(verdicts.success, wanted.success)
     np.testing.assert_array_equal(verdicts.crashed, wanted.crashed)
     assert verdicts.success.sum() >= good
-    for field in ("duration", "final_error", "mean_error", "top_speed", "top_rate", "roughness"):
+    for field in ("duration", "final_error", "mean_error", "top_speed", "mean_speed", "top_rate", "roughness"):
         np.testing.assert_allclose(getattr(verdicts, field), getattr(wanted, field), atol=1e-3, err_msg=field)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import e2efly
 from e2efly.cli import run
-from e2efly.env.stress import ALL, ROWS
+from e2efly.env.stress import ALL, ROWS, rows_for
 from e2efly.stress import stress as in_training
 from e2efly.validation.plant import EVERYTHING, Plant
 from e2efly.validation.plants import PLANTS, find_plant
@@ -23,6 +23,9 @@ DRAWN_ALIKE = (
     "mixer clips each rotor",
 )  # fmt: skip
 """Rows without white noise or gusts, which either place draws anew in every step."""
+
+BLIND = rows_for(())
+"""Rows of policies without cameras."""
 
 
 @pytest.mark.parametrize(("plant", "close"), [("simulator", 0.004), ("mujoco", 0.01)])
@@ -68,14 +71,14 @@ def test_air_and_noise_are_as_strong_as_the_rows_say() -> None:
 
 
 def test_every_row_says_what_it_changes_and_plants_what_they_can() -> None:
-    rows = {name: row.alters for name, row in ROWS.items()}
+    rows = {name: ROWS[name].alters for name in BLIND}
     assert rows["nominal"] == rows["delay +20 ms"] == rows["noise of motion capture"] == frozenset()
     assert rows["drag x2"] == {"drag_linear", "drag_quadratic"}
     assert frozenset().union(*rows.values()) <= EVERYTHING
     assert rows[ALL] == frozenset().union(*rows.values()) - {"plain_mixer"}
-    cannot = {name: {row for row in ROWS if lacking(find_plant(name), ROWS[row])} for name in ("simulator", "mujoco")}
+    cannot = {name: {row for row in BLIND if lacking(find_plant(name), ROWS[row])} for name in ("simulator", "mujoco")}
     assert cannot == {"simulator": set(), "mujoco": set()}
-    firmware = {row for row in ROWS if lacking(find_plant("betaflight"), ROWS[row])}
+    firmware = {row for row in BLIND if lacking(find_plant("betaflight"), ROWS[row])}
     assert firmware == {"rate loop x0.5", "rate loop x2", "mixer clips each rotor", ALL}
 
 
@@ -87,7 +90,7 @@ def test_the_command_reports_names_what_is_left_out_and_judges(
     asked = ["validate", "hover", "--stress", "--plant", f"{EXAMPLE}:PointMass", "--episodes", "2", "--out"]
     assert run([*asked, str(tmp_path), "--json", str(report), "--least", "0.5"]) == 0
     said = json.loads(report.read_text())
-    assert set(said["stress"]) | set(said["left_out"]) == set(ROWS)
+    assert set(said["stress"]) | set(said["left_out"]) == set(BLIND)
     assert "nominal" in said["stress"]
     assert said["left_out"]["mass x1.25"] == "mass"
     assert said["plant"] == "point_mass"
@@ -112,6 +115,10 @@ def test_a_row_that_fails_is_told_by_the_exit_status(
         (["--stress", "--rows", "mass x1.2"], "unknown stress 'mass x1.2'; did you mean 'mass x1.25'"),
         (["--rows", "nominal"], "--rows is ('nominal',); accepted with --stress"),
         (["--least", "0.9"], "--least is 0.9; accepted with --stress"),
+        (
+            ["--stress", "--rows", "images 40 ms older"],
+            "--rows has 'images 40 ms older', but the policy sees nothing; accepted: 'nominal', 'mass x0.8'",
+        ),
         (["--stress", "--least", "97"], "--least is 97.0; accepted: 0 to 1"),
         (["--stress", "--least", "nan"], "--least is nan; accepted: 0 to 1"),
         (["--stress", "--episodes", "0"], "--episodes is 0; accepted: more than 0"),

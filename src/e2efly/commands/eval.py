@@ -150,6 +150,7 @@ def _table(flown: dict[str, Any], episodes: int) -> Table:
     row("final error", lambda s: f"{100 * s['final_error_m']:.2f} cm")
     row("mean error", lambda s: f"{100 * s['mean_error_m']:.2f} cm")
     row("time of a success", lambda s: seconds(s["seconds_of_success"]))
+    row("mean speed", lambda s: "-" if s["mean_speed_m_s"] is None else f"{s['mean_speed_m_s']:.1f} m/s")
     row("top speed", lambda s: f"{s['top_speed_m_s']:.1f} m/s")
     row("roughness", lambda s: f"{s['roughness']:.3f}")
     return table

@@ -36,7 +36,7 @@ from e2efly.physics.body import hover_rotor_speed
 from e2efly.physics.rotation import from_euler, unrotate, yaw
 from e2efly.scenes import scene as scenes
 from e2efly.sensors import imu, latency
-from e2efly.sensors.eyes import Eye, image_shape, see
+from e2efly.sensors.eyes import Eye, image_shape, see, steady, steps_between
 from e2efly.sensors.noise import add_noise
 from e2efly.tasks.task import Shape, Task, into_ball, make_task, uniform
 from e2efly.vehicles import Family, Flown, Vehicle, load_family, nominal_vehicle
@@ -156,14 +156,15 @@ class Env:
 
     @property
     def is_disturbed(self) -> bool:
-        """Whether episodes have vehicles, delays or air that are not those of the vehicle's file."""
+        """Whether episodes have vehicles, delays, air or cameras that are not those of the files."""
         sooner, later = self.latency_range
         spread = sooner != later and self.family is None
+        spread = spread or any(camera != steady(camera) for camera in self.cameras)
         return bool(spread or any(self.randomize.values()) or self.wind or self.disturbance)
 
     def undisturbed(self) -> "Env":
-        """The environment with the vehicle of the file, its delay and still air; of a family, with its vehicles and
-        their delays. Numbers alone differ, so that the same compiled programs take it.
+        """The environment with the vehicle of the file, its delay, still air and cameras as they are meant to be; of a
+        family, with its vehicles and their delays. Numbers alone differ, so that the same compiled programs take it.
         """
         nominal = np.clip(np.asarray(self.physics.nominal.latency, self.latency_range.dtype), *self.latency_range)
         return dataclasses.replace(
@@ -172,6 +173,7 @@ class Env:
             randomize={name: 0 * width for name, width in self.randomize.items()},
             wind=self.wind and 0 * self.wind,
             disturbance=self.disturbance and DisturbanceConfig(),
+            cameras=tuple(map(steady, self.cameras)),
         )
 
     @property
@@ -237,8 +239,8 @@ class Env:
         scene = self.task.scene(still.memory)
         images = []
         for index, (camera, eye, old) in enumerate(zip(self.cameras, still.eyes, still.images, strict=True)):
-            every = 1 if camera.rate is None else round(1 / (camera.rate * self.control_period))
-            due = state.tick % every == 0
+            every = steps_between(camera, self.control_period)
+            due = state.tick % (every if eye.every is None else eye.every) == 0
 
             def new(_: None, index: int = index, camera: CameraConfig = camera, eye: Eye = eye) -> Array:
                 then, seen = still.time, still.vehicle
@@ -248,10 +250,10 @@ class Env:
                 key = jax.random.fold_in(_key(still, IMAGES), index)
                 return see(camera, eye, scene.at(then), seen, key)
 
-            if every == 1:
+            if every == 1 and eye.every is None:
                 images.append(new(None))
                 continue
-            fresh = jax.lax.cond(due | jnp.any(renewed), new, lambda _, old=old: old, None)
+            fresh = jax.lax.cond(jnp.any(due | renewed), new, lambda _, old=old: old, None)
             images.append(_where(due | renewed, fresh, old))
         return dataclasses.replace(state, images=tuple(images))
 

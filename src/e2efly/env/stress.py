@@ -14,10 +14,11 @@ from typing import Any
 import jax
 import numpy as np
 
-from e2efly.config import NoiseConfig
+from e2efly.config import CameraConfig, NoiseConfig
 from e2efly.env.disturbance import Disturbance
 from e2efly.env.environment import Env
 from e2efly.env.state import EnvState
+from e2efly.env.stress_cameras import CAMERAS, CameraDraw, CameraRow, with_noise
 from e2efly.sensors import latency
 from e2efly.vehicles.names import unknown
 from e2efly.vehicles.vehicle import Vehicle
@@ -25,7 +26,7 @@ from e2efly.vehicles.vehicle import Vehicle
 ALL = "all at once"
 """The row in which each vehicle draws everything."""
 LATEST = 0.04
-"""Largest delay that a row adds, s."""
+"""Largest delay that a row adds to commands, and to images, s."""
 MOCAP = NoiseConfig(position=0.005, velocity=0.05, attitude=0.005, body_rate=0.02)
 VIO = NoiseConfig(position=0.02, velocity=0.1, attitude=0.01, body_rate=0.02)
 
@@ -55,6 +56,8 @@ class Row:
     """White noise of the observed state."""
     drift: float = 0.0
     """Random walk of the observed position after one second, m per axis."""
+    camera: CameraRow = CameraRow()
+    """What is different about the cameras."""
 
     @property
     def alters(self) -> frozenset[str]:
@@ -63,12 +66,14 @@ class Row:
         Delay, noise and drift lie between plant and policy: every plant can be flown with them.
         """
         if self.name == ALL:
-            return frozenset().union(*(row.alters for row in ROWS.values() if row.name != ALL)) - {"plain_mixer"}
+            others = frozenset().union(*(row.alters for row in ROWS.values() if row.name != ALL))
+            return others - {"plain_mixer", "cameras"}
         beside = {
             "rotor_position": self.centre_of_mass,
             "wind": self.wind or self.gust,
             "rotor_share": self.sag or self.rotor,
             "plain_mixer": self.plain_mixer,
+            "cameras": self.camera.there,
         }
         return frozenset(self.factors) | {name for name, there in beside.items() if there}
 
@@ -98,9 +103,15 @@ ROWS: dict[str, Row] = {
         Row("noise of motion capture", noise=MOCAP),
         Row("noise and drift of a VIO", noise=VIO, drift=0.005),
         Row(ALL),
+        *(Row(name, camera=row) for name, row in CAMERAS.items()),
     )
 }
-"""The rows by name, in the order of the tables."""
+"""The rows by name. The place of a row decides what it draws: new ones come last."""
+
+
+def rows_for(cameras: tuple[CameraConfig, ...]) -> tuple[str, ...]:
+    """The names of the rows that mean anything to a policy with these cameras, in the order of the tables."""
+    return (*(name for name, row in ROWS.items() if name != ALL and row.camera.fits(cameras)), ALL)
 
 
 @dataclass(frozen=True)
@@ -118,6 +129,7 @@ class Draw:
     """(n,)."""
     noise: NoiseConfig
     """Of (n, 1)."""
+    camera: CameraDraw
 
     @staticmethod
     def of(row: Row, vehicle: Vehicle, rng: np.random.Generator, n: int) -> "Draw":
@@ -170,6 +182,7 @@ class Draw:
             ),
             plain_mixer=zero + row.plain_mixer,
             noise=NoiseConfig(**noise),  # type: ignore[arg-type]
+            camera=CameraDraw.of(None if everything else row.camera, rng.spawn(1)[0], n),
         )
 
     def vehicle(self, nominal: Vehicle, i: int) -> Vehicle:
@@ -181,12 +194,14 @@ class Draw:
     def env(self, env: Env) -> Env:
         """The environment with what a row changes of it."""
         mixer = dataclasses.replace(env.physics.mixer, plain=self.plain_mixer)
-        return dataclasses.replace(env, physics=dataclasses.replace(env.physics, mixer=mixer), noise=self.noise)
+        physics = dataclasses.replace(env.physics, mixer=mixer)
+        return dataclasses.replace(env, physics=physics, noise=self.noise, cameras=with_noise(env.cameras))
 
-    def state(self, state: EnvState) -> EnvState:
+    def state(self, env: Env, state: EnvState) -> EnvState:
         """The beginning of the episodes with what a row changes of it."""
         return dataclasses.replace(
             state,
+            eyes=self.camera.eyes(env.cameras, state.eyes, env.control_period),
             plant=self.plant,
             wind=self.wind,
             disturbance=self.disturbance,
@@ -198,9 +213,13 @@ jax.tree_util.register_dataclass(Draw, data_fields=[f.name for f in dataclasses.
 
 
 def with_longer_queue(env: Env) -> Env:
-    """The environment with room in its queue for the largest delay of the rows; the policy sees as many actions."""
+    """The environment with room for the largest delays of the rows, of commands and of images; the policy sees as many
+    actions.
+    """
     latest = latency.frames(float(env.physics.nominal.latency) + LATEST, env.control_period)
-    return dataclasses.replace(env, queue=max(env.queue, latest + 1))
+    oldest = max((camera.latency[0] + LATEST for camera in env.cameras), default=0.0)
+    past = latency.frames(oldest, env.control_period) + 1 if oldest else 0
+    return dataclasses.replace(env, queue=max(env.queue, latest + 1), past=max(env.past, past))
 
 
 def check_rows(rows: tuple[str, ...]) -> None:
@@ -212,6 +231,21 @@ def check_rows(rows: tuple[str, ...]) -> None:
     for name in rows:
         if name not in ROWS:
             raise ValueError(unknown("stress", name, tuple(ROWS)))
+
+
+def check_seen(rows: tuple[str, ...], cameras: tuple[CameraConfig, ...]) -> None:
+    """Refuse a row of cameras that a policy has not.
+
+    Raises:
+        ValueError: naming it, what the policy sees, and the rows that are accepted.
+    """
+    for name in rows:
+        if not ROWS[name].camera.fits(cameras):
+            seen = " and ".join(camera.sees for camera in cameras) or "nothing"
+            raise ValueError(
+                f"--rows has {name!r}, but the policy sees {seen}; accepted: "
+                + ", ".join(repr(row) for row in rows_for(cameras))
+            )
 
 
 def _number(value: np.ndarray) -> Any:

@@ -24,7 +24,8 @@ def input_files(config: TrainConfig) -> dict[str, Path]:
     """
     found = {"env.vehicle": vehicle_file(config.env.vehicle)}
     if (track := getattr(config.task, "track", "")) and not config.task.own_worlds:
-        found["task.track"] = track_file(track)
+        several = {f"task.track.{i}": name for i, name in enumerate(track)} if isinstance(track, tuple) else {}
+        found |= {field: track_file(name) for field, name in (several or {"task.track": track}).items()}
     if config.start_from is not None:
         found["start_from"] = Path(config.start_from)
     named = {"task.reference": getattr(config.task, "reference", "")}
@@ -54,7 +55,7 @@ def replaced(tree: Any, field: str, value: str) -> Any:
     """Nested dataclasses and tuples with another value at a dotted path."""
     name, _, rest = field.partition(".")
     if isinstance(tree, tuple):
-        return tuple(replaced(x, rest, value) if str(i) == name else x for i, x in enumerate(tree))
+        return tuple((replaced(x, rest, value) if rest else value) if str(i) == name else x for i, x in enumerate(tree))
     return dataclasses.replace(tree, **{name: replaced(getattr(tree, name), rest, value) if rest else value})
 
 

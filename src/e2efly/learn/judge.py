@@ -46,7 +46,7 @@ def stressed(setup: Setup, weights: Weights, episodes: int) -> dict[str, Episode
     @partial(jax.jit, compiler_options=fast_compile() | wide_vectors(episodes))
     def program(env: Env, weights: Weights, key: Any, draw: Draw) -> Episodes:
         act, steps = acting(setup.actor, weights), setup.episode_steps
-        return run_episodes(draw.env(env), act, key, episodes, steps, setup.settle, altered=draw.state)
+        return run_episodes(draw.env(env), act, key, episodes, steps, setup.settle, altered=partial(draw.state, env))
 
     for name, env in setup.judges.items():
         draw = Draw.of(ROWS[ALL], env.physics.nominal, rng, episodes)

@@ -56,12 +56,26 @@ def pattern(config: CameraConfig) -> Pattern:
 def mount(config: CameraConfig, n: int, key: PRNGKeyArray | None = None) -> Mount:
     """The cameras of n vehicles: each a little different where the configuration says so and a key is given."""
     u = jnp.zeros((n, 8)) if key is None else jax.random.uniform(key, (n, 8), minval=-1.0, maxval=1.0)
-    roll, pitch, yaw = (config.angle_spread * u[:, i] for i in range(3))
-    turned = to_matrix(from_euler(roll, pitch + config.pitch, yaw)) @ _AHEAD
+    factor = 1 + config.fov_spread * u[:, 3:5]
+    return mounted(config, config.angle_spread * u[:, :3], factor, config.position_spread * u[:, 5:8])
+
+
+def mounted(
+    config: CameraConfig, angles: Float[Array, "n 3"], factor: Float[Array, "n k"], offset: Float[Array, "n 3"]
+) -> Mount:
+    """The cameras of n vehicles, each mounted in its own way.
+
+    Args:
+        config: of all.
+        angles: roll, pitch and yaw, beside the configuration's pitch, rad.
+        factor: on a pinhole's field of view, of each axis or of both (k is 2 or 1).
+        offset: beside the configuration's position, body frame, m.
+    """
+    turned = to_matrix(from_euler(angles[:, 0], angles[:, 1] + config.pitch, angles[:, 2])) @ _AHEAD
     if config.projection == "pinhole":
-        half = jnp.asarray(config.fov) / 2 * (1 + config.fov_spread * u[:, 3:5])
-        turned = turned * jnp.concatenate([jnp.tan(half), jnp.ones((n, 1))], axis=1)[:, None]
-    return Mount(turned, jnp.asarray(config.position) + config.position_spread * u[:, 5:8])
+        half = jnp.asarray(config.fov) / 2 * factor
+        turned = turned * jnp.concatenate([jnp.tan(half), jnp.ones((len(half), 1))], axis=1)[:, None]
+    return Mount(turned, jnp.asarray(config.position) + offset)
 
 
 def pose(

@@ -4,10 +4,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from e2efly.courses.gates import FRAME, Gates
+from e2efly.courses.gates import FRAME, Gates, Tracks
 from e2efly.scenes.scene import Solids
 
-jax.tree_util.register_dataclass(Gates, data_fields=list(Gates.__dataclass_fields__), meta_fields=[])
+for _kind in (Gates, Tracks):
+    jax.tree_util.register_dataclass(_kind, data_fields=list(_kind.__dataclass_fields__), meta_fields=[])
 
 HALF_DEPTH = 0.05
 """Half the depth of a gate's bars, m."""

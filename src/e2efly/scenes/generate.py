@@ -5,7 +5,7 @@ import math
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from e2efly.config import CLUTTER, ClutterConfig, ForestConfig
 from e2efly.scenes.scene import WALL, Solids
@@ -55,6 +55,7 @@ def clutter(
     path: Float[Array, "n p 3"],
     keep: Float[Array, "n c 3"],
     radius: Array | float,
+    legs: Int[Array, " n"] | None = None,
 ) -> dict[str, Solids]:
     """Obstacles of all kinds around a polyline, clear of some points.
 
@@ -65,17 +66,19 @@ def clutter(
         path: corners of the polyline, world, m.
         keep: points that are kept clear, world, m.
         radius: of what is kept clear about each, beside `config.clear`, m.
+        legs: how many straight lines of its polyline each world has; None: all.
 
     Returns:
         Solids by kind, their centres over the ground.
     """
     each = config.room // len(CLUTTER)
+    lines = path.shape[1] - 1 if legs is None else legs[:, None, None]
     found = {}
     for index, kind in enumerate(CLUTTER):
         keys = jax.random.split(jax.random.fold_in(key, index), 8)
         shape = (n, each)
         tries = (*shape, TRIES)
-        leg = jax.nn.one_hot(jax.random.randint(keys[0], tries, 0, path.shape[1] - 1), path.shape[1] - 1)
+        leg = jax.nn.one_hot(jax.random.randint(keys[0], tries, 0, lines), path.shape[1] - 1)
         along = jax.random.uniform(keys[1], (*tries, 1))
         on_path = sum(
             share * jnp.einsum("nkcp,npi->nkci", leg, ends)

@@ -40,6 +40,8 @@ class Eye:
     """Light of the world, for a camera that sees colours."""
     tints: Float[Array, "n 8 3"] | None
     """What is added to the colours of the solids, in turn, for a camera that sees colours."""
+    every: Float[Array, " n"] | None = None
+    """Control steps from an image to the next, of each vehicle; None: `steps_between`, of all of them."""
 
     @staticmethod
     def of(config: CameraConfig, key: PRNGKeyArray, n: int) -> "Eye":
@@ -70,6 +72,21 @@ def _tinted(scene: Scene, tints: Float[Array, "n t 3"]) -> Scene:
         turn = (first + np.arange(old.colour.shape[1])) % TINTS
         solids[kind] = dataclasses.replace(old, colour=jnp.clip(old.colour + tints[:, turn], 0.0, 1.0))
     return dataclasses.replace(scene, solids=solids)
+
+
+def steps_between(config: CameraConfig, period: float) -> int:
+    """Control steps from an image of a camera to the next."""
+    return 1 if config.rate is None else round(1 / (config.rate * period))
+
+
+def steady(config: CameraConfig) -> CameraConfig:
+    """The camera as it is meant to be: mounted exactly, with its own field of view and its youngest images. Its noise
+    stays.
+    """
+    youngest = config.latency[0]
+    return dataclasses.replace(
+        config, angle_spread=0.0, position_spread=0.0, fov_spread=0.0, latency=(youngest, youngest)
+    )
 
 
 def image_shape(config: CameraConfig) -> tuple[int, ...]:

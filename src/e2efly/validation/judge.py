@@ -31,6 +31,8 @@ class Verdicts:
     """(n,) mean error over the episode after `settle`, m."""
     top_speed: np.ndarray
     """(n,) m/s."""
+    mean_speed: np.ndarray
+    """(n,) along the path, m/s."""
     top_rate: np.ndarray
     """(n,) largest body rate, rad/s."""
     roughness: np.ndarray
@@ -81,6 +83,7 @@ def judge(env: Env, starts: Starts, flights: list[Trajectory], settle: float = 0
         final_error=outcome.error[last, columns],
         mean_error=(outcome.error * counts).sum(0) / np.maximum(counts.sum(0), 1),
         top_speed=(speed * live).max(0),
+        mean_speed=(speed * live).sum(0) / np.maximum(length, 1),
         top_rate=(turn * live).max(0),
         roughness=(change * live).sum(0) / np.maximum(length, 1),
     )

@@ -12,7 +12,7 @@ import numpy as np
 from e2efly.budget import check_memory
 from e2efly.device import compute_at_once, prepare
 from e2efly.env import UNSEEN, disturbance, random_key
-from e2efly.env.stress import ROWS, Row, check_rows
+from e2efly.env.stress import ROWS, Row, check_rows, check_seen, rows_for
 from e2efly.evaluation import SEED, settling
 from e2efly.stress import Report, draws
 from e2efly.validation.fleet import Flight, Mission, fly_all
@@ -64,15 +64,17 @@ def stress(
     compute_at_once()
     prepare("cpu")  # the plants compute there, one vehicle at a time
     found, kind, own = flyable(policy, plant, vehicle, controller)
-    left_out = {row.name: lack for row in ROWS.values() if (lack := lacking(kind, row))}
+    check_seen(rows, found.env.cameras)
+    known = rows_for(found.env.cameras)
+    left_out = {row: lack for row in known if (lack := lacking(kind, ROWS[row]))}
     if refused := [row for row in rows if row in left_out]:
         raise ValueError(
             f"--rows has {refused[0]!r}, but plant {kind.name!r} cannot change {left_out[refused[0]]}; accepted: "
-            + ", ".join(repr(name) for name in ROWS if name not in left_out)
+            + ", ".join(repr(name) for name in known if name not in left_out)
         )
     flown, believed = found.flown.body, found.flown.believed
     check_realities(kind, believed, [Reality(flown, 0.0)])
-    chosen = [name for name in ROWS if name in rows] if rows else [name for name in ROWS if name not in left_out]
+    chosen = [name for name in known if (name in rows if rows else name not in left_out)]
     suites = found.task.criteria()
     longest = max(float(suite.episode_s) for suite in suites.values()) * found.policy.contract.control_rate_hz
     check_memory({f"--episodes is {episodes}": float(episodes) * len(chosen) * len(suites) * longest * (SAMPLE + AIR)})

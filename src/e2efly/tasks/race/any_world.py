@@ -36,7 +36,6 @@ LOW = 0.2
 """With the feet lower than this over the ground a vehicle stands out of where it should be, m."""
 
 jax.tree_util.register_dataclass(Memory, data_fields=["tracks", "passed"], meta_fields=[])
-jax.tree_util.register_dataclass(Tracks, data_fields=["gates", "count", "closed"], meta_fields=[])
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "given"], meta_fields=[])

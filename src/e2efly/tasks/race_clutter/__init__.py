@@ -2,6 +2,7 @@
 
 import dataclasses
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 from e2efly.config import (
@@ -51,8 +52,11 @@ class RaceClutterConfig(TaskConfig):
 
     episode_s: float = 20.0
     """Length of an episode, s."""
-    track: str = shape("s_shaped")
-    """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file (its gate count sets shapes)."""
+    track: tuple[str, ...] = shape(("s_shaped", "circle_3d", "j_shaped"))
+    """One or more of four_gates, s_shaped, circle_3d, j_shaped, or paths of .toml files; every episode has one of them
+    (their number and their gates set shapes)."""
+    only: float = number(-1.0, low=-1)
+    """Which of them every episode has, counted from 0; -1: any."""
     scale: float = number(2.0, above=0)
     """The track's ground plan is this many times larger: wide enough for 10 m/s."""
     clutter: ClutterConfig = ClutterConfig()
@@ -78,8 +82,11 @@ class RaceClutterConfig(TaskConfig):
         return cls(laps=0, collisions_end=False)
 
     def criteria(self) -> dict[str, TaskConfig]:
-        """One lap, or as many as are asked for; collisions end the episode."""
-        return {self.name: dataclasses.replace(self, laps=max(self.laps, 1), collisions_end=True)}
+        """Each track: one lap, or as many as are asked for; collisions end the episode."""
+        judged = dataclasses.replace(self, laps=max(self.laps, 1), collisions_end=True)
+        if len(self.track) == 1:
+            return {self.name: judged}
+        return {Path(track).stem: dataclasses.replace(judged, only=float(i)) for i, track in enumerate(self.track)}
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:

@@ -8,7 +8,7 @@ import numpy as np
 
 from e2efly.config import number
 from e2efly.control.vectors import Array, namespace
-from e2efly.courses.gates import Gates
+from e2efly.courses.gates import STRAIGHT_ON, Tracks
 from e2efly.courses.tracks import RaceTrack, load_track
 from e2efly.goal import Course, Goal, Outcome, Shape
 from e2efly.observation import Field
@@ -20,14 +20,18 @@ from e2efly.vehicles.tables import LARGEST
 
 @dataclass(frozen=True)
 class Memory:
-    """The gates of each vehicle, and how far it is."""
+    """The track of each vehicle, and how far it is."""
 
-    gates: Gates
-    """Each with a leading axis n."""
+    tracks: Tracks
     passed: Array
     """(n,) gates."""
     speed: Array
     """(n,) commanded, m/s."""
+
+    @property
+    def index(self) -> Array:
+        """(n,) the next gate, counted from 0 within a lap."""
+        return self.passed % self.tracks.count
 
 
 @dataclass(frozen=True)
@@ -36,18 +40,9 @@ class RaceClutterGoal(Goal):
 
     config: RaceClutterConfig
     shape: Shape
-    gates: Gates
-    """Where they stand on average."""
-    closed: bool
-    """Whether the first gate follows the last."""
     control_period: float
     checks: int
     """How often a control step is checked for collisions."""
-
-    @property
-    def count(self) -> int:
-        """Gates of the track."""
-        return self.gates.count
 
     @classmethod
     def state(cls, memory: Any) -> Memory:
@@ -55,9 +50,8 @@ class RaceClutterGoal(Goal):
         return Memory(**{part.name: getattr(memory, part.name) for part in dataclasses.fields(Memory)})
 
     def targets(self, memory: Memory) -> Array:
-        """(n, 2, 3) the centres of the next two gates."""
-        index = memory.passed % self.count
-        return rows(memory.gates.position, namespace(index).stack([index, index + 1], axis=-1))
+        """(n, 2, 3) the centres of the next two gates; behind the last of an open track, a point straight on."""
+        return self._next_two(memory)[0]
 
     def goal(self, memory: Memory, time: Array) -> Array:
         """The next gate's centre."""
@@ -66,10 +60,17 @@ class RaceClutterGoal(Goal):
 
     def axes(self, memory: Memory) -> Array:
         """(n, 2, 3) directions of the next two gates; behind the last of an open track, the last one's."""
-        index, g = memory.passed % self.count, memory.gates
-        xp = namespace(index)
-        following = (index + 1) % self.count if self.closed else (index + 1).clip(max=self.count - 1)
-        return rows(xp.stack([g.cos, g.sin, 0 * g.cos], axis=-1), xp.stack([index, following], axis=-1))
+        return self._next_two(memory)[1]
+
+    def _next_two(self, memory: Memory) -> tuple[Array, Array]:
+        tracks, index = memory.tracks, memory.index
+        g, xp = tracks.gates, namespace(index)
+        after = xp.where(index + 1 < tracks.count, index + 1, xp.where(tracks.closed, 0, index))
+        two = xp.stack([index, after], axis=-1)
+        axes = rows(xp.stack([g.cos, g.sin, 0 * g.cos], axis=-1), two)
+        beyond = STRAIGHT_ON * ((index + 1 >= tracks.count) & ~tracks.closed)[:, None] * axes[:, 1]
+        centres = rows(g.position[:, :-1], two)
+        return xp.stack([centres[:, 0], centres[:, 1] + beyond], axis=1), axes
 
     def target_offsets(self, memory: Memory, time: Array, body: Any) -> Array:
         """The next two gates minus position."""
@@ -103,16 +104,15 @@ class RaceClutterGoal(Goal):
     def verdict(self, memory: Any, before: Any, after: Any, time: Array, hit: Array | bool) -> tuple[Any, Outcome]:
         """Success: the last gate of the lap passed without touching anything; `hit`: gate, obstacle or ground."""
         c = self.config
-        passed, missed, _ = memory.gates.judge(
-            memory.passed % self.count, before.position, after.position, self.shape.radius
-        )
+        tracks, xp = memory.tracks, namespace(memory.passed)
+        passed, missed, _ = tracks.gates.judge(memory.index, before.position, after.position, self.shape.radius)
         error = distance(after.position, self.goal(memory, time))
         lost = missed | (error > c.fence) | (after.position[:, 2] < self.shape.feet_height)
         crashed = lost | hit
         passed = passed & ~lost
         moved = dataclasses.replace(memory, passed=memory.passed + passed)
-        laps = c.laps if self.closed else 1
-        finished = passed & (laps > 0) & (moved.passed >= laps * self.count)
+        laps = xp.where(tracks.closed, c.laps, 1)
+        finished = passed & (laps > 0) & (moved.passed >= laps * tracks.count)
         ends = lost | finished | (hit & (c.collisions_end > 0))
         return moved, Outcome(
             terminated=ends, success=finished & ~crashed, arrived=passed, crashed=crashed, error=error,
@@ -121,7 +121,7 @@ class RaceClutterGoal(Goal):
 
     def failure(self, memory: Memory, outcome: Outcome) -> str:
         """Which gate was missed, if that is why."""
-        where = f"gate {int(memory.passed[0]) % self.count + 1} of lap {int(memory.passed[0]) // self.count + 1}"
+        where = f"gate {int(memory.index[0]) + 1} of lap {int(memory.passed[0] // memory.tracks.count[0]) + 1}"
         return f"{where} missed" if outcome.signals["missed"][0] else f"{super().failure(memory, outcome)}, {where}"
 
 
@@ -143,13 +143,11 @@ class RaceClutterRoute(Route):
         """The track, from its start in its heading."""
         config = dataclasses.replace(RaceClutterConfig(), laps=self.laps)
         track = drawn_larger(load_track(self.track), config.scale)
-        gates = Gates.of(track)
-        worlds = dataclasses.replace(gates, position=gates.position[None], cos=gates.cos[None], sin=gates.sin[None])
-        memory = Memory(worlds, np.zeros(1, int), np.array([self.speed]))
+        memory = Memory(Tracks.of(track), np.zeros(1, int), np.array([self.speed]))
         lowest = float((track.position[:, 2] - track.opening[:, 1] / 2).min())
         return Course(
-            RaceClutterGoal(config, shape, gates, track.closed, control_period, 1), memory,
-            np.asarray(gates.start, np.float64), heading=float(gates.start_yaw), lowest=lowest, clearance=0.0,
+            RaceClutterGoal(config, shape, control_period, 1), memory,
+            np.asarray(track.start, np.float64), heading=float(track.start_yaw), lowest=lowest, clearance=0.0,
         )  # fmt: skip
 
 

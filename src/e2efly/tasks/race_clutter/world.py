@@ -6,9 +6,10 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, PRNGKeyArray
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
-from e2efly.courses.gates import Gates
+from e2efly.courses.gates import Tracks
 from e2efly.courses.tracks import load_track
 from e2efly.goal import Outcome, Shape
 from e2efly.physics import State
@@ -18,7 +19,7 @@ from e2efly.scenes.generate import clutter
 from e2efly.scenes.scene import Scene, Solids
 from e2efly.scenes.shapes import FAR
 from e2efly.tasks.race_clutter import RaceClutterConfig
-from e2efly.tasks.race_clutter.goal import Memory, RaceClutterGoal, drawn_larger
+from e2efly.tasks.race_clutter.goal import Memory, RaceClutterGoal, drawn_larger, rows
 from e2efly.tasks.task import at_rest, into_ball, struck, uniform
 
 APPROACH = 0.7
@@ -41,12 +42,15 @@ class World(Memory):
 
 @partial(
     jax.tree_util.register_dataclass,
-    data_fields=["config", "shape", "gates"],
-    meta_fields=["closed", "control_period", "checks"],
+    data_fields=["config", "shape", "given"],
+    meta_fields=["control_period", "checks"],
 )
 @dataclass(frozen=True)
 class RaceClutter(RaceClutterGoal):
     """Make it with `RaceClutter.of`."""
+
+    given: Tracks
+    """The tracks that worlds are made from, as they are on average."""
 
     @staticmethod
     def of(config: RaceClutterConfig, shape: Shape, control_period: float, checks: int) -> "RaceClutter":
@@ -55,44 +59,55 @@ class RaceClutter(RaceClutterGoal):
         Raises:
             ValueError: for an unknown or broken track.
         """
-        track = drawn_larger(load_track(config.track), config.scale)
-        numbers = dataclasses.replace(config, track="")  # resolved here: tracks share a compiled program
-        return RaceClutter(numbers, shape, Gates.of(track), track.closed, control_period, checks)
+        tracks = [drawn_larger(load_track(name), config.scale) for name in config.track]
+        room = max(len(track.yaw) for track in tracks)
+        given = jax.tree.map(lambda *x: np.concatenate(x), *(Tracks.of(track, room) for track in tracks))
+        # resolved here: tracks share a compiled program
+        numbers = dataclasses.replace(config, track=("",) * len(tracks))
+        return RaceClutter(numbers, shape, control_period, checks, given)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, World]:
-        """At rest in a ball about the track's start, every world another."""
+        """At rest in a ball about the start of a track, every world another."""
         gate_key, clutter_key, state_key = jax.random.split(key, 3)
         c, u = self.config, uniform(state_key, n, 4)
-        gates = self._moved(gate_key, n)
-        state = at_rest(jnp.asarray(self.gates.start) + c.position * into_ball(u[:, :3]))
+        tracks = self._drawn(gate_key, n)
+        g = tracks.gates
+        state = at_rest(g.start + c.position * into_ball(u[:, :3]))
         zero = jnp.zeros(n)
-        quaternion = from_euler(zero, zero, zero + self.gates.start_yaw)
-        axes = jnp.stack([gates.cos, gates.sin, jnp.zeros_like(gates.cos)], axis=-1)
-        centres = gates.position[:, :-1]
+        quaternion = from_euler(zero, zero, g.start_yaw)
+        axes = jnp.stack([g.cos, g.sin, jnp.zeros_like(g.cos)], axis=-1)
+        centres = g.position[:, :-1]
         keep = jnp.concatenate(
             [state.position[:, None], centres, centres - APPROACH * axes, centres + APPROACH * axes], axis=1
         )
-        path = jnp.concatenate([state.position[:, None], gates.position if self.closed else centres], axis=1)
-        obstacles = clutter(clutter_key, n, c.clutter, path, keep, jnp.max(jnp.asarray(self.gates.half)))
+        largest = jnp.max(jnp.where(_there(tracks)[..., None], g.half, 0.0))
+        path, legs = _path(tracks, state.position)
+        obstacles = clutter(clutter_key, n, c.clutter, path, keep, largest, legs)
         low, high = c.speed
         speed = (low + high) / 2 + (high - low) / 2 * u[:, 3]
-        memory = World(gates, jnp.zeros(n, jnp.int32), speed, obstacles)
+        memory = World(tracks, jnp.zeros(n, jnp.int32), speed, obstacles)
         return dataclasses.replace(state, quaternion=quaternion), memory
 
-    def _moved(self, key: PRNGKeyArray, n: int) -> Gates:
-        c, g = self.config, self.gates
-        u = uniform(key, n, 4 * self.count).reshape(n, self.count, 4)
+    def _drawn(self, key: PRNGKeyArray, n: int) -> Tracks:
+        """A track for each world, every gate a little elsewhere."""
+        c, given = self.config, self.given
+        track_key, gate_key = jax.random.split(key)
+        which = jax.random.randint(track_key, (n,), 0, len(c.track))
+        which = jnp.where(c.only < 0, which, jnp.asarray(c.only).astype(jnp.int32))
+        tracks = jax.tree.map(lambda x: jnp.asarray(x)[which], given)
+        g, count = tracks.gates, given.gates.count
+        u = uniform(gate_key, n, 4 * count).reshape(n, count, 4)
         move, turn = c.gate_position * u[..., :3], c.gate_yaw * u[..., 3]
         cos, sin = jnp.cos(turn), jnp.sin(turn)
-        last = move[:, :1] if self.closed else move[:, -1:]
-        return Gates(
-            start=g.start,
-            start_yaw=g.start_yaw,
-            position=jnp.asarray(g.position) + jnp.concatenate([move, last], axis=1),
+        last = jnp.take_along_axis(move, (tracks.count - 1)[:, None, None], axis=1)
+        behind = jnp.where(tracks.closed[:, None, None], move[:, :1], last)
+        moved = dataclasses.replace(
+            g,
+            position=g.position + jnp.concatenate([move, behind], axis=1),
             cos=g.cos * cos - g.sin * sin,
             sin=g.sin * cos + g.cos * sin,
-            half=g.half,
         )
+        return dataclasses.replace(tracks, gates=moved)
 
     def desired_velocity(self, memory: World, state: State) -> Float[Array, "n 3"]:
         """At the commanded speed towards a point close behind the next gate: in its middle still straight through."""
@@ -103,14 +118,14 @@ class RaceClutter(RaceClutterGoal):
     def scene(self, memory: World) -> Scene:
         """Gates and obstacles over level ground."""
         n = memory.speed.shape[0]
-        return Scene.of({**memory.obstacles, "gate": frames(memory.gates, n)}, n)
+        gates = frames(memory.tracks.gates, n, active=_there(memory.tracks))
+        return Scene.of({**memory.obstacles, "gate": gates}, n)
 
     def overhang(self, memory: World, state: State) -> Float[Array, "n 1"]:
         """How far the vehicle's sphere stands out of the next gate's opening, m; `-FAR` off its plane."""
         axis = self.axes(memory)[:, 0]
         d = state.position - self.targets(memory)[:, 0]
-        index = memory.passed % self.count
-        half = jax.nn.one_hot(index, self.count) @ jnp.asarray(self.gates.half)
+        half = rows(memory.tracks.gates.half, memory.index[:, None])[:, 0]
         ahead = d[:, 0] * axis[:, 0] + d[:, 1] * axis[:, 1]
         beside = d[:, 1] * axis[:, 0] - d[:, 0] * axis[:, 1]
         out = jnp.maximum(jnp.abs(beside) - half[:, 0], jnp.abs(d[:, 2]) - half[:, 1]) + self.shape.radius
@@ -137,3 +152,16 @@ class RaceClutter(RaceClutterGoal):
             "overhang": self.overhang(memory, after),
         }
         return moved, dataclasses.replace(outcome, signals=signals)
+
+
+def _there(tracks: Tracks) -> Bool[Array, "n g"]:
+    """Which gates there are."""
+    return jnp.arange(tracks.gates.count) < tracks.count[:, None]
+
+
+def _path(tracks: Tracks, start: Float[Array, "n 3"]) -> tuple[Float[Array, "n p 3"], Int[Array, " n"]]:
+    """The corners of the way from the start from gate to gate, on a closed track back to the first; and its legs."""
+    g, count = tracks.gates, tracks.count
+    home = jnp.arange(g.count + 1)[None, :, None] == count[:, None, None]
+    corners = jnp.where(home, g.position[:, -1:], g.position)
+    return jnp.concatenate([start[:, None], corners], axis=1), count + tracks.closed

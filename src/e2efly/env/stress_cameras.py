@@ -1,0 +1,116 @@
+"""What the rows of the stress change about cameras: how they sit, what they take in, when their images come."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import jax
+import numpy as np
+
+from e2efly.config import CameraConfig, ImageNoiseConfig
+from e2efly.scenes.camera import mounted
+from e2efly.sensors.eyes import Eye, steps_between
+
+DEPTH = ("depth", "range")
+"""What a D435i's noise is of."""
+
+
+@dataclass(frozen=True)
+class CameraRow:
+    """One way in which real cameras differ from those of a policy's contract."""
+
+    turn: float = 0.0
+    """Mounting, about a random axis, rad."""
+    offset: float = 0.0
+    """Mounting, in a random direction, m."""
+    fov: float = 0.0
+    """Relative, of the field of view, of both axes."""
+    latency: float = 0.0
+    """Added to the age of the images, s."""
+    every: int = 1
+    """Images that would come until one comes."""
+    noise: bool = False
+    """Whether depth has the noise of a D435i."""
+
+    @property
+    def there(self) -> bool:
+        """Whether it changes anything."""
+        return self != CameraRow()
+
+    def fits(self, cameras: tuple[CameraConfig, ...]) -> bool:
+        """Whether it means anything to a policy with these cameras."""
+        if self.noise:
+            return any(camera.sees in DEPTH for camera in cameras)
+        return bool(cameras) or not self.there
+
+
+CAMERAS: dict[str, CameraRow] = {
+    "camera 3 degrees and 1 cm off": CameraRow(turn=math.radians(3), offset=0.01),
+    "field of view x0.97": CameraRow(fov=-0.03),
+    "field of view x1.03": CameraRow(fov=0.03),
+    "images 40 ms older": CameraRow(latency=0.04),
+    "images half as often": CameraRow(every=2),
+    "noise of a D435i": CameraRow(noise=True),
+}
+"""The rows by name."""
+
+
+@dataclass(frozen=True)
+class CameraDraw:
+    """How the cameras of n vehicles differ."""
+
+    angles: np.ndarray
+    """(n, 3) roll, pitch and yaw of the mounting, rad."""
+    offset: np.ndarray
+    """(n, 3), body frame, m."""
+    fov: np.ndarray
+    """(n, 1), a factor."""
+    latency: np.ndarray
+    """(n,), s."""
+    every: np.ndarray
+    """(n,), images."""
+    noisy: np.ndarray
+    """(n,), 1: depth has the noise of a D435i, 0: it is clean."""
+
+    @staticmethod
+    def of(row: CameraRow | None, rng: np.random.Generator, n: int) -> "CameraDraw":
+        """Draw n episodes of a row; None: of all rows at once, every strength between their extremes."""
+        rows = tuple(CAMERAS.values())
+
+        def strength(name: str) -> np.ndarray:
+            if row is not None:
+                return np.full(n, float(getattr(row, name)))
+            values = [float(getattr(r, name)) for r in (*rows, CameraRow())]
+            return rng.uniform(min(values), max(values), n)
+
+        axis, way = (x / np.linalg.norm(x, axis=1, keepdims=True) for x in rng.standard_normal((2, n, 3)))
+        return CameraDraw(
+            angles=strength("turn")[:, None] * axis,
+            offset=strength("offset")[:, None] * way,
+            fov=1 + strength("fov")[:, None],
+            latency=strength("latency"),
+            every=np.round(strength("every")),
+            noisy=np.round(strength("noise")),
+        )
+
+    def eyes(self, cameras: tuple[CameraConfig, ...], eyes: tuple[Eye, ...], period: float) -> tuple[Eye, ...]:
+        """The eyes of n vehicles with what a row changes of them, and nothing else random but the light."""
+        return tuple(self._eye(camera, eye, period) for camera, eye in zip(cameras, eyes, strict=True))
+
+    def _eye(self, camera: CameraConfig, eye: Eye, period: float) -> Eye:
+        return dataclasses.replace(
+            eye,
+            mount=mounted(camera, self.angles, self.fov, self.offset),
+            latency=camera.latency[0] + self.latency,
+            noisy=self.noisy > 0 if camera.sees in DEPTH else eye.noisy,
+            every=steps_between(camera, period) * self.every,
+        )
+
+
+jax.tree_util.register_dataclass(CameraDraw, data_fields=[f.name for f in dataclasses.fields(CameraDraw)], meta_fields=[])
+
+
+def with_noise(cameras: tuple[CameraConfig, ...]) -> tuple[CameraConfig, ...]:
+    """The cameras with the noise of a D435i in place of their own, where they see depth."""
+    noise = ImageNoiseConfig(d435i=True)
+    return tuple(dataclasses.replace(c, noise=noise) if c.sees in DEPTH else c for c in cameras)
