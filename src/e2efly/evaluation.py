@@ -36,7 +36,8 @@ FIXED_OF_CAMERAS = ("sees", "of", "width", "height", "projection", "encoding", "
 FIGURES, ROW = 200, 3000
 """Bytes that the figures of a start take, and its row of the report."""
 UNITS = {
-    "duration": "s", "final_error": "m", "mean_error": "m", "top_speed": "m/s", "mean_speed": "m/s", "top_rate": "rad/s",
+    "duration": "s", "final_error": "m", "mean_error": "m",
+    "top_speed": "m/s", "mean_speed": "m/s", "top_rate": "rad/s",
     "roughness": "mean |change of action| per step, action in [-1, 1]",
     "start": "position m, velocity m/s (world), quaternion wxyz (body to world), body_rate rad/s",
     "knots": "one each 0.5 s: position m, velocity m/s, acceleration m/s^2 (world)",

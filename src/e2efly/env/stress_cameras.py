@@ -5,6 +5,7 @@ import math
 from dataclasses import dataclass
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from e2efly.config import CameraConfig, ImageNoiseConfig
@@ -100,14 +101,15 @@ class CameraDraw:
     def _eye(self, camera: CameraConfig, eye: Eye, period: float) -> Eye:
         return dataclasses.replace(
             eye,
-            mount=mounted(camera, self.angles, self.fov, self.offset),
+            mount=mounted(camera, *(jnp.asarray(x) for x in (self.angles, self.fov, self.offset))),
             latency=camera.latency[0] + self.latency,
             noisy=self.noisy > 0 if camera.sees in DEPTH else eye.noisy,
             every=steps_between(camera, period) * self.every,
         )
 
 
-jax.tree_util.register_dataclass(CameraDraw, data_fields=[f.name for f in dataclasses.fields(CameraDraw)], meta_fields=[])
+_FIELDS = [field.name for field in dataclasses.fields(CameraDraw)]
+jax.tree_util.register_dataclass(CameraDraw, data_fields=_FIELDS, meta_fields=[])
 
 
 def with_noise(cameras: tuple[CameraConfig, ...]) -> tuple[CameraConfig, ...]:

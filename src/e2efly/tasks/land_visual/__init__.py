@@ -13,6 +13,7 @@ from e2efly.config import (
     Paper,
     PPOConfig,
     RewardConfig,
+    Robust,
     TaskConfig,
     TrainConfig,
     number,
@@ -30,6 +31,7 @@ class LandVisualConfig(TaskConfig):
     goal_class: ClassVar[str] = "e2efly.tasks.land_visual.goal:LandVisualGoal"
     route: ClassVar[str] = "e2efly.tasks.land_visual.goal:LandVisualRoute"
     best: ClassVar = "bptt"
+    robust: ClassVar = {"bptt": Robust(steps=2_000_000, hidden=(128, 64))}
     cameras: ClassVar = (CameraConfig("mask", 16, 16, fov=(math.pi / 2, math.pi / 2), pitch=math.pi / 2),)
     paper: ClassVar = Paper(
         weights={"progxy": 0.04, "ori2": 0.003, "vz": 0.1, "anglev": 0.001},

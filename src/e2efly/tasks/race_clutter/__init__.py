@@ -16,6 +16,7 @@ from e2efly.config import (
     Paper,
     PPOConfig,
     RewardConfig,
+    Robust,
     StageConfig,
     TaskConfig,
     TrainConfig,
@@ -35,6 +36,7 @@ class RaceClutterConfig(TaskConfig):
     route: ClassVar[str] = "e2efly.tasks.race_clutter.goal:RaceClutterRoute"
     best: ClassVar = "bptt"
     precision: ClassVar = "duration"
+    robust: ClassVar = {"bptt": Robust(steps=12_000_000, chunk=200, recurrent=96, hidden=(128, 64))}
     cameras: ClassVar = (
         dataclasses.replace(
             D435I, noise=ImageNoiseConfig(d435i=True), width=48, height=24, pitch=-0.35, noise_share=0.5
