@@ -79,7 +79,7 @@ def test_starts_are_where_the_task_says(name: str) -> None:
         np.testing.assert_array_equal(v.position[:, 0], 0.0)
         assert speed.max() == 0
     if name == "race_clutter":
-        from_start = np.linalg.norm(v.position - np.asarray(env.task.gates.start), axis=-1)
+        from_start = np.linalg.norm(v.position - np.asarray(state.memory.tracks.gates.start), axis=-1)
         assert 0.49 < from_start.max() <= 0.5 + 1e-5
         assert speed.max() == 0
 

@@ -161,9 +161,9 @@ def test_all_of_a_batch_are_drawn_and_other_modes_are_refused() -> None:
     assert pictures is not None
     assert [picture.shape for picture in pictures] == [(320, 480, 3)] * 3
     assert np.any(pictures[0] != pictures[1])
-    gates = QuadrotorVectorEnv("race_clutter", 4, render_mode="rgb_array")  # of as many gates as vehicles
+    gates = QuadrotorVectorEnv("race_clutter", 6, render_mode="rgb_array")  # of as many gates as vehicles
     gates.reset(seed=0)
-    assert len(gates.render() or ()) == 4
+    assert len(gates.render() or ()) == 6
     assert QuadrotorEnv("hover").render() is None
     with pytest.raises(ValueError, match="render_mode is 'human'; accepted: None, rgb_array"):
         QuadrotorEnv("hover", render_mode="human")

@@ -1,5 +1,6 @@
 """The preset for vehicles that are not the file's."""
 
+import dataclasses
 from pathlib import Path
 
 import jax
@@ -14,6 +15,7 @@ from e2efly.commands.train import parse
 from e2efly.env import Env
 from e2efly.learn.judge import reported
 from e2efly.learn.setup import Setup
+from e2efly.sensors.eyes import steady
 from e2efly.tasks import TASKS
 from e2efly.vehicles import load_vehicle, vehicle_file
 
@@ -21,23 +23,28 @@ ROBUST = [name for name, task in TASKS.items() if task.robust and task.__module_
 
 
 def test_the_tasks_that_have_it_change_the_vehicle_and_remember() -> None:
-    assert ROBUST == ["hover", "land", "race", "track"]
+    assert ROBUST == ["avoid", "hover", "land", "land_visual", "race", "race_clutter", "track"]
     for task in ROBUST:
         nominal, robust = (e2efly.preset(task, "bptt", name) for name in ("nominal", "robust"))
-        assert nominal.network.recurrent == 0 < robust.network.recurrent
-        assert robust.env == presets.OTHERS
+        assert robust.network.recurrent > 0
+        assert bool(nominal.network.recurrent) == (task in ("avoid", "race_clutter"))
+        assert dataclasses.replace(robust.env, cameras=()) == presets.OTHERS
+        for own, other in zip(nominal.env.cameras, robust.env.cameras, strict=True):
+            assert steady(other) == own
+            assert (other.latency, other.angle_spread, other.fov_spread) == ((0.0, 0.05), 0.06, 0.04)
         assert robust.task == nominal.task
         assert robust.reward.weights.keys() >= nominal.reward.weights.keys()
     nominal, robust = (e2efly.preset("hover", "ppo", name) for name in ("nominal", "robust"))
     assert (robust.env, robust.reward) == (presets.OTHERS, nominal.reward)
 
 
-@pytest.mark.parametrize(("task", "algo"), [("avoid", "bptt"), ("race", "ppo")])
+@pytest.mark.parametrize(("task", "algo"), [("gap", "bptt"), ("race", "ppo")])
 def test_others_are_refused_by_name(task: str, algo: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["train", task, "--algo", algo, "--preset", "robust"]) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert (
-        "preset 'robust': accepted for hover by bptt or ppo, land by bptt, race by bptt, track by bptt or ppo" in said
+        "preset 'robust': accepted for avoid by bptt, hover by bptt or ppo, land by bptt, land_visual by bptt, "
+        "race by bptt, race_clutter by bptt, track by bptt or ppo" in said
     )
     assert f"not for {task} by {algo}" in said
 
@@ -50,7 +57,7 @@ def test_a_spread_that_makes_no_sense_is_named(spread: tuple[float, float]) -> N
 
 def test_robust_is_what_a_task_is_learned_by_where_it_can_be(tmp_path: Path) -> None:
     wanted = {("hover", "bptt"): "robust", ("hover", "ppo"): "robust", ("race", "ppo"): "nominal",
-              ("avoid", "bptt"): "nominal"}  # fmt: skip
+              ("gap", "bptt"): "nominal", ("avoid", "bptt"): "robust", ("avoid", "ppo"): "nominal"}  # fmt: skip
     for (task, algo), name in wanted.items():
         config = e2efly.preset(task, algo, name)
         assert e2efly.preset(task, algo) == config

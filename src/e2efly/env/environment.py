@@ -26,9 +26,11 @@ from e2efly.config import (
     RewardConfig,
     TaskConfig,
 )
-from e2efly.control import COMMAND_MODES, command_limits
+from e2efly.control import COMMAND_MODES
 from e2efly.env import disturbance
 from e2efly.env.check import check
+from e2efly.env.draws import between, perturbed
+from e2efly.env.limits import latencies_of, limits_of
 from e2efly.env.state import EnvState, Step
 from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field, past_actions
 from e2efly.physics import Physics, State, step
@@ -39,7 +41,7 @@ from e2efly.sensors import imu, latency
 from e2efly.sensors.eyes import Eye, image_shape, see, steady, steps_between
 from e2efly.sensors.noise import add_noise
 from e2efly.tasks.task import Shape, Task, into_ball, make_task, uniform
-from e2efly.vehicles import Family, Flown, Vehicle, load_family, nominal_vehicle
+from e2efly.vehicles import Family, Flown, load_family, load_vehicle
 from e2efly.vehicles.family import DRAWN
 
 LEADS = (0.0, 0.25, 0.5, 1.0, 1.5)
@@ -112,7 +114,8 @@ class Env:
         Raises:
             ValueError: naming the field, the value and what is accepted.
         """
-        vehicle, family = nominal_vehicle(config.vehicle), load_family(config.vehicle)
+        family = load_family(config.vehicle)
+        vehicle = load_vehicle(config.vehicle) if family is None else family.middle
         physics = Physics.of(
             vehicle, config.command_mode, config.integrator, config.control_rate, config.largest_step, dtype
         )
@@ -125,7 +128,7 @@ class Env:
             physics = physics if flown.as_believed else physics.flying(body, dtype)
         check(config, task)
         rewards.check(reward.weights, reward.parameters)
-        late = config.action_latency or _latencies(config, body, family if flown is None else None)
+        late = config.action_latency or latencies_of(config, body, family if flown is None else None)
         frames = latency.frames(late[1], period)
         seen = frames if config.past_actions is None else config.past_actions
         mode, (low, high) = COMMAND_MODES[config.command_mode], limits_of(config)
@@ -366,7 +369,7 @@ class Env:
         if self.family is not None:
             family = jax.random.uniform(jax.random.fold_in(plant_key, 2), (n, DRAWN), self.center.dtype)
         flown = self._physics(family).flown
-        disturbed, plant = None, _perturbed(plant_key, n, self.physics.flown, self.randomize, flown)
+        disturbed, plant = None, perturbed(plant_key, n, self.physics.flown, self.randomize, flown)
         if self.disturbance is not None:
             disturbed_key, mass_key = jax.random.split(jax.random.fold_in(plant_key, 1))
             disturbed = disturbance.draw(self.disturbance, disturbed_key, n)
@@ -388,13 +391,13 @@ class Env:
             memory=memory,
             time=jnp.zeros(n, dtype),
             actions=jnp.broadcast_to(self.hover, (n, self.queue, 4)).astype(dtype),
-            action_latency=_between(action_key, n, self.latency_range),
+            action_latency=between(action_key, n, self.latency_range),
             plant=plant,
             wind=None if self.wind is None else self.wind * into_ball(uniform(wind_key, n, 3)),
             family=family,
             disturbance=disturbed,
             past=past,
-            observation_latency=_between(observation_key, n, self.observation_latency_range),
+            observation_latency=between(observation_key, n, self.observation_latency_range),
             imu=None if self.imu is None else imu.ImuState.at(vehicle),
             eyes=tuple(Eye.of(c, jax.random.fold_in(eyes_key, i), n) for i, c in enumerate(self.cameras)),
             images=tuple(jnp.zeros((n, *image_shape(camera))) for camera in self.cameras),
@@ -466,46 +469,6 @@ def _where(mask: Bool[Array, " n"], a: Any, b: Any) -> Any:
 
 def _push(past: State, newest: State) -> State:
     return jax.tree.map(lambda old, new: jnp.concatenate([new[:, None], old[:, :-1]], axis=1), past, newest)
-
-
-def _between(key: PRNGKeyArray, n: int, bounds: Float[Array | np.ndarray, "2"]) -> Float[Array, " n"]:
-    return bounds[0] + (bounds[1] - bounds[0]) * jax.random.uniform(key, (n,), jnp.asarray(bounds).dtype)
-
-
-def _perturbed(key: PRNGKeyArray, n: int, nominal: Vehicle, widths: dict[str, Any], flown: Vehicle) -> dict[str, Array]:
-    """Each named parameter of what flies times a uniform factor in 1 +- its width, entry by entry.
-
-    `nominal` has the same fields without the axis of the batch that `flown` may have.
-    """
-    values = {name: jnp.asarray(getattr(nominal, name)) for name in sorted(widths)}
-    ends = np.cumsum([value.size for value in values.values()])
-    # one draw of all: on a CPU a dozen small ones take several times as long
-    drawn = uniform(key, n, int(ends[-1]) if widths else 0)
-    plant = {}
-    for (name, value), end in zip(values.items(), ends, strict=True):
-        factor = drawn[:, end - value.size : end].reshape(n, *value.shape).astype(value.dtype)
-        plant[name] = getattr(flown, name) * (1 + widths[name] * factor)
-    return plant
-
-
-def limits_of(config: EnvConfig) -> np.ndarray:
-    """Smallest and largest command, (2, 4): of the nominal vehicle, or all vehicles of a family together.
-
-    Raises:
-        ValueError: for a family in a command mode that its vehicles do not share.
-    """
-    family = load_family(config.vehicle)
-    if family is not None:
-        return np.asarray(family.limits(config.command_mode), np.float64)
-    mode = COMMAND_MODES[config.command_mode]
-    return command_limits(mode, nominal_vehicle(config.vehicle), config.position_range)
-
-
-def _latencies(config: EnvConfig, vehicle: Vehicle, family: Family | None) -> tuple[float, float]:
-    """Seconds from observation to command where the configuration does not say."""
-    low, high = (vehicle.latency,) * 2 if family is None else family.ranges.latency
-    sooner, later = config.latency_spread
-    return max(low - sooner, 0.0), high + later
 
 
 def _wrap(angle: Array) -> Array:

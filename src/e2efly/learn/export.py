@@ -16,7 +16,7 @@ from e2efly.deploy.policy.images import NONE, Image
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.deploy.policy.onnx_file import sealed
 from e2efly.env import Env
-from e2efly.env.environment import limits_of
+from e2efly.env.limits import limits_of
 from e2efly.learn.graph import OPERATORS, policy_graph
 from e2efly.learn.networks import FAINTEST, NEAREST, Actor, View, Weights
 from e2efly.observation import Field

@@ -42,8 +42,9 @@ def stressed(setup: Setup, weights: Weights, episodes: int) -> dict[str, Episode
     once (`e2efly.env.stress`); NumPy arrays.
     """
     rng, flown = np.random.default_rng(REPORTED), {}
+    options = fast_compile() if setup.config.fast_compile else {}
 
-    @partial(jax.jit, compiler_options=fast_compile() | wide_vectors(episodes))
+    @partial(jax.jit, compiler_options=options | wide_vectors(episodes))
     def program(env: Env, weights: Weights, key: Any, draw: Draw) -> Episodes:
         act, steps = acting(setup.actor, weights), setup.episode_steps
         return run_episodes(draw.env(env), act, key, episodes, steps, setup.settle, altered=partial(draw.state, env))

@@ -15,6 +15,7 @@ from e2efly.config import (
     Paper,
     PPOConfig,
     RewardConfig,
+    Robust,
     StageConfig,
     TaskConfig,
     TrainConfig,
@@ -32,6 +33,7 @@ class AvoidConfig(TaskConfig):
     goal_class: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidGoal"
     route: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidRoute"
     best: ClassVar = "bptt"
+    robust: ClassVar = {"bptt": Robust(steps=6_000_000, chunk=150, recurrent=96, hidden=(128, 64))}
     cameras: ClassVar = (dataclasses.replace(D435I, noise=ImageNoiseConfig(d435i=True), width=32, height=12),)
     curriculum: ClassVar = (
         StageConfig({"forest.density": 0.0, "speed": (2.0, 4.0)}, success=0.9, steps=1_000_000),
@@ -64,10 +66,10 @@ class AvoidConfig(TaskConfig):
         return cls(collisions_end=False)
 
     def criteria(self) -> dict[str, TaskConfig]:
-        """Two speeds; collisions end the episode."""
+        """Three speeds; collisions end the episode."""
         return {
             f"{self.name}_{speed:g}": dataclasses.replace(self, speed=(speed, speed), collisions_end=True)
-            for speed in (5.0, 8.0)
+            for speed in (5.0, 8.0, 10.0)
         }
 
     @classmethod
