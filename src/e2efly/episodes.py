@@ -123,7 +123,7 @@ def run_episodes(
     part: tuple[Array | int, int] = (0, 1),
     altered: Callable[[EnvState], EnvState] = lambda state: state,
 ) -> Episodes:
-    """Fly episodes of at most `steps` control steps; each stands still once it has ended.
+    """Fly episodes of at most `steps` control steps, until all have ended.
 
     Args:
         env: the environment.
@@ -139,14 +139,19 @@ def run_episodes(
     state, observation = env.reset(key, n)
     state, observation = part_of(altered(state), observation, part)
 
-    def step(carry: tuple[UnderWay, Array], _: None) -> tuple[tuple[UnderWay, Array], None]:
-        flight, memory = carry
-        action, memory = act.act(flight.observation, flight.state.images, memory)
-        return (flight.after(env, action, settle), memory), None
+    Under = tuple[Array, UnderWay, Array]
 
-    first = UnderWay.of(state, observation), act.begin(observation.shape[0])
-    (flight, _), _ = jax.lax.scan(step, first, None, length=steps)
-    return flight.episodes(env)
+    def goes_on(carry: Under) -> Array:
+        done, flight, _ = carry
+        return (done < steps) & ~jnp.all(flight.over)
+
+    def step(carry: Under) -> Under:
+        done, flight, memory = carry
+        action, memory = act.act(flight.observation, flight.state.images, memory)
+        return done + 1, flight.after(env, action, settle), memory
+
+    first = jnp.zeros((), jnp.int32), UnderWay.of(state, observation), act.begin(observation.shape[0])
+    return jax.lax.while_loop(goes_on, step, first)[1].episodes(env)
 
 
 def run_stepwise(

@@ -36,7 +36,7 @@ class RaceClutterConfig(TaskConfig):
     route: ClassVar[str] = "e2efly.tasks.race_clutter.goal:RaceClutterRoute"
     best: ClassVar = "bptt"
     precision: ClassVar = "duration"
-    robust: ClassVar = {"bptt": Robust(steps=12_000_000, chunk=300, recurrent=96, hidden=(128, 64))}
+    robust: ClassVar = {"bptt": Robust(steps=12_000_000, chunk=200, recurrent=96, hidden=(128, 64))}
     cameras: ClassVar = (
         dataclasses.replace(
             D435I, noise=ImageNoiseConfig(d435i=True), width=48, height=24, pitch=-0.35, noise_share=0.5
@@ -110,5 +110,5 @@ class RaceClutterConfig(TaskConfig):
             network = dataclasses.replace(network, recurrent=0)
         return TrainConfig(
             task, settings, RewardConfig(weights, parameters), EnvConfig(cameras=cls.cameras), network,
-            steps=steps, chunk=300, eval_episodes=250, curriculum=curriculum, fast_compile=False,
+            steps=steps, chunk=200, eval_episodes=500, curriculum=curriculum, fast_compile=False,
         )  # fmt: skip
