@@ -39,7 +39,7 @@ def arguments(about: str, **extra: Any) -> argparse.Namespace:
             parser.add_argument(flag, action="store_true")
             continue
         many = isinstance(default, list)
-        kind = type(default[0]) if many else type(default) if default is not None else str
+        kind = type(default[0] if many and default else "" if many or default is None else default)
         parser.add_argument(flag, type=kind, nargs="*" if many else None, default=default)
     return parser.parse_args()
 

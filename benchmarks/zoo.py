@@ -3,14 +3,16 @@
     python benchmarks/zoo.py [--vehicles vis_r ...] [--tasks hover ...] [--seeds 3]
     python benchmarks/zoo.py --digests
     python benchmarks/zoo.py --again
+    python benchmarks/zoo.py --runs DIR ...
 
 The preset is `robust` where the task has it. The best of at most `seeds` runs by each algorithm is kept, if it succeeds
 more often than not; none more is made once one meets 99.5 %, or a robust one 97 % in its worst row of the stress. What
 is best the runs' own reports say, and of robust ones those rows, from starts of their own; of a family's, unseen
 vehicles in still air. The success that is stated is that of the lone ONNX file, of the 1000 starts of `e2efly eval` and
-`eval --stress`, which nothing was chosen by.
+`eval --stress`, which nothing was chosen by; in the rows, of a policy that sees, of the first 250 of them.
 
 `--again` trains nothing: it flies the robust policies that are there in all rows of the stress.
+`--runs` trains nothing: it keeps the policies of finished runs, by the presets that are meant here.
 `--digests` trains nothing: it gives the files that are there their digests, where they have none, and writes the digest
 of each file into zoo.json.
 """
@@ -30,6 +32,7 @@ from common import arguments, table
 from e2efly.deploy.policy.onnx_file import is_sealed
 from e2efly.env.stress import ALL
 from e2efly.learn.judge import worst_success
+from e2efly.learn.rundir import RunDirectory
 from e2efly.storage import write_json
 from e2efly.tasks import TASKS
 from e2efly.vehicles import family_names, vehicle_names
@@ -41,6 +44,8 @@ USUAL_ALONE = ("land_visual", "avoid", *VARIANTS)
 """For the usual vehicle alone: they take minutes, and what a camera sees depends little on who carries it."""
 NOT_FOR = ("crazyflie", "race_clutter")
 """The task that a vehicle has no policy of: it carries no depth camera, and is no racer."""
+SEEN = 250
+"""Starts per row of the stress of a policy that sees, which takes minutes; of the others 1000."""
 ENOUGH, ENOUGH_STRESSED, WORTH = 0.995, 0.97, 0.5
 CHOSEN_BY = 2_000_000
 """Seed of the starts that a robust policy is chosen by."""
@@ -64,47 +69,61 @@ def stressed(policy: Path, folder: Path, *options: str) -> dict[str, float]:
     return {row: min(found["success"] for found in criteria.values()) for row, criteria in rows.items()}
 
 
-def trained(vehicle: str, task: str, algo: str, seed: int, folder: Path) -> tuple[float, dict[str, Any]]:
-    """A run in `folder`: its worst success by its own report, and what there is to say of its policy."""
-    out, report = folder / f"{algo}{seed}", folder / "report.json"
-    together, (kind, own) = vehicle in family_names(), VARIANTS.get(task, (task, ""))
-    robust = not together and not own and TASKS[kind].best in TASKS[kind].robust
-    preset = ("--preset", own or "robust") if own or robust else ()
-    run(
-        "train",
-        kind,
-        "--algo",
-        algo,
-        *preset,
-        "--vehicle",
-        vehicle,
-        "--seed",
-        str(seed),
-        "--out",
-        str(out),
-        "--no-plots",
-    )
+def recipe(vehicle: str, task: str) -> tuple[str, str]:
+    """The task that a policy is of, and the preset by which it is learned; empty: the one that `train` takes."""
+    kind, own = VARIANTS.get(task, (task, ""))
+    robust = vehicle not in family_names() and TASKS[kind].best in TASKS[kind].robust
+    return kind, own or ("robust" if robust else "")
+
+
+def trained(vehicle: str, task: str, algo: str, seed: int, out: Path) -> None:
+    """Train a run into a folder."""
+    kind, name = recipe(vehicle, task)
+    preset = ("--preset", name) if name else ()
+    options = ("--vehicle", vehicle, "--seed", str(seed), "--out", str(out), "--no-plots")
+    run("train", kind, "--algo", algo, *preset, *options)
+
+
+def judged(vehicle: str, task: str, out: Path, folder: Path, chosen: bool = True) -> tuple[float, dict[str, Any]]:
+    """What there is to say of a run, and what it is chosen by among others, where it is: its worst success by its own
+    report or, of a robust one, in the rows.
+    """
+    report, together, (_, name) = folder / "report.json", vehicle in family_names(), recipe(vehicle, task)
     lone = shutil.copy(out / "policy.onnx", folder / "lone.onnx")  # without its run: on the vehicle of its contract
     run("eval", str(lone), "--json", str(report), "--plots", str(folder / "plots"))
     suites = json.loads(report.read_text())["criteria"]
     summary = json.loads((out / "summary.json").read_text())
     reported = worst_success(summary["nominal" if together else "shipped"])
-    more: dict[str, Any] = {"preset": "robust"} if together else {}
-    if robust:
-        rows = stressed(out / "policy.onnx", folder, "--episodes", "250", "--seed", str(CHOSEN_BY))
-        at_once = rows.pop(ALL)
-        reported = min(rows.values()) + 1e-3 * at_once  # among equals the one that stands all at once more often
-        more = {"preset": "robust", "stress": stressed(out / "policy.onnx", folder)}
-    elif own:
-        more = {"preset": own}
+    more: dict[str, Any] = {"preset": "robust"} if together else {"preset": name} if name else {}
+    if name == "robust":
+        if chosen:
+            rows = stressed(out / "policy.onnx", folder, "--episodes", "250", "--seed", str(CHOSEN_BY))
+            at_once = rows.pop(ALL)
+            reported = min(rows.values()) + 1e-3 * at_once  # among equals the one that stands all at once more often
+        fewer = ("--episodes", str(SEEN)) if TASKS[task].cameras else ()
+        more |= {"stress": stressed(out / "policy.onnx", folder, *fewer)}
     return reported, {
-        "algorithm": algo,
-        "seed": seed,
+        "algorithm": summary["algorithm"],
+        "seed": summary["seed"],
         "env_steps": summary["env_steps"],
         "version": summary["versions"]["e2efly"],
         "success": {name: suite["success"] for name, suite in suites.items()},
         **more,
     }
+
+
+def keep(vehicle: str, task: str, policy: Path, about: dict[str, Any]) -> dict[str, Any]:
+    """Copy a policy into the zoo, and say so; a line for the table."""
+    kept = FOLDER / vehicle / f"{task}.onnx"
+    kept.parent.mkdir(exist_ok=True)
+    shutil.copy(policy, kept)
+    zoo = contents() if (FOLDER / "zoo.json").exists() else {}
+    zoo.setdefault(vehicle, {})[task] = about
+    write(zoo)
+    success = " ".join(f"{100 * share:.1f}" for share in about["success"].values())
+    line = {"vehicle": vehicle, "task": task, "success, %": success, "kB": kept.stat().st_size // 1000}
+    print(line, flush=True)
+    return line
 
 
 def write(zoo: dict[str, dict[str, dict[str, Any]]]) -> None:
@@ -118,7 +137,7 @@ def write(zoo: dict[str, dict[str, dict[str, Any]]]) -> None:
 def main() -> None:
     """Train, keep the policies and zoo.json, print a table."""
     every, policies = [*vehicle_names(), *family_names()], [*TASKS, *VARIANTS]
-    options = arguments(__doc__ or "", vehicles=every, tasks=policies, seeds=3, digests=False, again=False)
+    options = arguments(__doc__ or "", vehicles=every, tasks=policies, seeds=3, digests=False, again=False, runs=[])
     if options.digests:
         for file in FOLDER.glob("*/*.onnx"):
             if not is_sealed(file.read_bytes()):
@@ -135,32 +154,32 @@ def main() -> None:
         write(zoo)
         return
     rows = []
-    for vehicle in options.vehicles:
+    for out in map(Path, options.runs):
+        with tempfile.TemporaryDirectory() as folder:
+            config = RunDirectory(out).config()
+            vehicle, task = config.env.vehicle, "race_any" if config.task.own_worlds else config.task.name
+            _, about = judged(vehicle, task, out, Path(folder), chosen=False)
+            rows.append(keep(vehicle, task, out / "policy.onnx", about))
+    for vehicle in () if options.runs else options.vehicles:
         for task in options.tasks:
             if (task in USUAL_ALONE and vehicle != USUAL) or (vehicle, task) == NOT_FOR:
                 continue
             if vehicle in family_names() and TASKS[task].best not in TASKS[task].family:
                 continue
             with tempfile.TemporaryDirectory() as folder:
-                highest, best = -1.0, {}
+                highest, best, policy = -1.0, {}, Path()
                 for seed, algo in itertools.product(range(options.seeds), algorithms(task)):
-                    reported, found = trained(vehicle, task, algo, seed, Path(folder))
+                    out = Path(folder) / f"{algo}{seed}"
+                    trained(vehicle, task, algo, seed, out)
+                    reported, found = judged(vehicle, task, out, Path(folder))
                     if reported > highest:
-                        highest, best = reported, found
+                        highest, best, policy = reported, found, out / "policy.onnx"
                     if highest >= (ENOUGH if "stress" not in best else ENOUGH_STRESSED):
                         break
                 if min(best["success"].values()) < WORTH:
                     print(f"{vehicle} {task}: {best['success']}, not kept", flush=True)
                     continue
-                kept = FOLDER / vehicle / f"{task}.onnx"
-                kept.parent.mkdir(exist_ok=True)
-                shutil.copy(Path(folder) / f"{best['algorithm']}{best['seed']}" / "policy.onnx", kept)
-            zoo = contents() if (FOLDER / "zoo.json").exists() else {}
-            zoo.setdefault(vehicle, {})[task] = best
-            write(zoo)
-            success = " ".join(f"{100 * share:.1f}" for share in best["success"].values())
-            rows.append({"vehicle": vehicle, "task": task, "success, %": success, "kB": kept.stat().st_size // 1000})
-            print(rows[-1], flush=True)
+                rows.append(keep(vehicle, task, policy, best))
     print(table(rows))
 
 

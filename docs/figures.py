@@ -15,7 +15,7 @@ TITLES = {
     "rates": "Rates",
     "mesh_rendering": "Rendering of mesh scenes",
     "rendering": "Images of the clutter scene: ground, 4 gates, 16 obstacles, another world for each camera",
-    "visual_tasks": "Tasks flown by sight: 1000 unseen starts and worlds, full presets",
+    "visual_tasks": "Tasks flown by sight: trained, then flown under stress from unseen starts in unseen worlds",
     "time_to_criterion": "Time to the criterion, from process start",
     "cold_start": "Where a training spends its time, seconds from the start of the process to its end",
     "thrown": "Catching a thrown vehicle: success over 1000 unseen starts, full presets",
@@ -28,6 +28,7 @@ TITLES = {
     "any_vehicle": "One policy for any quadrotor: 1000 unseen vehicles, by delay, and the vehicles that ship",
     "raptor": "One policy for any quadrotor, beside RAPTOR: 1000 unseen vehicles, by delay",
     "zoo_stress": "The zoo under stress: vehicles, air and sensors that are not those of the training",
+    "zoo_stress_by_sight": "The zoo's policies that see, under stress of the vehicle and of its cameras",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
     "firmware_faults": "Faults injected into flights of the real firmware",
@@ -55,6 +56,9 @@ quadrotor](any- vehicle.md).""",
 Percent of 1000 unseen starts, of the worst criterion, in the training simulator. The rows:
 [robustness](robustness.md#stress). "preset nominal" has no memory and was trained on the
 nominal vehicle (seed 0).""",
+    "zoo_stress_by_sight": """
+Percent of 250 unseen starts, of the worst criterion: land_visual has one, avoid three speeds,
+race_clutter three tracks. The rows: [robustness](robustness.md#stress).""",
     "firmware_flights": """
 The zoo's policies of VIS-R, as they ship; all tasks that need no camera. Success is the
 task's own verdict, by the code that judges training. hover, land, track and race are of the
