@@ -100,6 +100,8 @@ def judged(vehicle: str, task: str, out: Path, folder: Path, chosen: bool = True
             rows = stressed(out / "policy.onnx", folder, "--episodes", "250", "--seed", str(CHOSEN_BY))
             at_once = rows.pop(ALL)
             reported = min(rows.values()) + 1e-3 * at_once  # among equals the one that stands all at once more often
+        if TASKS[task].cameras:
+            more |= {"mean_speed_m_s": {name: suite["mean_speed_m_s"] for name, suite in suites.items()}}
         fewer = ("--episodes", str(SEEN)) if TASKS[task].cameras else ()
         more |= {"stress": stressed(out / "policy.onnx", folder, *fewer)}
     return reported, {
