@@ -139,13 +139,11 @@ def run_episodes(
     state, observation = env.reset(key, n)
     state, observation = part_of(altered(state), observation, part)
 
-    Under = tuple[Array, UnderWay, Array]
-
-    def goes_on(carry: Under) -> Array:
+    def goes_on(carry: tuple[Array, UnderWay, Array]) -> Array:
         done, flight, _ = carry
         return (done < steps) & ~jnp.all(flight.over)
 
-    def step(carry: Under) -> Under:
+    def step(carry: tuple[Array, UnderWay, Array]) -> tuple[Array, UnderWay, Array]:
         done, flight, memory = carry
         action, memory = act.act(flight.observation, flight.state.images, memory)
         return done + 1, flight.after(env, action, settle), memory
