@@ -32,7 +32,7 @@ def own_files(folder: Path) -> TrainConfig:
     env = dataclasses.replace(
         config.env, vehicle=str(folder / "mine.toml"), cameras=(dataclasses.replace(camera, noise=noise),)
     )
-    task = dataclasses.replace(config.task, track=str(folder / "oval.toml"))
+    task = dataclasses.replace(config.task, track=("j_shaped", str(folder / "oval.toml")))
     return dataclasses.replace(config, env=env, task=task)
 
 
@@ -47,9 +47,10 @@ def test_a_run_keeps_the_files_that_it_is_made_from(tmp_path: Path) -> None:
     run.create(config)
     shutil.rmtree(tmp_path / "files")  # moved or deleted: the run is whole
     found = input_files(run.config())
+    assert found.pop("task.track.0") == PACKAGE / "courses/tracks/j_shaped.toml"
     assert {field: path.relative_to(run.path / "inputs").as_posix() for field, path in found.items()} == {
         "env.vehicle": "env.vehicle/mine.toml",
-        "task.track": "task.track/oval.toml",
+        "task.track.1": "task.track.1/oval.toml",
         "env.cameras.0.noise.redwood": "env.cameras.0.noise.redwood/table.npy",
     }
     assert load_vehicle(run.config().env.vehicle).hash == load_vehicle("vis_r").hash

@@ -24,7 +24,7 @@ SMALL = {"steps": 4096, "chunk": 1, "eval_episodes": 10, "preset_name": "nominal
 
 @pytest.mark.parametrize("task", ["hover", "land_visual", "avoid"])
 def test_what_is_read_acts_as_the_file(task: str) -> None:
-    config = e2efly.preset(task, "bptt", "robust" if task == "hover" else "nominal")
+    config = e2efly.preset(task, "bptt", "robust")
     setup = Setup.of(config)
     parameters = started_from(setup.algorithm.init(setup.env, config.algo, 0), policy_file(task), setup)
     policy, rng = e2efly.load_policy(task), np.random.default_rng(0)

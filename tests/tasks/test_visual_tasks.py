@@ -169,6 +169,12 @@ def test_one_of_several_tracks_is_the_track_alone(track: str) -> None:
     np.testing.assert_array_equal(*paths)
 
 
+@pytest.mark.parametrize("track", ["s_shaped", ()])
+def test_tracks_are_several(track: Any) -> None:
+    with pytest.raises(ValueError, match=r"task.track is .*; accepted: a tuple of one or more tracks"):
+        make_task(RaceClutterConfig(track=track), SHAPE, PERIOD, 7)
+
+
 @pytest.mark.parametrize("only", [0, 1])
 def test_a_lap_in_clutter_is_the_gates_in_order_without_a_touch(only: int) -> None:
     empty = dataclasses.replace(RaceClutterConfig().clutter, obstacles=0.0)

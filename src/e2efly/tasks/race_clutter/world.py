@@ -57,8 +57,10 @@ class RaceClutter(RaceClutterGoal):
         """Load the track.
 
         Raises:
-            ValueError: for an unknown or broken track.
+            ValueError: for an unknown or broken track, for none, and for a name in place of several.
         """
+        if isinstance(config.track, str) or not config.track:
+            raise ValueError(f"task.track is {config.track!r}; accepted: a tuple of one or more tracks")
         tracks = [drawn_larger(load_track(name), config.scale) for name in config.track]
         room = max(len(track.yaw) for track in tracks)
         given = jax.tree.map(lambda *x: np.concatenate(x), *(Tracks.of(track, room) for track in tracks))
