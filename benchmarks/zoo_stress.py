@@ -28,7 +28,7 @@ def _by_criterion(columns: Iterable[str], called: str, of: Callable[[Any], dict[
     zoo, row = contents(), {"row": f"{called}, each criterion"}
     for name in columns:
         task, vehicle = name.split(", ")
-        row[name] = " ".join(f"{scale * figure:.1f}" for figure in of(zoo[vehicle][task]).values())
+        row[name] = ", ".join(f"{criterion} {scale * x:.1f}" for criterion, x in of(zoo[vehicle][task]).items())
     return row
 
 

@@ -39,6 +39,8 @@ TITLES = {
     "msp_fuzz": "MSP codec under fuzzing",
 }
 
+SCRIPTS = {"zoo_stress_by_sight": "zoo_stress.py --by-sight"}
+"""What measured a file of results that has not the name of its script."""
 FIRST = """
 Rates and times below that are older than 2026-11-24 were measured with the first-order integrator, which
 was the default until then. The default of today takes three times as long per physics sub-step
@@ -49,6 +51,10 @@ NOTES = {
 A specialist begins as the one policy and learns on one track alone for 2.5 million steps.
 Eight were trained, not fifty. What is missed and what was tried: [any track](any-
 track.md#how-well-it- flies).""",
+    "visual_tasks": """
+The presets `nominal` of that day, of race_clutter one policy for each track. Today's presets are
+`robust`, and race_clutter has one policy for all: [the zoo by
+sight](#the-zoos-policies-that-see-under-stress-of-the-vehicle-and-of-its-cameras).""",
     "raptor": """
 Success: within 0.1 m for the last second of 8 s. What stands in which row: [any
 quadrotor](any- vehicle.md).""",
@@ -194,8 +200,9 @@ def main() -> None:
             content = json.loads(path.read_text())
             m = content["machine"]
             avx512 = {True: " with AVX-512", False: " without AVX-512"}.get(m.get("avx512"), "")
+            script = SCRIPTS.get(name, f"{name}.py")
             about = (
-                f"`benchmarks/{name}.py`, {content['date']}, {m['cores']} cores of {m['cpu']}{avx512}, JAX {m['jax']}."
+                f"`benchmarks/{script}`, {content['date']}, {m['cores']} cores of {m['cpu']}{avx512}, JAX {m['jax']}."
             )
             note = [NOTES[name].strip(), ""] if name in NOTES else []
             lines += [f"## {title}", "", about, "", *note, *markdown(content["table"]), ""]
