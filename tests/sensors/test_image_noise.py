@@ -77,6 +77,13 @@ def test_d435i_is_noisier_with_the_square_of_the_depth(depth: float) -> None:
     assert float(noisy.mean()) == pytest.approx(depth, rel=1e-3)
 
 
+@pytest.mark.parametrize("shape", [(2, 1, 1), (2, 4, 4)])
+def test_a_telephoto_s_shadows_may_be_wider_than_its_image(shape: tuple[int, ...]) -> None:
+    seen = np.asarray(d435i(KEY, jnp.full(shape, 2.0), 0.01))
+    assert seen.shape == shape
+    np.testing.assert_allclose(seen, 2.0, atol=0.05)
+
+
 def test_d435i_has_a_range_and_shadows_beside_what_is_near() -> None:
     for depth in (0.0, 0.2, 12.0):
         assert np.all(d435i(KEY, flat(depth), FOV) == 0)

@@ -12,7 +12,7 @@ from e2efly.config import CameraConfig, ImageNoiseConfig
 from e2efly.scenes.camera import mounted
 from e2efly.sensors.eyes import Eye, steps_between
 
-DEPTH = ("depth", "range")
+DEPTH = "depth"
 """What a D435i's noise is of."""
 
 
@@ -41,7 +41,7 @@ class CameraRow:
     def fits(self, cameras: tuple[CameraConfig, ...]) -> bool:
         """Whether it means anything to a policy with these cameras."""
         if self.noise:
-            return any(camera.sees in DEPTH for camera in cameras)
+            return any(camera.sees == DEPTH for camera in cameras)
         return bool(cameras) or not self.there
 
 
@@ -103,7 +103,7 @@ class CameraDraw:
             eye,
             mount=mounted(camera, *(jnp.asarray(x) for x in (self.angles, self.fov, self.offset))),
             latency=camera.latency[0] + self.latency,
-            noisy=self.noisy > 0 if camera.sees in DEPTH else eye.noisy,
+            noisy=self.noisy > 0 if camera.sees == DEPTH else eye.noisy,
             every=steps_between(camera, period) * self.every,
         )
 
@@ -115,4 +115,4 @@ jax.tree_util.register_dataclass(CameraDraw, data_fields=_FIELDS, meta_fields=[]
 def with_noise(cameras: tuple[CameraConfig, ...]) -> tuple[CameraConfig, ...]:
     """The cameras with the noise of a D435i in place of their own, where they see depth."""
     noise = ImageNoiseConfig(d435i=True)
-    return tuple(dataclasses.replace(c, noise=noise) if c.sees in DEPTH else c for c in cameras)
+    return tuple(dataclasses.replace(c, noise=noise) if c.sees == DEPTH else c for c in cameras)

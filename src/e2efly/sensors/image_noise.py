@@ -172,7 +172,8 @@ def d435i(key: PRNGKeyArray, depth: Depth, fov: float, least: float = 0.28, most
     noisy = 1.0 / jnp.maximum(inverse + DISPARITY_DEVIATION / (native * BASELINE) * _normal(key, depth), 1e-6)
     disparity = width / 2 / math.tan(fov / 2) * BASELINE * inverse
     hidden = jnp.zeros(depth.shape, bool)
-    for shift in range(1, math.ceil(width / 2 / math.tan(fov / 2) * BASELINE / least) + 1):
+    largest = math.ceil(width / 2 / math.tan(fov / 2) * BASELINE / least)
+    for shift in range(1, min(largest, width - 1) + 1):  # what is hidden by more lies outside of the image
         nearer = jnp.pad(disparity[..., shift:], [(0, 0)] * (depth.ndim - 1) + [(0, shift)], mode="edge")
         hidden |= nearer - disparity > shift - 0.5
     measured = (depth > 0) & (noisy >= least) & (noisy <= most) & ~hidden
