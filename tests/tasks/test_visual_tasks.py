@@ -17,6 +17,7 @@ from e2efly.scenes.scene import Solids, clearance
 from e2efly.scenes.shapes import DISC, SQUARE, TRIANGLE
 from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.land_visual import LandVisualConfig
+from e2efly.tasks.race.any_goal import Ahead
 from e2efly.tasks.race_clutter import RaceClutterConfig
 from e2efly.tasks.race_clutter.goal import drawn_larger
 from e2efly.tasks.race_clutter.world import World, _path
@@ -175,6 +176,19 @@ def test_tracks_are_several(track: Any) -> None:
         make_task(RaceClutterConfig(track=track), SHAPE, PERIOD, 7)
 
 
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"track": ("j_shaped", "j_shaped")}, r"task.track is .*; accepted: tracks of different names"),
+        ({"only": 3.0}, "task.only is 3.0; accepted: whole numbers from -1 to 2"),
+        ({"only": 0.5}, "task.only is 0.5; accepted: whole numbers from -1 to 2"),
+    ],
+)
+def test_no_track_is_chosen_or_judged_silently(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make_task(RaceClutterConfig(**changes), SHAPE, PERIOD, 7)
+
+
 @pytest.mark.parametrize("only", [0, 1])
 def test_a_lap_in_clutter_is_the_gates_in_order_without_a_touch(only: int) -> None:
     empty = dataclasses.replace(RaceClutterConfig().clutter, obstacles=0.0)
@@ -185,7 +199,7 @@ def test_a_lap_in_clutter_is_the_gates_in_order_without_a_touch(only: int) -> No
         centre = np.asarray(gates.position[0, gate])
         axis = np.array([gates.cos[0, gate], gates.sin[0, gate], 0.0])
         np.testing.assert_allclose(task.goal(memory, jnp.zeros(1))[0], centre, atol=1e-5)
-        np.testing.assert_allclose(task.axes(memory)[0, 0], axis, atol=1e-6)
+        np.testing.assert_allclose(Ahead.of(memory).axis[0, 0], axis, atol=1e-6)
         beside = [at(centre + 0.1 * s * axis + np.array([0.0, 0.0, 0.9]), 6 * axis) for s in (-1, 1)]
         lost = judged(task, memory, *beside)
         assert lost.terminated[0] and lost.crashed[0] and not lost.arrived[0]

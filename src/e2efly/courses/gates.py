@@ -100,6 +100,11 @@ class Tracks:
     closed: Any
     """(n,) whether the first gate follows the last."""
 
+    @property
+    def there(self) -> Any:
+        """(n, g) which gates there are."""
+        return self.count.__array_namespace__().arange(self.gates.count) < self.count[:, None]
+
     @staticmethod
     def of(track: RaceTrack, room: int = 0) -> "Tracks":
         """One world (n = 1) with a loaded track, with room for so many gates, or for as many as it has."""

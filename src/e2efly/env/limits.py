@@ -4,7 +4,7 @@ import numpy as np
 
 from e2efly.config import EnvConfig
 from e2efly.control import COMMAND_MODES, command_limits
-from e2efly.vehicles import Family, Vehicle, load_family, nominal_vehicle
+from e2efly.vehicles import Family, Vehicle, load_family, load_vehicle
 
 
 def limits_of(config: EnvConfig) -> np.ndarray:
@@ -17,7 +17,7 @@ def limits_of(config: EnvConfig) -> np.ndarray:
     if family is not None:
         return np.asarray(family.limits(config.command_mode), np.float64)
     mode = COMMAND_MODES[config.command_mode]
-    return command_limits(mode, nominal_vehicle(config.vehicle), config.position_range)
+    return command_limits(mode, load_vehicle(config.vehicle), config.position_range)
 
 
 def latencies_of(config: EnvConfig, vehicle: Vehicle, family: Family | None) -> tuple[float, float]:

@@ -75,8 +75,7 @@ class AnyRace(AnyRaceGoal):
     def scene(self, memory: Memory) -> Scene:
         """The gates over level ground."""
         n, tracks = memory.passed.shape[0], memory.tracks
-        there = jnp.arange(tracks.gates.count) < tracks.count[:, None]
-        return Scene.of({"gate": frames(tracks.gates, n, active=there)}, n)
+        return Scene.of({"gate": frames(tracks.gates, n, active=tracks.there)}, n)
 
     def desired_yaw(self, memory: Memory, state: State) -> Float[Array, " n"]:
         """Towards the next gate."""

@@ -8,10 +8,12 @@ import numpy as np
 
 from e2efly.config import number
 from e2efly.control.vectors import Array, namespace
-from e2efly.courses.gates import STRAIGHT_ON, Tracks
+from e2efly.courses.gates import Tracks
 from e2efly.courses.tracks import RaceTrack, load_track
 from e2efly.goal import Course, Goal, Outcome, Shape
 from e2efly.observation import Field
+from e2efly.tasks.race import any_goal
+from e2efly.tasks.race.any_goal import Ahead
 from e2efly.tasks.race_clutter import RaceClutterConfig
 from e2efly.tasks.route import Route
 from e2efly.tasks.verdicts import distance, offsets
@@ -19,19 +21,11 @@ from e2efly.vehicles.tables import LARGEST
 
 
 @dataclass(frozen=True)
-class Memory:
-    """The track of each vehicle, and how far it is."""
+class Memory(any_goal.Memory):
+    """The track of each vehicle, how far it is, and how fast it is to fly."""
 
-    tracks: Tracks
-    passed: Array
-    """(n,) gates."""
     speed: Array
     """(n,) commanded, m/s."""
-
-    @property
-    def index(self) -> Array:
-        """(n,) the next gate, counted from 0 within a lap."""
-        return self.passed % self.tracks.count
 
 
 @dataclass(frozen=True)
@@ -49,38 +43,20 @@ class RaceClutterGoal(Goal):
         """Without what only cameras see."""
         return Memory(**{part.name: getattr(memory, part.name) for part in dataclasses.fields(Memory)})
 
-    def targets(self, memory: Memory) -> Array:
-        """(n, 2, 3) the centres of the next two gates; behind the last of an open track, a point straight on."""
-        return self._next_two(memory)[0]
-
     def goal(self, memory: Memory, time: Array) -> Array:
         """The next gate's centre."""
         del time
-        return self.targets(memory)[:, 0]
-
-    def axes(self, memory: Memory) -> Array:
-        """(n, 2, 3) directions of the next two gates; behind the last of an open track, the last one's."""
-        return self._next_two(memory)[1]
-
-    def _next_two(self, memory: Memory) -> tuple[Array, Array]:
-        tracks, index = memory.tracks, memory.index
-        g, xp = tracks.gates, namespace(index)
-        after = xp.where(index + 1 < tracks.count, index + 1, xp.where(tracks.closed, 0, index))
-        two = xp.stack([index, after], axis=-1)
-        axes = rows(xp.stack([g.cos, g.sin, 0 * g.cos], axis=-1), two)
-        beyond = STRAIGHT_ON * ((index + 1 >= tracks.count) & ~tracks.closed)[:, None] * axes[:, 1]
-        centres = rows(g.position[:, :-1], two)
-        return xp.stack([centres[:, 0], centres[:, 1] + beyond], axis=1), axes
+        return Ahead.of(memory).centre[:, 0]
 
     def target_offsets(self, memory: Memory, time: Array, body: Any) -> Array:
         """The next two gates minus position."""
         del time
-        return offsets(self.targets(memory), body)
+        return offsets(Ahead.of(memory).centre[:, :2], body)
 
     def flat_axes(self, memory: Memory, time: Array, body: Any) -> Array:
         """Their directions."""
         del time
-        return self.axes(memory).reshape(body.position.shape[0], 6)
+        return Ahead.of(memory).axis[:, :2].reshape(body.position.shape[0], 6)
 
     def desired_speed(self, memory: Memory, time: Array, body: Any) -> Array:
         """The commanded speed."""
@@ -155,9 +131,3 @@ def drawn_larger(track: RaceTrack, scale: float) -> RaceTrack:
     """The track with its ground plan `scale` times as large; heights and openings stay."""
     size = np.array([scale, scale, 1.0])
     return dataclasses.replace(track, start=track.start * size, position=track.position * size)
-
-
-def rows(table: Array, index: Array) -> Array:
-    """(n, k, 3) rows (n, k) of each world's table (n, g, 3); as a product, whose gradient is no scatter."""
-    chosen = index[..., None] == np.arange(table.shape[1])
-    return chosen.astype(table.dtype) @ table

@@ -3,6 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -18,8 +19,9 @@ from e2efly.scenes.course import frames
 from e2efly.scenes.generate import clutter
 from e2efly.scenes.scene import Scene, Solids
 from e2efly.scenes.shapes import FAR
+from e2efly.tasks.race.any_goal import Ahead
 from e2efly.tasks.race_clutter import RaceClutterConfig
-from e2efly.tasks.race_clutter.goal import Memory, RaceClutterGoal, drawn_larger, rows
+from e2efly.tasks.race_clutter.goal import Memory, RaceClutterGoal, drawn_larger
 from e2efly.tasks.task import at_rest, into_ball, struck, uniform
 
 APPROACH = 0.7
@@ -57,10 +59,18 @@ class RaceClutter(RaceClutterGoal):
         """Load the track.
 
         Raises:
-            ValueError: for an unknown or broken track, for none, and for a name in place of several.
+            ValueError: for an unknown or broken track, for none, for a name in place of several or twice the same, and
+                for one chosen that is not among them.
         """
         if isinstance(config.track, str) or not config.track:
             raise ValueError(f"task.track is {config.track!r}; accepted: a tuple of one or more tracks")
+        names = [Path(track).stem for track in config.track]
+        if len(set(names)) < len(names):
+            raise ValueError(
+                f"task.track is {config.track}; accepted: tracks of different names, which tell the criteria"
+            )
+        if config.only not in range(-1, len(names)):
+            raise ValueError(f"task.only is {config.only}; accepted: whole numbers from -1 to {len(names) - 1}")
         tracks = [drawn_larger(load_track(name), config.scale) for name in config.track]
         room = max(len(track.yaw) for track in tracks)
         given = jax.tree.map(lambda *x: np.concatenate(x), *(Tracks.of(track, room) for track in tracks))
@@ -82,7 +92,7 @@ class RaceClutter(RaceClutterGoal):
         keep = jnp.concatenate(
             [state.position[:, None], centres, centres - APPROACH * axes, centres + APPROACH * axes], axis=1
         )
-        largest = jnp.max(jnp.where(_there(tracks)[..., None], g.half, 0.0))
+        largest = jnp.max(jnp.where(tracks.there[..., None], g.half, 0.0))
         path, legs = _path(tracks, state.position)
         obstacles = clutter(clutter_key, n, c.clutter, path, keep, largest, legs)
         low, high = c.speed
@@ -101,11 +111,9 @@ class RaceClutter(RaceClutterGoal):
         u = uniform(gate_key, n, 4 * count).reshape(n, count, 4)
         move, turn = c.gate_position * u[..., :3], c.gate_yaw * u[..., 3]
         cos, sin = jnp.cos(turn), jnp.sin(turn)
-        last = jnp.take_along_axis(move, (tracks.count - 1)[:, None, None], axis=1)
-        behind = jnp.where(tracks.closed[:, None, None], move[:, :1], last)
         moved = dataclasses.replace(
             g,
-            position=g.position + jnp.concatenate([move, behind], axis=1),
+            position=g.position.at[:, :-1].add(move),
             cos=g.cos * cos - g.sin * sin,
             sin=g.sin * cos + g.cos * sin,
         )
@@ -113,29 +121,30 @@ class RaceClutter(RaceClutterGoal):
 
     def desired_velocity(self, memory: World, state: State) -> Float[Array, "n 3"]:
         """At the commanded speed towards a point close behind the next gate: in its middle still straight through."""
-        behind = self.targets(memory)[:, 0] + BEHIND * self.axes(memory)[:, 0]
+        ahead = Ahead.of(memory)
+        behind = ahead.centre[:, 0] + BEHIND * ahead.axis[:, 0]
         away = behind - state.position
         return memory.speed[:, None] * away / (jnp.linalg.norm(away, axis=-1, keepdims=True) + 1e-3)
 
     def scene(self, memory: World) -> Scene:
         """Gates and obstacles over level ground."""
         n = memory.speed.shape[0]
-        gates = frames(memory.tracks.gates, n, active=_there(memory.tracks))
+        gates = frames(memory.tracks.gates, n, active=memory.tracks.there)
         return Scene.of({**memory.obstacles, "gate": gates}, n)
 
     def overhang(self, memory: World, state: State) -> Float[Array, "n 1"]:
         """How far the vehicle's sphere stands out of the next gate's opening, m; `-FAR` off its plane."""
-        axis = self.axes(memory)[:, 0]
-        d = state.position - self.targets(memory)[:, 0]
-        half = rows(memory.tracks.gates.half, memory.index[:, None])[:, 0]
-        ahead = d[:, 0] * axis[:, 0] + d[:, 1] * axis[:, 1]
+        ahead = Ahead.of(memory)
+        axis, half = ahead.axis[:, 0], ahead.half[:, 0]
+        d = state.position - ahead.centre[:, 0]
+        away = d[:, 0] * axis[:, 0] + d[:, 1] * axis[:, 1]
         beside = d[:, 1] * axis[:, 0] - d[:, 0] * axis[:, 1]
         out = jnp.maximum(jnp.abs(beside) - half[:, 0], jnp.abs(d[:, 2]) - half[:, 1]) + self.shape.radius
-        return jnp.where(jnp.abs(ahead) < PASSING, out, -FAR)[:, None]
+        return jnp.where(jnp.abs(away) < PASSING, out, -FAR)[:, None]
 
     def desired_yaw(self, memory: World, state: State) -> Float[Array, " n"]:
         """Towards where the way through the next two gates is `LOOKING` ahead: near a gate, behind its corner."""
-        here, there = (self.targets(memory)[:, i] for i in range(2))
+        here, there = (Ahead.of(memory).centre[:, i] for i in range(2))
         leg, away = there - here, jnp.linalg.norm(here - state.position, axis=-1, keepdims=True)
         length = jnp.maximum(jnp.linalg.norm(leg, axis=-1, keepdims=True), 1.0)
         d = here + leg * jnp.clip((LOOKING - away) / length, 0.0, 1.0) - state.position
@@ -156,14 +165,9 @@ class RaceClutter(RaceClutterGoal):
         return moved, dataclasses.replace(outcome, signals=signals)
 
 
-def _there(tracks: Tracks) -> Bool[Array, "n g"]:
-    """Which gates there are."""
-    return jnp.arange(tracks.gates.count) < tracks.count[:, None]
-
-
 def _path(tracks: Tracks, start: Float[Array, "n 3"]) -> tuple[Float[Array, "n p 3"], Int[Array, " n"]]:
     """The corners of the way from the start from gate to gate, on a closed track back to the first; and its legs."""
     g, count = tracks.gates, tracks.count
     home = jnp.arange(g.count + 1)[None, :, None] == count[:, None, None]
-    corners = jnp.where(home, g.position[:, -1:], g.position)
+    corners = jnp.where(home, g.position[:, :1], g.position)
     return jnp.concatenate([start[:, None], corners], axis=1), count + tracks.closed
