@@ -16,6 +16,7 @@ TITLES = {
     "mesh_rendering": "Rendering of mesh scenes",
     "rendering": "Images of the clutter scene: ground, 4 gates, 16 obstacles, another world for each camera",
     "visual_tasks": "Tasks flown by sight: trained, then flown under stress from unseen starts in unseen worlds",
+    "expert": "The expert of avoid, flown as a pilot",
     "time_to_criterion": "Time to the criterion, from process start",
     "cold_start": "Where a training spends its time, seconds from the start of the process to its end",
     "thrown": "Catching a thrown vehicle: success over 1000 unseen starts, full presets",
@@ -49,15 +50,22 @@ was the default until then. The default of today takes three times as long per p
 NOTES = {
     "any_track": """
 A specialist begins as the one policy and learns on one track alone for 2.5 million steps.
-Eight were trained, not fifty. What is missed and what was tried: [any track](any-
-track.md#how-well-it- flies).""",
+Eight were trained, not fifty. What is missed and what was tried:
+[any track](any-track.md#how-well-it-flies).""",
+    "cold_start": """
+Cold: with an empty compilation cache. Later: the same command again.
+
+![a bar for each command, in parts](cold_start.png)""",
     "visual_tasks": """
 The presets `nominal` of that day, of race_clutter one policy for each track. Today's presets are
 `robust`, and race_clutter has one policy for all: [the zoo by
 sight](#the-zoos-policies-that-see-under-stress-of-the-vehicle-and-of-its-cameras).""",
+    "expert": """
+It knows every trunk, and the mass, thrust and delay of its vehicle, but not its inertia, its motors, its
+rate loop or the wind. Policies that imitate it have to see the trunks.""",
     "raptor": """
-Success: within 0.1 m for the last second of 8 s. What stands in which row: [any
-quadrotor](any- vehicle.md).""",
+Success: within 0.1 m for the last second of 8 s. What stands in which row:
+[any quadrotor](any-vehicle.md).""",
     "zoo_stress": """
 Percent of 1000 unseen starts, of the worst criterion, in the training simulator. The rows:
 [robustness](robustness.md#stress). "preset nominal" has no memory and was trained on the
@@ -148,6 +156,32 @@ def thrown() -> None:
         axes[1].legend(loc="lower right")
 
 
+def cold_start() -> None:
+    """docs/cold_start.png: where a training spends its time, a stacked bar for each command."""
+    from e2efly.view.style import CYCLE, figure
+
+    path = RESULTS / "cold_start.json"
+    if not path.exists():
+        return
+    rows = json.loads(path.read_text())["table"]
+    parts = [part for part in rows[0] if part not in ("task", "when", "whole")]
+    with figure(DOCS / "cold_start.png", "Where a training spends its time", 1.2 + 0.4 * len(rows)) as fig:
+        ax = fig.subplots()
+        names, begun = [f"{row['task']}, {row['when']}" for row in rows], [0.0] * len(rows)
+        for i, part in enumerate(parts):
+            seconds = [float(row[part]) for row in rows]
+            pale = 0.45 if i >= len(CYCLE) else 1.0
+            ax.barh(names, seconds, left=begun, color=CYCLE[i % len(CYCLE)], alpha=pale, label=part)
+            begun = [before + more for before, more in zip(begun, seconds, strict=True)]
+        for i, whole in enumerate(begun):
+            ax.text(whole, i, f" {whole:.0f} s", va="center")
+        ax.invert_yaxis()
+        ax.margins(x=0.1)
+        ax.set_axisbelow(True)
+        ax.set_xlabel("time from the start of the process (s)")
+        fig.legend(*ax.get_legend_handles_labels(), loc="outside right center")
+
+
 def any_track() -> None:
     """docs/any_track.png: the first tracks that the sampler draws from a seed, from above."""
     import numpy as np
@@ -208,6 +242,7 @@ def main() -> None:
             lines += [f"## {title}", "", about, "", *note, *markdown(content["table"]), ""]
     (DOCS / "benchmarks.md").write_text("\n".join(lines))
     thrown()
+    cold_start()
     families()
     if "--noise" in sys.argv or "--pictures" in sys.argv:
         noise()

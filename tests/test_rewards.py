@@ -36,6 +36,7 @@ SIGNALS: dict[str, Any] = {
     "gaps": [0.3, 0.6],
     "closing": [1.5, 4.0],
     "overhang": [-0.05, 0.01, 0.1],
+    "expert_action": [0.6, 0.12, 0.0, 0.5],
 }
 DETACHED = {("avoid", "closing")}
 """What a term reads without gradient."""
@@ -68,6 +69,7 @@ BY_HAND = {
     "act2_sq": -0.25,
     "descent": -abs(0.5 / (1 + 25 / 0.09) - 6),
     "upright": -2 * 0.36,
+    "imitate": -(0.13 - 0.05) - (np.hypot(0.3, 0.05) - 0.05),
     "vel": -5 / np.sqrt(8),
     "overspeed": -1,
     "avoid": -(0.5**2 + 0.5 * np.log1p(np.exp(-16 * 0.3))) * 2.5 - (0.2**2 + 0.5 * np.log1p(np.exp(-16 * 0.6))) * 5,

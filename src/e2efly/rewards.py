@@ -237,6 +237,18 @@ def descent(
     return -jnp.abs(descent_speed(height, vz_slope, vz_min, vz_max) * centred + velocity[..., 2])
 
 
+def imitate(
+    action: Float[Array, "*n 4"], expert_action: Float[Array, "*n 4"], imitate_rounding: float | Array = 0.05
+) -> Scalar:
+    """Minus the distance to an expert's action, number by number: sqrt(e^2 + r^2) - r. Ours.
+
+    The expert acts where the policy has led (DAgger, Ross et al. 2011), and knows what the policy only sees. For
+    tasks that have one, `avoid` does, and policies that command thrust and body rates.
+    """
+    error, r = action - expert_action, imitate_rounding
+    return -jnp.sum(jnp.sqrt(error**2 + r**2) - r, axis=-1)
+
+
 def upright(quaternion: Float[Array, "*n 4"]) -> Scalar:
     """-(1 - cos tilt): level is 0, upside down -2; heading free. Ours."""
     return -2.0 * (quaternion[..., 1] ** 2 + quaternion[..., 2] ** 2)
@@ -287,7 +299,7 @@ class Term:
 _KINDS: dict[Kind, tuple[Callable[..., Array], ...]] = {
     "differentiable": (
         prog1, prog2, progxy, progx, progy, progz, act1, act2, act3, ori1, ori3, v1, v2, v3, anglev, near,
-        anglev_sq, act2_sq, upright, vel, overspeed, progway,
+        anglev_sq, act2_sq, upright, imitate, vel, overspeed, progway,
     ),
     "partly": (ori2, ori4, vz, avoid1, avoid2, avoid, descent, fit, fitlog),
     "sparse": (goal, crash),

@@ -27,7 +27,7 @@ from e2efly.config import (
     TaskConfig,
 )
 from e2efly.control import COMMAND_MODES
-from e2efly.env import disturbance
+from e2efly.env import disturbance, expert
 from e2efly.env.check import check
 from e2efly.env.draws import between, perturbed
 from e2efly.env.limits import latencies_of, limits_of
@@ -40,7 +40,7 @@ from e2efly.scenes import scene as scenes
 from e2efly.sensors import imu, latency
 from e2efly.sensors.eyes import Eye, image_shape, see, steady, steps_between
 from e2efly.sensors.noise import add_noise
-from e2efly.tasks.task import Shape, Task, into_ball, make_task, uniform
+from e2efly.tasks.task import Guided, Shape, Task, into_ball, make_task, uniform
 from e2efly.vehicles import Family, Flown, load_family, load_vehicle
 from e2efly.vehicles.family import DRAWN
 
@@ -348,6 +348,8 @@ class Env:
             "crashed": outcome.crashed,
         }
         signals |= outcome.signals
+        if self._reads("expert_action") and isinstance(self.task, Guided) and physics.command_mode == "ctbr":
+            signals["expert_action"] = self.expert_action(state)
         if self._reads("clearance", "gaps"):
             signals |= self._dangers(memory, after, time)
         total, terms = rewards.reward(self.weights, self.parameters, signals)
@@ -434,6 +436,25 @@ class Env:
             "clearance": jnp.sum(nearest * each, axis=-1),
             "approach_speed": -jnp.sum(nearest * growing, axis=-1),
         }
+
+    def expert_action(self, state: EnvState) -> Float[Array, "n 4"]:
+        """What one who knows the whole world, and what this vehicle weighs and lifts, would do now; no gradient.
+
+        Of tasks that have an `expert`, by thrust and body rates.
+        """
+        assert isinstance(self.task, Guided)
+        state = jax.lax.stop_gradient(state)
+        vehicle = self._physics(state.family).nominal
+        queue, latency = self.command(state.actions), state.action_latency
+        motion = expert.ahead(vehicle, state.vehicle, queue, latency, self.control_period)
+        velocity, yaw = self.task.expert(state.memory, motion.position.stack(), motion.velocity.stack())
+        command = expert.command(vehicle, (self.center + self.half)[0], motion, velocity, yaw)
+        needed = state.plant.get("mass", vehicle.mass) / vehicle.mass
+        if state.disturbance is not None:
+            lifted = state.disturbance.share(state.time / self.task.episode_s)
+            needed = needed / jnp.mean(lifted, axis=-1)
+        command = command.at[:, 0].multiply(needed)
+        return jnp.clip((command - self.center) / self.half, -1.0, 1.0)
 
     def _observe(self, state: EnvState) -> Float[Array, "n o"]:
         seen = state.vehicle

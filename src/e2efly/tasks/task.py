@@ -2,7 +2,7 @@
 
 import dataclasses
 from functools import cache
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import jax
 import jax.numpy as jnp
@@ -68,6 +68,17 @@ class Task(Protocol):
         self, memory: Any, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
     ) -> tuple[Any, Outcome]:
         """Judge the control step that ended at `time` and move the task's own state on."""
+        ...
+
+
+@runtime_checkable
+class Guided(Protocol):
+    """A task that one who knows the whole world can fly: what the reward term `imitate` needs."""
+
+    def expert(
+        self, memory: Any, position: Float[Array, "n 3"], velocity: Float[Array, "n 3"]
+    ) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
+        """The velocity to fly at, world, m/s, and the yaw, rad."""
         ...
 
 

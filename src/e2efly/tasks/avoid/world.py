@@ -14,12 +14,12 @@ from e2efly.physics.rotation import from_euler
 from e2efly.scenes.generate import forest
 from e2efly.scenes.scene import Scene, Solids
 from e2efly.tasks.avoid import AvoidConfig
-from e2efly.tasks.avoid.goal import AvoidGoal, Memory
+from e2efly.tasks.avoid.goal import CLIMB, AvoidGoal, Memory
+from e2efly.tasks.avoid.pilot import best_heading
 from e2efly.tasks.task import at_rest, struck, uniform
-from e2efly.tasks.way import open_heading
 
-ROOM = 0.4
-"""What an open way leaves between the vehicle and a tree, m."""
+STRICT = 1.5
+"""Vertical speed of the expert over the error of its height, 1/s."""
 
 
 @jax.tree_util.register_dataclass
@@ -51,13 +51,19 @@ class Avoid(AvoidGoal):
         trees = forest(trees_key, n, c.forest, state.position, end)
         return dataclasses.replace(state, quaternion=from_euler(zero, zero, 0.3 * u[:, 3])), World(speed, trees)
 
-    def open_velocity(self, memory: World, state: State) -> Float[Array, "n 3"]:
-        """The desired velocity, turned to where the way is open: what a reward may know and the policy may not."""
-        wanted = self.desired_velocity(memory, memory.speed, state)
-        bearing = jnp.arctan2(wanted[:, 1], wanted[:, 0])
-        side = self.config.forest.width / 2 - ROOM
-        heading = open_heading(memory.trees, state.position[:, :2], bearing, self.shape.radius + ROOM, side)
-        return jnp.concatenate([memory.speed[:, None] * heading, wanted[:, 2:]], axis=-1)
+    def expert(
+        self, memory: World, position: Float[Array, "n 3"], velocity: Float[Array, "n 3"]
+    ) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
+        """What one who knows every tree would fly at: a velocity, m/s, and a yaw half-way to it, rad."""
+        away = self.goal(memory, memory.speed) - position
+        bearing = jnp.arctan2(away[:, 1], away[:, 0])
+        side = self.config.forest.width / 2
+        heading = best_heading(
+            memory.trees, position[:, :2], velocity[:, :2], bearing, memory.speed, self.shape.radius, side
+        )
+        level = memory.speed[:, None] * jnp.stack([jnp.cos(heading), jnp.sin(heading)], axis=-1)
+        climb = jnp.clip(STRICT * away[:, 2:], -CLIMB, CLIMB)
+        return jnp.concatenate([level, climb], axis=-1), (heading + bearing) / 2
 
     def scene(self, memory: World) -> Scene:
         """The trees on level ground."""
@@ -75,5 +81,6 @@ class Avoid(AvoidGoal):
         del timed_out
         hit = struck(self.scene(memory), before, after, time, self.control_period, self.checks, self.shape.radius)
         moved, outcome = self.verdict(memory, before, after, time, hit)
-        signals = {"desired_velocity": self.open_velocity(memory, after), "desired_speed": memory.speed}
+        wanted, _ = self.expert(memory, after.position, after.velocity)
+        signals = {"desired_velocity": wanted, "desired_speed": memory.speed}
         return moved, dataclasses.replace(outcome, signals=signals)

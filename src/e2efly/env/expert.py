@@ -1,0 +1,91 @@
+"""An expert's command: how to fly at a velocity that only one who knows the whole world can choose.
+
+The task chooses the velocity, and the flight controller's cascade makes thrust and body rates of it. They are those of
+the moment when an action that is chosen now begins to act: until then the vehicle follows the actions under way.
+"""
+
+import dataclasses
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from e2efly.control import Quat, Vec3
+from e2efly.control.cascade import reach
+from e2efly.physics import State
+from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import GRAVITY
+
+RESERVE = 1.15
+"""The expert leans so far that this times its weight is what its rotors have to carry at most."""
+
+SOFTER = 0.67
+"""Its gain of attitude over the vehicle's own: its loop closes over the policy's delay, and over any rate loop."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What the cascade knows of the vehicle."""
+
+    position: Vec3
+    velocity: Vec3
+    attitude: Quat
+
+
+def ahead(
+    vehicle: Vehicle,
+    state: State,
+    commands: Float[Array, "n k 4"],
+    latency: Float[Array, " n"],
+    period: float,
+) -> Motion:
+    """Where a vehicle will be when the command that is chosen now begins to act.
+
+    Body rates follow with one lag for rate loop and motors, the thrust at once.
+
+    Args:
+        vehicle: what flies, as its flight controller knows it.
+        state: now.
+        commands: collective thrusts, m/s^2, and body rates, rad/s, under way, newest first.
+        latency: from a command to its effect, s.
+        period: between two commands, s.
+    """
+    position, velocity = Vec3.of(state.position), Vec3.of(state.velocity)
+    attitude, rate = Quat.of(state.quaternion), Vec3.of(state.body_rate)
+    lag = 1 / vehicle.rate_gain + jnp.asarray(vehicle.motor_time_constant)[..., None]
+    for i in reversed(range(commands.shape[1])):
+        time = jnp.clip(latency - i * period, 0.0, period)
+        commanded = Vec3.of(commands[:, i, 1:])
+        left = Vec3.of(jnp.exp(-time[:, None] / lag))
+        error = rate - commanded
+        middle = commanded + error.times((left + Vec3(1.0, 1.0, 1.0)) * 0.5)
+        attitude = (attitude + attitude.derivative(middle) * time).normalized()
+        rate = commanded + error.times(left)
+        acceleration = attitude.z_axis() * commands[:, i, 0] - Vec3(0.0, 0.0, GRAVITY)
+        position = position + velocity * time + acceleration * (time**2 / 2)
+        velocity = velocity + acceleration * time
+    return Motion(position, velocity, attitude)
+
+
+def command(
+    vehicle: Vehicle, largest: Float[Array, ""], motion: Motion, velocity: Float[Array, "n 3"], yaw: Float[Array, " n"]
+) -> Float[Array, "n 4"]:
+    """Collective thrust, m/s^2, and body rates, rad/s, towards a velocity in the world, m/s, and a yaw, rad.
+
+    Args:
+        vehicle: what flies, as its flight controller knows it; its own limits of tilt and acceleration do not count.
+        largest: collective thrust of all rotors over mass, m/s^2.
+        motion: where it is.
+        velocity: wanted.
+        yaw: wanted.
+    """
+    tilt = jnp.arccos(jnp.clip(RESERVE * GRAVITY / largest, 0.0, 1.0))
+    level = GRAVITY * jnp.tan(tilt)
+    pilot = dataclasses.replace(
+        vehicle,
+        tilt_max=tilt,
+        acceleration_max=jnp.stack([level, level, jnp.full_like(level, GRAVITY)], axis=-1),
+        attitude_gain=SOFTER * jnp.asarray(vehicle.attitude_gain),
+    )
+    out = reach(pilot, motion, Vec3.of(velocity), yaw)
+    return jnp.concatenate([out.thrust[:, None], out.rate.stack()], axis=-1)
