@@ -61,8 +61,8 @@ The presets `nominal` of that day, of race_clutter one policy for each track. To
 `robust`, and race_clutter has one policy for all: [the zoo by
 sight](#the-zoos-policies-that-see-under-stress-of-the-vehicle-and-of-its-cameras).""",
     "expert": """
-It knows every trunk, and the mass, thrust and delay of its vehicle, but not its inertia, its motors, its
-rate loop or the wind. Policies that imitate it have to see the trunks.""",
+It knows every trunk, and the mass, thrust, delay, motors and rate loop of its vehicle, but not its
+inertia or the wind. Policies that imitate it have to see the trunks.""",
     "raptor": """
 Success: within 0.1 m for the last second of 8 s. What stands in which row:
 [any quadrotor](any-vehicle.md).""",

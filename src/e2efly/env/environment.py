@@ -438,7 +438,7 @@ class Env:
         }
 
     def expert_action(self, state: EnvState) -> Float[Array, "n 4"]:
-        """What one who knows the whole world, and what this vehicle weighs and lifts, would do now; no gradient.
+        """What one who knows the whole world, and this vehicle, would do now; no gradient.
 
         Of tasks that have an `expert`, by thrust and body rates.
         """
@@ -446,9 +446,11 @@ class Env:
         state = jax.lax.stop_gradient(state)
         vehicle = self._physics(state.family).nominal
         queue, latency = self.command(state.actions), state.action_latency
-        motion = expert.ahead(vehicle, state.vehicle, queue, latency, self.control_period)
+        known = {name: state.plant[name] for name in ("rate_gain", "motor_time_constant") if name in state.plant}
+        flown = dataclasses.replace(vehicle, **known)
+        motion = expert.ahead(flown, state.vehicle, queue, latency, self.control_period)
         velocity, yaw = self.task.expert(state.memory, motion.position.stack(), motion.velocity.stack())
-        command = expert.command(vehicle, (self.center + self.half)[0], motion, velocity, yaw)
+        command = expert.command(flown, (self.center + self.half)[0], motion, velocity, yaw)
         needed = state.plant.get("mass", vehicle.mass) / vehicle.mass
         if state.disturbance is not None:
             lifted = state.disturbance.share(state.time / self.task.episode_s)

@@ -19,8 +19,8 @@ from e2efly.vehicles.vehicle import GRAVITY
 RESERVE = 1.15
 """The expert leans so far that this times its weight is what its rotors have to carry at most."""
 
-SOFTER = 0.67
-"""Its gain of attitude over the vehicle's own: its loop closes over the policy's delay, and over any rate loop."""
+DAMPED = 0.6
+"""The expert's gains of attitude are at most this over the lag of the body rates."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def ahead(
     Body rates follow with one lag for rate loop and motors, the thrust at once.
 
     Args:
-        vehicle: what flies, as its flight controller knows it.
+        vehicle: what flies.
         state: now.
         commands: collective thrusts, m/s^2, and body rates, rad/s, under way, newest first.
         latency: from a command to its effect, s.
@@ -52,7 +52,7 @@ def ahead(
     """
     position, velocity = Vec3.of(state.position), Vec3.of(state.velocity)
     attitude, rate = Quat.of(state.quaternion), Vec3.of(state.body_rate)
-    lag = 1 / vehicle.rate_gain + jnp.asarray(vehicle.motor_time_constant)[..., None]
+    lag = _lag(vehicle)
     for i in reversed(range(commands.shape[1])):
         time = jnp.clip(latency - i * period, 0.0, period)
         commanded = Vec3.of(commands[:, i, 1:])
@@ -73,7 +73,7 @@ def command(
     """Collective thrust, m/s^2, and body rates, rad/s, towards a velocity in the world, m/s, and a yaw, rad.
 
     Args:
-        vehicle: what flies, as its flight controller knows it; its own limits of tilt and acceleration do not count.
+        vehicle: what flies; its own limits of tilt and acceleration do not count.
         largest: collective thrust of all rotors over mass, m/s^2.
         motion: where it is.
         velocity: wanted.
@@ -85,7 +85,12 @@ def command(
         vehicle,
         tilt_max=tilt,
         acceleration_max=jnp.stack([level, level, jnp.full_like(level, GRAVITY)], axis=-1),
-        attitude_gain=SOFTER * jnp.asarray(vehicle.attitude_gain),
+        attitude_gain=jnp.minimum(vehicle.attitude_gain, DAMPED / _lag(vehicle)[..., jnp.array([0, 2])]),
     )
     out = reach(pilot, motion, Vec3.of(velocity), yaw)
     return jnp.concatenate([out.thrust[:, None], out.rate.stack()], axis=-1)
+
+
+def _lag(vehicle: Vehicle) -> Array:
+    """Of the body rates behind the commanded ones, an axis each, s."""
+    return 1 / jnp.asarray(vehicle.rate_gain) + jnp.asarray(vehicle.motor_time_constant)[..., None]
