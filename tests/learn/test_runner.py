@@ -320,6 +320,14 @@ def test_the_best_policy_succeeds_most_often_and_among_equals_is_most_precise(na
     assert np.isfinite(runner.score(task, flown([False], 1.0, 1.0)))
 
 
+def test_where_pace_counts_a_much_faster_policy_may_fail_a_little_more_often() -> None:
+    task = TASKS["avoid"]()
+    often, less = [True] * 98 + [False] * 2, [True] * 94 + [False] * 6
+    assert runner.score(task, flown(less, 1.0, 6.0)) > runner.score(task, flown(often, 1.0, 9.0))
+    assert runner.score(task, flown(often, 1.0, 6.0)) > runner.score(task, flown(less, 1.0, 6.0))
+    assert runner.score(task, flown([False], 1.0, 1.0)) == 0
+
+
 def test_a_full_disk_at_the_first_row_does_not_end_a_run_for_good(tmp_path: Path) -> None:
     run = RunDirectory(tmp_path)
     run.metrics.touch()

@@ -113,8 +113,8 @@ class TaskConfig:
     """Weights of the reward's terms, where there is no `recipe`."""
     best: ClassVar[str] = "ppo"
     """The algorithm that learns it best."""
-    precision: ClassVar[Literal["final_error", "mean_error", "duration"]] = "final_error"
-    """What is to be small among policies that succeed as often."""
+    precision: ClassVar[Literal["final_error", "mean_error", "duration", "pace"]] = "final_error"
+    """What is to be small among policies that succeed as often; `pace`: a success counts by one over its duration."""
     smooth: ClassVar[Mapping[str, float] | None] = None
     """Rewards for methods that have both a gradient and a critic; None: PPO's. To a critic nothing follows a crash:
     where every step costs, as in BPTT's rewards, an early crash would be the best end; these pay for living on, and

@@ -65,8 +65,13 @@ def success(flown: dict[str, Episodes]) -> float:
 def score(task: TaskConfig, flown: dict[str, Episodes]) -> float:
     """What the best policy is chosen by: success of the worst criterion; among equals, the task's `precision`.
 
-    No precision counts as much as one more success among the episodes.
+    No precision counts as much as one more success among the episodes, but for a task whose precision is `pace`: there
+    each success counts by one over the time that it took (success weighted by completion time, SCT), by the geometric
+    mean of the criteria.
     """
+    if task.precision == "pace":
+        paces = [float(np.mean(e.success / np.maximum(e.duration, 1e-3))) for e in flown.values()]
+        return float(np.prod(paces)) ** (1 / len(paces))
 
     def cost(e: Episodes) -> float:
         if task.precision == "duration":

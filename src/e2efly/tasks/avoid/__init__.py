@@ -33,6 +33,7 @@ class AvoidConfig(TaskConfig):
     goal_class: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidGoal"
     route: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidRoute"
     best: ClassVar = "bptt"
+    precision: ClassVar = "pace"
     robust: ClassVar = {"bptt": Robust(steps=4_500_000, chunk=150, recurrent=96, hidden=(128, 64))}
     cameras: ClassVar = (dataclasses.replace(D435I, noise=ImageNoiseConfig(d435i=True), width=32, height=12),)
     curriculum: ClassVar = (
