@@ -30,6 +30,7 @@ TITLES = {
     "raptor": "One policy for any quadrotor, beside RAPTOR: 1000 unseen vehicles, by delay",
     "zoo_stress": "The zoo under stress: vehicles, air and sensors that are not those of the training",
     "zoo_stress_by_sight": "The zoo's policies that see, under stress of the vehicle and of its cameras",
+    "identify": "Identification of hidden vehicles from the logs of a flight",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
     "firmware_faults": "Faults injected into flights of the real firmware",
@@ -66,6 +67,9 @@ inertia or the wind. Policies that imitate it have to see the trunks.""",
     "raptor": """
 Success: within 0.1 m for the last second of 8 s. What stands in which row:
 [any quadrotor](any-vehicle.md).""",
+    "identify": """
+30 s in MuJoCo each, with noise, biases, gaps, late poses and sag; errors are absolute values, of
+inertia per axis. [How it is done](identification.md).""",
     "zoo_stress": """
 Percent of 1000 unseen starts, of the worst criterion, in the training simulator. The rows:
 [robustness](robustness.md#stress). "preset nominal" has no memory and was trained on the

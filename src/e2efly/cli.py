@@ -24,6 +24,7 @@ _EXAMPLES = {
     "validate POLICY": "fly it on another physics, or through the real firmware",
     "fly POLICY": "fly it on a Betaflight quadrotor",
     "fly-report LOG": "draw a flight",
+    "identify flight LOG": "a vehicle file from flights, parts, a pendulum, a thrust stand",
     "render forest": "what cameras and LiDARs see of a world: pictures and a video",
     "firmware": "build the real Betaflight firmware for this machine",
     "bench": "how fast this machine simulates and learns",

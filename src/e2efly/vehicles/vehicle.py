@@ -249,8 +249,11 @@ def read_values(table: dict[str, Any], fields: Sequence[dataclasses.Field], wher
 def _read(where: str, f: dataclasses.Field, entry: Any) -> Any:
     """One value of the file, with its unit, shape and bounds checked."""
     key, unit, shape = f.name, f.metadata["unit"], f.metadata["shape"]
-    if not isinstance(entry, dict) or set(entry) != {"value", "unit", "source"}:
-        raise ValueError(f"{where}: [{key}] is {shown(entry)}; accepted: a table with value, unit and source")
+    if not isinstance(entry, dict) or set(entry) - {"sigma"} != {"value", "unit", "source"}:
+        raise ValueError(
+            f"{where}: [{key}] is {shown(entry)}; accepted: a table with value, unit and source, and sigma where it is "
+            "known"
+        )
     if entry["unit"] != unit:
         raise ValueError(f"{where}: {key}.unit is {shown(entry['unit'])}; accepted: {unit!r}")
     source, given = entry["source"], entry["value"]
@@ -265,6 +268,7 @@ def _read(where: str, f: dataclasses.Field, entry: Any) -> Any:
         expected = "a number" if shape == () else f"numbers of shape {shape}"
         raise ValueError(f"{where}: {key}.value is {shown(given)}; accepted: {expected}")
     value = value.astype(np.float64)
+    _read_sigma(where, f, entry)
     at_least, above = f.metadata["at_least"], f.metadata["above"]
     accepted = f">= {at_least:g}" if at_least is not None else f"> {above:g}" if above is not None else "finite"
     good = np.abs(value) <= _LARGEST  # false for NaN
@@ -277,6 +281,35 @@ def _read(where: str, f: dataclasses.Field, entry: Any) -> Any:
             f"{where}: {key}.value is {shown(given)}; accepted: {accepted} {unit}, finite, at most {_LARGEST:g} in size"
         )
     return value if shape else float(value)
+
+
+def _read_sigma(where: str, f: dataclasses.Field, entry: dict[str, Any]) -> np.ndarray:
+    """Standard deviations of an entry of the file, of the value's shape; NaN where they are not known."""
+    shape, given = f.metadata["shape"], entry.get("sigma")
+    if given is None:
+        return np.full(shape, np.nan)
+    try:
+        sigma = np.asarray(given, np.float64)
+    except (TypeError, ValueError):
+        sigma = np.full((0,), np.nan)
+    if sigma.shape != shape or np.any(sigma < 0) or np.any(np.isinf(sigma)):
+        raise ValueError(
+            f"{where}: {f.name}.sigma is {shown(given)}; accepted: a number of 0 or more for each of the value's, nan "
+            "where it is not known"
+        )
+    return sigma
+
+
+def read_sigmas(name_or_path: str | Path) -> dict[str, np.ndarray]:
+    """Standard deviations of a vehicle's values, by field, in their units; NaN where the file does not say.
+
+    Raises:
+        ValueError: as of `load_vehicle`.
+    """
+    path = vehicle_file(name_or_path)
+    load_vehicle(path)
+    table = read_table(path)
+    return {f.name: _read_sigma(str(path), f, table[f.name]) for f in quantities()}
 
 
 def check(vehicle: Vehicle, where: str = "vehicle") -> None:

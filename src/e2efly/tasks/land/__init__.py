@@ -41,6 +41,14 @@ class LandConfig(TaskConfig):
             steps=2_200_000,
         )
     }
+    family: ClassVar = {
+        "bptt": Robust(
+            weights={"progxy": 1.0, "descent": 1.0, "upright": 0.1, "anglev_sq": 0.05, "act2_sq": 0.05},
+            algo={"horizon": 96, "average": 0.99},
+            steps=6_000_000,
+            chunk=60,
+        )
+    }
     paper: ClassVar = Paper(
         weights={"progxy": 0.04, "vz": 0.1, "anglev": 0.001},
         ppo={"act3": 1.0, "goal": 1.0, "crash": 1.0},

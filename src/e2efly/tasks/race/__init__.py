@@ -54,6 +54,16 @@ class RaceConfig(TaskConfig):
             hidden=(96, 96),
         )
     }
+    family: ClassVar = {
+        "bptt": Robust(
+            weights={"prog1": 1.0, "near": 0.2, "anglev_sq": 0.001, "act2_sq": 0.01},
+            algo={"learning_rate": 5e-3, "average": 0.99},
+            steps=16_000_000,
+            chunk=60,
+            recurrent=96,
+            hidden=(96, 96),
+        )
+    }
     variants: ClassVar = (ANY_TRACK,)
     asked: ClassVar = {("track", ANY): ANY_TRACK}
     paper: ClassVar = Paper(

@@ -1,0 +1,220 @@
+"""`e2efly identify`."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from e2efly.storage import write_json
+from e2efly.terminal import Terminal
+from e2efly.vehicles import Vehicle, load_vehicle, unknown
+
+if TYPE_CHECKING:
+    from e2efly.identification.estimate import Estimate
+    from e2efly.identification.flight import Found
+    from e2efly.identification.record import Record
+
+KINDS = ("parts", "pendulum", "stand", "flight", "step")
+"""Sources, by what the command line calls them."""
+
+
+@dataclass(frozen=True)
+class Identify:
+    """Find a vehicle's parameters from what you can measure; write a vehicle file with standard deviations.
+
+    Sources are named by their kind, and then their files: `e2efly identify parts my.toml flight a.csv b.csv`.
+    """
+
+    sources: tyro.conf.Positional[tuple[str, ...]]
+    """parts FILE: a list of parts. pendulum FILE: periods of a bifilar pendulum. stand FILE: a thrust stand's record.
+    flight LOG...: flights. step LOG...: flights with steps of body rate, for delay and rate loop alone."""
+    vehicle: str = "vis_r"
+    """The base: a vehicle's name or a .toml file. What the sources do not say stays as it is there, and the flight
+    controller of the flights is taken to have believed in it."""
+    out: Path = Path("identified")
+    """Folder of vehicle.toml, identified.json and the plots."""
+    columns: tuple[str, ...] = ()
+    """Names of a CSV log's columns for ours: OURS=THEIRS or OURS=THEIRS*FACTOR, as az=acc_z*9.81."""
+    mass: tuple[float, float] | None = None
+    """What the vehicle weighs, and the scale's sigma, kg. Flights give thrust, inertia and drag over it."""
+
+
+def run(options: Identify) -> int:
+    """Read all sources, fuse what they say, write the vehicle file, the report and the plots.
+
+    Raises:
+        ValueError: naming the source, what is wrong with it and what is accepted. Nothing is written then.
+    """
+    from e2efly.identification import parts, pendulum, stand
+    from e2efly.identification.csv_file import column_map
+    from e2efly.identification.estimate import Estimate, fuse
+    from e2efly.identification.vehicle_file import merged, write_vehicle
+
+    began = time.perf_counter()
+    files, console = _sources(options.sources), Terminal()
+    base, columns = load_vehicle(options.vehicle), column_map(options.columns)
+    said: list[Estimate] = []
+    if options.mass:
+        mass, sigma = options.mass
+        if not (mass > 0 and sigma > 0):
+            raise ValueError(f"--mass is {mass} {sigma}; accepted: kg and its standard deviation, both above 0")
+        said.append(Estimate("mass", np.array(mass), np.array(sigma), "weighed"))
+    for kind, estimates in (("parts", parts.estimates), ("pendulum", pendulum.estimates), ("stand", stand.estimates)):
+        for path in files[kind]:
+            said += estimates(path)
+    found: dict[str, Found] = {}
+    for kind in ("flight", "step"):
+        if files[kind]:
+            known = merged(base, fuse(said))
+            records = _records(files[kind], columns, known, console)
+            found[kind] = _flown(known, base, records, kind == "step", console)
+            said += _with_mass(found[kind].estimates, said)
+    fused = fuse(said)
+    report = _report(options, base, fused, said, found)
+    options.out.mkdir(parents=True, exist_ok=True)
+    file = options.out / "vehicle.toml"
+    write_vehicle(file, options.vehicle, base, fused)
+    load_vehicle(file)
+    write_json(options.out / "identified.json", report)
+    console.print(_table(base, fused))
+    for each in found.values():
+        for refusal in each.refusals:
+            console.print(str(refusal), style="dim")
+    if found and not any(e.name == "mass" for e in said):
+        console.print(
+            f"mass is the file's, {base.mass:g} kg: flights give thrust, inertia and drag over it. Weigh the vehicle "
+            "(--mass KG SIGMA).",
+            style="dim",
+        )
+    from e2efly.view.identification import plot_identified
+
+    plots = plot_identified(options.out, base, fused, found)
+    console.print(
+        f"Vehicle: {file}. Report: {options.out / 'identified.json'}. Plots: {', '.join(p.name for p in plots)}"
+    )
+    console.print(f"Took {time.perf_counter() - began:.0f} s.", style="dim")
+    return 0
+
+
+def _sources(words: Sequence[str]) -> dict[str, list[Path]]:
+    files: dict[str, list[Path]] = {kind: [] for kind in KINDS}
+    kind = ""
+    for word in words:
+        if word in KINDS:
+            kind = word
+        elif not kind:
+            raise ValueError(f"sources: {unknown('source', word, KINDS)}; accepted: a kind, and then its files")
+        else:
+            files[kind].append(Path(word))
+    if empty := [k for k in KINDS if k in words and not files[k]]:
+        raise ValueError(f"sources: {empty[0]} has no file; accepted: {empty[0]} FILE")
+    if not any(files.values()):
+        raise ValueError(f"sources are missing; accepted: {' FILE, '.join(KINDS)} FILE, any of them")
+    return files
+
+
+def _records(files: Sequence[Path], columns: Any, vehicle: Vehicle, console: Console) -> "list[Record]":
+    from e2efly.identification.checks import checked
+    from e2efly.identification.readers import read_flights
+
+    records = checked([record for path in files for record in read_flights(path, columns)], vehicle)
+    for record in records:
+        rates = ", ".join(f"{name} {stream.rate:.0f} Hz" for name, stream in record.streams.items())
+        console.print(f"{record.path.name}: {record.duration:.1f} s; {rates}")
+        for note in record.notes:
+            console.print(f"  {note}", style="dim")
+    return records
+
+
+def _flown(vehicle: Vehicle, believed: Vehicle, records: "Sequence[Record]", step: bool, console: Console) -> "Found":
+    from e2efly.device import prepare
+    from e2efly.identification.flight import identify
+
+    prepare("cpu")
+    with console.status("fitting") as status:
+        return identify(
+            vehicle,
+            records,
+            believed=believed,
+            step=step,
+            told=lambda i, cost: status.update(f"fitting: iteration {i}, cost {cost:.1f}"),
+        )
+
+
+def _with_mass(estimates: "list[Estimate]", said: "Sequence[Estimate]") -> "list[Estimate]":
+    """What is proportional to the mass is no better known than it."""
+    from dataclasses import replace
+
+    masses = [e for e in said if e.name == "mass"]
+    off = float(min(e.sigma / e.value for e in masses)) if masses else 0.0
+    scaled = ("thrust_map", "rotor_thrust_max", "inertia", "drag_linear", "drag_quadratic")
+    return [replace(e, sigma=np.hypot(e.sigma, np.abs(e.value) * off)) if e.name in scaled else e for e in estimates]
+
+
+def _report(
+    options: Identify, base: Vehicle, fused: "dict[str, Estimate]", said: "list[Estimate]", found: "dict[str, Found]"
+) -> dict[str, Any]:
+    from e2efly.identification.flight import nuisances
+    from e2efly.identification.judge import judged
+
+    def entry(e: "Estimate") -> dict[str, Any]:
+        return {"value": e.value.tolist(), "sigma": e.sigma.tolist(), "source": e.source}
+
+    report: dict[str, Any] = {
+        "vehicle": options.vehicle,
+        "parameters": {
+            name: entry(e) | {"before": np.asarray(getattr(base, name)).tolist()} for name, e in fused.items()
+        },
+        "sources": [{"parameter": e.name, **entry(e)} for e in said],
+    }
+    for kind, each in found.items():
+        outside = judged(each)
+        covariance = each.fit.covariance
+        spread = np.sqrt(np.diag(covariance))
+        report[kind] = {
+            "driven_by": each.model.driver,
+            "seconds": each.windows.count * 0.4,
+            "unknowns": [
+                {"name": u.name, "found": float(x), "sigma": float(s)}
+                for u, x, s in zip(each.model.unknowns, each.fit.p, each.sigma, strict=True)
+            ],
+            "correlation": (covariance / np.outer(spread, spread)).round(3).tolist(),
+            "nuisances": nuisances(each),
+            "noise": each.fit.noise,
+            "iterations": each.fit.iterations,
+            "refused": [str(refusal) for refusal in each.refusals],
+            "held_out": {
+                name: {
+                    "seconds": outside.time[[12, 25, 50, 100]].tolist(),
+                    "before": outside.before[name][[12, 25, 50, 100]].tolist(),
+                    "after": outside.after[name][[12, 25, 50, 100]].tolist(),
+                }
+                for name in outside.before
+            },
+        }
+    return report
+
+
+def _table(base: Vehicle, fused: "dict[str, Estimate]") -> Table:
+    table = Table("parameter", "file", "identified", "sigma", "source", box=None, header_style="bold", pad_edge=False)
+    for name, e in fused.items():
+        own = np.atleast_1d(np.asarray(getattr(base, name), float))
+        for i, (before, value, sigma) in enumerate(
+            zip(own.flat, np.atleast_1d(e.value).flat, np.atleast_1d(e.sigma).flat, strict=True)
+        ):
+            if np.isfinite(value):
+                label = name if own.size == 1 else f"{name}[{i}]"
+                table.add_row(
+                    label,
+                    f"{before:.4g}",
+                    f"{value:.4g}",
+                    f"{100 * sigma / abs(value):.2g} %" if value else f"{sigma:.2g}",
+                    e.source,
+                )
+    return table

@@ -1,0 +1,275 @@
+"""Is a flight fit to learn from? Units, ranges, order of the rotors, clocks, duplicates: each refused by its name."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+
+from e2efly.identification.record import KINDS, Record, Stream
+from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import GRAVITY
+
+LIMITS = {
+    "position": 1e4, "velocity": 100.0, "quaternion": 1.01, "body_rate": 60.0, "specific_force": 300.0,
+    "rotor_speed": 1e4, "motor": 1.05, "command": 300.0, "voltage": 100.0,
+}  # fmt: skip
+"""The largest size of a number that a quadrotor's log can hold, in the stream's unit."""
+LOST = 1e-3
+"""Share of a stream that may lie outside, as single wrong samples, and is left out."""
+DRIFT = 0.02
+"""Change of the offset between two clocks over a flight from which on it is refused, s."""
+AGREE = 0.7
+"""Correlation of two streams of the same motion that counts as seeing it."""
+_GRID = 0.005
+
+
+def checked(records: Sequence[Record], vehicle: Vehicle) -> list[Record]:
+    """The flights, cut down to what can be used; what was cut is in their notes.
+
+    Args:
+        records: as read.
+        vehicle: for the geometry of its rotors.
+
+    Raises:
+        ValueError: naming the file, what is wrong with it, and what is accepted.
+    """
+    seen: dict[str, Record] = {}
+    found = []
+    for record in records:
+        digest = _digest(record)
+        if digest in seen:
+            raise ValueError(
+                f"{record.path}: holds the same numbers as {seen[digest].path}; accepted: each flight once"
+            )
+        seen[digest] = record
+        record = _within_limits(record)
+        _check_constant(record)
+        _check_units(record)
+        record = _in_the_air(record, vehicle)
+        _check_rotors(record, vehicle)
+        found.append(_on_one_clock(record))
+    return found
+
+
+def _digest(record: Record) -> str:
+    parts = hashlib.sha256()
+    for name in sorted(record.streams):
+        parts.update(name.encode())
+        parts.update(np.ascontiguousarray(record.streams[name].values).tobytes())
+    return parts.hexdigest()
+
+
+def _within_limits(record: Record) -> Record:
+    streams, notes = {}, list(record.notes)
+    for name, stream in record.streams.items():
+        bad = np.any(np.abs(stream.values) > LIMITS[name], axis=1)
+        if name == "quaternion":
+            bad |= np.abs(np.linalg.norm(stream.values, axis=1) - 1) > 0.02
+        if name in ("motor", "rotor_speed"):
+            bad |= np.any(stream.values < -0.05 * LIMITS[name], axis=1)
+        if bad.mean() > LOST:
+            worst = float(np.max(np.abs(stream.values)))
+            raise ValueError(
+                f"{record.path}: {name} is up to {worst:.4g} {KINDS[name].unit}, and beyond what a quadrotor can do in "
+                f"{100 * bad.mean():.2g} % of its samples; accepted: up to {LIMITS[name]:g} {KINDS[name].unit} "
+                "(are the units "
+                "right? Splines through gaps overshoot like this, too)"
+            )
+        if bad.any():
+            notes.append(f"{int(bad.sum())} samples of {name} that no quadrotor reaches are left out")
+        streams[name] = Stream(stream.time[~bad], stream.values[~bad])
+    return replace(record, streams=streams, notes=tuple(notes))
+
+
+def _check_constant(record: Record) -> None:
+    for name in ("body_rate", "specific_force", "rotor_speed", "motor", "velocity", "quaternion"):
+        if not record.has(name):
+            continue
+        spread = np.ptp(record.streams[name].values, axis=0)
+        if np.any(spread == 0):
+            column = KINDS[name].columns[int(np.argmin(spread))]
+            raise ValueError(
+                f"{record.path}: {column} of {name} never changes; accepted: what was measured in flight, or a log "
+                "without "
+                f"{name}"
+            )
+
+
+def _check_units(record: Record) -> None:
+    if record.has("specific_force"):
+        size = float(np.median(np.linalg.norm(record.streams["specific_force"].values, axis=1)))
+        if not 0.5 * GRAVITY < size < 2 * GRAVITY:
+            guess = "g" if 0.5 < size < 2 else "mm/s^2" if size > 2000 else "another unit, or without gravity"
+            raise ValueError(
+                f"{record.path}: specific_force has a median size of {size:.3g}, where gravity is {GRAVITY} m/s^2: it "
+                "looks "
+                f"like {guess}; accepted: m/s^2, with gravity (--columns az=THEIRS*9.81)"
+            )
+    if record.has("body_rate", "quaternion"):
+        told, true = _rates(record)
+        slope = float(np.sum(told * true) / max(np.sum(true**2), 1e-12))
+        if np.std(true) > 0.1 and (slope > 20 or 0 < slope < 0.05):
+            unit = "deg/s" if slope > 20 else "another unit"
+            raise ValueError(
+                f"{record.path}: body_rate is {slope:.3g} times what the attitude turns by: it looks like {unit}; "
+                "accepted: rad/s"
+            )
+
+
+def _in_the_air(record: Record, vehicle: Vehicle) -> Record:
+    """Cut away what lies before take-off and after landing.
+
+    In the air the motors turn; where nothing says so, the accelerometer is not quiet.
+    """
+    hover = vehicle.hover_rotor_speed
+    if record.has("rotor_speed"):
+        stream, flying = record.streams["rotor_speed"], record.streams["rotor_speed"].values.mean(1) > 0.5 * hover
+    elif record.has("motor"):
+        stream = record.streams["motor"]
+        flying = stream.values.mean(1) > 0.15
+    elif record.has("position"):
+        stream = record.streams["position"]
+        flying = stream.values[:, 2] > np.quantile(stream.values[:, 2], 0.02) + 0.1
+    else:
+        return record
+    if not flying.any():
+        raise ValueError(f"{record.path}: never leaves the ground; accepted: a flight")
+    if flying.mean() > 0.98:
+        return record
+    edges = np.diff(np.concatenate([[0], flying.astype(int), [0]]))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    # moments of low thrust, as in a fall, are part of a flight
+    spans = [[stream.time[s], stream.time[e]] for s, e in zip(starts, ends, strict=True)]
+    joined = [spans[0]]
+    for span in spans[1:]:
+        if span[0] - joined[-1][1] < 0.5:
+            joined[-1][1] = span[1]
+        else:
+            joined.append(span)
+    start, end = max(joined, key=lambda s: s[1] - s[0])
+    if end - start < 2.0:
+        raise ValueError(f"{record.path}: is in the air for {end - start:.1f} s at a time; accepted: 2 s or more")
+    start, end = start + 0.5, end - 0.5  # neither the ground's effect nor the landing
+    note = f"used from {start - record.span[0]:.1f} to {end - record.span[0]:.1f} s, when it is in the air"
+    return replace(record.during(start, end), notes=(*record.notes, note))
+
+
+def _check_rotors(record: Record, vehicle: Vehicle) -> None:
+    """The rotors' order and spin, by what their torques do to the body rates."""
+    name = "rotor_speed" if record.has("rotor_speed") else "motor" if record.has("motor") else ""
+    if not name or not record.has("body_rate"):
+        return
+    rate, rotors = record.streams["body_rate"], record.streams[name]
+    grid = np.arange(max(rate.time[0], rotors.time[0]), min(rate.time[-1], rotors.time[-1]), _GRID)
+    if len(grid) < 200:
+        return
+    w = _smooth(np.stack([np.interp(grid, rate.time, x) for x in rate.values.T], -1))
+    thrust = np.stack([np.interp(grid, rotors.time, x) for x in rotors.values.T], -1)
+    thrust = _smooth(thrust**2 if name == "rotor_speed" else thrust)
+    turn = np.gradient(w, _GRID, axis=0)[:, :2]
+    x, y = vehicle.rotor_position.T
+
+    def seen(order: tuple[int, ...]) -> np.ndarray:
+        torque = np.stack([thrust[:, order] @ y, -thrust[:, order] @ x], -1)
+        return np.array([_correlation(torque[:, i], turn[:, i]) for i in range(2)])
+
+    usual = seen((0, 1, 2, 3))
+    if np.all(usual > 0.1):
+        return
+    best = max(permutations(range(4)), key=lambda order: float(seen(order).sum()))
+    if np.all(seen(best) > np.maximum(0.3, usual - 0.1)):
+        listed = ", ".join(KINDS[name].columns[i] for i in best)
+        raise ValueError(
+            f"{record.path}: {name} does not turn the vehicle as its geometry says; the columns fit it in the order "
+            f"{listed}; "
+            f"accepted: rear right, front right, rear left, front left"
+        )
+
+
+def _on_one_clock(record: Record) -> Record:
+    """Move the poses by the offset of their clock; a clock that runs apart within the flight is refused."""
+    if not record.has("body_rate", "quaternion"):
+        return record
+    start, end = record.span
+    thirds = [_offset(record.during(a, a + (end - start) / 3)) for a in (start, end - (end - start) / 3)]
+    whole = _offset(record)
+    if whole is None:
+        return record
+    known = [x for x in thirds if x is not None]
+    if len(known) == 2 and abs(known[1] - known[0]) > DRIFT:
+        raise ValueError(
+            f"{record.path}: the poses are {1e3 * known[0]:.0f} ms behind the gyroscope at first and "
+            f"{1e3 * known[1]:.0f} ms "
+            f"at the end: their clocks run apart; accepted: {1e3 * DRIFT:g} ms over a flight"
+        )
+    if abs(whole) < 1e-3:
+        return record
+    poses = {
+        k: Stream(s.time - whole, s.values)
+        for k, s in record.streams.items()
+        if k in ("position", "velocity", "quaternion")
+    }
+    note = f"poses are moved by {-1e3 * whole:.0f} ms onto the gyroscope's clock"
+    return replace(record, streams={**record.streams, **poses}, notes=(*record.notes, note))
+
+
+def _offset(record: Record) -> float | None:
+    """Seconds by which the poses come after the gyroscope; None where they see no common motion."""
+    if not record.has("body_rate", "quaternion"):
+        return None
+    told, true = _rates(record)
+    if len(told) < 100 or np.std(true) < 0.05:
+        return None
+    reach = round(0.2 / _GRID)
+    scores = []
+    for shift in range(-reach, reach + 1):
+        a = told[max(-shift, 0) : len(told) - max(shift, 0)]
+        b = true[max(shift, 0) : len(true) - max(-shift, 0)]
+        scores.append(np.mean([_correlation(a[:, i], b[:, i]) for i in range(3)]))
+    i = int(np.argmax(scores))
+    if scores[i] < AGREE:
+        return None
+    part = 0.0
+    if 0 < i < len(scores) - 1:
+        left, middle, right = scores[i - 1 : i + 2]
+        bend = left - 2 * middle + right
+        part = 0.5 * (left - right) / bend if bend < 0 else 0.0
+    return (i - reach + part) * _GRID
+
+
+def _rates(record: Record) -> tuple[np.ndarray, np.ndarray]:
+    """Body rates by the gyroscope and by the attitude's derivative, smoothed, on one grid, (n, 3)."""
+    gyro, pose = record.streams["body_rate"], record.streams["quaternion"]
+    grid = np.arange(max(gyro.time[0], pose.time[0]), min(gyro.time[-1], pose.time[-1]), _GRID)
+    if len(grid) < 3:
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    told = np.stack([np.interp(grid, gyro.time, x) for x in gyro.values.T], -1)
+    q = np.stack([np.interp(grid, pose.time, x) for x in _continuous(pose.values).T], -1)
+    q = _smooth(q / np.linalg.norm(q, axis=1, keepdims=True))
+    dq = np.gradient(q, _GRID, axis=0)
+    w, x, y, z = q.T
+    dw, dx, dy, dz = dq.T
+    true = 2 * np.stack(
+        [w * dx - x * dw - y * dz + z * dy, w * dy + x * dz - y * dw - z * dx, w * dz - x * dy + y * dx - z * dw], -1
+    )
+    return _smooth(told), true
+
+
+def _continuous(q: np.ndarray) -> np.ndarray:
+    """The same attitudes by quaternions that do not change their sign from one to the next."""
+    flips = np.where(np.sum(q[1:] * q[:-1], axis=1) < 0, -1.0, 1.0)
+    return q * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
+
+
+def _smooth(x: np.ndarray) -> np.ndarray:
+    kernel = np.hanning(9)[1:-1]
+    kernel /= kernel.sum()
+    return np.stack([np.convolve(column, kernel, "same") for column in x.T], -1)
+
+
+def _correlation(a: np.ndarray, b: np.ndarray) -> float:
+    a, b = a - a.mean(), b - b.mean()
+    size = np.sqrt(np.sum(a**2) * np.sum(b**2))
+    return float(np.sum(a * b) / size) if size > 0 else 0.0

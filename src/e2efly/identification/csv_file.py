@@ -1,0 +1,151 @@
+"""Flights as CSV files: the columns of `KINDS`, any subset of them, in any order, empty where nothing was measured."""
+
+import csv
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from e2efly.identification.record import KINDS, Record, Stream
+from e2efly.vehicles.names import unknown
+
+TIME = "t"
+"""The column of the time, s."""
+DIGITS = 9
+"""Of the times that are written: nanoseconds."""
+COLUMNS = (TIME, *(name for kind in KINDS.values() for name in kind.columns))
+"""All that are known."""
+
+
+class Column(NamedTuple):
+    """Where one of our columns is in a file of other names."""
+
+    theirs: str
+    factor: float
+
+
+def column_map(given: Iterable[str]) -> dict[str, Column]:
+    """Of entries `ours=theirs` or `ours=theirs*factor`.
+
+    Raises:
+        ValueError: for an entry of another form, and for a column of ours that does not exist.
+    """
+    found: dict[str, Column] = {}
+    for entry in given:
+        ours, equals, rest = entry.partition("=")
+        theirs, _, factor = rest.rpartition("*") if "*" in rest else (rest, "", "1")
+        try:
+            scale = float(factor)
+        except ValueError:
+            scale = math.nan
+        if not equals or not theirs or not math.isfinite(scale) or scale == 0:
+            raise ValueError(f"--columns is {entry!r}; accepted: OURS=THEIRS or OURS=THEIRS*FACTOR, as az=acc_z*9.81")
+        if ours not in COLUMNS:
+            raise ValueError(f"--columns is {entry!r}: {unknown('column', ours, COLUMNS)}")
+        if ours in found:
+            raise ValueError(f"--columns names {ours!r} twice; accepted: once")
+        found[ours] = Column(theirs, scale)
+    return found
+
+
+def read_csv(path: Path, columns: Mapping[str, Column] | None = None) -> Record:
+    """Read a flight, line by line.
+
+    Args:
+        path: a file with a header.
+        columns: names of theirs for ours; columns that are not in it go by our names.
+
+    Raises:
+        ValueError: naming the file, the line or the column, what is there and what is accepted.
+    """
+    columns = columns or {}
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            lines = csv.reader(file)
+            header = [name.strip() for name in next(lines, [])]
+            places = _places(path, header, columns)
+            table = np.fromiter(_numbers(path, lines, len(header), places), (np.float64, len(places)))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{path}: {error}; accepted: a CSV file with a header") from None
+    if len(table) < 2:
+        raise ValueError(f"{path}: has {len(table)} lines of numbers; accepted: two or more")
+    factor = np.array([columns[name].factor if name in columns else 1.0 for name in places])
+    numbers = dict(zip(places, (table * factor).T, strict=True))
+    time = numbers[TIME]
+    if not np.all(np.diff(time) > 0):
+        at = int(np.argmin(np.diff(time) > 0)) + 3
+        raise ValueError(f"{path}: line {at}: t does not rise; accepted: rising times, s")
+    streams = {}
+    for name, kind in KINDS.items():
+        if kind.columns[0] not in numbers:
+            continue
+        values = np.stack([numbers[column] for column in kind.columns], -1)
+        there = np.isfinite(values).all(-1)
+        if there.any():
+            streams[name] = Stream(time[there], values[there])
+    return Record(path, streams)
+
+
+def write_csv(record: Record, path: Path) -> None:
+    """Write a flight in our columns; a line for each time of any stream."""
+    times = np.unique(np.concatenate([stream.time for stream in record.streams.values()]).round(DIGITS))
+    names, columns = [TIME], [times]
+    for name, kind in KINDS.items():
+        if name in record.streams:
+            stream = record.streams[name]
+            values = np.full((len(times), len(kind.columns)), np.nan)
+            values[np.searchsorted(times, stream.time.round(DIGITS))] = stream.values
+            names += kind.columns
+            columns += list(values.T)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        lines = csv.writer(file)
+        lines.writerow(names)
+        for row in zip(*columns, strict=True):
+            lines.writerow([f"{row[0]:.{DIGITS}f}", *("" if math.isnan(x) else f"{x:.8g}" for x in row[1:])])
+
+
+def _places(path: Path, header: list[str], columns: Mapping[str, Column]) -> dict[str, int]:
+    """The place of each of our columns in a line."""
+    if len(set(header)) < len(header):
+        twice = next(name for name in header if header.count(name) > 1)
+        raise ValueError(f"{path}: has two columns {twice!r}; accepted: each name once")
+    found = {}
+    for ours in COLUMNS:
+        theirs = columns[ours].theirs if ours in columns else ours
+        if theirs in header:
+            found[ours] = header.index(theirs)
+        elif ours in columns:
+            raise ValueError(f"{path}: --columns says that {ours} is {unknown('column', theirs, header)}")
+    if TIME not in found:
+        raise ValueError(f"{path}: has no column 't'; accepted: times in s in a column t, or --columns t=THEIRS")
+    for kind in KINDS.values():
+        there = [name for name in kind.columns if name in found]
+        if there and len(there) < len(kind.columns):
+            missing = next(name for name in kind.columns if name not in found)
+            raise ValueError(
+                f"{path}: has the column {there[0]} but not {missing}; accepted: {', '.join(kind.columns)}"
+            )
+    if len(found) == 1:
+        raise ValueError(f"{path}: knows none of the columns {', '.join(header)}; accepted: {', '.join(COLUMNS)}")
+    return found
+
+
+def _numbers(path: Path, lines: Iterable[list[str]], width: int, places: Mapping[str, int]) -> Iterable[list[float]]:
+    for number, line in enumerate(lines, 2):
+        if len(line) != width:
+            raise ValueError(f"{path}: line {number} has {len(line)} entries; accepted: {width}, as the header")
+        row = []
+        for name, place in places.items():
+            entry = line[place].strip()
+            try:
+                value = float(entry) if entry else math.nan
+            except ValueError:
+                raise ValueError(
+                    f"{path}: line {number}: {name} is {entry!r}; accepted: a number, or nothing"
+                ) from None
+            if math.isinf(value) or (name == TIME and math.isnan(value)):
+                raise ValueError(f"{path}: line {number}: {name} is {entry!r}; accepted: a finite number")
+            row.append(value)
+        yield row

@@ -1,0 +1,214 @@
+"""What flights say of a vehicle: streams are checked, cut into windows, and explained by multiple shooting."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from e2efly.identification.estimate import Estimate
+from e2efly.identification.model import NUISANCES, UNKNOWNS, Model, Unknown
+from e2efly.identification.record import Record
+from e2efly.identification.shooting import Fit, fit
+from e2efly.identification.windows import LENGTH, REACH, Windows, cut, join
+from e2efly.vehicles import Vehicle
+
+SHOWN = 0.5
+"""Part of the prior's standard deviation above which the flights have said nothing of an unknown."""
+EXACT = {"latency": 0.02, "drag": 0.5}
+"""Standard deviation above which an unknown is not taken over, s or relative; of all others ..."""
+EXACT_ELSE = 0.15
+STRUCTURE = {"thrust_map": 0.002, "inertia": 0.004, "rate_gain": 0.01, "motor_time_constant": 0.004, "latency": 3e-4}
+"""Spread of what is found over models that differ in what no log shows: how often the flight controller acts, how the
+accelerometer is filtered; s of the delay, else relative."""
+HELD_OUT = 5
+"""One window of so many is kept out of the fit, for the judgement."""
+LEAST = 10
+"""Windows that a fit needs."""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """An unknown that these flights do not give."""
+
+    unknown: Unknown
+    sigma: float
+    """Standard deviation after the fit, s or relative."""
+
+    def __str__(self) -> str:
+        unit = " s" if self.unknown.field == "latency" else ""
+        how = f"+- {self.sigma:.2g}{unit}" if unit else f"+- {100 * self.sigma:.0f} %"
+        return f"{self.unknown.name} is not taken from the flights ({how}); fly: {self.unknown.fly}"
+
+
+@dataclass(frozen=True)
+class Found:
+    """What flights said."""
+
+    model: Model
+    fit: Fit
+    windows: Windows
+    """All of them."""
+    held_out: np.ndarray
+    """Which of them the fit did not see."""
+    estimates: list[Estimate]
+    refusals: list[Refusal]
+    sigma: np.ndarray
+    """(u,) of the unknowns; what is believed of the fit's."""
+    notes: tuple[str, ...] = field(default=())
+
+    def drag_at(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
+        """Drag along each axis at a speed, m/s, and its standard deviation, (3,) N.
+
+        A flight tells drag at its own speeds better than how it divides into a linear and a quadratic part.
+        """
+        covariance = _whole_covariance(self.fit, self.sigma)
+        value, sigma = np.zeros(3), np.zeros(3)
+        for axis in range(3):
+            slope = np.zeros(len(self.fit.p))
+            for power, name in ((1, "drag_linear"), (2, "drag_quadratic")):
+                part = float(getattr(self.model.base, name)[axis]) * speed**power
+                for i, unknown in enumerate(self.model.unknowns):
+                    if unknown.field == name and axis in unknown.entries:
+                        part *= float(np.exp(self.fit.p[i]))
+                        slope[i] = part
+                value[axis] += part
+            sigma[axis] = np.sqrt(slope @ covariance @ slope)
+        return value, sigma
+
+
+def _whole_covariance(found: Fit, sigma: np.ndarray) -> np.ndarray:
+    """The believed standard deviations with the fit's correlations."""
+    spread = np.sqrt(np.diag(found.covariance))
+    return found.covariance / np.outer(spread, spread) * np.outer(sigma, sigma)
+
+
+def driver_of(records: Sequence[Record], step: bool = False) -> str:
+    """The stream that drives the simulation of these flights.
+
+    Raises:
+        ValueError: naming the flight that has none of them.
+    """
+    wanted = ("command",) if step else ("command", "rotor_speed", "motor")
+    if not step and all(record.has("motor") and not record.has("rotor_speed") for record in records):
+        wanted = ("motor",)
+    for name in wanted:
+        if all(record.has(name) for record in records):
+            return name
+    lacking = next(r for r in records if not any(r.has(name) for name in wanted))
+    raise ValueError(
+        f"{lacking.path}: has the streams {', '.join(lacking.streams) or 'none'}; accepted: "
+        f"{' or '.join(wanted)} in every flight, besides body_rate"
+    )
+
+
+def identify(
+    vehicle: Vehicle,
+    records: Sequence[Record],
+    *,
+    believed: Vehicle | None = None,
+    step: bool = False,
+    told: Callable[[int, float], None] = lambda i, cost: None,
+) -> Found:
+    """Find what flights say of a vehicle.
+
+    Args:
+        vehicle: what is known of it. Thrust, inertia and drag are found over its mass.
+        records: of the flights.
+        believed: the vehicle in which the flight controller of the flights believed; left out: `vehicle`.
+        step: look for delay and rate loop alone, which steps of body rate show.
+        told: (iteration, cost) after each of the fit's.
+
+    Raises:
+        ValueError: naming the flight and what it lacks.
+    """
+    driver = driver_of(records, step)
+    parts = []
+    for number, record in enumerate(records):
+        if not record.has("body_rate"):
+            raise ValueError(f"{record.path}: has no body_rate; accepted: a flight with a gyroscope in its log")
+        if record.duration < REACH + 3 * LENGTH:
+            raise ValueError(
+                f"{record.path}: lasts {record.duration:.2f} s; accepted: {REACH + 3 * LENGTH:g} s or more"
+            )
+        seen = (
+            record
+            if not step
+            else dataclasses.replace(
+                record, streams={k: s for k, s in record.streams.items() if k in ("command", "body_rate")}
+            )
+        )
+        parts.append(cut(seen, driver, number))
+    windows = join(parts)
+    if windows.count < LEAST:
+        raise ValueError(
+            f"{records[0].path}: {windows.count * LENGTH:.1f} s of flight without gaps; accepted: {LEAST * LENGTH:g} s "
+            "or more"
+        )
+    only = tuple(u.name for u in UNKNOWNS if u.field in ("rate_gain", "latency")) if step else ()
+    model = Model.of(vehicle, driver, believed, only)
+    held_out = np.arange(windows.count) % HELD_OUT == HELD_OUT - 1
+    found = fit(model, windows.some(~held_out), _best_delay(model, windows.some(~held_out)), told=told)
+    sigma = sigmas(model, found)
+    estimates, refusals = _estimates(model, found, sigma, records)
+    return Found(model, found, windows, held_out, estimates, refusals, sigma)
+
+
+def sigmas(model: Model, found: Fit) -> np.ndarray:
+    """Standard deviations of the unknowns: the larger of the windows' spread and of what white noise would leave, and
+    in squares over it what the model itself may be off by (`STRUCTURE`).
+    """
+    noise = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
+    return np.hypot(noise, [STRUCTURE.get(u.field, 0.0) for u in model.unknowns])
+
+
+def _best_delay(model: Model, windows: Windows) -> np.ndarray:
+    """A start of the fit: the delay that explains the body rates best, the rest by the file."""
+    from e2efly.identification.shooting import cost
+
+    names = [u.name for u in model.unknowns]
+    p = np.zeros(len(names))
+    if "latency" not in names:
+        return p
+    own = float(model.base.latency)
+    tries = np.arange(0.0, 0.16, 0.01) - own
+    some = windows.some(np.linspace(0, windows.count - 1, min(windows.count, 64)).astype(int))
+    costs = []
+    for late in tries:
+        q = p.copy()
+        q[names.index("latency")] = late
+        costs.append(cost(model, some, q))
+    p[names.index("latency")] = tries[int(np.argmin(costs))]
+    return p
+
+
+def _estimates(
+    model: Model, found: Fit, sigma: np.ndarray, records: Sequence[Record]
+) -> tuple[list[Estimate], list[Refusal]]:
+    """By field of the vehicle; what the flights do not say is left to the file."""
+    source = f"{', '.join(r.path.name for r in records)}; flight"
+    values: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    refusals = []
+    for unknown, x, off in zip(model.unknowns, found.p, sigma, strict=True):
+        limit = next((v for name, v in EXACT.items() if unknown.field.startswith(name)), EXACT_ELSE)
+        if off > min(limit, SHOWN * unknown.prior):
+            refusals.append(Refusal(unknown, float(off)))
+            continue
+        if not unknown.field:
+            continue
+        base = np.asarray(getattr(model.base, unknown.field), float)
+        value, spread = values.setdefault(unknown.field, (np.full(base.shape, np.nan), np.full(base.shape, np.nan)))
+        at = list(unknown.entries) if unknown.entries else ...
+        if unknown.field == "latency":
+            value[at], spread[at] = base + x, off
+        else:
+            value[at], spread[at] = base[at] * np.exp(x), np.abs(base[at]) * np.exp(x) * off
+        if unknown.field == "thrust_map":  # the largest thrust grows with the map
+            top = float(model.base.rotor_thrust_max) * np.exp(x)
+            values["rotor_thrust_max"] = np.array(top), np.array(top * off)
+    return [Estimate(name, value, spread, source) for name, (value, spread) in values.items()], refusals
+
+
+def nuisances(found: Found) -> list[dict[str, float]]:
+    """Of each flight, by name."""
+    return [dict(zip((name for name, _ in NUISANCES), map(float, q), strict=True)) for q in found.fit.q]

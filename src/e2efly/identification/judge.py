@@ -1,0 +1,71 @@
+"""How much better the identified vehicle foretells what it has not seen: open loop, old against new."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from e2efly.identification.flight import Found
+from e2efly.identification.model import NUISANCES, START, attitude_error, simulate
+from e2efly.identification.shooting import measured_starts
+from e2efly.identification.windows import STEP
+
+UNITS = {
+    "body_rate": "rad/s", "specific_force": "m/s^2", "rotor_speed": "rad/s", "velocity": "m/s", "quaternion": "rad",
+    "position": "m",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Windows that the fit did not see, simulated from their measured starts."""
+
+    time: np.ndarray
+    """(m + 1,) s from a window's start."""
+    before: dict[str, np.ndarray]
+    """By stream, (m + 1,): root mean square of what the file's vehicle gets wrong after that time."""
+    after: dict[str, np.ndarray]
+    """The same of the identified one."""
+    measured: dict[str, np.ndarray]
+    """By stream, (n, m + 1, k)."""
+    old: dict[str, np.ndarray]
+    new: dict[str, np.ndarray]
+
+
+def judged(found: Found) -> Prediction:
+    """Foretell the windows that were held out."""
+    windows = found.windows.some(found.held_out)
+    model, p = found.model, found.fit.p
+    with jax.enable_x64(True):
+        data = measured_starts(model, windows)
+
+        def seen(p: Any, q: np.ndarray) -> dict[str, np.ndarray]:
+            def one(data: dict[str, Any], q: Any) -> dict[str, Any]:
+                return simulate(model, p, q, jnp.zeros(START), data)
+
+            return jax.tree.map(np.asarray, jax.jit(jax.vmap(one))(data, q))
+
+        still = np.zeros((windows.count, len(NUISANCES)))
+        old, new = seen(np.zeros(len(p)), still), seen(p, found.fit.q[windows.flight])
+
+    def wrong(guess: dict[str, np.ndarray], name: str) -> np.ndarray:
+        there = windows.there[name] > 0
+        if name == "quaternion":
+            quiet = np.where(there[..., None], windows.measured[name], [1.0, 0, 0, 0])
+            left = np.asarray(attitude_error(jnp.asarray(quiet), jnp.asarray(guess[name])))
+        else:
+            left = guess[name] - windows.measured[name]
+        square = np.where(there, np.sum(left**2, -1), np.nan)
+        with np.errstate(invalid="ignore"):
+            count = np.maximum(np.sum(there, 0), 1)
+        return np.sqrt(np.nansum(square, 0) / count)
+
+    names_there = [name for name in windows.measured if windows.there[name].any()]
+    return Prediction(
+        np.arange(windows.steps + 1) * STEP,
+        {name: wrong(old, name) for name in names_there},
+        {name: wrong(new, name) for name in names_there},
+        windows.measured, old, new,
+    )  # fmt: skip

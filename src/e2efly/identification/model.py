@@ -1,0 +1,244 @@
+"""What a window of a flight should have looked like: the vehicle's parameters to be found, simulated by our physics."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from e2efly.control import COMMAND_MODES, Vec3
+from e2efly.control.vectors import Quat
+from e2efly.identification.windows import STEP, past_steps
+from e2efly.physics.body import drag, rotor_speed_for, rotor_thrust, rotor_wrench
+from e2efly.physics.control import control_law
+from e2efly.physics.integrate import INTEGRATORS
+from e2efly.physics.mixer import Mixer
+from e2efly.physics.plant import Plant
+from e2efly.physics.state import Parts, State, split4
+from e2efly.vehicles import Vehicle
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number that the fit looks for; zero is the vehicle's file."""
+
+    name: str
+    field: str
+    """Of the vehicle; empty for what belongs to the flight."""
+    entries: tuple[int, ...]
+    """Of the field, that it moves together; empty: all."""
+    prior: float
+    """Standard deviation of what it may be off by, before any flight: of the logarithm, or, of a delay, s."""
+    drivers: tuple[str, ...]
+    """Whether it shows at all, by what drives the vehicle."""
+    fly: str
+    """What to fly and to log, where it cannot be found."""
+
+
+_ALL = ("command", "motor", "rotor_speed")
+_RATES = "doublets of body rate about this axis, with rotor speeds or motor outputs in the log"
+_FAST = "fast straight flight (5 m/s and more), with velocity and attitude in the log"
+_CLIMB = "changes of thrust between half and twice of hover, with the accelerometer in the log"
+_YAW = "steps of yaw rate, with rotor speeds or motor outputs in the log"
+_STEPS = "steps of thrust and body rate, logged at 200 Hz or more, with the times at which commands were sent"
+UNKNOWNS: tuple[Unknown, ...] = (
+    Unknown("thrust", "thrust_map", (), 0.5, _ALL, _CLIMB),
+    Unknown("torque_ratio", "torque_ratio", (), 0.5, _ALL, _YAW),
+    Unknown("inertia_x", "inertia", (0,), 0.5, _ALL, _RATES),
+    Unknown("inertia_y", "inertia", (1,), 0.5, _ALL, _RATES),
+    Unknown("inertia_z", "inertia", (2,), 0.5, _ALL, _RATES),
+    Unknown("motor_time_constant", "motor_time_constant", (), 0.7, ("command", "motor"), _STEPS),
+    Unknown("drag_linear_xy", "drag_linear", (0, 1), 1.0, _ALL, _FAST),
+    Unknown("drag_linear_z", "drag_linear", (2,), 1.0, _ALL, _FAST),
+    Unknown("drag_quadratic_xy", "drag_quadratic", (0, 1), 1.0, _ALL, _FAST),
+    Unknown("drag_quadratic_z", "drag_quadratic", (2,), 1.0, _ALL, _FAST),
+    Unknown("rate_gain_x", "rate_gain", (0,), 0.7, ("command",), _RATES),
+    Unknown("rate_gain_y", "rate_gain", (1,), 0.7, ("command",), _RATES),
+    Unknown("rate_gain_z", "rate_gain", (2,), 0.7, ("command",), _RATES),
+    Unknown("motor_curve", "", (), 0.3, ("motor",), _CLIMB),
+    Unknown("latency", "latency", (), 0.05, ("command", "motor"), _STEPS),
+)  # fmt: skip
+"""Of the vehicle. Each is the logarithm of a factor on the file's value, but for what is added: the delay, s, and the
+curve of the motors, the part of the thrust that rises with the square of the output."""
+NUISANCES: tuple[tuple[str, float], ...] = (
+    ("gyro_x", 0.05), ("gyro_y", 0.05), ("gyro_z", 0.05), ("force_x", 0.5), ("force_y", 0.5), ("force_z", 0.3),
+    ("pose_delay", 0.05), ("tilt_x", 0.03), ("tilt_y", 0.03), ("sag", 0.1), ("flight_thrust", 0.03),
+)  # fmt: skip
+"""Of each flight, with the standard deviation of their priors: biases of gyroscope (rad/s) and accelerometer (m/s^2),
+delay of the pose source (s), tilt of its body's axes (rad), share of the thrust lost by the end, and, of several
+flights, the logarithm of the factor on the thrust of this one."""
+START = 16
+"""Numbers of a window's start: position, velocity, attitude, body rate, rotor speeds (as a share of hover's)."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Model:
+    """What is known before the fit, and what drives the vehicle."""
+
+    base: Vehicle
+    """At whose values the unknowns are zero."""
+    believed: Vehicle
+    """In which the flight controller of the flights believes."""
+    mixer: Mixer
+    """That of the flight controller."""
+    hover: float | Array
+    """rad/s."""
+    driver: str = dataclasses.field(metadata={"static": True})
+    names: tuple[str, ...] = dataclasses.field(metadata={"static": True})
+    """Of the unknowns that are looked for."""
+
+    @staticmethod
+    def of(vehicle: Vehicle, driver: str, believed: Vehicle | None = None, only: tuple[str, ...] = ()) -> "Model":
+        """Of loaded vehicles.
+
+        Args:
+            vehicle: what is known of what flies.
+            driver: the stream that drives it.
+            believed: in which its flight controller believes; left out: the same.
+            only: names of unknowns; left out: all that can show.
+        """
+        believed = vehicle if believed is None else believed
+        base, told = (jax.tree.map(lambda x: np.asarray(x, np.float64), v) for v in (vehicle, believed))
+        names = tuple(u.name for u in UNKNOWNS if _shows(u, base, driver) and (not only or u.name in only))
+        return Model(base, told, Mixer.of(believed, np.float64), vehicle.hover_rotor_speed, driver, names)
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """What is looked for."""
+        return tuple(u for u in UNKNOWNS if u.name in self.names)
+
+
+def _shows(unknown: Unknown, base: Vehicle, driver: str) -> bool:
+    """A factor on nothing shows nothing."""
+    if driver not in unknown.drivers:
+        return False
+    return unknown.field in ("", "latency") or bool(np.any(_entries(base, unknown) != 0))
+
+
+def _entries(vehicle: Vehicle, unknown: Unknown) -> np.ndarray:
+    value = np.asarray(getattr(vehicle, unknown.field))
+    return value[list(unknown.entries)] if unknown.entries else value
+
+
+def vehicle_of(model: Model, p: Array) -> Vehicle:
+    """The vehicle at values of its unknowns, (u,)."""
+    changed: dict[str, Any] = {}
+    for unknown, x in zip(model.unknowns, p, strict=True):
+        value = jnp.asarray(changed.get(unknown.field, getattr(model.base, unknown.field)))
+        if not unknown.field:
+            continue
+        if unknown.field == "latency":
+            changed["latency"] = value + x
+        elif unknown.entries:
+            moved = np.isin(np.arange(value.shape[-1]), unknown.entries)
+            changed[unknown.field] = value * jnp.exp(jnp.where(moved, x, 0.0))
+        else:
+            changed[unknown.field] = value * jnp.exp(x)
+    return dataclasses.replace(model.base, **changed)
+
+
+def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, Any]) -> dict[str, Array]:
+    """What the sensors say in a window, by stream, (m + 1, k).
+
+    Args:
+        model: what is simulated.
+        p: unknowns of the vehicle, (u,).
+        q: nuisances of the flight, (len(NUISANCES),).
+        start: of the window: what is added to its measured start, (START,).
+        window: `driven`, `when` and the measured start: position, velocity, quaternion, body_rate, rotor_speed.
+    """
+    vehicle = vehicle_of(model, p)
+    share = jnp.exp(q[10]) * (1 - q[9] * window["when"])
+    plant = Plant.of(vehicle, STEP, jnp.broadcast_to(share, (4,)))
+    first = State(
+        window["position"] + start[:3],
+        window["velocity"] + start[3:6],
+        _turned(window["quaternion"], start[6:9]),
+        window["body_rate"] + start[9:12],
+        window["rotor_speed"] + start[12:16] * model.hover,
+    )
+    acting = _acting(model, vehicle, window["driven"])
+    places = {unknown.name: i for i, unknown in enumerate(model.unknowns)}
+    curve = 0.5 + (p[places["motor_curve"]] if "motor_curve" in places else 0.0)
+    law, integrate = control_law(COMMAND_MODES["ctbr"]), INTEGRATORS["rk3"]
+    controller = dataclasses.replace(model.believed, rate_gain=vehicle.rate_gain)
+
+    def advance(parts: Parts, drive: Array) -> tuple[Parts, Parts]:
+        drives = split4(drive)
+        if model.driver == "rotor_speed":
+            parts = dataclasses.replace(parts, rotor_speed=drives)
+            parts = integrate(plant, parts, drives, None, STEP)
+        elif model.driver == "motor":
+            parts = integrate(plant, parts, _driven_speed(model, drives, curve), None, STEP)
+        else:  # a flight controller acts anew a thousand times a second or more: the mean of start and end of the step
+            at_start = law(controller, model.mixer, parts, drives)
+            at_end = law(controller, model.mixer, integrate(plant, parts, at_start, None, STEP), drives)
+            mean = (
+                0.5 * at_start[0] + 0.5 * at_end[0],
+                0.5 * at_start[1] + 0.5 * at_end[1],
+                0.5 * at_start[2] + 0.5 * at_end[2],
+                0.5 * at_start[3] + 0.5 * at_end[3],
+            )
+            parts = integrate(plant, parts, mean, None, STEP)
+        return parts, parts
+
+    begin = Parts.of(first)
+    if model.driver == "rotor_speed":
+        begin = dataclasses.replace(begin, rotor_speed=split4(acting[0]))
+    _, later = jax.lax.scan(advance, begin, acting)
+    whole = jax.tree.map(lambda a, b: jnp.concatenate([jnp.asarray(a)[None], b]), begin, later)
+    return _sensed(plant, whole, q)
+
+
+def _driven_speed(model: Model, output: tuple[Array, ...], curve: Any) -> Any:
+    """Rotor speeds that motor outputs lead to: thrust rises with the output, and, by the share `curve`, its square."""
+    top = model.mixer.thrust_max
+    a, b, c, d = (jnp.maximum(top * u * ((1 - curve) + curve * jnp.abs(u)), model.mixer.thrust_min) for u in output)
+    return rotor_speed_for(model.base, (a, b, c, d))
+
+
+def _acting(model: Model, vehicle: Vehicle, driven: Array) -> Array:
+    """What acts on average over each step, (m, 4), a latency after it was sent."""
+    delay = 0.0 if model.driver == "rotor_speed" else vehicle.latency
+    steps = driven.shape[0] - 1 - past_steps()
+    place = jnp.maximum(past_steps() + jnp.arange(steps + 1) - delay / STEP, 0.0)
+    below = jnp.clip(jax.lax.stop_gradient(jnp.floor(place)).astype(int), 0, driven.shape[0] - 2)
+    part = (place - below)[:, None]
+    integral = driven[below] * (1 - part) + driven[below + 1] * part
+    return jnp.diff(integral, axis=0) / STEP
+
+
+def _sensed(plant: Plant, parts: Parts, q: Array) -> dict[str, Array]:
+    collective, _ = rotor_wrench(plant, rotor_thrust(plant, parts.rotor_speed))
+    air = drag(plant, parts.attitude.unrotate(parts.velocity))
+    force = Vec3(air.x, air.y, air.z + collective).stack() * plant.specific
+    rate, velocity = parts.body_rate.stack(), parts.velocity.stack()
+    # a pose that is told late is that of a little earlier
+    late = q[6]
+    turn = jnp.stack([q[7], q[8], jnp.zeros_like(q[7])]) - rate * late
+    accelerated = parts.attitude.rotate(Vec3.of(force)).stack() - jnp.array([0.0, 0.0, 9.81])
+    return {
+        "body_rate": rate + q[0:3],
+        "specific_force": force + q[3:6],
+        "rotor_speed": jnp.stack(parts.rotor_speed, -1),
+        "velocity": velocity - accelerated * late,
+        "quaternion": _turned(parts.attitude.stack(), turn),
+        "position": parts.position.stack() - velocity * late,
+    }
+
+
+def _turned(quaternion: Array, angle: Array) -> Array:
+    """An attitude turned by a small angle about its own axes, rad."""
+    half = angle / 2
+    small = jnp.concatenate([jnp.ones_like(half[..., :1]), half], -1)
+    return Quat.of(quaternion).compose(Quat.of(small)).normalized().stack()
+
+
+def attitude_error(measured: Array, simulated: Array) -> Array:
+    """The small angle from one attitude to the other, about body axes, rad, (..., 3)."""
+    away = Quat.of(measured).conjugate().compose(Quat.of(simulated)).stack()
+    return 2 * away[..., 1:] * jnp.where(away[..., :1] < 0, -1.0, 1.0)

@@ -1,0 +1,97 @@
+"""A flight as it was recorded: streams of numbers, each with its own times. SI units, world ENU, body FLU."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One stream that a record may have."""
+
+    columns: tuple[str, ...]
+    """Names of its numbers in a CSV file."""
+    unit: str
+    """Their unit."""
+    what: str
+    """What it is, and its frame."""
+
+
+KINDS: dict[str, Kind] = {
+    "position": Kind(("px", "py", "pz"), "m", "centre of mass, world"),
+    "velocity": Kind(("vx", "vy", "vz"), "m/s", "world"),
+    "quaternion": Kind(("qw", "qx", "qy", "qz"), "1", "attitude, wxyz, body to world"),
+    "body_rate": Kind(("wx", "wy", "wz"), "rad/s", "about body x, y, z"),
+    "specific_force": Kind(("ax", "ay", "az"), "m/s^2", "accelerometer, body: (0, 0, 9.81) at rest"),
+    "rotor_speed": Kind(("n1", "n2", "n3", "n4"), "rad/s", "in the order of the vehicle's file"),
+    "motor": Kind(("m1", "m2", "m3", "m4"), "1", "output to each motor, 0 to 1, in the order of the vehicle's file"),
+    "command": Kind(
+        ("cmd_thrust", "cmd_wx", "cmd_wy", "cmd_wz"), "m/s^2, rad/s",
+        "thrust over mass and body rates (command mode ctbr) that were sent, each held until the next",
+    ),
+    "voltage": Kind(("volts",), "V", "of the whole battery"),
+}  # fmt: skip
+"""All streams, by name."""
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Numbers over time."""
+
+    time: np.ndarray
+    """(n,) s, rising, of the record's clock."""
+    values: np.ndarray
+    """(n, k) finite."""
+
+    @property
+    def rate(self) -> float:
+        """Samples a second: one over the median of their distances, Hz; 0 for fewer than two."""
+        return float(1 / np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
+
+    def during(self, start: float, end: float) -> "Stream":
+        """What lies between two times, s."""
+        inside = (self.time >= start) & (self.time <= end)
+        return Stream(self.time[inside], self.values[inside])
+
+
+@dataclass(frozen=True)
+class Record:
+    """One flight."""
+
+    path: Path
+    """Where it was read from."""
+    streams: Mapping[str, Stream]
+    """By the names of `KINDS`; what was not recorded is not there."""
+    notes: tuple[str, ...] = field(default=())
+    """What was left out or changed while it was read, in words."""
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time of all streams, s."""
+        times = [stream.time for stream in self.streams.values() if len(stream.time)]
+        return (min(float(t[0]) for t in times), max(float(t[-1]) for t in times)) if times else (0.0, 0.0)
+
+    @property
+    def duration(self) -> float:
+        """S."""
+        start, end = self.span
+        return end - start
+
+    def during(self, start: float, end: float) -> "Record":
+        """What lies between two times, s."""
+        return replace(self, streams={name: stream.during(start, end) for name, stream in self.streams.items()})
+
+    def has(self, *names: str) -> bool:
+        """Whether all of these streams were recorded."""
+        return all(name in self.streams and len(self.streams[name].time) > 1 for name in names)
+
+
+def stream_table() -> str:
+    """All streams and their columns as a Markdown table, for the documentation."""
+    rows = ["| stream | columns of a CSV file | unit | what |", "| --- | --- | --- | --- |", "| | `t` | s | time |"]
+    for name, kind in KINDS.items():
+        columns = " ".join(f"`{column}`" for column in kind.columns)
+        rows.append(f"| {name} | {columns} | {kind.unit} | {kind.what} |")
+    return "\n".join(rows)

@@ -1,0 +1,296 @@
+"""Gauss-Newton multiple shooting: the vehicle's unknowns that explain all windows, each with a start of its own.
+
+Every window's start is free, with a prior, and is eliminated by the Schur complement; residuals count by Huber's
+weights (P. J. Huber, "Robust Estimation of a Location Parameter", 1964), and by the spread that each sensor shows.
+Multiple shooting: H. G. Bock, "Numerical treatment of inverse problems in chemical reaction kinetics", 1981.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from e2efly.identification.model import NUISANCES, START, Model, attitude_error, simulate
+from e2efly.identification.windows import Windows
+
+HUBER = 2.0
+"""Standard deviations up to which a residual counts by its square."""
+NOISE = {
+    "body_rate": 0.05, "specific_force": 0.5, "rotor_speed": 20.0, "velocity": 0.05, "quaternion": 0.02,
+    "position": 0.01,
+}  # fmt: skip
+"""Spread of each sensor about the model at first, in its unit; then what the residuals show."""
+FLOOR = {
+    "body_rate": 2e-3, "specific_force": 0.02, "rotor_speed": 0.5, "velocity": 2e-3, "quaternion": 5e-4,
+    "position": 2e-4,
+}  # fmt: skip
+"""The least that is believed."""
+FREE = np.array([0.05] * 3 + [0.5] * 3 + [0.1] * 3 + [0.5] * 3 + [0.3] * 4)
+"""Standard deviation of a window's start about its measured one."""
+BATCH = 32
+"""Windows that are computed together."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What the fit found."""
+
+    p: np.ndarray
+    """(u,) unknowns of the vehicle."""
+    q: np.ndarray
+    """(flights, nuisances)."""
+    covariance: np.ndarray
+    """(u, u) of `p`: the sandwich of windows, which holds where residuals are not white."""
+    assumed: np.ndarray
+    """(u, u) as it would be if they were: Gauss-Newton's."""
+    noise: dict[str, float]
+    """Spread of each sensor about the fitted model."""
+    cost: float
+    iterations: int
+    starts: np.ndarray
+    """(n, START) of the windows."""
+
+
+def fit(
+    model: Model,
+    windows: Windows,
+    p: np.ndarray | None = None,
+    iterations: int = 30,
+    told: Callable[[int, float], None] = lambda i, cost: None,
+) -> Fit:
+    """Find the unknowns.
+
+    Args:
+        model: the vehicle of the file, and what drives it.
+        windows: of one or several flights.
+        p: where to begin; the file's values when left out.
+        iterations: at most.
+        told: (iteration, cost) after each.
+    """
+    with jax.enable_x64(True):
+        return _fit(model, windows, p, iterations, told)
+
+
+def _fit(
+    model: Model, windows: Windows, p0: np.ndarray | None, iterations: int, told: Callable[[int, float], None]
+) -> Fit:
+    unknowns, flights = model.unknowns, int(windows.flight.max()) + 1
+    u, v = len(unknowns), len(NUISANCES)
+    prior_p = np.array([x.prior for x in unknowns])
+    prior_q = np.array([sigma for _, sigma in NUISANCES])
+    if flights == 1 or model.driver == "rotor_speed":
+        prior_q[-1] = 1e-6  # one flight cannot tell its own factor from the vehicle's
+    p = np.zeros(u) if p0 is None else p0
+    q, starts = np.zeros((flights, v)), np.zeros((windows.count, START))
+    noise = {name: NOISE[name] for name in windows.measured}
+    data = _data(model, windows)
+    free = FREE.copy()
+    if "velocity" not in windows.measured and "position" not in windows.measured:
+        free[:6] = 1e-6
+    if "quaternion" not in windows.measured:
+        free[6:9] = 1e-6
+
+    def total(p: np.ndarray, q: np.ndarray, costs: np.ndarray) -> float:
+        return float(np.sum(costs) + 0.5 * np.sum((p / prior_p) ** 2) + 0.5 * np.sum((q / prior_q) ** 2))
+
+    damping, cost, i = 1e-3, np.inf, 0
+    terms = _terms(model, p, q, starts, data, noise, free)
+    cost = total(p, q, terms["cost"])
+    for i in range(1, iterations + 1):
+        H, g = _assembled(terms, windows.flight, flights, u, v)
+        H += np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
+        g += np.concatenate([p / prior_p**2, (q / prior_q**2).ravel()])
+        for _ in range(8):
+            step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
+            dp, dq = step[:u], step[u:].reshape(flights, v)
+            both = np.concatenate([np.broadcast_to(dp, (windows.count, u)), dq[windows.flight]], 1)
+            moved = starts - terms["gain"] - np.einsum("nij,nj->ni", terms["slope"], both)
+            tried = _terms(model, p + dp, q + dq, moved, data, noise, free)
+            now = total(p + dp, q + dq, tried["cost"])
+            if np.isfinite(now) and now < cost:
+                break
+            damping *= 10
+        else:
+            break
+        gained = cost - now
+        p, q, starts, terms, cost, damping = p + dp, q + dq, moved, tried, now, max(damping / 10, 1e-9)
+        told(i, cost)
+        spread = {name: max(float(terms[f"spread/{name}"]), FLOOR[name]) for name in noise}
+        settled = all(abs(np.log(spread[name] / noise[name])) < 0.02 for name in noise)
+        if gained < 1e-3 and settled and np.all(np.abs(dp) < 1e-4):
+            break
+        if not settled:
+            noise = spread
+            terms = _terms(model, p, q, starts, data, noise, free)
+            cost = total(p, q, terms["cost"])
+    H, _ = _assembled(terms, windows.flight, flights, u, v)
+    H += np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
+    inverse = np.linalg.inv(H)
+    each = np.zeros((windows.count, len(H)))
+    each[:, :u] = terms["g"][:, :u]
+    for f in range(flights):
+        own = windows.flight == f
+        each[np.ix_(own, np.arange(u + f * v, u + (f + 1) * v))] = terms["g"][own, u:]
+    each -= each.mean(0)
+    inner = each.T @ each * (windows.count / max(windows.count - 1, 1))
+    sandwich = inverse @ (inner + np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))) @ inverse
+    return Fit(p, q, sandwich[:u, :u], inverse[:u, :u], noise, cost, i, starts)
+
+
+def cost(model: Model, windows: Windows, p: np.ndarray) -> float:
+    """How badly windows are explained at `p`, their starts as measured."""
+    with jax.enable_x64(True):
+        noise = {name: NOISE[name] for name in windows.measured}
+        return float(np.sum(np.asarray(_costs(model, p, _data(model, windows), noise))))
+
+
+@jax.jit
+def _costs(model: Model, p: Array, data: dict[str, Any], noise: dict[str, Any]) -> Array:
+    still = jnp.zeros(len(NUISANCES))
+
+    def one(data: dict[str, Any]) -> Array:
+        left = _residuals(model, p, still, jnp.zeros(START), data, noise)
+        return sum(jnp.sum(_huber((left[name] / noise[name]).ravel())) for name in noise) * data["counts"]
+
+    return jax.lax.map(one, data, batch_size=BATCH)
+
+
+def _data(model: Model, windows: Windows) -> dict[str, Any]:
+    """Arrays of all windows, filled up to whole batches, with a guess of where each starts."""
+    n, hover = windows.count, float(model.hover)
+    full = -(-n // BATCH) * BATCH
+    data: dict[str, Any] = {"driven": windows.driven, "when": windows.when, "flight": windows.flight}
+    data |= {f"start/{name}": guess for name, guess in _guesses(windows, hover).items()}
+    for name in windows.measured:
+        data[f"measured/{name}"], data[f"there/{name}"] = windows.measured[name], windows.there[name]
+    data["counts"] = np.ones(n)
+    return {k: np.concatenate([x, np.repeat(x[:1] * (k != "counts"), full - n, 0)]) for k, x in data.items()}
+
+
+def measured_starts(model: Model, windows: Windows) -> dict[str, np.ndarray]:
+    """What `simulate` takes as a window, of each of them: they start as they were measured."""
+    return {"driven": windows.driven, "when": windows.when} | _guesses(windows, float(model.hover))
+
+
+def _guesses(windows: Windows, hover: float) -> dict[str, np.ndarray]:
+    """The first measurement of each window; where a stream is missing, a vehicle that hovers."""
+    n, found = windows.count, {}
+    for name, size in (("position", 3), ("velocity", 3), ("quaternion", 4), ("body_rate", 3), ("rotor_speed", 4)):
+        default = np.full(size, hover) if name == "rotor_speed" else np.eye(4)[0] if size == 4 else np.zeros(size)
+        found[name] = np.tile(default, (n, 1))
+        if name in windows.measured:
+            first, seen = np.argmax(windows.there[name], 1), windows.there[name].any(1)
+            found[name][seen] = windows.measured[name][np.arange(n), first][seen]
+    return found
+
+
+def _terms(
+    model: Model,
+    p: np.ndarray,
+    q: np.ndarray,
+    starts: np.ndarray,
+    data: dict[str, Any],
+    noise: dict[str, float],
+    free: np.ndarray,
+) -> dict[str, Any]:
+    n, full = len(starts), len(data["counts"])
+    padded = np.concatenate([starts, np.zeros((full - n, START))])
+    found = jax.tree.map(np.asarray, _computed(model, p, q, padded, data, noise, free))
+    spreads = {k: v for k, v in found.items() if k.startswith("spread/")}
+    return {k: x[:n] for k, x in found.items() if k not in spreads} | spreads
+
+
+@jax.jit
+def _computed(
+    model: Model, p: Array, q: Array, starts: Array, data: dict[str, Any], noise: dict[str, Any], free: Array
+) -> dict[str, Array]:
+    batches = jax.tree.map(lambda x: x.reshape(-1, BATCH, *x.shape[1:]), (starts, data))
+
+    def batch(args: Any) -> Any:
+        return jax.vmap(partial(_window, model, p, q, noise, free))(*args)
+
+    found = jax.lax.map(batch, batches)
+    found = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), found)
+    for name in noise:
+        # the median of the windows' mean squares, of those that have this sensor
+        squares, there = found.pop(f"square/{name}"), found.pop(f"sum/{name}")
+        mean = jnp.where(there > 0, squares / jnp.maximum(there, 1), jnp.nan)
+        found[f"spread/{name}"] = jnp.sqrt(jnp.nanmedian(mean))
+    return found
+
+
+def _window(
+    model: Model, p: Array, q: Array, noise: dict[str, Any], free: Array, start: Array, data: dict[str, Any]
+) -> dict[str, Array]:
+    """Cost, gradient and curvature of one window, its start eliminated."""
+    u, v = p.shape[0], q.shape[1]
+
+    def residuals(z: Array) -> dict[str, Array]:
+        return _residuals(model, z[:u], z[u : u + v], z[u + v :], data, noise)
+
+    z = jnp.concatenate([p, q[data["flight"]], start])
+    left = residuals(z)
+    slopes = jax.jacfwd(residuals)(z)
+    r = jnp.concatenate([(left[name] / noise[name]).ravel() for name in noise])
+    J = jnp.concatenate([(slopes[name] / noise[name]).reshape(-1, z.size) for name in noise])
+    size = jnp.abs(r)
+    weight = jnp.minimum(1.0, HUBER / jnp.maximum(size, 1e-12)) * data["counts"]
+    A, g = (J * weight[:, None]).T @ J, J.T @ (weight * r)
+    k = u + v
+    Axx = A[k:, k:] + jnp.diag(free**-2.0)
+    gx = g[k:] + start / free**2
+    solved = jnp.linalg.solve(Axx, jnp.concatenate([gx[:, None], A[k:, :k]], 1))
+    gain, slope = solved[:, 0], solved[:, 1:]
+    told = {
+        "cost": jnp.sum(_huber(r)) * data["counts"] + 0.5 * jnp.sum((start / free) ** 2),
+        "H": A[:k, :k] - A[:k, k:] @ slope,
+        "g": g[:k] - A[:k, k:] @ gain,
+        "gain": gain,
+        "slope": slope,
+    }
+    for name in noise:
+        told[f"square/{name}"] = jnp.sum(left[name] ** 2) * data["counts"]
+        told[f"sum/{name}"] = jnp.sum(data[f"there/{name}"]) * left[name].shape[-1] * data["counts"]
+    return told
+
+
+def _residuals(
+    model: Model, p: Array, q: Array, start: Array, data: dict[str, Any], noise: dict[str, Any]
+) -> dict[str, Array]:
+    """Simulated less measured, by stream, in its unit; zero where nothing was measured."""
+    window = {"driven": data["driven"], "when": data["when"]} | {
+        name: data[f"start/{name}"] for name in ("position", "velocity", "quaternion", "body_rate", "rotor_speed")
+    }
+    seen = simulate(model, p, q, start, window)
+    left = {}
+    for name in noise:
+        there, measured = data[f"there/{name}"][:, None], data[f"measured/{name}"]
+        if name == "quaternion":
+            quiet = jnp.where(there > 0, measured, jnp.array([1.0, 0, 0, 0]))
+            left[name] = attitude_error(quiet, seen[name]) * there
+        else:
+            left[name] = (seen[name] - measured) * there
+    return left
+
+
+def _huber(r: Array) -> Array:
+    size = jnp.abs(r)
+    return jnp.where(size < HUBER, 0.5 * r**2, HUBER * (size - HUBER / 2))
+
+
+def _assembled(
+    terms: dict[str, Any], flight: np.ndarray, flights: int, u: int, v: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Curvature and gradient of all windows in the unknowns and the nuisances of every flight."""
+    size = u + flights * v
+    H, g = np.zeros((size, size)), np.zeros(size)
+    for f in range(flights):
+        own, at = flight == f, np.concatenate([np.arange(u), np.arange(u + f * v, u + (f + 1) * v)])
+        H[np.ix_(at, at)] += terms["H"][own].sum(0)
+        g[at] += terms["g"][own].sum(0)
+    return H, g

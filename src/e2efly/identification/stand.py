@@ -1,0 +1,219 @@
+"""Thrust map, torque ratio, limits and lag of a rotor from a thrust stand's record."""
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import curve_fit
+
+from e2efly.identification.estimate import Estimate
+
+COLUMNS = {
+    "t": "s, needed for the lag",
+    "throttle": "0 to 1",
+    "voltage": "V",
+    "rpm": "1/min, or rotor_speed in rad/s",
+    "thrust": "N",
+    "torque": "N*m",
+}
+"""What a record may hold, by the names of its columns."""
+STEP = 0.1
+"""Change of the throttle that counts as a step."""
+LONGEST = 0.5
+"""How long after a step its response is looked at, s."""
+SETTLED = 0.02
+"""Relative change of the rotor speed over 0.1 s below which it counts as steady."""
+FLOOR = 0.01
+"""Relative standard deviation of a stand's calibration, below which no sigma goes."""
+
+
+@dataclass(frozen=True)
+class Stand:
+    """What a stand's record comes to."""
+
+    thrust_map: np.ndarray
+    """[k2, k1, k0] of the vehicle's file."""
+    covariance: np.ndarray
+    """Of the three, (3, 3)."""
+    residual: float
+    """Root mean square of measured less fitted thrust, N."""
+    torque_ratio: tuple[float, float] | None
+    """And its standard deviation, m."""
+    lag_up: np.ndarray
+    """Time constant of each step upwards, s."""
+    lag_down: np.ndarray
+    """... and downwards."""
+    speed: tuple[float, float]
+    """Slowest and fastest steady rotor speed, rad/s."""
+    thrust_max: float
+    """Largest steady thrust, N."""
+    speed_per_volt: float | None
+    """Relative change of the rotor speed over relative change of the voltage at a given throttle."""
+
+
+def read_stand(path: Path) -> dict[str, np.ndarray]:
+    """The columns of a stand's record (CSV with a header), in SI units.
+
+    Raises:
+        ValueError: naming the file, the column or the line, the value and what is accepted.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.reader(file))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: {error}; accepted: a CSV file of a thrust stand") from None
+    if len(rows) < 2:
+        raise ValueError(f"{path}: has {len(rows)} lines; accepted: a header and a line a measurement")
+    header = [name.strip() for name in rows[0]]
+    known = {*COLUMNS, "rotor_speed"}
+    if unknown := [name for name in header if name not in known]:
+        accepted = ", ".join(f"{name} ({what})" for name, what in COLUMNS.items())
+        raise ValueError(f"{path}: column {unknown[0]!r} is unknown; accepted: {accepted}")
+    if len(set(header)) < len(header):
+        raise ValueError(f"{path}: the columns are {', '.join(header)}; accepted: each once")
+    table = np.empty((len(rows) - 1, len(header)))
+    for i, row in enumerate(rows[1:]):
+        if len(row) != len(header):
+            raise ValueError(f"{path}: line {i + 2} has {len(row)} entries; accepted: {len(header)}, as the header")
+        for j, entry in enumerate(row):
+            try:
+                table[i, j] = float(entry)
+            except ValueError:
+                table[i, j] = math.nan
+            if not math.isfinite(table[i, j]):
+                raise ValueError(f"{path}: line {i + 2}: {header[j]} is {entry!r}; accepted: a finite number")
+    found = dict(zip(header, table.T, strict=True))
+    if "rpm" in found:
+        found["rotor_speed"] = found.pop("rpm") * (2 * np.pi / 60)
+    for name in ("rotor_speed", "thrust"):
+        if name not in found:
+            raise ValueError(f"{path}: has no column {'rpm' if name == 'rotor_speed' else name!r}; accepted: {COLUMNS}")
+    if "t" in found and np.any(np.diff(found["t"]) <= 0):
+        at = int(np.argmax(np.diff(found["t"]) <= 0)) + 3
+        raise ValueError(f"{path}: line {at}: t does not rise; accepted: rising times, s")
+    if "throttle" in found and not np.all((found["throttle"] >= 0) & (found["throttle"] <= 1)):
+        raise ValueError(f"{path}: throttle is up to {found['throttle'].max():g}; accepted: 0 to 1")
+    return found
+
+
+def evaluate(path: Path) -> Stand:
+    """Fit a stand's record.
+
+    Raises:
+        ValueError: as of `read_stand`; where thrust does not rise with speed, or too little of the range was measured.
+    """
+    data = read_stand(path)
+    steady = _steady(data)
+    speed, thrust = data["rotor_speed"][steady], data["thrust"][steady]
+    if len(speed) < 6 or speed.max() < 2 * max(speed.min(), 1e-9):
+        raise ValueError(
+            f"{path}: {len(speed)} steady points between {speed.min(initial=math.inf):.0f} and "
+            f"{speed.max(initial=0):.0f} rad/s; accepted: 6 or more, the fastest at least twice the slowest"
+        )
+    # scaled, or the normal equations of squares of thousands lose all digits
+    scale = speed.max()
+    x = np.stack([(speed / scale) ** 2, speed / scale, np.ones_like(speed)], -1)
+    fit, *_ = np.linalg.lstsq(x, thrust, rcond=None)
+    left = thrust - x @ fit
+    noise = np.sum(left**2) / (len(left) - 3)
+    unscale = np.array([1 / scale**2, 1 / scale, 1.0])
+    covariance = np.linalg.inv(x.T @ x) * noise * np.outer(unscale, unscale)
+    found = fit * unscale
+    if found[0] <= 0 or 2 * found[0] * speed.min() + found[1] <= 0:
+        raise ValueError(
+            f"{path}: the fitted thrust map {found.tolist()} does not rise with the speed; accepted: thrust that grows "
+            "with the square of the speed (are rpm and thrust in the right columns, and thrust positive upwards?)"
+        )
+    covariance = covariance + np.outer(found, found) * FLOOR**2
+    return Stand(
+        found, covariance, float(np.sqrt(np.mean(left**2))), _torque(data, steady),
+        *_lags(data), (float(speed.min()), float(speed.max())), float(thrust.max()), _per_volt(data, steady),
+    )  # fmt: skip
+
+
+def estimates(path: Path) -> list[Estimate]:
+    """Thrust map, largest thrust and speed, torque ratio and motor lag, whichever the record gives.
+
+    Raises:
+        ValueError: as of `evaluate`.
+    """
+    found, source = evaluate(path), f"{path.name}, thrust stand"
+    said = [
+        Estimate("thrust_map", found.thrust_map, np.sqrt(np.diag(found.covariance)), source),
+        Estimate("rotor_thrust_max", np.array(found.thrust_max), np.array(found.thrust_max * FLOOR), source),
+        Estimate("rotor_speed_max", np.array(found.speed[1]), np.array(found.speed[1] * FLOOR), source),
+    ]
+    if found.torque_ratio is not None:
+        ratio, off = found.torque_ratio
+        said.append(Estimate("torque_ratio", np.array(ratio), np.array(off), source))
+    lags = np.concatenate([found.lag_up, found.lag_down])
+    if len(lags):
+        up, down = (np.mean(x) if len(x) else np.mean(lags) for x in (found.lag_up, found.lag_down))
+        # a model with one lag cannot have both: what lies between them counts as uncertainty
+        spread = np.hypot(np.std(lags) / np.sqrt(len(lags)), abs(up - down) / 2)
+        said.append(Estimate("motor_time_constant", np.array((up + down) / 2), np.array(max(spread, 1e-3)), source))
+    return said
+
+
+def _steady(data: dict[str, np.ndarray]) -> np.ndarray:
+    """Which points are steady: all, where there are no times."""
+    speed = data["rotor_speed"]
+    turning = speed > 0
+    if "t" not in data:
+        return turning
+    t = data["t"]
+    before = np.interp(t - 0.1, t, speed)
+    settled = np.abs(speed - before) < SETTLED * np.maximum(speed, 1.0)
+    return turning & settled & (t - t[0] >= 0.1)
+
+
+def _torque(data: dict[str, np.ndarray], steady: np.ndarray) -> tuple[float, float] | None:
+    if "torque" not in data:
+        return None
+    thrust, torque = data["thrust"][steady], np.abs(data["torque"][steady])
+    ratio = float(thrust @ torque / (thrust @ thrust))
+    left = torque - ratio * thrust
+    sigma = math.sqrt(float(left @ left) / (len(left) - 1) / float(thrust @ thrust))
+    return ratio, math.hypot(sigma, FLOOR * ratio)
+
+
+def _lags(data: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Time constants of the steps up and of those down."""
+    if "t" not in data or "throttle" not in data:
+        return np.zeros(0), np.zeros(0)
+    t, throttle, speed = data["t"], data["throttle"], data["rotor_speed"]
+    steps = np.flatnonzero(np.abs(np.diff(throttle)) > STEP) + 1
+    found: dict[bool, list[float]] = {True: [], False: []}
+    for n, start in enumerate(steps):
+        end = steps[n + 1] if n + 1 < len(steps) else len(t)
+        end = min(end, int(np.searchsorted(t, t[start] + LONGEST)))
+        if end - start < 8:
+            continue
+        x, y = t[start:end] - t[start], speed[start:end]
+
+        def response(x: np.ndarray, first: float, last: float, tau: float, delay: float) -> np.ndarray:
+            return last + (first - last) * np.exp(-np.maximum(x - delay, 0) / tau)
+
+        try:
+            bounds = ([0, 0, 1e-3, 0], [np.inf, np.inf, LONGEST, 0.1])
+            best, _ = curve_fit(response, x, y, [y[0], y[-1], 0.03, 0.001], bounds=bounds)
+        except RuntimeError:  # no fit: a step that is not one
+            continue
+        if abs(best[1] - best[0]) > SETTLED * speed.max():
+            found[throttle[start] > throttle[start - 1]].append(float(best[2]))
+    return np.array(found[True]), np.array(found[False])
+
+
+def _per_volt(data: dict[str, np.ndarray], steady: np.ndarray) -> float | None:
+    """Exponent of the voltage in rotor speed = a throttle^p voltage^q, where the voltage varied by 3 % or more."""
+    if "voltage" not in data or "throttle" not in data:
+        return None
+    use = steady & (data["throttle"] > 0.05) & (data["voltage"] > 0)
+    volts = data["voltage"][use]
+    if use.sum() < 10 or volts.max() < 1.03 * volts.min():
+        return None
+    x = np.stack([np.log(data["throttle"][use]), np.log(volts), np.ones(use.sum())], -1)
+    fit, *_ = np.linalg.lstsq(x, np.log(data["rotor_speed"][use]), rcond=None)
+    return float(fit[1])

@@ -1,0 +1,74 @@
+"""The vehicle file that comes out: the base's values, and what was identified in their place, with their sigmas."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from e2efly.identification.estimate import Estimate
+from e2efly.storage import write_atomically
+from e2efly.vehicles import Vehicle
+from e2efly.vehicles.tables import read_table
+from e2efly.vehicles.vehicle import check, quantities, vehicle_file
+
+
+def merged(base: Vehicle, found: Mapping[str, Estimate]) -> Vehicle:
+    """The base with what was found in place of its values.
+
+    Raises:
+        ValueError: where the two together are no vehicle, naming the values.
+    """
+    values = {}
+    for name, estimate in found.items():
+        own = np.asarray(getattr(base, name), float)
+        new = np.where(np.isfinite(estimate.value), estimate.value, own)
+        values[name] = new if new.shape else float(new)
+    vehicle = Vehicle(**({f.name: getattr(base, f.name) for f in quantities()} | {"name": base.name} | values))
+    check(vehicle, "identified vehicle")
+    return vehicle
+
+
+def write_vehicle(path: Path, base_name: str, base: Vehicle, found: Mapping[str, Estimate]) -> Vehicle:
+    """Write the vehicle file.
+
+    Args:
+        path: of the new TOML file.
+        base_name: the name or path of the base, whose sources stay with its values.
+        base: the base, loaded.
+        found: by field.
+
+    Raises:
+        ValueError: as of `merged`.
+    """
+    vehicle, table = merged(base, found), read_table(vehicle_file(base_name))
+    lines = [
+        f"# {path.stem}: identified by e2efly, from {base.name}. Every entry: value, unit and source; sigma is the",
+        "# standard deviation, nan where it is not known. Rotors in Betaflight's order. Body frame FLU.",
+    ]
+    for f in quantities():
+        entry: dict[str, Any] = table[f.name]
+        lines += ["", f"[{f.name}]", f"value = {_toml(getattr(vehicle, f.name))}", f"unit = {_text(entry['unit'])}"]
+        if f.name in found:
+            lines += [f"sigma = {_toml(found[f.name].sigma, digits=3)}", f"source = {_text(found[f.name].source)}"]
+        else:
+            lines += [f"sigma = {_toml(np.asarray(entry['sigma']))}"] if "sigma" in entry else []
+            lines += [f"source = {_text(entry['source'])}"]
+    write_atomically(path, ("\n".join(lines) + "\n").encode())
+    return vehicle
+
+
+def _toml(value: Any, digits: int = 6) -> str:
+    if np.ndim(value):
+        return f"[{', '.join(_toml(x, digits) for x in value)}]"
+    return _number(float(value), digits)
+
+
+def _number(x: float, digits: int) -> str:
+    said = f"{x:.{digits}g}"
+    return said if any(c in said for c in ".ne") else f"{said}.0"
+
+
+def _text(words: str) -> str:
+    escaped = words.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else " " for c in escaped) + '"'

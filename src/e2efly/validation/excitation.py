@@ -1,0 +1,154 @@
+"""Fly on a plant what identification needs, and keep the log that a vehicle would keep. Imports no JAX."""
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from e2efly.control import COMMAND_MODES, Quat, Vec3
+from e2efly.control.excitation import DURATION, doublets, lines
+from e2efly.identification.record import Record, Stream
+from e2efly.validation.plant import Delay, Plant, RigidState
+from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import GRAVITY
+
+RATE, POSES, COMMANDS = 250.0, 100.0, 50.0
+"""Samples of gyroscope, accelerometer and rotor speeds, of the poses, and of the commands, Hz."""
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What is wrong with a log: standard deviations of white noise, and what stays for a flight."""
+
+    body_rate: float = 0.02
+    """rad/s."""
+    specific_force: float = 0.3
+    """m/s^2."""
+    rotor_speed: float = 10.0
+    """rad/s."""
+    position: float = 0.001
+    """m."""
+    velocity: float = 0.02
+    """m/s."""
+    attitude: float = 0.003
+    """rad."""
+    gyro_bias: float = 0.01
+    """rad/s."""
+    force_bias: float = 0.1
+    """m/s^2."""
+    pose_delay: float = 0.03
+    """The largest, s: uniform from none."""
+    gaps: int = 5
+    """Times that gyroscope, accelerometer and rotor speeds miss 20 to 100 ms."""
+
+
+PERFECT = Sensors(*[0.0] * 9, gaps=0)
+
+
+@dataclass(frozen=True)
+class _Motion:
+    position: Vec3
+    velocity: Vec3
+    attitude: Quat
+
+
+def fly_excitation(
+    plant: Plant,
+    believed: Vehicle,
+    latency: float,
+    *,
+    seconds: float = DURATION,
+    speed: float = 5.0,
+    sag: float = 0.0,
+    pulses: bool = True,
+    start: tuple[float, float, float] = (0.0, 0.0, 50.0),
+) -> Record:
+    """Fly lines and doublets, and keep everything without an error.
+
+    Args:
+        plant: what flies, in the command mode ctbr; its flight controller believes in `believed`.
+        believed: whose gains steer, softened for a vehicle that is not known.
+        latency: from a command's sending to the rate loop, s.
+        seconds: of the flight.
+        speed: of the fastest line, m/s.
+        sag: share of the thrust that is lost, evenly, by the end.
+        pulses: whether doublets are added.
+        start: position, m.
+    """
+    steer = dataclasses.replace(
+        believed,
+        attitude_gain=np.minimum(believed.attitude_gain, [4.0, 2.0]),
+        velocity_gain=np.minimum(believed.velocity_gain, [1.3, 1.3, 3.0]),
+        tilt_max=min(believed.tilt_max, 0.6),
+    )
+    wanted = COMMAND_MODES["velocity"].controller
+    assert wanted is not None
+    hover = np.array([GRAVITY, 0.0, 0.0, 0.0])
+    plant.reset(RigidState(np.array(start), np.zeros(3), np.eye(4)[0], np.zeros(3)))
+    delay, ticks = Delay.of(latency, hover), round(RATE / COMMANDS)
+    states, rotors, commands = [], [], []
+    for k in range(round(seconds * RATE)):
+        now, then = k / RATE, (k + 1) / RATE
+        state = plant.state
+        states.append(state)
+        rotors.append(getattr(plant, "rotor_speed", np.full(4, np.nan)))
+        if sag:
+            plant.disturb(np.zeros(3), np.full(4, 1 - sag * now / seconds))
+        if k % ticks == 0:
+            motion = _Motion(Vec3(*state.position), Vec3(*state.velocity), Quat(*state.quaternion))
+            found = wanted(steer, motion, (*lines(now, speed), 0.0))
+            rates, thrust = doublets(now) if pulses else (np.zeros(3), 0.0)
+            rates = rates + np.array([found.rate.x, found.rate.y, found.rate.z])
+            rates = np.clip(rates, -believed.body_rate_max, believed.body_rate_max)
+            command = np.array([max(float(found.thrust) + thrust, 0.0), *rates])
+            commands.append((now, command))
+            delay = delay.send(command, now)
+        delay, parts = delay.until(now, then)
+        for command, held in parts:
+            plant.step(command, held)
+    time = np.arange(len(states)) / RATE
+    velocity = np.array([s.velocity for s in states])
+    attitude = np.array([s.quaternion for s in states])
+    change = np.gradient(velocity, 1 / RATE, axis=0) + np.array([0.0, 0.0, GRAVITY])
+    pull = Quat(*attitude.T).unrotate(Vec3(*change.T))
+    streams = {
+        "body_rate": Stream(time, np.array([s.body_rate for s in states])),
+        "specific_force": Stream(time, np.stack([pull.x, pull.y, pull.z], -1)),
+        "rotor_speed": Stream(time, np.array(rotors)),
+        "position": Stream(time, np.array([s.position for s in states])),
+        "velocity": Stream(time, velocity),
+        "quaternion": Stream(time, attitude),
+        "command": Stream(np.array([t for t, _ in commands]), np.array([c for _, c in commands])),
+    }
+    return Record(Path("excitation.csv"), {k: s for k, s in streams.items() if np.isfinite(s.values).all()})
+
+
+def sensed(record: Record, sensors: Sensors, seed: int) -> Record:
+    """The log of imperfect sensors: poses at their own rate and late, gaps, noise and biases."""
+    rng, streams = np.random.default_rng(seed), dict(record.streams)
+    time = streams["body_rate"].time
+    keep = np.ones(len(time), bool)
+    for _ in range(sensors.gaps):
+        begin, length = rng.uniform(time[0], time[-1]), rng.uniform(0.02, 0.1)
+        keep &= ~((time > begin) & (time < begin + length))
+    late = rng.uniform(0, sensors.pose_delay)
+    every = round(RATE / POSES * 2) / 2
+    chosen = np.unique((np.arange(0, len(time), every)).astype(int))
+    for name, stream in record.streams.items():
+        values = stream.values
+        if name == "quaternion":
+            half = 0.5 * sensors.attitude * rng.standard_normal((len(values), 3))
+            turned = Quat(*values.T).compose(Quat(np.ones(len(values)), *half.T)).normalized()
+            values = np.stack([turned.w, turned.x, turned.y, turned.z], -1)
+        elif name != "command":
+            values = values + getattr(sensors, name) * rng.standard_normal(values.shape)
+        if name == "body_rate":
+            values = values + sensors.gyro_bias * rng.standard_normal(3)
+        if name == "specific_force":
+            values = values + sensors.force_bias * rng.standard_normal(3)
+        if name in ("position", "velocity", "quaternion"):
+            streams[name] = Stream(stream.time[chosen] + late, values[chosen])
+        elif name != "command":
+            streams[name] = Stream(stream.time[keep], values[keep])
+    return dataclasses.replace(record, streams=streams)
