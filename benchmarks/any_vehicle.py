@@ -31,14 +31,15 @@ def rows_of(found: Evaluation, what: str, delay: str) -> list[dict[str, Any]]:
             "success, %": round(100 * float(np.mean(e.success)), 1),
             "median error, cm": round(100 * float(np.median(error(name, e))), 2),
             "90 % below, cm": round(100 * float(np.quantile(error(name, e), 0.9)), 2),
+            "time of a success, s": round(float(np.mean(e.duration[e.success])), 2),
         }
         for name, e in found.flown.items()
     ]
 
 
 def error(criterion: str, e: Any) -> np.ndarray:
-    """At the end of a hover; the mean along a reference."""
-    return e.final_error if criterion == "hover" else e.mean_error
+    """The mean along a reference; at the end of all else: of a race, from the centre of the last gate."""
+    return e.mean_error if criterion in ("circle", "lemniscate") else e.final_error
 
 
 def question(policy: str) -> float:

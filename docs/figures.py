@@ -70,6 +70,9 @@ Success: within 0.1 m for the last second of 8 s. What stands in which row:
     "identify": """
 30 s in MuJoCo each, with noise, biases, gaps, late poses and sag; errors are absolute values, of
 inertia per axis. [How it is done](identification.md).""",
+    "robust": """
+Five seeds, 1000 starts a row. While track's last two and race's first three trained, other programs
+ran on the same two cores: they took up to twice the time of the others.""",
     "zoo_stress": """
 Percent of 1000 unseen starts, of the worst criterion, in the training simulator. The rows:
 [robustness](robustness.md#stress). "preset nominal" has no memory and was trained on the

@@ -222,6 +222,23 @@ def test_what_stands_out_is_measured_where_the_plane_is_crossed() -> None:
     np.testing.assert_allclose(over[:, 2], 0.25 - np.asarray(after)[:, 2], atol=1e-6)  # and the ground
 
 
+@pytest.mark.parametrize("track", ["four_gates", "s_shaped"])
+def test_a_race_on_one_track_has_the_same_signals(track: str) -> None:
+    """At every gate, the last of a closed and of an open track included."""
+    shown, plain = task(track, laps=0), make_task(RaceConfig(track=track, laps=0), SHAPE, 1 / 30)
+    rng, gates = np.random.default_rng(0), load_track(track)
+    _, memory = shown.start(random_key(0), 30)
+    for passed in range(len(gates.yaw)):
+        near = gates.position[passed] + rng.uniform(-1, 1, (30, 3))
+        before, after = (at_rest(jnp.asarray(near + step, jnp.float32)) for step in rng.uniform(-0.5, 0.5, (2, 30, 3)))
+        count = jnp.full(30, passed, jnp.int32)
+        still = jnp.zeros(30), jnp.zeros(30, bool)
+        _, one = shown.advance(dataclasses.replace(memory, passed=count), before, after, *still)
+        _, other = plain.advance(count, before, after, *still)
+        for name in ("way", "previous_way", "overhang"):
+            np.testing.assert_allclose(one.signals[name], other.signals[name], atol=1e-5)
+
+
 @pytest.fixture(scope="module")
 def contract() -> Contract:
     return contract_of(Env.of(ANY.task, ANY.reward, ANY.env), ANY)

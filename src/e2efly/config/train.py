@@ -69,6 +69,8 @@ class Robust:
 
     weights: Mapping[str, float] | None = None
     """Of the reward, in place of the recipe's; None: those."""
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    """Constants of its terms, beside the recipe's."""
     algo: Mapping[str, Any] = field(default_factory=dict)
     """Options of the algorithm."""
     steps: int
@@ -87,7 +89,9 @@ class Robust:
             config,
             network=replace(config.network, recurrent=self.recurrent, hidden=self.hidden),
             algo=replace(config.algo, **self.algo),
-            reward=config.reward if self.weights is None else RewardConfig(dict(self.weights), given),
+            reward=config.reward
+            if self.weights is None
+            else RewardConfig(dict(self.weights), {**given, **self.parameters}),
             steps=self.steps,
             chunk=self.chunk,
         )

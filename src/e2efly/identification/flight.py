@@ -53,6 +53,8 @@ class Found:
     """Which of them the fit did not see."""
     estimates: list[Estimate]
     refusals: list[Refusal]
+    p: np.ndarray
+    """(u,) of the unknowns: the fit's, under what is refused being the file's."""
     sigma: np.ndarray
     """(u,) of the unknowns; what is believed of the fit's."""
     notes: tuple[str, ...] = field(default=())
@@ -65,12 +67,12 @@ class Found:
         covariance = _whole_covariance(self.fit, self.sigma)
         value, sigma = np.zeros(3), np.zeros(3)
         for axis in range(3):
-            slope = np.zeros(len(self.fit.p))
+            slope = np.zeros(len(self.p))
             for power, name in ((1, "drag_linear"), (2, "drag_quadratic")):
                 part = float(getattr(self.model.base, name)[axis]) * speed**power
                 for i, unknown in enumerate(self.model.unknowns):
                     if unknown.field == name and axis in unknown.entries:
-                        part *= float(np.exp(self.fit.p[i]))
+                        part *= float(np.exp(self.p[i]))
                         slope[i] = part
                 value[axis] += part
             sigma[axis] = np.sqrt(slope @ covariance @ slope)
@@ -150,8 +152,31 @@ def identify(
     held_out = np.arange(windows.count) % HELD_OUT == HELD_OUT - 1
     found = fit(model, windows.some(~held_out), _best_delay(model, windows.some(~held_out)), told=told)
     sigma = sigmas(model, found)
-    estimates, refusals = _estimates(model, found, sigma, records)
-    return Found(model, found, windows, held_out, estimates, refusals, sigma)
+    refused = np.array([_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)])
+    p = _given(found.p, _whole_covariance(found, sigma), refused)
+    refusals = [Refusal(model.unknowns[i], float(sigma[i])) for i in np.flatnonzero(refused)]
+    source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
+    estimates = _estimates(model, p, sigma, refused, source)
+    return Found(model, found, windows, held_out, estimates, refusals, p, sigma)
+
+
+def _is_vague(unknown: Unknown, sigma: float) -> bool:
+    """Whether the flights say too little of an unknown."""
+    limit = next((v for name, v in EXACT.items() if unknown.field.startswith(name)), EXACT_ELSE)
+    return bool(sigma > min(limit, SHOWN * unknown.prior))
+
+
+def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> np.ndarray:
+    """The unknowns, those that are refused being zero, as the file has them: the mean of the normal distribution under
+    that condition. The others then do not make up for what a refused one was found to be.
+    """
+    if not refused.any() or refused.all():
+        return np.where(refused, 0.0, p)
+    kept = ~refused
+    moved = covariance[np.ix_(kept, refused)] @ np.linalg.solve(covariance[np.ix_(refused, refused)], -p[refused])
+    out = np.zeros_like(p)
+    out[kept] = p[kept] + moved
+    return out
 
 
 def sigmas(model: Model, found: Fit) -> np.ndarray:
@@ -182,19 +207,11 @@ def _best_delay(model: Model, windows: Windows) -> np.ndarray:
     return p
 
 
-def _estimates(
-    model: Model, found: Fit, sigma: np.ndarray, records: Sequence[Record]
-) -> tuple[list[Estimate], list[Refusal]]:
+def _estimates(model: Model, p: np.ndarray, sigma: np.ndarray, refused: np.ndarray, source: str) -> list[Estimate]:
     """By field of the vehicle; what the flights do not say is left to the file."""
-    source = f"{', '.join(r.path.name for r in records)}; flight"
     values: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    refusals = []
-    for unknown, x, off in zip(model.unknowns, found.p, sigma, strict=True):
-        limit = next((v for name, v in EXACT.items() if unknown.field.startswith(name)), EXACT_ELSE)
-        if off > min(limit, SHOWN * unknown.prior):
-            refusals.append(Refusal(unknown, float(off)))
-            continue
-        if not unknown.field:
+    for unknown, x, off, vague in zip(model.unknowns, p, sigma, refused, strict=True):
+        if vague or not unknown.field:
             continue
         base = np.asarray(getattr(model.base, unknown.field), float)
         value, spread = values.setdefault(unknown.field, (np.full(base.shape, np.nan), np.full(base.shape, np.nan)))
@@ -206,7 +223,7 @@ def _estimates(
         if unknown.field == "thrust_map":  # the largest thrust grows with the map
             top = float(model.base.rotor_thrust_max) * np.exp(x)
             values["rotor_thrust_max"] = np.array(top), np.array(top * off)
-    return [Estimate(name, value, spread, source) for name, (value, spread) in values.items()], refusals
+    return [Estimate(name, value, spread, source) for name, (value, spread) in values.items()]
 
 
 def nuisances(found: Found) -> list[dict[str, float]]:

@@ -37,7 +37,7 @@ class Prediction:
 def judged(found: Found) -> Prediction:
     """Foretell the windows that were held out."""
     windows = found.windows.some(found.held_out)
-    model, p = found.model, found.fit.p
+    model, p = found.model, found.p
     with jax.enable_x64(True):
         data = measured_starts(model, windows)
 

@@ -178,14 +178,14 @@ def measured_starts(model: Model, windows: Windows) -> dict[str, np.ndarray]:
 
 
 def _guesses(windows: Windows, hover: float) -> dict[str, np.ndarray]:
-    """The first measurement of each window; where a stream is missing, a vehicle that hovers."""
+    """Where each window starts by its streams; where one is missing, a vehicle that hovers."""
     n, found = windows.count, {}
     for name, size in (("position", 3), ("velocity", 3), ("quaternion", 4), ("body_rate", 3), ("rotor_speed", 4)):
         default = np.full(size, hover) if name == "rotor_speed" else np.eye(4)[0] if size == 4 else np.zeros(size)
         found[name] = np.tile(default, (n, 1))
-        if name in windows.measured:
-            first, seen = np.argmax(windows.there[name], 1), windows.there[name].any(1)
-            found[name][seen] = windows.measured[name][np.arange(n), first][seen]
+        if name in windows.start:
+            seen = np.isfinite(windows.start[name]).all(1)
+            found[name][seen] = windows.start[name][seen]
     return found
 
 

@@ -33,6 +33,8 @@ class Windows:
     """By stream, (n, m + 1, k); zero where nothing was measured."""
     there: dict[str, np.ndarray]
     """By stream, (n, m + 1): 1 where something was."""
+    start: dict[str, np.ndarray]
+    """By stream, (n, k): between its samples, at the start of each."""
 
     @property
     def count(self) -> int:
@@ -50,7 +52,10 @@ class Windows:
         def cut(table: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
             return {name: x[which] for name, x in table.items()}
 
-        return Windows(self.flight[which], self.when[which], self.driven[which], cut(self.measured), cut(self.there))
+        return Windows(
+            self.flight[which], self.when[which], self.driven[which],
+            cut(self.measured), cut(self.there), cut(self.start),
+        )  # fmt: skip
 
 
 def past_steps() -> int:
@@ -77,16 +82,17 @@ def cut(record: Record, driver: str, flight: int = 0) -> Windows:
     integral = _integral(driving, before, held=driver == "command")
     rows = np.arange(n)[:, None] * m + np.arange(m + 1 + past)
     inner = np.arange(n)[:, None] * m + np.arange(m + 1)
-    measured, there = {}, {}
+    measured, there, start = {}, {}, {}
     for name in names:
         values, good = _on_grid(record.streams[name], grid)
-        measured[name], there[name] = values[inner], good[inner].astype(float)
+        start[name] = values[inner[:, 0]]
+        measured[name], there[name] = np.where(good[:, None], values, 0.0)[inner], good[inner].astype(float)
     longest = max(GAP / driving.rate, 0.05) if driver != "command" else np.inf
     gaps = np.diff(driving.time) > longest
     torn = np.zeros(n, bool)
     for start, end in zip(driving.time[:-1][gaps], driving.time[1:][gaps], strict=True):
         torn |= (grid[inner[:, -1]] > start) & (before[rows[:, 0]] < end)
-    windows = Windows(np.full(n, flight), np.arange(n) / max(n, 1), integral[rows], measured, there)
+    windows = Windows(np.full(n, flight), np.arange(n) / max(n, 1), integral[rows], measured, there, start)
     return windows.some(~torn & (there["body_rate"].mean(1) > 0.2))
 
 
@@ -97,13 +103,15 @@ def join(parts: Sequence[Windows]) -> Windows:
     def nothing(part: Windows, *size: int) -> np.ndarray:
         return np.zeros((part.count, part.steps + 1, *size))
 
-    measured, there = {}, {}
+    measured, there, start = {}, {}, {}
     for name in names:
         size = len(KINDS[name].columns)
         measured[name] = np.concatenate([part.measured.get(name, nothing(part, size)) for part in parts])
         there[name] = np.concatenate([part.there.get(name, nothing(part)) for part in parts])
+        unknown = np.full((1, size), np.nan)
+        start[name] = np.concatenate([part.start.get(name, unknown.repeat(part.count, 0)) for part in parts])
     flight, when, driven = (np.concatenate([getattr(p, name) for p in parts]) for name in ("flight", "when", "driven"))
-    return Windows(flight, when, driven, measured, there)
+    return Windows(flight, when, driven, measured, there, start)
 
 
 def _integral(stream: Stream, grid: np.ndarray, held: bool) -> np.ndarray:
@@ -127,4 +135,4 @@ def _on_grid(stream: Stream, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     period = 1 / stream.rate
     # of a stream slower than the grid, the points next to a sample count; of a faster one, all
     good = (nearest <= max(STEP / 2 + 1e-9, period / 2 if period <= 1.5 * STEP else 0)) & (apart < GAP * period + 1e-9)
-    return np.where(good[:, None], values, 0.0), good
+    return values, good

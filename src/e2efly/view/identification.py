@@ -62,8 +62,9 @@ def _plot_prediction(path: Path, each: Found, outside: Prediction) -> None:
     with figure(path, "Foretelling what was not seen", 0.9 + 2.1 * -(-len(names) // 3), notes) as fig:
         for i, name in enumerate(names):
             ax = fig.add_subplot(-(-len(names) // 3), 3, i + 1)
-            ax.plot(outside.time, outside.before[name], color=GREY, label="by the file")
-            ax.plot(outside.time, outside.after[name], color=BLUE, label="identified")
+            there = outside.before[name] > 0  # a slow stream has no sample after some times
+            ax.plot(outside.time[there], outside.before[name][there], color=GREY, label="by the file")
+            ax.plot(outside.time[there], outside.after[name][there], color=BLUE, label="identified")
             ax.set_title(_NAMES[name])
             ax.set_ylabel(UNITS[name])
             ax.set_xlabel("time ahead (s)")

@@ -56,8 +56,9 @@ class RaceConfig(TaskConfig):
     }
     family: ClassVar = {
         "bptt": Robust(
-            weights={"prog1": 1.0, "near": 0.2, "anglev_sq": 0.001, "act2_sq": 0.01},
-            algo={"learning_rate": 5e-3, "average": 0.99},
+            weights={"progway": 1.0, "fitlog": 40.0, "anglev_sq": 0.001, "act2_sq": 0.01},
+            parameters={"fitlog_margin": 0.12},
+            algo={"learning_rate": 4e-3, "learning_rate_end": 1e-4, "gradient_decay": 0.3, "average": 0.99},
             steps=16_000_000,
             chunk=60,
             recurrent=96,

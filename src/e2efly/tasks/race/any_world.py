@@ -15,25 +15,15 @@ from e2efly.courses.tracks import load_track
 from e2efly.goal import Outcome, Shape
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
-from e2efly.rewards import norm
 from e2efly.scenes.course import frames
 from e2efly.scenes.scene import Scene
-from e2efly.scenes.shapes import FAR
 from e2efly.tasks.race import ANY, RaceConfig
 from e2efly.tasks.race.any_goal import Ahead, AnyRaceGoal, Memory
+from e2efly.tasks.race.way import NextGates
 from e2efly.tasks.task import at_rest, into_ball, uniform
 
 LOWEST_START = 0.3
 """Starts are drawn at least this high over the feet, m."""
-AROUND = 1.5
-"""The way to a gate from behind it leads through a point at most so far before it, m ..."""
-DETOUR = 0.5
-"""... and so far for each metre that the vehicle is behind it."""
-
-SHORTEST = 0.01
-"""Keeps the gradient of where a gate's plane is crossed finite, m: a step that crosses it is longer than this."""
-LOW = 0.2
-"""With the feet lower than this over the ground a vehicle stands out of where it should be, m."""
 
 jax.tree_util.register_dataclass(Memory, data_fields=["tracks", "passed"], meta_fields=[])
 
@@ -85,51 +75,14 @@ class AnyRace(AnyRaceGoal):
     def advance(
         self, memory: Memory, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
     ) -> tuple[Memory, Outcome]:
-        """The goal's verdict, with signals for the reward: `way`, `previous_way` and `overhang`.
-
-        What stands out of an opening, sideways and up, is followed by what is too near to the ground.
-
-        The way is that to the next gate. In the step that passes it, it is what was flown of the way from there to the
-        gate after it, negative: so that no step charges for being fast through a gate.
-        """
+        """The goal's verdict, with signals for the reward."""
         moved, outcome = super().advance(memory, before, after, time, timed_out)
         ahead = Ahead.of(memory)
-        centre, axis = (ahead.centre[:, i] for i in (0, 1)), (ahead.axis[:, i] for i in (0, 1))
-        (here, there), (along, onward) = centre, axis
-        was, now = (_local(s.position - here, along) for s in (before, after))
-        beyond = _way(_local(after.position - there, onward)) - _way(_local(here - there, onward))
-        way = jnp.where(outcome.arrived, beyond, _way(now))
-        low = self.shape.feet_height + LOW - after.position[:, 2:]
-        out = jnp.concatenate([self._overhang(was, now, ahead.half[:, 0]), low], axis=-1)
-        signals = {"way": way, "previous_way": _way(was), "overhang": out}
+        (here, there), (along, onward) = ((x[:, 0], x[:, 1]) for x in (ahead.centre, ahead.axis))
+        signals = NextGates((here, there), (along, onward), ahead.half[:, 0]).signals(
+            self.shape, before, after, outcome.arrived
+        )
         return moved, dataclasses.replace(outcome, signals=outcome.signals | signals)
-
-    def _overhang(
-        self, was: Float[Array, "n 3"], now: Float[Array, "n 3"], half: Float[Array, "n 2"]
-    ) -> Float[Array, "n 2"]:
-        """How far the vehicle's sphere stands out of the opening, sideways and up, where it crosses its plane forward,
-        m; `-FAR` in steps that do not cross it.
-        """
-        crossing = (was[:, 0] < 0) & (now[:, 0] >= 0)
-        step = jnp.where(crossing, jnp.minimum(was[:, 0] - now[:, 0], -SHORTEST), -1.0)
-        share = jnp.where(crossing, was[:, 0], -1.0) / step
-        there = was[:, 1:] + share[:, None] * (now[:, 1:] - was[:, 1:])
-        return jnp.where(crossing[:, None], jnp.abs(there) - half + self.shape.radius, -FAR)
-
-
-def _local(d: Float[Array, "n 3"], axis: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
-    """Offsets from a gate in its frame: along its axis, to the left, up."""
-    x = d[:, 0] * axis[:, 0] + d[:, 1] * axis[:, 1]
-    return jnp.stack([x, d[:, 1] * axis[:, 0] - d[:, 0] * axis[:, 1], d[:, 2]], axis=-1)
-
-
-def _way(local: Float[Array, "n 3"]) -> Float[Array, " n"]:
-    """How far it is to fly to a gate's centre and through it forward, m: before it straight, from behind it around.
-
-    The way around leads by a point before the gate, the farther before it the farther behind it the vehicle is.
-    """
-    back = jnp.clip(DETOUR * local[:, 0], 0.0, AROUND)
-    return norm(local.at[:, 0].add(back)) + back
 
 
 def begun(key: PRNGKeyArray, n: int, radius: Any, shape: Shape, place: Any, heading: Any) -> State:

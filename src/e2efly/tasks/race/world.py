@@ -6,17 +6,18 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from e2efly.courses.gates import Gates
 from e2efly.courses.tracks import load_track
-from e2efly.goal import Shape
+from e2efly.goal import Outcome, Shape
 from e2efly.physics import State
 from e2efly.scenes.course import frames
 from e2efly.scenes.scene import Scene
 from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.race.any_world import AnyRace, begun
 from e2efly.tasks.race.goal import RaceGoal
+from e2efly.tasks.race.way import NextGates
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "gates"], meta_fields=["closed"])
@@ -44,6 +45,25 @@ class Race(RaceGoal):
         """At rest and level in a ball about the start, heading as the track says."""
         state = begun(key, n, self.config.position, self.shape, self.gates.start, self.gates.start_yaw)
         return state, jnp.zeros(n, jnp.int32)
+
+    def advance(
+        self,
+        memory: Int[Array, " n"],
+        before: State,
+        after: State,
+        time: Float[Array, " n"],
+        timed_out: Bool[Array, " n"],
+    ) -> tuple[Int[Array, " n"], Outcome]:
+        """The goal's verdict, with signals for the reward."""
+        moved, outcome = super().advance(memory, before, after, time, timed_out)
+        here, beyond = memory % self.count, (memory + 1) % self.count
+        axes = jnp.stack([jnp.asarray(self.gates.cos), jnp.asarray(self.gates.sin), jnp.zeros(self.count)], axis=-1)
+        # behind the last gate of an open track the way leads straight on
+        onward = axes[beyond] if self.closed else axes[jnp.minimum(here + 1, self.count - 1)]
+        centre = jnp.asarray(self.gates.position)
+        gates = NextGates((centre[here], centre[here + 1]), (axes[here], onward), jnp.asarray(self.gates.half)[here])
+        signals = gates.signals(self.shape, before, after, outcome.arrived)
+        return moved, dataclasses.replace(outcome, signals=outcome.signals | signals)
 
     def scene(self, memory: Int[Array, " n"]) -> Scene:
         """The gates over level ground."""
