@@ -2,6 +2,8 @@
 vehicles that ship, which they were never told of; how long a question takes.
 
     python benchmarks/any_vehicle.py [--policies any/hover ...] [--vehicles 1000]
+
+Rows that are not measured anew stay.
 """
 
 import json
@@ -9,7 +11,7 @@ import time
 from typing import Any
 
 import numpy as np
-from common import arguments, table, write
+from common import arguments, table, with_earlier, write
 
 import e2efly
 from e2efly.evaluation import Evaluation
@@ -75,7 +77,8 @@ def main() -> None:
             rows += rows_of(e2efly.evaluate(policy, options.vehicles, vehicle=name), name, "its own")
         print(table(rows), flush=True)
     print(asked)
-    write("any_vehicle", options.json, {"table": rows, "question_us": asked})
+    whole = with_earlier("any_vehicle", options.json, "table", ("task",), rows)
+    write("any_vehicle", options.json, {"table": whole, "question_us": asked})
 
 
 if __name__ == "__main__":
