@@ -18,7 +18,7 @@ SHOWN = 0.5
 EXACT = {"latency": 0.02, "drag": 0.5}
 """Standard deviation above which an unknown is not taken over, s or relative; of all others ..."""
 EXACT_ELSE = 0.15
-STRUCTURE = {"thrust_map": 0.002, "inertia": 0.004, "rate_gain": 0.01, "motor_time_constant": 0.004, "latency": 3e-4}
+STRUCTURE = {"thrust_map": 0.002, "inertia": 0.004, "rate_gain": 0.01, "motor_time_constant": 0.01, "latency": 3e-4}
 """Spread of what is found over models that differ in what no log shows: how often the flight controller acts, how the
 accelerometer is filtered; s of the delay, else relative."""
 HELD_OUT = 5

@@ -51,9 +51,11 @@ UNKNOWNS: tuple[Unknown, ...] = (
     Unknown("inertia_y", "inertia", (1,), 0.5, _ALL, _RATES),
     Unknown("inertia_z", "inertia", (2,), 0.5, _ALL, _RATES),
     Unknown("motor_time_constant", "motor_time_constant", (), 0.7, ("command", "motor"), _STEPS),
-    Unknown("drag_linear_xy", "drag_linear", (0, 1), 1.0, _ALL, _FAST),
+    Unknown("drag_linear_x", "drag_linear", (0,), 1.0, _ALL, _FAST),
+    Unknown("drag_linear_y", "drag_linear", (1,), 1.0, _ALL, _FAST),
     Unknown("drag_linear_z", "drag_linear", (2,), 1.0, _ALL, _FAST),
-    Unknown("drag_quadratic_xy", "drag_quadratic", (0, 1), 1.0, _ALL, _FAST),
+    Unknown("drag_quadratic_x", "drag_quadratic", (0,), 1.0, _ALL, _FAST),
+    Unknown("drag_quadratic_y", "drag_quadratic", (1,), 1.0, _ALL, _FAST),
     Unknown("drag_quadratic_z", "drag_quadratic", (2,), 1.0, _ALL, _FAST),
     Unknown("rate_gain_x", "rate_gain", (0,), 0.7, ("command",), _RATES),
     Unknown("rate_gain_y", "rate_gain", (1,), 0.7, ("command",), _RATES),
@@ -128,9 +130,9 @@ def vehicle_of(model: Model, p: Array) -> Vehicle:
     """The vehicle at values of its unknowns, (u,)."""
     changed: dict[str, Any] = {}
     for unknown, x in zip(model.unknowns, p, strict=True):
-        value = jnp.asarray(changed.get(unknown.field, getattr(model.base, unknown.field)))
         if not unknown.field:
             continue
+        value = jnp.asarray(changed.get(unknown.field, getattr(model.base, unknown.field)))
         if unknown.field == "latency":
             changed["latency"] = value + x
         elif unknown.entries:

@@ -14,7 +14,7 @@ from e2efly.vehicles.vehicle import check, quantities, vehicle_file
 
 
 def merged(base: Vehicle, found: Mapping[str, Estimate]) -> Vehicle:
-    """The base with what was found in place of its values.
+    """The base with what was found in place of its values. Moments of inertia that were not found grow as the others.
 
     Raises:
         ValueError: where the two together are no vehicle, naming the values.
@@ -22,7 +22,10 @@ def merged(base: Vehicle, found: Mapping[str, Estimate]) -> Vehicle:
     values = {}
     for name, estimate in found.items():
         own = np.asarray(getattr(base, name), float)
-        new = np.where(np.isfinite(estimate.value), estimate.value, own)
+        known = np.isfinite(estimate.value)
+        new = np.where(known, estimate.value, own)
+        if name == "inertia" and known.any():  # or the three may be of no rigid body
+            new = np.where(known, new, own * np.mean(estimate.value[known] / own[known]))
         values[name] = new if new.shape else float(new)
     vehicle = Vehicle(**({f.name: getattr(base, f.name) for f in quantities()} | {"name": base.name} | values))
     check(vehicle, "identified vehicle")
