@@ -18,10 +18,13 @@ from e2efly.vehicles import Vehicle, load_vehicle, unknown
 if TYPE_CHECKING:
     from e2efly.identification.estimate import Estimate
     from e2efly.identification.flight import Found
+    from e2efly.identification.judge import Prediction
     from e2efly.identification.record import Record
 
 KINDS = ("parts", "pendulum", "stand", "flight", "step")
 """Sources, by what the command line calls them."""
+AHEAD = (0.048, 0.1, 0.2, 0.4)
+"""How far ahead the report tells the errors of the prediction, s."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,10 @@ def run(options: Identify) -> int:
             found[kind] = _flown(known, base, records, kind == "step", console)
             said += _with_mass(found[kind].estimates, said)
     fused = fuse(said)
-    report = _report(options, base, fused, said, found)
+    from e2efly.identification.judge import judged
+
+    outside = {kind: judged(each) for kind, each in found.items()}
+    report = _report(options, base, fused, said, found, outside)
     options.out.mkdir(parents=True, exist_ok=True)
     file = options.out / "vehicle.toml"
     write_vehicle(file, options.vehicle, base, fused)
@@ -94,7 +100,7 @@ def run(options: Identify) -> int:
         )
     from e2efly.view.identification import plot_identified
 
-    plots = plot_identified(options.out, base, fused, found)
+    plots = plot_identified(options.out, base, fused, found, outside)
     console.print(
         f"Vehicle: {file}. Report: {options.out / 'identified.json'}. Plots: {', '.join(p.name for p in plots)}"
     )
@@ -158,10 +164,15 @@ def _with_mass(estimates: "list[Estimate]", said: "Sequence[Estimate]") -> "list
 
 
 def _report(
-    options: Identify, base: Vehicle, fused: "dict[str, Estimate]", said: "list[Estimate]", found: "dict[str, Found]"
+    options: Identify,
+    base: Vehicle,
+    fused: "dict[str, Estimate]",
+    said: "list[Estimate]",
+    found: "dict[str, Found]",
+    outside: "dict[str, Prediction]",
 ) -> dict[str, Any]:
     from e2efly.identification.flight import nuisances
-    from e2efly.identification.judge import judged
+    from e2efly.identification.windows import LENGTH, STEP
 
     def entry(e: "Estimate") -> dict[str, Any]:
         return {"value": e.value.tolist(), "sigma": e.sigma.tolist(), "source": e.source}
@@ -174,12 +185,12 @@ def _report(
         "sources": [{"parameter": e.name, **entry(e)} for e in said],
     }
     for kind, each in found.items():
-        outside = judged(each)
+        held_out, at = outside[kind], [round(ahead / STEP) for ahead in AHEAD]
         covariance = each.fit.covariance
         spread = np.sqrt(np.diag(covariance))
         report[kind] = {
             "driven_by": each.model.driver,
-            "seconds": each.windows.count * 0.4,
+            "seconds": each.windows.count * LENGTH,
             "unknowns": [
                 {"name": u.name, "found": float(x), "sigma": float(s)}
                 for u, x, s in zip(each.model.unknowns, each.fit.p, each.sigma, strict=True)
@@ -191,11 +202,11 @@ def _report(
             "refused": [str(refusal) for refusal in each.refusals],
             "held_out": {
                 name: {
-                    "seconds": outside.time[[12, 25, 50, 100]].tolist(),
-                    "before": outside.before[name][[12, 25, 50, 100]].tolist(),
-                    "after": outside.after[name][[12, 25, 50, 100]].tolist(),
+                    "seconds": list(AHEAD),
+                    "before": held_out.before[name][at].tolist(),
+                    "after": held_out.after[name][at].tolist(),
                 }
-                for name in outside.before
+                for name in held_out.before
             },
         }
     return report

@@ -7,6 +7,7 @@ from itertools import permutations
 
 import numpy as np
 
+from e2efly.deploy.log.blackbox import vertex
 from e2efly.identification.record import KINDS, Record, Stream
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
@@ -231,12 +232,7 @@ def _offset(record: Record) -> float | None:
     i = int(np.argmax(scores))
     if scores[i] < AGREE:
         return None
-    part = 0.0
-    if 0 < i < len(scores) - 1:
-        left, middle, right = scores[i - 1 : i + 2]
-        bend = left - 2 * middle + right
-        part = 0.5 * (left - right) / bend if bend < 0 else 0.0
-    return (i - reach + part) * _GRID
+    return (i - reach + vertex(np.array(scores), i)) * _GRID
 
 
 def _rates(record: Record) -> tuple[np.ndarray, np.ndarray]:

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -57,7 +57,6 @@ class Found:
     """(u,) of the unknowns: the fit's, under what is refused being the file's."""
     sigma: np.ndarray
     """(u,) of the unknowns; what is believed of the fit's."""
-    notes: tuple[str, ...] = field(default=())
 
     def drag_at(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
         """Drag along each axis at a speed, m/s, and its standard deviation, (3,) N.

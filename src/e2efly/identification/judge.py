@@ -12,11 +12,6 @@ from e2efly.identification.model import NUISANCES, START, attitude_error, simula
 from e2efly.identification.shooting import measured_starts
 from e2efly.identification.windows import STEP
 
-UNITS = {
-    "body_rate": "rad/s", "specific_force": "m/s^2", "rotor_speed": "rad/s", "velocity": "m/s", "quaternion": "rad",
-    "position": "m",
-}  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Prediction:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.control import Quat, Vec3
 from e2efly.identification.estimate import Estimate
 from e2efly.vehicles.names import unknown
 from e2efly.vehicles.tables import number, numbers, read_table, shown, text
@@ -214,12 +215,9 @@ def _above(where: str, given: Any) -> float:
 
 
 def _turn(angles: np.ndarray) -> np.ndarray:
-    """R = Rz(yaw) Ry(pitch) Rx(roll) of roll, pitch, yaw in rad."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(angles), np.sin(angles)
-    x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    return z @ y @ x
+    """The matrix of roll, pitch and yaw, rad."""
+    axes = Vec3(*np.eye(3))
+    return Quat.of_euler(*angles).rotate(axes).stack().T
 
 
 def _mesh(where: str, path: Path) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.control import Quat, Vec3
 from e2efly.identification.crazyflie import is_crazyflie, read_crazyflie
 from e2efly.identification.csv_file import Column, read_csv
 from e2efly.identification.record import Record, Stream
@@ -207,11 +208,11 @@ def read_bag(path: Path) -> Record:
 def _of_odometry(message: Any) -> dict[str, list[float]]:
     pose, twist = message.pose.pose, message.twist.twist
     q, v = pose.orientation, twist.linear
-    attitude = np.array([q.w, q.x, q.y, q.z])
+    velocity = Quat(q.w, q.x, q.y, q.z).rotate(Vec3(v.x, v.y, v.z))  # nav_msgs has it in the body's frame
     return {
         "position": [pose.position.x, pose.position.y, pose.position.z],
-        "quaternion": attitude.tolist(),
-        "velocity": _rotated(attitude, np.array([v.x, v.y, v.z])).tolist(),  # nav_msgs has it in the body's frame
+        "quaternion": [q.w, q.x, q.y, q.z],
+        "velocity": [velocity.x, velocity.y, velocity.z],
     }
 
 
@@ -230,11 +231,6 @@ _BAG: dict[str, Callable[[Any], dict[str, list[float]]]] = {
     "sensor_msgs/msg/Imu": _of_imu,
     "geometry_msgs/msg/PoseStamped": _of_pose,
 }
-
-
-def _rotated(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    w, u = q[0], q[1:]
-    return v + 2 * np.cross(u, np.cross(u, v) + w * v)
 
 
 def _put(streams: dict[str, Stream], name: str, time: np.ndarray, values: np.ndarray) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from e2efly.control import COMMAND_MODES, Quat, Vec3
 from e2efly.control.excitation import DURATION, doublets, lines
 from e2efly.identification.record import Record, Stream
-from e2efly.validation.plant import Delay, Plant, RigidState
+from e2efly.validation.plant import Delay, Known, Plant, RigidState
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
@@ -44,13 +44,6 @@ class Sensors:
 
 
 PERFECT = Sensors(*[0.0] * 9, gaps=0)
-
-
-@dataclass(frozen=True)
-class _Motion:
-    position: Vec3
-    velocity: Vec3
-    attitude: Quat
 
 
 def fly_excitation(
@@ -96,7 +89,7 @@ def fly_excitation(
         if sag:
             plant.disturb(np.zeros(3), np.full(4, 1 - sag * now / seconds))
         if k % ticks == 0:
-            motion = _Motion(Vec3(*state.position), Vec3(*state.velocity), Quat(*state.quaternion))
+            motion = Known(Vec3(*state.position), Vec3(*state.velocity), Quat(*state.quaternion))
             found = wanted(steer, motion, (*lines(now, speed), 0.0))
             rates, thrust = doublets(now) if pulses else (np.zeros(3), 0.0)
             rates = rates + np.array([found.rate.x, found.rate.y, found.rate.z])

@@ -11,7 +11,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from e2efly.control import COMMAND_MODES
+from e2efly.control import COMMAND_MODES, Quat, Vec3
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.policy.contract import Contract
 from e2efly.vehicles import Vehicle, unknown
@@ -57,6 +57,15 @@ class RigidState:
     def odometry(self, time: float) -> Odometry:
         """What a perfect pose source says of it at `time`, s."""
         return Odometry(time, self.position, self.velocity, self.quaternion, self.body_rate)
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the controllers know of the vehicle."""
+
+    position: Vec3
+    velocity: Vec3
+    attitude: Quat
 
 
 _SHAPES = {"position": (3,), "velocity": (3,), "quaternion": (4,), "body_rate": (3,)}

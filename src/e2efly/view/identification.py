@@ -7,10 +7,13 @@ import numpy as np
 
 from e2efly.identification.estimate import Estimate
 from e2efly.identification.flight import Found
-from e2efly.identification.judge import UNITS, Prediction, judged
+from e2efly.identification.judge import Prediction
+from e2efly.identification.record import KINDS
 from e2efly.vehicles import Vehicle
 from e2efly.view.style import BLUE, GREY, INK, VERMILLION, figure
 
+UNITS = {name: kind.unit for name, kind in KINDS.items()} | {"quaternion": "rad"}
+"""Of errors: that of an attitude is an angle."""
 _NAMES = {
     "body_rate": "body rate", "specific_force": "specific force", "rotor_speed": "rotor speed", "velocity": "velocity",
     "quaternion": "attitude", "position": "position",
@@ -18,16 +21,19 @@ _NAMES = {
 
 
 def plot_identified(
-    folder: Path, base: Vehicle, fused: Mapping[str, Estimate], found: Mapping[str, Found]
+    folder: Path,
+    base: Vehicle,
+    fused: Mapping[str, Estimate],
+    found: Mapping[str, Found],
+    outside: Mapping[str, Prediction],
 ) -> list[Path]:
     """Draw all figures; returns their files."""
     paths = [folder / "parameters.png"]
     _plot_parameters(paths[0], base, fused)
     for kind, each in found.items():
-        outside = judged(each)
         for name, draw in (("prediction", _plot_prediction), ("fit", _plot_fit), ("residuals", _plot_residuals)):
             paths.append(folder / f"{kind}_{name}.png")
-            draw(paths[-1], each, outside)
+            draw(paths[-1], each, outside[kind])
     return paths
 
 

@@ -181,7 +181,7 @@ def _best(flight: np.ndarray, window: np.ndarray, low: int, high: int) -> tuple[
     size = np.sqrt(np.maximum(energy[len(window) :] - energy[: -len(window)], 1e-6) * max(np.sum(window**2), 1e-6))
     agreement = match / size
     i = int(np.argmax(agreement))
-    return low + i + _vertex(agreement, i), float(agreement[i])
+    return low + i + vertex(agreement, i), float(agreement[i])
 
 
 def _resampled(time: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -189,7 +189,7 @@ def _resampled(time: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(grid, time, values[:, i]) for i in _AXES], axis=1)
 
 
-def _vertex(y: np.ndarray, i: int) -> float:
+def vertex(y: np.ndarray, i: int) -> float:
     """Offset of the vertex of the parabola through three samples from the middle one, in samples."""
     if not 0 < i < len(y) - 1:
         return 0.0

@@ -15,13 +15,12 @@ and mixer, float64) runs before every step of at most 1 ms. Two things need a wo
 import importlib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from e2efly.control import COMMAND_MODES, Quat, Vec3
-from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
+from e2efly.validation.plant import EVERYTHING, MOMENT, Known, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY, allocation_matrix
@@ -161,15 +160,6 @@ Law = Callable[[Sequence[float], Sequence[float], Sequence[float]], list[float]]
 """(command, pose: position and quaternion, motion: velocity in the world and body rates) -> rotor thrusts, N."""
 
 
-@dataclass(frozen=True)
-class _Motion:
-    """What the controllers know of the vehicle."""
-
-    position: Vec3
-    velocity: Vec3
-    attitude: Quat
-
-
 def control_law(vehicle: Vehicle, command_mode: str, plain_mixer: bool = False) -> Law:
     """The flight controller of a command mode, for the vehicle that it knows; `plain_mixer` as for `rate_loop`.
 
@@ -187,7 +177,7 @@ def control_law(vehicle: Vehicle, command_mode: str, plain_mixer: bool = False) 
         return lambda command, pose, motion: rates(command, motion[3:])
 
     def law(command: Sequence[float], pose: Sequence[float], motion: Sequence[float]) -> list[float]:
-        known = _Motion(Vec3(*pose[:3]), Vec3(*motion[:3]), Quat(*pose[3:]))
+        known = Known(Vec3(*pose[:3]), Vec3(*motion[:3]), Quat(*pose[3:]))
         wanted = controller(vehicle, known, (command[0], command[1], command[2], command[3]))
         ctbr = (wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z)
         return rates([float(x) for x in ctbr], motion[3:])
