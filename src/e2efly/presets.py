@@ -22,10 +22,10 @@ from e2efly.config import (
 )
 from e2efly.registry import is_shipped
 from e2efly.tasks import TASKS
-from e2efly.vehicles import load_family, load_vehicle
+from e2efly.vehicles import load_family, load_vehicle, posterior
 from e2efly.vehicles.names import unknown
 
-ROBUST, NOMINAL, PAPER = "robust", "nominal", "paper"
+ROBUST, IDENTIFIED, NOMINAL, PAPER = "robust", "identified", "nominal", "paper"
 OTHERS = EnvConfig(
     latency_spread=(0.04, 0.05),
     randomize={
@@ -36,6 +36,12 @@ OTHERS = EnvConfig(
     disturbance=DisturbanceConfig(gust=1.0, thrust=0.25, rotor=0.1, sag=0.2, centre_of_mass=0.006),
 )  # fmt: skip
 """The vehicles of the preset `robust`."""
+AROUND = EnvConfig(
+    randomize={posterior.IDENTIFIED: 1.0},
+    wind=2.0,
+    disturbance=DisturbanceConfig(gust=0.5, thrust=0.05, rotor=0.03, sag=0.12, centre_of_mass=0.002),
+)
+"""The vehicles of the preset `identified`: what the file's standard deviations leave open, and what no file knows."""
 BESIDE_CAMERA = {"angle_spread": 0.06, "position_spread": 0.012, "fov_spread": 0.04}
 """What the preset `robust` draws of cameras beside what the task says of them ..."""
 OLDER = 0.05
@@ -51,7 +57,7 @@ BESIDE_FAMILY = EnvConfig(
 
 def names() -> tuple[str, ...]:
     """The presets that there are; not every task has each."""
-    return ROBUST, NOMINAL, PAPER, *dict.fromkeys(name for task in TASKS.values() for name in task.variants)
+    return ROBUST, IDENTIFIED, NOMINAL, PAPER, *dict.fromkeys(name for task in TASKS.values() for name in task.variants)
 
 
 def default(
@@ -90,8 +96,8 @@ def preset(task: str, algo: str, name: str = NOMINAL) -> TrainConfig:
     config = _nominal(options, learner)
     if name == NOMINAL:
         return config
-    if name == ROBUST:
-        return _robust(options, config)
+    if name in (ROBUST, IDENTIFIED):
+        return _adaptive(options, config, name)
     if name not in options.variants:
         having = ", ".join(other for other, known in TASKS.items() if name in known.variants)
         raise ValueError(f"preset {name!r}: accepted for task {having}, not {options.name!r}")
@@ -117,18 +123,19 @@ def _with_critic(task: type[TaskConfig], algo: str) -> TrainConfig:
     return dataclasses.replace(config, algo=ALGORITHMS[algo](**taken), reward=reward)
 
 
-def _robust(task: type[TaskConfig], config: TrainConfig) -> TrainConfig:
+def _adaptive(task: type[TaskConfig], config: TrainConfig, name: str) -> TrainConfig:
     """Other vehicles in every episode, and a policy with a memory by which it feels them."""
     given = task.robust.get(config.algo.name)
     if given is None:
         raise ValueError(
-            f"preset 'robust': accepted for {_having('robust')}; not for {task.name} by {config.algo.name}"
+            f"preset {name!r}: accepted for {_having('robust')}; not for {task.name} by {config.algo.name}"
         )
     cameras = tuple(
         dataclasses.replace(c, latency=(c.latency[0], c.latency[1] + OLDER), **BESIDE_CAMERA)
         for c in config.env.cameras
     )
-    return given.into(dataclasses.replace(config, env=dataclasses.replace(OTHERS, cameras=cameras)))
+    env = OTHERS if name == ROBUST else AROUND
+    return given.into(dataclasses.replace(config, env=dataclasses.replace(env, cameras=cameras)))
 
 
 def _having(recipes: str) -> str:

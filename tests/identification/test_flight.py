@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from e2efly.identification.correlation import OVER_MASS, correlation
 from e2efly.identification.csv_file import write_csv
+from e2efly.identification.estimate import Estimate
 from e2efly.identification.flight import Found, identify
 from e2efly.identification.record import Record
 from e2efly.identification.vehicle_file import merged
@@ -64,6 +66,30 @@ def test_biases_and_sag_are_told_apart_from_the_vehicle(found: Found) -> None:
     assert abs(q[9] - 0.04) < 0.01
     rng_delay = found.fit.noise["position"]
     assert 5e-4 < rng_delay < 3e-3
+
+
+def test_what_is_found_over_the_mass_goes_with_it(found: Found) -> None:
+    """A scale that is 3 % off moves thrust and inertia by 3 %, together; lag and delay keep the fit's correlation."""
+    off = 0.03
+    said = [
+        dataclasses.replace(e, sigma=np.hypot(e.sigma, off * e.value)) if e.name in OVER_MASS else e
+        for e in found.estimates
+    ]
+    mass = Estimate("mass", np.array(BODY.mass), np.array(off * BODY.mass), "scale")
+    names, matrix = correlation([found], {e.name: e for e in [*said, mass]}, off)
+    at = {name: i for i, name in enumerate(names)}
+    assert matrix[at["mass"], at["thrust_map"]] > 0.95
+    assert matrix[at["thrust_map"], at["inertia[0]"]] > 0.95
+    assert matrix[at["mass"], at["latency"]] == 0
+    own = found.fit.covariance
+    i, j = ([u.name for u in found.model.unknowns].index(name) for name in ("motor_time_constant", "latency"))
+    assert np.isclose(matrix[at["motor_time_constant"], at["latency"]], own[i, j] / np.sqrt(own[i, i] * own[j, j]))
+    assert np.linalg.eigvalsh(matrix).min() > 0
+    exact = {e.name: e for e in [*said, mass]} | {
+        "inertia": Estimate("inertia", BODY.inertia, 1e-4 * BODY.inertia, "pendulum and flight")
+    }
+    names, matrix = correlation([found], exact, off)
+    assert abs(matrix[names.index("inertia[0]"), names.index("mass")]) < 0.01  # the pendulum did not weigh it
 
 
 def test_without_rotor_speeds_the_inertia_is_less_sure(record: Record, found: Found) -> None:

@@ -55,6 +55,7 @@ def run(options: Identify) -> int:
         ValueError: naming the source, what is wrong with it and what is accepted. Nothing is written then.
     """
     from e2efly.identification import parts, pendulum, stand
+    from e2efly.identification.correlation import correlation
     from e2efly.identification.csv_file import column_map
     from e2efly.identification.estimate import Estimate, fuse
     from e2efly.identification.vehicle_file import merged, write_vehicle
@@ -85,7 +86,8 @@ def run(options: Identify) -> int:
     report = _report(options, base, fused, said, found, outside)
     options.out.mkdir(parents=True, exist_ok=True)
     file = options.out / "vehicle.toml"
-    write_vehicle(file, options.vehicle, base, fused)
+    together = correlation(found.values(), fused, _mass_spread(said))
+    write_vehicle(file, options.vehicle, base, fused, together)
     load_vehicle(file)
     write_json(options.out / "identified.json", report)
     console.print(_table(base, fused))
@@ -157,10 +159,15 @@ def _with_mass(estimates: "list[Estimate]", said: "Sequence[Estimate]") -> "list
     """What is proportional to the mass is no better known than it."""
     from dataclasses import replace
 
-    masses = [e for e in said if e.name == "mass"]
-    off = float(min(e.sigma / e.value for e in masses)) if masses else 0.0
-    scaled = ("thrust_map", "rotor_thrust_max", "inertia", "drag_linear", "drag_quadratic")
-    return [replace(e, sigma=np.hypot(e.sigma, np.abs(e.value) * off)) if e.name in scaled else e for e in estimates]
+    from e2efly.identification.correlation import OVER_MASS
+
+    off = _mass_spread(said)
+    return [replace(e, sigma=np.hypot(e.sigma, np.abs(e.value) * off)) if e.name in OVER_MASS else e for e in estimates]
+
+
+def _mass_spread(said: "Sequence[Estimate]") -> float:
+    """Relative standard deviation of the mass; 0 where no source says it."""
+    return float(min((e.sigma / e.value for e in said if e.name == "mass"), default=0.0))
 
 
 def _report(

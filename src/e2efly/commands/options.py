@@ -7,6 +7,8 @@ from typing import Any, TypeVar
 import tyro
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
+from e2efly.vehicles.posterior import IDENTIFIED
+
 T = TypeVar("T")
 _TYPES = ConstructorRegistry()
 
@@ -43,11 +45,32 @@ def parse(options: type[T], command: str, arguments: list[str], **default: Any) 
         ValueError: for the path of a device or of a pipe: it may never end, and a report written there replaces it.
     """
     config = (tyro.conf.AvoidSubcommands,)
-    found = tyro.cli(options, args=arguments, prog=f"e2efly {command}", config=config, registry=_TYPES, **default)
+    found = tyro.cli(
+        options, args=_once(arguments), prog=f"e2efly {command}", config=config, registry=_TYPES, **default
+    )
     for name, value in vars(found).items():
         if isinstance(value, Path) and value.exists() and not (value.is_file() or value.is_dir()):
             raise ValueError(f"{name} is {value}; accepted: the path of a file or of a folder")
     return found
+
+
+def _once(arguments: list[str]) -> list[str]:
+    """`--env.randomize identified` with the factor that it leaves out: once the file's standard deviations."""
+    out: list[str] = []
+    for i, argument in enumerate(arguments):
+        out.append(argument)
+        following = arguments[i + 1] if i + 1 < len(arguments) else "--"
+        if argument == IDENTIFIED and "--env.randomize" in arguments[:i] and not _is_number(following):
+            out.append("1")
+    return out
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def peek(arguments: list[str], flag: str, default: str) -> str:

@@ -20,6 +20,7 @@ from e2efly.device import Hosts, prepare
 from e2efly.supervised import is_watched, watched
 from e2efly.tasks import TASKS
 from e2efly.terminal import Terminal, TerminalProgress, console_table, seconds
+from e2efly.vehicles.posterior import IDENTIFIED, load_posterior
 from e2efly.zoo import policy_file
 
 _FLOWN = {"nominal": "best, nominal", "stress": "best, stress", "shipped": "best", "last": "last"}
@@ -206,7 +207,11 @@ def _config(options: Any, config: TrainConfig) -> TrainConfig:
     shared["curriculum"] = config.curriculum if options.curriculum else ()
     changes, old = options.reward, config.reward
     shared["reward"] = RewardConfig(_changed(old.weights, changes.weights), {**old.parameters, **changes.parameters})
-    randomize = _changed(config.env.randomize, options.env.randomize)
+    own = config.env.randomize
+    if options.env.randomize.get(IDENTIFIED):  # the preset's draws are of a vehicle that nobody has measured
+        known = {entry.field for entry in load_posterior(options.vehicle).entries}
+        own = {name: width for name, width in own.items() if name not in known}
+    randomize = _changed(own, options.env.randomize)
     shared["env"] = dataclasses.replace(options.env, randomize=randomize)
     if options.start_from is not None:
         shared["start_from"] = str(policy_file(options.start_from, options.vehicle).absolute())

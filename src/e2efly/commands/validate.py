@@ -50,6 +50,8 @@ class Validate:
     """Points of success by which the plant may lie under the training simulator; --stress has --least."""
     json: Path | None = None
     """Write the report, with a row for every start, to this file."""
+    log: Path | None = None
+    """Folder for a CSV log of each flight, for `e2efly identify flight`; not with --stress."""
     seed: int = 1_000_000
     """Seed of the starts."""
     vehicle: str | None = None
@@ -124,6 +126,7 @@ def run(asked: Asked) -> int:
             task=asked.task,
             seed=o.seed,
             max_drop=o.max_drop,
+            log=o.log,
             progress=progress,
         )
     for note in found.notes():
@@ -135,6 +138,8 @@ def run(asked: Asked) -> int:
     if o.json:
         write_json(o.json, found.as_json())
         console.print(f"Report: {o.json}")
+    if o.log:
+        console.print(f"Logs: {o.log}")
     whole = _whole_flights(found, o.flights, console)
     if not found.passed:
         console.print(
@@ -147,6 +152,8 @@ def run(asked: Asked) -> int:
 def _stress(o: Validate) -> int:
     from e2efly.validation.stress import FLIGHTS, stress
 
+    if o.log:
+        raise ValueError(f"--log is {o.log}; accepted without --stress")
     for field in dataclasses.fields(Validate):
         if field.name in ("flights", "max_drop") and getattr(o, field.name) != field.default:
             option = field.name.replace("_", "-")

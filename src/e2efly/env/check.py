@@ -4,11 +4,15 @@ import math
 
 from e2efly.config import EnvConfig, TaskConfig, check_numbers
 from e2efly.deploy.policy.contract_json import LATEST
+from e2efly.env.limits import posterior_of
 from e2efly.scenes.camera import check as check_camera
 from e2efly.sensors.image_noise import check as check_noise
 from e2efly.vehicles import load_family, nominal_vehicle, unknown
+from e2efly.vehicles.posterior import IDENTIFIED, WIDEST
 from e2efly.vehicles.vehicle import quantities
 
+MOST = 10.0
+"""Times the standard deviations of an identified vehicle that episodes may draw from."""
 COUNTED = 2**24
 """Control steps that an episode can have: float32 counts no further."""
 
@@ -21,9 +25,11 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
     """
     names = [f.name for f in quantities()]
     for name, width in config.randomize.items():
-        if name not in names:
+        if name == IDENTIFIED:
+            _check_identified(config)
+        elif name not in names:
             raise ValueError(unknown("vehicle parameter", name, names))
-        if not 0 <= width < 1:
+        elif not 0 <= width < 1:
             raise ValueError(f"env.randomize.{name} is {width}; accepted: at least 0 and below 1")
     for field, bounds in (
         ("action_latency", config.action_latency),
@@ -76,6 +82,8 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
         check_numbers(prefix, part)
     margin = vehicle.thrust_to_weight if family is None else family.ranges.thrust_to_weight[0]
     d, drawn = config.disturbance, margin * config.weakest
+    if (posterior := posterior_of(config)) is not None:
+        drawn *= 1 - WIDEST * posterior.thrust_sigma
     if drawn < 1:
         raise ValueError(
             f"env.randomize is {dict(config.randomize)} and env.disturbance has thrust {d.thrust:g}, "
@@ -91,4 +99,17 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
             raise ValueError(
                 f"task.{name} is {place}; accepted: a place more than {vehicle.feet_height:g} m over the ground, the "
                 "height of the centre of mass over the feet"
+            )
+
+
+def _check_identified(config: EnvConfig) -> None:
+    width = config.randomize[IDENTIFIED]
+    if not 0 <= width <= MOST:
+        raise ValueError(f"env.randomize.{IDENTIFIED} is {width}; accepted: 0 to {MOST:g} times the file's sigma")
+    posterior = posterior_of(config)
+    for entry in () if posterior is None else posterior.entries:
+        if config.randomize.get(entry.field):
+            raise ValueError(
+                f"env.randomize has {IDENTIFIED} and {entry.field}, and {config.vehicle} has a sigma of {entry.name}; "
+                "accepted: one of the two"
             )

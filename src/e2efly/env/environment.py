@@ -29,8 +29,8 @@ from e2efly.config import (
 from e2efly.control import COMMAND_MODES
 from e2efly.env import disturbance, expert
 from e2efly.env.check import check
-from e2efly.env.draws import between, perturbed
-from e2efly.env.limits import latencies_of, limits_of
+from e2efly.env.draws import around, between, perturbed
+from e2efly.env.limits import latencies_of, limits_of, posterior_of
 from e2efly.env.state import EnvState, Step
 from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field, past_actions
 from e2efly.physics import Physics, State, step
@@ -43,6 +43,7 @@ from e2efly.sensors.noise import add_noise
 from e2efly.tasks.task import Guided, Shape, Task, into_ball, make_task, uniform
 from e2efly.vehicles import Family, Flown, load_family, load_vehicle
 from e2efly.vehicles.family import DRAWN
+from e2efly.vehicles.posterior import IDENTIFIED, Posterior
 
 LEADS = (0.0, 0.25, 0.5, 1.0, 1.5)
 """How far ahead a critic is told the clearance, s."""
@@ -56,7 +57,7 @@ DEFAULT = EnvConfig()
     jax.tree_util.register_dataclass,
     data_fields=[
         "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range",
-        "observation_latency_range", "randomize", "wind", "disturbance", "noise", "imu", "cameras",
+        "observation_latency_range", "randomize", "posterior", "wind", "disturbance", "noise", "imu", "cameras",
     ],
     meta_fields=["queue", "seen_actions", "past", "family"],
 )  # fmt: skip
@@ -78,6 +79,8 @@ class Env:
     observation_latency_range: Float[Array | np.ndarray, "2"]
     randomize: dict[str, Any]
     """Relative half-width of each randomised vehicle parameter."""
+    posterior: Posterior | None
+    """What an identified vehicle is drawn from; None: it is not."""
     wind: Any
     """Largest wind speed, m/s; None: still air."""
     disturbance: DisturbanceConfig | None
@@ -134,6 +137,7 @@ class Env:
         mode, (low, high) = COMMAND_MODES[config.command_mode], limits_of(config)
         noisy = config.noise != NoiseConfig()
         shape = Shape(body.feet_height, body.radius)
+        drawn = posterior_of(config)
         oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
         return Env(
             physics=physics,
@@ -145,7 +149,8 @@ class Env:
             hover=((np.asarray(mode.hover(vehicle)) - low) / (high - low) * 2 - 1).astype(dtype),
             latency_range=np.asarray(late, dtype),
             observation_latency_range=np.asarray(config.observation_latency, dtype),
-            randomize=dict(config.randomize),
+            randomize={name: width for name, width in config.randomize.items() if name != IDENTIFIED},
+            posterior=drawn and dataclasses.replace(drawn, root=drawn.root.astype(dtype)),
             wind=config.wind or None,
             disturbance=None if config.disturbance == DisturbanceConfig() else config.disturbance,
             noise=config.noise if noisy else None,
@@ -163,7 +168,8 @@ class Env:
         sooner, later = self.latency_range
         spread = sooner != later and self.family is None
         spread = spread or any(camera != steady(camera) for camera in self.cameras)
-        return bool(spread or any(self.randomize.values()) or self.wind or self.disturbance)
+        drawn = any(self.randomize.values()) or (self.posterior is not None and np.any(self.posterior.root))
+        return bool(spread or drawn or self.wind or self.disturbance)
 
     def undisturbed(self) -> "Env":
         """The environment with the vehicle of the file, its delay, still air and cameras as they are meant to be; of a
@@ -174,6 +180,7 @@ class Env:
             self,
             latency_range=np.stack([nominal, nominal]) if self.family is None else self.latency_range,
             randomize={name: 0 * width for name, width in self.randomize.items()},
+            posterior=self.posterior and self.posterior.times(0.0),
             wind=self.wind and 0 * self.wind,
             disturbance=self.disturbance and DisturbanceConfig(),
             cameras=tuple(map(steady, self.cameras)),
@@ -372,6 +379,11 @@ class Env:
             family = jax.random.uniform(jax.random.fold_in(plant_key, 2), (n, DRAWN), self.center.dtype)
         flown = self._physics(family).flown
         disturbed, plant = None, perturbed(plant_key, n, self.physics.flown, self.randomize, flown)
+        late = between(action_key, n, self.latency_range)
+        if self.posterior is not None:
+            identified = jax.random.fold_in(plant_key, 3)
+            values, late = around(identified, n, self.physics.flown, self.posterior, self.latency_range, late)
+            plant |= values
         if self.disturbance is not None:
             disturbed_key, mass_key = jax.random.split(jax.random.fold_in(plant_key, 1))
             disturbed = disturbance.draw(self.disturbance, disturbed_key, n)
@@ -393,7 +405,7 @@ class Env:
             memory=memory,
             time=jnp.zeros(n, dtype),
             actions=jnp.broadcast_to(self.hover, (n, self.queue, 4)).astype(dtype),
-            action_latency=between(action_key, n, self.latency_range),
+            action_latency=late,
             plant=plant,
             wind=None if self.wind is None else self.wind * into_ball(uniform(wind_key, n, 3)),
             family=family,

@@ -5,6 +5,7 @@ import numpy as np
 from e2efly.config import EnvConfig
 from e2efly.control import COMMAND_MODES, command_limits
 from e2efly.vehicles import Family, Vehicle, load_family, load_vehicle
+from e2efly.vehicles.posterior import IDENTIFIED, WIDEST, Posterior, load_posterior
 
 
 def limits_of(config: EnvConfig) -> np.ndarray:
@@ -24,4 +25,16 @@ def latencies_of(config: EnvConfig, vehicle: Vehicle, family: Family | None) -> 
     """Seconds from observation to command where the configuration does not say."""
     low, high = (vehicle.latency,) * 2 if family is None else family.ranges.latency
     sooner, later = config.latency_spread
+    if (drawn := posterior_of(config)) is not None:
+        sooner, later = (x + WIDEST * float(drawn.latency_sigma) for x in (sooner, later))
     return max(low - sooner, 0.0), high + later
+
+
+def posterior_of(config: EnvConfig) -> Posterior | None:
+    """The distribution about the vehicle's file that episodes draw from; None: they do not.
+
+    Raises:
+        ValueError: for a file that has no standard deviations.
+    """
+    width = config.randomize.get(IDENTIFIED, 0.0)
+    return load_posterior(config.vehicle).times(width) if width else None

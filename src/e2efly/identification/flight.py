@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from e2efly.identification.coarse import begin
 from e2efly.identification.estimate import Estimate
 from e2efly.identification.model import NUISANCES, UNKNOWNS, Model, Unknown
 from e2efly.identification.record import Record
@@ -149,7 +150,7 @@ def identify(
     only = tuple(u.name for u in UNKNOWNS if u.field in ("rate_gain", "latency")) if step else ()
     model = Model.of(vehicle, driver, believed, only)
     held_out = np.arange(windows.count) % HELD_OUT == HELD_OUT - 1
-    found = fit(model, windows.some(~held_out), _best_delay(model, windows.some(~held_out)), told=told)
+    found = fit(model, windows.some(~held_out), begin(model, windows.some(~held_out)), told=told)
     sigma = sigmas(model, found)
     refused = np.array([_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)])
     p = _given(found.p, _whole_covariance(found, sigma), refused)
@@ -184,26 +185,6 @@ def sigmas(model: Model, found: Fit) -> np.ndarray:
     """
     noise = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
     return np.hypot(noise, [STRUCTURE.get(u.field, 0.0) for u in model.unknowns])
-
-
-def _best_delay(model: Model, windows: Windows) -> np.ndarray:
-    """A start of the fit: the delay that explains the body rates best, the rest by the file."""
-    from e2efly.identification.shooting import cost
-
-    names = [u.name for u in model.unknowns]
-    p = np.zeros(len(names))
-    if "latency" not in names:
-        return p
-    own = float(model.base.latency)
-    tries = np.arange(0.0, 0.16, 0.01) - own
-    some = windows.some(np.linspace(0, windows.count - 1, min(windows.count, 64)).astype(int))
-    costs = []
-    for late in tries:
-        q = p.copy()
-        q[names.index("latency")] = late
-        costs.append(cost(model, some, q))
-    p[names.index("latency")] = tries[int(np.argmin(costs))]
-    return p
 
 
 def _estimates(model: Model, p: np.ndarray, sigma: np.ndarray, refused: np.ndarray, source: str) -> list[Estimate]:

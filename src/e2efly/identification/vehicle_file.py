@@ -9,8 +9,9 @@ import numpy as np
 from e2efly.identification.estimate import Estimate
 from e2efly.storage import write_atomically
 from e2efly.vehicles import Vehicle
+from e2efly.vehicles.posterior import Entry, read_correlation
 from e2efly.vehicles.tables import read_table
-from e2efly.vehicles.vehicle import check, quantities, vehicle_file
+from e2efly.vehicles.vehicle import CORRELATION, check, quantities, vehicle_file
 
 
 def merged(base: Vehicle, found: Mapping[str, Estimate]) -> Vehicle:
@@ -32,7 +33,13 @@ def merged(base: Vehicle, found: Mapping[str, Estimate]) -> Vehicle:
     return vehicle
 
 
-def write_vehicle(path: Path, base_name: str, base: Vehicle, found: Mapping[str, Estimate]) -> Vehicle:
+def write_vehicle(
+    path: Path,
+    base_name: str,
+    base: Vehicle,
+    found: Mapping[str, Estimate],
+    correlation: tuple[list[str], np.ndarray] = ([], np.zeros((0, 0))),
+) -> Vehicle:
     """Write the vehicle file.
 
     Args:
@@ -40,6 +47,7 @@ def write_vehicle(path: Path, base_name: str, base: Vehicle, found: Mapping[str,
         base_name: the name or path of the base, whose sources stay with its values.
         base: the base, loaded.
         found: by field.
+        correlation: names of entries, and their matrix, as `e2efly.vehicles.posterior` reads it.
 
     Raises:
         ValueError: as of `merged`.
@@ -57,8 +65,23 @@ def write_vehicle(path: Path, base_name: str, base: Vehicle, found: Mapping[str,
         else:
             lines += [f"sigma = {_toml(np.asarray(entry['sigma']))}"] if "sigma" in entry else []
             lines += [f"source = {_text(entry['source'])}"]
+    names, matrix = _with_older(correlation, read_correlation(table, str(path)), found)
+    if names:
+        lines += ["", f"[{CORRELATION}]", f"of = [{', '.join(map(_text, names))}]", "value = ["]
+        lines += [*(f"    {_toml(row, digits=4)}," for row in matrix), "]"]
     write_atomically(path, ("\n".join(lines) + "\n").encode())
     return vehicle
+
+
+def _with_older(
+    new: tuple[list[str], np.ndarray], old: tuple[list[str], np.ndarray], found: Mapping[str, Estimate]
+) -> tuple[list[str], np.ndarray]:
+    """Correlations, with those of the base among the entries that nothing new was found of."""
+    kept = [i for i, name in enumerate(old[0]) if Entry.of(name).field not in found]
+    size = len(new[0])
+    matrix = np.eye(size + len(kept))
+    matrix[:size, :size], matrix[size:, size:] = new[1], old[1][np.ix_(kept, kept)]
+    return [*new[0], *(old[0][i] for i in kept)], matrix
 
 
 def _toml(value: Any, digits: int = 6) -> str:

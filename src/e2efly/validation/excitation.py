@@ -9,12 +9,17 @@ import numpy as np
 from e2efly.control import COMMAND_MODES, Quat, Vec3
 from e2efly.control.excitation import DURATION, doublets, lines
 from e2efly.identification.record import Record, Stream
+from e2efly.validation.log import motion_streams
 from e2efly.validation.plant import Delay, Known, Plant, RigidState
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
 RATE, POSES, COMMANDS = 250.0, 100.0, 50.0
 """Samples of gyroscope, accelerometer and rotor speeds, of the poses, and of the commands, Hz."""
+
+LIFT, WEAKEST = 2.0, 8.0
+"""Thrust over mass that is added a second for each m/s of error of the climb, 1/s^2, and the most of it, m/s^2: the
+flight controller may believe in far more thrust than there is, and the vehicle is not to sink into the ground."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,7 @@ def fly_excitation(
     hover = np.array([GRAVITY, 0.0, 0.0, 0.0])
     plant.reset(RigidState(np.array(start), np.zeros(3), np.eye(4)[0], np.zeros(3)))
     delay, ticks = Delay.of(latency, hover), round(RATE / COMMANDS)
-    states, rotors, commands = [], [], []
+    states, rotors, commands, climb = [], [], [], 0.0
     for k in range(round(seconds * RATE)):
         now, then = k / RATE, (k + 1) / RATE
         state = plant.state
@@ -92,29 +97,21 @@ def fly_excitation(
             motion = Known(Vec3(*state.position), Vec3(*state.velocity), Quat(*state.quaternion))
             found = wanted(steer, motion, (*lines(now, speed), 0.0))
             rates, thrust = doublets(now) if pulses else (np.zeros(3), 0.0)
+            climb = float(
+                np.clip(climb + LIFT * (lines(now, speed)[2] - state.velocity[2]) / COMMANDS, -WEAKEST, WEAKEST)
+            )
             rates = rates + np.array([found.rate.x, found.rate.y, found.rate.z])
             rates = np.clip(rates, -believed.body_rate_max, believed.body_rate_max)
-            command = np.array([max(float(found.thrust) + thrust, 0.0), *rates])
+            command = np.array([max(float(found.thrust) + thrust + climb, 0.0), *rates])
             commands.append((now, command))
             delay = delay.send(command, now)
         delay, parts = delay.until(now, then)
         for command, held in parts:
             plant.step(command, held)
     time = np.arange(len(states)) / RATE
-    velocity = np.array([s.velocity for s in states])
-    attitude = np.array([s.quaternion for s in states])
-    change = np.gradient(velocity, 1 / RATE, axis=0) + np.array([0.0, 0.0, GRAVITY])
-    pull = Quat(*attitude.T).unrotate(Vec3(*change.T))
-    streams = {
-        "body_rate": Stream(time, np.array([s.body_rate for s in states])),
-        "specific_force": Stream(time, np.stack([pull.x, pull.y, pull.z], -1)),
-        "rotor_speed": Stream(time, np.array(rotors)),
-        "position": Stream(time, np.array([s.position for s in states])),
-        "velocity": Stream(time, velocity),
-        "quaternion": Stream(time, attitude),
-        "command": Stream(np.array([t for t, _ in commands]), np.array([c for _, c in commands])),
-    }
-    return Record(Path("excitation.csv"), {k: s for k, s in streams.items() if np.isfinite(s.values).all()})
+    streams = motion_streams(time, states, np.array(rotors))
+    sent = np.array([t for t, _ in commands]), np.array([c for _, c in commands])
+    return Record(Path("excitation.csv"), streams | {"command": Stream(*sent)})
 
 
 def sensed(record: Record, sensors: Sensors, seed: int) -> Record:

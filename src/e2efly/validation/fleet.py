@@ -39,6 +39,8 @@ class Mission:
     """The vehicle that the plant's flight controller believes in."""
     duration: float
     """Longest flight, s."""
+    sample: float | None = None
+    """Seconds between two samples of a log, at most; None: none are kept."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,7 @@ def _fly(mission: Mission, flights: Sequence[Flight]) -> Iterator[Trajectory]:
                 met = meets
             runtime = Runtime.of(policy, flight.course, mission.trained, imu=True)
             latency = max(reality.latency - kind.latency, 0.0)
-            yield fly(runtime, plant, flight.start, mission.duration, latency, reality.air)
+            yield fly(runtime, plant, flight.start, mission.duration, latency, reality.air, mission.sample)
 
 
 def _prepare(task: str) -> None:

@@ -13,6 +13,24 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 
 @dataclass(frozen=True)
+class Sample:
+    """A moment of a flight, for a log."""
+
+    time: float
+    """Since the start, s."""
+    state: RigidState
+    """The vehicle."""
+    rotor_speed: np.ndarray
+    """(4,) rad/s; NaN where the plant does not tell."""
+
+    @staticmethod
+    def of(plant: Plant, time: float) -> "Sample":
+        """Of a plant now."""
+        speed = np.asarray(getattr(plant, "rotor_speed", np.full(4, np.nan)), np.float64)
+        return Sample(time, RigidState.of(plant.state), speed.copy())
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """A flight: `t` control steps, float64. Step k leads from row k of the states to row k + 1."""
 
@@ -40,6 +58,8 @@ class Trajectory:
     """Why the task failed in flight; empty: it did not."""
     fault: str = ""
     """Why the flight broke off before its time, where the policy or the plant refused to go on."""
+    samples: tuple[Sample, ...] = ()
+    """Moments between control steps, where they are asked for."""
 
 
 def fly(
@@ -49,6 +69,7 @@ def fly(
     duration: float,
     latency: float,
     air: Air | None = None,
+    sample: float | None = None,
 ) -> Trajectory:
     """Fly one start until the time is out, or the task is done or has failed.
 
@@ -59,6 +80,7 @@ def fly(
         duration: seconds of the flight, in whole control periods.
         latency: seconds from observation to command.
         air: wind, thrust and what the policy sees from step to step; None: still, full, and the truth.
+        sample: seconds between two samples, at most; None: none are kept.
 
     Returns:
         The flight. A policy that refuses its observation, or a plant that fails, ends it with a `fault`.
@@ -75,6 +97,7 @@ def fly(
     delay = Delay.of(latency, runtime.policy.command(np.array(contract.hover_action)))
     plant.reset(start)
     states, decisions, fault = [plant.state], [], ""
+    samples = [] if sample is None else [Sample.of(plant, 0.0)]
     memory = begin(runtime, states[0].odometry(0.0), 0.0)
     for k in range(steps):
         now, then = k * period, (k + 1) * period
@@ -88,8 +111,14 @@ def fly(
             delay, parts = delay.send(decision.command, now).until(now, then)
             if disturbed and air is not None:
                 plant.disturb(air.wind[k], air.rotor_share[k])
+            at = now
             for command, seconds in parts:
-                plant.step(command, seconds)
+                count = 1 if sample is None else max(math.ceil(seconds / sample - 1e-6), 1)
+                for _ in range(count):
+                    plant.step(command, seconds / count)
+                    at += seconds / count
+                    if sample is not None:
+                        samples.append(Sample.of(plant, at))
             reached = RigidState.of(plant.state)
         except (ValueError, OSError) as error:
             fault = f"after {now:.2f} s: {error}"
@@ -106,6 +135,7 @@ def fly(
         success=memory.outcome is not None and bool(memory.outcome.success[0]),
         failure=memory.failure,
         fault=fault,
+        samples=tuple(samples),
     )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,17 +15,19 @@ from e2efly.deploy.policy.runtime import check
 from e2efly.device import compute_at_once, prepare
 from e2efly.episodes import Episodes, rows, summary
 from e2efly.evaluation import ROW, SEED, UNITS, Candidate, candidate, course_rows, fly_criteria, settling
+from e2efly.identification.csv_file import write_csv
 from e2efly.tasks.route import fields_of
 from e2efly.validation.fleet import Flight, Mission, fly_all
 from e2efly.validation.flight import Trajectory
 from e2efly.validation.judge import Verdicts, judge
+from e2efly.validation.log import SAMPLE, record_of
 from e2efly.validation.plant import Plant
 from e2efly.validation.plants import PLANTS, find_plant
 from e2efly.validation.reality import Reality, check_realities
 from e2efly.validation.starts import Starts, draw_starts
 from e2efly.vehicles import Controller, Vehicle, load_vehicle
 
-SAMPLE = 136
+KEPT = 136
 """Bytes of a control step of a flight on a plant, of which all are kept."""
 
 
@@ -134,6 +137,7 @@ def validate(
     task: Mapping[str, Any] | None = None,
     seed: int = SEED,
     max_drop: float = 2.0,
+    log: str | os.PathLike[str] | None = None,
     progress: Callable[[str, int, int], None] = lambda criterion, done, total: None,
 ) -> Validation:
     """Fly a policy by the bridge's runtime on another plant, from the starts of `evaluate`.
@@ -151,11 +155,13 @@ def validate(
             {"track": "four_gates"}.
         seed: of the starts.
         max_drop: points of success by which the plant may lie under the training simulator.
+        log: folder for a CSV log of each flight, CRITERION_NUMBER.csv, which `e2efly identify flight` reads; None:
+            none are written.
         progress: (criterion, flights that are over, of how many).
 
     Raises:
         ValueError: naming the option or the field, what it is and what is accepted.
-        OSError: when the plant cannot be started.
+        OSError: when the plant cannot be started, or the folder cannot be written to.
     """
     name = plant_name(plant)
     kind = find_plant(name)
@@ -171,18 +177,29 @@ def validate(
     check_realities(kind, found.flown.believed, [reality])
     suites = found.task.criteria()
     longest = max(float(suite.episode_s) for suite in suites.values())
-    kept = ROW + SAMPLE * int(longest * found.policy.contract.control_rate_hz)
+    kept = ROW + KEPT * int(longest * found.policy.contract.control_rate_hz)
+    kept += 0 if log is None else 4 * KEPT * int(longest / SAMPLE)
     trained, _, _ = fly_criteria(found.at_home, episodes, seed, kept)
     criteria = {}
     for criterion, suite in suites.items():
         env = found.environment(suite)
         starts = draw_starts(env, episodes, seed)
-        mission = Mission(found.file, name, own, found.flown.believed, float(suite.episode_s))
+        sample = None if log is None else SAMPLE
+        mission = Mission(found.file, name, own, found.flown.believed, float(suite.episode_s), sample)
         asked = [Flight(*start, reality) for start in zip(starts.states, starts.courses, strict=True)]
         flights = fly_all(mission, asked, lambda done: progress(criterion, done, episodes))  # noqa: B023
+        if log is not None:
+            _write_logs(Path(log), criterion, flights, found.policy.contract.action.mode)
         verdicts = judge(env, starts, flights, settling(suite))
         criteria[criterion] = Comparison(trained[criterion], verdicts, starts, flights)
     return Validation(found, kind, seed, max_drop, criteria)
+
+
+def _write_logs(folder: Path, criterion: str, flights: list[Trajectory], mode: str) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for number, flight in enumerate(flights):
+        path = folder / f"{criterion}_{number:04d}.csv"
+        write_csv(record_of(path, flight, mode), path)
 
 
 def plant_name(plant: str | type[Plant]) -> str:

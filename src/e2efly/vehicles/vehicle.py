@@ -27,6 +27,10 @@ FAMILIES = _HERE / "families"
 OF_FAMILIES = "thrust_to_weight"
 """A key that files of families alone have."""
 
+CORRELATION = "correlation"
+"""The table of a vehicle's file that no single value has: how the errors of its values hang together
+(`e2efly.vehicles.posterior`)."""
+
 Controller = Literal["policy", "plant"]
 """The vehicle that the flight controller believes in: the policy's own, or the one that flies."""
 
@@ -224,6 +228,7 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
             f"vehicle {path.stem!r} is a family, the ranges of many vehicles; accepted here: one vehicle: "
             f"{', '.join(vehicle_names())}, or the path of a .toml file"
         )
+    table.pop(CORRELATION, None)
     vehicle = Vehicle(name=path.stem, **read_values(table, quantities(), where))
     check(vehicle, where)
     return vehicle

@@ -1,0 +1,94 @@
+"""`e2efly tune`."""
+
+import shutil
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from e2efly.commands import eval as evaluation
+from e2efly.commands import identify, train
+from e2efly.commands.identify import Identify
+from e2efly.storage import write_json
+from e2efly.tasks import TASKS
+from e2efly.terminal import Terminal
+from e2efly.vehicles.posterior import IDENTIFIED
+
+
+@dataclass(frozen=True)
+class Tune:
+    """From logs of your vehicle to a policy for it: identify, train under what stays uncertain, evaluate with stress.
+
+    It does what `identify flight LOG...`, `train TASK --preset identified` and `eval --stress` do, one after the other.
+    """
+
+    logs: tyro.conf.Positional[tuple[Path, ...]]
+    """Flights of the vehicle, as `e2efly identify flight` reads them."""
+    task: str = "race"
+    """What to learn: a task that has the preset `identified`."""
+    vehicle: str = "vis_r"
+    """The base: a vehicle's name or a .toml file, in which the flight controller of the flights believed."""
+    mass: tuple[float, float] | None = None
+    """What the vehicle weighs, and the scale's sigma, kg."""
+    columns: tuple[str, ...] = ()
+    """Names of a CSV log's columns for ours, as of `identify`."""
+    out: Path = Path("tuned")
+    """Folder of identified/ (the vehicle file and its plots), run/ (the training) and policy.onnx."""
+    steps: int | None = None
+    """Environment steps of the training; the preset's when left out."""
+    seed: int = 0
+    """Seed of the training."""
+    overwrite: bool = False
+    """Delete the run that is in --out, and begin anew."""
+    least: float | None = None
+    """Exit status 1 when a row of the stress succeeds less often than this, such as 0.9."""
+
+
+def run(options: Tune) -> int:
+    """Identify, train, evaluate; leave policy.onnx.
+
+    Returns:
+        0, or 1 when a row of the stress succeeds less often than `least`.
+
+    Raises:
+        ValueError: naming the option, the log or the parameter. What was done before stays in the folder.
+    """
+    began, console, o = time.perf_counter(), Terminal(), options
+    folder, learned = o.out / "identified", o.out / "run"
+    kind = TASKS.find(o.task)
+    if kind.best not in kind.robust:
+        having = ", ".join(name for name, known in TASKS.items() if known.best in known.robust)
+        raise ValueError(f"--task is {o.task}, which has no preset {IDENTIFIED}; accepted: {having}")
+    if (learned / "config.json").exists() and not o.overwrite:
+        raise ValueError(
+            f"--out is {o.out}, which has a run; accepted: another folder, --overwrite, or `e2efly train --resume "
+            f"{learned}` to go on with it"
+        )
+    seconds = {}
+
+    def did(what: str) -> None:
+        seconds[what] = time.perf_counter() - began - sum(seconds.values())
+
+    console.rule(f"identify {', '.join(path.name for path in o.logs)}")
+    identify.run(Identify(("flight", *map(str, o.logs)), o.vehicle, folder, o.columns, o.mass))
+    did("identify")
+    console.rule(f"train {o.task} on what stays uncertain")
+    steps = [] if o.steps is None else ["--steps", str(o.steps)]
+    arguments = [
+        o.task, "--vehicle", str(folder / "vehicle.toml"), "--preset", IDENTIFIED, "--seed", str(o.seed), "--out",
+        str(learned), "--no-plots", *steps, *(["--overwrite"] if o.overwrite else []),
+    ]  # fmt: skip
+    if status := train.run(train.parse(arguments)):
+        return status
+    did("train")
+    console.rule("evaluate with stress")
+    least = [] if o.least is None else ["--least", str(o.least)]
+    report = o.out / "stress.json"
+    status = evaluation.run(evaluation.parse([str(learned), "--stress", "--json", str(report), *least]))
+    did("evaluate")
+    shutil.copy(learned / "policy.onnx", o.out / "policy.onnx")
+    write_json(o.out / "tuned.json", {"seconds": seconds, "logs": [str(path) for path in o.logs], "task": o.task})
+    took = ", ".join(f"{what} {s:.0f} s" for what, s in seconds.items())
+    console.print(f"Policy: {o.out / 'policy.onnx'}; fly it with --vehicle {folder / 'vehicle.toml'}. Took: {took}.")
+    return status

@@ -1,0 +1,73 @@
+"""How the errors of what was identified hang together: a matrix over the uncertain entries of the vehicle's file."""
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from e2efly.identification.estimate import Estimate
+from e2efly.identification.flight import Found
+from e2efly.identification.model import Unknown
+from e2efly.vehicles.posterior import ADDED, TOGETHER, Entry
+
+OVER_MASS = ("thrust_map", "rotor_thrust_max", "inertia", "drag_linear", "drag_quadratic")
+"""Fields that flights give over the mass: an error of the scale moves them all in the same share."""
+MASS = "mass"
+
+
+def entry_of(unknown: Unknown) -> Entry:
+    """What the vehicle's file calls an unknown of the fit."""
+    whole = unknown.field in TOGETHER or not unknown.entries
+    return Entry(unknown.field, None if whole else unknown.entries[0])
+
+
+def correlation(
+    found: Iterable[Found], fused: Mapping[str, Estimate], mass_sigma: float
+) -> tuple[list[str], np.ndarray]:
+    """Names of entries, and their correlation, (d, d).
+
+    Args:
+        found: of flights.
+        fused: what all sources said together. Where another source knows an entry better than the flights do, its error
+            hangs less on theirs: the flights' part of it is the square root of their share of the information.
+        mass_sigma: relative standard deviation of the mass that the flights were given; 0: it is not known.
+    """
+    names: list[str] = []
+    blocks: list[np.ndarray] = []
+    for each in found:
+        covariance, sigma = each.fit.covariance, each.sigma
+        spread = np.sqrt(np.diag(covariance))
+        kept = [
+            i for i, u in enumerate(each.model.unknowns)
+            if u.field in fused and entry_of(u).name not in names and _sigma(fused[u.field], entry_of(u)) > 0
+        ]  # fmt: skip
+        own = (covariance / np.outer(spread, spread) * np.outer(sigma, sigma))[np.ix_(kept, kept)]
+        entries = [entry_of(each.model.unknowns[i]) for i in kept]
+        over = np.array([float(e.field in OVER_MASS) for e in entries]) * mass_sigma
+        whole = own + np.outer(over, over)
+        by_flight = np.sqrt(np.diag(whole))
+        share = np.array([_sigma(fused[e.field], e) for e in entries]) / by_flight
+        # the fused variance over the flights' is the flights' share of the information
+        block = whole / np.outer(by_flight, by_flight) * np.outer(*(np.minimum(share, 1.0),) * 2)
+        np.fill_diagonal(block, 1.0)
+        if mass_sigma and not blocks:
+            with_mass = over / by_flight * np.minimum(share, 1.0)
+            block = np.block([[block, with_mass[:, None]], [with_mass[None], np.ones((1, 1))]])
+            entries.append(Entry(MASS))
+        names += [e.name for e in entries]
+        blocks.append(block)
+    matrix = np.zeros((len(names), len(names)))
+    at = 0
+    for block in blocks:
+        end = at + len(block)
+        matrix[at:end, at:end] = block
+        at = end
+    return names, matrix
+
+
+def _sigma(estimate: Estimate, entry: Entry) -> float:
+    """Standard deviation of an entry: relative, of the delay s; 0 where it was not found."""
+    at = 0 if entry.index is None else entry.index
+    value, sigma = (float(np.atleast_1d(x).flat[at]) for x in (estimate.value, estimate.sigma))
+    if not np.isfinite(sigma):
+        return 0.0
+    return sigma if entry.field in ADDED else sigma / abs(value)

@@ -1,0 +1,213 @@
+"""What a vehicle's file says of its own uncertainty: standard deviations and correlations. Imports no JAX.
+
+A file may have, beside its entries with `sigma`, a table `[correlation]`: `of` names parameters, as "mass" or
+"inertia[0]", and `value` is their matrix. `e2efly identify` writes it.
+"""
+
+import dataclasses
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from e2efly.vehicles.tables import read_table, shown
+from e2efly.vehicles.vehicle import CORRELATION, Vehicle, load_vehicle, quantities, read_sigmas, vehicle_file
+
+IDENTIFIED = "identified"
+"""What `randomize` calls this distribution."""
+WIDEST = 2.5
+"""Largest of the standard normal numbers that are drawn: 1.2 % of them lie beyond, and are drawn in."""
+LARGEST = 0.7
+"""Relative standard deviation above which a value is too vague to be drawn from."""
+TOGETHER = {"thrust_map": ("rotor_thrust_max",)}
+"""Fields that are drawn by one factor on all of their entries, and what that factor moves besides."""
+ADDED = ("latency",)
+"""Fields whose deviation is added, in their own unit; on all others it is the logarithm of a factor."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One number that is uncertain: a field of the vehicle, or one of its entries."""
+
+    field: str
+    """Of `Vehicle`."""
+    index: int | None = None
+    """Of the entry; None: the whole field."""
+
+    @property
+    def name(self) -> str:
+        """As files call it."""
+        return self.field if self.index is None else f"{self.field}[{self.index}]"
+
+    @staticmethod
+    def of(name: str) -> "Entry":
+        """The entry that a file calls so.
+
+        Raises:
+            ValueError: for a name of another form, or of no parameter.
+        """
+        found, shapes = re.fullmatch(r"(\w+)(?:\[(\d+)\])?", name), {f.name: f.metadata["shape"] for f in quantities()}
+        if found and found[1] in shapes:
+            field, index, shape = found[1], found[2], shapes[found[1]]
+            whole = shape == () or field in TOGETHER
+            if (index is None) if whole else (index is not None and len(shape) == 1 and int(index) < shape[0]):
+                return Entry(field, None if index is None else int(index))
+        raise ValueError(f"{name!r} is no parameter; accepted: names such as mass, thrust_map, inertia[0]")
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """The distribution of a vehicle about its file: normal in the logarithms, and in seconds of the delay."""
+
+    entries: tuple[Entry, ...]
+    """What is uncertain."""
+    root: np.ndarray
+    """(d, d) lower triangular; times a vector of standard normal numbers it gives the deviations."""
+
+    @property
+    def latency_sigma(self) -> Any:
+        """Standard deviation of the delay, s; 0 where the file does not say."""
+        at = [i for i, entry in enumerate(self.entries) if entry.field == "latency"]
+        return (self.root[at[0]] ** 2).sum() ** 0.5 if at else 0.0
+
+    @property
+    def thrust_sigma(self) -> float:
+        """Standard deviation of the thrust over the mass, relative."""
+        names = [entry.field for entry in self.entries]
+        rows = {name: self.root[names.index(name)] for name in ("thrust_map", "mass") if name in names}
+        return float(np.linalg.norm(rows.get("thrust_map", 0.0 * self.root[0]) - rows.get("mass", 0.0)))
+
+    def times(self, width: float) -> "Posterior":
+        """The distribution with so many times its standard deviations."""
+        return dataclasses.replace(self, root=self.root * width)
+
+    @property
+    def sigma(self) -> dict[str, float]:
+        """Standard deviations, by the name of the entry: relative, of the delay s."""
+        return {e.name: float(np.linalg.norm(row)) for e, row in zip(self.entries, self.root, strict=True)}
+
+    def deviation(self, normal: Any) -> Any:
+        """Deviations of the entries, (n, d), of standard normal numbers, (n, d), NumPy's or JAX's.
+
+        Each number counts up to `WIDEST`, so that no episode has an absurd vehicle.
+        """
+        return normal.clip(-WIDEST, WIDEST) @ self.root.T
+
+    def values(self, vehicle: Vehicle, deviation: Any) -> dict[str, Any]:
+        """Fields of the vehicles that have these deviations, each (n, ...).
+
+        Args:
+            vehicle: at whose values the deviations are zero.
+            deviation: (n, d), of `deviation`.
+        """
+        drawn: dict[str, list[Any]] = {}
+        for i, entry in enumerate(self.entries):
+            drawn.setdefault(entry.field, []).append((entry.index, deviation[:, i]))
+        out: dict[str, Any] = {}
+        for field, moved in drawn.items():
+            base, (index, first) = getattr(vehicle, field), moved[0]
+            library = first.__array_namespace__()
+            if field in ADDED:
+                out[field] = (base + first).clip(0.0)
+            elif index is None:
+                for name in (field, *TOGETHER.get(field, ())):
+                    own = getattr(vehicle, name)
+                    out[name] = library.exp(first).reshape(-1, *(1,) * np.ndim(own)) * own
+            else:
+                by, still = dict(moved), 0 * first
+                logs = [by.get(i, still) for i in range(np.shape(base)[-1])]
+                out[field] = library.exp(library.stack(logs, axis=-1)) * base
+        return out
+
+
+def covariance_of(entries: dict[str, float], names: list[str], correlation: np.ndarray) -> np.ndarray:
+    """Covariance, (d, d), of entries with these standard deviations; those that `names` leaves out are independent."""
+    order = list(entries)
+    sigma, whole = np.array(list(entries.values())), np.eye(len(order))
+    at = [order.index(name) for name in names]
+    whole[np.ix_(at, at)] = correlation
+    return whole * np.outer(sigma, sigma)
+
+
+def load_posterior(name_or_path: str | Path) -> Posterior:
+    """What a vehicle's file says of its uncertainty.
+
+    Raises:
+        ValueError: naming the file and what is wrong with it; for a file without a single standard deviation.
+    """
+    path = vehicle_file(name_or_path)
+    vehicle, sigmas, table = load_vehicle(path), read_sigmas(path), read_table(path)
+    known = _relative(vehicle, sigmas, str(path))
+    if not known:
+        raise ValueError(
+            f"env.randomize is identified, but {path} has no sigma; accepted: a vehicle file whose entries have "
+            "standard deviations, as `e2efly identify` writes it"
+        )
+    names, correlation = read_correlation(table, str(path))
+    for name in names:
+        if name not in known:
+            raise ValueError(f"{path}: correlation.of names {name!r}, which has no sigma; accepted: {', '.join(known)}")
+    covariance = covariance_of(known, names, correlation)
+    entries = tuple(map(Entry.of, known))
+    return Posterior(entries, np.linalg.cholesky(covariance))
+
+
+def _relative(vehicle: Vehicle, sigmas: dict[str, np.ndarray], where: str) -> dict[str, float]:
+    """Standard deviations by entry: relative, of what is added in its unit."""
+    moved_along = {name for names in TOGETHER.values() for name in names}
+    found: dict[str, float] = {}
+    for field, sigma in sigmas.items():
+        value = np.asarray(getattr(vehicle, field), np.float64)
+        if field in moved_along or value.ndim > 1:
+            continue
+        places = [None] if not value.ndim or field in TOGETHER else list(range(value.size))
+        for index in places:
+            at = 0 if index is None else index
+            off, own = float(sigma.flat[at]), float(value.flat[at])
+            share = off if field in ADDED else off / abs(own) if own else np.nan
+            if not (np.isfinite(share) and share > 0):
+                continue
+            entry = Entry(field, index)
+            if field not in ADDED and share > LARGEST:
+                raise ValueError(
+                    f"{where}: {entry.name} is {own:.4g} with sigma {off:.2g}; accepted for a draw: a sigma of at most "
+                    f"{100 * LARGEST:g} % of the value"
+                )
+            found[entry.name] = share
+    return found
+
+
+def read_correlation(file: dict[str, Any], where: str) -> tuple[list[str], np.ndarray]:
+    """Names and matrix of a vehicle file's table `[correlation]`; empty where there is none.
+
+    Raises:
+        ValueError: naming the file and what is wrong with the table.
+    """
+    table = file.get(CORRELATION)
+    if table is None:
+        return [], np.zeros((0, 0))
+    names = table.get("of") if isinstance(table, dict) else None
+    if not isinstance(names, list) or not names or len({*map(str, names)}) < len(names):
+        raise ValueError(f"{where}: correlation.of is {shown(names)}; accepted: a list of parameters, each once")
+    for name in names:
+        try:
+            Entry.of(str(name))
+        except ValueError as error:
+            raise ValueError(f"{where}: correlation.of: {error}") from None
+    try:
+        matrix = np.asarray(table.get("value"), np.float64)
+    except (TypeError, ValueError):
+        matrix = np.zeros(0)
+    good = matrix.shape == (len(names),) * 2 and np.isfinite(matrix).all()
+    if not (good and np.allclose(matrix, matrix.T) and np.allclose(np.diag(matrix), 1) and _is_positive(matrix)):
+        raise ValueError(
+            f"{where}: correlation.value is {shown(table.get('value'))}; accepted: a symmetric, positive definite "
+            f"matrix of {len(names)} rows with 1 on its diagonal"
+        )
+    return names, matrix
+
+
+def _is_positive(matrix: np.ndarray) -> bool:
+    return bool(np.linalg.eigvalsh(matrix).min() > 0)
