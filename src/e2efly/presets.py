@@ -125,7 +125,9 @@ def _with_critic(task: type[TaskConfig], algo: str) -> TrainConfig:
 
 def _adaptive(task: type[TaskConfig], config: TrainConfig, name: str) -> TrainConfig:
     """Other vehicles in every episode, and a policy with a memory by which it feels them."""
-    given = task.robust.get(config.algo.name)
+    algo = config.algo.name
+    # an identified vehicle may be as weak as any of a family, which the recipes for families learn to fly
+    given = (task.family.get(algo) if name == IDENTIFIED else None) or task.robust.get(algo)
     if given is None:
         raise ValueError(
             f"preset {name!r}: accepted for {_having('robust')}; not for {task.name} by {config.algo.name}"
