@@ -25,6 +25,7 @@ _EXAMPLES = {
     "fly POLICY": "fly it on a Betaflight quadrotor",
     "fly-report LOG": "draw a flight",
     "identify flight LOG": "a vehicle file from flights, parts, a pendulum, a thrust stand",
+    "align LOG": "fit delay and rate loop to a flight, lay its replay over it",
     "render forest": "what cameras and LiDARs see of a world: pictures and a video",
     "firmware": "build the real Betaflight firmware for this machine",
     "bench": "how fast this machine simulates and learns",

@@ -1,0 +1,130 @@
+"""The paper's alignment: delay and rate loop with which the simulator answers to commands as the vehicle did."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from e2efly.identification.estimate import Estimate
+from e2efly.identification.flight import Found, Refusal, identify
+from e2efly.identification.record import Record
+from e2efly.identification.replay import Stretches, replay, rms, stretches, wrong
+from e2efly.identification.windows import LENGTH, REACH
+from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import GRAVITY
+
+CAUSAL = 3.0
+"""Standard deviations by which a response may seem to come before its command."""
+AXES = {"rate_gain_x": "roll", "rate_gain_y": "pitch", "rate_gain_z": "yaw"}
+FLY = "steps or doublets of {} rate, 2 rad/s and more, 0.2 s and longer each, three of them or more"
+SHOWN_S = 0.8
+"""Length of the stretches that are shown, s ..."""
+LEAD_S = 0.12
+"""... of which so much lies before the step."""
+JUMP_S = 0.06
+"""A command that goes over within this counts as a step, s."""
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """What was found, and what it is worth."""
+
+    found: Found
+    """The fit, in which the vehicle's latency is the delay alone."""
+    delay: tuple[float, float, float]
+    """From a command's sending to the rate loop, s: by the file, as found, and its standard deviation; NaN for none."""
+    pose_delay: float
+    """Of the poses that the commands were made from, s: it is a part of the vehicle's latency."""
+    estimates: list[Estimate]
+    """For the vehicle file."""
+    refusals: list[Refusal]
+    before: dict[str, float]
+    """By signal, root mean square of what the file's vehicle gets wrong in stretches that the fit did not see."""
+    after: dict[str, float]
+    """The same of the aligned one."""
+
+
+def align(
+    vehicle: Vehicle,
+    records: Sequence[Record],
+    pose_delay: float = 0.0,
+    told: Callable[[int, float], None] = lambda i, cost: None,
+) -> Alignment:
+    """Fit delay and rate loop to flights, and judge both on what was held out.
+
+    Args:
+        vehicle: of the file; its latency holds the delay of the poses.
+        records: of the flights, checked.
+        pose_delay: of the poses that the commands were made from, s.
+        told: (iteration, cost) after each of the fit's.
+
+    Raises:
+        ValueError: naming the flight and what it lacks; naming all parameters and what to fly, where none can be had.
+    """
+    own = max(float(vehicle.latency) - pose_delay, 0.0)
+    base = dataclasses.replace(vehicle, latency=own)
+    found = identify(base, records, step=True, told=told)
+    if not found.estimates:
+        reasons = "; ".join(refused(refusal) for refusal in found.refusals)
+        raise ValueError(f"{', '.join(str(r.path) for r in records)}: nothing can be aligned: {reasons}")
+    estimates, delay = [], (own, np.nan, np.nan)
+    for estimate in found.estimates:
+        if estimate.name == "latency":
+            late, sigma = float(estimate.value), float(estimate.sigma)
+            if late < -CAUSAL * sigma:
+                raise ValueError(
+                    f"{records[0].path}: the body rates answer {-1e3 * late:.1f} +- {1e3 * sigma:.1f} ms before the "
+                    "commands were sent; accepted: times of both by one clock"
+                )
+            delay = own, max(late, 0.0), sigma
+            estimate = dataclasses.replace(estimate, value=np.array(delay[1] + pose_delay))
+        estimates.append(dataclasses.replace(estimate, source=estimate.source.replace("; step", "; align")))
+    errors = [_held_out(found, records, p) for p in (np.zeros(len(found.p)), found.p)]
+    return Alignment(found, delay, pose_delay, estimates, found.refusals, *errors)
+
+
+def refused(refusal: Refusal) -> str:
+    """Why a parameter was not aligned, and what to fly, in words."""
+    name = refusal.unknown.name
+    if name in AXES:
+        axis = AXES[name]
+        return f"rate_gain of {axis} cannot be had (+- {100 * refusal.sigma:.0f} %); fly {FLY.format(axis)}"
+    return f"the delay cannot be had (+- {1e3 * refusal.sigma:.0f} ms); fly {FLY.format('body')}"
+
+
+def _held_out(found: Found, records: Sequence[Record], p: np.ndarray) -> dict[str, float]:
+    """By signal, root mean square of the error in windows that the fit did not see, all of their streams used."""
+    windows = found.windows.some(found.held_out)
+    errors: dict[str, list[np.ndarray]] = {}
+    for number, record in enumerate(records):
+        begin = windows.begin[windows.flight == number]
+        if len(begin):
+            flown = stretches(record, begin, LENGTH)
+            for signal, error in wrong(flown, replay(found.model, p, flown)).items():
+                errors.setdefault(signal, []).append(error)
+    return {signal: rms(np.concatenate(parts)) for signal, parts in errors.items()}
+
+
+def clearest(record: Record, channel: int) -> Stretches:
+    """The stretch about the largest sudden change of a command that comes after calm.
+
+    Args:
+        record: the flight.
+        channel: 0: thrust over mass, 1 to 3: body rate about x, y, z.
+    """
+    sent, rates = record.streams["command"], record.streams["body_rate"]
+    first, last = (f(s.time[i] for s in (sent, rates)) for f, i in ((max, 0), (min, -1)))
+    grid = np.arange(first + REACH + LEAD_S, max(last - SHOWN_S + LEAD_S, first + REACH + 2 * LEAD_S), 0.01)
+    past = np.arange(-LEAD_S, 1e-9, 0.01)
+
+    def held(time: np.ndarray) -> np.ndarray:
+        return sent.values[np.clip(np.searchsorted(sent.time, time, side="right") - 1, 0, None), channel]
+
+    before, neutral = held(grid[:, None] + past), 0.0 if channel else GRAVITY
+    restless = 2 * np.std(before, axis=1) + 1.5 * np.abs(before[:, -1] - neutral)
+    start = grid[int(np.argmax(np.abs(held(grid + JUMP_S) - before[:, -1]) - restless))]
+    near = sent.during(start, start + JUMP_S)
+    change = np.abs(np.diff(near.values[:, channel])) if len(near.time) > 1 else np.zeros(0)
+    step = near.time[1 + int(np.argmax(change))] if len(change) else start
+    return stretches(record, [step - LEAD_S], SHOWN_S)
