@@ -157,6 +157,7 @@ def test_a_flight_that_does_not_move_has_no_step_response(tmp_path: Path) -> Non
         assert r.reason.startswith("not enough excitation")
     numbers = summary(still)["rate_response"]["roll"]
     assert numbers["delay_s"] is None and "not enough excitation" in numbers["reason"]
+    assert summary(still)["align"] is None
 
 
 def test_a_response_that_is_not_the_command_s_is_not_believed(log: FlightLog) -> None:
@@ -197,6 +198,8 @@ def test_the_command_draws_prints_and_exports(
     bag1, bag2 = tmp_path / "flight.bag", tmp_path / "bag"
     assert run(FlyReport(log.path, tmp_path / "out", bag1=bag1, bag2=bag2)) == 0
     told = capsys.readouterr().out
+    align = f"e2efly align {log.path} --vehicle vis_r.toml"  # the log's vehicle has the name, and another hash
+    assert align in "".join(told.split("\n")) and summary(log)["align"] == align
     for word in ("POLICY", "odometry stale", "deadlines missed", "policy handed over", "ROS 1 bag", "ROS 2 bag"):
         assert word in told
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == json.loads(json.dumps(summary(log)))
@@ -225,6 +228,7 @@ def test_a_flight_of_few_channels_is_reported_as_far_as_it_goes(
     part = read_log(fly(tmp_path / "part.mcap", only=only).path)
     assert {path.stem for path in draw(part, tmp_path)} == figures == {path.stem for path in tmp_path.glob("*.png")}
     json.dumps(summary(part), allow_nan=False)
+    assert summary(part)["align"] is None
 
 
 def test_a_cut_off_flight_is_reported_and_told(

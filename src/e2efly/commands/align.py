@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from e2efly.identification.align import Alignment
     from e2efly.identification.record import Record
 
+THRUST = 0.03
+"""By how much the thrust may differ before it is told."""
+
 
 @dataclass(frozen=True)
 class Align:
@@ -67,8 +70,8 @@ def run(options: Align) -> int:
         console.print(f"{record.path.name}: {record.duration:.1f} s")
         for note in record.notes:
             console.print(f"  {note}", style="dim")
-    pose_delay, how = _pose_delay(options, read, records)
-    console.print(how, style="dim")
+    pose_delay, how, known = pose_delay_of(options.pose_delay, read, records)
+    console.print(how, style="dim" if known else "bold")
     prepare("cpu")
     with console.status("fitting") as status:
         found = align(
@@ -88,18 +91,41 @@ def run(options: Align) -> int:
         console.print(refused(refusal), style="dim")
     if found.after["roll_rate"] + found.after["pitch_rate"] > found.before["roll_rate"] + found.before["pitch_rate"]:
         console.print("The error of roll and pitch rate did not fall: keep the file that you have.", style="bold")
+    if found.early:
+        console.print(
+            f"The response seemed to come {1e3 * found.early:.0f} ms before the command, and the delay is held at none: "
+            "the vehicle is quicker than motor_time_constant and rate loop of the file allow.",
+            style="bold",
+        )
+    if abs(found.thrust - 1) > THRUST:
+        console.print(
+            f"The vehicle gave {found.thrust:.2f} of the simulator's thrust: weigh it, and identify its thrust "
+            "(e2efly identify flight LOG --mass KG SIGMA).",
+            style="bold",
+        )
     plots = plot_alignment(options.out, found, records)
     console.print(f"Vehicle: {file}. Report: {options.out / 'align.json'}. Plots: {', '.join(p.name for p in plots)}")
     console.print(f"Took {time.perf_counter() - began:.0f} s.", style="dim")
     return 0
 
 
-def _pose_delay(options: Align, read: "list[Record]", records: "list[Record]") -> tuple[float, str]:
-    """How late the poses were when they were flown by, s, and from where that is known, in words."""
+def pose_delay_of(
+    given: float | None, read: "list[Record]", records: "list[Record]"
+) -> tuple[float, str, bool]:
+    """How late the poses were when they were flown by, s; from where that is known, in words; and whether it is.
+
+    In a log of ours the poses are behind the gyroscope by what their source does not tell, and older by their age when
+    they are used. How late the gyroscope itself is cancels: the delay from command to response has it the other way.
+
+    Args:
+        given: by the user, s.
+        read: the flights as they were read.
+        records: the same, checked: cut to what is used, poses on the gyroscope's clock.
+    """
     from e2efly.identification.checks import poses_behind
 
-    if options.pose_delay is not None:
-        return options.pose_delay, f"The poses are taken to be {1e3 * options.pose_delay:.0f} ms late (--pose-delay)."
+    if given is not None:
+        return given, f"The poses are taken to be {1e3 * given:.0f} ms late (--pose-delay).", True
     known = []
     for log, record in zip(read, records, strict=True):
         if log.path.suffix.lower() == ".mcap":
@@ -108,11 +134,13 @@ def _pose_delay(options: Align, read: "list[Record]", records: "list[Record]") -
                 known.append(max(behind, 0.0) + age)
     if known:
         late = float(np.median(known))
-        return late, f"The poses are {1e3 * late:.0f} ms late by the log: behind its gyroscope, and until their use."
-    return 0.0, (
-        "The log does not say how late the poses were when they were flown by: latency is the delay from command to "
-        "response alone. Add it by --pose-delay."
+        told = f"The poses are {1e3 * late:.0f} ms late by the log: behind its gyroscope, and until their use."
+        return late, told, True
+    told = (
+        "The log does not say how late the poses were when they were flown by: latency becomes the delay from command "
+        "to response alone. Add the poses' by --pose-delay."
     )
+    return 0.0, told, False
 
 
 def _age(path: Path) -> float:
@@ -145,17 +173,19 @@ def _rows(vehicle: Vehicle, found: "Alignment") -> list[dict[str, Any]]:
 def _report(options: Align, vehicle: Vehicle, found: "Alignment", records: "list[Record]") -> dict[str, Any]:
     from e2efly.identification.align import refused
     from e2efly.identification.replay import SIGNALS
-    from e2efly.identification.windows import LENGTH
+    from e2efly.identification.windows import STEP
 
+    windows = found.found.windows.some(found.found.held_out)
     return {
         "vehicle": options.vehicle,
         "logs": [{"file": str(r.path), "seconds": r.duration, "notes": list(r.notes)} for r in records],
         "pose_delay_s": found.pose_delay,
         "parameters": _rows(vehicle, found),
+        "thrust_over_simulated": found.thrust if np.isfinite(found.thrust) else None,
         "refused": [refused(r) for r in found.refusals],
         "held_out": {
-            "seconds": float(found.found.held_out.sum() * LENGTH),
-            "length_s": LENGTH,
+            "seconds": windows.count * windows.steps * STEP,
+            "length_s": windows.steps * STEP,
             "rms": {
                 name: {"unit": SIGNALS[name], "before": before, "after": found.after[name]}
                 for name, before in found.before.items()

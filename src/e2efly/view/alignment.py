@@ -13,7 +13,7 @@ from e2efly.drawing import INK
 from e2efly.identification.align import LEAD_S, SHOWN_S, Alignment, clearest
 from e2efly.identification.record import Record
 from e2efly.identification.replay import SIGNALS, Stretches, replay, stretches, thrust_is_told
-from e2efly.identification.windows import LENGTH, REACH
+from e2efly.identification.windows import REACH, STEP
 from e2efly.view.style import BLUE, GREY, PALE, VERMILLION, figure, say
 
 STEPPED = ("thrust (m/s²)", "roll rate (rad/s)", "pitch rate (rad/s)", "yaw rate (rad/s)")
@@ -38,8 +38,8 @@ def plot_alignment(folder: Path, alignment: Alignment, records: Sequence[Record]
 
 def both(alignment: Alignment, flown: Stretches) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Replays by the file and by the aligned vehicle."""
-    model, p = alignment.found.model, alignment.found.p
-    return replay(model, np.zeros(len(p)), flown), replay(model, p, flown)
+    before, found = alignment.model, alignment.found
+    return replay(before, np.zeros(len(before.names)), flown), replay(found.model, found.p, flown)
 
 
 def plot_steps(path: Path, alignment: Alignment, record: Record, title: str = "Response to steps") -> None:
@@ -70,10 +70,15 @@ def _draw_step(ax: Axes, alignment: Alignment, flown: Stretches, channel: int) -
     t, there = 1e3 * (flown.time - LEAD_S), flown.there[stream][0]
     old, new = both(alignment, flown)
     ax.plot(t, flown.command[0, :, channel], **ASKED)
-    ax.plot(t[there], flown.measured[stream][0, there, axis], **MEASURED)
+    ax.plot(t[there], flown.measured[stream][0, there, axis], **_measured(stream))
     ax.plot(t, old[stream][0, :, axis], **BEFORE)
     ax.plot(t, new[stream][0, :, axis], **AFTER)
     ax.set_xlim(t[0], t[-1])
+
+
+def _measured(stream: str) -> dict[str, Any]:
+    """An accelerometer shakes: a thin line leaves the others to be seen."""
+    return MEASURED | ({"linewidth": 1.0, "alpha": 0.55} if stream == "specific_force" else {})
 
 
 def plot_replay(path: Path, alignment: Alignment, record: Record) -> None:
@@ -133,7 +138,7 @@ def _draw_stretches(
         if stream == "body_rate" or stream == "specific_force":
             channel = axis + 1 if stream == "body_rate" else 0
             ax.plot(t, flown.command[k, :, channel], **(ASKED | labelled))
-        ax.plot(t[there], measured[k, there], **(MEASURED | labelled))
+        ax.plot(t[there], measured[k, there], **(_measured(stream) | labelled))
         for replayed, style in zip(seen, (BEFORE, AFTER), strict=True):
             line = _shown(replayed[stream], stream)[k, :, axis]
             if stream == "quaternion":  # a full turn further is the same angle
@@ -157,9 +162,10 @@ def _shown(values: np.ndarray, stream: str) -> np.ndarray:
 def plot_errors(path: Path, alignment: Alignment) -> None:
     """What is left of the errors in the stretches that the fit did not see."""
     names = list(alignment.before)
-    count = int(alignment.found.held_out.sum())
+    found = alignment.found
+    count, length = int(found.held_out.sum()), found.windows.steps * STEP
     notes = [
-        f"Root mean square over {count} stretches of {LENGTH:g} s that the fit did not see, over that of the file's vehicle"
+        f"Root mean square over {count} stretches of {length:g} s that the fit did not see, over that of the file's vehicle"
     ]
     with figure(path, "Error of the simulator, before and after", 1.3 + 0.42 * len(names), notes) as fig:
         ax = fig.add_subplot()
