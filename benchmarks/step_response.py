@@ -5,6 +5,7 @@
 The paper's figure of the step-response alignment, with the firmware in the place of the vehicle: it flies over the
 rigid body of the vehicle's file (`e2efly.validation.steps`), `e2efly.identification.align` fits delay and rate loop to
 the log, and docs/step_response.png shows the mean of four steps of each command. `--log` keeps the flight as CSV.
+The zoo's race through the same firmware is aligned, too, with the log that the bridge keeps.
 """
 
 import tempfile
@@ -15,19 +16,24 @@ import numpy as np
 from common import arguments, table, write
 from PIL import Image
 
+from e2efly.commands.align import pose_delay_of
+from e2efly.deploy.log.telemetry import Telemetry
+from e2efly.deploy.policy.loader import load_policy
 from e2efly.device import prepare
 from e2efly.identification.align import LEAD_S, Alignment, align
 from e2efly.identification.checks import checked
 from e2efly.identification.csv_file import write_csv
+from e2efly.identification.readers import read_flights
 from e2efly.identification.record import Record
 from e2efly.identification.replay import SIGNALS, stretches
 from e2efly.validation import firmware
-from e2efly.validation.rehearsal import LINK_S
+from e2efly.validation.rehearsal import LINK_S, rehearse
 from e2efly.validation.rig import Rig
 from e2efly.validation.steps import HOLD_S, Step, fly_steps
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.view.alignment import AFTER, ASKED, BEFORE, MEASURED, both
 from e2efly.view.style import figure
+from e2efly.zoo import policy_file
 
 PICTURE = Path(__file__).parents[1] / "docs" / "step_response.png"
 NAMES = ("thrust", "roll rate", "pitch rate", "yaw rate")
@@ -56,6 +62,35 @@ def reached(time: np.ndarray, share: np.ndarray, level: float) -> float:
     return float(np.interp(level, share[i - 1 : i + 1], time[i - 1 : i + 1]))
 
 
+def race(name: str) -> dict[str, Any]:
+    """The zoo's race through the firmware, aligned with the bridge's log: most of it at twice hover's thrust."""
+    vehicle = load_vehicle(name)
+    with tempfile.TemporaryDirectory() as folder:
+        with Telemetry(Path(folder) / "race.mcap", queue_size=200_000) as log:
+            flown = rehearse(firmware.chosen(), load_policy(policy_file("race", name)), vehicle, log=log)
+        read = read_flights(Path(folder) / "race.mcap")
+        records = checked(read, vehicle)
+        pose_delay, _, _ = pose_delay_of(None, read, records)
+    return {"complete": flown.complete, **report(vehicle, align(vehicle, records, pose_delay))}
+
+
+def report(vehicle: Vehicle, found: Alignment) -> dict[str, Any]:
+    """What an alignment found."""
+    gains = next(e for e in found.estimates if e.name == "rate_gain")
+    return {
+        "pose_delay_s": found.pose_delay,
+        "delay_s": dict(zip(("before", "aligned", "sigma"), found.delay, strict=True)),
+        "rate_gain": {
+            "before": vehicle.rate_gain.tolist(), "aligned": gains.value.tolist(), "sigma": gains.sigma.tolist(),
+        },
+        "thrust_over_simulated": found.thrust,
+        "held_out_rms": {
+            name: {"unit": SIGNALS[name], "before": found.before[name], "aligned": found.after[name]}
+            for name in found.before
+        },
+    }  # fmt: skip
+
+
 def main() -> None:
     """Fly, align, draw, write JSON."""
     options = arguments(__doc__ or "", vehicle="vis_r", log="")
@@ -72,20 +107,10 @@ def main() -> None:
     for channel, (time, shares) in curves.items():
         rows.append({"response": NAMES[channel]})
         for column, share in zip(COLUMNS, shares, strict=True):
-            told = [f"{1e3 * reached(time, share, level):.0f}" for level in (0.1, RISEN)]
-            rows[-1][f"{column}: 10 / 63 %, ms"] = " / ".join(told)
-            rows[-1][f"{column}: overshoot"] = f"{100 * max(share.max() - 1, 0):.0f} %" if channel else "-"
+            times = " / ".join(f"{1e3 * reached(time, share, level):.0f}" for level in (0.1, RISEN))
+            rows[-1][column] = f"{times} ms" + (f", {100 * max(share.max() - 1, 0):.0f} %" if channel else "")
     draw(curves)
-    gains = [e for e in found.estimates if e.name == "rate_gain"][0]
-    content = {
-        "table": rows,
-        "delay_s": dict(zip(("before", "aligned", "sigma"), found.delay, strict=True)),
-        "rate_gain": {"before": vehicle.rate_gain.tolist(), "aligned": gains.value.tolist(), "sigma": gains.sigma.tolist()},
-        "held_out_rms": {
-            name: {"unit": SIGNALS[name], "before": found.before[name], "aligned": found.after[name]}
-            for name in found.before
-        },
-    }
+    content = {"table": rows, "steps": report(vehicle, found), "race": race(options.vehicle)}
     write("step_response", options.json, content)
     print(table(rows))
     print({k: v for k, v in content.items() if k != "table"})

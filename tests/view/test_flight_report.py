@@ -1,5 +1,6 @@
 """Flight reports: estimates against known truth, figures and summary of whole, partial and cut-off flights."""
 
+import dataclasses
 import json
 import subprocess
 import sys
@@ -14,10 +15,10 @@ from matplotlib.image import imread
 
 from e2efly.commands.fly_report import FlyReport, run
 from e2efly.deploy.log.blackbox import align, read_blackbox
-from e2efly.deploy.log.flight_log import FlightLog, read_log
+from e2efly.deploy.log.flight_log import FlightLog, Series, read_log
 from e2efly.deploy.log.telemetry import Telemetry
 from e2efly.view.flight_figures import draw
-from e2efly.view.flight_log import blackbox_responses, intervals, responses, summary
+from e2efly.view.flight_log import align_command, blackbox_responses, intervals, responses, summary
 from e2efly.view.rate_response import step_response
 
 DATA = Path(__file__).parents[1] / "data" / "blackbox"
@@ -158,6 +159,21 @@ def test_a_flight_that_does_not_move_has_no_step_response(tmp_path: Path) -> Non
     numbers = summary(still)["rate_response"]["roll"]
     assert numbers["delay_s"] is None and "not enough excitation" in numbers["reason"]
     assert summary(still)["align"] is None
+
+
+def test_a_flight_that_cannot_be_aligned_is_not_said_to_be(log: FlightLog) -> None:
+    """Too short, or with the body rates of its poses alone."""
+    found = responses(log)
+    assert align_command(log, found) is not None
+    short = {name: _until(s, 6.0) for name, s in log.series.items()}  # of which 2 s on the ground
+    assert align_command(dataclasses.replace(log, series={k: s for k, s in short.items() if len(s)}), found) is None
+    blind = {name: s for name, s in log.series.items() if name != "imu"}
+    assert align_command(dataclasses.replace(log, series=blind), found) is None
+
+
+def _until(s: Series, end: float) -> Series:
+    kept = int(np.sum(s.time <= end))
+    return Series(s.channel, s.stamp[:kept], s.time[:kept], s.values[:kept])
 
 
 def test_a_response_that_is_not_the_command_s_is_not_believed(log: FlightLog) -> None:

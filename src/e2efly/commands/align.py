@@ -36,7 +36,7 @@ class Align:
     out: Path = Path("aligned")
     """Folder of vehicle.toml, align.json and the plots."""
     pose_delay: float | None = None
-    """How late the poses are when a command is made from them, s: it is a part of the vehicle's latency that commands and
+    """How late the poses are when a command is made from them, s: the part of the vehicle's latency that commands and
     body rates do not show. Left out: what the logs tell, as our .mcap does, and else 0."""
     columns: tuple[str, ...] = ()
     """Names of a CSV log's columns for ours: OURS=THEIRS or OURS=THEIRS*FACTOR, as wx=gyro_x*0.01745."""
@@ -93,8 +93,8 @@ def run(options: Align) -> int:
         console.print("The error of roll and pitch rate did not fall: keep the file that you have.", style="bold")
     if found.early:
         console.print(
-            f"The response seemed to come {1e3 * found.early:.0f} ms before the command, and the delay is held at none: "
-            "the vehicle is quicker than motor_time_constant and rate loop of the file allow.",
+            f"The response seemed to come {1e3 * found.early:.0f} ms before the command; the delay is held at none. "
+            "The vehicle is quicker than motor_time_constant and rate loop of the file allow.",
             style="bold",
         )
     if abs(found.thrust - 1) > THRUST:
@@ -109,9 +109,7 @@ def run(options: Align) -> int:
     return 0
 
 
-def pose_delay_of(
-    given: float | None, read: "list[Record]", records: "list[Record]"
-) -> tuple[float, str, bool]:
+def pose_delay_of(given: float | None, read: "list[Record]", records: "list[Record]") -> tuple[float, str, bool]:
     """How late the poses were when they were flown by, s; from where that is known, in words; and whether it is.
 
     In a log of ours the poses are behind the gyroscope by what their source does not tell, and older by their age when
@@ -156,7 +154,8 @@ def _rows(vehicle: Vehicle, found: "Alignment") -> list[dict[str, Any]]:
     own, late, sigma = found.delay
     rows: list[dict[str, Any]] = []
     if np.isfinite(late):
-        rows.append({"name": "delay from command to response", "unit": "s", "before": own, "after": late, "sigma": sigma})
+        delay = "delay from command to response"
+        rows.append({"name": delay, "unit": "s", "before": own, "after": late, "sigma": sigma})
     for estimate in found.estimates:
         before = np.atleast_1d(np.asarray(getattr(vehicle, estimate.name), float))
         for i, (was, value, off) in enumerate(
@@ -210,5 +209,6 @@ def _errors(found: "Alignment") -> Table:
         "error where the fit did not look (rms)", "before", "aligned", box=None, header_style="bold", pad_edge=False
     )
     for name, before in found.before.items():
-        table.add_row(name.replace("_", " "), f"{before:.3g} {SIGNALS[name]}", f"{found.after[name]:.3g} {SIGNALS[name]}")
+        told = [f"{value:.3g} {SIGNALS[name]}" for value in (before, found.after[name])]
+        table.add_row(name.replace("_", " "), *told)
     return table

@@ -49,7 +49,7 @@ class Alignment:
     after: dict[str, float]
     """The same of the aligned one."""
     thrust: float
-    """Specific force along body z over that of the aligned simulator, in the same stretches; NaN where neither is known."""
+    """Specific force along body z over that of the aligned simulator, in the same stretches; NaN where not known."""
 
 
 def align(
@@ -80,7 +80,8 @@ def align(
             "times of both by one clock"
         )
     if late is not None and early:
-        found = identify(dataclasses.replace(base, latency=0.0), records, believed=base, step=True, delay=False, told=told)
+        prompt = dataclasses.replace(base, latency=0.0)
+        found = identify(prompt, records, believed=base, step=True, delay=False, told=told)
     if late is None and not found.estimates:
         reasons = "; ".join(refused(refusal) for refusal in found.refusals)
         raise ValueError(f"{', '.join(str(r.path) for r in records)}: nothing can be aligned: {reasons}")
@@ -104,9 +105,7 @@ def refused(refusal: Refusal) -> str:
     return f"the delay cannot be had (+- {1e3 * refusal.sigma:.0f} ms); fly {FLY.format('body')}"
 
 
-def _held_out(
-    found: Found, model: Model, records: Sequence[Record], p: np.ndarray
-) -> tuple[dict[str, float], float]:
+def _held_out(found: Found, model: Model, records: Sequence[Record], p: np.ndarray) -> tuple[dict[str, float], float]:
     """By signal, root mean square of the error in windows that the fit did not see, all of their streams used; and the
     thrust there, measured over simulated.
     """

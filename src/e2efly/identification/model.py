@@ -114,7 +114,7 @@ class Model:
         return tuple(u for u in UNKNOWNS if u.name in self.names)
 
     def controller(self, vehicle: Vehicle) -> Vehicle:
-        """What the flight controller goes by: the rate loop of a vehicle at values of the unknowns, the rest believed."""
+        """What the flight controller goes by: the rate loop of a vehicle with some unknowns, the rest believed."""
         return dataclasses.replace(self.believed, rate_gain=vehicle.rate_gain)
 
 

@@ -67,9 +67,8 @@ def stretches(record: Record, begin: Sequence[float] | np.ndarray, length: float
         there[name] = good.reshape(inside.shape)
     whole = integral(sent, around.ravel(), held=True).reshape(*around.shape, 4)
     before, _ = on_grid(rates, around[:, :past].ravel())
-    return Stretches(
-        begin, STEP * np.arange(m + 1), sent.values[latest], whole, before.reshape(len(begin), past, 3), measured, there,
-    )  # fmt: skip
+    before = before.reshape(len(begin), past, 3)
+    return Stretches(begin, STEP * np.arange(m + 1), sent.values[latest], whole, before, measured, there)
 
 
 def replay(model: Model, p: np.ndarray, flown: Stretches) -> dict[str, np.ndarray]:

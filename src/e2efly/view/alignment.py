@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from e2efly.control import Quat
 from e2efly.drawing import INK
-from e2efly.identification.align import LEAD_S, SHOWN_S, Alignment, clearest
+from e2efly.identification.align import LEAD_S, Alignment, clearest
 from e2efly.identification.record import Record
 from e2efly.identification.replay import SIGNALS, Stretches, replay, stretches, thrust_is_told
 from e2efly.identification.windows import REACH, STEP
@@ -164,9 +164,7 @@ def plot_errors(path: Path, alignment: Alignment) -> None:
     names = list(alignment.before)
     found = alignment.found
     count, length = int(found.held_out.sum()), found.windows.steps * STEP
-    notes = [
-        f"Root mean square over {count} stretches of {length:g} s that the fit did not see, over that of the file's vehicle"
-    ]
+    notes = [f"Root mean square over {count} stretches of {length:g} s that the fit did not see, over that of the file"]
     with figure(path, "Error of the simulator, before and after", 1.3 + 0.42 * len(names), notes) as fig:
         ax = fig.add_subplot()
         ax.axvline(100, color=GREY, linewidth=1)
