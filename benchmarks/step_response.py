@@ -119,11 +119,13 @@ def main() -> None:
 def draw(curves: dict[int, tuple[np.ndarray, list[np.ndarray]]]) -> None:
     """The picture: commanded, the firmware's response, the simulator's before and after."""
     notes = ["VIS-R; mean of four steps (3 rad/s, yaw 2 rad/s, thrust 4 m/s², and 0.6 of it, both ways), over the step"]
+    asked: dict[str, Any] = ASKED | {"drawstyle": "default"}
+    measured: dict[str, Any] = MEASURED | {"label": "firmware"}
     with figure(PICTURE, "Steps through real Betaflight firmware, and the simulator", 5.6, notes) as fig:
         for place, (channel, (time, shares)) in enumerate(curves.items(), 1):
             ax = fig.add_subplot(2, 2, place)
-            ax.plot([1e3 * time[0], 0, 0, 1e3 * time[-1]], [0, 0, 1, 1], **(ASKED | {"drawstyle": "default"}))
-            for share, style in zip(shares, (MEASURED | {"label": "firmware"}, BEFORE, AFTER), strict=True):
+            ax.plot([1e3 * time[0], 0, 0, 1e3 * time[-1]], [0, 0, 1, 1], **asked)
+            for share, style in zip(shares, (measured, BEFORE, AFTER), strict=True):
                 ax.plot(1e3 * time, share, **style)
             ax.set_title(NAMES[channel])
             ax.set_ylabel("response over command (1)")

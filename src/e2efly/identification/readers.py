@@ -10,7 +10,6 @@ from e2efly.control import Quat, Vec3
 from e2efly.identification.crazyflie import is_crazyflie, read_crazyflie
 from e2efly.identification.csv_file import Column, read_csv
 from e2efly.identification.record import Record, Stream
-from e2efly.vehicles.vehicle import GRAVITY
 
 ACCEPTED = (
     "our .mcap, a .csv, a ROS 1 .bag, the folder of a ROS 2 bag, Betaflight's .bbl or .bfl, PX4's .ulg, or the log "
@@ -100,7 +99,9 @@ def read_betaflight(path: Path) -> list[Record]:
         streams: dict[str, Stream] = {}
         _put(streams, "body_rate", session.time, session.gyro)
         _put(streams, "motor", session.time, session.motor)
-        _put(streams, "command", session.time, _without_thrust(session.setpoint))
+        hover = np.full((len(session.time), 1), np.nan)
+        hover[:] = 9.81  # a blackbox says nothing of thrust over mass; `step` needs the rates alone
+        _put(streams, "command", session.time, np.concatenate([hover, session.setpoint], 1))
         records.append(_whole(path, streams, (f"session {session.session}, {session.firmware}",)))
     return records
 
@@ -151,13 +152,7 @@ def read_ulog(path: Path) -> Record:
     # PX4: 1 front right, 2 rear left, 3 front left, 4 rear right
     take("motor", "actuator_motors", [f"control[{i}]" for i in (3, 0, 1, 2)], lambda x: x)
     take("voltage", "battery_status", ["voltage_v"], lambda x: x)
-    take("command", "vehicle_rates_setpoint", ["roll", "pitch", "yaw"], lambda x: _without_thrust(flip(x)))
     return _whole(path, streams)
-
-
-def _without_thrust(rates: np.ndarray) -> np.ndarray:
-    """Commands of a log that does not say how much thrust was asked for, (n, 4): it never changes."""
-    return np.concatenate([np.full((len(rates), 1), GRAVITY), rates], 1)
 
 
 def _ned_attitude(q: np.ndarray) -> np.ndarray:
