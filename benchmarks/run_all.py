@@ -8,7 +8,7 @@ for name in (
     "rates", "time_to_criterion", "success", "runtime_speed", "msp_fuzz", "sim_to_sim", "firmware_flights",
     "firmware_faults", "fault_campaign", "process_faults", "bridge_loop", "rendering",
     "mesh_rendering", "expert", "visual_tasks", "ablation", "stable_baselines3_ppo", "thrown_starts", "thrown",
-    "any_vehicle", "raptor", "identify",
+    "any_vehicle", "raptor", "identify", "step_response",
 ):  # fmt: skip
     print(f"== {name}", flush=True)
     subprocess.run([sys.executable, str(Path(__file__).parent / f"{name}.py")], check=True)

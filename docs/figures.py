@@ -31,6 +31,7 @@ TITLES = {
     "zoo_stress": "The zoo under stress: vehicles, air and sensors that are not those of the training",
     "zoo_stress_by_sight": "The zoo's policies that see, under stress of the vehicle and of its cameras",
     "identify": "Identification of hidden vehicles from the logs of a flight",
+    "step_response": "Steps of the real firmware, and the simulator's before and after alignment",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
     "firmware_faults": "Faults injected into flights of the real firmware",
@@ -76,6 +77,9 @@ Success: within 0.1 m for the last second of 8 s. What stands in which row:
 inertia per axis. The structural part of sigma (`STRUCTURE`) was set on these same vehicles: with
 0.4 % in the place of 1 % for the motors' lag, 40 % of its intervals held the truth. So the last
 column is no independent test. [How it is done](identification.md).""",
+    "step_response": """
+VIS-R; mean of four steps of each command. Time until 10 % and 63 % of the step, and overshoot (of
+thrust, which an accelerometer shakes, none). [How it is done, and the picture](identification.md#align).""",
     "robust": """
 Five seeds, 1000 starts a row. While track's last two and race's first three trained, other programs
 ran on the same two cores: they took up to twice the time of the others.""",

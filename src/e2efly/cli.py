@@ -26,6 +26,7 @@ _EXAMPLES = {
     "fly-report LOG": "draw a flight",
     "identify flight LOG": "a vehicle file from flights, parts, a pendulum, a thrust stand",
     "tune LOG --task race": "from logs of your vehicle to a policy for it",
+    "align LOG": "fit delay and rate loop to a flight, lay its replay over it",
     "render forest": "what cameras and LiDARs see of a world: pictures and a video",
     "firmware": "build the real Betaflight firmware for this machine",
     "bench": "how fast this machine simulates and learns",

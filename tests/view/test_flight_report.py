@@ -1,5 +1,6 @@
 """Flight reports: estimates against known truth, figures and summary of whole, partial and cut-off flights."""
 
+import dataclasses
 import json
 import subprocess
 import sys
@@ -14,10 +15,10 @@ from matplotlib.image import imread
 
 from e2efly.commands.fly_report import FlyReport, run
 from e2efly.deploy.log.blackbox import align, read_blackbox
-from e2efly.deploy.log.flight_log import FlightLog, read_log
+from e2efly.deploy.log.flight_log import FlightLog, Series, read_log
 from e2efly.deploy.log.telemetry import Telemetry
 from e2efly.view.flight_figures import draw
-from e2efly.view.flight_log import blackbox_responses, intervals, responses, summary
+from e2efly.view.flight_log import align_command, blackbox_responses, intervals, responses, summary
 from e2efly.view.rate_response import step_response
 
 DATA = Path(__file__).parents[1] / "data" / "blackbox"
@@ -157,6 +158,22 @@ def test_a_flight_that_does_not_move_has_no_step_response(tmp_path: Path) -> Non
         assert r.reason.startswith("not enough excitation")
     numbers = summary(still)["rate_response"]["roll"]
     assert numbers["delay_s"] is None and "not enough excitation" in numbers["reason"]
+    assert summary(still)["align"] is None
+
+
+def test_a_flight_that_cannot_be_aligned_is_not_said_to_be(log: FlightLog) -> None:
+    """Too short, or with the body rates of its poses alone."""
+    found = responses(log)
+    assert align_command(log, found) is not None
+    short = {name: _until(s, 6.0) for name, s in log.series.items()}  # of which 2 s on the ground
+    assert align_command(dataclasses.replace(log, series={k: s for k, s in short.items() if len(s)}), found) is None
+    blind = {name: s for name, s in log.series.items() if name != "imu"}
+    assert align_command(dataclasses.replace(log, series=blind), found) is None
+
+
+def _until(s: Series, end: float) -> Series:
+    kept = int(np.sum(s.time <= end))
+    return Series(s.channel, s.stamp[:kept], s.time[:kept], s.values[:kept])
 
 
 def test_a_response_that_is_not_the_command_s_is_not_believed(log: FlightLog) -> None:
@@ -197,6 +214,8 @@ def test_the_command_draws_prints_and_exports(
     bag1, bag2 = tmp_path / "flight.bag", tmp_path / "bag"
     assert run(FlyReport(log.path, tmp_path / "out", bag1=bag1, bag2=bag2)) == 0
     told = capsys.readouterr().out
+    align = f"e2efly align {log.path} --vehicle vis_r.toml"  # the log's vehicle has the name, and another hash
+    assert align in "".join(told.split("\n")) and summary(log)["align"] == align
     for word in ("POLICY", "odometry stale", "deadlines missed", "policy handed over", "ROS 1 bag", "ROS 2 bag"):
         assert word in told
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == json.loads(json.dumps(summary(log)))
@@ -225,6 +244,7 @@ def test_a_flight_of_few_channels_is_reported_as_far_as_it_goes(
     part = read_log(fly(tmp_path / "part.mcap", only=only).path)
     assert {path.stem for path in draw(part, tmp_path)} == figures == {path.stem for path in tmp_path.glob("*.png")}
     json.dumps(summary(part), allow_nan=False)
+    assert summary(part)["align"] is None
 
 
 def test_a_cut_off_flight_is_reported_and_told(

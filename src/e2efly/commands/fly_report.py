@@ -53,6 +53,8 @@ def run(options: FlyReport) -> int:
             counts = export_bag(log, bag, version)
             console.print(f"ROS {version} bag: {bag} ({sum(counts.values())} messages of {len(counts)} topics)")
     console.print(f"Figures and summary.json: {out}")
+    if table["align"]:
+        console.print(f"To make the simulator answer as this vehicle did: {table['align']}")
     return 0
 
 

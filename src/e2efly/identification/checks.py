@@ -194,8 +194,8 @@ def _on_one_clock(record: Record) -> Record:
     if not record.has("body_rate", "quaternion"):
         return record
     start, end = record.span
-    thirds = [_offset(record.during(a, a + (end - start) / 3)) for a in (start, end - (end - start) / 3)]
-    whole = _offset(record)
+    thirds = [poses_behind(record.during(a, a + (end - start) / 3)) for a in (start, end - (end - start) / 3)]
+    whole = poses_behind(record)
     if whole is None:
         return record
     known = [x for x in thirds if x is not None]
@@ -216,7 +216,7 @@ def _on_one_clock(record: Record) -> Record:
     return replace(record, streams={**record.streams, **poses}, notes=(*record.notes, note))
 
 
-def _offset(record: Record) -> float | None:
+def poses_behind(record: Record) -> float | None:
     """Seconds by which the poses come after the gyroscope; None where they see no common motion."""
     if not record.has("body_rate", "quaternion"):
         return None

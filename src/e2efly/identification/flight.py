@@ -110,6 +110,7 @@ def identify(
     *,
     believed: Vehicle | None = None,
     step: bool = False,
+    delay: bool = True,
     told: Callable[[int, float], None] = lambda i, cost: None,
 ) -> Found:
     """Find what flights say of a vehicle.
@@ -119,6 +120,7 @@ def identify(
         records: of the flights.
         believed: the vehicle in which the flight controller of the flights believed; left out: `vehicle`.
         step: look for delay and rate loop alone, which steps of body rate show.
+        delay: with `step`, look for the delay, too.
         told: (iteration, cost) after each of the fit's.
 
     Raises:
@@ -147,7 +149,7 @@ def identify(
             f"{records[0].path}: {windows.count * LENGTH:.1f} s of flight without gaps; accepted: {LEAST * LENGTH:g} s "
             "or more"
         )
-    only = tuple(u.name for u in UNKNOWNS if u.field in ("rate_gain", "latency")) if step else ()
+    only = tuple(u.name for u in UNKNOWNS if u.field == "rate_gain" or (u.field == "latency" and delay)) if step else ()
     model = Model.of(vehicle, driver, believed, only)
     held_out = np.arange(windows.count) % HELD_OUT == HELD_OUT - 1
     found = fit(model, windows.some(~held_out), begin(model, windows.some(~held_out)), told=told)

@@ -113,6 +113,10 @@ class Model:
         """What is looked for."""
         return tuple(u for u in UNKNOWNS if u.name in self.names)
 
+    def controller(self, vehicle: Vehicle) -> Vehicle:
+        """What the flight controller goes by: the rate loop of a vehicle with some unknowns, the rest believed."""
+        return dataclasses.replace(self.believed, rate_gain=vehicle.rate_gain)
+
 
 def _shows(unknown: Unknown, base: Vehicle, driver: str) -> bool:
     """A factor on nothing shows nothing."""
@@ -163,11 +167,11 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
         window["body_rate"] + start[9:12],
         window["rotor_speed"] + start[12:16] * model.hover,
     )
-    acting = _acting(model, vehicle, window["driven"])
+    acting = commanded(model, vehicle, window["driven"])
     places = {unknown.name: i for i, unknown in enumerate(model.unknowns)}
     curve = 0.5 + (p[places["motor_curve"]] if "motor_curve" in places else 0.0)
     law, integrate = control_law(COMMAND_MODES["ctbr"]), INTEGRATORS["rk3"]
-    controller = dataclasses.replace(model.believed, rate_gain=vehicle.rate_gain)
+    controller = model.controller(vehicle)
 
     def advance(parts: Parts, drive: Array) -> tuple[Parts, Parts]:
         drives = split4(drive)
@@ -203,7 +207,7 @@ def _driven_speed(model: Model, output: tuple[Array, ...], curve: Any) -> Any:
     return rotor_speed_for(model.base, (a, b, c, d))
 
 
-def _acting(model: Model, vehicle: Vehicle, driven: Array) -> Array:
+def commanded(model: Model, vehicle: Vehicle, driven: Array) -> Array:
     """What acts on average over each step, (m, 4), a latency after it was sent."""
     delay = 0.0 if model.driver == "rotor_speed" else vehicle.latency
     steps = driven.shape[0] - 1 - past_steps()

@@ -27,6 +27,8 @@ class Windows:
     """(n,) which flight each is of."""
     when: np.ndarray
     """(n,) start of each, as a share of its flight, 0 to 1."""
+    begin: np.ndarray
+    """(n,) start of each, s of its record's clock."""
     driven: np.ndarray
     """(n, past + m + 1, 4) integral over time of what drives the vehicle: commands, motor outputs or rotor speeds."""
     measured: dict[str, np.ndarray]
@@ -53,7 +55,7 @@ class Windows:
             return {name: x[which] for name, x in table.items()}
 
         return Windows(
-            self.flight[which], self.when[which], self.driven[which],
+            self.flight[which], self.when[which], self.begin[which], self.driven[which],
             cut(self.measured), cut(self.there), cut(self.start),
         )  # fmt: skip
 
@@ -79,12 +81,12 @@ def cut(record: Record, driver: str, flight: int = 0) -> Windows:
     n = max(int((last - first - REACH) / (m * STEP)), 0)
     grid = first + STEP * (past + np.arange(n * m + 1))
     before = first + STEP * np.arange(n * m + 1 + past)
-    integral = _integral(driving, before, held=driver == "command")
+    driven = integral(driving, before, held=driver == "command")
     rows = np.arange(n)[:, None] * m + np.arange(m + 1 + past)
     inner = np.arange(n)[:, None] * m + np.arange(m + 1)
     measured, there, start = {}, {}, {}
     for name in names:
-        values, good = _on_grid(record.streams[name], grid)
+        values, good = on_grid(record.streams[name], grid)
         start[name] = values[inner[:, 0]]
         measured[name], there[name] = np.where(good[:, None], values, 0.0)[inner], good[inner].astype(float)
     longest = max(GAP / driving.rate, 0.05) if driver != "command" else np.inf
@@ -92,7 +94,8 @@ def cut(record: Record, driver: str, flight: int = 0) -> Windows:
     torn = np.zeros(n, bool)
     for start, end in zip(driving.time[:-1][gaps], driving.time[1:][gaps], strict=True):
         torn |= (grid[inner[:, -1]] > start) & (before[rows[:, 0]] < end)
-    windows = Windows(np.full(n, flight), np.arange(n) / max(n, 1), integral[rows], measured, there, start)
+    begin = grid[inner[:, 0]]
+    windows = Windows(np.full(n, flight), np.arange(n) / max(n, 1), begin, driven[rows], measured, there, start)
     return windows.some(~torn & (there["body_rate"].mean(1) > 0.2))
 
 
@@ -110,22 +113,24 @@ def join(parts: Sequence[Windows]) -> Windows:
         there[name] = np.concatenate([part.there.get(name, nothing(part)) for part in parts])
         unknown = np.full((1, size), np.nan)
         start[name] = np.concatenate([part.start.get(name, unknown.repeat(part.count, 0)) for part in parts])
-    flight, when, driven = (np.concatenate([getattr(p, name) for p in parts]) for name in ("flight", "when", "driven"))
-    return Windows(flight, when, driven, measured, there, start)
+    flight, when, begin, driven = (
+        np.concatenate([getattr(p, name) for p in parts]) for name in ("flight", "when", "begin", "driven")
+    )
+    return Windows(flight, when, begin, driven, measured, there, start)
 
 
-def _integral(stream: Stream, grid: np.ndarray, held: bool) -> np.ndarray:
+def integral(stream: Stream, grid: np.ndarray, held: bool) -> np.ndarray:
     """Integral over time, from the grid's start, of a stream whose samples hold until the next, or go over evenly."""
     t, x = stream.time, stream.values
     pieces = x[:-1] if held else (x[:-1] + x[1:]) / 2
     total = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(pieces * np.diff(t)[:, None], 0)])
-    end = grid[-1] + 1.0
+    end = max(grid[-1], t[-1]) + 1.0
     t, total = np.append(t, end), np.concatenate([total, total[-1:] + x[-1:] * (end - t[-1])])
     found = np.stack([np.interp(grid, t, column) for column in total.T], -1)
     return found - found[:1]
 
 
-def _on_grid(stream: Stream, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def on_grid(stream: Stream, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A stream between its samples, and where there is a sample close enough to be believed."""
     t = stream.time
     values = np.stack([np.interp(grid, t, column) for column in stream.values.T], -1)

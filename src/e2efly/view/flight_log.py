@@ -2,6 +2,7 @@
 
 import datetime
 import math
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,11 +12,14 @@ import numpy as np
 from e2efly.control import Quat
 from e2efly.deploy.log.blackbox import Alignment, Blackbox
 from e2efly.deploy.log.flight_log import FlightLog
-from e2efly.view.rate_response import StepResponse, step_response
+from e2efly.vehicles import load_vehicle, vehicle_names
+from e2efly.view.rate_response import EXCITATION, StepResponse, step_response
 
 AXES = ("roll", "pitch", "yaw")
 GROUNDED = ("INIT", "DONE", "DISARMED", "")
 """Modes in which the vehicle does not follow commands."""
+ALIGNED_S = 5.0
+"""Time in all others that an alignment needs, s."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,22 @@ def responses(log: FlightLog) -> dict[str, StepResponse]:
     return {axis: step_response(commands.time, asked[:, i], time, rate[:, i], flown) for i, axis in enumerate(AXES)}
 
 
+def align_command(log: FlightLog, found: Mapping[str, StepResponse]) -> str | None:
+    """What to type to align the simulator with this flight; None where the log has not what that needs.
+
+    Args:
+        log: the flight.
+        found: the step responses of its axes.
+    """
+    flown = sum(i.end - i.start for i in intervals(log) if i.mode.upper() not in GROUNDED)
+    felt = np.isfinite(log["imu"].numbers("gyro", 3)).any()
+    if not felt or flown < ALIGNED_S or all(r.excitation < EXCITATION for r in found.values()):
+        return None
+    name, _, known = log.meta.get("vehicle", "").partition(" ")
+    shipped = name in vehicle_names() and load_vehicle(name).hash == known
+    return shlex.join(["e2efly", "align", str(log.path), "--vehicle", name if shipped else f"{name or 'my'}.toml"])
+
+
 def blackbox_responses(blackbox: Blackbox) -> dict[str, StepResponse]:
     """The same from the blackbox's own setpoint and gyro: without the link, and finer in time."""
     t, x, y = blackbox.time, blackbox.setpoint, blackbox.gyro
@@ -92,6 +112,7 @@ def summary(log: FlightLog, blackbox: Blackbox | None = None, alignment: Alignme
     speed = np.linalg.norm(motion.numbers("velocity", 3), axis=1)
     began = datetime.datetime.fromtimestamp(log.start * 1e-9, datetime.UTC) if log.series else None
     changes = [i for i in intervals(log) if i.mode]
+    found = responses(log)
     table = {
         "file": str(log.path),
         "start": began.isoformat(timespec="milliseconds") if began else None,
@@ -104,7 +125,8 @@ def summary(log: FlightLog, blackbox: Blackbox | None = None, alignment: Alignme
         "speed_max_m_s": _largest(speed),
         "tilt_max_rad": _largest(tilt(motion.numbers("quaternion", 4))),
         "odometry_age_s": _spread(motion.numbers("age")),
-        "rate_response": {axis: _response(r) for axis, r in responses(log).items()},
+        "rate_response": {axis: _response(r) for axis, r in found.items()},
+        "align": align_command(log, found),
         "loop": {
             "rounds": len(timing),
             "deadlines_missed": int(np.nansum(timing.numbers("deadline_missed"))),

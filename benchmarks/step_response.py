@@ -1,0 +1,144 @@
+"""Steps of body rate and thrust flown through the real firmware, and the simulator's, before and after alignment.
+
+    python benchmarks/step_response.py [--vehicle vis_r] [--log steps.csv]
+
+The paper's figure of the step-response alignment, with the firmware in the place of the vehicle: it flies over the
+rigid body of the vehicle's file (`e2efly.validation.steps`), `e2efly.identification.align` fits delay and rate loop to
+the log, and docs/step_response.png shows the mean of four steps of each command. `--log` keeps the flight as CSV.
+The zoo's race through the same firmware is aligned, too, with the log that the bridge keeps.
+"""
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from common import arguments, table, write
+from PIL import Image
+
+from e2efly.commands.align import pose_delay_of
+from e2efly.deploy.log.telemetry import Telemetry
+from e2efly.deploy.policy.loader import load_policy
+from e2efly.device import prepare
+from e2efly.identification.align import LEAD_S, Alignment, align
+from e2efly.identification.checks import checked
+from e2efly.identification.csv_file import write_csv
+from e2efly.identification.readers import read_flights
+from e2efly.identification.record import Record
+from e2efly.identification.replay import SIGNALS, stretches
+from e2efly.validation import firmware
+from e2efly.validation.rehearsal import LINK_S, rehearse
+from e2efly.validation.rig import Rig
+from e2efly.validation.steps import HOLD_S, Step, fly_steps
+from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.view.alignment import AFTER, ASKED, BEFORE, MEASURED, both
+from e2efly.view.style import figure
+from e2efly.zoo import policy_file
+
+PICTURE = Path(__file__).parents[1] / "docs" / "step_response.png"
+NAMES = ("thrust", "roll rate", "pitch rate", "yaw rate")
+RISEN = 0.632
+"""1 - 1/e."""
+COLUMNS = ("firmware", "simulator, before", "simulator, aligned")
+
+
+def responses(record: Record, steps: list[Step], found: Alignment, channel: int) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Times since a step, s, and the mean response as a share of the step: firmware, simulator before and after."""
+    own = [step for step in steps if step.channel == channel]
+    flown = stretches(record, [step.time - LEAD_S for step in own], LEAD_S + HOLD_S)
+    size = np.array([step.size for step in own])[:, None]
+    stream, axis = ("body_rate", channel - 1) if channel else ("specific_force", 2)
+    shares, calm = [], flown.time < LEAD_S
+    for seen in (flown.measured, *both(found, flown)):
+        value = seen[stream][..., axis]
+        shares.append(np.mean((value - value[:, calm].mean(1, keepdims=True)) / size, axis=0))
+    return flown.time - LEAD_S, shares
+
+
+def reached(time: np.ndarray, share: np.ndarray, level: float) -> float:
+    """When a response passes a level on its way to 63 %, s."""
+    i = int(np.argmax((share >= RISEN) & (time > 0)))
+    i = int(np.flatnonzero(share[: i + 1] < level)[-1]) + 1
+    return float(np.interp(level, share[i - 1 : i + 1], time[i - 1 : i + 1]))
+
+
+def race(name: str) -> dict[str, Any]:
+    """The zoo's race through the firmware, aligned with the bridge's log: most of it at twice hover's thrust."""
+    vehicle = load_vehicle(name)
+    with tempfile.TemporaryDirectory() as folder:
+        with Telemetry(Path(folder) / "race.mcap", queue_size=200_000) as log:
+            flown = rehearse(firmware.chosen(), load_policy(policy_file("race", name)), vehicle, log=log)
+        read = read_flights(Path(folder) / "race.mcap")
+        records = checked(read, vehicle)
+        pose_delay, _, _ = pose_delay_of(None, read, records)
+    return {"complete": flown.complete, **report(vehicle, align(vehicle, records, pose_delay))}
+
+
+def report(vehicle: Vehicle, found: Alignment) -> dict[str, Any]:
+    """What an alignment found."""
+    gains = next(e for e in found.estimates if e.name == "rate_gain")
+    return {
+        "pose_delay_s": found.pose_delay,
+        "delay_s": dict(zip(("before", "aligned", "sigma"), found.delay, strict=True)),
+        "rate_gain": {
+            "before": vehicle.rate_gain.tolist(), "aligned": gains.value.tolist(), "sigma": gains.sigma.tolist(),
+        },
+        "thrust_over_simulated": found.thrust,
+        "held_out_rms": {
+            name: {"unit": SIGNALS[name], "before": found.before[name], "aligned": found.after[name]}
+            for name in found.before
+        },
+    }  # fmt: skip
+
+
+def main() -> None:
+    """Fly, align, draw, write JSON."""
+    options = arguments(__doc__ or "", vehicle="vis_r", log="")
+    prepare("cpu")
+    vehicle = load_vehicle(options.vehicle)
+    with tempfile.TemporaryDirectory() as folder, Rig(firmware.chosen(), Path(folder), vehicle) as rig:
+        record, steps = fly_steps(rig)
+    if options.log:
+        write_csv(record, Path(options.log))
+    (record,) = checked([record], vehicle)
+    found = align(vehicle, [record], vehicle.latency - LINK_S)
+    rows: list[dict[str, Any]] = []
+    curves = {channel: responses(record, steps, found, channel) for channel in (1, 2, 3, 0)}
+    for channel, (time, shares) in curves.items():
+        rows.append({"response": NAMES[channel]})
+        for column, share in zip(COLUMNS, shares, strict=True):
+            times = " / ".join(f"{1e3 * reached(time, share, level):.0f}" for level in (0.1, RISEN))
+            rows[-1][column] = f"{times} ms" + (f", {100 * max(share.max() - 1, 0):.0f} %" if channel else "")
+    draw(curves)
+    content = {"table": rows, "steps": report(vehicle, found), "race": race(options.vehicle)}
+    write("step_response", options.json, content)
+    print(table(rows))
+    print({k: v for k, v in content.items() if k != "table"})
+
+
+def draw(curves: dict[int, tuple[np.ndarray, list[np.ndarray]]]) -> None:
+    """The picture: commanded, the firmware's response, the simulator's before and after."""
+    notes = ["VIS-R; mean of four steps (3 rad/s, yaw 2 rad/s, thrust 4 m/s², and 0.6 of it, both ways), over the step"]
+    asked: dict[str, Any] = ASKED | {"drawstyle": "default"}
+    measured: dict[str, Any] = MEASURED | {"label": "firmware"}
+    with figure(PICTURE, "Steps through real Betaflight firmware, and the simulator", 5.6, notes) as fig:
+        for place, (channel, (time, shares)) in enumerate(curves.items(), 1):
+            ax = fig.add_subplot(2, 2, place)
+            ax.plot([1e3 * time[0], 0, 0, 1e3 * time[-1]], [0, 0, 1, 1], **asked)
+            for share, style in zip(shares, (measured, BEFORE, AFTER), strict=True):
+                ax.plot(1e3 * time, share, **style)
+            ax.set_title(NAMES[channel])
+            ax.set_ylabel("response over command (1)")
+            ax.set_xlim(-50, 1e3 * HOLD_S)
+            ax.set_ylim(-0.1, 1.35)
+            if place > 2:
+                ax.set_xlabel("time since the step was sent (ms)")
+        handles, labels = fig.axes[0].get_legend_handles_labels()
+        fig.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    with Image.open(PICTURE) as picture:
+        small = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    small.save(PICTURE, optimize=True)
+
+
+if __name__ == "__main__":
+    main()

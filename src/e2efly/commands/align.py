@@ -1,0 +1,214 @@
+"""`e2efly align`."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import tyro
+from rich.table import Table
+
+from e2efly.storage import write_json
+from e2efly.terminal import Terminal
+from e2efly.vehicles import Vehicle, load_vehicle
+
+if TYPE_CHECKING:
+    from e2efly.identification.align import Alignment
+    from e2efly.identification.record import Record
+
+THRUST = 0.03
+"""By how much the thrust may differ before it is told."""
+
+
+@dataclass(frozen=True)
+class Align:
+    """Make the simulator answer to commands as the vehicle did: fit delay and rate loop to flights, show both.
+
+    The commands that were really sent are replayed through the simulator, and its response is laid over the measured
+    one, before and after.
+    """
+
+    logs: tyro.conf.Positional[tuple[Path, ...]]
+    """Flights with commands (thrust over mass and body rates) and body rates: our .mcap, CSV, Betaflight's blackbox."""
+    vehicle: str = "vis_r"
+    """A vehicle's name or a .toml file: what is aligned. All but delay and rate loop stays as it is there."""
+    out: Path = Path("aligned")
+    """Folder of vehicle.toml, align.json and the plots."""
+    pose_delay: float | None = None
+    """How late the poses are when a command is made from them, s: the part of the vehicle's latency that commands and
+    body rates do not show. Left out: what the logs tell, as our .mcap does, and else 0."""
+    columns: tuple[str, ...] = ()
+    """Names of a CSV log's columns for ours: OURS=THEIRS or OURS=THEIRS*FACTOR, as wx=gyro_x*0.01745."""
+
+
+def run(options: Align) -> int:
+    """Fit, write the vehicle file, the report and the plots.
+
+    Raises:
+        ValueError: naming the log, what is wrong with it and what is accepted. Nothing is written then.
+    """
+    from e2efly.device import prepare
+    from e2efly.identification.align import align, refused
+    from e2efly.identification.checks import checked
+    from e2efly.identification.csv_file import column_map
+    from e2efly.identification.flight import driver_of
+    from e2efly.identification.readers import read_flights
+    from e2efly.identification.vehicle_file import write_vehicle
+    from e2efly.view.alignment import plot_alignment
+
+    began, console = time.perf_counter(), Terminal()
+    if not options.logs:
+        raise ValueError("logs are missing; accepted: one flight log or more")
+    if options.pose_delay is not None and not 0 <= options.pose_delay <= 1:
+        raise ValueError(f"--pose-delay is {options.pose_delay}; accepted: 0 to 1 s")
+    vehicle, columns = load_vehicle(options.vehicle), column_map(options.columns)
+    read = [record for path in options.logs for record in read_flights(path, columns)]
+    driver_of(read, step=True)
+    records = checked(read, vehicle)
+    for record in records:
+        console.print(f"{record.path.name}: {record.duration:.1f} s")
+        for note in record.notes:
+            console.print(f"  {note}", style="dim")
+    pose_delay, how, known = pose_delay_of(options.pose_delay, read, records)
+    console.print(how, style="dim" if known else "bold")
+    prepare("cpu")
+    with console.status("fitting") as status:
+        found = align(
+            vehicle,
+            records,
+            pose_delay,
+            told=lambda i, cost: status.update(f"fitting: iteration {i}, cost {cost:.1f}"),
+        )
+    options.out.mkdir(parents=True, exist_ok=True)
+    file = options.out / "vehicle.toml"
+    write_vehicle(file, options.vehicle, vehicle, {e.name: e for e in found.estimates})
+    load_vehicle(file)
+    write_json(options.out / "align.json", _report(options, vehicle, found, records))
+    console.print(_parameters(vehicle, found))
+    console.print(_errors(found))
+    for refusal in found.refusals:
+        console.print(refused(refusal), style="dim")
+    if found.after["roll_rate"] + found.after["pitch_rate"] > found.before["roll_rate"] + found.before["pitch_rate"]:
+        console.print("The error of roll and pitch rate did not fall: keep the file that you have.", style="bold")
+    if found.early:
+        console.print(
+            f"The response seemed to come {1e3 * found.early:.0f} ms before the command; the delay is held at none. "
+            "The vehicle is quicker than motor_time_constant and rate loop of the file allow.",
+            style="bold",
+        )
+    if abs(found.thrust - 1) > THRUST:
+        console.print(
+            f"The vehicle gave {found.thrust:.2f} of the simulator's thrust: weigh it, and identify its thrust "
+            "(e2efly identify flight LOG --mass KG SIGMA).",
+            style="bold",
+        )
+    plots = plot_alignment(options.out, found, records)
+    console.print(f"Vehicle: {file}. Report: {options.out / 'align.json'}. Plots: {', '.join(p.name for p in plots)}")
+    console.print(f"Took {time.perf_counter() - began:.0f} s.", style="dim")
+    return 0
+
+
+def pose_delay_of(given: float | None, read: "list[Record]", records: "list[Record]") -> tuple[float, str, bool]:
+    """How late the poses were when they were flown by, s; from where that is known, in words; and whether it is.
+
+    In a log of ours the poses are behind the gyroscope by what their source does not tell, and older by their age when
+    they are used. How late the gyroscope itself is cancels: the delay from command to response has it the other way.
+
+    Args:
+        given: by the user, s.
+        read: the flights as they were read.
+        records: the same, checked: cut to what is used, poses on the gyroscope's clock.
+    """
+    from e2efly.identification.checks import poses_behind
+
+    if given is not None:
+        return given, f"The poses are taken to be {1e3 * given:.0f} ms late (--pose-delay).", True
+    known = []
+    for log, record in zip(read, records, strict=True):
+        if log.path.suffix.lower() == ".mcap":
+            behind, age = poses_behind(log.during(*record.span)), _age(log.path)
+            if behind is not None and np.isfinite(age):
+                known.append(max(behind, 0.0) + age)
+    if known:
+        late = float(np.median(known))
+        told = f"The poses are {1e3 * late:.0f} ms late by the log: behind its gyroscope, and until their use."
+        return late, told, True
+    told = (
+        "The log does not say how late the poses were when they were flown by: latency becomes the delay from command "
+        "to response alone. Add the poses' by --pose-delay."
+    )
+    return 0.0, told, False
+
+
+def _age(path: Path) -> float:
+    """Age of the odometry when it was used, s; NaN where none was recorded."""
+    from e2efly.deploy.log.flight_log import read_log
+
+    age = read_log(path)["odometry"].numbers("age")
+    return float(np.nanmedian(age)) if np.isfinite(age).any() else float("nan")
+
+
+def _rows(vehicle: Vehicle, found: "Alignment") -> list[dict[str, Any]]:
+    """Parameters before and after."""
+    own, late, sigma = found.delay
+    rows: list[dict[str, Any]] = []
+    if np.isfinite(late):
+        delay = "delay from command to response"
+        rows.append({"name": delay, "unit": "s", "before": own, "after": late, "sigma": sigma})
+    for estimate in found.estimates:
+        before = np.atleast_1d(np.asarray(getattr(vehicle, estimate.name), float))
+        for i, (was, value, off) in enumerate(
+            zip(before, np.atleast_1d(estimate.value), np.atleast_1d(estimate.sigma), strict=True)
+        ):
+            if np.isfinite(value):
+                name, unit = (f"rate_gain[{i}]", "1/s") if before.size > 1 else (estimate.name, "s")
+                rows.append(
+                    {"name": name, "unit": unit, "before": float(was), "after": float(value), "sigma": float(off)}
+                )
+    return rows
+
+
+def _report(options: Align, vehicle: Vehicle, found: "Alignment", records: "list[Record]") -> dict[str, Any]:
+    from e2efly.identification.align import refused
+    from e2efly.identification.replay import SIGNALS
+    from e2efly.identification.windows import STEP
+
+    windows = found.found.windows.some(found.found.held_out)
+    return {
+        "vehicle": options.vehicle,
+        "logs": [{"file": str(r.path), "seconds": r.duration, "notes": list(r.notes)} for r in records],
+        "pose_delay_s": found.pose_delay,
+        "parameters": _rows(vehicle, found),
+        "thrust_over_simulated": found.thrust if np.isfinite(found.thrust) else None,
+        "refused": [refused(r) for r in found.refusals],
+        "held_out": {
+            "seconds": windows.count * windows.steps * STEP,
+            "length_s": windows.steps * STEP,
+            "rms": {
+                name: {"unit": SIGNALS[name], "before": before, "after": found.after[name]}
+                for name, before in found.before.items()
+            },
+        },
+    }
+
+
+def _parameters(vehicle: Vehicle, found: "Alignment") -> Table:
+    table = Table("parameter", "before", "aligned", "sigma", box=None, header_style="bold", pad_edge=False)
+    for row in _rows(vehicle, found):
+        factor, unit = (1e3, "ms") if row["unit"] == "s" else (1.0, row["unit"])
+        told = [f"{factor * row[key]:.{digits}g} {unit}" for key, digits in (("before", 4), ("after", 4), ("sigma", 2))]
+        table.add_row(row["name"], *told)
+    return table
+
+
+def _errors(found: "Alignment") -> Table:
+    from e2efly.identification.replay import SIGNALS
+
+    table = Table(
+        "error where the fit did not look (rms)", "before", "aligned", box=None, header_style="bold", pad_edge=False
+    )
+    for name, before in found.before.items():
+        told = [f"{value:.3g} {SIGNALS[name]}" for value in (before, found.after[name])]
+        table.add_row(name.replace("_", " "), *told)
+    return table
