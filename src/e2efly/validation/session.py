@@ -14,8 +14,7 @@ from e2efly.deploy.betaflight.link import Link, open_link
 from e2efly.deploy.bridge import Bridge
 from e2efly.deploy.log.record import Log
 from e2efly.deploy.pilot.flight_state import Mode
-from e2efly.deploy.policy.loader import Policy
-from e2efly.deploy.policy.runtime import Envelope, Runtime
+from e2efly.deploy.policy.runtime import Acting, Envelope, Runtime
 from e2efly.deploy.policy.worker import PolicyWorker
 from e2efly.deploy.pose.source import PlantSource
 from e2efly.deploy.settings import Fence, FlightSettings
@@ -72,7 +71,7 @@ class Session:
         rig: Rig,
         settings: FlightSettings,
         *,
-        policy: Policy | None = None,
+        policy: Acting | None = None,
         course: Course | None = None,
         log: Log | None = None,
         link: Link | None = None,
