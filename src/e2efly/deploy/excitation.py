@@ -13,6 +13,8 @@ import numpy as np
 from e2efly import __version__
 from e2efly.control import COMMAND_MODES, Quat, Vec3, command_limits
 from e2efly.control.excitation import DURATION, Progress, Room, excite, length_for
+from e2efly.deploy.betaflight.client import SCHEDULE
+from e2efly.deploy.betaflight.messages import Motor
 from e2efly.deploy.pilot.hover import FlightMotion, flight_gains
 from e2efly.deploy.policy.contract import CONTRACT_VERSION, Action, Contract
 from e2efly.deploy.settings import FlightSettings
@@ -26,12 +28,14 @@ NAME = "excitation"
 """What the command line and the contract call it."""
 CONTROL_RATE = 100.0
 """How often it acts, Hz."""
+EXCITATION_SCHEDULE = SCHEDULE | {Motor.CODE: 50.0}
+"""How often each message is asked for, Hz: inertia and motor lag show in gyroscope and motor outputs, if at all."""
 MARGIN, FLOOR = 0.3, 0.6
 """It stays so far inside the fence, m, and so high over the ground, m."""
 SLOWEST, LEAST_HEIGHT = 1.2, 1.0
 """The fence must have room for lines of this speed, m/s, and be so high inside of the margins, m."""
 BRAKING, REACTION = 3.5, 0.45
-"""The deceleration that its turns count on, m/s^2, and the time before that acts, s, where the fence's are not worse."""
+"""The deceleration that its turns count on, m/s^2, and the time before it acts, s, where the fence's are not worse."""
 TILT, PULSED = 0.6, 0.45
 """The tilt that steering asks for, rad, and what doublets and chirps may add, rad."""
 LEAST_TILT = 0.3
@@ -170,9 +174,7 @@ def room_of(settings: FlightSettings) -> tuple[Room, float]:
                 f"{max(room, 0.0):.2g} m {inside}; accepted for {NAME}: {needed:.2g} m or more there"
             )
     if fence.speed * QUICK < SLOWEST:
-        raise ValueError(
-            f"flight.fence.speed is {fence.speed:g}; accepted for {NAME}: {SLOWEST / QUICK:g} m/s or more"
-        )
+        raise ValueError(f"flight.fence.speed is {fence.speed:g}; accepted for {NAME}: {SLOWEST / QUICK:g} m/s or more")
     if fence.tilt < LEAST_TILT + PULSED:
         raise ValueError(
             f"flight.fence.tilt is {fence.tilt:g}; accepted for {NAME}: {LEAST_TILT + PULSED:g} rad or more"

@@ -1,7 +1,7 @@
 """The bridge flying the firmware on a rig, in one process and in virtual time: the pilot is a script."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -77,10 +77,11 @@ class Session:
         link: Link | None = None,
         wrap_worker: Callable[[PolicyWorker], Any] | None = None,
         source: Any = None,
+        schedule: Mapping[int, float] = SCHEDULE,
     ) -> None:
         vehicle = rig.world.vehicle
         self.rig, self.settings = rig, settings
-        self.client = Client(link or open_link(rig.sitl.msp), dict(SCHEDULE))
+        self.client = Client(link or open_link(rig.sitl.msp), dict(schedule))
         self.info = identify(self.client, 3.0, clock=rig)
         self.worker = None
         rate = CONTROL_HZ
