@@ -1,4 +1,4 @@
-"""The excitation flight, which the bridge flies as a policy: inside the fence, whatever the vehicle, and only so long."""
+"""The excitation flight, which the bridge flies as a policy: inside the fence, whatever the vehicle, and so long."""
 
 import dataclasses
 
@@ -77,9 +77,7 @@ def test_it_stays_inside_the_fence_with_a_vehicle_that_is_not_the_files(seed: in
 
 def test_a_larger_room_is_flown_faster() -> None:
     wide = dataclasses.replace(SETTINGS, fence=Fence(low=(-12.0, -12.0, 0.2), high=(12.0, 12.0, 6.0), speed=8.0))
-    slow, fast = (
-        np.array([m.velocity for m in flown(FILE, 15.0, settings)[0]]) for settings in (SETTINGS, wide)
-    )
+    slow, fast = (np.array([m.velocity for m in flown(FILE, 15.0, settings)[0]]) for settings in (SETTINGS, wide))
     assert np.abs(fast[:, :2]).max() > 1.5 * np.abs(slow[:, :2]).max()
 
 
@@ -100,7 +98,7 @@ def test_a_fence_without_room_is_refused_by_name(fence: dict[str, object], said:
 
 
 def test_options_out_of_range_are_refused_by_name() -> None:
-    with pytest.raises(ValueError, match="excitation.seconds is 5"):
+    with pytest.raises(ValueError, match=r"excitation\.seconds is 5"):
         excitation(FILE, SETTINGS, ExcitationOptions(seconds=5.0))
 
 

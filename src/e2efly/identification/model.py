@@ -12,7 +12,7 @@ from jax import Array
 from e2efly.control import COMMAND_MODES, Vec3
 from e2efly.control.vectors import Quat
 from e2efly.identification.windows import STEP, past_steps
-from e2efly.physics.body import drag, rotor_speed_for, rotor_thrust, rotor_wrench
+from e2efly.physics.body import drag, rotor_thrust, rotor_wrench
 from e2efly.physics.control import control_law
 from e2efly.physics.integrate import INTEGRATORS
 from e2efly.physics.mixer import Mixer
@@ -108,7 +108,15 @@ class Model:
         believed = vehicle if believed is None else believed
         base, told = (jax.tree.map(lambda x: np.asarray(x, np.float64), v) for v in (vehicle, believed))
         names = tuple(u.name for u in UNKNOWNS if _shows(u, base, driver) and (not only or u.name in only))
-        return Model(base, told, Mixer.of(believed, np.float64), vehicle.hover_rotor_speed, vehicle.full_rotor_speed, driver, names)
+        return Model(
+            base,
+            told,
+            Mixer.of(believed, np.float64),
+            vehicle.hover_rotor_speed,
+            vehicle.full_rotor_speed,
+            driver,
+            names,
+        )
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
