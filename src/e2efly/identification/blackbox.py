@@ -72,10 +72,11 @@ def _even(own: np.ndarray, laid: np.ndarray, lively: np.ndarray) -> np.ndarray:
     some = slice(None, None, max(len(own) // 2000, 1))
     width = max(len(own) // 50, 1)
     weight = np.sqrt(np.convolve(lively**2, np.ones(width) / width, "same"))[some]
+    line, spread = np.array([1.0, 0.0]), np.inf
     for _ in range(3):  # what lies far from the line counts less
         line = np.polyfit(own[some], laid[some], 1, w=weight)
         off = laid[some] - np.polyval(line, own[some])
-        spread = np.sqrt(np.average(off**2, weights=weight**2))
+        spread = float(np.sqrt(np.average(off**2, weights=weight**2)))
         weight = weight * np.minimum(1.0, 2 * spread / np.maximum(np.abs(off), 1e-12))
     return laid if spread > UNEVEN else np.polyval(line, own)
 
