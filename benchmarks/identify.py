@@ -144,7 +144,8 @@ def main() -> None:
     if options.plant == "mujoco":
         write(name, options.json, {"table": tables[""], "seconds_each": seconds, "vehicles": every[""]})
     else:
-        write(name, options.json, {"tables": tables, "seconds_each": seconds, "vehicles": every})
+        both = [{"from": label, **row} for label, rows in tables.items() for row in rows]
+        write(name, options.json, {"table": both, "seconds_each": seconds, "vehicles": every})
     for label, rows in tables.items():
         print(label, table(rows), sep="\n")
     print(f"{seconds:.1f} s a vehicle, flight and fit")

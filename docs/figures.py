@@ -31,6 +31,7 @@ TITLES = {
     "zoo_stress": "The zoo under stress: vehicles, air and sensors that are not those of the training",
     "zoo_stress_by_sight": "The zoo's policies that see, under stress of the vehicle and of its cameras",
     "identify": "Identification of hidden vehicles from the logs of a flight",
+    "identify_betaflight": "Identification of hidden vehicles behind the real firmware",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
     "firmware_faults": "Faults injected into flights of the real firmware",
@@ -41,7 +42,7 @@ TITLES = {
     "msp_fuzz": "MSP codec under fuzzing",
 }
 
-SCRIPTS = {"zoo_stress_by_sight": "zoo_stress.py --by-sight"}
+SCRIPTS = {"identify_betaflight": "identify.py --plant betaflight", "zoo_stress_by_sight": "zoo_stress.py --by-sight"}
 """What measured a file of results that has not the name of its script."""
 FIRST = """
 Rates and times below that are older than 2026-11-24 were measured with the first-order integrator, which
@@ -76,6 +77,10 @@ Success: within 0.1 m for the last second of 8 s. What stands in which row:
 inertia per axis. The structural part of sigma (`STRUCTURE`) was set on these same vehicles: with
 0.4 % in the place of 1 % for the motors' lag, 40 % of its intervals held the truth. So the last
 column is no independent test. [How it is done](identification.md).""",
+    "identify_betaflight": """
+30 s of `e2efly fly excitation` each, in a fence of 12 x 12 x 4.8 m, by the bridge, through Betaflight 4.6
+in virtual time. The delay's truth is on the rig's own clock: the age of the poses, and the time from a
+command to the setpoint. Four vehicles are few. [What to fly](identification.md#what-to-fly).""",
     "robust": """
 Five seeds, 1000 starts a row. While track's last two and race's first three trained, other programs
 ran on the same two cores: they took up to twice the time of the others.""",

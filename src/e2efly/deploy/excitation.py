@@ -14,7 +14,7 @@ from e2efly import __version__
 from e2efly.control import COMMAND_MODES, Quat, Vec3, command_limits
 from e2efly.control.excitation import DURATION, Progress, Room, excite, length_for
 from e2efly.deploy.betaflight.client import SCHEDULE
-from e2efly.deploy.betaflight.messages import Motor
+from e2efly.deploy.betaflight.messages import Motor, RawImu
 from e2efly.deploy.pilot.hover import FlightMotion, flight_gains
 from e2efly.deploy.policy.contract import CONTRACT_VERSION, Action, Contract
 from e2efly.deploy.settings import FlightSettings
@@ -28,8 +28,8 @@ NAME = "excitation"
 """What the command line and the contract call it."""
 CONTROL_RATE = 100.0
 """How often it acts, Hz."""
-EXCITATION_SCHEDULE = SCHEDULE | {Motor.CODE: 50.0}
-"""How often each message is asked for, Hz: inertia and motor lag show in gyroscope and motor outputs, if at all."""
+EXCITATION_SCHEDULE = SCHEDULE | {RawImu.CODE: 100.0, Motor.CODE: 100.0}
+"""How often each message is asked for, Hz, at most: inertia and motor lag show in gyroscope and motor outputs alone."""
 MARGIN, FLOOR = 0.3, 0.6
 """It stays so far inside the fence, m, and so high over the ground, m."""
 SLOWEST, LEAST_HEIGHT = 1.2, 1.0
