@@ -1,23 +1,37 @@
 """Identification of vehicles whose parameters are hidden, from logs of a flight with noise, delay, gaps and sag.
 
-    python benchmarks/identify.py [--vehicles 100] [--vehicle vis_r]
+    python benchmarks/identify.py [--vehicles 100] [--vehicle vis_r] [--plant mujoco]
 
 Each vehicle is drawn about the file (mass 20 %, thrust 12 %, inertia 30 % an axis, motor lag 40 %, drag 50 %, torque
 ratio 20 %, rate gain 30 %, delay 20 to 80 ms, sag up to 8 %), flown for 30 s in MuJoCo by a flight controller that
 believes in the file, and identified from the log of its sensors (`e2efly.validation.excitation`). Its mass is weighed.
+
+`--plant betaflight` flies them by the bridge's excitation mode through the real firmware (`e2efly.validation.excited`),
+and identifies each twice: from the flight log alone, and with the firmware's blackbox laid over it. The delay is
+compared with the one on the rig's own clock: the age of the poses, and the time from a command to the setpoint.
 """
 
 import dataclasses
+import tempfile
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from common import arguments, table, write
 
+from e2efly.deploy.log.telemetry import Telemetry
+from e2efly.deploy.settings import Fence
 from e2efly.device import prepare
-from e2efly.identification.flight import identify
+from e2efly.identification.blackbox import setpoint_delay, with_blackboxes
+from e2efly.identification.checks import checked
+from e2efly.identification.flight import Found, identify
+from e2efly.identification.readers import read_flights
+from e2efly.validation import firmware
 from e2efly.validation.excitation import Sensors, fly_excitation, sensed
+from e2efly.validation.excited import fly_excited
 from e2efly.validation.plants import find_plant
+from e2efly.validation.session import rehearsal_settings
 from e2efly.vehicles import Vehicle, load_vehicle
 
 INTERVAL = 1.645
@@ -42,17 +56,53 @@ def hidden(vehicle: Vehicle, rng: np.random.Generator) -> Vehicle:
     return dataclasses.replace(vehicle, **changed, latency=float(rng.uniform(0.02, 0.08)))
 
 
-def one(vehicle: Vehicle, seed: int) -> dict[str, tuple[float, float]]:
-    """By parameter: its error (relative, or s) and by how many standard deviations it is off."""
+Errors = dict[str, tuple[float, float]]
+"""By parameter: its error (relative, or s) and by how many standard deviations it is off."""
+ROOM = Fence(low=(-6.0, -6.0, 0.2), high=(6.0, 6.0, 5.0), speed=8.0)
+"""In which the firmware's flights stay."""
+
+
+def through_firmware(vehicle: Vehicle, seed: int) -> dict[str, Errors]:
+    """By what it is identified from."""
+    rng = np.random.default_rng(seed)
+    body = hidden(vehicle, rng)
+    settings = dataclasses.replace(rehearsal_settings(1.5), fence=ROOM)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "flight.mcap"
+        with Telemetry(path) as log:
+            flight = fly_excited(
+                firmware.chosen(), vehicle, body, settings, log=log, folder=Path(folder), blackbox=True,
+                sag=rng.uniform(0, 0.08), seed=seed,
+            )  # fmt: skip
+        if not flight.complete or flight.blackbox is None:
+            raise RuntimeError(f"vehicle {seed}: {flight.flown.changes}")
+        (exact,) = with_blackboxes([flight.truth, *read_flights(flight.blackbox)])
+        link, age = setpoint_delay(exact), flight.truth.pose_age
+        assert link is not None
+        assert age is not None
+        body = dataclasses.replace(body, latency=link + age)
+        weighed, out = dataclasses.replace(vehicle, mass=body.mass), {}
+        for label, logs in (("flight log", [path]), ("with blackbox", [path, flight.blackbox])):
+            records = checked(with_blackboxes([r for p in logs for r in read_flights(p)]), weighed)
+            out[label] = errors(body, identify(weighed, records, believed=vehicle), by_firmware=True)
+    return out
+
+
+def one(vehicle: Vehicle, seed: int) -> Errors:
+    """Flown in MuJoCo."""
     rng = np.random.default_rng(seed)
     body = hidden(vehicle, rng)
     plant = find_plant("mujoco")(vehicle)
     plant.meet(body)
     record = sensed(fly_excitation(plant, vehicle, body.latency, sag=rng.uniform(0, 0.08)), Sensors(), seed)
     weighed = dataclasses.replace(vehicle, mass=body.mass)
-    found = identify(weighed, [record], believed=vehicle)
+    return errors(body, identify(weighed, [record], believed=vehicle))
+
+
+def errors(body: Vehicle, found: Found, by_firmware: bool = False) -> Errors:
+    """What was found against what flew. The firmware has no rate gain."""
     values = {e.name: (e.value, e.sigma) for e in found.estimates}
-    out: dict[str, tuple[float, float]] = {}
+    out: Errors = {}
 
     def told(label: str, error: float, sigma: float) -> None:
         out[label] = error, error / sigma
@@ -61,7 +111,7 @@ def one(vehicle: Vehicle, seed: int) -> dict[str, tuple[float, float]]:
         ("thrust_map", "thrust over mass"), ("inertia", "inertia over torque"), ("torque_ratio", "torque ratio"),
         ("motor_time_constant", "motor lag"), ("rate_gain", "rate gain"), ("latency", "delay"),
     ):  # fmt: skip
-        if name not in values:
+        if name not in values or (by_firmware and name == "rate_gain"):
             continue
         truth = np.atleast_1d(np.asarray(getattr(body, name), float))
         value, sigma = (np.atleast_1d(x) for x in values[name])
@@ -78,13 +128,31 @@ def one(vehicle: Vehicle, seed: int) -> dict[str, tuple[float, float]]:
 
 def main() -> None:
     """Identify all of them, print a table, write JSON."""
-    options = arguments(__doc__ or "", vehicles=100, vehicle="vis_r")
+    options = arguments(__doc__ or "", vehicles=100, vehicle="vis_r", plant="mujoco")
     prepare("cpu")
-    vehicle, began, every = load_vehicle(options.vehicle), time.perf_counter(), []
+    vehicle, began = load_vehicle(options.vehicle), time.perf_counter()
+    every: dict[str, list[Errors]] = {}
     for seed in range(options.vehicles):
-        every.append(one(vehicle, seed))
-        if seed % 10 == 9:
+        found = through_firmware(vehicle, seed) if options.plant == "betaflight" else {"": one(vehicle, seed)}
+        for label, errors_of in found.items():
+            every.setdefault(label, []).append(errors_of)
+        if seed % 10 == 9 or options.plant == "betaflight":
             print(seed + 1, f"{time.perf_counter() - began:.0f} s", flush=True)
+    tables = {label: rows_of(found) for label, found in every.items()}
+    seconds = (time.perf_counter() - began) / options.vehicles
+    name = "identify" if options.plant == "mujoco" else f"identify_{options.plant}"
+    if options.plant == "mujoco":
+        write(name, options.json, {"table": tables[""], "seconds_each": seconds, "vehicles": every[""]})
+    else:
+        both = [{"from": label, **row} for label, rows in tables.items() for row in rows]
+        write(name, options.json, {"table": both, "seconds_each": seconds, "vehicles": every})
+    for label, rows in tables.items():
+        print(label, table(rows), sep="\n")
+    print(f"{seconds:.1f} s a vehicle, flight and fit")
+
+
+def rows_of(every: list[Errors]) -> list[dict[str, str]]:
+    """A row for each parameter, and one for all."""
     rows = []
     for label in dict.fromkeys(name for found in every for name in found):
         of = np.array([found[label] for found in every if label in found])
@@ -101,10 +169,7 @@ def main() -> None:
     inside = np.concatenate([[abs(z) < INTERVAL for _, z in found.values()] for found in every])
     last = {"parameter": "all", "identified": "", "median error": "", "90 % below": ""}
     rows.append(last | {"truth in the 90 % interval": f"{100 * np.mean(inside):.0f} %"})
-    seconds = (time.perf_counter() - began) / len(every)
-    write("identify", options.json, {"table": rows, "seconds_each": seconds, "vehicles": every})
-    print(table(rows))
-    print(f"{seconds:.1f} s a vehicle, flight and fit")
+    return rows
 
 
 if __name__ == "__main__":

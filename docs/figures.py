@@ -32,6 +32,7 @@ TITLES = {
     "zoo_stress_by_sight": "The zoo's policies that see, under stress of the vehicle and of its cameras",
     "identify": "Identification of hidden vehicles from the logs of a flight",
     "step_response": "Steps of the real firmware, and the simulator's before and after alignment",
+    "identify_betaflight": "Identification of hidden vehicles behind the real firmware",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
     "firmware_faults": "Faults injected into flights of the real firmware",
@@ -42,7 +43,7 @@ TITLES = {
     "msp_fuzz": "MSP codec under fuzzing",
 }
 
-SCRIPTS = {"zoo_stress_by_sight": "zoo_stress.py --by-sight"}
+SCRIPTS = {"identify_betaflight": "identify.py --plant betaflight", "zoo_stress_by_sight": "zoo_stress.py --by-sight"}
 """What measured a file of results that has not the name of its script."""
 FIRST = """
 Rates and times below that are older than 2026-11-24 were measured with the first-order integrator, which
@@ -80,6 +81,10 @@ column is no independent test. [How it is done](identification.md).""",
     "step_response": """
 VIS-R; mean of four steps of each command. Time until 10 % and 63 % of the step, and overshoot (of
 thrust, which an accelerometer shakes, none). [How it is done, and the picture](identification.md#align).""",
+    "identify_betaflight": """
+30 s of `e2efly fly excitation` each, in a fence of 12 x 12 x 4.8 m, by the bridge, through Betaflight 4.6
+in virtual time. The delay's truth is on the rig's own clock: the age of the poses, and the time from a
+command to the setpoint. Four vehicles are few. [What to fly](identification.md#what-to-fly).""",
     "robust": """
 Five seeds, 1000 starts a row. While track's last two and race's first three trained, other programs
 ran on the same two cores: they took up to twice the time of the others.""",

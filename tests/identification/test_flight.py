@@ -107,24 +107,27 @@ def test_without_rotor_speeds_the_inertia_is_less_sure(record: Record, found: Fo
 
 
 def test_motor_outputs_give_the_motors_lag_and_the_thrust(record: Record) -> None:
-    """Outputs that lead to thrust half linearly and half by their square, as the fit guesses at first."""
-    top = FILE.thrust_range[1]
-    k2, k1, k0 = FILE.thrust_map
+    """Outputs of which the rotor speed is a fifth by their root, which the fit does not know at first."""
+    curve = 0.2
     plain = find_plant("mujoco")(FILE)
     plain.meet(BODY)
     exact = fly_excitation(plain, FILE, 0.0, seconds=10.0)
     speed = exact.streams["rotor_speed"].values
     # the speed that was asked for, from the one that was reached by a first-order lag
     asked = speed + BODY.motor_time_constant * np.gradient(speed, exact.streams["rotor_speed"].time, axis=0)
-    share = np.clip((k2 * asked**2 + k1 * asked + k0) / top, 0.0, 1.0)
-    output = np.sqrt(0.25 + 2 * share) - 0.5
+    share = np.clip(asked / FILE.full_rotor_speed, 0.0, 1.0)
+    output = ((np.sqrt(curve**2 + 4 * (1 - curve) * share) - curve) / (2 * (1 - curve))) ** 2
     streams = {k: s for k, s in sensed(exact, Sensors(), 3).streams.items() if k not in ("rotor_speed", "command")}
     streams["motor"] = dataclasses.replace(exact.streams["rotor_speed"], values=output)
     found = identify(dataclasses.replace(FILE, mass=BODY.mass), [dataclasses.replace(record, streams=streams)])
     vehicle = merged(FILE, {e.name: e for e in found.estimates})
     assert found.model.driver == "motor"
     assert np.isclose(vehicle.thrust_map[0], BODY.thrust_map[0], rtol=0.03)
-    assert abs(vehicle.motor_time_constant + vehicle.latency - BODY.motor_time_constant) < 5e-3
+    names = [u.name for u in found.model.unknowns]
+    late = FILE.latency + float(found.fit.p[names.index("latency")])
+    assert abs(vehicle.motor_time_constant + late - BODY.motor_time_constant) < 5e-3
+    assert abs(float(found.fit.p[names.index("motor_curve")]) - curve) < 0.05
+    assert "latency" not in {e.name for e in found.estimates}  # how late motors hear is not how late a vehicle is
     assert np.allclose(vehicle.inertia[:2], BODY.inertia[:2], rtol=0.1)
 
 

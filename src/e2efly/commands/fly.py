@@ -23,6 +23,8 @@ from e2efly.deploy.betaflight.controller import ControllerInfo, identify
 from e2efly.deploy.betaflight.link import Link, open_link
 from e2efly.deploy.betaflight.watchdog import WatchedLink
 from e2efly.deploy.bridge import Bridge
+from e2efly.deploy.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
+from e2efly.deploy.excitation import NAME as EXCITATION
 from e2efly.deploy.flight_loop import LOWEST_RATE, fly, loop_rate
 from e2efly.deploy.log.telemetry import Telemetry
 from e2efly.deploy.pilot import throttle_map
@@ -56,7 +58,8 @@ class Fly:
     """Fly on a Betaflight quadrotor; the pilot's switches decide. See docs/flying.md before the first flight."""
 
     policy: tyro.conf.Positional[Path | None] = None
-    """A policy.onnx, a run directory, or a task (the zoo's policy); left out: take-off, hover and landing only.
+    """A policy.onnx, a run directory, or a task (the zoo's policy); `excitation`: what identification needs is flown in
+    place of a policy; left out: take-off, hover and landing only.
     `e2efly fly POLICY --help` also lists the options of its goal."""
     link: str = "/dev/ttyACM0"
     """To the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT."""
@@ -81,6 +84,8 @@ class Fly:
     """Heights, speeds, time-outs, fence, channels."""
     envelope: Envelope = Envelope()
     """In which state the policy may take over."""
+    excitation: ExcitationOptions = ExcitationOptions()
+    """What `excitation` flies."""
 
 
 def parse(arguments: list[str]) -> Fly:
@@ -117,7 +122,8 @@ def run(options: Fly) -> int:
     check_settings(settings)
     if options.latency is not None and not 0 <= options.latency <= SLOWEST:
         raise ValueError(f"--latency is {options.latency}; accepted: 0 to {SLOWEST:g} s")
-    policy = None if options.policy is None else policy_file(options.policy, options.vehicle)
+    excited = options.policy == Path(EXCITATION)
+    policy = None if options.policy is None or excited else policy_file(options.policy, options.vehicle)
     loaded = None if policy is None else load_policy(policy)
     if loaded is None and options.vehicle is None:
         raise ValueError("--vehicle is left out; accepted: a vehicle's name or .toml file, as no policy names one")
@@ -133,6 +139,10 @@ def run(options: Fly) -> int:
             raise ValueError("\n".join(reasons))
         course = course_for(loaded.contract, body, options.goal)
         runtime = Runtime.of(loaded, course, body, envelope=options.envelope, imu=True)
+    if excited:
+        acts, course = excitation(body, settings, options.excitation, options.latency)
+        runtime = Runtime.of(acts, course, body, envelope=options.envelope)
+    contract = runtime.policy.contract if runtime else None
     saved = options.throttle_map
     known = throttle_map.from_json(_read(saved, "--throttle-map"), body) if saved else None
     open_link(options.link).close()  # a wrong text is refused here rather than by the watchdog
@@ -141,9 +151,9 @@ def run(options: Fly) -> int:
         stack.callback(source.close)
         held: Link = WatchedLink(options.link) if options.watchdog and not options.check else open_link(options.link)
         stack.callback(held.close)
-        client = Client(held, dict(SCHEDULE))
+        client = Client(held, dict(EXCITATION_SCHEDULE if excited else SCHEDULE))
         info = _connect(client, options.link)
-        rows = examine(info, body, settings, loaded.contract if loaded else None)
+        rows = examine(info, body, settings, contract)
         console.print(_table(rows))
         worker = PolicyWorker(runtime, settings.policy_timeout) if runtime else None
         if worker is not None:
@@ -160,13 +170,13 @@ def run(options: Fly) -> int:
         path = options.log or Path("flights") / time.strftime("%Y-%m-%d_%H-%M-%S.mcap")
         telemetry = stack.enter_context(Telemetry(path))
         bridge.log = telemetry
-        _record_meta(telemetry, bridge, body, loaded.contract.to_json() if loaded else "", rows)
-        rate = loop_rate(loaded.contract.control_rate_hz) if loaded else LOWEST_RATE
+        _record_meta(telemetry, bridge, body, contract.to_json() if contract else "", rows)
+        rate = loop_rate(contract.control_rate_hz) if contract else LOWEST_RATE
         say = Speaker(sys.stdout)
         stack.callback(say.close)
 
         def again() -> ControllerInfo | None:
-            return _identify_again(bridge, body, settings, loaded.contract if loaded else None, say)
+            return _identify_again(bridge, body, settings, contract, say)
 
         say(f"{rate:g} Hz, log {path}. Ctrl-C lands.")
         timing = fly(
@@ -182,6 +192,8 @@ def run(options: Fly) -> int:
         if telemetry.missing:
             say(f"log: {telemetry.missing}")
         path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map), encoding="utf-8")
+        if excited:
+            say(f"Next: e2efly identify flight {path} --vehicle {options.vehicle} --mass KG SIGMA")
         say(f"Next: e2efly fly-report {path}; throttle map: {path.with_suffix('.throttle.json')}")
         return 0
 

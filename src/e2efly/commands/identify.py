@@ -128,10 +128,12 @@ def _sources(words: Sequence[str]) -> dict[str, list[Path]]:
 
 
 def _records(files: Sequence[Path], columns: Any, vehicle: Vehicle, console: Console) -> "list[Record]":
+    from e2efly.identification.blackbox import with_blackboxes
     from e2efly.identification.checks import checked
     from e2efly.identification.readers import read_flights
 
-    records = checked([record for path in files for record in read_flights(path, columns)], vehicle)
+    read = [record for path in files for record in read_flights(path, columns)]
+    records = checked(with_blackboxes(read), vehicle)
     for record in records:
         rates = ", ".join(f"{name} {stream.rate:.0f} Hz" for name, stream in record.streams.items())
         console.print(f"{record.path.name}: {record.duration:.1f} s; {rates}")

@@ -14,7 +14,7 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 LIMITS = {
     "position": 1e4, "velocity": 100.0, "quaternion": 1.01, "body_rate": 60.0, "specific_force": 300.0,
-    "rotor_speed": 1e4, "motor": 1.05, "command": 300.0, "voltage": 100.0,
+    "rotor_speed": 1e4, "motor": 1.05, "command": 300.0, "setpoint": 60.0, "voltage": 100.0,
 }  # fmt: skip
 """The largest size of a number that a quadrotor's log can hold, in the stream's unit."""
 LOST = 1e-3
@@ -213,7 +213,8 @@ def _on_one_clock(record: Record) -> Record:
         if k in ("position", "velocity", "quaternion")
     }
     note = f"poses are moved by {-1e3 * whole:.0f} ms onto the gyroscope's clock"
-    return replace(record, streams={**record.streams, **poses}, notes=(*record.notes, note))
+    age = None if record.pose_age is None else record.pose_age + whole
+    return replace(record, streams={**record.streams, **poses}, notes=(*record.notes, note), pose_age=age)
 
 
 def poses_behind(record: Record) -> float | None:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from e2efly.identification.coarse import begin
+from e2efly.identification.blackbox import DELAY_SIGMA, setpoint_delay
 from e2efly.identification.estimate import Estimate
 from e2efly.identification.model import NUISANCES, UNKNOWNS, Model, Unknown
-from e2efly.identification.record import Record
+from e2efly.identification.record import MOTORS, Record
 from e2efly.identification.shooting import Fit, fit
 from e2efly.identification.windows import LENGTH, REACH, Windows, cut, join
 from e2efly.vehicles import Vehicle
@@ -24,6 +25,7 @@ STRUCTURE = {"thrust_map": 0.002, "inertia": 0.004, "rate_gain": 0.01, "motor_ti
 accelerometer is filtered; s of the delay, else relative."""
 HELD_OUT = 5
 """One window of so many is kept out of the fit, for the judgement."""
+POSE_DELAY = [name for name, _ in NUISANCES].index("pose_delay")
 LEAST = 10
 """Windows that a fit needs."""
 
@@ -92,7 +94,7 @@ def driver_of(records: Sequence[Record], step: bool = False) -> str:
         ValueError: naming the flight that has none of them.
     """
     wanted = ("command",) if step else ("command", "rotor_speed", "motor")
-    if not step and all(record.has("motor") and not record.has("rotor_speed") for record in records):
+    if not step and all(_shows_motors(record) and not record.has("rotor_speed") for record in records):
         wanted = ("motor",)
     for name in wanted:
         if all(record.has(name) for record in records):
@@ -102,6 +104,11 @@ def driver_of(records: Sequence[Record], step: bool = False) -> str:
         f"{lacking.path}: has the streams {', '.join(lacking.streams) or 'none'}; accepted: "
         f"{' or '.join(wanted)} in every flight, besides body_rate"
     )
+
+
+def _shows_motors(record: Record) -> bool:
+    """Whether motor outputs were logged so often that a simulation can be driven by them."""
+    return record.has("motor") and record.streams["motor"].rate >= MOTORS
 
 
 def identify(
@@ -158,8 +165,41 @@ def identify(
     p = _given(found.p, _whole_covariance(found, sigma), refused)
     refusals = [Refusal(model.unknowns[i], float(sigma[i])) for i in np.flatnonzero(refused)]
     source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
-    estimates = _estimates(model, p, sigma, refused, source)
+    estimates = [e for e in _estimates(model, p, sigma, refused, source) if e.name != "latency"]
+    estimates += _latency(model, records, found, p, sigma, refused, source)
     return Found(model, found, windows, held_out, estimates, refusals, p, sigma)
+
+
+def _latency(
+    model: Model,
+    records: Sequence[Record],
+    found: Fit,
+    p: np.ndarray,
+    sigma: np.ndarray,
+    refused: np.ndarray,
+    source: str,
+) -> list[Estimate]:
+    """From the vehicle's motion to its rate loop: from a command to the rate loop, and, where a log tells, the age of
+    the poses of which the command was made.
+
+    The first is what the setpoints show, where a flight controller logs them; else what the fit of commands found. A
+    delay of motor outputs is none of the vehicle's.
+    """
+    shown = [late for late in map(setpoint_delay, records) if late is not None]
+    at = [i for i, u in enumerate(model.unknowns) if u.field == "latency" and not refused[i]]
+    if shown:
+        late, off = float(np.mean(shown)), DELAY_SIGMA
+    elif at and model.driver == "command":
+        late, off = float(model.base.latency) + float(p[at[0]]), float(sigma[at[0]])
+    else:
+        return []
+    ages = [
+        record.pose_age + float(q[POSE_DELAY])
+        for record, q in zip(records, found.q, strict=True)
+        if record.pose_age is not None
+    ]
+    total = max(late + (float(np.mean(ages)) if ages else 0.0), 0.0)
+    return [Estimate("latency", np.array(total), np.array(off), source)]
 
 
 def _is_vague(unknown: Unknown, sigma: float) -> bool:

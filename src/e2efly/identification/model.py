@@ -12,7 +12,7 @@ from jax import Array
 from e2efly.control import COMMAND_MODES, Vec3
 from e2efly.control.vectors import Quat
 from e2efly.identification.windows import STEP, past_steps
-from e2efly.physics.body import drag, rotor_speed_for, rotor_thrust, rotor_wrench
+from e2efly.physics.body import drag, rotor_thrust, rotor_wrench
 from e2efly.physics.control import control_law
 from e2efly.physics.integrate import INTEGRATORS
 from e2efly.physics.mixer import Mixer
@@ -64,7 +64,7 @@ UNKNOWNS: tuple[Unknown, ...] = (
     Unknown("latency", "latency", (), 0.05, ("command", "motor"), _STEPS),
 )  # fmt: skip
 """Of the vehicle. Each is the logarithm of a factor on the file's value, but for what is added: the delay, s, and the
-curve of the motors, the part of the thrust that rises with the square of the output."""
+curve of the motors, the part of the rotor speed that rises with the root of the output."""
 NUISANCES: tuple[tuple[str, float], ...] = (
     ("gyro_x", 0.05), ("gyro_y", 0.05), ("gyro_z", 0.05), ("force_x", 0.5), ("force_y", 0.5), ("force_z", 0.3),
     ("pose_delay", 0.05), ("tilt_x", 0.03), ("tilt_y", 0.03), ("sag", 0.1), ("flight_thrust", 0.03),
@@ -89,6 +89,8 @@ class Model:
     """That of the flight controller."""
     hover: float | Array
     """rad/s."""
+    full: float | Array
+    """Rotor speed of full motor output, rad/s."""
     driver: str = dataclasses.field(metadata={"static": True})
     names: tuple[str, ...] = dataclasses.field(metadata={"static": True})
     """Of the unknowns that are looked for."""
@@ -106,7 +108,15 @@ class Model:
         believed = vehicle if believed is None else believed
         base, told = (jax.tree.map(lambda x: np.asarray(x, np.float64), v) for v in (vehicle, believed))
         names = tuple(u.name for u in UNKNOWNS if _shows(u, base, driver) and (not only or u.name in only))
-        return Model(base, told, Mixer.of(believed, np.float64), vehicle.hover_rotor_speed, driver, names)
+        return Model(
+            base,
+            told,
+            Mixer.of(believed, np.float64),
+            vehicle.hover_rotor_speed,
+            vehicle.full_rotor_speed,
+            driver,
+            names,
+        )
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -169,7 +179,7 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
     )
     acting = commanded(model, vehicle, window["driven"])
     places = {unknown.name: i for i, unknown in enumerate(model.unknowns)}
-    curve = 0.5 + (p[places["motor_curve"]] if "motor_curve" in places else 0.0)
+    curve = p[places["motor_curve"]] if "motor_curve" in places else 0.0
     law, integrate = control_law(COMMAND_MODES["ctbr"]), INTEGRATORS["rk3"]
     controller = model.controller(vehicle)
 
@@ -201,10 +211,10 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
 
 
 def _driven_speed(model: Model, output: tuple[Array, ...], curve: Any) -> Any:
-    """Rotor speeds that motor outputs lead to: thrust rises with the output, and, by the share `curve`, its square."""
-    top = model.mixer.thrust_max
-    a, b, c, d = (jnp.maximum(top * u * ((1 - curve) + curve * jnp.abs(u)), model.mixer.thrust_min) for u in output)
-    return rotor_speed_for(model.base, (a, b, c, d))
+    """Rotor speeds that motor outputs lead to: they rise with the output, and, by the share `curve`, with its root, by
+    which the thrust rises nearly evenly.
+    """
+    return tuple(model.full * ((1 - curve) * u + curve * jnp.sqrt(jnp.maximum(u, 1e-4))) for u in output)
 
 
 def commanded(model: Model, vehicle: Vehicle, driven: Array) -> Array:

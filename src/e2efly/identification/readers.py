@@ -1,21 +1,27 @@
 """Flight logs of many kinds, read into records: which kind a file is, its beginning or its name says."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from e2efly.control import Quat, Vec3
 from e2efly.identification.crazyflie import is_crazyflie, read_crazyflie
 from e2efly.identification.csv_file import Column, read_csv
-from e2efly.identification.record import Record, Stream
+from e2efly.identification.record import MOTORS, Record, Stream
+
+if TYPE_CHECKING:
+    from e2efly.deploy.log.flight_log import Series
 
 ACCEPTED = (
-    "our .mcap, a .csv, a ROS 1 .bag, the folder of a ROS 2 bag, Betaflight's .bbl or .bfl, PX4's .ulg, or the log "
-    "of a "
+    "our .mcap, a .csv, a ROS 1 .bag, the folder of a ROS 2 bag, Betaflight's .bbl, .bfl or .bf, PX4's .ulg, or "
+    "the log of a "
     "Crazyflie's micro-SD deck"
 )
+BLACKBOXES = (".bbl", ".bfl", ".bf")
+"""Endings of the names of Betaflight's blackbox logs."""
 _FLIP = np.array([1.0, -1.0, -1.0])
 """FLU from FRD: forward stays, left is minus right, up is minus down."""
 
@@ -41,8 +47,7 @@ def read_flights(path: Path, columns: Mapping[str, Column] | None = None) -> lis
     kinds: dict[str, Callable[[Path], list[Record]]] = {
         ".csv": lambda p: [read_csv(p, columns)],
         ".mcap": lambda p: [read_mcap(p)],
-        ".bbl": read_betaflight,
-        ".bfl": read_betaflight,
+        **dict.fromkeys(BLACKBOXES, read_betaflight),
         ".ulg": lambda p: [read_ulog(p)],
         ".bag": lambda p: [read_bag(p)],
     }
@@ -82,8 +87,40 @@ def read_mcap(path: Path) -> Record:
     if len(commands):
         values = np.column_stack([commands.numbers("collective_thrust"), commands.numbers("body_rate", 3)])
         _put(streams, "command", commands.time, values)
+    channels = log["rc"]
+    if len(commands) and len(channels):
+        _put(streams, "setpoint", channels.time, _asked(streams["command"], channels))
     notes = (f"cut off: {log.cut_off}",) if getattr(log, "cut_off", "") else ()
-    return _whole(path, streams, notes)
+    if "motor" in streams and streams["motor"].rate < MOTORS:
+        notes += (
+            f"motor outputs at {streams['motor'].rate:.0f} Hz: too few to show inertia and motor lag, and by commands "
+            "alone they are as wrong as Betaflight's rate loop is unlike the simulation's; fly: e2efly fly excitation, "
+            "or give the blackbox of the flight, too",
+        )
+    ages = log["odometry"].numbers("age") if len(log["odometry"]) else np.array([np.nan])
+    age = float(np.nanmean(ages)) if np.isfinite(ages).any() else None
+    return replace(_whole(path, streams, notes), pose_age=age)
+
+
+def _asked(command: Stream, channels: "Series") -> np.ndarray:
+    """The body rates that the controller's channels ask for, (n, 3) rad/s; NaN before the first command.
+
+    Which pulse is which rate, the log itself shows: by the delay at which smooth curves from one to the other fit best.
+    """
+    time, pulses = channels.time, channels.numbers("channels", channels.width("channels"))[:, :3]
+    x = (pulses - 1500) / 500
+    best, least = np.full(x.shape, np.nan), np.inf
+    for late in np.arange(0.0, 0.1, 0.002):
+        at = np.searchsorted(command.time, time - late, side="right") - 1
+        good = (at >= 0) & np.isfinite(x).all(1)
+        if good.sum() < 20:
+            continue
+        curves = [np.polynomial.Polynomial.fit(x[good, i], command.values[at[good], 1 + i], 3) for i in range(3)]
+        rates = np.stack([curve(x[:, i]) for i, curve in enumerate(curves)], -1)
+        left = float(np.mean((rates[good] - command.values[at[good], 1:]) ** 2))
+        if left < least:
+            best, least = np.where((time >= command.time[0])[:, None], rates, np.nan), left
+    return best
 
 
 def read_betaflight(path: Path) -> list[Record]:
@@ -98,7 +135,8 @@ def read_betaflight(path: Path) -> list[Record]:
     for session in read_blackbox(path):
         streams: dict[str, Stream] = {}
         _put(streams, "body_rate", session.time, session.gyro)
-        _put(streams, "motor", session.time, session.motor)
+        _put(streams, "motor", session.time, session.output)
+        _put(streams, "setpoint", session.time, session.setpoint)
         hover = np.full((len(session.time), 1), np.nan)
         hover[:] = 9.81  # a blackbox says nothing of thrust over mass; `step` needs the rates alone
         _put(streams, "command", session.time, np.concatenate([hover, session.setpoint], 1))

@@ -31,9 +31,16 @@ KINDS: dict[str, Kind] = {
         ("cmd_thrust", "cmd_wx", "cmd_wy", "cmd_wz"), "m/s^2, rad/s",
         "thrust over mass and body rates (command mode ctbr) that were sent, each held until the next",
     ),
+    "setpoint": Kind(
+        ("set_wx", "set_wy", "set_wz"), "rad/s", "body rates that the flight controller's rate loop was asked for",
+    ),
     "voltage": Kind(("volts",), "V", "of the whole battery"),
 }  # fmt: skip
 """All streams, by name."""
+
+
+MOTORS = 40.0
+"""Motor outputs that were logged less often, Hz, drive no simulation."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +73,8 @@ class Record:
     """By the names of `KINDS`; what was not recorded is not there."""
     notes: tuple[str, ...] = field(default=())
     """What was left out or changed while it was read, in words."""
+    pose_age: float | None = None
+    """How old the poses were, by the gyroscope's clock, when commands were made of them, s; None: not known."""
 
     @property
     def span(self) -> tuple[float, float]:

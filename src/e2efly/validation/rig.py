@@ -36,6 +36,12 @@ POSE_NOISE = (0.0005, 0.01, 0.02, 0.001)
 VIBRATION = 0.3
 """Of the force that the accelerometer feels while the rotors turn, before the firmware's own filter, m/s^2: a standard
 deviation as of a small quadrotor with good propellers."""
+BLACKBOX = (
+    "set blackbox_device=VIRTUAL",
+    "set blackbox_sample_rate=1/8",
+    "set blackbox_high_resolution=ON",
+)
+"""Settings with which the firmware writes its blackbox, a thousand frames a second, into its folder."""
 LOST_CHANNEL = 13
 """AUX9: the receiver's own, by which firmware that does not hear its silence is told of it."""
 LANDING_S = 10
@@ -100,7 +106,8 @@ class Transmitter:
 class Rig:
     """One firmware in its world. Use it as a context manager: inside, the thread and the firmware share one core.
 
-    Time is virtual; with `real_time` it keeps pace with the machine's clock, as for a bridge in another process.
+    Time is virtual; with `real_time` it keeps pace with the machine's clock, as for a bridge in another process. `step`
+    is how often sensors are told and motors heard, s, a whole number of ms; `settings` are added to `SETTINGS`.
     """
 
     def __init__(
@@ -113,8 +120,11 @@ class Rig:
         pose_rate: float = 200.0,
         latency: float = 0.0,
         seed: int = 0,
+        step: float = STEP_S,
+        settings: tuple[str, ...] = (),
     ) -> None:
         compute_at_once()
+        self._step, self._settings = step, (*SETTINGS, *settings)
         self.sitl = Sitl(firmware, folder)
         self.thrust_shares = np.ones(4)
         """Thrust of each rotor over that of the vehicle's thrust map."""
@@ -168,7 +178,7 @@ class Rig:
         self.sitl.close()
 
     def _boot(self) -> None:
-        prepare(self.sitl)
+        prepare(self.sitl, self._settings)
         self.sitl.start()
         self._next_pose = self._next_rc = self.now()
         self._run(CALIBRATION_S)  # nobody is there yet for whom it would have to be in real time
@@ -189,9 +199,9 @@ class Rig:
             end = time.monotonic() + seconds
             while (now := time.monotonic()) < end:
                 self._epoch = max(self._epoch, now - LONGEST_LAG_S - self.now())
-                while self.now() + STEP_S <= now - self._epoch:
-                    self.step(STEP_S)
-                time.sleep(min(end - now, STEP_S))
+                while self.now() + self._step <= now - self._epoch:
+                    self.step(self._step)
+                time.sleep(min(end - now, self._step))
         else:
             self._run(seconds)
 
@@ -199,9 +209,9 @@ class Rig:
         """Steps for so long, as fast as they go."""
         self.sitl.exchange()
         self._left += seconds
-        while self._left > STEP_S / 2:
-            self.step(STEP_S)
-            self._left -= STEP_S
+        while self._left > self._step / 2:
+            self.step(self._step)
+            self._left -= self._step
         self.sitl.exchange()
 
     def step(self, dt: float) -> None:

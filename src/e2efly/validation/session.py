@@ -1,7 +1,7 @@
 """The bridge flying the firmware on a rig, in one process and in virtual time: the pilot is a script."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,7 @@ from e2efly.deploy.betaflight.link import Link, open_link
 from e2efly.deploy.bridge import Bridge
 from e2efly.deploy.log.record import Log
 from e2efly.deploy.pilot.flight_state import Mode
-from e2efly.deploy.policy.loader import Policy
-from e2efly.deploy.policy.runtime import Envelope, Runtime
+from e2efly.deploy.policy.runtime import Acting, Envelope, Runtime
 from e2efly.deploy.policy.worker import PolicyWorker
 from e2efly.deploy.pose.source import PlantSource
 from e2efly.deploy.settings import Fence, FlightSettings
@@ -72,16 +71,17 @@ class Session:
         rig: Rig,
         settings: FlightSettings,
         *,
-        policy: Policy | None = None,
+        policy: Acting | None = None,
         course: Course | None = None,
         log: Log | None = None,
         link: Link | None = None,
         wrap_worker: Callable[[PolicyWorker], Any] | None = None,
         source: Any = None,
+        schedule: Mapping[int, float] = SCHEDULE,
     ) -> None:
         vehicle = rig.world.vehicle
         self.rig, self.settings = rig, settings
-        self.client = Client(link or open_link(rig.sitl.msp), dict(SCHEDULE))
+        self.client = Client(link or open_link(rig.sitl.msp), dict(schedule))
         self.info = identify(self.client, 3.0, clock=rig)
         self.worker = None
         rate = CONTROL_HZ

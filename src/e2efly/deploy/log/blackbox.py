@@ -33,11 +33,19 @@ class Blackbox:
     setpoint: np.ndarray
     """(n, 3) body rate asked of the rate loop, FLU, rad/s; NaN where it was not logged."""
     motor: np.ndarray
-    """(n, 4) motor outputs, 0 to 1, in Betaflight's order; NaN where they were not logged."""
+    """(n, 4) motor outputs over idle, 0 to 1, in Betaflight's order; NaN where they were not logged."""
     firmware: str
     """What the header says of the firmware."""
     session: int
     """Which session of the file, from 1."""
+    reach: tuple[float, float] = (0.0, 1.0)
+    """What the ESCs are told where `motor` is 0 and 1: 0 is 1000 us or DShot's 48, 1 is 2000 us or DShot's 2047."""
+
+    @property
+    def output(self) -> np.ndarray:
+        """(n, 4) what the ESCs are told, 0 to 1, as MSP tells it, too."""
+        idle, full = self.reach
+        return idle + (full - idle) * self.motor
 
 
 @dataclass(frozen=True)
@@ -102,6 +110,7 @@ def _session(parser: Any, number: int) -> Blackbox:
     fine = 0.1 if int(header.get("blackbox_high_resolution", 0)) else 1.0
     low, high = map(float, header["motorOutput"])
     time = frames[:, names["time"]]
+    least, most = (48.0, 2047.0) if low < 1000 else (1000.0, 2000.0)
     return Blackbox(
         time=(time - time[0]) * 1e-6,
         gyro=np.radians(columns("gyroADC", 3) * fine),
@@ -109,6 +118,7 @@ def _session(parser: Any, number: int) -> Blackbox:
         motor=(columns("motor", 4) - low) / max(high - low, 1.0),
         firmware=str(header.get("Firmware revision") or "unknown"),
         session=number,
+        reach=((low - least) / (most - least), (high - least) / (most - least)),
     )
 
 

@@ -8,14 +8,13 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from e2efly.control import COMMAND_MODES
 from e2efly.deploy.odometry import Odometry, tilt_of, yaw_of
 from e2efly.deploy.policy.contract import ACTION_SIZE, Contract
-from e2efly.deploy.policy.loader import Policy
 from e2efly.goal import Course, Outcome
 from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field
 from e2efly.vehicles import Vehicle
@@ -56,11 +55,26 @@ class Envelope:
     """Largest angle between the heading and that with which such a course begins, rad."""
 
 
+class Acting(Protocol):
+    """What flies by observations and actions: a policy (`e2efly.deploy.policy.loader.Policy`), or what acts as one."""
+
+    @property
+    def contract(self) -> Contract:
+        """What it sees and commands."""
+        ...
+
+    def act(
+        self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The action of an observation, (4,) in [-1, 1], and the memory for the next call; None: there was none."""
+        ...
+
+
 @dataclass(frozen=True)
 class Runtime:
     """A policy and where it is to fly. Make it with `Runtime.of`."""
 
-    policy: Policy
+    policy: Acting
     course: Course
     envelope: Envelope
     period: float
@@ -72,7 +86,7 @@ class Runtime:
 
     @staticmethod
     def of(
-        policy: Policy,
+        policy: Acting,
         course: Course,
         vehicle: Vehicle,
         control_rate: float | None = None,
@@ -83,7 +97,7 @@ class Runtime:
         """Check that they fit together.
 
         Args:
-            policy: as loaded.
+            policy: as loaded, or what acts as one.
             course: as `e2efly.tasks.route.course_for` makes it.
             vehicle: that flies.
             control_rate: at which the policy will be asked, Hz; None: as it was trained.

@@ -1,0 +1,84 @@
+"""The excitation flight through the real firmware, on a body that is not the file's; what identification sees."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from e2efly.deploy.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
+from e2efly.deploy.log.telemetry import Telemetry
+from e2efly.deploy.pilot.fence import fence_problem
+from e2efly.deploy.pilot.flight_state import Mission, Mode, Reason
+from e2efly.deploy.settings import Fence
+from e2efly.identification.blackbox import setpoint_delay, with_blackboxes
+from e2efly.identification.checks import checked
+from e2efly.identification.flight import driver_of
+from e2efly.identification.readers import read_flights
+from e2efly.validation import firmware
+from e2efly.validation.excited import fly_excited
+from e2efly.validation.rig import Rig
+from e2efly.validation.session import Session, rehearsal_settings
+from e2efly.vehicles import load_vehicle
+
+FILE = load_vehicle("vis_r")
+BODY = dataclasses.replace(FILE, mass=0.85, inertia=FILE.inertia * 1.2, motor_time_constant=0.045, latency=0.05)
+SETTINGS = dataclasses.replace(rehearsal_settings(1.2), fence=Fence(low=(-4.0, -4.0, 0.2), high=(4.0, 4.0, 4.5)))
+SHORT = ExcitationOptions(seconds=10.0)
+
+
+def test_it_ends_by_itself_and_its_log_and_blackbox_are_read_together(tmp_path: Path) -> None:
+    log = tmp_path / "flight.mcap"
+    with Telemetry(log) as telemetry:
+        flight = fly_excited(
+            firmware.chosen(), FILE, BODY, SETTINGS, options=SHORT, log=telemetry, folder=tmp_path, blackbox=True
+        )
+    assert flight.complete
+    changes = {mode: (at, reasons) for at, mode, reasons in flight.flown.changes}
+    begun = changes["policy"][0]
+    (ended,) = [at for at, mode, reasons in flight.flown.changes if Reason.POLICY_DONE in reasons]
+    assert ended - begun == pytest.approx(SHORT.seconds, abs=0.05)
+    steps = flight.flown.where(Mode.POLICY)
+    assert np.all(np.abs(np.array(flight.flown.position)[steps, :2]) < 4.0)
+    # as it is: motor outputs drive the simulation, and the delay shows
+    alone = checked(read_flights(log), BODY)
+    assert driver_of(alone) == "motor"
+    assert flight.blackbox is not None
+    boxes = read_flights(flight.blackbox)
+    (whole,) = checked(with_blackboxes([*read_flights(log), *boxes]), BODY)
+    assert whole.streams["motor"].rate == pytest.approx(1000, rel=0.05)
+    (exact,) = with_blackboxes([flight.truth, *boxes])
+    link, age = setpoint_delay(exact), flight.truth.pose_age
+    assert link is not None
+    assert age is not None
+    assert age == pytest.approx(BODY.latency - 0.01, abs=0.006)
+    for record in (alone[0], whole):
+        late = setpoint_delay(record)
+        assert late is not None
+        assert record.pose_age is not None
+        assert late + record.pose_age == pytest.approx(link + age, abs=0.006)
+
+
+def test_the_pilots_switch_ends_it_at_once(tmp_path: Path) -> None:
+    acts, course = excitation(FILE, SETTINGS, SHORT)
+    with Rig(firmware.chosen(), tmp_path, FILE, latency=0.03) as rig:
+        rig.sleep(0.5)
+        session = Session(rig, SETTINGS, policy=acts, course=course, schedule=EXCITATION_SCHEDULE)
+        try:
+            assert session.take_off(1.0)
+            rig.set(mission="policy")
+            assert session.fly(0.5, session.in_mode(Mode.POLICY))
+            assert not session.fly(2.0, session.in_mode(Mode.HOVER, Mode.LAND))
+            rig.set(mission="hover")
+            bridge = session.bridge
+            while bridge.inputs.pilot is not None and bridge.inputs.pilot.mission is Mission.POLICY:
+                assert bridge.flight.mode is Mode.POLICY
+                session.step()
+            assert bridge.flight.mode is Mode.HOVER  # in the very step that heard it
+            assert bridge.sent.source == "hover"
+            session.fly(2.0)
+            assert bridge.odometry is not None
+            assert fence_problem(SETTINGS.fence, bridge.odometry) is None
+            assert session.land()
+        finally:
+            session.close()
