@@ -6,21 +6,32 @@ from e2efly.config import EnvConfig, TaskConfig, check_numbers
 from e2efly.deploy.policy.contract_json import LATEST
 from e2efly.scenes.camera import check as check_camera
 from e2efly.sensors.image_noise import check as check_noise
-from e2efly.vehicles import load_family, nominal_vehicle, unknown
-from e2efly.vehicles.vehicle import quantities
+from e2efly.vehicles import Vehicle, load_family, nominal_vehicle, unknown
+from e2efly.vehicles.vehicle import quantities, terms
 
 COUNTED = 2**24
 """Control steps that an episode can have: float32 counts no further."""
 
 
-def check(config: EnvConfig, task: TaskConfig) -> None:
+def check(config: EnvConfig, task: TaskConfig, flown: Vehicle | None = None) -> None:
     """Check the numbers of a configuration.
+
+    Args:
+        config: of the environment.
+        task: its options.
+        flown: whose parameters are randomised; None: the configuration's vehicle.
 
     Raises:
         ValueError: naming the field, the value and what is accepted.
     """
-    names = [f.name for f in quantities()]
+    body = nominal_vehicle(config.vehicle) if flown is None else flown
+    names = [f.name for f in quantities(body)]
     for name, width in config.randomize.items():
+        if any(name == term.name for term in terms()) and name not in names:
+            raise ValueError(
+                f"env.randomize.{name} is {width}, and vehicle {body.name!r} has no {name}; accepted: a vehicle file "
+                f"with an entry [{name}], or what vehicle {body.name!r} has: {', '.join(names)}"
+            )
         if name not in names:
             raise ValueError(unknown("vehicle parameter", name, names))
         if not 0 <= width < 1:

@@ -126,7 +126,7 @@ class Env:
                 believed, config.command_mode, config.integrator, config.control_rate, config.largest_step, dtype
             )
             physics = physics if flown.as_believed else physics.flying(body, dtype)
-        check(config, task)
+        check(config, task, body)
         rewards.check(reward.weights, reward.parameters)
         late = config.action_latency or latencies_of(config, body, family if flown is None else None)
         frames = latency.frames(late[1], period)

@@ -7,9 +7,9 @@ from jax import Array
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.physics.plant import Plant, Rotors
 from e2efly.physics.state import Parts
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle, quantities
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle, quantities, terms
 
-jax.tree_util.register_dataclass(Vehicle, data_fields=[f.name for f in quantities()], meta_fields=["name"])
+jax.tree_util.register_dataclass(Vehicle, data_fields=[f.name for f in (*quantities(), *terms())], meta_fields=["name"])
 
 
 def rotor_thrust(plant: Plant, rotor_speed: Rotors) -> Rotors:
@@ -72,15 +72,49 @@ def gyroscopic_torque(inertia: Vec3, body_rate: Vec3) -> Vec3:
     return Vec3((j.z - j.y) * w.y * w.z, (j.x - j.z) * w.z * w.x, (j.y - j.x) * w.x * w.y)
 
 
-def derivative(plant: Plant, parts: Parts, wind: Vec3 | None) -> Parts:
-    """Time derivative of the body's state at the rotor speeds of `parts`; the rotors' own entry is zero."""
+def rotor_momentum_torque(
+    inertia: Array, spin: Rotors, body_rate: Vec3, rotor_speed: Rotors, rotor_acceleration: Rotors
+) -> Vec3:
+    """Torque on the body from the angular momentum h of its rotors about body z, N*m: -(dh/dt + w x h).
+
+    A rotor turns against the torque of the air on it, so h = -inertia * sum(spin * speed). The body's own inertia
+    includes the rotors as if they stood still, so that body and rotors together keep their angular momentum. `inertia`
+    is that of a rotor, kg*m^2; accelerations are in rad/s^2.
+    """
+    momentum = -inertia * _weighted(spin, rotor_speed)
+    change = -inertia * _weighted(spin, rotor_acceleration)
+    return Vec3(-body_rate.y * momentum, body_rate.x * momentum, -change)
+
+
+def accelerations(
+    plant: Plant, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None
+) -> tuple[Vec3, Vec3]:
+    """Acceleration of the centre of mass in the world, m/s^2, and of the body about its axes, rad/s^2.
+
+    Args:
+        plant: what flies.
+        parts: its state, with the rotor speeds that push.
+        wind: velocity of the air in the world, m/s.
+        rotor_acceleration: rad/s^2; needed where the plant has rotor inertia.
+    """
     collective, torque = rotor_wrench(plant, rotor_thrust(plant, parts.rotor_speed))
-    zero = jnp.zeros_like(collective)
+    if plant.rotor_inertia is not None and rotor_acceleration is not None:
+        torque = torque + rotor_momentum_torque(
+            plant.rotor_inertia, plant.spin, parts.body_rate, parts.rotor_speed, rotor_acceleration
+        )
+    linear = acceleration(plant, parts.attitude, parts.velocity, collective, wind)
+    return linear, angular_acceleration(plant, parts.body_rate, torque)
+
+
+def derivative(plant: Plant, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None) -> Parts:
+    """Time derivative of the body's state, arguments as of `accelerations`; the rotors' own entry is zero."""
+    linear, angular = accelerations(plant, parts, wind, rotor_acceleration)
+    zero = jnp.zeros_like(linear.z)
     return Parts(
         position=parts.velocity,
-        velocity=acceleration(plant, parts.attitude, parts.velocity, collective, wind),
+        velocity=linear,
         attitude=parts.attitude.derivative(parts.body_rate),
-        body_rate=angular_acceleration(plant, parts.body_rate, torque),
+        body_rate=angular,
         rotor_speed=(zero, zero, zero, zero),
     )
 

@@ -47,6 +47,10 @@ class Plant:
     """What is left of a rotor's lag after a sub-step, ..."""
     half_decay: Array | np.ndarray
     """... and after half of one."""
+    rotor_inertia: Array | None = None
+    """Of each rotor about its axis, kg*m^2; None, here and below: the physics is without this term."""
+    lag_rate: Array | None = None
+    """One over the time constant of the rotors, 1/s, where their acceleration is needed."""
 
     @staticmethod
     def of(vehicle: Vehicle, dt: float, rotor_share: Array | None = None) -> "Plant":
@@ -68,4 +72,6 @@ class Plant:
             rotor_share=None if rotor_share is None else split4(rotor_share),
             decay=exp(-dt / time),
             half_decay=exp(-0.5 * dt / time),
+            rotor_inertia=v.rotor_inertia,
+            lag_rate=None if v.rotor_inertia is None else 1 / time,
         )

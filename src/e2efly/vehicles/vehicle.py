@@ -36,6 +36,11 @@ def _quantity(unit: str, shape: tuple[int, ...] = (), at_least: float | None = N
     return field(metadata={"unit": unit, "shape": shape, "at_least": at_least, "above": above})
 
 
+def _term(unit: str, shape: tuple[int, ...] = (), at_least: float | None = None, above: float | None = None) -> Any:
+    """A vehicle value that a file may leave out: the physics is then without what it describes."""
+    return field(default=None, metadata={"unit": unit, "shape": shape, "at_least": at_least, "above": above})
+
+
 @dataclass(frozen=True)
 class Vehicle:
     """Physical parameters of a quadrotor, float64 as loaded.
@@ -93,11 +98,13 @@ class Vehicle:
     """Height of the centre of mass over the feet."""
     radius: Any = _quantity("m", above=0.0)
     """Radius of the sphere that holds the vehicle, for collisions."""
+    rotor_inertia: Any = _term("kg*m^2", at_least=0.0)
+    """Moment of inertia of a rotor, with all that turns with it, about its axis."""
 
     @property
     def hash(self) -> str:
         """First 16 hex digits of the SHA-256 of all values: two vehicles fly alike if and only if it is equal."""
-        values = {f.name: np.asarray(getattr(self, f.name), np.float64).tolist() for f in quantities()}
+        values = {f.name: np.asarray(getattr(self, f.name), np.float64).tolist() for f in quantities(self)}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
     def under(self, other: "Vehicle", *names: str) -> "Vehicle":
@@ -183,9 +190,18 @@ class Flown:
         return self.body.hash == self.believed.hash
 
 
-def quantities() -> tuple[dataclasses.Field, ...]:
-    """The fields of `Vehicle` that have a unit: all but its name."""
-    return tuple(f for f in dataclasses.fields(Vehicle) if "unit" in f.metadata)
+def quantities(vehicle: Vehicle | None = None) -> tuple[dataclasses.Field, ...]:
+    """The fields with a unit that every vehicle has; of a vehicle, those and the terms of physics that it has."""
+    return tuple(
+        f
+        for f in dataclasses.fields(Vehicle)
+        if "unit" in f.metadata and (f.default is not None or getattr(vehicle, f.name, None) is not None)
+    )
+
+
+def terms() -> tuple[dataclasses.Field, ...]:
+    """The fields that a vehicle's file may leave out, each a term of the physics: None where there is none."""
+    return tuple(f for f in dataclasses.fields(Vehicle) if f.default is None)
 
 
 def vehicle_names() -> list[str]:
@@ -224,13 +240,15 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
             f"vehicle {path.stem!r} is a family, the ranges of many vehicles; accepted here: one vehicle: "
             f"{', '.join(vehicle_names())}, or the path of a .toml file"
         )
-    vehicle = Vehicle(name=path.stem, **read_values(table, quantities(), where))
+    vehicle = Vehicle(name=path.stem, **read_values(table, (*quantities(), *terms()), where))
     check(vehicle, where)
     return vehicle
 
 
 def read_values(table: dict[str, Any], fields: Sequence[dataclasses.Field], where: str) -> dict[str, Any]:
     """The values of a file that has an entry for each of these fields, made as those of `Vehicle`, and no others.
+
+    A field that has a default may be left out.
 
     Raises:
         ValueError: naming the file, the key, the value and what is accepted.
@@ -241,9 +259,9 @@ def read_values(table: dict[str, Any], fields: Sequence[dataclasses.Field], wher
             guess = nearest(key, known)
             hint = f"; did you mean {guess!r}?" if guess else f" (accepted: {', '.join(known)})"
             raise ValueError(f"{where}: unknown key {key!r}{hint}")
-    if missing := [key for key in known if key not in table]:
+    if missing := [key for key, f in known.items() if key not in table and f.default is dataclasses.MISSING]:
         raise ValueError(f"{where}: missing key {', '.join(map(repr, missing))}")
-    return {key: _read(where, f, table[key]) for key, f in known.items()}
+    return {key: _read(where, f, table[key]) for key, f in known.items() if key in table}
 
 
 def _read(where: str, f: dataclasses.Field, entry: Any) -> Any:
@@ -307,9 +325,8 @@ def read_sigmas(name_or_path: str | Path) -> dict[str, np.ndarray]:
         ValueError: as of `load_vehicle`.
     """
     path = vehicle_file(name_or_path)
-    load_vehicle(path)
-    table = read_table(path)
-    return {f.name: _read_sigma(str(path), f, table[f.name]) for f in quantities()}
+    vehicle, table = load_vehicle(path), read_table(path)
+    return {f.name: _read_sigma(str(path), f, table[f.name]) for f in quantities(vehicle)}
 
 
 def check(vehicle: Vehicle, where: str = "vehicle") -> None:

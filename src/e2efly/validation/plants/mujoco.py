@@ -10,6 +10,8 @@ and mixer, float64) runs before every step of at most 1 ms. Two things need a wo
 - MuJoCo's fluid models take their drag from a body's box or ellipsoid and have no coefficients per axis. So each axis
   has an actuator without an input that pushes back by its own velocity, -(k1 + k2 |v|) v, with |v| as of the last step;
   wind is taken off that velocity, turned into the body's frame as of the last step.
+- The angular momentum of the rotors, where the vehicle has rotor inertia: over a step they give the body the momentum
+  that they lose, and the torque w x h of the body rate w in the middle of the step, by its last change.
 """
 
 import importlib
@@ -132,7 +134,7 @@ class MujocoPlant(Plant):
         self.data.qpos[:] = np.concatenate([state.position, state.quaternion])
         self.data.qvel[:] = np.concatenate([state.velocity, state.body_rate])
         self.data.act[:] = self._body.hover_rotor_speed
-        self._wind, self._share = _CALM, np.ones(4)
+        self._wind, self._share, self._last_rate = _CALM, np.ones(4), state.body_rate
         self._mujoco.mj_forward(self.model, self.data)  # the velocities that the drag starts from
 
     def step(self, command: np.ndarray, dt: float) -> None:
@@ -153,7 +155,23 @@ class MujocoPlant(Plant):
             drag = linear + quadratic * np.abs(data.actuator_velocity[4:] - air)
             model.actuator_biasprm[4:, 0] = drag * air
             model.actuator_biasprm[4:, 2] = -drag
+            if self._body.rotor_inertia is not None:
+                data.qfrc_applied[3:] = self._rotor_torque(dt / count)
             self._mujoco.mj_step(model, data)
+
+    def _rotor_torque(self, dt: float) -> np.ndarray:
+        """Mean torque on the body from the angular momentum of its rotors over the next step, body axes, N*m."""
+        body, data = self._body, self.data
+        now, told, lag = data.act, data.ctrl[:4], body.motor_time_constant
+        after = told + (now - told) * np.exp(-dt / lag)
+        inertia = -body.rotor_inertia * body.rotor_spin  # a rotor turns against its reaction torque
+        before = inertia @ now
+        change = inertia @ after - before
+        rate = data.qvel[3:]
+        p, q, _ = 1.5 * rate - 0.5 * self._last_rate
+        self._last_rate = rate.copy()
+        middle = before + change / 2
+        return np.array([-q * middle, p * middle, -change / dt])
 
 
 Law = Callable[[Sequence[float], Sequence[float], Sequence[float]], list[float]]

@@ -1,0 +1,134 @@
+"""The terms of the physics that a vehicle's file may leave out: what they conserve, their limits, their gradients."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.flatten_util import ravel_pytree
+from scipy.spatial.transform import Rotation
+
+from e2efly.physics import INTEGRATORS, Physics, State, step
+from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import terms
+from tests.gradients import central, reverse
+
+pytestmark = pytest.mark.usefixtures("x64")
+
+VALUES: dict[str, Any] = {
+    "rotor_inertia": 1.5e-5,
+}
+"""Of the size that a vehicle like the VIS-R has."""
+NOTHING: dict[str, Any] = {
+    "rotor_inertia": 0.0,
+}
+"""Values at which a term does nothing."""
+
+
+def having(vehicle: Vehicle, *names: str, values: dict[str, Any] = VALUES) -> Vehicle:
+    """The vehicle with these terms."""
+    return dataclasses.replace(vehicle, **{name: np.asarray(values[name]) for name in names})
+
+
+def turned(state: State, vector: np.ndarray) -> np.ndarray:
+    """Body vectors in the world, (t, 3)."""
+    return Rotation.from_quat(np.array(state.quaternion), scalar_first=True).apply(vector)
+
+
+def angular_momentum(vehicle: Vehicle, path: State) -> np.ndarray:
+    """Of body and rotors together, world, (t, 3): rotors turn against their reaction torque."""
+    own = np.array(path.body_rate) * vehicle.inertia
+    rotors = 0.0 if vehicle.rotor_inertia is None else -vehicle.rotor_inertia
+    own[:, 2] += rotors * np.sum(vehicle.rotor_spin * np.array(path.rotor_speed), axis=-1)
+    return turned(path, own)
+
+
+def test_every_term_is_tested() -> None:
+    assert set(VALUES) == set(NOTHING) == {f.name for f in terms()}
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_terms_of_no_size_change_nothing(integrator: str, vis_r: Vehicle, random_state: Callable[..., State]) -> None:
+    command = jnp.asarray([12.0, 2.0, -3.0, 1.0])
+
+    def end(vehicle: Vehicle) -> State:
+        physics = Physics.of(vehicle, integrator=integrator, dtype=np.float64)
+        return step(physics, physics.nominal, random_state(3), command, wind=jnp.asarray([1.0, -2.0, 0.5]))
+
+    with_terms = dataclasses.replace(vis_r, **{name: np.asarray(value) for name, value in NOTHING.items()})
+    before, after = jax.tree.leaves(end(vis_r)), jax.tree.leaves(end(with_terms))
+    for a, b in zip(before, after[: len(before)], strict=True):
+        np.testing.assert_allclose(b, a, rtol=1e-12, atol=1e-12)
+
+
+SCALES = {"position": 1.0, "velocity": 1.0, "quaternion": 1.0, "body_rate": 1.0, "rotor_speed": 1e-3}
+
+
+@pytest.mark.parametrize("integrator", ["semi_implicit", "rk3"])
+@pytest.mark.parametrize("name", VALUES)
+def test_gradients_of_a_step_with_a_term(name: str, integrator: str, vis_r: Vehicle) -> None:
+    """By state, command and the term's own values, against central differences; in flight and at rest."""
+    vehicle = having(vis_r, name)
+    physics = Physics.of(vehicle, integrator=integrator, control_rate=100.0, dtype=np.float64)
+    level = jnp.asarray([1.0, 0, 0, 0])
+    flying = {
+        "state": State(
+            jnp.asarray([0.1, -0.2, 0.3]),
+            jnp.asarray([2.0, -1.0, 0.7]),
+            jnp.asarray(np.array([0.9, 0.1, -0.3, 0.2]) / np.linalg.norm([0.9, 0.1, -0.3, 0.2])),
+            jnp.asarray([1.3, -2.5, 1.2]),
+            jnp.asarray([2.0, 2.1, 2.2, 2.05]),
+        ),
+        "command": jnp.asarray([11.0, 1.0, -2.0, 0.7]),
+        "term": jnp.ones(np.shape(VALUES[name])),
+    }
+    rest = State(jnp.zeros(3), jnp.zeros(3), level, jnp.zeros(3), jnp.full(4, 2.0))
+    points = [flying, {**flying, "state": rest, "command": jnp.asarray([8.0, 0.0, 0.0, 0.0])}]
+    structure = ravel_pytree(flying)[1]
+
+    def run(rows: jax.Array) -> jax.Array:
+        i = jax.vmap(structure)(rows)
+        plant = dataclasses.replace(physics.nominal, **{name: np.asarray(VALUES[name]) * i["term"]})
+        state = dataclasses.replace(i["state"], rotor_speed=1000 * i["state"].rotor_speed)
+        end = step(physics, plant, state, i["command"])
+        return jnp.concatenate([getattr(end, key) * scale for key, scale in SCALES.items()], axis=-1)
+
+    rows = jnp.stack([ravel_pytree(point)[0] for point in points])
+    with jax.disable_jit():
+        exact, numeric = np.asarray(reverse(run, rows, 17)), np.asarray(central(run, rows))
+    np.testing.assert_allclose(exact, numeric, atol=1e-6, rtol=1e-6)
+    size = np.size(VALUES[name])
+    assert np.all(np.max(np.abs(exact[0][:, -size:]), axis=0) > 1e-8)  # each of its numbers matters
+
+
+@pytest.mark.parametrize("integrator", ["semi_implicit", "rk3", "rk4"])
+def test_body_and_rotors_keep_their_angular_momentum(
+    integrator: str, stone: Vehicle, random_state: Callable[..., State], fly_open_loop: Callable[..., State]
+) -> None:
+    """Nothing pushes; the rotors speed up and slow down, and the body turns for it."""
+    vehicle, rng = having(stone, "rotor_inertia"), np.random.default_rng(2)
+    commands = jnp.asarray(rng.uniform(500, 3500, (10, 1, 4)).repeat(20, 0))
+    start = random_state(4, (1,))
+    path = fly_open_loop(integrator, vehicle, start, commands, jnp.zeros((1, 3)), 0.002, 10)
+    whole = jax.tree.map(lambda first, later: jnp.concatenate([first, later[:, 0]]), start, path)
+    momentum = angular_momentum(vehicle, whole)
+    alone = angular_momentum(stone, whole)
+    size = np.linalg.norm(momentum[0])
+    assert np.ptp(alone, axis=0).max() > size  # the rotors take and give more than there is in all
+    drift = {"semi_implicit": 2e-3}.get(integrator, 1e-6)  # of first order
+    np.testing.assert_allclose(momentum, momentum[:1].repeat(len(momentum), 0), atol=drift * size)
+
+
+def test_a_rotor_that_speeds_up_turns_the_body_the_other_way(
+    stone: Vehicle, fly_open_loop: Callable[..., State]
+) -> None:
+    """By hand: the body takes what the rotors gain, and a rotor whose reaction torque is up turns clockwise."""
+    vehicle = having(stone, "rotor_inertia")
+    start = dataclasses.replace(State.hovering(vehicle, jnp.zeros((1, 3))), rotor_speed=jnp.full((1, 4), 2000.0))
+    commands = jnp.broadcast_to(2000.0 + 300 * (vehicle.rotor_spin > 0), (50, 1, 4))
+    path = fly_open_loop("rk3", vehicle, start, commands, jnp.zeros((1, 3)), 0.01, 2)
+    expected = vehicle.rotor_inertia * 2 * 300 / vehicle.inertia[2]
+    np.testing.assert_allclose(path.body_rate[-1, 0], [0, 0, expected], rtol=1e-5, atol=1e-12)

@@ -1,0 +1,86 @@
+"""Terms of the physics in a vehicle's file: left out or there, refused by name, randomised like all else."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from e2efly.config import EnvConfig, RewardConfig
+from e2efly.env import Env
+from e2efly.env.random import random_key
+from e2efly.presets import preset
+from e2efly.vehicles import load_vehicle, vehicle_file, vehicle_names
+from e2efly.vehicles.vehicle import quantities, read_sigmas, terms
+
+VALUES: dict[str, Any] = {
+    "rotor_inertia": 1.5e-5,
+}
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Callable[..., Path]:
+    """VIS-R's file with entries of these values."""
+
+    def write(**values: Any) -> Path:
+        units = {f.name: f.metadata["unit"] for f in terms()}
+        entries = [f'[{k}]\nvalue = {v}\nunit = "{units[k]}"\nsource = "estimated"\n' for k, v in values.items()]
+        path = tmp_path / "mine.toml"
+        path.write_text("\n".join([vehicle_file("vis_r").read_text(), *entries]))
+        return path
+
+    return write
+
+
+def test_shipped_vehicles_have_none_of_them() -> None:
+    for name in vehicle_names():
+        assert all(getattr(load_vehicle(name), term.name) is None for term in terms())
+    assert load_vehicle("vis_r").hash == "1536c594658f65aa"  # by which exported policies know it
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_a_term_in_a_file(name: str, written: Callable[..., Path]) -> None:
+    path = written(**{name: VALUES[name]})
+    vehicle, plain = load_vehicle(path), load_vehicle("vis_r")
+    np.testing.assert_array_equal(getattr(vehicle, name), VALUES[name])
+    assert vehicle.hash != plain.hash
+    assert dataclasses.replace(vehicle, **{name: None}).hash == plain.hash
+    assert [f.name for f in quantities(vehicle)] == [*(f.name for f in quantities()), name]
+    assert np.isnan(read_sigmas(path)[name]).all()
+    assert set(read_sigmas("vis_r")) == {f.name for f in quantities()}
+
+
+BROKEN: dict[str, tuple[dict[str, Any], str]] = {
+    "negative rotor inertia": ({"rotor_inertia": -1e-6}, r"rotor_inertia.value is -1e-06; accepted: >= 0 kg\*m\^2"),
+}
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_a_term_that_cannot_be_is_refused_by_name(kind: str, written: Callable[..., Path]) -> None:
+    values, words = BROKEN[kind]
+    with pytest.raises(ValueError, match=rf"mine\.toml: .*{words}"):
+        load_vehicle(written(**values))
+
+
+def env_of(vehicle: Path | str, randomize: dict[str, float]) -> Env:
+    config = EnvConfig(vehicle=str(vehicle), randomize=randomize)
+    return Env.of(preset("hover", "ppo").task, RewardConfig({"prog2": 1.0}), config)
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_a_term_is_randomised_where_it_is(name: str, written: Callable[..., Path]) -> None:
+    env = env_of(written(**VALUES), {name: 0.3})
+    drawn = np.asarray(env.reset(random_key(0), 64)[0].plant[name]) / np.asarray(VALUES[name])
+    assert 0.7 <= drawn.min() < 0.75
+    assert 1.25 < drawn.max() <= 1.3
+
+
+@pytest.mark.parametrize("name", VALUES)
+@pytest.mark.parametrize("vehicle", ["vis_r", "any"])
+def test_a_term_that_is_not_there_is_not_randomised(name: str, vehicle: str) -> None:
+    with pytest.raises(
+        ValueError, match=rf"env.randomize.{name} is 0.3, and vehicle '{vehicle}' has no {name}; accept"
+    ):
+        env_of(vehicle, {name: 0.3})
