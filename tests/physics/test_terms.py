@@ -20,10 +20,12 @@ pytestmark = pytest.mark.usefixtures("x64")
 
 VALUES: dict[str, Any] = {
     "rotor_inertia": 1.5e-5,
+    "motor_time_constant_down": 0.06,
 }
 """Of the size that a vehicle like the VIS-R has."""
 NOTHING: dict[str, Any] = {
     "rotor_inertia": 0.0,
+    "motor_time_constant_down": 0.035,
 }
 """Values at which a term does nothing."""
 
@@ -132,3 +134,17 @@ def test_a_rotor_that_speeds_up_turns_the_body_the_other_way(
     path = fly_open_loop("rk3", vehicle, start, commands, jnp.zeros((1, 3)), 0.01, 2)
     expected = vehicle.rotor_inertia * 2 * 300 / vehicle.inertia[2]
     np.testing.assert_allclose(path.body_rate[-1, 0], [0, 0, expected], rtol=1e-5, atol=1e-12)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_rotors_slow_down_with_a_lag_of_their_own(
+    integrator: str, vis_r: Vehicle, fly_open_loop: Callable[..., State]
+) -> None:
+    """By the closed form of either step, after one period and after many; one that is where it should be stays."""
+    vehicle = having(vis_r, "motor_time_constant_down")
+    told = np.array([3000.0, 1000.0, 2000.0, 1500.0])
+    start = dataclasses.replace(State.hovering(vehicle, jnp.zeros((1, 3))), rotor_speed=jnp.full((1, 4), 2000.0))
+    commands = jnp.broadcast_to(told, (30, 1, 4))
+    path = fly_open_loop(integrator, vehicle, start, commands, jnp.zeros((1, 3)), 0.004, 1)
+    t, lag = 0.004 * np.arange(1, 31)[:, None], np.array([0.035, 0.06, 0.035, 0.06])
+    np.testing.assert_allclose(path.rotor_speed[:, 0], told + (2000 - told) * np.exp(-t / lag), rtol=1e-12)

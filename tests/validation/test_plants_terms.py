@@ -17,6 +17,7 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 TERMS: dict[str, dict[str, Any]] = {
     "rotor inertia": {"rotor_inertia": 1.5e-5},
+    "lag down": {"motor_time_constant_down": 0.06},
 }
 """Of the VIS-R's size."""
 TERMS["all of them"] = {name: value for term in TERMS.values() for name, value in term.items()}

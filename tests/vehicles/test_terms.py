@@ -17,6 +17,7 @@ from e2efly.vehicles.vehicle import quantities, read_sigmas, terms
 
 VALUES: dict[str, Any] = {
     "rotor_inertia": 1.5e-5,
+    "motor_time_constant_down": 0.06,
 }
 
 
@@ -54,6 +55,7 @@ def test_a_term_in_a_file(name: str, written: Callable[..., Path]) -> None:
 
 BROKEN: dict[str, tuple[dict[str, Any], str]] = {
     "negative rotor inertia": ({"rotor_inertia": -1e-6}, r"rotor_inertia.value is -1e-06; accepted: >= 0 kg\*m\^2"),
+    "no lag down": ({"motor_time_constant_down": 0.0}, r"motor_time_constant_down.value is 0.0; accepted: > 0 s"),
 }
 
 

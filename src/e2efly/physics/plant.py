@@ -51,12 +51,17 @@ class Plant:
     """Of each rotor about its axis, kg*m^2; None, here and below: the physics is without this term."""
     lag_rate: Array | None = None
     """One over the time constant of the rotors, 1/s, where their acceleration is needed."""
+    decay_down: Array | np.ndarray | None = None
+    """`decay`, ..."""
+    half_decay_down: Array | np.ndarray | None = None
+    """... `half_decay` ..."""
+    lag_rate_down: Array | None = None
+    """... and `lag_rate` of a rotor that slows down."""
 
     @staticmethod
     def of(vehicle: Vehicle, dt: float, rotor_share: Array | None = None) -> "Plant":
         """Of a vehicle, any field of which may be batched, for sub-steps of `dt` seconds; `rotor_share` is (*n, 4)."""
-        v, time = vehicle, vehicle.motor_time_constant
-        exp = jnp.exp if isinstance(time, jax.Array) else np.exp
+        v, time, down = vehicle, vehicle.motor_time_constant, vehicle.motor_time_constant_down
         k2, k1, k0 = (v.thrust_map[..., i] for i in range(3))
         return Plant(
             thrust_map=(k2, k1, k0),
@@ -70,8 +75,16 @@ class Plant:
             drag_linear=Vec3.of(v.drag_linear),
             drag_quadratic=Vec3.of(v.drag_quadratic),
             rotor_share=None if rotor_share is None else split4(rotor_share),
-            decay=exp(-dt / time),
-            half_decay=exp(-0.5 * dt / time),
+            decay=_exp(-dt / time),
+            half_decay=_exp(-0.5 * dt / time),
             rotor_inertia=v.rotor_inertia,
             lag_rate=None if v.rotor_inertia is None else 1 / time,
+            decay_down=None if down is None else _exp(-dt / down),
+            half_decay_down=None if down is None else _exp(-0.5 * dt / down),
+            lag_rate_down=None if v.rotor_inertia is None or down is None else 1 / down,
         )
+
+
+def _exp(x: Array | np.ndarray) -> Array | np.ndarray:
+    """Constants stay constants."""
+    return jnp.exp(x) if isinstance(x, jax.Array) else np.exp(x)

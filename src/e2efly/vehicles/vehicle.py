@@ -100,6 +100,8 @@ class Vehicle:
     """Radius of the sphere that holds the vehicle, for collisions."""
     rotor_inertia: Any = _term("kg*m^2", at_least=0.0)
     """Moment of inertia of a rotor, with all that turns with it, about its axis."""
+    motor_time_constant_down: Any = _term("s", above=0.0)
+    """Time constant of a rotor that slows down; `motor_time_constant` is that of one that speeds up."""
 
     @property
     def hash(self) -> str:

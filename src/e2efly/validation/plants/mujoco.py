@@ -148,6 +148,7 @@ class MujocoPlant(Plant):
             thrusts = self._law(wanted, data.qpos.tolist(), data.qvel.tolist())
             data.ctrl[:4] = np.minimum(rotor_speed_of(told, thrusts), self._full_speed)
             speed = data.act.copy()
+            model.actuator_dynprm[:4, 0] = self._lags()
             model.actuator_gainprm[:4, 0] = share * (2 * k2 * speed + k1)
             model.actuator_biasprm[:4, 0] = share * (k0 - k2 * speed * speed)
             wind = self._wind if self._wind == _CALM else Quat(*data.qpos[3:].tolist()).unrotate(self._wind)
@@ -159,10 +160,15 @@ class MujocoPlant(Plant):
                 data.qfrc_applied[3:] = self._rotor_torque(dt / count)
             self._mujoco.mj_step(model, data)
 
+    def _lags(self) -> np.ndarray:
+        """Time constant of each rotor's lag on the way to what it is told now, s; it keeps to its side of that."""
+        up, down = self._body.motor_time_constant, self._body.motor_time_constant_down
+        return np.where(self.data.ctrl[:4] < self.data.act, up if down is None else down, up)
+
     def _rotor_torque(self, dt: float) -> np.ndarray:
         """Mean torque on the body from the angular momentum of its rotors over the next step, body axes, N*m."""
         body, data = self._body, self.data
-        now, told, lag = data.act, data.ctrl[:4], body.motor_time_constant
+        now, told, lag = data.act, data.ctrl[:4], self._lags()
         after = told + (now - told) * np.exp(-dt / lag)
         inertia = -body.rotor_inertia * body.rotor_spin  # a rotor turns against its reaction torque
         before = inertia @ now
