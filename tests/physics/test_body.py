@@ -78,7 +78,9 @@ def test_hover_is_an_equilibrium(name: str) -> None:
     state = State.hovering(vehicle, jnp.zeros(3))
     assert float(body.hover_rotor_speed(vehicle)) == pytest.approx(vehicle.hover_rotor_speed, rel=1e-12)
     collective, torque = body.rotor_wrench(plant(vehicle), body.rotor_thrust(plant(vehicle), split4(state.rotor_speed)))
-    a = body.acceleration(plant(vehicle), Quat.of(state.quaternion), Vec3.of(state.velocity), collective, None)
+    attitude = Quat.of(state.quaternion)
+    force = body.drag(plant(vehicle), body.air_velocity(attitude, Vec3.of(state.velocity), None))
+    a = body.acceleration(plant(vehicle), attitude, force, collective)
     np.testing.assert_allclose(a.stack(), 0, atol=1e-12)
     np.testing.assert_allclose(torque.stack(), 0, atol=1e-14)
 
@@ -89,13 +91,9 @@ def test_acceleration_by_hand(vis_r: Vehicle, random_state: Callable[..., State]
     v = R.inv().apply(np.array(state.velocity) - wind)
     force = -(vis_r.drag_linear * v + vis_r.drag_quadratic * v * np.abs(v)) + collective[:, None] * [0, 0, 1]
     expected = R.apply(force) / vis_r.mass - [0, 0, GRAVITY]
-    actual = body.acceleration(
-        plant(vis_r),
-        Quat.of(state.quaternion),
-        Vec3.of(state.velocity),
-        jnp.asarray(collective),
-        Vec3.of(jnp.asarray(wind)),
-    )
+    attitude = Quat.of(state.quaternion)
+    air = body.air_velocity(attitude, Vec3.of(state.velocity), Vec3.of(jnp.asarray(wind)))
+    actual = body.acceleration(plant(vis_r), attitude, body.drag(plant(vis_r), air), jnp.asarray(collective))
     np.testing.assert_allclose(actual.stack(), expected, rtol=1e-12, atol=1e-12)
 
 

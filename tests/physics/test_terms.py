@@ -11,9 +11,12 @@ import pytest
 from jax.flatten_util import ravel_pytree
 from scipy.spatial.transform import Rotation
 
+from e2efly.control.vectors import Vec3
 from e2efly.physics import INTEGRATORS, Physics, State, step
+from e2efly.physics.body import angular_acceleration
+from e2efly.physics.plant import Plant
 from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import terms
+from e2efly.vehicles.vehicle import inertia_tensor, terms
 from tests.gradients import central, reverse
 
 pytestmark = pytest.mark.usefixtures("x64")
@@ -21,11 +24,15 @@ pytestmark = pytest.mark.usefixtures("x64")
 VALUES: dict[str, Any] = {
     "rotor_inertia": 1.5e-5,
     "motor_time_constant_down": 0.06,
+    "centre_of_mass": [0.004, -0.006, 0.01],
+    "inertia_products": [1e-4, -2e-4, 5e-5],
 }
 """Of the size that a vehicle like the VIS-R has."""
 NOTHING: dict[str, Any] = {
     "rotor_inertia": 0.0,
     "motor_time_constant_down": 0.035,
+    "centre_of_mass": [0.0, 0.0, 0.0],
+    "inertia_products": [0.0, 0.0, 0.0],
 }
 """Values at which a term does nothing."""
 
@@ -42,7 +49,7 @@ def turned(state: State, vector: np.ndarray) -> np.ndarray:
 
 def angular_momentum(vehicle: Vehicle, path: State) -> np.ndarray:
     """Of body and rotors together, world, (t, 3): rotors turn against their reaction torque."""
-    own = np.array(path.body_rate) * vehicle.inertia
+    own = np.array(path.body_rate) @ inertia_tensor(vehicle)
     rotors = 0.0 if vehicle.rotor_inertia is None else -vehicle.rotor_inertia
     own[:, 2] += rotors * np.sum(vehicle.rotor_spin * np.array(path.rotor_speed), axis=-1)
     return turned(path, own)
@@ -148,3 +155,28 @@ def test_rotors_slow_down_with_a_lag_of_their_own(
     path = fly_open_loop(integrator, vehicle, start, commands, jnp.zeros((1, 3)), 0.004, 1)
     t, lag = 0.004 * np.arange(1, 31)[:, None], np.array([0.035, 0.06, 0.035, 0.06])
     np.testing.assert_allclose(path.rotor_speed[:, 0], told + (2000 - told) * np.exp(-t / lag), rtol=1e-12)
+
+
+def test_a_free_body_keeps_its_energy_and_its_angular_momentum(
+    stone: Vehicle, random_state: Callable[..., State], fly_open_loop: Callable[..., State]
+) -> None:
+    """Of an inertia whose axes are not the body's."""
+    vehicle = having(stone, "inertia_products")
+    start = random_state(9, (1,))
+    commands = jnp.zeros((100, 1, 4))
+    path = fly_open_loop("rk4", vehicle, start, commands, jnp.zeros((1, 3)), 0.02, 20)
+    whole = jax.tree.map(lambda first, later: jnp.concatenate([first, later[:, 0]]), start, path)
+    momentum, tensor = angular_momentum(vehicle, whole), inertia_tensor(vehicle)
+    energy = np.einsum("ti,ij,tj->t", whole.body_rate, tensor, whole.body_rate) / 2
+    assert np.ptp(whole.body_rate, axis=0).min() > 0.5  # it tumbles
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-9)
+    np.testing.assert_allclose(momentum, momentum[:1].repeat(len(momentum), 0), atol=1e-9 * np.linalg.norm(momentum[0]))
+
+
+def test_eulers_equation_with_products_of_inertia(vis_r: Vehicle) -> None:
+    vehicle, rng = having(vis_r, "inertia_products"), np.random.default_rng(2)
+    rate, torque, tensor = 5 * rng.normal(size=(20, 3)), 0.1 * rng.normal(size=(20, 3)), inertia_tensor(vehicle)
+    expected = np.linalg.solve(tensor, (torque - np.cross(rate, rate @ tensor)).T).T
+    plant = Plant.of(vehicle, 0.005)
+    actual = angular_acceleration(plant, Vec3.of(jnp.asarray(rate)), Vec3.of(jnp.asarray(torque))).stack()
+    np.testing.assert_allclose(actual, expected, rtol=1e-12, atol=1e-12)

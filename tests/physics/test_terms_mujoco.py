@@ -8,10 +8,11 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from e2efly.control.vectors import Vec3
-from e2efly.physics import State
-from e2efly.physics.body import derivative
+from e2efly.physics import INTEGRATORS, State
+from e2efly.physics.body import derivative, rotor_speed_for
 from e2efly.physics.plant import Plant
 from e2efly.physics.state import Parts, split4
 from e2efly.vehicles import Vehicle
@@ -84,3 +85,46 @@ def test_rotors_that_are_bodies_of_their_own(stone: Vehicle, random_state: Calla
 
     ours = jax.lax.scan(one, jnp.asarray(rates[0]), (jnp.asarray(speeds), jnp.asarray(pushes)))[1]
     np.testing.assert_allclose(ours, rates, atol=3e-6)
+
+
+def test_an_inertial_frame_that_is_not_the_bodys(vis_r: Vehicle, random_state: Callable[..., State]) -> None:
+    """MuJoCo is told where the centre of mass is, a full inertia, and that rotors and drag act at other places."""
+    away, products = np.array([0.004, -0.006, 0.03]), np.array([1e-4, -2e-4, 5e-5])
+    vehicle = dataclasses.replace(vis_r, centre_of_mass=away, inertia_products=products, drag_quadratic=np.zeros(3))
+    thrust = np.array([1.7, 1.9, 2.1, 1.8])
+    sites, actuators = '<site name="origin"/>', ""
+    for i, (x, y) in enumerate(vehicle.rotor_position):
+        sites += f'<site name="rotor_{i}" pos="{x} {y} 0"/>'
+        gear = f"0 0 1 0 0 {vehicle.rotor_spin[i] * vehicle.torque_ratio}"
+        actuators += f'<general site="rotor_{i}" gear="{gear}" biastype="affine" biasprm="{thrust[i]} 0 0"/>'
+    for gear, k in zip(("1 0 0", "0 1 0", "0 0 1"), vehicle.drag_linear, strict=True):
+        actuators += (
+            f'<general site="origin" gear="{gear} 0 0 0" gainprm="0" biastype="affine" biasprm="0 0 {-20 * k}"/>'
+        )
+    place, moments = (" ".join(map(str, x)) for x in (away, [*vehicle.inertia, *products]))
+    model, data = world(
+        f'<inertial pos="{place}" mass="{vehicle.mass}" fullinertia="{moments}"/>{sites}',
+        f"<actuator>{actuators}</actuator>",
+    )
+    vehicle = dataclasses.replace(vehicle, drag_linear=20 * vehicle.drag_linear)  # strong, to be seen
+    start = random_state(8)
+    turn = Rotation.from_quat(np.array(start.quaternion), scalar_first=True)
+    data.qpos[:3] = start.position - turn.apply(away)
+    data.qpos[3:] = start.quaternion
+    data.qvel[:3] = start.velocity - turn.apply(np.cross(start.body_rate, away))
+    data.qvel[3:] = start.body_rate
+    for _ in range(2000):
+        mujoco.mj_step(model, data)
+    speed = rotor_speed_for(vehicle, split4(jnp.asarray(thrust)))
+    end = flown(vehicle, dataclasses.replace(start, rotor_speed=jnp.stack(speed)), 2000)
+    turn = Rotation.from_quat(data.qpos[3:], scalar_first=True)
+    np.testing.assert_allclose(end.position, data.qpos[:3] + turn.apply(away), atol=1e-7)
+    np.testing.assert_allclose(end.velocity, data.qvel[:3] + turn.apply(np.cross(data.qvel[3:], away)), atol=1e-6)
+    np.testing.assert_allclose(end.body_rate, data.qvel[3:], atol=1e-6)
+
+
+def flown(vehicle: Vehicle, start: State, steps: int) -> State:
+    """Our physics at constant rotor speeds."""
+    plant, speed = Plant.of(vehicle, STEP), split4(start.rotor_speed)
+    one = lambda _, parts: INTEGRATORS["rk4"](plant, parts, speed, None, STEP)  # noqa: E731
+    return jax.lax.fori_loop(0, steps, one, Parts.of(start)).join()

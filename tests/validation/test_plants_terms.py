@@ -18,6 +18,8 @@ from e2efly.vehicles.vehicle import GRAVITY
 TERMS: dict[str, dict[str, Any]] = {
     "rotor inertia": {"rotor_inertia": 1.5e-5},
     "lag down": {"motor_time_constant_down": 0.06},
+    "centre of mass": {"centre_of_mass": [0.004, -0.006, 0.03]},
+    "full inertia": {"inertia_products": [1e-4, -2e-4, 5e-5]},
 }
 """Of the VIS-R's size."""
 TERMS["all of them"] = {name: value for term in TERMS.values() for name, value in term.items()}

@@ -18,6 +18,8 @@ from e2efly.vehicles.vehicle import quantities, read_sigmas, terms
 VALUES: dict[str, Any] = {
     "rotor_inertia": 1.5e-5,
     "motor_time_constant_down": 0.06,
+    "centre_of_mass": [0.004, -0.006, 0.01],
+    "inertia_products": [1e-4, -2e-4, 5e-5],
 }
 
 
@@ -55,6 +57,22 @@ def test_a_term_in_a_file(name: str, written: Callable[..., Path]) -> None:
 
 BROKEN: dict[str, tuple[dict[str, Any], str]] = {
     "negative rotor inertia": ({"rotor_inertia": -1e-6}, r"rotor_inertia.value is -1e-06; accepted: >= 0 kg\*m\^2"),
+    "centre of mass outside": (
+        {"centre_of_mass": [0.06, 0.0, 0.0]},
+        r"centre_of_mass.value is \[0.06, 0.0, 0.0\]: to hover level .*accepted: a pl",
+    ),
+    "flat centre of mass": (
+        {"centre_of_mass": [0.01, 0.0]},
+        r"centre_of_mass.value is .*accepted: numbers of shape \(3,",
+    ),
+    "no principal moment": (
+        {"inertia_products": [2e-3, 0.0, 0.0]},
+        r"inertia_products.value is .*accepted: a tensor of which every principal",
+    ),
+    "no rigid body": (
+        {"inertia_products": [1.2e-3, 0.0, 0.0]},
+        r"inertia.value is .* with products .*accepted: no principal moment larger",
+    ),
     "no lag down": ({"motor_time_constant_down": 0.0}, r"motor_time_constant_down.value is 0.0; accepted: > 0 s"),
 }
 
@@ -86,3 +104,10 @@ def test_a_term_that_is_not_there_is_not_randomised(name: str, vehicle: str) -> 
         ValueError, match=rf"env.randomize.{name} is 0.3, and vehicle '{vehicle}' has no {name}; accept"
     ):
         env_of(vehicle, {name: 0.3})
+
+
+def test_draws_of_an_inertia_that_no_body_has_are_refused(written: Callable[..., Path]) -> None:
+    path = written(inertia_products=[6e-4, -2e-4, 5e-5])
+    env_of(path, {"inertia": 0.3, "inertia_products": 0.3})
+    with pytest.raises(ValueError, match=r"env.randomize is .*'inertia': 0.5.*no positive principal moment"):
+        env_of(path, {"inertia": 0.5, "inertia_products": 0.5})

@@ -1,13 +1,16 @@
 """Whether the numbers of an environment's configuration make sense."""
 
+import dataclasses
 import math
+
+import numpy as np
 
 from e2efly.config import EnvConfig, TaskConfig, check_numbers
 from e2efly.deploy.policy.contract_json import LATEST
 from e2efly.scenes.camera import check as check_camera
 from e2efly.sensors.image_noise import check as check_noise
 from e2efly.vehicles import Vehicle, load_family, nominal_vehicle, unknown
-from e2efly.vehicles.vehicle import quantities, terms
+from e2efly.vehicles.vehicle import principal_moments, quantities, terms
 
 COUNTED = 2**24
 """Control steps that an episode can have: float32 counts no further."""
@@ -36,6 +39,15 @@ def check(config: EnvConfig, task: TaskConfig, flown: Vehicle | None = None) -> 
             raise ValueError(unknown("vehicle parameter", name, names))
         if not 0 <= width < 1:
             raise ValueError(f"env.randomize.{name} is {width}; accepted: at least 0 and below 1")
+    if body.inertia_products is not None:
+        less, more = (config.randomize.get(name, 0.0) for name in ("inertia", "inertia_products"))
+        drawn = {"inertia": (1 - less) * body.inertia, "inertia_products": -(1 + more) * np.abs(body.inertia_products)}
+        if principal_moments(dataclasses.replace(body, **drawn))[0] <= 0:
+            raise ValueError(
+                f"env.randomize is {dict(config.randomize)}: an inertia of these draws may have no positive principal "
+                f"moment (inertia {body.inertia.tolist()}, inertia_products {body.inertia_products.tolist()}); "
+                "accepted: smaller widths of inertia and inertia_products"
+            )
     for field, bounds in (
         ("action_latency", config.action_latency),
         ("observation_latency", config.observation_latency),

@@ -52,23 +52,38 @@ def drag(plant: Plant, air_velocity: Vec3) -> Vec3:
     return air_velocity.times(k1 + air_velocity.abs().times(k2)) * -1.0
 
 
-def acceleration(plant: Plant, attitude: Quat, velocity: Vec3, collective: Array, wind: Vec3 | None) -> Vec3:
-    """Acceleration of the centre of mass in the world, m/s^2."""
-    air_velocity = attitude.unrotate(velocity if wind is None else velocity - wind)
-    force = drag(plant, air_velocity)
-    force = Vec3(force.x, force.y, force.z + collective)
-    a = attitude.rotate(force) * plant.specific
+def air_velocity(attitude: Quat, velocity: Vec3, wind: Vec3 | None) -> Vec3:
+    """Velocity relative to the air in the body frame, m/s, of a velocity in the world, m/s."""
+    return attitude.unrotate(velocity if wind is None else velocity - wind)
+
+
+def acceleration(plant: Plant, attitude: Quat, force: Vec3, collective: Array) -> Vec3:
+    """Acceleration of the centre of mass in the world, m/s^2, under the drag, body, N, and the collective thrust, N."""
+    a = attitude.rotate(Vec3(force.x, force.y, force.z + collective)) * plant.specific
     return Vec3(a.x, a.y, a.z - GRAVITY)
 
 
 def angular_acceleration(plant: Plant, body_rate: Vec3, torque: Vec3) -> Vec3:
     """Euler's equation in the body frame, rad/s^2: J^-1 (torque - w x J w)."""
-    return (torque - gyroscopic_torque(plant.inertia, body_rate)).times(plant.mobility)
+    left = torque - gyroscopic_torque(plant.inertia, body_rate, plant.products)
+    return tensor_times(plant.mobility, plant.mobility_products, left)
 
 
-def gyroscopic_torque(inertia: Vec3, body_rate: Vec3) -> Vec3:
-    """W x J w of a diagonal inertia J, N*m."""
+def tensor_times(diagonal: Vec3, products: Vec3 | None, v: Vec3) -> Vec3:
+    """A symmetric tensor, of which `products` are the entries xy, xz and yz (None: zero), times a vector."""
+    if products is None:
+        return v.times(diagonal)
+    d, o = diagonal, products
+    return Vec3(
+        d.x * v.x + o.x * v.y + o.y * v.z, o.x * v.x + d.y * v.y + o.z * v.z, o.y * v.x + o.z * v.y + d.z * v.z
+    )  # fmt: skip
+
+
+def gyroscopic_torque(inertia: Vec3, body_rate: Vec3, products: Vec3 | None = None) -> Vec3:
+    """W x J w of an inertia J by its diagonal, and its entries xy, xz and yz (None: zero), N*m."""
     j, w = inertia, body_rate
+    if products is not None:
+        return w.cross(tensor_times(inertia, products, w))
     return Vec3((j.z - j.y) * w.y * w.z, (j.x - j.z) * w.z * w.x, (j.y - j.x) * w.x * w.y)
 
 
@@ -102,7 +117,13 @@ def accelerations(
         torque = torque + rotor_momentum_torque(
             plant.rotor_inertia, plant.spin, parts.body_rate, parts.rotor_speed, rotor_acceleration
         )
-    linear = acceleration(plant, parts.attitude, parts.velocity, collective, wind)
+    air = air_velocity(parts.attitude, parts.velocity, wind)
+    if plant.centre is not None:  # the place of the drag moves around the centre of mass
+        air = air + plant.centre.cross(parts.body_rate)
+    force = drag(plant, air)
+    if plant.centre is not None:
+        torque = torque + force.cross(plant.centre)
+    linear = acceleration(plant, parts.attitude, force, collective)
     return linear, angular_acceleration(plant, parts.body_rate, torque)
 
 

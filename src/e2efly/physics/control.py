@@ -9,7 +9,7 @@ from collections.abc import Callable
 from jax import Array
 
 from e2efly.control import CommandMode, Ctbr, Vec3
-from e2efly.physics.body import gyroscopic_torque, rotor_speed_for
+from e2efly.physics.body import gyroscopic_torque, rotor_speed_for, tensor_times
 from e2efly.physics.mixer import Mixer
 from e2efly.physics.plant import Rotors
 from e2efly.physics.state import Parts
@@ -37,7 +37,11 @@ def control_law(mode: CommandMode) -> Law:
 
 def _rates(vehicle: Vehicle, mixer: Mixer, parts: Parts, wanted: Ctbr) -> Rotors:
     """The rate loop: torque = J K (wanted - w) + w x J w."""
-    stiffness = Vec3.of(vehicle.inertia * vehicle.rate_gain)
-    held = gyroscopic_torque(Vec3.of(vehicle.inertia), parts.body_rate)
-    torque = stiffness.times(wanted.rate - parts.body_rate) + held
+    error, inertia = wanted.rate - parts.body_rate, Vec3.of(vehicle.inertia)
+    if vehicle.inertia_products is None:
+        pushed, products = Vec3.of(vehicle.inertia * vehicle.rate_gain).times(error), None
+    else:
+        products = Vec3.of(vehicle.inertia_products)
+        pushed = tensor_times(inertia, products, Vec3.of(vehicle.rate_gain).times(error))
+    torque = pushed + gyroscopic_torque(inertia, parts.body_rate, products)
     return rotor_speed_for(vehicle, mixer.thrusts(vehicle.mass * wanted.thrust, torque))

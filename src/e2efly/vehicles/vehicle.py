@@ -15,6 +15,7 @@ import numpy as np
 
 from e2efly.vehicles.names import nearest, unknown
 from e2efly.vehicles.tables import read_table, shown
+from e2efly.vehicles.terms import check_terms
 
 _LARGEST = 1e6
 """Largest size of a value, in its unit."""
@@ -53,7 +54,7 @@ class Vehicle:
     mass: Any = _quantity("kg", above=0.0)
     """Mass."""
     inertia: Any = _quantity("kg*m^2", (3,), above=0.0)
-    """Principal moments of inertia about the body axes."""
+    """Moments of inertia about the body axes: all of the inertia tensor where `inertia_products` is left out."""
     rotor_position: Any = _quantity("m", (4, 2))
     """Rotor positions in the body's x-y plane."""
     rotor_spin: Any = _quantity("1", (4,))
@@ -102,6 +103,10 @@ class Vehicle:
     """Moment of inertia of a rotor, with all that turns with it, about its axis."""
     motor_time_constant_down: Any = _term("s", above=0.0)
     """Time constant of a rotor that slows down; `motor_time_constant` is that of one that speeds up."""
+    centre_of_mass: Any = _term("m", (3,))
+    """Centre of mass in the axes in which `rotor_position` stands; the drag acts at their origin."""
+    inertia_products: Any = _term("kg*m^2", (3,))
+    """Entries xy, xz and yz of the inertia tensor, whose diagonal is `inertia`: xy is minus the integral of x y dm."""
 
     @property
     def hash(self) -> str:
@@ -337,11 +342,17 @@ def check(vehicle: Vehicle, where: str = "vehicle") -> None:
     Raises:
         ValueError: naming the values and what is accepted.
     """
-    ix, iy, iz = vehicle.inertia
-    if ix + iy < iz or iy + iz < ix or iz + ix < iy:
+    ix, iy, iz = principal_moments(vehicle)
+    if ix <= 0:
         raise ValueError(
-            f"{where}: inertia.value is {list(vehicle.inertia)}; accepted: no moment larger than the sum of the "
-            "other two (the triangle inequality of every rigid body)"
+            f"{where}: inertia_products.value is {vehicle.inertia_products.tolist()} and inertia.value is "
+            f"{list(vehicle.inertia)}; accepted: a tensor of which every principal moment is positive"
+        )
+    if ix + iy < iz:
+        products = "" if vehicle.inertia_products is None else f" with products {vehicle.inertia_products.tolist()}"
+        raise ValueError(
+            f"{where}: inertia.value is {list(vehicle.inertia)}{products}; accepted: no principal moment larger than "
+            "the sum of the other two (the triangle inequality of every rigid body)"
         )
     if sorted(vehicle.rotor_spin) != [-1, -1, 1, 1]:
         raise ValueError(f"{where}: rotor_spin.value is {list(vehicle.rotor_spin)}; accepted: two of +1 and two of -1")
@@ -378,9 +389,34 @@ def check(vehicle: Vehicle, where: str = "vehicle") -> None:
             f"({vehicle.torque_ratio} m) leave an axis without control; accepted: rotors that give independent "
             "thrust, roll, pitch and yaw"
         )
+    check_terms(vehicle, allocation, vehicle.mass * GRAVITY, where)
+
+
+def rotor_arms(vehicle: Vehicle) -> np.ndarray:
+    """Places of the rotors from the centre of mass in the body's x-y plane, (4, 2), m."""
+    arms = np.asarray(vehicle.rotor_position, np.float64)
+    return arms if vehicle.centre_of_mass is None else arms - np.asarray(vehicle.centre_of_mass)[:2]
+
+
+def inertia_tensor(vehicle: Vehicle) -> np.ndarray:
+    """Inertia about the centre of mass in body axes, (3, 3), kg*m^2."""
+    tensor = np.diag(np.asarray(vehicle.inertia, np.float64))
+    if vehicle.inertia_products is not None:
+        tensor[(0, 0, 1), (1, 2, 2)] = tensor[(1, 2, 2), (0, 0, 1)] = vehicle.inertia_products
+    return tensor
+
+
+def principal_moments(vehicle: Vehicle) -> np.ndarray:
+    """Principal moments of inertia, rising, (3,), kg*m^2."""
+    if vehicle.inertia_products is None:
+        return np.sort(vehicle.inertia)
+    return np.linalg.eigvalsh(inertia_tensor(vehicle))
 
 
 def allocation_matrix(vehicle: Vehicle) -> np.ndarray:
-    """The 4x4 matrix from rotor thrusts, N, to [collective thrust, N; torque about body x, y, z, N*m]."""
-    x, y = np.asarray(vehicle.rotor_position, np.float64).T
+    """The 4x4 matrix from rotor thrusts, N, to [collective thrust, N; torque about body x, y, z, N*m].
+
+    Torques are about the centre of mass.
+    """
+    x, y = rotor_arms(vehicle).T
     return np.stack([np.ones(4), y, -x, np.asarray(vehicle.rotor_spin) * vehicle.torque_ratio])

@@ -25,7 +25,7 @@ from e2efly.control import COMMAND_MODES, Quat, Vec3
 from e2efly.validation.plant import EVERYTHING, MOMENT, Known, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY, allocation_matrix
+from e2efly.vehicles.vehicle import GRAVITY, allocation_matrix, inertia_tensor, rotor_arms
 
 STEP = 1e-3
 """Longest step of MuJoCo and of the rate loop, s."""
@@ -41,9 +41,11 @@ def vehicle_xml(vehicle: Vehicle) -> str:
     """
     k2, k1, k0 = vehicle.thrust_map
     hover, lag, ratio = vehicle.hover_rotor_speed, vehicle.motor_time_constant, vehicle.torque_ratio
-    sites, feet, actuators = ['<site name="centre"/>'], [], []
-    for i, ((x, y), spin) in enumerate(zip(vehicle.rotor_position, vehicle.rotor_spin, strict=True)):
-        sites.append(f'<site name="rotor_{i}" pos="{x} {y} 0"/>')
+    centre = np.zeros(3) if vehicle.centre_of_mass is None else vehicle.centre_of_mass
+    dx, dy, dz = (-centre).tolist()  # the body's frame is that of its centre of mass, the state of the plant
+    sites, feet, actuators = [f'<site name="centre" pos="{dx} {dy} {dz}"/>'], [], []
+    for i, ((x, y), spin) in enumerate(zip(rotor_arms(vehicle), vehicle.rotor_spin, strict=True)):
+        sites.append(f'<site name="rotor_{i}" pos="{x} {y} {dz}"/>')
         feet.append(f'<geom name="foot_{i}" type="sphere" size="{FOOT}" pos="{x} {y} {FOOT - vehicle.feet_height}"/>')
         actuators.append(
             f'<general name="motor_{i}" site="rotor_{i}" gear="0 0 1 0 0 {spin * ratio}" dyntype="filter" '
@@ -54,7 +56,10 @@ def vehicle_xml(vehicle: Vehicle) -> str:
             f'<general name="drag_{axis}" site="centre" gear="{gear} 0 0 0" gainprm="0" biastype="affine" '
             f'biasprm="0 0 {-drag}"/>'
         )
-    inertia = " ".join(str(x) for x in vehicle.inertia)
+    entries = inertia_tensor(vehicle)[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)].tolist()
+    inertia = f'diaginertia="{" ".join(map(str, entries[:3]))}"'
+    if vehicle.inertia_products is not None:
+        inertia = f'fullinertia="{" ".join(map(str, entries))}"'
     line = "\n      "
     return f"""<mujoco model="{vehicle.name}">
   <compiler inertiafromgeom="false"/>
@@ -66,7 +71,7 @@ def vehicle_xml(vehicle: Vehicle) -> str:
     <geom name="ground" type="plane" size="20 20 1"/>
     <body name="vehicle" pos="0 0 {vehicle.feet_height}">
       <freejoint/>
-      <inertial pos="0 0 0" mass="{vehicle.mass}" diaginertia="{inertia}"/>
+      <inertial pos="0 0 0" mass="{vehicle.mass}" {inertia}/>
       {line.join(sites)}
       {line.join(feet)}
     </body>
@@ -217,18 +222,21 @@ def rate_loop(vehicle: Vehicle, plain_mixer: bool = False) -> Callable[[Sequence
     mixer clips each rotor by itself instead. On plain numbers, which at a thousand times a second is four times as fast
     as on arrays of three.
     """
-    mass, (jx, jy, jz) = float(vehicle.mass), vehicle.inertia.tolist()
-    stiffness, limits = (vehicle.inertia * vehicle.rate_gain).tolist(), vehicle.body_rate_max.tolist()
+    mass, ((jx, xy, xz), (_, jy, yz), (*_, jz)) = float(vehicle.mass), inertia_tensor(vehicle).tolist()
+    gains, limits = vehicle.rate_gain.tolist(), vehicle.body_rate_max.tolist()
     rows = np.linalg.inv(allocation_matrix(vehicle)).tolist()
     low, high = vehicle.thrust_range
 
     def thrusts(command: Sequence[float], body_rate: Sequence[float]) -> list[float]:
         p, q, r = body_rate
-        gyroscopic = (jz - jy) * q * r, (jx - jz) * r * p, (jy - jx) * p * q
-        x, y, z = (
-            k * (min(max(wanted, -limit), limit) - rate) + g
-            for k, wanted, limit, rate, g in zip(stiffness, command[1:], limits, body_rate, gyroscopic, strict=True)
+        hx, hy, hz = jx * p + xy * q + xz * r, xy * p + jy * q + yz * r, xz * p + yz * q + jz * r
+        a, b, c = (
+            k * (min(max(wanted, -limit), limit) - rate)
+            for k, wanted, limit, rate in zip(gains, command[1:], limits, body_rate, strict=True)
         )
+        x = jx * a + xy * b + xz * c + q * hz - r * hy
+        y = xy * a + jy * b + yz * c + r * hx - p * hz
+        z = xz * a + yz * b + jz * c + p * hy - q * hx
         spread = [row[1] * x + row[2] * y + row[3] * z for row in rows]
         if plain_mixer:
             return [min(max(row[0] * mass * command[0] + s, low), high) for row, s in zip(rows, spread, strict=True)]
