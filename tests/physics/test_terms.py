@@ -26,6 +26,7 @@ VALUES: dict[str, Any] = {
     "motor_time_constant_down": 0.06,
     "centre_of_mass": [0.004, -0.006, 0.01],
     "inertia_products": [1e-4, -2e-4, 5e-5],
+    "drag_torque": [2e-3, 3e-3, 1e-3],
 }
 """Of the size that a vehicle like the VIS-R has."""
 NOTHING: dict[str, Any] = {
@@ -33,6 +34,7 @@ NOTHING: dict[str, Any] = {
     "motor_time_constant_down": 0.035,
     "centre_of_mass": [0.0, 0.0, 0.0],
     "inertia_products": [0.0, 0.0, 0.0],
+    "drag_torque": [0.0, 0.0, 0.0],
 }
 """Values at which a term does nothing."""
 
@@ -180,3 +182,15 @@ def test_eulers_equation_with_products_of_inertia(vis_r: Vehicle) -> None:
     plant = Plant.of(vehicle, 0.005)
     actual = angular_acceleration(plant, Vec3.of(jnp.asarray(rate)), Vec3.of(jnp.asarray(torque))).stack()
     np.testing.assert_allclose(actual, expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_drag_slows_a_turn_about_an_axis_exponentially(
+    axis: int, stone: Vehicle, fly_open_loop: Callable[..., State]
+) -> None:
+    vehicle, rate = having(stone, "drag_torque"), 5 * np.eye(3)[axis]
+    start = dataclasses.replace(State.hovering(vehicle, jnp.zeros((1, 3))), body_rate=jnp.asarray(rate[None]))
+    path = fly_open_loop("rk4", vehicle, start, jnp.zeros((50, 1, 4)), jnp.zeros((1, 3)), 0.02, 10)
+    slowed = np.exp(-vehicle.drag_torque[axis] / vehicle.inertia[axis] * 0.02 * np.arange(1, 51))
+    assert slowed[-1] < 0.7
+    np.testing.assert_allclose(path.body_rate[:, 0], slowed[:, None] * rate, rtol=1e-9, atol=1e-12)

@@ -19,6 +19,7 @@ TERMS: dict[str, dict[str, Any]] = {
     "rotor inertia": {"rotor_inertia": 1.5e-5},
     "lag down": {"motor_time_constant_down": 0.06},
     "centre of mass": {"centre_of_mass": [0.004, -0.006, 0.03]},
+    "drag torque": {"drag_torque": [2e-3, 3e-3, 1e-3]},
     "full inertia": {"inertia_products": [1e-4, -2e-4, 5e-5]},
 }
 """Of the VIS-R's size."""

@@ -20,6 +20,7 @@ VALUES: dict[str, Any] = {
     "motor_time_constant_down": 0.06,
     "centre_of_mass": [0.004, -0.006, 0.01],
     "inertia_products": [1e-4, -2e-4, 5e-5],
+    "drag_torque": [2e-3, 3e-3, 1e-3],
 }
 
 
@@ -73,6 +74,7 @@ BROKEN: dict[str, tuple[dict[str, Any], str]] = {
         {"inertia_products": [1.2e-3, 0.0, 0.0]},
         r"inertia.value is .* with products .*accepted: no principal moment larger",
     ),
+    "drag torque that drives": ({"drag_torque": [-1e-3, 0.0, 0.0]}, r"drag_torque.value is .*accepted: >= 0 N\*m\*s"),
     "no lag down": ({"motor_time_constant_down": 0.0}, r"motor_time_constant_down.value is 0.0; accepted: > 0 s"),
 }
 

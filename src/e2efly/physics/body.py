@@ -123,6 +123,8 @@ def accelerations(
     force = drag(plant, air)
     if plant.centre is not None:
         torque = torque + force.cross(plant.centre)
+    if plant.drag_torque is not None:
+        torque = torque - plant.drag_torque.times(parts.body_rate)
     linear = acceleration(plant, parts.attitude, force, collective)
     return linear, angular_acceleration(plant, parts.body_rate, torque)
 

@@ -57,6 +57,8 @@ class Plant:
     """... `half_decay` ..."""
     lag_rate_down: Array | None = None
     """... and `lag_rate` of a rotor that slows down."""
+    drag_torque: Vec3 | None = None
+    """N*m*s."""
     products: Vec3 | None = None
     """Entries xy, xz and yz of the inertia, kg*m^2, ..."""
     mobility_products: Vec3 | None = None
@@ -95,6 +97,7 @@ class Plant:
             decay_down=None if down is None else _exp(-dt / down),
             half_decay_down=None if down is None else _exp(-0.5 * dt / down),
             lag_rate_down=None if v.rotor_inertia is None or down is None else 1 / down,
+            drag_torque=None if v.drag_torque is None else Vec3.of(v.drag_torque),
             products=products,
             mobility_products=mobility_products,
             centre=None if v.centre_of_mass is None else Vec3.of(v.centre_of_mass),

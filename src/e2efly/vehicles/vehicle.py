@@ -107,6 +107,8 @@ class Vehicle:
     """Centre of mass in the axes in which `rotor_position` stands; the drag acts at their origin."""
     inertia_products: Any = _term("kg*m^2", (3,))
     """Entries xy, xz and yz of the inertia tensor, whose diagonal is `inertia`: xy is minus the integral of x y dm."""
+    drag_torque: Any = _term("N*m*s", (3,), at_least=0.0)
+    """Torque of the air against the body's turning, per axis, over body rate."""
 
     @property
     def hash(self) -> str:

@@ -56,6 +56,12 @@ def vehicle_xml(vehicle: Vehicle) -> str:
             f'<general name="drag_{axis}" site="centre" gear="{gear} 0 0 0" gainprm="0" biastype="affine" '
             f'biasprm="0 0 {-drag}"/>'
         )
+    if vehicle.drag_torque is not None:
+        for axis, gear, drag in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), vehicle.drag_torque, strict=True):
+            actuators.append(
+                f'<general name="drag_torque_{axis}" site="centre" gear="0 0 0 {gear}" gainprm="0" biastype="affine" '
+                f'biasprm="0 0 {-drag}"/>'
+            )
     entries = inertia_tensor(vehicle)[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)].tolist()
     inertia = f'diaginertia="{" ".join(map(str, entries[:3]))}"'
     if vehicle.inertia_products is not None:
@@ -158,9 +164,9 @@ class MujocoPlant(Plant):
             model.actuator_biasprm[:4, 0] = share * (k0 - k2 * speed * speed)
             wind = self._wind if self._wind == _CALM else Quat(*data.qpos[3:].tolist()).unrotate(self._wind)
             air = np.array([wind.x, wind.y, wind.z])
-            drag = linear + quadratic * np.abs(data.actuator_velocity[4:] - air)
-            model.actuator_biasprm[4:, 0] = drag * air
-            model.actuator_biasprm[4:, 2] = -drag
+            drag = linear + quadratic * np.abs(data.actuator_velocity[4:7] - air)
+            model.actuator_biasprm[4:7, 0] = drag * air
+            model.actuator_biasprm[4:7, 2] = -drag
             if self._body.rotor_inertia is not None:
                 data.qfrc_applied[3:] = self._rotor_torque(dt / count)
             self._mujoco.mj_step(model, data)
