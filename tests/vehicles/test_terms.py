@@ -5,12 +5,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from e2efly.config import EnvConfig, RewardConfig
-from e2efly.env import Env
-from e2efly.env.random import random_key
+from e2efly.env import Env, EnvState, random_key
 from e2efly.presets import preset
 from e2efly.vehicles import load_vehicle, vehicle_file, vehicle_names
 from e2efly.vehicles.vehicle import quantities, read_sigmas, terms
@@ -21,6 +22,8 @@ VALUES: dict[str, Any] = {
     "centre_of_mass": [0.004, -0.006, 0.01],
     "inertia_products": [1e-4, -2e-4, 5e-5],
     "drag_torque": [2e-3, 3e-3, 1e-3],
+    "rate_integral_gain": [60.0, 50.0, 20.0],
+    "gyro_time_constant": 0.004,
 }
 
 
@@ -75,6 +78,11 @@ BROKEN: dict[str, tuple[dict[str, Any], str]] = {
         r"inertia.value is .* with products .*accepted: no principal moment larger",
     ),
     "drag torque that drives": ({"drag_torque": [-1e-3, 0.0, 0.0]}, r"drag_torque.value is .*accepted: >= 0 N\*m\*s"),
+    "an integral that drives": (
+        {"rate_integral_gain": [-1.0, 0.0, 0.0]},
+        r"rate_integral_gain.value is .*accepted: >= 0 ",
+    ),
+    "no filter": ({"gyro_time_constant": 0.0}, r"gyro_time_constant.value is 0.0; accepted: > 0 s"),
     "no lag down": ({"motor_time_constant_down": 0.0}, r"motor_time_constant_down.value is 0.0; accepted: > 0 s"),
 }
 
@@ -113,3 +121,25 @@ def test_draws_of_an_inertia_that_no_body_has_are_refused(written: Callable[...,
     env_of(path, {"inertia": 0.3, "inertia_products": 0.3})
     with pytest.raises(ValueError, match=r"env.randomize is .*'inertia': 0.5.*no positive principal moment"):
         env_of(path, {"inertia": 0.5, "inertia_products": 0.5})
+
+
+def test_episodes_begin_with_a_rate_loop_that_remembers_nothing(written: Callable[..., Path]) -> None:
+    """In the environment, whose loops keep the structure of the state; after a crash, too."""
+    env = env_of(written(rate_integral_gain=[60.0, 50.0, 20.0], gyro_time_constant=0.004), {})
+    state, _ = env.reset(random_key(0), 8)
+    before = state.vehicle.rate_loop
+    assert before is not None
+    np.testing.assert_array_equal(before.integral, 0.0)
+    np.testing.assert_array_equal(before.seen, state.vehicle.body_rate)
+
+    def fly(state: EnvState, _: None) -> tuple[EnvState, tuple[jax.Array, jax.Array, jax.Array]]:
+        state, out = env.step(state, jnp.tile(jnp.asarray([-1.0, 0.5, -0.3, 0.2]), (8, 1)))
+        loop = state.vehicle.rate_loop
+        assert loop is not None
+        return state, (out.done, loop.integral, loop.seen - state.vehicle.body_rate)
+
+    done, integral, lag = (np.asarray(x) for x in jax.jit(lambda s: jax.lax.scan(fly, s, None, 90)[1])(state))
+    assert done.any()
+    assert np.abs(integral[~done]).max() > 1
+    np.testing.assert_array_equal(integral[done], 0.0)
+    np.testing.assert_array_equal(lag[done], 0.0)

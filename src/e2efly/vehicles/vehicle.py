@@ -109,6 +109,10 @@ class Vehicle:
     """Entries xy, xz and yz of the inertia tensor, whose diagonal is `inertia`: xy is minus the integral of x y dm."""
     drag_torque: Any = _term("N*m*s", (3,), at_least=0.0)
     """Torque of the air against the body's turning, per axis, over body rate."""
+    rate_integral_gain: Any = _term("1/s^2", (3,), at_least=0.0)
+    """Angular acceleration commanded per integral of the body-rate error."""
+    gyro_time_constant: Any = _term("s", above=0.0)
+    """Time constant of the first-order filter through which the rate loop sees the body rates."""
 
     @property
     def hash(self) -> str:
@@ -157,8 +161,10 @@ class Vehicle:
 
 TIMED = ("control_rate", "latency")
 """What a vehicle's file says of the policy's computer and its link."""
+RATE_LOOP = ("rate_gain", "rate_integral_gain", "gyro_time_constant")
+"""What a vehicle's file says of the rate loop."""
 CONTROLLED = (
-    "body_rate_max", "rate_gain", "attitude_gain", "velocity_gain", "position_gain", "tilt_max", "acceleration_max",
+    "body_rate_max", *RATE_LOOP, "attitude_gain", "velocity_gain", "position_gain", "tilt_max", "acceleration_max",
     "speed_max", *TIMED,
 )  # fmt: skip
 """What a vehicle's file says of the flight controller and what asks it; all else is the body."""

@@ -16,16 +16,16 @@ and mixer, float64) runs before every step of at most 1 ms. Two things need a wo
 
 import importlib
 import math
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from e2efly.control import COMMAND_MODES, Quat, Vec3
-from e2efly.validation.plant import EVERYTHING, MOMENT, Known, Plant, RigidState, check_mode
+from e2efly.control import Quat, Vec3
+from e2efly.validation.controller import FlightController, rotor_speed_of
+from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY, allocation_matrix, inertia_tensor, rotor_arms
+from e2efly.vehicles.vehicle import GRAVITY, RATE_LOOP, inertia_tensor, rotor_arms
 
 STEP = 1e-3
 """Longest step of MuJoCo and of the rate loop, s."""
@@ -121,7 +121,7 @@ class MujocoPlant(Plant):
         self.model = self._mujoco.MjModel.from_xml_string(vehicle_xml(body))
         self.data = self._mujoco.MjData(self.model)
         self._body = body
-        self._law = control_law(self._believed.under(body, "rate_gain"), self._mode, plain_mixer)
+        self._controller = FlightController(self._believed.under(body, *RATE_LOOP), self._mode, plain_mixer)
         self._full_speed = body.full_rotor_speed
 
     def disturb(self, wind: np.ndarray, rotor_share: np.ndarray) -> None:
@@ -146,6 +146,7 @@ class MujocoPlant(Plant):
         self.data.qvel[:] = np.concatenate([state.velocity, state.body_rate])
         self.data.act[:] = self._body.hover_rotor_speed
         self._wind, self._share, self._last_rate = _CALM, np.ones(4), state.body_rate
+        self._controller.start(state.body_rate.tolist())
         self._mujoco.mj_forward(self.model, self.data)  # the velocities that the drag starts from
 
     def step(self, command: np.ndarray, dt: float) -> None:
@@ -156,7 +157,7 @@ class MujocoPlant(Plant):
         linear, quadratic, share = self._body.drag_linear, self._body.drag_quadratic, self._share
         for _ in range(count):
             model.opt.timestep = dt / count
-            thrusts = self._law(wanted, data.qpos.tolist(), data.qvel.tolist())
+            thrusts = self._controller.thrusts(wanted, data.qpos.tolist(), data.qvel.tolist(), dt / count)
             data.ctrl[:4] = np.minimum(rotor_speed_of(told, thrusts), self._full_speed)
             speed = data.act.copy()
             model.actuator_dynprm[:4, 0] = self._lags()
@@ -189,72 +190,3 @@ class MujocoPlant(Plant):
         self._last_rate = rate.copy()
         middle = before + change / 2
         return np.array([-q * middle, p * middle, -change / dt])
-
-
-Law = Callable[[Sequence[float], Sequence[float], Sequence[float]], list[float]]
-"""(command, pose: position and quaternion, motion: velocity in the world and body rates) -> rotor thrusts, N."""
-
-
-def control_law(vehicle: Vehicle, command_mode: str, plain_mixer: bool = False) -> Law:
-    """The flight controller of a command mode, for the vehicle that it knows; `plain_mixer` as for `rate_loop`.
-
-    Raises:
-        KeyError: for an unknown command mode.
-    """
-    mode = COMMAND_MODES[command_mode]
-    controller = mode.controller
-    if controller is None:
-        low, high = vehicle.thrust_range
-        unit = high if mode.of_largest else 1.0
-        return lambda command, pose, motion: [min(max(unit * f, low), high) for f in command]
-    rates = rate_loop(vehicle, plain_mixer)
-    if command_mode == "ctbr":
-        return lambda command, pose, motion: rates(command, motion[3:])
-
-    def law(command: Sequence[float], pose: Sequence[float], motion: Sequence[float]) -> list[float]:
-        known = Known(Vec3(*pose[:3]), Vec3(*motion[:3]), Quat(*pose[3:]))
-        wanted = controller(vehicle, known, (command[0], command[1], command[2], command[3]))
-        ctbr = (wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z)
-        return rates([float(x) for x in ctbr], motion[3:])
-
-    return law
-
-
-def rate_loop(vehicle: Vehicle, plain_mixer: bool = False) -> Callable[[Sequence[float], Sequence[float]], list[float]]:
-    """The rate loop and the mixer: collective thrust over mass, m/s^2, and body rates, rad/s, to rotor thrusts.
-
-    torque = J K (wanted - w) + w x J w, mixed with attitude before thrust: when the torque asks for more span than a
-    rotor has, all of it is scaled down; then the collective is shifted until every rotor is inside its limits. A plain
-    mixer clips each rotor by itself instead. On plain numbers, which at a thousand times a second is four times as fast
-    as on arrays of three.
-    """
-    mass, ((jx, xy, xz), (_, jy, yz), (*_, jz)) = float(vehicle.mass), inertia_tensor(vehicle).tolist()
-    gains, limits = vehicle.rate_gain.tolist(), vehicle.body_rate_max.tolist()
-    rows = np.linalg.inv(allocation_matrix(vehicle)).tolist()
-    low, high = vehicle.thrust_range
-
-    def thrusts(command: Sequence[float], body_rate: Sequence[float]) -> list[float]:
-        p, q, r = body_rate
-        hx, hy, hz = jx * p + xy * q + xz * r, xy * p + jy * q + yz * r, xz * p + yz * q + jz * r
-        a, b, c = (
-            k * (min(max(wanted, -limit), limit) - rate)
-            for k, wanted, limit, rate in zip(gains, command[1:], limits, body_rate, strict=True)
-        )
-        x = jx * a + xy * b + xz * c + q * hz - r * hy
-        y = xy * a + jy * b + yz * c + r * hx - p * hz
-        z = xz * a + yz * b + jz * c + p * hy - q * hx
-        spread = [row[1] * x + row[2] * y + row[3] * z for row in rows]
-        if plain_mixer:
-            return [min(max(row[0] * mass * command[0] + s, low), high) for row, s in zip(rows, spread, strict=True)]
-        scale = (high - low) / max(max(spread) - min(spread), high - low)
-        asked = [row[0] * mass * command[0] + scale * s for row, s in zip(rows, spread, strict=True)]
-        shift = max(low - min(asked), 0.0) - max(max(asked) - high, 0.0)
-        return [min(max(f + shift, low), high) for f in asked]
-
-    return thrusts
-
-
-def rotor_speed_of(thrust_map: Sequence[float], thrusts: Sequence[float]) -> list[float]:
-    """The rotor speeds, rad/s, that give thrusts, N: the rising branch of the map k2 W^2 + k1 W + k0."""
-    k2, k1, k0 = thrust_map
-    return [(math.sqrt(k1 * k1 + 4 * k2 * (f - k0)) - k1) / (2 * k2) for f in thrusts]
