@@ -16,6 +16,7 @@ from e2efly.physics import INTEGRATORS, Physics, RateLoop, State, started, step
 from e2efly.physics.body import angular_acceleration
 from e2efly.physics.plant import Plant
 from e2efly.vehicles import Vehicle
+from e2efly.vehicles.terms import BATTERY, battery_share
 from e2efly.vehicles.vehicle import inertia_tensor, terms
 from tests.gradients import central, reverse
 
@@ -29,6 +30,10 @@ VALUES: dict[str, Any] = {
     "drag_torque": [2e-3, 3e-3, 1e-3],
     "rate_integral_gain": [60.0, 50.0, 20.0],
     "gyro_time_constant": 0.004,
+    "nominal_voltage": 14.8,
+    "battery_voltage": 15.6,
+    "voltage_sag": 0.08,
+    "speed_per_volt": 0.9,
 }
 """Of the size that a vehicle like the VIS-R has."""
 NOTHING: dict[str, Any] = {
@@ -39,12 +44,17 @@ NOTHING: dict[str, Any] = {
     "drag_torque": [0.0, 0.0, 0.0],
     "rate_integral_gain": [0.0, 0.0, 0.0],
     "gyro_time_constant": 1e-6,
+    "nominal_voltage": 14.8,
+    "battery_voltage": 14.8,
+    "voltage_sag": 0.0,
+    "speed_per_volt": 1.0,
 }
 """Values at which a term does nothing."""
 
 
 def having(vehicle: Vehicle, *names: str, values: dict[str, Any] = VALUES) -> Vehicle:
-    """The vehicle with these terms."""
+    """The vehicle with these terms; none of a battery's stands alone."""
+    names = (*names, *BATTERY) if set(names) & set(BATTERY) else names
     return dataclasses.replace(vehicle, **{name: np.asarray(values[name]) for name in names})
 
 
@@ -260,3 +270,17 @@ def test_without_an_integral_or_a_filter_the_state_has_neither(vis_r: Vehicle, l
         state = State.hovering(vehicle, jnp.zeros(3))
         assert len(jax.tree.leaves(started(physics, physics.nominal, state))) == leaves
         assert len(jax.tree.leaves(step(physics, physics.nominal, state, jnp.full(4, 2.0)))) == leaves
+
+
+def test_full_rotors_turn_as_fast_as_the_sagging_battery_lets_them(vis_r: Vehicle, fly: Callable[..., State]) -> None:
+    """By hand: where speed, thrust and voltage agree; and the shares by which a file is judged are those of flight."""
+    vehicle = having(vis_r, "voltage_sag")
+    physics = Physics.of(vehicle, "rotor_thrust", control_rate=100.0, dtype=np.float64)
+    start = State.hovering(vehicle, jnp.zeros(3))
+    path = fly(physics, vehicle, start, jnp.full((100, 4), vis_r.thrust_range[1]))
+    speed = np.array(path.rotor_speed[-1, 0])
+    thrust = 4 * vehicle.rotor_thrust(speed)
+    voltage = 15.6 - 0.08 * thrust
+    assert speed == pytest.approx(vis_r.full_rotor_speed * (voltage / 14.8) ** 0.9, rel=1e-5)
+    assert thrust == pytest.approx(battery_share(vehicle) * 4 * vis_r.thrust_range[1], rel=1e-5)
+    assert 0.8 < battery_share(vehicle) < 0.99

@@ -14,6 +14,7 @@ from e2efly.config import EnvConfig, RewardConfig
 from e2efly.env import Env, EnvState, random_key
 from e2efly.presets import preset
 from e2efly.vehicles import load_vehicle, vehicle_file, vehicle_names
+from e2efly.vehicles.terms import BATTERY
 from e2efly.vehicles.vehicle import quantities, read_sigmas, terms
 
 VALUES: dict[str, Any] = {
@@ -24,6 +25,10 @@ VALUES: dict[str, Any] = {
     "drag_torque": [2e-3, 3e-3, 1e-3],
     "rate_integral_gain": [60.0, 50.0, 20.0],
     "gyro_time_constant": 0.004,
+    "nominal_voltage": 14.8,
+    "battery_voltage": 15.6,
+    "voltage_sag": 0.08,
+    "speed_per_volt": 0.9,
 }
 
 
@@ -49,12 +54,14 @@ def test_shipped_vehicles_have_none_of_them() -> None:
 
 @pytest.mark.parametrize("name", VALUES)
 def test_a_term_in_a_file(name: str, written: Callable[..., Path]) -> None:
-    path = written(**{name: VALUES[name]})
+    names = [name] if name not in BATTERY else list(BATTERY)
+    path = written(**{name: VALUES[name] for name in names})
     vehicle, plain = load_vehicle(path), load_vehicle("vis_r")
     np.testing.assert_array_equal(getattr(vehicle, name), VALUES[name])
-    assert vehicle.hash != plain.hash
-    assert dataclasses.replace(vehicle, **{name: None}).hash == plain.hash
-    assert [f.name for f in quantities(vehicle)] == [*(f.name for f in quantities()), name]
+    hashes = {plain.hash, vehicle.hash, dataclasses.replace(vehicle, **{name: 2 * np.asarray(VALUES[name])}).hash}
+    assert len(hashes) == 3
+    assert dataclasses.replace(vehicle, **dict.fromkeys(names)).hash == plain.hash
+    assert [f.name for f in quantities(vehicle)] == [*(f.name for f in quantities()), *names]
     assert np.isnan(read_sigmas(path)[name]).all()
     assert set(read_sigmas("vis_r")) == {f.name for f in quantities()}
 
@@ -83,6 +90,14 @@ BROKEN: dict[str, tuple[dict[str, Any], str]] = {
         r"rate_integral_gain.value is .*accepted: >= 0 ",
     ),
     "no filter": ({"gyro_time_constant": 0.0}, r"gyro_time_constant.value is 0.0; accepted: > 0 s"),
+    "a battery without a nominal voltage": (
+        {"battery_voltage": 15.0, "voltage_sag": 0.1},
+        "battery_voltage and voltage_sag without nominal_voltage; accepted",
+    ),
+    "a flat battery": (
+        {"nominal_voltage": 14.8, "battery_voltage": 10.0, "voltage_sag": 0.3},
+        r"battery_voltage.value is 10.0 V.*not hover",
+    ),
     "no lag down": ({"motor_time_constant_down": 0.0}, r"motor_time_constant_down.value is 0.0; accepted: > 0 s"),
 }
 
@@ -143,3 +158,10 @@ def test_episodes_begin_with_a_rate_loop_that_remembers_nothing(written: Callabl
     assert np.abs(integral[~done]).max() > 1
     np.testing.assert_array_equal(integral[done], 0.0)
     np.testing.assert_array_equal(lag[done], 0.0)
+
+
+def test_draws_of_a_battery_that_lifts_nothing_are_refused(written: Callable[..., Path]) -> None:
+    path = written(nominal_voltage=14.8, battery_voltage=14.0, voltage_sag=0.1)
+    env_of(path, {"battery_voltage": 0.1})
+    with pytest.raises(ValueError, match=r"env.randomize is .*'battery_voltage': 0.5.*weakest vehicle.*cannot hover"):
+        env_of(path, {"battery_voltage": 0.5})

@@ -10,6 +10,7 @@ from e2efly.deploy.policy.contract_json import LATEST
 from e2efly.scenes.camera import check as check_camera
 from e2efly.sensors.image_noise import check as check_noise
 from e2efly.vehicles import Vehicle, load_family, nominal_vehicle, unknown
+from e2efly.vehicles.terms import battery_share
 from e2efly.vehicles.vehicle import principal_moments, quantities, terms
 
 COUNTED = 2**24
@@ -99,6 +100,9 @@ def check(config: EnvConfig, task: TaskConfig, flown: Vehicle | None = None) -> 
         check_numbers(prefix, part)
     margin = vehicle.thrust_to_weight if family is None else family.ranges.thrust_to_weight[0]
     d, drawn = config.disturbance, margin * config.weakest
+    if body.battery_voltage is not None:
+        empty = (1 - config.randomize.get("battery_voltage", 0.0)) * body.battery_voltage
+        drawn *= battery_share(dataclasses.replace(body, battery_voltage=empty))
     if drawn < 1:
         raise ValueError(
             f"env.randomize is {dict(config.randomize)} and env.disturbance has thrust {d.thrust:g}, "

@@ -7,6 +7,7 @@ from jax import Array
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.physics.plant import Plant, Rotors
 from e2efly.physics.state import Parts
+from e2efly.vehicles.terms import LEAST_VOLTAGE
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle, quantities, terms
 
 jax.tree_util.register_dataclass(Vehicle, data_fields=[f.name for f in (*quantities(), *terms())], meta_fields=["name"])
@@ -20,6 +21,20 @@ def rotor_thrust(plant: Plant, rotor_speed: Rotors) -> Rotors:
         return a, b, c, d
     s = plant.rotor_share
     return a * s[0], b * s[1], c * s[2], d * s[3]
+
+
+def powered(plant: Plant, rotor_speed: Rotors, command: Rotors) -> Rotors:
+    """The speeds, rad/s, towards which rotors turn that are told `command`, at the voltage that their thrust leaves."""
+    battery = plant.battery
+    if battery is None:
+        return command
+    voltage = battery.voltage
+    if battery.sag is not None:
+        a, b, c, d = rotor_thrust(plant, rotor_speed)
+        voltage = jnp.maximum(voltage - battery.sag * (a + b + c + d), LEAST_VOLTAGE)
+    share = voltage if battery.exponent is None else voltage**battery.exponent
+    a, b, c, d = (share * speed for speed in command)
+    return a, b, c, d
 
 
 def rotor_speed_for(vehicle: Vehicle, thrust: Rotors) -> Rotors:

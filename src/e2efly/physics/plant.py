@@ -15,6 +15,28 @@ Rotors = tuple[Array, Array, Array, Array]
 
 
 @dataclass(frozen=True)
+class Battery:
+    """What a battery makes of the rotor speeds that are told; voltages over the nominal one."""
+
+    voltage: Array
+    """Without load."""
+    sag: Array | None
+    """Lost for a newton of the thrust of all rotors, 1/N; None: nothing."""
+    exponent: Array | None
+    """Relative change of the rotors' speed over relative change of the voltage; None: 1."""
+
+    @staticmethod
+    def of(vehicle: Vehicle) -> "Battery | None":
+        """Of a vehicle, any field of which may be batched; None where its file has none."""
+        if vehicle.battery_voltage is None:
+            return None
+        nominal, sag = vehicle.nominal_voltage, vehicle.voltage_sag
+        return Battery(
+            vehicle.battery_voltage / nominal, None if sag is None else sag / nominal, vehicle.speed_per_volt
+        )
+
+
+@dataclass(frozen=True)
 class Plant:
     """What moves the body, taken apart into numbers of the batch's shape, with what follows from them.
 
@@ -63,6 +85,7 @@ class Plant:
     """Entries xy, xz and yz of the inertia, kg*m^2, ..."""
     mobility_products: Vec3 | None = None
     """... and of its inverse."""
+    battery: Battery | None = None
     centre: Vec3 | None = None
     """Centre of mass from where the drag acts, body, m."""
 
@@ -98,6 +121,7 @@ class Plant:
             half_decay_down=None if down is None else _exp(-0.5 * dt / down),
             lag_rate_down=None if v.rotor_inertia is None or down is None else 1 / down,
             drag_torque=None if v.drag_torque is None else Vec3.of(v.drag_torque),
+            battery=Battery.of(v),
             products=products,
             mobility_products=mobility_products,
             centre=None if v.centre_of_mass is None else Vec3.of(v.centre_of_mass),

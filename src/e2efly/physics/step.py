@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from e2efly.control import COMMAND_MODES, Vec3
+from e2efly.physics.body import powered
 from e2efly.physics.control import Command, control_law, remembering_law
 from e2efly.physics.integrate import INTEGRATORS
 from e2efly.physics.mixer import Mixer
@@ -158,6 +159,7 @@ def step(
         if physics.full_speed is not None:
             a, b, c, d = (jnp.minimum(speed, physics.full_speed) for speed in rotor_command)
             rotor_command = a, b, c, d
+        rotor_command = powered(plant, parts.rotor_speed, rotor_command)
         return (integrate(plant, parts, rotor_command, air, dt), loop), None
 
     # a gradient computes each sub-step again from its start: faster than storing what is inside, and far smaller

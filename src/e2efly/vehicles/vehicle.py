@@ -113,6 +113,14 @@ class Vehicle:
     """Angular acceleration commanded per integral of the body-rate error."""
     gyro_time_constant: Any = _term("s", above=0.0)
     """Time constant of the first-order filter through which the rate loop sees the body rates."""
+    nominal_voltage: Any = _term("V", above=0.0)
+    """Voltage of the battery, under load, at which rotors turn as they are told: at which the thrust's limits hold."""
+    battery_voltage: Any = _term("V", above=0.0)
+    """Voltage of the battery without load, in flight."""
+    voltage_sag: Any = _term("V/N", at_least=0.0)
+    """Voltage that the battery loses under load, over the thrust of all rotors; left out: none."""
+    speed_per_volt: Any = _term("1", at_least=0.0)
+    """Relative change of the rotors' speed over relative change of the voltage, of a given command; left out: 1."""
 
     @property
     def hash(self) -> str:

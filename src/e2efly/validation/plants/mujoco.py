@@ -25,6 +25,7 @@ from e2efly.validation.controller import FlightController, rotor_speed_of
 from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle
+from e2efly.vehicles.terms import LEAST_VOLTAGE
 from e2efly.vehicles.vehicle import GRAVITY, RATE_LOOP, inertia_tensor, rotor_arms
 
 STEP = 1e-3
@@ -158,8 +159,8 @@ class MujocoPlant(Plant):
         for _ in range(count):
             model.opt.timestep = dt / count
             thrusts = self._controller.thrusts(wanted, data.qpos.tolist(), data.qvel.tolist(), dt / count)
-            data.ctrl[:4] = np.minimum(rotor_speed_of(told, thrusts), self._full_speed)
             speed = data.act.copy()
+            data.ctrl[:4] = np.minimum(rotor_speed_of(told, thrusts), self._full_speed) * self._powered(speed)
             model.actuator_dynprm[:4, 0] = self._lags()
             model.actuator_gainprm[:4, 0] = share * (2 * k2 * speed + k1)
             model.actuator_biasprm[:4, 0] = share * (k0 - k2 * speed * speed)
@@ -171,6 +172,16 @@ class MujocoPlant(Plant):
             if self._body.rotor_inertia is not None:
                 data.qfrc_applied[3:] = self._rotor_torque(dt / count)
             self._mujoco.mj_step(model, data)
+
+    def _powered(self, speed: np.ndarray) -> float:
+        """Speed to which the battery brings a rotor, over the one that it is told."""
+        body, (k2, k1, k0) = self._body, self._body.thrust_map
+        if body.battery_voltage is None:
+            return 1.0
+        thrust = self._share @ np.maximum((k2 * speed + k1) * speed + k0, 0.0)
+        voltage = body.battery_voltage - (0.0 if body.voltage_sag is None else body.voltage_sag) * thrust
+        exponent = 1.0 if body.speed_per_volt is None else float(body.speed_per_volt)
+        return max(float(voltage / body.nominal_voltage), LEAST_VOLTAGE) ** exponent
 
     def _lags(self) -> np.ndarray:
         """Time constant of each rotor's lag on the way to what it is told now, s; it keeps to its side of that."""
