@@ -60,7 +60,7 @@ def fly() -> Fly:
             x = jnp.asarray(x)
             return jnp.broadcast_to(x, (n, *x.shape))[rows] if x.ndim == ndim else x[rows]
 
-        shapes = {f.name: len(f.metadata["shape"]) for f in quantities()}
+        shapes = {f.name: len(f.metadata["shape"]) for f in quantities(plant)}
         plants = {name: fill(getattr(plant, name), ndim) for name, ndim in shapes.items()}
         commands = jnp.broadcast_to(jnp.asarray(commands).reshape(t, -1, 4), (t, n, 4))[:, rows]
         path = run(

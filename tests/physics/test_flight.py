@@ -39,9 +39,9 @@ def test_hover_stays(name: str, integrator: str, fly: Callable[..., State]) -> N
     vehicle = load_vehicle(name)
     end = fly(physics_of(vehicle, integrator=integrator), vehicle, at_rest(vehicle), hover_thrusts(vehicle, 60))
     start = at_rest(vehicle)
-    for f in dataclasses.fields(State):
+    for part in ("position", "velocity", "quaternion", "body_rate", "rotor_speed"):
         np.testing.assert_allclose(
-            getattr(end, f.name)[-1], getattr(start, f.name), atol=1e-10, err_msg=f"{f.name} under {integrator}"
+            getattr(end, part)[-1], getattr(start, part), atol=1e-10, err_msg=f"{part} under {integrator}"
         )
 
 

@@ -14,9 +14,10 @@ import pytest
 from e2efly.control import Vec3
 from e2efly.physics import Physics, State, step
 from e2efly.physics.mixer import Mixer
+from e2efly.validation.controller import RateLoop, rotor_speed_of
 from e2efly.validation.plant import Delay, Plant, RigidState
 from e2efly.validation.plants import find_plant
-from e2efly.validation.plants.mujoco import MujocoPlant, rate_loop, rotor_speed_of, vehicle_xml
+from e2efly.validation.plants.mujoco import MujocoPlant, vehicle_xml
 from e2efly.validation.plants.simulator import SimulatorPlant
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY
@@ -144,7 +145,7 @@ def test_rate_loop_and_mixer_are_the_simulators(vis_r: Vehicle) -> None:
     """Over commands of which many saturate."""
     from e2efly.physics.body import gyroscopic_torque
 
-    rng, mixer, law = np.random.default_rng(0), Mixer.of(vis_r, np.float64), rate_loop(vis_r)
+    rng, mixer, law = np.random.default_rng(0), Mixer.of(vis_r, np.float64), RateLoop(vis_r)
     saturated = 0
     for _ in range(200):
         command = np.array([rng.uniform(0, 28), *rng.uniform(-15, 15, 3)])
@@ -153,7 +154,7 @@ def test_rate_loop_and_mixer_are_the_simulators(vis_r: Vehicle) -> None:
         torque = vis_r.inertia * vis_r.rate_gain * (wanted - rate)
         torque = torque + np.array(gyroscopic_torque(Vec3.of(vis_r.inertia), Vec3(*rate)).stack())
         ours = mixer.thrusts(vis_r.mass * command[0], Vec3(*(jnp.asarray(x) for x in torque)))
-        theirs = law(command.tolist(), rate.tolist())
+        theirs = law.thrusts(command.tolist(), rate.tolist(), 1e-3)
         np.testing.assert_allclose(theirs, np.array(ours), rtol=1e-5, atol=1e-5)
         saturated += max(theirs) == vis_r.thrust_range[1]
     assert saturated > 50

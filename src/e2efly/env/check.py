@@ -1,15 +1,19 @@
 """Whether the numbers of an environment's configuration make sense."""
 
+import dataclasses
 import math
+
+import numpy as np
 
 from e2efly.config import EnvConfig, TaskConfig, check_numbers
 from e2efly.deploy.policy.contract_json import LATEST
 from e2efly.env.limits import posterior_of
 from e2efly.scenes.camera import check as check_camera
 from e2efly.sensors.image_noise import check as check_noise
-from e2efly.vehicles import load_family, nominal_vehicle, unknown
+from e2efly.vehicles import Vehicle, load_family, nominal_vehicle, unknown
 from e2efly.vehicles.posterior import IDENTIFIED, WIDEST
-from e2efly.vehicles.vehicle import quantities
+from e2efly.vehicles.terms import battery_share
+from e2efly.vehicles.vehicle import principal_moments, quantities, terms
 
 MOST = 10.0
 """Times the standard deviations of an identified vehicle that episodes may draw from."""
@@ -17,20 +21,41 @@ COUNTED = 2**24
 """Control steps that an episode can have: float32 counts no further."""
 
 
-def check(config: EnvConfig, task: TaskConfig) -> None:
+def check(config: EnvConfig, task: TaskConfig, flown: Vehicle | None = None) -> None:
     """Check the numbers of a configuration.
+
+    Args:
+        config: of the environment.
+        task: its options.
+        flown: whose parameters are randomised; None: the configuration's vehicle.
 
     Raises:
         ValueError: naming the field, the value and what is accepted.
     """
-    names = [f.name for f in quantities()]
+    body = nominal_vehicle(config.vehicle) if flown is None else flown
+    names = [f.name for f in quantities(body)]
     for name, width in config.randomize.items():
         if name == IDENTIFIED:
             _check_identified(config)
-        elif name not in names:
+            continue
+        if any(name == term.name for term in terms()) and name not in names:
+            raise ValueError(
+                f"env.randomize.{name} is {width}, and vehicle {body.name!r} has no {name}; accepted: a vehicle file "
+                f"with an entry [{name}], or what vehicle {body.name!r} has: {', '.join(names)}"
+            )
+        if name not in names:
             raise ValueError(unknown("vehicle parameter", name, names))
-        elif not 0 <= width < 1:
+        if not 0 <= width < 1:
             raise ValueError(f"env.randomize.{name} is {width}; accepted: at least 0 and below 1")
+    if body.inertia_products is not None:
+        less, more = (config.randomize.get(name, 0.0) for name in ("inertia", "inertia_products"))
+        drawn = {"inertia": (1 - less) * body.inertia, "inertia_products": -(1 + more) * np.abs(body.inertia_products)}
+        if principal_moments(dataclasses.replace(body, **drawn))[0] <= 0:
+            raise ValueError(
+                f"env.randomize is {dict(config.randomize)}: an inertia of these draws may have no positive principal "
+                f"moment (inertia {body.inertia.tolist()}, inertia_products {body.inertia_products.tolist()}); "
+                "accepted: smaller widths of inertia and inertia_products"
+            )
     for field, bounds in (
         ("action_latency", config.action_latency),
         ("observation_latency", config.observation_latency),
@@ -84,6 +109,9 @@ def check(config: EnvConfig, task: TaskConfig) -> None:
     d, drawn = config.disturbance, margin * config.weakest
     if (posterior := posterior_of(config)) is not None:
         drawn *= 1 - WIDEST * posterior.thrust_sigma
+    if body.battery_voltage is not None:
+        empty = (1 - config.randomize.get("battery_voltage", 0.0)) * body.battery_voltage
+        drawn *= battery_share(dataclasses.replace(body, battery_voltage=empty))
     if drawn < 1:
         raise ValueError(
             f"env.randomize is {dict(config.randomize)} and env.disturbance has thrust {d.thrust:g}, "

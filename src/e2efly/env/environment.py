@@ -33,7 +33,7 @@ from e2efly.env.draws import around, between, perturbed
 from e2efly.env.limits import latencies_of, limits_of, posterior_of
 from e2efly.env.state import EnvState, Step
 from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field, past_actions
-from e2efly.physics import Physics, State, step
+from e2efly.physics import Physics, State, started, step
 from e2efly.physics.body import hover_rotor_speed
 from e2efly.physics.rotation import from_euler, unrotate, yaw
 from e2efly.scenes import scene as scenes
@@ -129,7 +129,7 @@ class Env:
                 believed, config.command_mode, config.integrator, config.control_rate, config.largest_step, dtype
             )
             physics = physics if flown.as_believed else physics.flying(body, dtype)
-        check(config, task)
+        check(config, task, body)
         rewards.check(reward.weights, reward.parameters)
         late = config.action_latency or latencies_of(config, body, family if flown is None else None)
         frames = latency.frames(late[1], period)
@@ -396,7 +396,7 @@ class Env:
         vehicle, memory = self.task.start(task_key, n)
         rotor_speed = jnp.broadcast_to(jnp.asarray(hover_rotor_speed(flown))[..., None], (n, 4))
         vehicle = dataclasses.replace(vehicle, rotor_speed=rotor_speed)
-        vehicle = jax.tree.map(lambda x: x.astype(dtype), vehicle)
+        vehicle = jax.tree.map(lambda x: x.astype(dtype), started(self.physics, flown, vehicle))
         past = None
         if self.past:
             past = jax.tree.map(lambda x: jnp.broadcast_to(x[:, None], (n, self.past, *x.shape[1:])), vehicle)

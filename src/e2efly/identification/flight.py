@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from e2efly.identification.coarse import begin
 from e2efly.identification.blackbox import DELAY_SIGMA, setpoint_delay
+from e2efly.identification.coarse import begin
 from e2efly.identification.estimate import Estimate
 from e2efly.identification.model import NUISANCES, UNKNOWNS, Model, Unknown
 from e2efly.identification.record import MOTORS, Record

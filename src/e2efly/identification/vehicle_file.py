@@ -28,7 +28,7 @@ def merged(base: Vehicle, found: Mapping[str, Estimate]) -> Vehicle:
         if name == "inertia" and known.any():  # or the three may be of no rigid body
             new = np.where(known, new, own * np.mean(estimate.value[known] / own[known]))
         values[name] = new if new.shape else float(new)
-    vehicle = Vehicle(**({f.name: getattr(base, f.name) for f in quantities()} | {"name": base.name} | values))
+    vehicle = Vehicle(**({f.name: getattr(base, f.name) for f in quantities(base)} | {"name": base.name} | values))
     check(vehicle, "identified vehicle")
     return vehicle
 
@@ -57,7 +57,7 @@ def write_vehicle(
         f"# {path.stem}: identified by e2efly, from {base.name}. Every entry: value, unit and source; sigma is the",
         "# standard deviation, nan where it is not known. Rotors in Betaflight's order. Body frame FLU.",
     ]
-    for f in quantities():
+    for f in quantities(vehicle):
         entry: dict[str, Any] = table[f.name]
         lines += ["", f"[{f.name}]", f"value = {_toml(getattr(vehicle, f.name))}", f"unit = {_text(entry['unit'])}"]
         if f.name in found:

@@ -23,7 +23,7 @@ from e2efly.observation import Field
 from e2efly.storage import write_atomically
 from e2efly.tasks import TASKS
 from e2efly.vehicles import load_family, nominal_vehicle
-from e2efly.vehicles.vehicle import quantities
+from e2efly.vehicles.vehicle import quantities, terms
 
 OPSET, IR_VERSION = 17, 8
 """Old enough for the ONNX Runtime of any companion computer in use."""
@@ -49,7 +49,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
     low, high = limits_of(about)
     _same("command_mode", physics.command_mode, mode.name)
     _same("control_period", physics.control_period, 1 / rate)
-    for name in (field.name for field in quantities()):
+    for name in (field.name for field in (*quantities(), *terms())):
         _same(f"vehicle {vehicle.name}: {name}", getattr(physics.nominal, name), getattr(vehicle, name))
     _same("position_range (centre of the commands)", env.center, (low + high) / 2)
     _same("position_range (half range of the commands)", env.half, (high - low) / 2)
@@ -249,7 +249,10 @@ def _arrays(weights: Weights) -> dict[str, np.ndarray]:
 
 def _same(name: str, has: Any, wanted: Any) -> None:
     """Equal, up to the rounding of the environment's type."""
-    same = has == wanted if isinstance(wanted, str) else np.allclose(has, wanted, rtol=1e-6, atol=0.0)
+    if has is None or wanted is None:
+        same = has is wanted
+    else:
+        same = has == wanted if isinstance(wanted, str) else np.allclose(has, wanted, rtol=1e-6, atol=0.0)
     if not same:
         raise ValueError(f"{name} of the environment is {has}; its configuration and vehicle say {wanted}")
 

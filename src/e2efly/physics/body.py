@@ -7,9 +7,10 @@ from jax import Array
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.physics.plant import Plant, Rotors
 from e2efly.physics.state import Parts
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle, quantities
+from e2efly.vehicles.terms import LEAST_VOLTAGE
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle, quantities, terms
 
-jax.tree_util.register_dataclass(Vehicle, data_fields=[f.name for f in quantities()], meta_fields=["name"])
+jax.tree_util.register_dataclass(Vehicle, data_fields=[f.name for f in (*quantities(), *terms())], meta_fields=["name"])
 
 
 def rotor_thrust(plant: Plant, rotor_speed: Rotors) -> Rotors:
@@ -20,6 +21,20 @@ def rotor_thrust(plant: Plant, rotor_speed: Rotors) -> Rotors:
         return a, b, c, d
     s = plant.rotor_share
     return a * s[0], b * s[1], c * s[2], d * s[3]
+
+
+def powered(plant: Plant, rotor_speed: Rotors, command: Rotors) -> Rotors:
+    """The speeds, rad/s, towards which rotors turn that are told `command`, at the voltage that their thrust leaves."""
+    battery = plant.battery
+    if battery is None:
+        return command
+    voltage = battery.voltage
+    if battery.sag is not None:
+        a, b, c, d = rotor_thrust(plant, rotor_speed)
+        voltage = jnp.maximum(voltage - battery.sag * (a + b + c + d), LEAST_VOLTAGE)
+    share = voltage if battery.exponent is None else voltage**battery.exponent
+    a, b, c, d = (share * speed for speed in command)
+    return a, b, c, d
 
 
 def rotor_speed_for(vehicle: Vehicle, thrust: Rotors) -> Rotors:
@@ -52,35 +67,92 @@ def drag(plant: Plant, air_velocity: Vec3) -> Vec3:
     return air_velocity.times(k1 + air_velocity.abs().times(k2)) * -1.0
 
 
-def acceleration(plant: Plant, attitude: Quat, velocity: Vec3, collective: Array, wind: Vec3 | None) -> Vec3:
-    """Acceleration of the centre of mass in the world, m/s^2."""
-    air_velocity = attitude.unrotate(velocity if wind is None else velocity - wind)
-    force = drag(plant, air_velocity)
-    force = Vec3(force.x, force.y, force.z + collective)
-    a = attitude.rotate(force) * plant.specific
+def air_velocity(attitude: Quat, velocity: Vec3, wind: Vec3 | None) -> Vec3:
+    """Velocity relative to the air in the body frame, m/s, of a velocity in the world, m/s."""
+    return attitude.unrotate(velocity if wind is None else velocity - wind)
+
+
+def acceleration(plant: Plant, attitude: Quat, force: Vec3, collective: Array) -> Vec3:
+    """Acceleration of the centre of mass in the world, m/s^2, under the drag, body, N, and the collective thrust, N."""
+    a = attitude.rotate(Vec3(force.x, force.y, force.z + collective)) * plant.specific
     return Vec3(a.x, a.y, a.z - GRAVITY)
 
 
 def angular_acceleration(plant: Plant, body_rate: Vec3, torque: Vec3) -> Vec3:
     """Euler's equation in the body frame, rad/s^2: J^-1 (torque - w x J w)."""
-    return (torque - gyroscopic_torque(plant.inertia, body_rate)).times(plant.mobility)
+    left = torque - gyroscopic_torque(plant.inertia, body_rate, plant.products)
+    return tensor_times(plant.mobility, plant.mobility_products, left)
 
 
-def gyroscopic_torque(inertia: Vec3, body_rate: Vec3) -> Vec3:
-    """W x J w of a diagonal inertia J, N*m."""
+def tensor_times(diagonal: Vec3, products: Vec3 | None, v: Vec3) -> Vec3:
+    """A symmetric tensor, of which `products` are the entries xy, xz and yz (None: zero), times a vector."""
+    if products is None:
+        return v.times(diagonal)
+    d, o = diagonal, products
+    return Vec3(
+        d.x * v.x + o.x * v.y + o.y * v.z, o.x * v.x + d.y * v.y + o.z * v.z, o.y * v.x + o.z * v.y + d.z * v.z
+    )  # fmt: skip
+
+
+def gyroscopic_torque(inertia: Vec3, body_rate: Vec3, products: Vec3 | None = None) -> Vec3:
+    """W x J w of an inertia J by its diagonal, and its entries xy, xz and yz (None: zero), N*m."""
     j, w = inertia, body_rate
+    if products is not None:
+        return w.cross(tensor_times(inertia, products, w))
     return Vec3((j.z - j.y) * w.y * w.z, (j.x - j.z) * w.z * w.x, (j.y - j.x) * w.x * w.y)
 
 
-def derivative(plant: Plant, parts: Parts, wind: Vec3 | None) -> Parts:
-    """Time derivative of the body's state at the rotor speeds of `parts`; the rotors' own entry is zero."""
+def rotor_momentum_torque(
+    inertia: Array, spin: Rotors, body_rate: Vec3, rotor_speed: Rotors, rotor_acceleration: Rotors
+) -> Vec3:
+    """Torque on the body from the angular momentum h of its rotors about body z, N*m: -(dh/dt + w x h).
+
+    A rotor turns against the torque of the air on it, so h = -inertia * sum(spin * speed). The body's own inertia
+    includes the rotors as if they stood still, so that body and rotors together keep their angular momentum. `inertia`
+    is that of a rotor, kg*m^2; accelerations are in rad/s^2.
+    """
+    momentum = -inertia * _weighted(spin, rotor_speed)
+    change = -inertia * _weighted(spin, rotor_acceleration)
+    return Vec3(-body_rate.y * momentum, body_rate.x * momentum, -change)
+
+
+def accelerations(
+    plant: Plant, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None
+) -> tuple[Vec3, Vec3]:
+    """Acceleration of the centre of mass in the world, m/s^2, and of the body about its axes, rad/s^2.
+
+    Args:
+        plant: what flies.
+        parts: its state, with the rotor speeds that push.
+        wind: velocity of the air in the world, m/s.
+        rotor_acceleration: rad/s^2; needed where the plant has rotor inertia.
+    """
     collective, torque = rotor_wrench(plant, rotor_thrust(plant, parts.rotor_speed))
-    zero = jnp.zeros_like(collective)
+    if plant.rotor_inertia is not None and rotor_acceleration is not None:
+        torque = torque + rotor_momentum_torque(
+            plant.rotor_inertia, plant.spin, parts.body_rate, parts.rotor_speed, rotor_acceleration
+        )
+    air = air_velocity(parts.attitude, parts.velocity, wind)
+    if plant.centre is not None:  # the place of the drag moves around the centre of mass
+        air = air + plant.centre.cross(parts.body_rate)
+    force = drag(plant, air)
+    if plant.centre is not None:
+        torque = torque + force.cross(plant.centre)
+    if plant.drag_torque is not None:
+        torque = torque - plant.drag_torque.times(parts.body_rate)
+    linear = acceleration(plant, parts.attitude, force, collective)
+    return linear, angular_acceleration(plant, parts.body_rate, torque)
+
+
+def derivative(plant: Plant, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None) -> Parts:
+    """Time derivative of the body's state, arguments as of `accelerations`; the rotors' own entry is zero."""
+    linear, angular = accelerations(plant, parts, wind, rotor_acceleration)
+    zero = jnp.zeros_like(linear.z)
     return Parts(
         position=parts.velocity,
-        velocity=acceleration(plant, parts.attitude, parts.velocity, collective, wind),
+        velocity=linear,
         attitude=parts.attitude.derivative(parts.body_rate),
-        body_rate=angular_acceleration(plant, parts.body_rate, torque),
+        body_rate=angular,
         rotor_speed=(zero, zero, zero, zero),
     )
 

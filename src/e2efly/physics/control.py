@@ -6,18 +6,21 @@ to rotor thrusts and speeds. All laws use the nominal vehicle: the flight contro
 
 from collections.abc import Callable
 
+import jax.numpy as jnp
 from jax import Array
 
 from e2efly.control import CommandMode, Ctbr, Vec3
-from e2efly.physics.body import gyroscopic_torque, rotor_speed_for
+from e2efly.physics.body import gyroscopic_torque, rotor_speed_for, tensor_times
 from e2efly.physics.mixer import Mixer
 from e2efly.physics.plant import Rotors
-from e2efly.physics.state import Parts
+from e2efly.physics.state import Parts, RateLoop
 from e2efly.vehicles.vehicle import Vehicle
 
 Command = tuple[Array, Array, Array, Array]
 Law = Callable[[Vehicle, Mixer, Parts, Command], Rotors]
 """(nominal vehicle, its mixer, state, command) -> rotor speed commands, rad/s."""
+RememberingLaw = Callable[[Vehicle, Mixer, Parts, Command, RateLoop, float], tuple[Rotors, RateLoop]]
+"""The same with what the rate loop remembers, taken apart into components, and the time since it last ran, s."""
 
 
 def control_law(mode: CommandMode) -> Law:
@@ -30,14 +33,41 @@ def control_law(mode: CommandMode) -> Law:
                 a, b, c, d = (share * mixer.thrust_max for share in command)
                 command = a, b, c, d
             return rotor_speed_for(vehicle, mixer.limit(command))
-        return _rates(vehicle, mixer, parts, controller(vehicle, parts, command))
+        return _rates(vehicle, mixer, parts.body_rate, controller(vehicle, parts, command))
 
     return law
 
 
-def _rates(vehicle: Vehicle, mixer: Mixer, parts: Parts, wanted: Ctbr) -> Rotors:
-    """The rate loop: torque = J K (wanted - w) + w x J w."""
-    stiffness = Vec3.of(vehicle.inertia * vehicle.rate_gain)
-    held = gyroscopic_torque(Vec3.of(vehicle.inertia), parts.body_rate)
-    torque = stiffness.times(wanted.rate - parts.body_rate) + held
+def remembering_law(mode: CommandMode) -> RememberingLaw:
+    """The law of a command mode whose rate loop has an integral part, a filter of the body rates, or both."""
+    controller = mode.controller
+    assert controller is not None, "no rate loop"
+
+    def law(
+        vehicle: Vehicle, mixer: Mixer, parts: Parts, command: Command, loop: RateLoop, dt: float
+    ) -> tuple[Rotors, RateLoop]:
+        wanted, rate, extra = controller(vehicle, parts, command), parts.body_rate, None
+        if loop.seen is not None:
+            rate = rate + (loop.seen - rate) * jnp.exp(-dt / vehicle.gyro_time_constant)
+        if loop.integral is not None:
+            change = Vec3.of(vehicle.rate_integral_gain).times(wanted.rate - rate) * dt
+            # no more than a full error's proportional part, so that it does not wind up where the rotors saturate
+            extra = (loop.integral + change).clip(Vec3.of(vehicle.rate_gain * vehicle.body_rate_max))
+        rotors = _rates(vehicle, mixer, rate, wanted, extra)
+        return rotors, RateLoop(extra, None if loop.seen is None else rate)
+
+    return law
+
+
+def _rates(vehicle: Vehicle, mixer: Mixer, rate: Vec3, wanted: Ctbr, extra: Vec3 | None = None) -> Rotors:
+    """The rate loop: torque = J (K (wanted - w) + extra) + w x J w, at body rates w; rad/s, rad/s^2."""
+    error, inertia = wanted.rate - rate, Vec3.of(vehicle.inertia)
+    if vehicle.inertia_products is None:
+        pushed, products = Vec3.of(vehicle.inertia * vehicle.rate_gain).times(error), None
+    else:
+        products = Vec3.of(vehicle.inertia_products)
+        pushed = tensor_times(inertia, products, Vec3.of(vehicle.rate_gain).times(error))
+    torque = pushed + gyroscopic_torque(inertia, rate, products)
+    if extra is not None:
+        torque = torque + tensor_times(inertia, products, extra)
     return rotor_speed_for(vehicle, mixer.thrusts(vehicle.mass * wanted.thrust, torque))

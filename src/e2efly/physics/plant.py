@@ -15,6 +15,28 @@ Rotors = tuple[Array, Array, Array, Array]
 
 
 @dataclass(frozen=True)
+class Battery:
+    """What a battery makes of the rotor speeds that are told; voltages over the nominal one."""
+
+    voltage: Array
+    """Without load."""
+    sag: Array | None
+    """Lost for a newton of the thrust of all rotors, 1/N; None: nothing."""
+    exponent: Array | None
+    """Relative change of the rotors' speed over relative change of the voltage; None: 1."""
+
+    @staticmethod
+    def of(vehicle: Vehicle) -> "Battery | None":
+        """Of a vehicle, any field of which may be batched; None where its file has none."""
+        if vehicle.battery_voltage is None:
+            return None
+        nominal, sag = vehicle.nominal_voltage, vehicle.voltage_sag
+        return Battery(
+            vehicle.battery_voltage / nominal, None if sag is None else sag / nominal, vehicle.speed_per_volt
+        )
+
+
+@dataclass(frozen=True)
 class Plant:
     """What moves the body, taken apart into numbers of the batch's shape, with what follows from them.
 
@@ -25,7 +47,7 @@ class Plant:
     thrust_map: tuple[Array, Array, Array]
     """Of rotor speed squared, rotor speed, and one; N, s/rad."""
     arm_x: Rotors
-    """Places of the rotors, body, m."""
+    """Places of the rotors from the centre of mass, body, m."""
     arm_y: Rotors
     spin: Rotors
     """Signs of their yaw torques."""
@@ -36,7 +58,7 @@ class Plant:
     inertia: Vec3
     """kg*m^2."""
     mobility: Vec3
-    """One over the inertia."""
+    """The inverse of the inertia: its diagonal."""
     drag_linear: Vec3
     """N*s/m."""
     drag_quadratic: Vec3
@@ -47,25 +69,74 @@ class Plant:
     """What is left of a rotor's lag after a sub-step, ..."""
     half_decay: Array | np.ndarray
     """... and after half of one."""
+    rotor_inertia: Array | None = None
+    """Of each rotor about its axis, kg*m^2; None, here and below: the physics is without this term."""
+    lag_rate: Array | None = None
+    """One over the time constant of the rotors, 1/s, where their acceleration is needed."""
+    decay_down: Array | np.ndarray | None = None
+    """`decay`, ..."""
+    half_decay_down: Array | np.ndarray | None = None
+    """... `half_decay` ..."""
+    lag_rate_down: Array | None = None
+    """... and `lag_rate` of a rotor that slows down."""
+    drag_torque: Vec3 | None = None
+    """N*m*s."""
+    products: Vec3 | None = None
+    """Entries xy, xz and yz of the inertia, kg*m^2, ..."""
+    mobility_products: Vec3 | None = None
+    """... and of its inverse."""
+    battery: Battery | None = None
+    centre: Vec3 | None = None
+    """Centre of mass from where the drag acts, body, m."""
 
     @staticmethod
     def of(vehicle: Vehicle, dt: float, rotor_share: Array | None = None) -> "Plant":
         """Of a vehicle, any field of which may be batched, for sub-steps of `dt` seconds; `rotor_share` is (*n, 4)."""
-        v, time = vehicle, vehicle.motor_time_constant
-        exp = jnp.exp if isinstance(time, jax.Array) else np.exp
+        v, time, down = vehicle, vehicle.motor_time_constant, vehicle.motor_time_constant_down
         k2, k1, k0 = (v.thrust_map[..., i] for i in range(3))
+        x, y = v.rotor_position[..., 0], v.rotor_position[..., 1]
+        if v.centre_of_mass is not None:
+            x, y = x - v.centre_of_mass[..., 0, None], y - v.centre_of_mass[..., 1, None]
+        inertia, products = Vec3.of(v.inertia), None if v.inertia_products is None else Vec3.of(v.inertia_products)
+        mobility, mobility_products = Vec3.of(1 / v.inertia), None
+        if products is not None:
+            mobility, mobility_products = _inverse(inertia, products)
         return Plant(
             thrust_map=(k2, k1, k0),
-            arm_x=split4(v.rotor_position[..., 0]),
-            arm_y=split4(v.rotor_position[..., 1]),
+            arm_x=split4(x),
+            arm_y=split4(y),
             spin=split4(v.rotor_spin),
             torque_ratio=v.torque_ratio,
             specific=1 / v.mass,
-            inertia=Vec3.of(v.inertia),
-            mobility=Vec3.of(1 / v.inertia),
+            inertia=inertia,
+            mobility=mobility,
             drag_linear=Vec3.of(v.drag_linear),
             drag_quadratic=Vec3.of(v.drag_quadratic),
             rotor_share=None if rotor_share is None else split4(rotor_share),
-            decay=exp(-dt / time),
-            half_decay=exp(-0.5 * dt / time),
+            decay=_exp(-dt / time),
+            half_decay=_exp(-0.5 * dt / time),
+            rotor_inertia=v.rotor_inertia,
+            lag_rate=None if v.rotor_inertia is None else 1 / time,
+            decay_down=None if down is None else _exp(-dt / down),
+            half_decay_down=None if down is None else _exp(-0.5 * dt / down),
+            lag_rate_down=None if v.rotor_inertia is None or down is None else 1 / down,
+            drag_torque=None if v.drag_torque is None else Vec3.of(v.drag_torque),
+            battery=Battery.of(v),
+            products=products,
+            mobility_products=mobility_products,
+            centre=None if v.centre_of_mass is None else Vec3.of(v.centre_of_mass),
         )
+
+
+def _inverse(diagonal: Vec3, products: Vec3) -> tuple[Vec3, Vec3]:
+    """Diagonal, and entries xy, xz and yz, of the inverse of a symmetric tensor that is given by the same."""
+    a, b, c, xy, xz, yz = diagonal.x, diagonal.y, diagonal.z, products.x, products.y, products.z
+    bc, ac, ab = b * c - yz * yz, a * c - xz * xz, a * b - xy * xy
+    x, y, z = xz * yz - xy * c, xy * yz - b * xz, xy * xz - a * yz
+    whole = 1 / (a * bc + xy * x + xz * y)
+    return Vec3(bc, ac, ab) * whole, Vec3(x, y, z) * whole
+
+
+def _exp(x: Array | np.ndarray) -> Array | np.ndarray:
+    """Constants stay constants."""
+    return jnp.exp(x) if isinstance(x, jax.Array) else np.exp(x)

@@ -1,6 +1,7 @@
 """The state of a vehicle."""
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -11,6 +12,30 @@ from e2efly.vehicles.vehicle import Vehicle
 
 for _kind in (Vec3, Quat):
     jax.tree_util.register_dataclass(_kind, data_fields=[f.name for f in fields(_kind)], meta_fields=[])
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class RateLoop:
+    """What the rate loop remembers from sub-step to sub-step, where it has an integral part or a filter.
+
+    Arrays, or, inside a step, the `Vec3` of their components.
+    """
+
+    integral: Any
+    """The integral part of the commanded angular acceleration, rad/s^2, (*n, 3); None: it has none."""
+    seen: Any
+    """Filtered body rates, rad/s, (*n, 3); None: it sees them as they are."""
+
+    @staticmethod
+    def at_rest(vehicle: Vehicle, body_rate: Float[Array, "*n 3"]) -> "RateLoop | None":
+        """At a start: no integral yet, and a filter that has settled; None where the vehicle's file has neither."""
+        if vehicle.rate_integral_gain is None and vehicle.gyro_time_constant is None:
+            return None
+        return RateLoop(
+            None if vehicle.rate_integral_gain is None else jnp.zeros_like(body_rate),
+            None if vehicle.gyro_time_constant is None else body_rate,
+        )
 
 
 @jax.tree_util.register_dataclass
@@ -28,6 +53,8 @@ class State:
     """Angular velocity in the body frame, rad/s."""
     rotor_speed: Float[Array, "*n 4"]
     """Rear right, front right, rear left, front left, rad/s."""
+    rate_loop: RateLoop | None = None
+    """What the rate loop remembers, where it remembers anything; None at the start of a flight."""
 
     @staticmethod
     def hovering(vehicle: Vehicle, position: Float[Array, "*n 3"]) -> "State":

@@ -11,13 +11,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from e2efly.control import COMMAND_MODES, Vec3
-from e2efly.physics.control import Command, control_law
+from e2efly.physics.body import powered
+from e2efly.physics.control import Command, control_law, remembering_law
 from e2efly.physics.integrate import INTEGRATORS
 from e2efly.physics.mixer import Mixer
 from e2efly.physics.plant import Plant
-from e2efly.physics.state import Parts, State, split4
+from e2efly.physics.state import Parts, RateLoop, State, split4
 from e2efly.vehicles.names import unknown
-from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle
 
 RATES = (0.1, 10_000.0)
 """Slowest and fastest control rate, Hz: no flight controller's loop is faster."""
@@ -94,6 +95,21 @@ class Physics:
         return Physics(nominal, Mixer.of(vehicle, dtype), command_mode, integrator, 1 / rate, substeps)
 
 
+def vehicle_of_loop(physics: Physics, vehicle: Vehicle) -> Vehicle:
+    """The vehicle of the control laws: the nominal one, with the rate loop of the plant."""
+    return dataclasses.replace(physics.nominal, **{name: getattr(vehicle, name) for name in RATE_LOOP})
+
+
+def started(physics: Physics, vehicle: Vehicle, state: State) -> State:
+    """The state with what the plant's rate loop remembers at a start, where it will remember anything.
+
+    `step` does so itself; loops whose state keeps its structure need it before their first step.
+    """
+    if state.rate_loop is not None or COMMAND_MODES[physics.command_mode].controller is None:
+        return state
+    return dataclasses.replace(state, rate_loop=RateLoop.at_rest(vehicle, state.body_rate))
+
+
 def step(
     physics: Physics,
     vehicle: Vehicle,
@@ -109,8 +125,8 @@ def step(
 
     Args:
         physics: how to integrate and control.
-        vehicle: the plant; any field may be batched. Its `rate_gain` is that of the rate loop; in all else the flight
-            controller believes in `physics.nominal`.
+        vehicle: the plant; any field may be batched. Its `rate_gain`, integral gain and filter are those of the rate
+            loop; in all else the flight controller believes in `physics.nominal`.
         state: where it starts.
         command: in the units of the command mode.
         previous: the command that still acts before `switch_time`, for latencies that are no whole steps.
@@ -120,30 +136,43 @@ def step(
         wind: velocity of the air in the world, m/s.
         rotor_share: thrust of each rotor over that of the vehicle's thrust map; None: 1.
     """
-    law = control_law(COMMAND_MODES[physics.command_mode])
+    mode = COMMAND_MODES[physics.command_mode]
+    state = started(physics, vehicle, state)
     integrate = INTEGRATORS[physics.integrator]
     dt = physics.control_period / physics.substeps
     plant = Plant.of(vehicle, dt, rotor_share)
-    controller = dataclasses.replace(physics.nominal, rate_gain=vehicle.rate_gain)
+    controller = vehicle_of_loop(physics, vehicle)
     air = None if wind is None else Vec3.of(wind)
     after = split4(command)
     before = None if previous is None else split4(previous)
 
-    def substep(parts: Parts, index: Array) -> tuple[Parts, None]:
+    def substep(carry: tuple[Parts, RateLoop | None], index: Array) -> tuple[tuple[Parts, RateLoop | None], None]:
+        parts, loop = carry
         acting = after
         if before is not None and switch_time is not None:
             done = jnp.clip((index + 1) - switch_time / dt, 0.0, 1.0).astype(command.dtype)
             acting = _blend(before, after, done)
-        rotor_command = law(controller, physics.mixer, parts, acting)
+        if loop is None:
+            rotor_command = control_law(mode)(controller, physics.mixer, parts, acting)
+        else:
+            rotor_command, loop = remembering_law(mode)(controller, physics.mixer, parts, acting, loop, dt)
         if physics.full_speed is not None:
             a, b, c, d = (jnp.minimum(speed, physics.full_speed) for speed in rotor_command)
             rotor_command = a, b, c, d
-        return integrate(plant, parts, rotor_command, air, dt), None
+        rotor_command = powered(plant, parts.rotor_speed, rotor_command)
+        return (integrate(plant, parts, rotor_command, air, dt), loop), None
 
     # a gradient computes each sub-step again from its start: faster than storing what is inside, and far smaller
     again = jax.checkpoint(substep, prevent_cse=False)
-    parts, _ = jax.lax.scan(again, Parts.of(state), jnp.arange(physics.substeps))
-    return parts.join()
+    loop = None if mode.controller is None else state.rate_loop
+    start = Parts.of(state), jax.tree.map(Vec3.of, loop)
+    (parts, loop), _ = jax.lax.scan(again, start, jnp.arange(physics.substeps))
+    end = parts.join()
+    if loop is None:
+        return dataclasses.replace(end, rate_loop=state.rate_loop)
+    return dataclasses.replace(
+        end, rate_loop=RateLoop(*(x if x is None else x.stack() for x in (loop.integral, loop.seen)))
+    )
 
 
 def _blend(before: Command, after: Command, share: Array) -> Command:

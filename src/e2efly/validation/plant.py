@@ -15,11 +15,11 @@ from e2efly.control import COMMAND_MODES, Quat, Vec3
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.policy.contract import Contract
 from e2efly.vehicles import Vehicle, unknown
-from e2efly.vehicles.vehicle import quantities
+from e2efly.vehicles.vehicle import quantities, terms
 
 BESIDE = frozenset({"wind", "rotor_share", "plain_mixer"})
 """What a flight may meet beside another body."""
-EVERYTHING = BESIDE | {f.name for f in quantities()}
+EVERYTHING = BESIDE | {f.name for f in (*quantities(), *terms())}
 """All that can be changed without the flight controller's knowledge."""
 MOMENT = 1e-9
 """Seconds below which two times are one: rounding of sums of periods."""

@@ -10,7 +10,7 @@ from e2efly.control import Quat
 from e2efly.deploy.odometry import Odometry
 from e2efly.validation.plant import Plant
 from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import quantities
+from e2efly.vehicles.vehicle import quantities, terms
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,9 @@ class Reality:
 def altered(body: Vehicle, believed: Vehicle) -> frozenset[str]:
     """The fields in which a body is not what the flight controller takes it for."""
     return frozenset(
-        f.name for f in quantities() if not np.array_equal(getattr(body, f.name), getattr(believed, f.name))
+        f.name
+        for f in (*quantities(), *terms())
+        if not np.array_equal(getattr(body, f.name), getattr(believed, f.name))
     )
 
 

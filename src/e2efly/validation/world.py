@@ -14,6 +14,7 @@ import numpy as np
 
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.physics import State
+from e2efly.physics.body import powered
 from e2efly.physics.integrate import rk4
 from e2efly.physics.plant import Plant
 from e2efly.physics.state import Parts
@@ -92,7 +93,8 @@ class World:
             command, air, plant = tuple(row[17:21]), Vec3.of(row[21:24]), Plant.of(vehicle, STEP_S, row[24:28])
 
             def step(parts: Parts, _: None) -> tuple[Parts, None]:
-                free = rk4(plant, parts, command, air, STEP_S)  # type: ignore[arg-type]
+                told = powered(plant, parts.rotor_speed, command)  # type: ignore[arg-type]
+                free = rk4(plant, parts, told, air, STEP_S)
                 return _stand(vehicle, free), None
 
             after = jax.lax.scan(step, Parts.of(state), None, length=steps)[0].join()

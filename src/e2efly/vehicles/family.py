@@ -281,7 +281,7 @@ def _log(xp: Any, u: Any, bounds: Range) -> Any:
 
 def _loaded(vehicle: Vehicle, name: str) -> Vehicle:
     """A vehicle without leading axes as one that was read from a file: numbers, not arrays without axes."""
-    values = {f.name: getattr(vehicle, f.name) for f in quantities()}
+    values = {f.name: getattr(vehicle, f.name) for f in quantities(vehicle)}
     return Vehicle(name=name, **{key: value if np.ndim(value) else float(value) for key, value in values.items()})
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.vehicles.tables import read_table, shown
-from e2efly.vehicles.vehicle import CORRELATION, Vehicle, load_vehicle, quantities, read_sigmas, vehicle_file
+from e2efly.vehicles.vehicle import CORRELATION, Vehicle, load_vehicle, quantities, read_sigmas, terms, vehicle_file
 
 IDENTIFIED = "identified"
 """What `randomize` calls this distribution."""
@@ -48,7 +48,10 @@ class Entry:
         Raises:
             ValueError: for a name of another form, or of no parameter.
         """
-        found, shapes = re.fullmatch(r"(\w+)(?:\[(\d+)\])?", name), {f.name: f.metadata["shape"] for f in quantities()}
+        found, shapes = (
+            re.fullmatch(r"(\w+)(?:\[(\d+)\])?", name),
+            {f.name: f.metadata["shape"] for f in (*quantities(), *terms())},
+        )
         if found and found[1] in shapes:
             field, index, shape = found[1], found[2], shapes[found[1]]
             whole = shape == () or field in TOGETHER

@@ -15,6 +15,7 @@ import numpy as np
 
 from e2efly.vehicles.names import nearest, unknown
 from e2efly.vehicles.tables import read_table, shown
+from e2efly.vehicles.terms import check_terms
 
 _LARGEST = 1e6
 """Largest size of a value, in its unit."""
@@ -40,6 +41,11 @@ def _quantity(unit: str, shape: tuple[int, ...] = (), at_least: float | None = N
     return field(metadata={"unit": unit, "shape": shape, "at_least": at_least, "above": above})
 
 
+def _term(unit: str, shape: tuple[int, ...] = (), at_least: float | None = None, above: float | None = None) -> Any:
+    """A vehicle value that a file may leave out: the physics is then without what it describes."""
+    return field(default=None, metadata={"unit": unit, "shape": shape, "at_least": at_least, "above": above})
+
+
 @dataclass(frozen=True)
 class Vehicle:
     """Physical parameters of a quadrotor, float64 as loaded.
@@ -52,7 +58,7 @@ class Vehicle:
     mass: Any = _quantity("kg", above=0.0)
     """Mass."""
     inertia: Any = _quantity("kg*m^2", (3,), above=0.0)
-    """Principal moments of inertia about the body axes."""
+    """Moments of inertia about the body axes: all of the inertia tensor where `inertia_products` is left out."""
     rotor_position: Any = _quantity("m", (4, 2))
     """Rotor positions in the body's x-y plane."""
     rotor_spin: Any = _quantity("1", (4,))
@@ -97,11 +103,33 @@ class Vehicle:
     """Height of the centre of mass over the feet."""
     radius: Any = _quantity("m", above=0.0)
     """Radius of the sphere that holds the vehicle, for collisions."""
+    rotor_inertia: Any = _term("kg*m^2", at_least=0.0)
+    """Moment of inertia of a rotor, with all that turns with it, about its axis."""
+    motor_time_constant_down: Any = _term("s", above=0.0)
+    """Time constant of a rotor that slows down; `motor_time_constant` is that of one that speeds up."""
+    centre_of_mass: Any = _term("m", (3,))
+    """Centre of mass in the axes in which `rotor_position` stands; the drag acts at their origin."""
+    inertia_products: Any = _term("kg*m^2", (3,))
+    """Entries xy, xz and yz of the inertia tensor, whose diagonal is `inertia`: xy is minus the integral of x y dm."""
+    drag_torque: Any = _term("N*m*s", (3,), at_least=0.0)
+    """Torque of the air against the body's turning, per axis, over body rate."""
+    rate_integral_gain: Any = _term("1/s^2", (3,), at_least=0.0)
+    """Angular acceleration commanded per integral of the body-rate error."""
+    gyro_time_constant: Any = _term("s", above=0.0)
+    """Time constant of the first-order filter through which the rate loop sees the body rates."""
+    nominal_voltage: Any = _term("V", above=0.0)
+    """Voltage of the battery, under load, at which rotors turn as they are told: at which the thrust's limits hold."""
+    battery_voltage: Any = _term("V", above=0.0)
+    """Voltage of the battery without load, in flight."""
+    voltage_sag: Any = _term("V/N", at_least=0.0)
+    """Voltage that the battery loses under load, over the thrust of all rotors; left out: none."""
+    speed_per_volt: Any = _term("1", at_least=0.0)
+    """Relative change of the rotors' speed over relative change of the voltage, of a given command; left out: 1."""
 
     @property
     def hash(self) -> str:
         """First 16 hex digits of the SHA-256 of all values: two vehicles fly alike if and only if it is equal."""
-        values = {f.name: np.asarray(getattr(self, f.name), np.float64).tolist() for f in quantities()}
+        values = {f.name: np.asarray(getattr(self, f.name), np.float64).tolist() for f in quantities(self)}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
     def under(self, other: "Vehicle", *names: str) -> "Vehicle":
@@ -145,8 +173,10 @@ class Vehicle:
 
 TIMED = ("control_rate", "latency")
 """What a vehicle's file says of the policy's computer and its link."""
+RATE_LOOP = ("rate_gain", "rate_integral_gain", "gyro_time_constant")
+"""What a vehicle's file says of the rate loop."""
 CONTROLLED = (
-    "body_rate_max", "rate_gain", "attitude_gain", "velocity_gain", "position_gain", "tilt_max", "acceleration_max",
+    "body_rate_max", *RATE_LOOP, "attitude_gain", "velocity_gain", "position_gain", "tilt_max", "acceleration_max",
     "speed_max", *TIMED,
 )  # fmt: skip
 """What a vehicle's file says of the flight controller and what asks it; all else is the body."""
@@ -187,9 +217,18 @@ class Flown:
         return self.body.hash == self.believed.hash
 
 
-def quantities() -> tuple[dataclasses.Field, ...]:
-    """The fields of `Vehicle` that have a unit: all but its name."""
-    return tuple(f for f in dataclasses.fields(Vehicle) if "unit" in f.metadata)
+def quantities(vehicle: Vehicle | None = None) -> tuple[dataclasses.Field, ...]:
+    """The fields with a unit that every vehicle has; of a vehicle, those and the terms of physics that it has."""
+    return tuple(
+        f
+        for f in dataclasses.fields(Vehicle)
+        if "unit" in f.metadata and (f.default is not None or getattr(vehicle, f.name, None) is not None)
+    )
+
+
+def terms() -> tuple[dataclasses.Field, ...]:
+    """The fields that a vehicle's file may leave out, each a term of the physics: None where there is none."""
+    return tuple(f for f in dataclasses.fields(Vehicle) if f.default is None)
 
 
 def vehicle_names() -> list[str]:
@@ -229,13 +268,15 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
             f"{', '.join(vehicle_names())}, or the path of a .toml file"
         )
     table.pop(CORRELATION, None)
-    vehicle = Vehicle(name=path.stem, **read_values(table, quantities(), where))
+    vehicle = Vehicle(name=path.stem, **read_values(table, (*quantities(), *terms()), where))
     check(vehicle, where)
     return vehicle
 
 
 def read_values(table: dict[str, Any], fields: Sequence[dataclasses.Field], where: str) -> dict[str, Any]:
     """The values of a file that has an entry for each of these fields, made as those of `Vehicle`, and no others.
+
+    A field that has a default may be left out.
 
     Raises:
         ValueError: naming the file, the key, the value and what is accepted.
@@ -246,9 +287,9 @@ def read_values(table: dict[str, Any], fields: Sequence[dataclasses.Field], wher
             guess = nearest(key, known)
             hint = f"; did you mean {guess!r}?" if guess else f" (accepted: {', '.join(known)})"
             raise ValueError(f"{where}: unknown key {key!r}{hint}")
-    if missing := [key for key in known if key not in table]:
+    if missing := [key for key, f in known.items() if key not in table and f.default is dataclasses.MISSING]:
         raise ValueError(f"{where}: missing key {', '.join(map(repr, missing))}")
-    return {key: _read(where, f, table[key]) for key, f in known.items()}
+    return {key: _read(where, f, table[key]) for key, f in known.items() if key in table}
 
 
 def _read(where: str, f: dataclasses.Field, entry: Any) -> Any:
@@ -312,9 +353,8 @@ def read_sigmas(name_or_path: str | Path) -> dict[str, np.ndarray]:
         ValueError: as of `load_vehicle`.
     """
     path = vehicle_file(name_or_path)
-    load_vehicle(path)
-    table = read_table(path)
-    return {f.name: _read_sigma(str(path), f, table[f.name]) for f in quantities()}
+    vehicle, table = load_vehicle(path), read_table(path)
+    return {f.name: _read_sigma(str(path), f, table[f.name]) for f in quantities(vehicle)}
 
 
 def check(vehicle: Vehicle, where: str = "vehicle") -> None:
@@ -323,11 +363,17 @@ def check(vehicle: Vehicle, where: str = "vehicle") -> None:
     Raises:
         ValueError: naming the values and what is accepted.
     """
-    ix, iy, iz = vehicle.inertia
-    if ix + iy < iz or iy + iz < ix or iz + ix < iy:
+    ix, iy, iz = principal_moments(vehicle)
+    if ix <= 0:
         raise ValueError(
-            f"{where}: inertia.value is {list(vehicle.inertia)}; accepted: no moment larger than the sum of the "
-            "other two (the triangle inequality of every rigid body)"
+            f"{where}: inertia_products.value is {vehicle.inertia_products.tolist()} and inertia.value is "
+            f"{list(vehicle.inertia)}; accepted: a tensor of which every principal moment is positive"
+        )
+    if ix + iy < iz:
+        products = "" if vehicle.inertia_products is None else f" with products {vehicle.inertia_products.tolist()}"
+        raise ValueError(
+            f"{where}: inertia.value is {list(vehicle.inertia)}{products}; accepted: no principal moment larger than "
+            "the sum of the other two (the triangle inequality of every rigid body)"
         )
     if sorted(vehicle.rotor_spin) != [-1, -1, 1, 1]:
         raise ValueError(f"{where}: rotor_spin.value is {list(vehicle.rotor_spin)}; accepted: two of +1 and two of -1")
@@ -364,9 +410,34 @@ def check(vehicle: Vehicle, where: str = "vehicle") -> None:
             f"({vehicle.torque_ratio} m) leave an axis without control; accepted: rotors that give independent "
             "thrust, roll, pitch and yaw"
         )
+    check_terms(vehicle, allocation, vehicle.mass * GRAVITY, where)
+
+
+def rotor_arms(vehicle: Vehicle) -> np.ndarray:
+    """Places of the rotors from the centre of mass in the body's x-y plane, (4, 2), m."""
+    arms = np.asarray(vehicle.rotor_position, np.float64)
+    return arms if vehicle.centre_of_mass is None else arms - np.asarray(vehicle.centre_of_mass)[:2]
+
+
+def inertia_tensor(vehicle: Vehicle) -> np.ndarray:
+    """Inertia about the centre of mass in body axes, (3, 3), kg*m^2."""
+    tensor = np.diag(np.asarray(vehicle.inertia, np.float64))
+    if vehicle.inertia_products is not None:
+        tensor[(0, 0, 1), (1, 2, 2)] = tensor[(1, 2, 2), (0, 0, 1)] = vehicle.inertia_products
+    return tensor
+
+
+def principal_moments(vehicle: Vehicle) -> np.ndarray:
+    """Principal moments of inertia, rising, (3,), kg*m^2."""
+    if vehicle.inertia_products is None:
+        return np.sort(vehicle.inertia)
+    return np.linalg.eigvalsh(inertia_tensor(vehicle))
 
 
 def allocation_matrix(vehicle: Vehicle) -> np.ndarray:
-    """The 4x4 matrix from rotor thrusts, N, to [collective thrust, N; torque about body x, y, z, N*m]."""
-    x, y = np.asarray(vehicle.rotor_position, np.float64).T
+    """The 4x4 matrix from rotor thrusts, N, to [collective thrust, N; torque about body x, y, z, N*m].
+
+    Torques are about the centre of mass.
+    """
+    x, y = rotor_arms(vehicle).T
     return np.stack([np.ones(4), y, -x, np.asarray(vehicle.rotor_spin) * vehicle.torque_ratio])

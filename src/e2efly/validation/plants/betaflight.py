@@ -13,6 +13,7 @@ from e2efly.deploy.pilot.hover import controlled
 from e2efly.validation.plant import EVERYTHING, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import RATE_LOOP
 
 if TYPE_CHECKING:
     from e2efly.deploy.bridge import Bridge
@@ -32,7 +33,7 @@ class BetaflightPlant(Plant):
     """Starts the firmware, takes off once to learn the throttle map, and then flies from wherever it is put."""
 
     parallel, latency, episodes, whole_flights = False, LATENCY_S, 20, True
-    alters = EVERYTHING - {"rate_gain", "plain_mixer"}
+    alters = EVERYTHING - {*RATE_LOOP, "plain_mixer"}
 
     def __init__(self, vehicle: Vehicle, mode: str) -> None:
         """Build the firmware where need be, start it and take off.

@@ -10,20 +10,23 @@ and mixer, float64) runs before every step of at most 1 ms. Two things need a wo
 - MuJoCo's fluid models take their drag from a body's box or ellipsoid and have no coefficients per axis. So each axis
   has an actuator without an input that pushes back by its own velocity, -(k1 + k2 |v|) v, with |v| as of the last step;
   wind is taken off that velocity, turned into the body's frame as of the last step.
+- The angular momentum of the rotors, where the vehicle has rotor inertia: over a step they give the body the momentum
+  that they lose, and the torque w x h of the body rate w in the middle of the step, by its last change.
 """
 
 import importlib
 import math
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from e2efly.control import COMMAND_MODES, Quat, Vec3
-from e2efly.validation.plant import EVERYTHING, MOMENT, Known, Plant, RigidState, check_mode
+from e2efly.control import Quat, Vec3
+from e2efly.validation.controller import FlightController, rotor_speed_of
+from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY, allocation_matrix
+from e2efly.vehicles.terms import LEAST_VOLTAGE
+from e2efly.vehicles.vehicle import GRAVITY, RATE_LOOP, inertia_tensor, rotor_arms
 
 STEP = 1e-3
 """Longest step of MuJoCo and of the rate loop, s."""
@@ -39,9 +42,11 @@ def vehicle_xml(vehicle: Vehicle) -> str:
     """
     k2, k1, k0 = vehicle.thrust_map
     hover, lag, ratio = vehicle.hover_rotor_speed, vehicle.motor_time_constant, vehicle.torque_ratio
-    sites, feet, actuators = ['<site name="centre"/>'], [], []
-    for i, ((x, y), spin) in enumerate(zip(vehicle.rotor_position, vehicle.rotor_spin, strict=True)):
-        sites.append(f'<site name="rotor_{i}" pos="{x} {y} 0"/>')
+    centre = np.zeros(3) if vehicle.centre_of_mass is None else vehicle.centre_of_mass
+    dx, dy, dz = (-centre).tolist()  # the body's frame is that of its centre of mass, the state of the plant
+    sites, feet, actuators = [f'<site name="centre" pos="{dx} {dy} {dz}"/>'], [], []
+    for i, ((x, y), spin) in enumerate(zip(rotor_arms(vehicle), vehicle.rotor_spin, strict=True)):
+        sites.append(f'<site name="rotor_{i}" pos="{x} {y} {dz}"/>')
         feet.append(f'<geom name="foot_{i}" type="sphere" size="{FOOT}" pos="{x} {y} {FOOT - vehicle.feet_height}"/>')
         actuators.append(
             f'<general name="motor_{i}" site="rotor_{i}" gear="0 0 1 0 0 {spin * ratio}" dyntype="filter" '
@@ -52,7 +57,16 @@ def vehicle_xml(vehicle: Vehicle) -> str:
             f'<general name="drag_{axis}" site="centre" gear="{gear} 0 0 0" gainprm="0" biastype="affine" '
             f'biasprm="0 0 {-drag}"/>'
         )
-    inertia = " ".join(str(x) for x in vehicle.inertia)
+    if vehicle.drag_torque is not None:
+        for axis, gear, drag in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), vehicle.drag_torque, strict=True):
+            actuators.append(
+                f'<general name="drag_torque_{axis}" site="centre" gear="0 0 0 {gear}" gainprm="0" biastype="affine" '
+                f'biasprm="0 0 {-drag}"/>'
+            )
+    entries = inertia_tensor(vehicle)[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)].tolist()
+    inertia = f'diaginertia="{" ".join(map(str, entries[:3]))}"'
+    if vehicle.inertia_products is not None:
+        inertia = f'fullinertia="{" ".join(map(str, entries))}"'
     line = "\n      "
     return f"""<mujoco model="{vehicle.name}">
   <compiler inertiafromgeom="false"/>
@@ -64,7 +78,7 @@ def vehicle_xml(vehicle: Vehicle) -> str:
     <geom name="ground" type="plane" size="20 20 1"/>
     <body name="vehicle" pos="0 0 {vehicle.feet_height}">
       <freejoint/>
-      <inertial pos="0 0 0" mass="{vehicle.mass}" diaginertia="{inertia}"/>
+      <inertial pos="0 0 0" mass="{vehicle.mass}" {inertia}/>
       {line.join(sites)}
       {line.join(feet)}
     </body>
@@ -108,7 +122,7 @@ class MujocoPlant(Plant):
         self.model = self._mujoco.MjModel.from_xml_string(vehicle_xml(body))
         self.data = self._mujoco.MjData(self.model)
         self._body = body
-        self._law = control_law(self._believed.under(body, "rate_gain"), self._mode, plain_mixer)
+        self._controller = FlightController(self._believed.under(body, *RATE_LOOP), self._mode, plain_mixer)
         self._full_speed = body.full_rotor_speed
 
     def disturb(self, wind: np.ndarray, rotor_share: np.ndarray) -> None:
@@ -132,7 +146,8 @@ class MujocoPlant(Plant):
         self.data.qpos[:] = np.concatenate([state.position, state.quaternion])
         self.data.qvel[:] = np.concatenate([state.velocity, state.body_rate])
         self.data.act[:] = self._body.hover_rotor_speed
-        self._wind, self._share = _CALM, np.ones(4)
+        self._wind, self._share, self._last_rate = _CALM, np.ones(4), state.body_rate
+        self._controller.start(state.body_rate.tolist())
         self._mujoco.mj_forward(self.model, self.data)  # the velocities that the drag starts from
 
     def step(self, command: np.ndarray, dt: float) -> None:
@@ -143,80 +158,46 @@ class MujocoPlant(Plant):
         linear, quadratic, share = self._body.drag_linear, self._body.drag_quadratic, self._share
         for _ in range(count):
             model.opt.timestep = dt / count
-            thrusts = self._law(wanted, data.qpos.tolist(), data.qvel.tolist())
-            data.ctrl[:4] = np.minimum(rotor_speed_of(told, thrusts), self._full_speed)
+            thrusts = self._controller.thrusts(wanted, data.qpos.tolist(), data.qvel.tolist(), dt / count)
             speed = data.act.copy()
+            data.ctrl[:4] = np.minimum(rotor_speed_of(told, thrusts), self._full_speed) * self._powered(speed)
+            model.actuator_dynprm[:4, 0] = self._lags()
             model.actuator_gainprm[:4, 0] = share * (2 * k2 * speed + k1)
             model.actuator_biasprm[:4, 0] = share * (k0 - k2 * speed * speed)
             wind = self._wind if self._wind == _CALM else Quat(*data.qpos[3:].tolist()).unrotate(self._wind)
             air = np.array([wind.x, wind.y, wind.z])
-            drag = linear + quadratic * np.abs(data.actuator_velocity[4:] - air)
-            model.actuator_biasprm[4:, 0] = drag * air
-            model.actuator_biasprm[4:, 2] = -drag
+            drag = linear + quadratic * np.abs(data.actuator_velocity[4:7] - air)
+            model.actuator_biasprm[4:7, 0] = drag * air
+            model.actuator_biasprm[4:7, 2] = -drag
+            if self._body.rotor_inertia is not None:
+                data.qfrc_applied[3:] = self._rotor_torque(dt / count)
             self._mujoco.mj_step(model, data)
 
+    def _powered(self, speed: np.ndarray) -> float:
+        """Speed to which the battery brings a rotor, over the one that it is told."""
+        body, (k2, k1, k0) = self._body, self._body.thrust_map
+        if body.battery_voltage is None:
+            return 1.0
+        thrust = self._share @ np.maximum((k2 * speed + k1) * speed + k0, 0.0)
+        voltage = body.battery_voltage - (0.0 if body.voltage_sag is None else body.voltage_sag) * thrust
+        exponent = 1.0 if body.speed_per_volt is None else float(body.speed_per_volt)
+        return max(float(voltage / body.nominal_voltage), LEAST_VOLTAGE) ** exponent
 
-Law = Callable[[Sequence[float], Sequence[float], Sequence[float]], list[float]]
-"""(command, pose: position and quaternion, motion: velocity in the world and body rates) -> rotor thrusts, N."""
+    def _lags(self) -> np.ndarray:
+        """Time constant of each rotor's lag on the way to what it is told now, s; it keeps to its side of that."""
+        up, down = self._body.motor_time_constant, self._body.motor_time_constant_down
+        return np.where(self.data.ctrl[:4] < self.data.act, up if down is None else down, up)
 
-
-def control_law(vehicle: Vehicle, command_mode: str, plain_mixer: bool = False) -> Law:
-    """The flight controller of a command mode, for the vehicle that it knows; `plain_mixer` as for `rate_loop`.
-
-    Raises:
-        KeyError: for an unknown command mode.
-    """
-    mode = COMMAND_MODES[command_mode]
-    controller = mode.controller
-    if controller is None:
-        low, high = vehicle.thrust_range
-        unit = high if mode.of_largest else 1.0
-        return lambda command, pose, motion: [min(max(unit * f, low), high) for f in command]
-    rates = rate_loop(vehicle, plain_mixer)
-    if command_mode == "ctbr":
-        return lambda command, pose, motion: rates(command, motion[3:])
-
-    def law(command: Sequence[float], pose: Sequence[float], motion: Sequence[float]) -> list[float]:
-        known = Known(Vec3(*pose[:3]), Vec3(*motion[:3]), Quat(*pose[3:]))
-        wanted = controller(vehicle, known, (command[0], command[1], command[2], command[3]))
-        ctbr = (wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z)
-        return rates([float(x) for x in ctbr], motion[3:])
-
-    return law
-
-
-def rate_loop(vehicle: Vehicle, plain_mixer: bool = False) -> Callable[[Sequence[float], Sequence[float]], list[float]]:
-    """The rate loop and the mixer: collective thrust over mass, m/s^2, and body rates, rad/s, to rotor thrusts.
-
-    torque = J K (wanted - w) + w x J w, mixed with attitude before thrust: when the torque asks for more span than a
-    rotor has, all of it is scaled down; then the collective is shifted until every rotor is inside its limits. A plain
-    mixer clips each rotor by itself instead. On plain numbers, which at a thousand times a second is four times as fast
-    as on arrays of three.
-    """
-    mass, (jx, jy, jz) = float(vehicle.mass), vehicle.inertia.tolist()
-    stiffness, limits = (vehicle.inertia * vehicle.rate_gain).tolist(), vehicle.body_rate_max.tolist()
-    rows = np.linalg.inv(allocation_matrix(vehicle)).tolist()
-    low, high = vehicle.thrust_range
-
-    def thrusts(command: Sequence[float], body_rate: Sequence[float]) -> list[float]:
-        p, q, r = body_rate
-        gyroscopic = (jz - jy) * q * r, (jx - jz) * r * p, (jy - jx) * p * q
-        x, y, z = (
-            k * (min(max(wanted, -limit), limit) - rate) + g
-            for k, wanted, limit, rate, g in zip(stiffness, command[1:], limits, body_rate, gyroscopic, strict=True)
-        )
-        spread = [row[1] * x + row[2] * y + row[3] * z for row in rows]
-        if plain_mixer:
-            return [min(max(row[0] * mass * command[0] + s, low), high) for row, s in zip(rows, spread, strict=True)]
-        scale = (high - low) / max(max(spread) - min(spread), high - low)
-        asked = [row[0] * mass * command[0] + scale * s for row, s in zip(rows, spread, strict=True)]
-        shift = max(low - min(asked), 0.0) - max(max(asked) - high, 0.0)
-        return [min(max(f + shift, low), high) for f in asked]
-
-    return thrusts
-
-
-def rotor_speed_of(thrust_map: Sequence[float], thrusts: Sequence[float]) -> list[float]:
-    """The rotor speeds, rad/s, that give thrusts, N: the rising branch of the map k2 W^2 + k1 W + k0."""
-    k2, k1, k0 = thrust_map
-    return [(math.sqrt(k1 * k1 + 4 * k2 * (f - k0)) - k1) / (2 * k2) for f in thrusts]
+    def _rotor_torque(self, dt: float) -> np.ndarray:
+        """Mean torque on the body from the angular momentum of its rotors over the next step, body axes, N*m."""
+        body, data = self._body, self.data
+        now, told, lag = data.act, data.ctrl[:4], self._lags()
+        after = told + (now - told) * np.exp(-dt / lag)
+        inertia = -body.rotor_inertia * body.rotor_spin  # a rotor turns against its reaction torque
+        before = inertia @ now
+        change = inertia @ after - before
+        rate = data.qvel[3:]
+        p, q, _ = 1.5 * rate - 0.5 * self._last_rate
+        self._last_rate = rate.copy()
+        middle = before + change / 2
+        return np.array([-q * middle, p * middle, -change / dt])

@@ -71,10 +71,12 @@ class SimulatorPlant(Plant):
         """Put the vehicle there, the rotors at hover speed."""
         import jax.numpy as jnp
 
-        from e2efly.physics import State
+        from e2efly.physics import State, started
 
         arrays = (state.position, state.velocity, state.quaternion, state.body_rate, np.full(4, self._hover))
-        self._state = State(*(jnp.asarray(x, jnp.float32) for x in arrays))
+        p, v, q, w, speed = (jnp.asarray(x, jnp.float32) for x in arrays)
+        begin = State(p, v, q, w, speed)
+        self._state = started(self._physics, self._physics.flown, begin)
         self._filled, self._mean, self._air = 0.0, np.zeros(4), _STILL
 
     def step(self, command: np.ndarray, dt: float) -> None:

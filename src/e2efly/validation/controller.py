@@ -1,0 +1,128 @@
+"""The flight controller of a plant that simulates none: rate loop and mixer on plain numbers, float64. Imports no JAX.
+
+On plain numbers it is four times as fast as on arrays of three, which counts at a thousand times a second.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from e2efly.control import COMMAND_MODES, Quat, Vec3
+from e2efly.validation.plant import Known
+from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import allocation_matrix, inertia_tensor
+
+Numbers = Sequence[float]
+
+
+class FlightController:
+    """From commands to rotor thrusts, for the vehicle that it knows."""
+
+    def __init__(self, vehicle: Vehicle, command_mode: str, plain_mixer: bool = False) -> None:
+        """Make it; `start` comes before the first `thrusts`.
+
+        Args:
+            vehicle: in which it believes.
+            command_mode: a name of `COMMAND_MODES`.
+            plain_mixer: as for `RateLoop`.
+
+        Raises:
+            KeyError: for an unknown command mode.
+        """
+        mode = COMMAND_MODES[command_mode]
+        self._vehicle, self._by_rates, self._controller = vehicle, command_mode == "ctbr", mode.controller
+        self._low, self._high = vehicle.thrust_range
+        self._unit = self._high if mode.of_largest else 1.0
+        self._loop = RateLoop(vehicle, plain_mixer)
+
+    def start(self, body_rate: Numbers) -> None:
+        """Forget what was; the filter of the body rates has settled."""
+        self._loop.start(body_rate)
+
+    def thrusts(self, command: Numbers, pose: Numbers, motion: Numbers, dt: float) -> list[float]:
+        """Thrusts of the rotors, N.
+
+        Args:
+            command: in the units of the command mode.
+            pose: position and quaternion.
+            motion: velocity in the world and body rates.
+            dt: time since it was last asked, s.
+        """
+        if self._controller is None:
+            return [min(max(self._unit * f, self._low), self._high) for f in command]
+        if not self._by_rates:
+            known = Known(Vec3(*pose[:3]), Vec3(*motion[:3]), Quat(*pose[3:]))
+            wanted = self._controller(self._vehicle, known, (command[0], command[1], command[2], command[3]))
+            command = [float(x) for x in (wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z)]
+        return self._loop.thrusts(command, motion[3:], dt)
+
+
+class RateLoop:
+    """The rate loop and the mixer: collective thrust over mass, m/s^2, and body rates, rad/s, to rotor thrusts.
+
+    torque = J (K (wanted - w) + integral) + w x J w at the filtered body rates w, mixed with attitude before thrust:
+    when the torque asks for more span than a rotor has, all of it is scaled down; then the collective is shifted until
+    every rotor is inside its limits. A plain mixer clips each rotor by itself instead.
+    """
+
+    def __init__(self, vehicle: Vehicle, plain_mixer: bool = False) -> None:
+        self._plain, self._mass = plain_mixer, float(vehicle.mass)
+        (jx, xy, xz), (_, jy, yz), (*_, jz) = inertia_tensor(vehicle).tolist()
+        self._inertia = jx, jy, jz, xy, xz, yz
+        self._gains, self._limits = vehicle.rate_gain.tolist(), vehicle.body_rate_max.tolist()
+        self._rows = np.linalg.inv(allocation_matrix(vehicle)).tolist()
+        self._range = vehicle.thrust_range
+        gain, time = vehicle.rate_integral_gain, vehicle.gyro_time_constant
+        self._integral_gains = None if gain is None else gain.tolist()
+        self._largest = [k * rate for k, rate in zip(self._gains, self._limits, strict=True)]
+        self._filter = None if time is None else float(time)
+        self.start([0.0, 0.0, 0.0])
+
+    def start(self, body_rate: Numbers) -> None:
+        """Forget what was; the filter of the body rates has settled."""
+        self._integral, self._seen = [0.0, 0.0, 0.0], list(body_rate)
+
+    def thrusts(self, command: Numbers, body_rate: Numbers, dt: float) -> list[float]:
+        """Thrusts of the rotors, N, for a command by thrust and rates; `dt` s after the last one."""
+        if self._filter is not None:
+            left = math.exp(-dt / self._filter)
+            self._seen = body_rate = [w + (old - w) * left for old, w in zip(self._seen, body_rate, strict=True)]
+        errors = [
+            min(max(wanted, -limit), limit) - rate
+            for wanted, limit, rate in zip(command[1:], self._limits, body_rate, strict=True)
+        ]
+        asked = [k * error for k, error in zip(self._gains, errors, strict=True)]
+        if self._integral_gains is not None:
+            self._integral = [
+                min(max(now + k * error * dt, -most), most)
+                for now, k, error, most in zip(self._integral, self._integral_gains, errors, self._largest, strict=True)
+            ]
+            asked = [a + now for a, now in zip(asked, self._integral, strict=True)]
+        return self._mixed(self._mass * command[0], self._torque(asked, body_rate))
+
+    def _torque(self, asked: Numbers, body_rate: Numbers) -> tuple[float, float, float]:
+        """J times the angular acceleration that is asked for, and w x J w, N*m."""
+        (jx, jy, jz, xy, xz, yz), (a, b, c), (p, q, r) = self._inertia, asked, body_rate
+        hx, hy, hz = jx * p + xy * q + xz * r, xy * p + jy * q + yz * r, xz * p + yz * q + jz * r
+        return (
+            jx * a + xy * b + xz * c + q * hz - r * hy,
+            xy * a + jy * b + yz * c + r * hx - p * hz,
+            xz * a + yz * b + jz * c + p * hy - q * hx,
+        )
+
+    def _mixed(self, collective: float, torque: tuple[float, float, float]) -> list[float]:
+        (x, y, z), (low, high) = torque, self._range
+        spread = [row[1] * x + row[2] * y + row[3] * z for row in self._rows]
+        if self._plain:
+            return [min(max(row[0] * collective + s, low), high) for row, s in zip(self._rows, spread, strict=True)]
+        scale = (high - low) / max(max(spread) - min(spread), high - low)
+        asked = [row[0] * collective + scale * s for row, s in zip(self._rows, spread, strict=True)]
+        shift = max(low - min(asked), 0.0) - max(max(asked) - high, 0.0)
+        return [min(max(f + shift, low), high) for f in asked]
+
+
+def rotor_speed_of(thrust_map: Numbers, thrusts: Numbers) -> list[float]:
+    """The rotor speeds, rad/s, that give thrusts, N: the rising branch of the map k2 W^2 + k1 W + k0."""
+    k2, k1, k0 = thrust_map
+    return [(math.sqrt(k1 * k1 + 4 * k2 * (f - k0)) - k1) / (2 * k2) for f in thrusts]
