@@ -78,7 +78,7 @@ def _draw_step(ax: Axes, alignment: Alignment, flown: Stretches, channel: int) -
 
 def _measured(stream: str) -> dict[str, Any]:
     """An accelerometer shakes: a thin line leaves the others to be seen."""
-    return MEASURED | ({"linewidth": 1.0, "alpha": 0.55} if stream == "specific_force" else {})
+    return MEASURED | ({"linewidth": 1.3, "alpha": 0.8} if stream == "specific_force" else {})
 
 
 def plot_replay(path: Path, alignment: Alignment, record: Record) -> None:
