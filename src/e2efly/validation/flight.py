@@ -94,7 +94,8 @@ def fly(
     if steps < 1:
         raise ValueError(f"duration is {duration} s; accepted: one control period or more, {period:.4g} s")
     disturbed = air is not None and air.disturbs
-    delay = Delay.of(latency, runtime.policy.command(np.array(contract.hover_action)))
+    hover = runtime.low + (np.array(contract.hover_action) + 1) / 2 * runtime.span
+    delay = Delay.of(latency, hover)
     plant.reset(start)
     states, decisions, fault = [plant.state], [], ""
     samples = [] if sample is None else [Sample.of(plant, 0.0)]
