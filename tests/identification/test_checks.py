@@ -108,6 +108,53 @@ def test_a_bad_flight_is_refused_by_name(
         checked(records(flight()), vehicle)
 
 
+def test_poses_are_turned_onto_the_accelerometer_s_level_before_take_off(vehicle: Vehicle) -> None:
+    """Markers that were put on with a pitch of 3 degrees: the poses' x axis points down."""
+    record, rest = flight(), 2.0
+    half = np.radians(3.0) / 2
+    still = np.arange(0, rest, 0.005)
+    before = {
+        "body_rate": np.zeros(3), "specific_force": np.array([0, 0, 9.81]), "motor": np.zeros(4),
+        "quaternion": np.array([1.0, 0, 0, 0]),
+    }  # fmt: skip
+    thrust = record.streams["rotor_speed"].values ** 2 * vehicle.thrust_map[0] / vehicle.rotor_thrust_max
+    streams = {**record.streams, "motor": Stream(record.streams["rotor_speed"].time, thrust)}
+    tilted = {}
+    for name, at_rest in before.items():
+        stream = streams[name]
+        values = np.concatenate([np.tile(at_rest, (len(still), 1)), stream.values])
+        if name == "quaternion":  # times a turn about y
+            w, x, y, z = values.T
+            c, s = np.cos(half), np.sin(half)
+            values = np.stack([w * c - y * s, x * c - z * s, y * c + w * s, z * c + x * s], -1)
+        tilted[name] = Stream(np.concatenate([still, rest + stream.time]), values)
+    (found,) = checked([replace(record, streams=tilted)], vehicle)
+    assert "poses are turned by 3.0 degrees onto the accelerometer's level before take-off" in found.notes
+    pose = found.streams["quaternion"]
+    told = np.stack(
+        [
+            np.interp(pose.time - rest, record.streams["quaternion"].time, q)
+            for q in record.streams["quaternion"].values.T
+        ],
+        -1,
+    )
+    assert np.all(np.abs(np.sum(told * pose.values, -1)) > 1 - 1e-5)
+
+
+def test_swapped_motor_outputs_are_told_through_the_motors_lag(vehicle: Vehicle) -> None:
+    """Outputs that lead what the body does by lag and delay."""
+    record = flight()
+    speed = record.streams["rotor_speed"]
+    thrust = speed.values**2 * vehicle.thrust_map[0] / vehicle.rotor_thrust_max
+    asked = thrust + vehicle.motor_time_constant * np.gradient(thrust, speed.time, axis=0)
+    streams = {k: s for k, s in record.streams.items() if k != "rotor_speed"}
+    good = replace(record, streams={**streams, "motor": Stream(speed.time - 0.01, np.clip(asked, 0, 1))})
+    checked([good], vehicle)
+    swapped = changed(good, "motor", lambda x: x[:, [1, 0, 2, 3]])
+    with pytest.raises(ValueError, match="the columns fit it in the order m2, m1, m3, m4"):
+        checked([swapped], vehicle)
+
+
 def test_splines_that_overshoot_are_refused(vehicle: Vehicle) -> None:
     rng = np.random.default_rng(0)
     with pytest.raises(ValueError, match=r"rotor_speed is up to 1e\+06 rad/s, and beyond what a quadrotor can do in"):

@@ -129,6 +129,21 @@ def test_motor_outputs_give_the_motors_lag_and_the_thrust(record: Record) -> Non
     assert abs(float(found.fit.p[names.index("motor_curve")]) - curve) < 0.05
     assert "latency" not in {e.name for e in found.estimates}  # how late motors hear is not how late a vehicle is
     assert np.allclose(vehicle.inertia[:2], BODY.inertia[:2], rtol=0.1)
+    off = found.sigma[[u.name for u in found.model.unknowns].index("motor_time_constant")]
+    assert "without delay" in found.structures and off > 0.01
+
+
+def test_slow_motor_outputs_give_thrust_while_the_measured_rates_turn_the_vehicle(record: Record) -> None:
+    rotors = record.streams["rotor_speed"]
+    share = np.clip(FILE.thrust_map[0] * rotors.values**2 / FILE.thrust_range[1], 0.0, 1.0)
+    output = np.sqrt(0.25 + 2 * share) - 0.5
+    streams = {k: s for k, s in record.streams.items() if k not in ("rotor_speed", "command")}
+    streams["motor"] = dataclasses.replace(rotors, time=rotors.time[::3], values=output[::3])
+    found = identify(dataclasses.replace(FILE, mass=BODY.mass), [dataclasses.replace(record, streams=streams)])
+    assert found.model.driver == "motor_and_rate"
+    assert not {"inertia", "torque_ratio"} & {e.name for e in found.estimates}
+    thrust = next(e for e in found.estimates if e.name == "thrust_map")
+    assert np.isclose(thrust.value[0], BODY.thrust_map[0], rtol=0.05)
 
 
 def test_hover_does_not_give_the_inertia() -> None:

@@ -13,7 +13,7 @@ from e2efly.deploy.log.bags import export_bag
 from e2efly.deploy.log.flight_log import read_log
 from e2efly.deploy.log.telemetry import Telemetry
 from e2efly.identification.csv_file import column_map, read_csv, write_csv
-from e2efly.identification.readers import read_flights
+from e2efly.identification.readers import read_flights, read_part
 from e2efly.identification.record import Record, Stream, stream_table
 
 HALF = math.sqrt(0.5)
@@ -53,7 +53,7 @@ def test_columns_of_other_names_and_units_are_mapped(tmp_path: Path) -> None:
         ("t,a,b\n0,1,2\n", "knows none of the columns t, a, b"),
         ("t,wx,wy,wz\n0,1,2,3\n", "has 1 lines of numbers"),
         ("t,wx,wy,wz\n0,1,2,3\n0,1,2,3\n", "line 3: t does not rise"),
-        ("t,wx,wy,wz\n0,1,2,3\n1,1,2\n", "line 3 has 3 entries; accepted: 4"),
+        ("t,wx,wy,wz\n0,1,2,3\n1,1,2\n2,1,2,3\n", "line 3 has 3 entries; accepted: 4"),
         ("t,wx,wy,wz\n0,1,2,3\n1,1,2,fast\n", "line 3: wz is 'fast'"),
         ("t,wx,wy,wz\n0,1,2,3\n1,1,2,inf\n", "line 3: wz is 'inf'; accepted: a finite number"),
         ("t,t,wx,wy,wz\n0,0,1,2,3\n", "has two columns 't'"),
@@ -63,6 +63,23 @@ def test_a_wrong_csv_file_is_refused_with_its_line(tmp_path: Path, text: str, to
     (tmp_path / "c.csv").write_text(text)
     with pytest.raises(ValueError, match=told):
         read_csv(tmp_path / "c.csv")
+
+
+def test_a_last_line_that_breaks_off_is_left_out(tmp_path: Path) -> None:
+    (tmp_path / "d.csv").write_text("t,wx,wy,wz\n0,1,2,3\n1,1,2,3\n2,1,2")
+    found = read_csv(tmp_path / "d.csv")
+    assert len(found.streams["body_rate"].time) == 2
+    assert found.notes == ("line 4, the last, breaks off and is left out",)
+
+
+def test_a_part_of_a_log_is_cut_out_by_times_after_its_beginning(tmp_path: Path) -> None:
+    crazyflie(tmp_path / "log07", samples=2000)
+    (found,) = read_part(tmp_path / "log07:0.5-1.25")
+    time = found.streams["body_rate"].time
+    assert np.isclose(time[0], 0.501) and np.isclose(time[-1], 1.251)
+    assert found.path == tmp_path / "log07" and found.notes == ("used from 0.5 to 1.25 s, as asked",)
+    with pytest.raises(ValueError, match=r"log07:3-4: is from 3 to 4 s, of a log of 2\.0 s"):
+        read_part(tmp_path / "log07:3-4")
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,8 @@ class Identify:
 
     sources: tyro.conf.Positional[tuple[str, ...]]
     """parts FILE: a list of parts. pendulum FILE: periods of a bifilar pendulum. stand FILE: a thrust stand's record.
-    flight LOG...: flights. step LOG...: flights with steps of body rate, for delay and rate loop alone."""
+    flight LOG...: flights. step LOG...: flights with steps of body rate, for delay and rate loop alone. LOG:BEGIN-END
+    takes what lies between two times, s after the log begins."""
     vehicle: str = "vis_r"
     """The base: a vehicle's name or a .toml file. What the sources do not say stays as it is there, and the flight
     controller of the flights is taken to have believed in it."""
@@ -130,9 +131,9 @@ def _sources(words: Sequence[str]) -> dict[str, list[Path]]:
 def _records(files: Sequence[Path], columns: Any, vehicle: Vehicle, console: Console) -> "list[Record]":
     from e2efly.identification.blackbox import with_blackboxes
     from e2efly.identification.checks import checked
-    from e2efly.identification.readers import read_flights
+    from e2efly.identification.readers import read_part
 
-    read = [record for path in files for record in read_flights(path, columns)]
+    read = [record for path in files for record in read_part(path, columns)]
     records = checked(with_blackboxes(read), vehicle)
     for record in records:
         rates = ", ".join(f"{name} {stream.rate:.0f} Hz" for name, stream in record.streams.items())
@@ -181,7 +182,7 @@ def _report(
     outside: "dict[str, Prediction]",
 ) -> dict[str, Any]:
     from e2efly.identification.flight import nuisances
-    from e2efly.identification.windows import LENGTH, STEP
+    from e2efly.identification.windows import STEP
 
     def entry(e: "Estimate") -> dict[str, Any]:
         return {"value": e.value.tolist(), "sigma": e.sigma.tolist(), "source": e.source}
@@ -194,24 +195,29 @@ def _report(
         "sources": [{"parameter": e.name, **entry(e)} for e in said],
     }
     for kind, each in found.items():
-        held_out, at = outside[kind], [round(ahead / STEP) for ahead in AHEAD]
+        held_out, ahead = outside[kind], [x for x in AHEAD if x <= each.windows.length]
+        at = [round(x / STEP) for x in ahead]
         covariance = each.fit.covariance
         spread = np.sqrt(np.diag(covariance))
         report[kind] = {
             "driven_by": each.model.driver,
-            "seconds": each.windows.count * LENGTH,
+            "seconds": each.windows.count * each.windows.length,
             "unknowns": [
                 {"name": u.name, "found": float(x), "sigma": float(s)}
                 for u, x, s in zip(each.model.unknowns, each.fit.p, each.sigma, strict=True)
             ],
             "correlation": (covariance / np.outer(spread, spread)).round(3).tolist(),
             "nuisances": nuisances(each),
+            "structures": {
+                label: dict(zip((u.name for u in each.model.unknowns), map(float, other), strict=True))
+                for label, other in each.structures.items()
+            },
             "noise": each.fit.noise,
             "iterations": each.fit.iterations,
             "refused": [str(refusal) for refusal in each.refusals],
             "held_out": {
                 name: {
-                    "seconds": list(AHEAD),
+                    "seconds": ahead,
                     "before": held_out.before[name][at].tolist(),
                     "after": held_out.after[name][at].tolist(),
                 }

@@ -6,7 +6,9 @@ from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
+from scipy.signal import lfilter
 
+from e2efly.control import Quat
 from e2efly.deploy.log.blackbox import vertex
 from e2efly.identification.record import KINDS, Record, Stream
 from e2efly.vehicles import Vehicle
@@ -23,6 +25,10 @@ DRIFT = 0.02
 """Change of the offset between two clocks over a flight from which on it is refused, s."""
 AGREE = 0.7
 """Correlation of two streams of the same motion that counts as seeing it."""
+AT_REST, LEVEL = 0.02, 0.2
+"""Motor output below which a vehicle on the ground is at rest; largest tilt of the poses' axes that is one, rad."""
+SEEN = 0.12
+"""Correlation of the rotors' torques with what the body turns by that counts as seeing their order."""
 _GRID = 0.005
 
 
@@ -48,7 +54,7 @@ def checked(records: Sequence[Record], vehicle: Vehicle) -> list[Record]:
         record = _within_limits(record)
         _check_constant(record)
         _check_units(record)
-        record = _in_the_air(record, vehicle)
+        record = _in_the_air(_levelled(record), vehicle)
         _check_rotors(record, vehicle)
         found.append(_on_one_clock(record))
     return found
@@ -71,10 +77,11 @@ def _within_limits(record: Record) -> Record:
         if name in ("motor", "rotor_speed"):
             bad |= np.any(stream.values < -0.05 * LIMITS[name], axis=1)
         if bad.mean() > LOST:
+            unit = "" if KINDS[name].unit == "1" else f" {KINDS[name].unit}"
             worst = float(np.max(np.abs(stream.values)))
             raise ValueError(
-                f"{record.path}: {name} is up to {worst:.4g} {KINDS[name].unit}, and beyond what a quadrotor can do in "
-                f"{100 * bad.mean():.2g} % of its samples; accepted: up to {LIMITS[name]:g} {KINDS[name].unit} "
+                f"{record.path}: {name} is up to {worst:.4g}{unit}, and beyond what a quadrotor can do in "
+                f"{100 * bad.mean():.2g} % of its samples; accepted: up to {LIMITS[name]:g}{unit} "
                 "(are the units "
                 "right? Splines through gaps overshoot like this, too)"
             )
@@ -117,6 +124,40 @@ def _check_units(record: Record) -> None:
                 f"{record.path}: body_rate is {slope:.3g} times what the attitude turns by: it looks like {unit}; "
                 "accepted: rad/s"
             )
+
+
+def _levelled(record: Record) -> Record:
+    """Turn the poses' body axes onto the accelerometer's, as far as a vehicle at rest before take-off shows.
+
+    Motion capture puts a body's axes anywhere. What is left is the tilt between accelerometer and rotors, which stays
+    the same from flight to flight, where that of the poses changes whenever markers are placed anew.
+    """
+    if not record.has("specific_force", "quaternion", "motor", "body_rate"):
+        return record
+    motor, pose = record.streams["motor"], record.streams["quaternion"]
+    turning = motor.values.max(1) > AT_REST
+    start = motor.time[int(np.argmax(turning))] if turning.any() else motor.time[0]
+    ground = record.during(record.span[0], start - 0.2).streams
+    if start - record.span[0] < 0.7 or min(len(ground[k].time) for k in ("specific_force", "quaternion")) < 20:
+        return record
+    if np.any(np.abs(ground["body_rate"].values).max(0) > 0.3):
+        return record
+    told = ground["specific_force"].values.mean(0)
+    told /= np.linalg.norm(told)
+    w, x, y, z = _continuous(ground["quaternion"].values).mean(0)
+    true = np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])  # up, in the body's axes
+    true /= np.linalg.norm(true)
+    turn = np.cross(told, true)  # small, and about no axis of heading
+    size = float(np.linalg.norm(turn))
+    if not 1e-3 < size < LEVEL:
+        return record
+    half = 0.5 * turn
+    level = (
+        Quat(*pose.values.T).compose(Quat(np.ones(len(pose.time)), *np.tile(half, (len(pose.time), 1)).T)).normalized()
+    )
+    turned = Stream(pose.time, np.stack([level.w, level.x, level.y, level.z], -1))
+    note = f"poses are turned by {np.degrees(size):.1f} degrees onto the accelerometer's level before take-off"
+    return replace(record, streams={**record.streams, "quaternion": turned}, notes=(*record.notes, note))
 
 
 def _in_the_air(record: Record, vehicle: Vehicle) -> Record:
@@ -168,7 +209,7 @@ def _check_rotors(record: Record, vehicle: Vehicle) -> None:
         return
     w = _smooth(np.stack([np.interp(grid, rate.time, x) for x in rate.values.T], -1))
     thrust = np.stack([np.interp(grid, rotors.time, x) for x in rotors.values.T], -1)
-    thrust = _smooth(thrust**2 if name == "rotor_speed" else thrust)
+    thrust = _smooth(thrust**2 if name == "rotor_speed" else _lagged(thrust, vehicle))
     turn = np.gradient(w, _GRID, axis=0)[:, :2]
     x, y = vehicle.rotor_position.T
 
@@ -177,16 +218,22 @@ def _check_rotors(record: Record, vehicle: Vehicle) -> None:
         return np.array([_correlation(torque[:, i], turn[:, i]) for i in range(2)])
 
     usual = seen((0, 1, 2, 3))
-    if np.all(usual > 0.1):
-        return
     best = max(permutations(range(4)), key=lambda order: float(seen(order).sum()))
-    if np.all(seen(best) > np.maximum(0.3, usual - 0.1)):
+    if np.all(seen(best) > SEEN) and seen(best).sum() > 1.4 * max(float(usual.sum()), 0.0):
         listed = ", ".join(KINDS[name].columns[i] for i in best)
         raise ValueError(
             f"{record.path}: {name} does not turn the vehicle as its geometry says; the columns fit it in the order "
             f"{listed}; "
             f"accepted: rear right, front right, rear left, front left"
         )
+
+
+def _lagged(outputs: np.ndarray, vehicle: Vehicle) -> np.ndarray:
+    """What rotors make of motor outputs, about: late by the vehicle's lag and by two steps of the grid."""
+    kept = float(np.exp(-_GRID / vehicle.motor_time_constant))
+    late = np.concatenate([outputs[:1], outputs[:1], outputs[:-2]])
+    first = kept * late[:1]
+    return np.asarray(lfilter([1 - kept], [1, -kept], late, axis=0, zi=first)[0])
 
 
 def _on_one_clock(record: Record) -> Record:

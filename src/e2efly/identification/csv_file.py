@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -60,13 +60,13 @@ def read_csv(path: Path, columns: Mapping[str, Column] | None = None) -> Record:
     Raises:
         ValueError: naming the file, the line or the column, what is there and what is accepted.
     """
-    columns = columns or {}
+    columns, notes = columns or {}, []
     try:
         with path.open(newline="", encoding="utf-8") as file:
             lines = csv.reader(file)
             header = [name.strip() for name in next(lines, [])]
             places = _places(path, header, columns)
-            table = np.fromiter(_numbers(path, lines, len(header), places), (np.float64, len(places)))
+            table = np.fromiter(_numbers(path, lines, len(header), places, notes), (np.float64, len(places)))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"{path}: {error}; accepted: a CSV file with a header") from None
     if len(table) < 2:
@@ -85,7 +85,7 @@ def read_csv(path: Path, columns: Mapping[str, Column] | None = None) -> Record:
         there = np.isfinite(values).all(-1)
         if there.any():
             streams[name] = Stream(time[there], values[there])
-    return Record(path, streams)
+    return Record(path, streams, tuple(notes))
 
 
 def write_csv(record: Record, path: Path) -> None:
@@ -132,9 +132,14 @@ def _places(path: Path, header: list[str], columns: Mapping[str, Column]) -> dic
     return found
 
 
-def _numbers(path: Path, lines: Iterable[list[str]], width: int, places: Mapping[str, int]) -> Iterable[list[float]]:
+def _numbers(
+    path: Path, lines: Iterator[list[str]], width: int, places: Mapping[str, int], notes: list[str]
+) -> Iterator[list[float]]:
     for number, line in enumerate(lines, 2):
         if len(line) != width:
+            if number > 2 and len(line) < width and next(lines, None) is None:
+                notes.append(f"line {number}, the last, breaks off and is left out")
+                return
             raise ValueError(f"{path}: line {number} has {len(line)} entries; accepted: {width}, as the header")
         row = []
         for name, place in places.items():

@@ -12,7 +12,7 @@ from e2efly.identification.estimate import Estimate
 from e2efly.identification.model import NUISANCES, UNKNOWNS, Model, Unknown
 from e2efly.identification.record import MOTORS, Record
 from e2efly.identification.shooting import Fit, fit
-from e2efly.identification.windows import LENGTH, REACH, Windows, cut, join
+from e2efly.identification.windows import LENGTH, LENGTHS, REACH, Windows, cut, join
 from e2efly.vehicles import Vehicle
 
 SHOWN = 0.5
@@ -26,8 +26,13 @@ accelerometer is filtered; s of the delay, else relative."""
 HELD_OUT = 5
 """One window of so many is kept out of the fit, for the judgement."""
 POSE_DELAY = [name for name, _ in NUISANCES].index("pose_delay")
-LEAST = 10
-"""Windows that a fit needs."""
+LEAST = 4.0
+"""Seconds of flight that a fit needs."""
+TORQUES = 200.0
+"""Samples of motor outputs a second from which on they tell the torques on the body."""
+NEAR, REFITS = 1.0, 2
+"""Standard deviations by which unknowns may move when refused ones take the file's values, without another fit; and
+how many more fits at most."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,8 @@ class Found:
     """(u,) of the unknowns: the fit's, under what is refused being the file's."""
     sigma: np.ndarray
     """(u,) of the unknowns; what is believed of the fit's."""
+    structures: dict[str, np.ndarray]
+    """(u,) of the unknowns by models of another structure, by its name."""
 
     def drag_at(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
         """Drag along each axis at a speed, m/s, and its standard deviation, (3,) N.
@@ -88,7 +95,7 @@ def _whole_covariance(found: Fit, sigma: np.ndarray) -> np.ndarray:
 
 
 def driver_of(records: Sequence[Record], step: bool = False) -> str:
-    """The stream that drives the simulation of these flights.
+    """What drives the simulation of these flights (`Model.driver`).
 
     Raises:
         ValueError: naming the flight that has none of them.
@@ -98,7 +105,8 @@ def driver_of(records: Sequence[Record], step: bool = False) -> str:
         wanted = ("motor",)
     for name in wanted:
         if all(record.has(name) for record in records):
-            return name
+            slow = name == "motor" and any(record.streams[name].rate < TORQUES for record in records)
+            return "motor_and_rate" if slow and all(r.has("quaternion", "position") for r in records) else name
     lacking = next(r for r in records if not any(r.has(name) for name in wanted))
     raise ValueError(
         f"{lacking.path}: has the streams {', '.join(lacking.streams) or 'none'}; accepted: "
@@ -111,6 +119,13 @@ def _shows_motors(record: Record) -> bool:
     return record.has("motor") and record.streams["motor"].rate >= MOTORS
 
 
+def _volts(records: Sequence[Record]) -> float | None:
+    """Of the battery, about which it was in these flights; None where one of them does not say."""
+    if not all(record.has("voltage") for record in records):
+        return None
+    return float(np.median([np.median(record.streams["voltage"].values) for record in records]))
+
+
 def identify(
     vehicle: Vehicle,
     records: Sequence[Record],
@@ -118,6 +133,7 @@ def identify(
     believed: Vehicle | None = None,
     step: bool = False,
     delay: bool = True,
+    volts: float | None = None,
     told: Callable[[int, float], None] = lambda i, cost: None,
 ) -> Found:
     """Find what flights say of a vehicle.
@@ -128,13 +144,15 @@ def identify(
         believed: the vehicle in which the flight controller of the flights believed; left out: `vehicle`.
         step: look for delay and rate loop alone, which steps of body rate show.
         delay: with `step`, look for the delay, too.
+        volts: of the battery, at which the thrust is told; left out: about what it was in these flights.
         told: (iteration, cost) after each of the fit's.
 
     Raises:
         ValueError: naming the flight and what it lacks.
     """
     driver = driver_of(records, step)
-    parts = []
+    volts = _volts(records) if volts is None else volts
+    parts, length = [], LENGTHS.get(driver, LENGTH)
     for number, record in enumerate(records):
         if not record.has("body_rate"):
             raise ValueError(f"{record.path}: has no body_rate; accepted: a flight with a gyroscope in its log")
@@ -149,25 +167,59 @@ def identify(
                 record, streams={k: s for k, s in record.streams.items() if k in ("command", "body_rate")}
             )
         )
-        parts.append(cut(seen, driver, number))
+        parts.append(cut(seen, driver, number, volts))
     windows = join(parts)
-    if windows.count < LEAST:
+    if windows.count * length < LEAST:
         raise ValueError(
-            f"{records[0].path}: {windows.count * LENGTH:.1f} s of flight without gaps; accepted: {LEAST * LENGTH:g} s "
-            "or more"
+            f"{records[0].path}: {windows.count * length:.1f} s of flight without gaps; accepted: {LEAST:g} s or more"
         )
     only = tuple(u.name for u in UNKNOWNS if u.field == "rate_gain" or (u.field == "latency" and delay)) if step else ()
     model = Model.of(vehicle, driver, believed, only)
     held_out = np.arange(windows.count) % HELD_OUT == HELD_OUT - 1
-    found = fit(model, windows.some(~held_out), begin(model, windows.some(~held_out)), told=told)
+    seen = windows.some(~held_out)
+    found = fit(model, seen, begin(model, seen), told=told)
     sigma = sigmas(model, found)
     refused = np.array([_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)])
     p = _given(found.p, _whole_covariance(found, sigma), refused)
+    for _ in range(REFITS):
+        if not refused.any() or np.all(np.abs(p - found.p)[~refused] < NEAR * sigma[~refused]):
+            break
+        # far from where it was fitted, the straight line of `_given` says nothing
+        found = fit(model, seen, np.where(refused, 0.0, found.p), told=told, fixed=refused)
+        sigma = np.where(refused, sigma, sigmas(model, found))
+        p = np.where(refused, 0.0, found.p)
+        more = refused | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
+        if np.all(more == refused):
+            break
+        refused, p = more, _given(found.p, _whole_covariance(found, sigma), more)
+    structures = _structures(model, seen, p, refused)
+    if structures:
+        spread = np.sqrt(np.mean([(each - p) ** 2 for each in structures.values()], 0))
+        sigma = np.where(refused, sigma, np.hypot(sigma, spread))
     refusals = [Refusal(model.unknowns[i], float(sigma[i])) for i in np.flatnonzero(refused)]
     source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
     estimates = [e for e in _estimates(model, p, sigma, refused, source) if e.name != "latency"]
     estimates += _latency(model, records, found, p, sigma, refused, source)
-    return Found(model, found, windows, held_out, estimates, refusals, p, sigma)
+    return Found(model, found, windows, held_out, estimates, refusals, p, sigma, structures)
+
+
+def _structures(model: Model, windows: Windows, p: np.ndarray, refused: np.ndarray) -> dict[str, np.ndarray]:
+    """What motor outputs say by models that explain them nearly as well: what of the motors' answer is delay and what
+    is lag, and how thrust begins, no such log decides, and lag, inertia and thrust move with it.
+    """
+    names, found = [u.name for u in model.unknowns], {}
+    for label, name in (("without delay", "latency"), ("no thrust at no output", "motor_idle")):
+        if model.driver not in ("motor", "motor_and_rate") or name not in names or refused[names.index(name)]:
+            continue
+        at = names.index(name)
+        other = model
+        if name == "latency":
+            other = dataclasses.replace(model, base=dataclasses.replace(model.base, latency=np.asarray(0.0)))
+        fixed = refused.copy()
+        fixed[at] = True
+        found[label] = fit(other, windows, np.where(fixed, 0.0, p), iterations=8, fixed=fixed).p
+        found[label][at] = p[at]  # what is left out has no say of itself
+    return found
 
 
 def _latency(

@@ -12,7 +12,7 @@ from jax import Array
 from e2efly.control import COMMAND_MODES, Vec3
 from e2efly.control.vectors import Quat
 from e2efly.identification.windows import STEP, past_steps
-from e2efly.physics.body import drag, rotor_thrust, rotor_wrench
+from e2efly.physics.body import drag, rotor_speed_for, rotor_thrust, rotor_wrench
 from e2efly.physics.control import control_law
 from e2efly.physics.integrate import INTEGRATORS
 from e2efly.physics.mixer import Mixer
@@ -38,7 +38,9 @@ class Unknown:
     """What to fly and to log, where it cannot be found."""
 
 
-_ALL = ("command", "motor", "rotor_speed")
+_TURNS = ("command", "motor", "rotor_speed")
+_ALL = (*_TURNS, "motor_and_rate")
+_MOTORS = ("motor", "motor_and_rate")
 _RATES = "doublets of body rate about this axis, with rotor speeds or motor outputs in the log"
 _FAST = "fast straight flight (5 m/s and more), with velocity and attitude in the log"
 _CLIMB = "changes of thrust between half and twice of hover, with the accelerometer in the log"
@@ -46,11 +48,11 @@ _YAW = "steps of yaw rate, with rotor speeds or motor outputs in the log"
 _STEPS = "steps of thrust and body rate, logged at 200 Hz or more, with the times at which commands were sent"
 UNKNOWNS: tuple[Unknown, ...] = (
     Unknown("thrust", "thrust_map", (), 0.5, _ALL, _CLIMB),
-    Unknown("torque_ratio", "torque_ratio", (), 0.5, _ALL, _YAW),
-    Unknown("inertia_x", "inertia", (0,), 0.5, _ALL, _RATES),
-    Unknown("inertia_y", "inertia", (1,), 0.5, _ALL, _RATES),
-    Unknown("inertia_z", "inertia", (2,), 0.5, _ALL, _RATES),
-    Unknown("motor_time_constant", "motor_time_constant", (), 0.7, ("command", "motor"), _STEPS),
+    Unknown("torque_ratio", "torque_ratio", (), 0.5, _TURNS, _YAW),
+    Unknown("inertia_x", "inertia", (0,), 0.5, _TURNS, _RATES),
+    Unknown("inertia_y", "inertia", (1,), 0.5, _TURNS, _RATES),
+    Unknown("inertia_z", "inertia", (2,), 0.5, _TURNS, _RATES),
+    Unknown("motor_time_constant", "motor_time_constant", (), 0.7, ("command", *_MOTORS), _STEPS),
     Unknown("drag_linear_x", "drag_linear", (0,), 1.0, _ALL, _FAST),
     Unknown("drag_linear_y", "drag_linear", (1,), 1.0, _ALL, _FAST),
     Unknown("drag_linear_z", "drag_linear", (2,), 1.0, _ALL, _FAST),
@@ -60,18 +62,26 @@ UNKNOWNS: tuple[Unknown, ...] = (
     Unknown("rate_gain_x", "rate_gain", (0,), 0.7, ("command",), _RATES),
     Unknown("rate_gain_y", "rate_gain", (1,), 0.7, ("command",), _RATES),
     Unknown("rate_gain_z", "rate_gain", (2,), 0.7, ("command",), _RATES),
-    Unknown("motor_curve", "", (), 0.3, ("motor",), _CLIMB),
-    Unknown("latency", "latency", (), 0.05, ("command", "motor"), _STEPS),
+    Unknown("motor_curve", "", (), 0.3, _MOTORS, _CLIMB),
+    Unknown("motor_idle", "", (), 0.15, _MOTORS, _CLIMB),
+    Unknown("rotor_inertia", "", (), 0.3, ("motor",), _YAW),
+    Unknown("latency", "latency", (), 0.05, ("command", *_MOTORS), _STEPS),
 )  # fmt: skip
-"""Of the vehicle. Each is the logarithm of a factor on the file's value, but for what is added: the delay, s, and the
-curve of the motors, the part of the rotor speed that rises with the root of the output."""
+"""Of the vehicle. Each is the logarithm of a factor on the file's value, but for what is added: the delay, s, the curve
+of the motors (the part of the thrust that rises with the square of the output), the share of the largest thrust at no
+output, and the rotors' inertia: the yaw rate that a vehicle gets when all rotors of one spin gain the speed of hover,
+rad/s, over ten."""
 NUISANCES: tuple[tuple[str, float], ...] = (
     ("gyro_x", 0.05), ("gyro_y", 0.05), ("gyro_z", 0.05), ("force_x", 0.5), ("force_y", 0.5), ("force_z", 0.3),
     ("pose_delay", 0.05), ("tilt_x", 0.03), ("tilt_y", 0.03), ("sag", 0.1), ("flight_thrust", 0.03),
+    ("uneven_roll", 0.1), ("uneven_pitch", 0.1), ("uneven_yaw", 0.1),
 )  # fmt: skip
 """Of each flight, with the standard deviation of their priors: biases of gyroscope (rad/s) and accelerometer (m/s^2),
-delay of the pose source (s), tilt of its body's axes (rad), share of the thrust lost by the end, and, of several
-flights, the logarithm of the factor on the thrust of this one."""
+delay of the pose source (s), tilt of its body's axes (rad), share of the thrust lost by the end, of several flights the
+logarithm of the factor on the thrust of this one, and the share by which rotors pull more than the others on the left,
+at the rear, and among those of positive spin: worn propellers, or a centre of mass beside the middle."""
+GYRO, FORCE, LOST, FACTOR, UNEVEN = slice(0, 3), slice(3, 6), 9, 10, slice(11, 14)
+"""Places in `NUISANCES`: of the biases, and of what acts on the thrust."""
 START = 16
 """Numbers of a window's start: position, velocity, attitude, body rate, rotor speeds (as a share of hover's)."""
 
@@ -89,9 +99,9 @@ class Model:
     """That of the flight controller."""
     hover: float | Array
     """rad/s."""
-    full: float | Array
-    """Rotor speed of full motor output, rad/s."""
     driver: str = dataclasses.field(metadata={"static": True})
+    """The stream that drives it: command, motor or rotor_speed; motor_and_rate: motor outputs drive the rotors, and the
+    body turns by the measured rates, whatever the rotors' torques."""
     names: tuple[str, ...] = dataclasses.field(metadata={"static": True})
     """Of the unknowns that are looked for."""
 
@@ -108,15 +118,7 @@ class Model:
         believed = vehicle if believed is None else believed
         base, told = (jax.tree.map(lambda x: np.asarray(x, np.float64), v) for v in (vehicle, believed))
         names = tuple(u.name for u in UNKNOWNS if _shows(u, base, driver) and (not only or u.name in only))
-        return Model(
-            base,
-            told,
-            Mixer.of(believed, np.float64),
-            vehicle.hover_rotor_speed,
-            vehicle.full_rotor_speed,
-            driver,
-            names,
-        )
+        return Model(base, told, Mixer.of(believed, np.float64), vehicle.hover_rotor_speed, driver, names)
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -168,28 +170,40 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
         window: `driven`, `when` and the measured start: position, velocity, quaternion, body_rate, rotor_speed.
     """
     vehicle = vehicle_of(model, p)
-    share = jnp.exp(q[10]) * (1 - q[9] * window["when"])
-    plant = Plant.of(vehicle, STEP, jnp.broadcast_to(share, (4,)))
+    x, y = jnp.sign(model.base.rotor_position).T
+    sides = jnp.stack([y, -x, jnp.asarray(model.base.rotor_spin)])
+    share = jnp.exp(q[FACTOR]) * (1 - q[LOST] * window["when"]) * (1 + q[UNEVEN] @ sides)
+    plant = Plant.of(vehicle, STEP, share)
+    before, acting = commanded(model, vehicle, window["driven"])
+    places = {unknown.name: i for i, unknown in enumerate(model.unknowns)}
+    added = {
+        name: p[places[name]] if name in places else 0.0 for name in ("motor_curve", "motor_idle", "rotor_inertia")
+    }
+    spun = window["rotor_speed"]
+    if model.driver in _MOTORS:  # nobody measured the speeds at the start: what the outputs before it have led to
+        spun = _spun_up(plant, jnp.stack(_driven_speed(model, split4(before[:, :4]), added), -1))
     first = State(
         window["position"] + start[:3],
         window["velocity"] + start[3:6],
         _turned(window["quaternion"], start[6:9]),
         window["body_rate"] + start[9:12],
-        window["rotor_speed"] + start[12:16] * model.hover,
+        spun + start[12:16] * model.hover,
     )
-    acting = commanded(model, vehicle, window["driven"])
-    places = {unknown.name: i for i, unknown in enumerate(model.unknowns)}
-    curve = p[places["motor_curve"]] if "motor_curve" in places else 0.0
     law, integrate = control_law(COMMAND_MODES["ctbr"]), INTEGRATORS["rk3"]
     controller = model.controller(vehicle)
 
     def advance(parts: Parts, drive: Array) -> tuple[Parts, Parts]:
-        drives = split4(drive)
+        drives = split4(drive[:4])
         if model.driver == "rotor_speed":
             parts = dataclasses.replace(parts, rotor_speed=drives)
             parts = integrate(plant, parts, drives, None, STEP)
         elif model.driver == "motor":
-            parts = integrate(plant, parts, _driven_speed(model, drives, curve), None, STEP)
+            parts = _recoiled(
+                model, integrate(plant, parts, _driven_speed(model, drives, added), None, STEP), parts, added
+            )
+        elif model.driver == "motor_and_rate":
+            parts = dataclasses.replace(parts, body_rate=Vec3.of(drive[4:] - q[GYRO]))
+            parts = integrate(_without_torque(plant), parts, _driven_speed(model, drives, added), None, STEP)
         else:  # a flight controller acts anew a thousand times a second or more: the mean of start and end of the step
             at_start = law(controller, model.mixer, parts, drives)
             at_end = law(controller, model.mixer, integrate(plant, parts, at_start, None, STEP), drives)
@@ -210,22 +224,49 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
     return _sensed(plant, whole, q)
 
 
-def _driven_speed(model: Model, output: tuple[Array, ...], curve: Any) -> Any:
-    """Rotor speeds that motor outputs lead to: they rise with the output, and, by the share `curve`, with its root, by
-    which the thrust rises nearly evenly.
+def _driven_speed(model: Model, output: tuple[Array, ...], added: dict[str, Any]) -> Any:
+    """Rotor speeds that motor outputs lead to: thrust rises from that of no output linearly, and with the square."""
+    top, idle, curve = model.mixer.thrust_max, added["motor_idle"], 0.5 + added["motor_curve"]
+
+    def thrust(u: Array) -> Array:
+        return jnp.maximum(top * (idle + (1 - idle) * u * ((1 - curve) + curve * jnp.abs(u))), model.mixer.thrust_min)
+
+    a, b, c, d = (thrust(u) for u in output)
+    return rotor_speed_for(model.base, (a, b, c, d))
+
+
+def _without_torque(plant: Plant) -> Plant:
+    zero, one = jnp.zeros_like(plant.torque_ratio), jnp.ones_like(plant.specific)
+    arms, ones = (zero, zero, zero, zero), Vec3(one, one, one)
+    return dataclasses.replace(plant, arm_x=arms, arm_y=arms, torque_ratio=zero, inertia=ones, mobility=ones)
+
+
+def _recoiled(model: Model, now: Parts, before: Parts, added: dict[str, Any]) -> Parts:
+    """After a step, with the yaw rate that rotors of some inertia leave to the body when their speeds change."""
+    gained = jnp.stack(now.rotor_speed) - jnp.stack(before.rotor_speed)
+    rate = now.body_rate
+    turned = 10 * added["rotor_inertia"] * (gained @ model.base.rotor_spin) / (2 * model.hover)
+    return dataclasses.replace(now, body_rate=Vec3(rate.x, rate.y, rate.z + turned))
+
+
+def _spun_up(plant: Plant, asked: Array) -> Array:
+    """Rotor speeds after steps of first-order lag towards what was asked for in each, (steps, 4): (4,)."""
+    left = plant.decay ** jnp.arange(len(asked) - 1, -1, -1)
+    return left @ asked / jnp.sum(left)
+
+
+def commanded(model: Model, vehicle: Vehicle, driven: Array) -> tuple[Array, Array]:
+    """What acts on average over each step, a latency after it was sent: (past, 4) before the window, and (m, 4) in it.
+
+    What was sent before the window's past is taken to be as at its beginning.
     """
-    return tuple(model.full * ((1 - curve) * u + curve * jnp.sqrt(jnp.maximum(u, 1e-4))) for u in output)
-
-
-def commanded(model: Model, vehicle: Vehicle, driven: Array) -> Array:
-    """What acts on average over each step, (m, 4), a latency after it was sent."""
     delay = 0.0 if model.driver == "rotor_speed" else vehicle.latency
-    steps = driven.shape[0] - 1 - past_steps()
-    place = jnp.maximum(past_steps() + jnp.arange(steps + 1) - delay / STEP, 0.0)
+    place = jnp.arange(driven.shape[0]) - delay / STEP
     below = jnp.clip(jax.lax.stop_gradient(jnp.floor(place)).astype(int), 0, driven.shape[0] - 2)
     part = (place - below)[:, None]
     integral = driven[below] * (1 - part) + driven[below + 1] * part
-    return jnp.diff(integral, axis=0) / STEP
+    mean = jnp.diff(integral, axis=0) / STEP
+    return mean[: past_steps()], mean[past_steps() :]
 
 
 def _sensed(plant: Plant, parts: Parts, q: Array) -> dict[str, Array]:

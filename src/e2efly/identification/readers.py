@@ -1,5 +1,6 @@
 """Flight logs of many kinds, read into records: which kind a file is, its beginning or its name says."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +23,7 @@ ACCEPTED = (
 )
 BLACKBOXES = (".bbl", ".bfl", ".bf")
 """Endings of the names of Betaflight's blackbox logs."""
+_PART = re.compile(r"(?P<name>.+):(?P<begin>\d+(\.\d+)?)-(?P<end>\d+(\.\d+)?)")
 _FLIP = np.array([1.0, -1.0, -1.0])
 """FLU from FRD: forward stays, left is minus right, up is minus down."""
 
@@ -55,6 +57,30 @@ def read_flights(path: Path, columns: Mapping[str, Column] | None = None) -> lis
     if kind is None:
         raise ValueError(f"{path}: of no kind that is known here; accepted: {ACCEPTED}")
     return kind(path)
+
+
+def read_part(path: Path, columns: Mapping[str, Column] | None = None) -> list[Record]:
+    """The flights of a log, or of LOG:BEGIN-END what lies between two times, s after the log begins.
+
+    Raises:
+        ValueError: as of `read_flights`; where nothing lies between the times.
+    """
+    asked = None if path.exists() else _PART.fullmatch(path.name)
+    if asked is None:
+        return read_flights(path, columns)
+    begin, end = float(asked["begin"]), float(asked["end"])
+    found = []
+    for record in read_flights(path.with_name(asked["name"]), columns):
+        first, length = record.span[0], record.duration
+        if not begin < min(end, length):
+            raise ValueError(
+                f"{path}: is from {begin:g} to {end:g} s, of a log of {length:.1f} s; accepted: LOG:BEGIN-END in s "
+                "after the log begins, BEGIN below END"
+            )
+        part = record.during(first + begin, first + end)
+        kept = {name: stream for name, stream in part.streams.items() if len(stream.time)}
+        found.append(replace(part, streams=kept, notes=(*record.notes, f"used from {begin:g} to {end:g} s, as asked")))
+    return found
 
 
 def read_mcap(path: Path) -> Record:

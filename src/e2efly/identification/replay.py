@@ -106,7 +106,7 @@ def _rotors(model: Model, p: Array, window: dict[str, Any]) -> Array:
     plant = Plant.of(vehicle, STEP)
     known = window["driven"][: past + 1]
     held = known[0] + (known[1] - known[0]) * jnp.arange(-past, 0)[:, None]  # the first command held, before it
-    asked = commanded(model, vehicle, jnp.concatenate([held, known]))
+    _, asked = commanded(model, vehicle, jnp.concatenate([held, known]))
     law = control_law(COMMAND_MODES["ctbr"])
     controller = model.controller(vehicle)
 

@@ -15,8 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from e2efly.identification.model import NUISANCES, START, Model, attitude_error, simulate
-from e2efly.identification.windows import Windows
+from e2efly.identification.model import FACTOR, FORCE, GYRO, NUISANCES, START, Model, attitude_error, simulate
+from e2efly.identification.windows import LENGTH, Windows
 
 HUBER = 2.0
 """Standard deviations up to which a residual counts by its square."""
@@ -30,8 +30,16 @@ FLOOR = {
     "position": 2e-4,
 }  # fmt: skip
 """The least that is believed."""
+CALM = 0.9
+"""Share of the windows that are closer to the model than the spread that a sensor is given: in calm flight the flight
+controller answers what shakes the vehicle, and only lively windows tell the vehicle from that."""
 FREE = np.array([0.05] * 3 + [0.5] * 3 + [0.1] * 3 + [0.5] * 3 + [0.3] * 4)
 """Standard deviation of a window's start about its measured one."""
+SPUN = 0.003
+"""The same of rotor speeds that follow from the motor outputs before the window. Wider, it would take disturbances for
+rotors that have not come to rest yet, and the lag for as long as they last."""
+STILL = 0.02
+"""Standard deviations below which a step of all unknowns is the last."""
 BATCH = 32
 """Windows that are computed together."""
 
@@ -62,6 +70,7 @@ def fit(
     p: np.ndarray | None = None,
     iterations: int = 30,
     told: Callable[[int, float], None] = lambda i, cost: None,
+    fixed: np.ndarray | None = None,
 ) -> Fit:
     """Find the unknowns.
 
@@ -71,25 +80,41 @@ def fit(
         p: where to begin; the file's values when left out.
         iterations: at most.
         told: (iteration, cost) after each.
+        fixed: (u,) unknowns that stay as the file has them; left out: none.
     """
     with jax.enable_x64(True):
-        return _fit(model, windows, p, iterations, told)
+        return _fit(model, windows, p, iterations, told, fixed)
 
 
 def _fit(
-    model: Model, windows: Windows, p0: np.ndarray | None, iterations: int, told: Callable[[int, float], None]
+    model: Model,
+    windows: Windows,
+    p0: np.ndarray | None,
+    iterations: int,
+    told: Callable[[int, float], None],
+    fixed: np.ndarray | None,
 ) -> Fit:
     unknowns, flights = model.unknowns, int(windows.flight.max()) + 1
     u, v = len(unknowns), len(NUISANCES)
     prior_p = np.array([x.prior for x in unknowns])
+    if fixed is not None:
+        prior_p[fixed] = 1e-6
     prior_q = np.array([sigma for _, sigma in NUISANCES])
     if flights == 1 or model.driver == "rotor_speed":
-        prior_q[-1] = 1e-6  # one flight cannot tell its own factor from the vehicle's
-    p = np.zeros(u) if p0 is None else p0
+        prior_q[FACTOR] = 1e-6  # one flight cannot tell its own factor from the vehicle's
+    # without poses, a bias shows by nothing but what the model does wrong
+    if "quaternion" not in windows.measured:
+        prior_q[GYRO] = 1e-6
+    if "velocity" not in windows.measured and "position" not in windows.measured:
+        prior_q[FORCE] = 1e-6
+    p = np.zeros(u) if p0 is None else np.array(p0)
+    least = np.array([-float(model.base.latency) if x.field == "latency" else -np.inf for x in unknowns])
     q, starts = np.zeros((flights, v)), np.zeros((windows.count, START))
     noise = {name: NOISE[name] for name in windows.measured}
     data = _data(model, windows)
     free = FREE.copy()
+    if model.driver in ("motor", "motor_and_rate"):
+        free[12:] = SPUN
     if "velocity" not in windows.measured and "position" not in windows.measured:
         free[:6] = 1e-6
     if "quaternion" not in windows.measured:
@@ -105,9 +130,11 @@ def _fit(
         H, g = _assembled(terms, windows.flight, flights, u, v)
         H += np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
         g += np.concatenate([p / prior_p**2, (q / prior_q**2).ravel()])
+        held = np.flatnonzero((p <= least) & (g[:u] > 0))  # a delay below zero is none
+        H[held, held] *= 1e12
         for _ in range(8):
             step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
-            dp, dq = step[:u], step[u:].reshape(flights, v)
+            dp, dq = np.maximum(step[:u], least - p), step[u:].reshape(flights, v)
             both = np.concatenate([np.broadcast_to(dp, (windows.count, u)), dq[windows.flight]], 1)
             moved = starts - terms["gain"] - np.einsum("nij,nj->ni", terms["slope"], both)
             tried = _terms(model, p + dp, q + dq, moved, data, noise, free)
@@ -122,7 +149,8 @@ def _fit(
         told(i, cost)
         spread = {name: max(float(terms[f"spread/{name}"]), FLOOR[name]) for name in noise}
         settled = all(abs(np.log(spread[name] / noise[name])) < 0.02 for name in noise)
-        if gained < 1e-3 and settled and np.all(np.abs(dp) < 1e-4):
+        still = np.abs(dp) < np.maximum(STILL * np.sqrt(np.diag(np.linalg.inv(H)))[:u], 1e-4)
+        if settled and (gained < 1e-3 or np.all(still)):
             break
         if not settled:
             noise = spread
@@ -137,7 +165,11 @@ def _fit(
         own = windows.flight == f
         each[np.ix_(own, np.arange(u + f * v, u + (f + 1) * v))] = terms["g"][own, u:]
     each -= each.mean(0)
-    inner = each.T @ each * (windows.count / max(windows.count - 1, 1))
+    # what disturbs one window disturbs the next, where they are brief
+    group = np.arange(windows.count) // max(round(LENGTH / windows.length), 1)
+    groups = np.zeros((group[-1] + 1, len(H)))
+    np.add.at(groups, group, each)
+    inner = groups.T @ groups * (len(groups) / max(len(groups) - 1, 1))
     sandwich = inverse @ (inner + np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))) @ inverse
     return Fit(p, q, sandwich[:u, :u], inverse[:u, :u], noise, cost, i, starts)
 
@@ -217,10 +249,10 @@ def _computed(
     found = jax.lax.map(batch, batches)
     found = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), found)
     for name in noise:
-        # the median of the windows' mean squares, of those that have this sensor
+        # of the windows that have this sensor
         squares, there = found.pop(f"square/{name}"), found.pop(f"sum/{name}")
         mean = jnp.where(there > 0, squares / jnp.maximum(there, 1), jnp.nan)
-        found[f"spread/{name}"] = jnp.sqrt(jnp.nanmedian(mean))
+        found[f"spread/{name}"] = jnp.sqrt(jnp.nanquantile(mean, CALM))
     return found
 
 

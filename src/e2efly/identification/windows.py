@@ -11,6 +11,9 @@ STEP = 0.004
 """Time between two points of the grid, s: no longer than the physics is exact with (docs/physics.md)."""
 LENGTH = 0.4
 """Length of a window, s: long enough to see lag, delay and rate loop at work, short enough not to diverge."""
+LENGTHS = {"motor": 0.1, "motor_and_rate": 1.0}
+"""The same where motor outputs drive, s: with nothing to steer it, a simulated vehicle turns away from the flown one
+within tenths of a second; one that turns by the measured rates does not."""
 REACH = 0.252
 """How far back the commands of a window are kept, s: the largest delay that can be found."""
 MEASURED = ("body_rate", "specific_force", "rotor_speed", "velocity", "quaternion", "position")
@@ -30,7 +33,8 @@ class Windows:
     begin: np.ndarray
     """(n,) start of each, s of its record's clock."""
     driven: np.ndarray
-    """(n, past + m + 1, 4) integral over time of what drives the vehicle: commands, motor outputs or rotor speeds."""
+    """(n, past + m + 1, 4) integral over time of what drives the vehicle: commands, motor outputs or rotor speeds; with
+    the body rates 7."""
     measured: dict[str, np.ndarray]
     """By stream, (n, m + 1, k); zero where nothing was measured."""
     there: dict[str, np.ndarray]
@@ -42,6 +46,11 @@ class Windows:
     def count(self) -> int:
         """How many windows."""
         return len(self.flight)
+
+    @property
+    def length(self) -> float:
+        """Of each, s."""
+        return self.steps * STEP
 
     @property
     def steps(self) -> int:
@@ -65,18 +74,20 @@ def past_steps() -> int:
     return round(REACH / STEP)
 
 
-def cut(record: Record, driver: str, flight: int = 0) -> Windows:
+def cut(record: Record, driver: str, flight: int = 0, volts: float | None = None, length: float = 0.0) -> Windows:
     """Windows of a flight, one after the other; windows in which the driving stream has a gap are left out.
 
     Args:
         record: the flight.
-        driver: the stream that drives: command, motor or rotor_speed.
+        driver: what drives (`Model.driver`).
         flight: its number.
+        volts: of the battery, to which motor outputs are scaled; left out: they are taken as they are.
+        length: of a window, s; 0: as long as suits what drives.
     """
-    m, past = round(LENGTH / STEP), past_steps()
+    m, past = round((length or LENGTHS.get(driver, LENGTH)) / STEP), past_steps()
     names = [name for name in MEASURED if record.has(name)]
-    driving = record.streams[driver]
-    spans = [(record.streams[name].time[0], record.streams[name].time[-1]) for name in ("body_rate", driver)]
+    driving = _driving(record, driver, volts)
+    spans = [(s.time[0], s.time[-1]) for s in (record.streams["body_rate"], driving)]
     first, last = max(s[0] for s in spans), min(s[1] for s in spans)
     n = max(int((last - first - REACH) / (m * STEP)), 0)
     grid = first + STEP * (past + np.arange(n * m + 1))
@@ -96,7 +107,24 @@ def cut(record: Record, driver: str, flight: int = 0) -> Windows:
         torn |= (grid[inner[:, -1]] > start) & (before[rows[:, 0]] < end)
     begin = grid[inner[:, 0]]
     windows = Windows(np.full(n, flight), np.arange(n) / max(n, 1), begin, driven[rows], measured, there, start)
-    return windows.some(~torn & (there["body_rate"].mean(1) > 0.2))
+    whole = windows.some(~torn & (there["body_rate"].mean(1) > 0.2))
+    if driver == "motor_and_rate":  # what is given is no witness
+        del whole.measured["body_rate"], whole.there["body_rate"]
+    return whole
+
+
+def _driving(record: Record, driver: str, volts: float | None) -> Stream:
+    """What drives, (n, 4), or with the body rates (n, 7)."""
+    if driver not in ("motor", "motor_and_rate"):
+        return record.streams[driver]
+    stream = record.streams["motor"]
+
+    def at(name: str) -> np.ndarray:
+        other = record.streams[name]
+        return np.stack([np.interp(stream.time, other.time, column) for column in other.values.T], -1)
+
+    values = stream.values if volts is None else stream.values * at("voltage") / volts
+    return Stream(stream.time, values if driver == "motor" else np.concatenate([values, at("body_rate")], 1))
 
 
 def join(parts: Sequence[Windows]) -> Windows:

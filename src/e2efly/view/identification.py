@@ -82,8 +82,8 @@ def _plot_prediction(path: Path, each: Found, outside: Prediction) -> None:
 def _plot_fit(path: Path, each: Found, outside: Prediction) -> None:
     """The liveliest held-out windows, one after the other."""
     windows = each.windows.some(each.held_out)
-    lively = np.argsort(-np.var(outside.measured["body_rate"], axis=1).sum(-1))[:6]
-    names = [name for name in ("body_rate", "specific_force") if name in outside.measured]
+    names = [name for name in ("body_rate", "specific_force", "velocity", "position") if name in outside.measured][:2]
+    lively = np.argsort(-np.var(outside.measured[names[0]], axis=1).sum(-1))[:6]
     notes = ["six lively windows that the fit did not see; dots: measured; lines: simulated from their starts"]
     with figure(path, "Fit against data", 1.0 + 1.5 * 3 * len(names), notes) as fig:
         for n, name in enumerate(names):
