@@ -42,6 +42,8 @@ AROUND = EnvConfig(
     disturbance=DisturbanceConfig(gust=0.5, thrust=0.05, rotor=0.03, sag=0.12, centre_of_mass=0.002),
 )
 """The vehicles of the preset `identified`: what the file's standard deviations leave open, and what no file knows."""
+ONE_OF_A_FAMILY = 4
+"""By this the steps are fewer that the preset `identified` learns in than the recipe for a family."""
 BESIDE_CAMERA = {"angle_spread": 0.06, "position_spread": 0.012, "fov_spread": 0.04}
 """What the preset `robust` draws of cameras beside what the task says of them ..."""
 OLDER = 0.05
@@ -126,8 +128,10 @@ def _with_critic(task: type[TaskConfig], algo: str) -> TrainConfig:
 def _adaptive(task: type[TaskConfig], config: TrainConfig, name: str) -> TrainConfig:
     """Other vehicles in every episode, and a policy with a memory by which it feels them."""
     algo = config.algo.name
-    # an identified vehicle may be as weak as any of a family, which the recipes for families learn to fly
-    given = (task.family.get(algo) if name == IDENTIFIED else None) or task.robust.get(algo)
+    given = task.robust.get(algo)
+    if name == IDENTIFIED and (other := task.family.get(algo)):
+        # the vehicle may be as weak as any of a family, which that recipe learns to fly; but it is one, nearly known
+        given = dataclasses.replace(other, steps=other.steps // ONE_OF_A_FAMILY)
     if given is None:
         raise ValueError(
             f"preset {name!r}: accepted for {_having('robust')}; not for {task.name} by {config.algo.name}"

@@ -23,7 +23,7 @@ ROBUST = [name for name, task in TASKS.items() if task.robust and task.__module_
 
 
 def test_the_tasks_that_have_it_change_the_vehicle_and_remember() -> None:
-    assert ROBUST == ["avoid", "hover", "land", "land_visual", "race", "race_clutter", "track"]
+    assert ROBUST == ["avoid", "gap", "hover", "hover_aware", "land", "land_visual", "race", "race_clutter", "track"]
     for task in ROBUST:
         nominal, robust = (e2efly.preset(task, "bptt", name) for name in ("nominal", "robust"))
         assert robust.network.recurrent > 0
@@ -38,13 +38,13 @@ def test_the_tasks_that_have_it_change_the_vehicle_and_remember() -> None:
     assert (robust.env, robust.reward) == (presets.OTHERS, nominal.reward)
 
 
-@pytest.mark.parametrize(("task", "algo"), [("gap", "bptt"), ("race", "ppo")])
+@pytest.mark.parametrize(("task", "algo"), [("gap", "ppo"), ("race", "ppo")])
 def test_others_are_refused_by_name(task: str, algo: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["train", task, "--algo", algo, "--preset", "robust"]) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert (
-        "preset 'robust': accepted for avoid by bptt, hover by bptt or ppo, land by bptt, land_visual by bptt, "
-        "race by bptt, race_clutter by bptt, track by bptt or ppo" in said
+        "preset 'robust': accepted for avoid by bptt, gap by bptt, hover by bptt or ppo, hover_aware by bptt, "
+        "land by bptt, land_visual by bptt, race by bptt, race_clutter by bptt, track by bptt or ppo" in said
     )
     assert f"not for {task} by {algo}" in said
 
@@ -57,7 +57,8 @@ def test_a_spread_that_makes_no_sense_is_named(spread: tuple[float, float]) -> N
 
 def test_robust_is_what_a_task_is_learned_by_where_it_can_be(tmp_path: Path) -> None:
     wanted = {("hover", "bptt"): "robust", ("hover", "ppo"): "robust", ("race", "ppo"): "nominal",
-              ("gap", "bptt"): "nominal", ("avoid", "bptt"): "robust", ("avoid", "ppo"): "nominal"}  # fmt: skip
+              ("gap", "bptt"): "robust", ("gap", "ppo"): "nominal", ("avoid", "bptt"): "robust",
+              ("avoid", "ppo"): "nominal"}  # fmt: skip
     for (task, algo), name in wanted.items():
         config = e2efly.preset(task, algo, name)
         assert e2efly.preset(task, algo) == config

@@ -256,7 +256,7 @@ def test_only_hover_starts_thrown() -> None:
         presets.preset("race", "ppo", "thrown")
 
 
-@pytest.mark.parametrize(("task", "algo"), [("hover", "bptt"), ("hover_aware", "ppo"), ("avoid", "bptt")])
+@pytest.mark.parametrize(("task", "algo"), [("hover", "bptt"), ("hover_aware", "bptt"), ("avoid", "bptt")])
 def test_the_algorithm_left_out_is_the_task_s_best(task: str, algo: str) -> None:
     assert TASKS[task].best == algo
 

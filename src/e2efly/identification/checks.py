@@ -21,6 +21,8 @@ LIMITS = {
 """The largest size of a number that a quadrotor's log can hold, in the stream's unit."""
 LOST = 1e-3
 """Share of a stream that may lie outside, as single wrong samples, and is left out."""
+MOVING = 0.3
+"""Speed from which on poses show a vehicle that moves, m/s."""
 DRIFT = 0.02
 """Change of the offset between two clocks over a flight from which on it is refused, s."""
 AGREE = 0.7
@@ -173,7 +175,10 @@ def _in_the_air(record: Record, vehicle: Vehicle) -> Record:
         flying = stream.values.mean(1) > 0.15
     elif record.has("position"):
         stream = record.streams["position"]
-        flying = stream.values[:, 2] > np.quantile(stream.values[:, 2], 0.02) + 0.1
+        height = stream.values[:, 2]
+        # what flies along the lowest height of a flight is not on the ground
+        moves = np.linalg.norm(np.gradient(_smooth(stream.values), stream.time, axis=0), axis=1) > MOVING
+        flying = (height > np.quantile(height, 0.02) + 0.1) | moves
     else:
         return record
     if not flying.any():

@@ -4,7 +4,7 @@ import dataclasses
 from dataclasses import dataclass
 from typing import ClassVar
 
-from e2efly.config import AlgorithmConfig, BPTTConfig, PPOConfig, RewardConfig, TaskConfig, TrainConfig, number
+from e2efly.config import AlgorithmConfig, BPTTConfig, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
 from e2efly.tasks.registry import register
 
 
@@ -17,6 +17,7 @@ class GapConfig(TaskConfig):
     goal_class: ClassVar[str] = "e2efly.tasks.gap.goal:GapGoal"
     route: ClassVar[str] = "e2efly.tasks.gap.goal:GapRoute"
     best: ClassVar = "bptt"
+    robust: ClassVar = {"bptt": Robust(steps=8_000_000, chunk=60, recurrent=96, hidden=(96, 96))}
 
     episode_s: float = 6.0
     """Length of an episode, s."""

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from e2efly.config import BPTTConfig, PPOConfig, RewardConfig, TaskConfig, TrainConfig, number
+from e2efly.config import BPTTConfig, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
 from e2efly.courses import defaults
 from e2efly.tasks.registry import register
 
@@ -17,6 +17,14 @@ class HoverAwareConfig(TaskConfig):
     world: ClassVar[str] = "e2efly.tasks.hover_aware.world:HoverAware"
     goal_class: ClassVar[str] = "e2efly.tasks.hover_aware.goal:HoverAwareGoal"
     route: ClassVar[str] = "e2efly.tasks.hover_aware.goal:HoverAwareRoute"
+    best: ClassVar = "bptt"
+    robust: ClassVar = {
+        "bptt": Robust(
+            weights={"prog2": 1.0, "ori1": 1.0, "ori3": 1.0, "v1": 0.1, "anglev_sq": 0.06, "act2_sq": 0.05},
+            algo={"horizon": 96, "learning_rate": 8e-3},
+            steps=3_000_000,
+        ),
+    }
 
     episode_s: float = 8.0
     """Length of an episode, s."""
