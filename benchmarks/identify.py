@@ -1,10 +1,11 @@
 """Identification of vehicles whose parameters are hidden, from logs of a flight with noise, delay, gaps and sag.
 
-    python benchmarks/identify.py [--vehicles 100] [--vehicle vis_r]
+    python benchmarks/identify.py [--vehicles 100] [--first 0] [--vehicle vis_r]
 
 Each vehicle is drawn about the file (mass 20 %, thrust 12 %, inertia 30 % an axis, motor lag 40 %, drag 50 %, torque
 ratio 20 %, rate gain 30 %, delay 20 to 80 ms, sag up to 8 %), flown for 30 s in MuJoCo by a flight controller that
 believes in the file, and identified from the log of its sensors (`e2efly.validation.excitation`). Its mass is weighed.
+`--first` is the seed of the first vehicle.
 """
 
 import dataclasses
@@ -78,13 +79,13 @@ def one(vehicle: Vehicle, seed: int) -> dict[str, tuple[float, float]]:
 
 def main() -> None:
     """Identify all of them, print a table, write JSON."""
-    options = arguments(__doc__ or "", vehicles=100, vehicle="vis_r")
+    options = arguments(__doc__ or "", vehicles=100, first=0, vehicle="vis_r")
     prepare("cpu")
     vehicle, began, every = load_vehicle(options.vehicle), time.perf_counter(), []
-    for seed in range(options.vehicles):
+    for seed in range(options.first, options.first + options.vehicles):
         every.append(one(vehicle, seed))
-        if seed % 10 == 9:
-            print(seed + 1, f"{time.perf_counter() - began:.0f} s", flush=True)
+        if len(every) % 10 == 0:
+            print(len(every), f"{time.perf_counter() - began:.0f} s", flush=True)
     rows = []
     for label in dict.fromkeys(name for found in every for name in found):
         of = np.array([found[label] for found in every if label in found])
@@ -102,7 +103,7 @@ def main() -> None:
     last = {"parameter": "all", "identified": "", "median error": "", "90 % below": ""}
     rows.append(last | {"truth in the 90 % interval": f"{100 * np.mean(inside):.0f} %"})
     seconds = (time.perf_counter() - began) / len(every)
-    write("identify", options.json, {"table": rows, "seconds_each": seconds, "vehicles": every})
+    write("identify", options.json, {"table": rows, "first": options.first, "seconds_each": seconds, "vehicles": every})
     print(table(rows))
     print(f"{seconds:.1f} s a vehicle, flight and fit")
 

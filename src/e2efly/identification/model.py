@@ -248,7 +248,7 @@ def _recoiled(model: Model, now: Parts, before: Parts, added: dict[str, Any]) ->
 def _spun_up(plant: Plant, asked: Array) -> Array:
     """Rotor speeds after steps of first-order lag towards what was asked for in each, (steps, 4): (4,)."""
     left = plant.decay ** jnp.arange(len(asked) - 1, -1, -1)
-    return left @ asked / jnp.sum(left)
+    return jnp.asarray(left) @ asked / jnp.sum(left)
 
 
 def _acting(model: Model, vehicle: Vehicle, driven: Array) -> tuple[Array, Array]:
