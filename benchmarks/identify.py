@@ -1,6 +1,6 @@
 """Identification of vehicles whose parameters are hidden, from logs of a flight with noise, delay, gaps and sag.
 
-    python benchmarks/identify.py [--vehicles 100] [--vehicle vis_r] [--plant mujoco]
+    python benchmarks/identify.py [--vehicles 100] [--first 0] [--vehicle vis_r] [--plant mujoco]
 
 Each vehicle is drawn about the file (mass 20 %, thrust 12 %, inertia 30 % an axis, motor lag 40 %, drag 50 %, torque
 ratio 20 %, rate gain 30 %, delay 20 to 80 ms, sag up to 8 %), flown for 30 s in MuJoCo by a flight controller that
@@ -9,6 +9,7 @@ believes in the file, and identified from the log of its sensors (`e2efly.valida
 `--plant betaflight` flies them by the bridge's excitation mode through the real firmware (`e2efly.validation.excited`),
 and identifies each twice: from the flight log alone, and with the firmware's blackbox laid over it. The delay is
 compared with the one on the rig's own clock: the age of the poses, and the time from a command to the setpoint.
+`--first` is the seed of the first vehicle.
 """
 
 import dataclasses
@@ -128,24 +129,25 @@ def errors(body: Vehicle, found: Found, by_firmware: bool = False) -> Errors:
 
 def main() -> None:
     """Identify all of them, print a table, write JSON."""
-    options = arguments(__doc__ or "", vehicles=100, vehicle="vis_r", plant="mujoco")
+    options = arguments(__doc__ or "", vehicles=100, first=0, vehicle="vis_r", plant="mujoco")
     prepare("cpu")
     vehicle, began = load_vehicle(options.vehicle), time.perf_counter()
     every: dict[str, list[Errors]] = {}
-    for seed in range(options.vehicles):
+    for seed in range(options.first, options.first + options.vehicles):
         found = through_firmware(vehicle, seed) if options.plant == "betaflight" else {"": one(vehicle, seed)}
         for label, errors_of in found.items():
             every.setdefault(label, []).append(errors_of)
-        if seed % 10 == 9 or options.plant == "betaflight":
-            print(seed + 1, f"{time.perf_counter() - began:.0f} s", flush=True)
+        if (seed + 1 - options.first) % 10 == 0 or options.plant == "betaflight":
+            print(seed + 1 - options.first, f"{time.perf_counter() - began:.0f} s", flush=True)
     tables = {label: rows_of(found) for label, found in every.items()}
     seconds = (time.perf_counter() - began) / options.vehicles
     name = "identify" if options.plant == "mujoco" else f"identify_{options.plant}"
+    told = {"first": options.first, "seconds_each": seconds}
     if options.plant == "mujoco":
-        write(name, options.json, {"table": tables[""], "seconds_each": seconds, "vehicles": every[""]})
+        write(name, options.json, {"table": tables[""], **told, "vehicles": every[""]})
     else:
         both = [{"from": label, **row} for label, rows in tables.items() for row in rows]
-        write(name, options.json, {"table": both, "seconds_each": seconds, "vehicles": every})
+        write(name, options.json, {"table": both, **told, "vehicles": every})
     for label, rows in tables.items():
         print(label, table(rows), sep="\n")
     print(f"{seconds:.1f} s a vehicle, flight and fit")

@@ -103,8 +103,8 @@ def cut(record: Record, driver: str, flight: int = 0, volts: float | None = None
     longest = max(GAP / driving.rate, 0.05) if driver != "command" else np.inf
     gaps = np.diff(driving.time) > longest
     torn = np.zeros(n, bool)
-    for start, end in zip(driving.time[:-1][gaps], driving.time[1:][gaps], strict=True):
-        torn |= (grid[inner[:, -1]] > start) & (before[rows[:, 0]] < end)
+    for lost, again in zip(driving.time[:-1][gaps], driving.time[1:][gaps], strict=True):
+        torn |= (grid[inner[:, -1]] > lost) & (before[rows[:, 0]] < again)
     begin = grid[inner[:, 0]]
     windows = Windows(np.full(n, flight), np.arange(n) / max(n, 1), begin, driven[rows], measured, there, start)
     whole = windows.some(~torn & (there["body_rate"].mean(1) > 0.2))
