@@ -1,6 +1,7 @@
 """The zoo under stress, and beside it VIS-R's policies by BPTT's preset `nominal`, which have no memory.
 
     python benchmarks/zoo_stress.py [--tasks hover land track race]
+    python benchmarks/zoo_stress.py --tasks gap hover_aware
     python benchmarks/zoo_stress.py --by-sight
 
 Percent of 1000 starts in each row (250 of those who see), of the worst criterion. The zoo's figures are those of
@@ -34,7 +35,8 @@ def _by_criterion(columns: Iterable[str], called: str, of: Callable[[Any], dict[
 
 def main() -> None:
     """Train what has no memory, print the table, write the figures."""
-    options = arguments(__doc__ or "", tasks=["hover", "land", "track", "race"], by_sight=False)
+    usual = ["hover", "land", "track", "race"]
+    options = arguments(__doc__ or "", tasks=usual, by_sight=False)
     zoo, columns = contents(), {}
     for task in [task for task in TASKS if TASKS[task].cameras] if options.by_sight else options.tasks:
         for vehicle in vehicle_names():
@@ -51,7 +53,8 @@ def main() -> None:
     if options.by_sight:
         rows += [_by_criterion(columns, "success of 1000 starts", lambda about: about["success"], 100)]
         rows += [_by_criterion(columns, "mean speed, m/s", lambda about: about["mean_speed_m_s"], 1)]
-    name = "zoo_stress_by_sight" if options.by_sight else "zoo_stress"
+    name = "zoo_stress" if options.tasks == usual else f"zoo_stress_{'_'.join(options.tasks)}"
+    name = "zoo_stress_by_sight" if options.by_sight else name
     write(name, options.json, {"table": rows, "success": columns})
     print(table(rows))
 
