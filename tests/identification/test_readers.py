@@ -3,6 +3,7 @@
 import math
 import struct
 import time
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
@@ -70,6 +71,22 @@ def test_a_last_line_that_breaks_off_is_left_out(tmp_path: Path) -> None:
     found = read_csv(tmp_path / "d.csv")
     assert len(found.streams["body_rate"].time) == 2
     assert found.notes == ("line 4, the last, breaks off and is left out",)
+
+
+def test_a_long_file_is_read_as_far_as_memory_shall_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Memory grows with the lines that are kept, not with the file."""
+    monkeypatch.setattr("e2efly.identification.csv_file.LINES", 1000)
+    peaks = []
+    for lines in (2_000, 40_000):
+        path = tmp_path / f"{lines}.csv"
+        path.write_text("t,wx,wy,wz\n" + "".join(f"{0.001 * i:.3f},1,2,3\n" for i in range(lines)))
+        tracemalloc.start()
+        found = read_csv(path)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert len(found.streams["body_rate"].time) == 1000
+        assert found.notes[0].startswith("the first 1000 lines are read")
+    assert peaks[1] < 1.2 * peaks[0]
 
 
 def test_a_part_of_a_log_is_cut_out_by_times_after_its_beginning(tmp_path: Path) -> None:

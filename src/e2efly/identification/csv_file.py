@@ -15,6 +15,8 @@ TIME = "t"
 """The column of the time, s."""
 DIGITS = 9
 """Of the times that are written: nanoseconds."""
+LINES = 1_000_000
+"""That are read of a file: half an hour at 500 Hz, in a third of a gigabyte."""
 COLUMNS = (TIME, *(name for kind in KINDS.values() for name in kind.columns))
 """All that are known."""
 
@@ -51,7 +53,7 @@ def column_map(given: Iterable[str]) -> dict[str, Column]:
 
 
 def read_csv(path: Path, columns: Mapping[str, Column] | None = None) -> Record:
-    """Read a flight, line by line.
+    """Read a flight, line by line, and of a long file the first `LINES`.
 
     Args:
         path: a file with a header.
@@ -136,6 +138,9 @@ def _numbers(
     path: Path, lines: Iterator[list[str]], width: int, places: Mapping[str, int], notes: list[str]
 ) -> Iterator[list[float]]:
     for number, line in enumerate(lines, 2):
+        if number > LINES + 1:
+            notes.append(f"the first {LINES} lines are read, and no more: cut the file where another part matters")
+            return
         if len(line) != width:
             if number > 2 and len(line) < width and next(lines, None) is None:
                 notes.append(f"line {number}, the last, breaks off and is left out")
