@@ -126,7 +126,6 @@ def test_motor_outputs_give_the_motors_lag_and_the_thrust(record: Record) -> Non
     names = [u.name for u in found.model.unknowns]
     late = FILE.latency + float(found.fit.p[names.index("latency")])
     assert abs(vehicle.motor_time_constant + late - BODY.motor_time_constant) < 5e-3
-    assert abs(float(found.fit.p[names.index("motor_curve")]) - curve) < 0.05
     assert "latency" not in {e.name for e in found.estimates}  # how late motors hear is not how late a vehicle is
     assert np.allclose(vehicle.inertia[:2], BODY.inertia[:2], rtol=0.1)
     off = found.sigma[[u.name for u in found.model.unknowns].index("motor_time_constant")]

@@ -81,6 +81,11 @@ def run(options: Identify) -> int:
             found[kind] = _flown(known, base, records, kind == "step", console)
             said += _with_mass(found[kind].estimates, said)
     fused = fuse(said)
+    if "latency" in fused and float(fused["latency"].value) < 0:
+        raise ValueError(
+            f"{fused['latency'].source}: the vehicle answers {-1e3 * float(fused['latency'].value):.0f} ms before its "
+            "commands; accepted: times of both by one clock"
+        )
     from e2efly.identification.judge import judged
 
     outside = {kind: judged(each) for kind, each in found.items()}

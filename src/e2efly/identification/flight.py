@@ -198,8 +198,10 @@ def identify(
         sigma = np.where(refused, sigma, np.hypot(sigma, spread))
     refusals = [Refusal(model.unknowns[i], float(sigma[i])) for i in np.flatnonzero(refused)]
     source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
-    estimates = [e for e in _estimates(model, p, sigma, refused, source) if e.name != "latency"]
-    estimates += _latency(model, records, found, p, sigma, refused, source)
+    estimates = _estimates(model, p, sigma, refused, source)
+    if not step:  # steps show the time from command to response alone
+        estimates = [e for e in estimates if e.name != "latency"]
+        estimates += _latency(model, records, found, p, sigma, refused, source)
     return Found(model, found, windows, held_out, estimates, refusals, p, sigma, structures)
 
 
