@@ -85,8 +85,10 @@ thrust, which an accelerometer shakes, none). [How it is done, and the picture](
     "identify_betaflight": """
 30 s of `e2efly fly excitation` each, in a fence of 12 x 12 x 4.8 m, by the bridge, through Betaflight 4.6
 in virtual time. The delay's truth is on the rig's own clock: the age of the poses, and the time from a
-command to the setpoint. Three vehicles are few. With the blackbox: measured when rotor speeds were
-taken to rise evenly with motor outputs; since then thrust is a quadratic of them. [What to fly](identification.md#what-to-fly).""",
+command to the setpoint. Three vehicles are few. Measured when rotor speeds were taken to rise
+evenly with motor outputs, and outputs of 50 Hz to tell torques. Since then thrust is a quadratic of
+outputs, and a log with less than 200 Hz of them gives thrust, lag and drag, but no inertia.
+[What to fly](identification.md#what-to-fly).""",
     "robust": """
 Five seeds, 1000 starts a row. While track's last two and race's first three trained, other programs
 ran on the same two cores: they took up to twice the time of the others.""",

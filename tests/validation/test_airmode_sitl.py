@@ -11,7 +11,7 @@ from e2efly.deploy.betaflight.messages import set_raw_rc
 from e2efly.deploy.betaflight.settings import PidAdvanced
 from e2efly.deploy.pilot.flight_state import Mode
 from e2efly.validation import firmware, rig
-from e2efly.validation.rig import SETTINGS, Rig
+from e2efly.validation.rig import Rig
 from e2efly.validation.session import Session, rehearsal_settings
 from e2efly.vehicles import load_vehicle
 
@@ -23,7 +23,7 @@ LOW = 0.15
 def session_of(folder: Path, monkeypatch: pytest.MonkeyPatch, *lines: str) -> Iterator[Session]:
     """A bridge on firmware that is set by `SETTINGS` and further lines, and told what forbids a take-off."""
     prepare = rig.prepare
-    monkeypatch.setattr(rig, "prepare", lambda sitl: prepare(sitl, (*SETTINGS, *lines)))
+    monkeypatch.setattr(rig, "prepare", lambda sitl, settings: prepare(sitl, (*settings, *lines)))
     with Rig(firmware.chosen(), folder, VEHICLE) as running:
         session = Session(running, rehearsal_settings(1.0))
         session.bridge.settings_problems = problems(examine(session.info, VEHICLE, session.settings))

@@ -40,12 +40,13 @@ def test_it_ends_by_itself_and_its_log_and_blackbox_are_read_together(tmp_path: 
     assert ended - begun == pytest.approx(SHORT.seconds, abs=0.05)
     steps = flight.flown.where(Mode.POLICY)
     assert np.all(np.abs(np.array(flight.flown.position)[steps, :2]) < 4.0)
-    # as it is: motor outputs drive the simulation, and the delay shows
+    # as it is: motor outputs, too few for torques, drive the simulation, and the delay shows
     alone = checked(read_flights(log), BODY)
-    assert driver_of(alone) == "motor"
+    assert driver_of(alone) == "motor_and_rate"
     assert flight.blackbox is not None
     boxes = read_flights(flight.blackbox)
     (whole,) = checked(with_blackboxes([*read_flights(log), *boxes]), BODY)
+    assert driver_of([whole]) == "motor"
     assert whole.streams["motor"].rate == pytest.approx(1000, rel=0.05)
     (exact,) = with_blackboxes([flight.truth, *boxes])
     link, age = setpoint_delay(exact), flight.truth.pose_age

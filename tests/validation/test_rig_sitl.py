@@ -190,16 +190,10 @@ def test_it_hovers_where_thrust_equals_weight(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("override_failsafe", [False, True])
-def test_a_silent_msp_is_held_or_handed_back_as_the_version_is_said_to(
-    tmp_path: Path, override_failsafe: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_silent_msp_is_held_or_handed_back_as_the_version_is_said_to(tmp_path: Path, override_failsafe: bool) -> None:
     """Why the bridge has a watchdog: where the last sticks are held, only the override switch ends them."""
-    from e2efly.validation import rig as rig_module
-
-    chosen = (*rig_module.SETTINGS, f"set msp_override_failsafe={'ON' if override_failsafe else 'OFF'}")
-    prepare = rig_module.prepare
-    monkeypatch.setattr(rig_module, "prepare", lambda sitl: prepare(sitl, chosen))
-    with Rig(firmware.chosen(), tmp_path, VEHICLE) as rig:
+    settings = (f"set msp_override_failsafe={'ON' if override_failsafe else 'OFF'}",)
+    with Rig(firmware.chosen(), tmp_path, VEHICLE, settings=settings) as rig:
         bench = Bench(rig)
         timeout = bench.info.release.override_timeout
         bench.arm()
