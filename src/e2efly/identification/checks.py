@@ -140,7 +140,10 @@ def _levelled(record: Record) -> Record:
     turning = motor.values.max(1) > AT_REST
     start = motor.time[int(np.argmax(turning))] if turning.any() else motor.time[0]
     ground = record.during(record.span[0], start - 0.2).streams
-    if start - record.span[0] < 0.7 or min(len(ground[k].time) for k in ("specific_force", "quaternion")) < 20:
+    if (
+        start - record.span[0] < 0.7
+        or min(len(ground[k].time) for k in ("specific_force", "quaternion", "body_rate")) < 20
+    ):
         return record
     if np.any(np.abs(ground["body_rate"].values).max(0) > 0.3):
         return record
