@@ -12,8 +12,8 @@ PASSES = 2
 """Times that all quantities are searched."""
 LOGS = np.linspace(-0.7, 0.7, 15)
 """Logarithms of the factors that are tried: half to twice."""
-DELAYS = np.arange(0.0, 0.16, 0.01)
-"""Delays that are tried, s."""
+DELAYS = np.arange(-0.1, 0.155, 0.01)
+"""Delays that are tried, s; below zero, so that clocks that do not fit together show."""
 GROUPS: tuple[tuple[str, ...], ...] = (
     ("thrust",),
     ("latency",),
