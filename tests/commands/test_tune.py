@@ -40,7 +40,7 @@ def test_a_log_becomes_a_policy_for_the_vehicle_that_it_shows(tmp_path: Path) ->
     [
         (["--task", "hoover"], "unknown task 'hoover'; did you mean 'hover'?"),
         (["--task", "hover", "--mass", "0", "1"], "--mass is 0.0 1.0; accepted: kg"),
-        ([], "No such file"),
+        ([], "none.csv' does not exist"),
     ],
 )
 def test_what_cannot_be_tuned_is_named(
