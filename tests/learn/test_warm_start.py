@@ -12,7 +12,6 @@ import pytest
 
 import e2efly
 from e2efly.cli import run
-from e2efly.config import NetworkConfig
 from e2efly.learn.checkpoint import read_arrays
 from e2efly.learn.export import random_images, random_observations
 from e2efly.learn.setup import Setup
@@ -38,9 +37,8 @@ def test_what_is_read_acts_as_the_file(task: str) -> None:
     np.testing.assert_allclose(found[1], wanted[1], atol=1e-5)
 
 
-@pytest.mark.parametrize("algo", ["ppo", "bptt"])
-def test_a_run_begins_where_the_policy_was(algo: str, tmp_path: Path) -> None:
-    task, options = "hover_aware", {**SMALL, "vehicle": "crazyflie"}
+def test_a_run_begins_where_the_policy_was(tmp_path: Path) -> None:
+    task, algo, options = "hover_aware", "bptt", {**SMALL, "preset_name": "robust"}
     begun = e2efly.train(task, algo, out=tmp_path / "run", start_from=task, **options)
     assert begun["shipped"][task]["success"] > 0.9
     more = e2efly.train(task, algo, out=tmp_path / "more", start_from=tmp_path / "run", **options)
@@ -61,9 +59,12 @@ def test_what_does_not_fit_is_named(tmp_path: Path, capsys: pytest.CaptureFixtur
     config = e2efly.preset("hover_aware")
     own = config.network.activation
     for changes, message in (
-        ({"network": NetworkConfig((32, 64))}, r"weight_0 has shape \(23, 64\); accepted: \(23, 32\)"),
-        ({"network": NetworkConfig((64, 64, 64))}, "weight_2 has shape"),
-        ({"network": NetworkConfig(activation="relu" if own != "relu" else "tanh")}, "accepted: .* network.activation"),
+        ({"network": replace(config.network, hidden=(32, 64))}, r"weight_0 has shape \(95, 64\); accepted: \(95, 32\)"),
+        ({"network": replace(config.network, hidden=(64, 64, 64))}, "weight_2 has shape"),
+        (
+            {"network": replace(config.network, activation="relu" if own != "relu" else "tanh")},
+            "accepted: .* network.activation",
+        ),
         ({"env": replace(config.env, command_mode="rotor_thrust")}, "command mode is ctbr; accepted: rotor_thrust"),
     ):
         setup = Setup.of(replace(config, **changes))
