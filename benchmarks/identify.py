@@ -52,6 +52,8 @@ def hidden(vehicle: Vehicle, rng: np.random.Generator) -> Vehicle:
         value = np.asarray(getattr(vehicle, name), float)
         shape = () if name == "thrust_map" else value.shape
         changed[name] = value * (1 + width * rng.uniform(-1, 1, shape))
+        while name == "inertia" and 2 * changed[name].max() > changed[name].sum():  # of no rigid body
+            changed[name] = value * (1 + width * rng.uniform(-1, 1, shape))
     changed["rotor_thrust_max"] = vehicle.rotor_thrust_max * changed["thrust_map"][0] / vehicle.thrust_map[0]
     changed = {k: x if np.ndim(x) else float(x) for k, x in changed.items()}
     return dataclasses.replace(vehicle, **changed, latency=float(rng.uniform(0.02, 0.08)))
