@@ -70,7 +70,7 @@ def race(name: str) -> dict[str, Any]:
             flown = rehearse(firmware.chosen(), load_policy(policy_file("race", name)), vehicle, log=log)
         read = read_flights(Path(folder) / "race.mcap")
         records = checked(read, vehicle)
-        pose_delay, _, _ = pose_delay_of(None, read, records)
+        pose_delay, _, _ = pose_delay_of(None, records)
     return {"complete": flown.complete, **report(vehicle, align(vehicle, records, pose_delay))}
 
 

@@ -92,10 +92,10 @@ def test_a_log_of_ours_says_how_late_its_poses_were(tmp_path: Path, record: Reco
         for at, command in zip(record.streams["command"].time, record.streams["command"].values.tolist(), strict=True):
             log.record("command", begin + 1 + at, {"collective_thrust": command[0], "body_rate": command[1:]})
     read = read_flights(tmp_path / "flight.mcap")
-    late, how, known = pose_delay_of(None, read, checked(read, FILE))
+    late, how, known = pose_delay_of(None, checked(read, FILE))
     assert known and late == pytest.approx(0.045, abs=2e-3) and "by the log" in how
-    assert pose_delay_of(0.03, read, read)[0] == 0.03
-    late, how, known = pose_delay_of(None, [record], [record])
+    assert pose_delay_of(0.03, read)[0] == 0.03
+    late, how, known = pose_delay_of(None, [record])
     assert late == 0 and not known and "--pose-delay" in how
 
 

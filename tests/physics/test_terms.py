@@ -19,23 +19,10 @@ from e2efly.vehicles import Vehicle
 from e2efly.vehicles.terms import BATTERY, battery_share
 from e2efly.vehicles.vehicle import inertia_tensor, terms
 from tests.gradients import central, reverse
+from tests.terms import VALUES
 
 pytestmark = pytest.mark.usefixtures("x64")
 
-VALUES: dict[str, Any] = {
-    "rotor_inertia": 1.5e-5,
-    "motor_time_constant_down": 0.06,
-    "centre_of_mass": [0.004, -0.006, 0.01],
-    "inertia_products": [1e-4, -2e-4, 5e-5],
-    "drag_torque": [2e-3, 3e-3, 1e-3],
-    "rate_integral_gain": [60.0, 50.0, 20.0],
-    "gyro_time_constant": 0.004,
-    "nominal_voltage": 14.8,
-    "battery_voltage": 15.6,
-    "voltage_sag": 0.08,
-    "speed_per_volt": 0.9,
-}
-"""Of the size that a vehicle like the VIS-R has."""
 NOTHING: dict[str, Any] = {
     "rotor_inertia": 0.0,
     "motor_time_constant_down": 0.035,

@@ -4,16 +4,16 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.physics import Physics, State, started, step
+from e2efly.physics import Physics, State, started
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plants.mujoco import MujocoPlant
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY
+from tests.validation.test_plants import fine
 
 TERMS: dict[str, dict[str, Any]] = {
     "rotor inertia": {"rotor_inertia": 1.5e-5},
@@ -26,17 +26,6 @@ TERMS: dict[str, dict[str, Any]] = {
 }
 """Of the VIS-R's size."""
 TERMS["all of them"] = {name: value for term in TERMS.values() for name, value in term.items()}
-
-
-@jax.jit
-def fine(physics: Physics, state: State, commands: jax.Array) -> State:
-    """Our physics under a command each control period."""
-
-    def one(state: State, command: jax.Array) -> tuple[State, State]:
-        state = step(physics, physics.nominal, state, command)
-        return state, state
-
-    return jax.lax.scan(one, state, commands)[1]
 
 
 @pytest.fixture(scope="module")

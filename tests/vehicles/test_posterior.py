@@ -75,6 +75,21 @@ def test_delays_stay_within_what_the_environment_keeps_of_actions(file: str) -> 
     assert 0.07 < late.max() <= high + 1e-6
 
 
+def test_a_delay_that_may_be_none_is_not_drawn_longer_than_the_file_says(tmp_path: Path) -> None:
+    late = {"latency": Estimate("latency", np.array(0.004), np.array(0.003), "flight")}
+    write_vehicle(tmp_path / "a.toml", "vis_r", BASE, late)
+    _, drawn = draws(str(tmp_path / "a.toml"))
+    assert drawn.min() == 0
+    assert drawn.mean() == pytest.approx(0.004, abs=3e-4)
+
+
+def test_a_delay_that_is_asked_for_is_drawn_as_asked(file: str) -> None:
+    plant, late = draws(file, action_latency=(0.08, 0.12))
+    assert 0.08 <= late.min() < 0.081
+    assert 0.119 < late.max() <= 0.12
+    assert np.std(plant["thrust_map"][:, 0]) > 0
+
+
 def test_a_mass_that_goes_with_the_thrust_leaves_their_ratio_exact(tmp_path: Path) -> None:
     together = {name: FOUND[name] for name in ("thrust_map",)} | {
         "mass": Estimate("mass", np.array(0.75), np.array(0.03), "scale")
@@ -101,6 +116,8 @@ def test_the_command_line_takes_it_with_and_without_a_factor(file: str) -> None:
     robust = e2efly.preset("race").env.randomize
     measured = {"inertia", "motor_time_constant"}  # what the preset draws, and the file knows better
     assert config.env.randomize == {k: v for k, v in robust.items() if k not in measured} | {"identified": 1.0}
+    own = parse(["race", "--vehicle", file, "--env.randomize", "mass", "0.1", "--out", "identified"])
+    assert (own.out, own.config.env.randomize["mass"]) == (Path("identified"), 0.1)
     assert parse([*asked, "2.5", "mass", "0.1"]).config.env.randomize["identified"] == 2.5
     assert parse(["race", "--vehicle", file, "--preset", "identified"]).config.env.randomize == {"identified": 1.0}
 

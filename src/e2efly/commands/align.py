@@ -70,7 +70,7 @@ def run(options: Align) -> int:
         console.print(f"{record.path.name}: {record.duration:.1f} s")
         for note in record.notes:
             console.print(f"  {note}", style="dim")
-    pose_delay, how, known = pose_delay_of(options.pose_delay, read, records)
+    pose_delay, how, known = pose_delay_of(options.pose_delay, records)
     console.print(how, style="dim" if known else "bold")
     prepare("cpu")
     with console.status("fitting") as status:
@@ -109,7 +109,7 @@ def run(options: Align) -> int:
     return 0
 
 
-def pose_delay_of(given: float | None, read: "list[Record]", records: "list[Record]") -> tuple[float, str, bool]:
+def pose_delay_of(given: float | None, records: "list[Record]") -> tuple[float, str, bool]:
     """How late the poses were when they were flown by, s; from where that is known, in words; and whether it is.
 
     In a log of ours the poses are behind the gyroscope by what their source does not tell, and older by their age when
@@ -117,19 +117,11 @@ def pose_delay_of(given: float | None, read: "list[Record]", records: "list[Reco
 
     Args:
         given: by the user, s.
-        read: the flights as they were read.
-        records: the same, checked: cut to what is used, poses on the gyroscope's clock.
+        records: the flights, checked: poses on the gyroscope's clock.
     """
-    from e2efly.identification.checks import poses_behind
-
     if given is not None:
         return given, f"The poses are taken to be {1e3 * given:.0f} ms late (--pose-delay).", True
-    known = []
-    for log, record in zip(read, records, strict=True):
-        if log.path.suffix.lower() == ".mcap":
-            behind, age = poses_behind(log.during(*record.span)), _age(log.path)
-            if behind is not None and np.isfinite(age):
-                known.append(max(behind, 0.0) + age)
+    known = [max(record.pose_age, 0.0) for record in records if record.pose_age is not None]
     if known:
         late = float(np.median(known))
         told = f"The poses are {1e3 * late:.0f} ms late by the log: behind its gyroscope, and until their use."
@@ -139,14 +131,6 @@ def pose_delay_of(given: float | None, read: "list[Record]", records: "list[Reco
         "to response alone. Add the poses' by --pose-delay."
     )
     return 0.0, told, False
-
-
-def _age(path: Path) -> float:
-    """Age of the odometry when it was used, s; NaN where none was recorded."""
-    from e2efly.deploy.log.flight_log import read_log
-
-    age = read_log(path)["odometry"].numbers("age")
-    return float(np.nanmedian(age)) if np.isfinite(age).any() else float("nan")
 
 
 def _rows(vehicle: Vehicle, found: "Alignment") -> list[dict[str, Any]]:

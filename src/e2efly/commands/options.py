@@ -57,10 +57,11 @@ def parse(options: type[T], command: str, arguments: list[str], **default: Any) 
 def _once(arguments: list[str]) -> list[str]:
     """`--env.randomize identified` with the factor that it leaves out: once the file's standard deviations."""
     out: list[str] = []
-    for i, argument in enumerate(arguments):
+    flag = ""
+    for argument, following in zip(arguments, [*arguments[1:], "--"], strict=True):
+        flag = argument if argument.startswith("--") else flag
         out.append(argument)
-        following = arguments[i + 1] if i + 1 < len(arguments) else "--"
-        if argument == IDENTIFIED and "--env.randomize" in arguments[:i] and not _is_number(following):
+        if flag == "--env.randomize" and argument == IDENTIFIED and not _is_number(following):
             out.append("1")
     return out
 

@@ -3,6 +3,7 @@
 `lines` and `doublets` are what is flown where there is room without end; `excite` flies them inside a room.
 """
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -38,6 +39,10 @@ INWARDS = 1.0
 """Speed at which the edge is left, m/s."""
 TRIM_GAIN, TRIM = 1.5, 4.0
 """Growth of the trim over the error of the climb, 1/s^2 per m/s, and its largest, m/s^2."""
+TILT = 0.6
+"""The largest tilt that steering asks for, rad."""
+GAINS = (4.0, 2.0), (1.3, 1.3, 3.0)
+"""Largest gains of tilt and yaw, and of the velocity, 1/s: the vehicle is not known yet."""
 _LINES = np.array([
     (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 0.3), (0, 0, -0.3), (0.8, 0.8, 0), (-0.8, -0.8, 0),
     (0.7, -0.7, 0.2), (-0.7, 0.7, -0.2),
@@ -65,6 +70,26 @@ def doublets(time: float) -> tuple[np.ndarray, float]:
     if which < 3:
         rates[which] = sign * RATES[which]
     return rates, sign * THRUST if which == 3 else 0.0
+
+
+def softened(vehicle: Vehicle, tilt: float = TILT) -> Vehicle:
+    """A vehicle with gains that steer one that is not known.
+
+    Args:
+        vehicle: whose gains are taken where they are lower.
+        tilt: the largest that steering may ask for, rad.
+    """
+    return dataclasses.replace(
+        vehicle,
+        attitude_gain=np.minimum(vehicle.attitude_gain, GAINS[0]),
+        velocity_gain=np.minimum(vehicle.velocity_gain, GAINS[1]),
+        tilt_max=min(vehicle.tilt_max, tilt),
+    )
+
+
+def trimmed(trim: float, error: float, dt: float, gain: float = TRIM_GAIN, most: float = TRIM) -> float:
+    """The thrust over mass that makes up for an unknown mass, m/s^2, after `dt` s of an error of the climb, m/s."""
+    return min(max(trim + gain * error * dt, -most), most)
 
 
 @dataclass(frozen=True)
@@ -162,8 +187,7 @@ def excite(
     # whatever is flown: what would come to rest outside flies inwards
     wanted = np.where(stop > room.high, np.minimum(wanted, -INWARDS), wanted)
     wanted = np.where(stop < room.low, np.maximum(wanted, INWARDS), wanted)
-    trim = before.trim + TRIM_GAIN * (wanted[2] - velocity[2]) * min(max(time - before.time, 0.0), 0.1)
-    trim = min(max(trim, -TRIM), TRIM)
+    trim = trimmed(before.trim, float(wanted[2] - velocity[2]), min(max(time - before.time, 0.0), 0.1))
     found = reach(vehicle, motion, Vec3(*wanted), np.float64(yaw))
     command = limited(vehicle, max(float(found.thrust) + trim + push, 0.0), found.rate + Vec3(*rates))
     return Progress(before.centre, before.yaw, leg, since, trim, time), command

@@ -3,7 +3,6 @@
 A contract, an `act` and a course: modes, fence, guard, watchdog and the pilot's switch are those of every policy.
 """
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -12,7 +11,7 @@ import numpy as np
 
 from e2efly import __version__
 from e2efly.control import COMMAND_MODES, Quat, Vec3, command_limits
-from e2efly.control.excitation import DURATION, Progress, Room, excite, length_for
+from e2efly.control.excitation import DURATION, TILT, Progress, Room, excite, length_for, softened
 from e2efly.deploy.betaflight.client import SCHEDULE
 from e2efly.deploy.betaflight.messages import Motor, RawImu
 from e2efly.deploy.pilot.hover import FlightMotion, flight_gains
@@ -36,14 +35,12 @@ SLOWEST, LEAST_HEIGHT = 1.2, 1.0
 """The fence must have room for lines of this speed, m/s, and be so high inside of the margins, m."""
 BRAKING, REACTION = 3.5, 0.45
 """The deceleration that its turns count on, m/s^2, and the time before it acts, s, where the fence's are not worse."""
-TILT, PULSED = 0.6, 0.45
-"""The tilt that steering asks for, rad, and what doublets and chirps may add, rad."""
+PULSED = 0.45
+"""The tilt that doublets and chirps may add to what steering asks for, rad."""
 LEAST_TILT = 0.3
 """The tilt that is left for steering under the fence's, rad."""
 QUICK = 0.8
 """Share of the fence's speed that is flown."""
-GAINS = (4.0, 2.0), (1.3, 1.3, 3.0)
-"""Largest gains of tilt and yaw, and of the velocity, 1/s: the vehicle is not known yet."""
 _ELAPSED = Field("elapsed", 1, "none", "s", 1.0, "time since the beginning")
 _PLACE = Field("place", 3, "world", "m", 1.0, "position of the centre of mass")
 
@@ -142,13 +139,7 @@ def excitation(
     check_numbers(NAME, options)
     room, tilt = room_of(settings)
     late: float = vehicle.latency if latency is None else latency
-    gentle = flight_gains(vehicle, late)
-    steer = dataclasses.replace(
-        gentle,
-        attitude_gain=np.minimum(gentle.attitude_gain, GAINS[0]),
-        velocity_gain=np.minimum(gentle.velocity_gain, GAINS[1]),
-        tilt_max=min(vehicle.tilt_max, tilt),
-    )
+    steer = softened(flight_gains(vehicle, late), tilt)
     speed = min(options.speed, QUICK * settings.fence.speed)
     acts = Excitation(_contract(vehicle, late), steer, room, speed, options.seconds)
     goal = ExcitationGoal(options, (room.low + room.high) / 2)

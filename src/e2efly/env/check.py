@@ -7,27 +7,27 @@ import numpy as np
 
 from e2efly.config import EnvConfig, TaskConfig, check_numbers
 from e2efly.deploy.policy.contract_json import LATEST
-from e2efly.env.limits import posterior_of
 from e2efly.scenes.camera import check as check_camera
 from e2efly.sensors.image_noise import check as check_noise
 from e2efly.vehicles import Vehicle, load_family, nominal_vehicle, unknown
-from e2efly.vehicles.posterior import IDENTIFIED, WIDEST
+from e2efly.vehicles.posterior import IDENTIFIED, WIDEST, Posterior
 from e2efly.vehicles.terms import battery_share
 from e2efly.vehicles.vehicle import principal_moments, quantities, terms
 
-MOST = 10.0
-"""Times the standard deviations of an identified vehicle that episodes may draw from."""
 COUNTED = 2**24
 """Control steps that an episode can have: float32 counts no further."""
 
 
-def check(config: EnvConfig, task: TaskConfig, flown: Vehicle | None = None) -> None:
+def check(
+    config: EnvConfig, task: TaskConfig, flown: Vehicle | None = None, posterior: Posterior | None = None
+) -> None:
     """Check the numbers of a configuration.
 
     Args:
         config: of the environment.
         task: its options.
         flown: whose parameters are randomised; None: the configuration's vehicle.
+        posterior: what an identified vehicle is drawn from.
 
     Raises:
         ValueError: naming the field, the value and what is accepted.
@@ -36,7 +36,6 @@ def check(config: EnvConfig, task: TaskConfig, flown: Vehicle | None = None) -> 
     names = [f.name for f in quantities(body)]
     for name, width in config.randomize.items():
         if name == IDENTIFIED:
-            _check_identified(config)
             continue
         if any(name == term.name for term in terms()) and name not in names:
             raise ValueError(
@@ -107,7 +106,7 @@ def check(config: EnvConfig, task: TaskConfig, flown: Vehicle | None = None) -> 
         check_numbers(prefix, part)
     margin = vehicle.thrust_to_weight if family is None else family.ranges.thrust_to_weight[0]
     d, drawn = config.disturbance, margin * config.weakest
-    if (posterior := posterior_of(config)) is not None:
+    if posterior is not None:
         drawn *= 1 - WIDEST * posterior.thrust_sigma
     if body.battery_voltage is not None:
         empty = (1 - config.randomize.get("battery_voltage", 0.0)) * body.battery_voltage
@@ -127,17 +126,4 @@ def check(config: EnvConfig, task: TaskConfig, flown: Vehicle | None = None) -> 
             raise ValueError(
                 f"task.{name} is {place}; accepted: a place more than {vehicle.feet_height:g} m over the ground, the "
                 "height of the centre of mass over the feet"
-            )
-
-
-def _check_identified(config: EnvConfig) -> None:
-    width = config.randomize[IDENTIFIED]
-    if not 0 <= width <= MOST:
-        raise ValueError(f"env.randomize.{IDENTIFIED} is {width}; accepted: 0 to {MOST:g} times the file's sigma")
-    posterior = posterior_of(config)
-    for entry in () if posterior is None else posterior.entries:
-        if config.randomize.get(entry.field):
-            raise ValueError(
-                f"env.randomize has {IDENTIFIED} and {entry.field}, and {config.vehicle} has a sigma of {entry.name}; "
-                "accepted: one of the two"
             )

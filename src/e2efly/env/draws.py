@@ -35,36 +35,31 @@ def perturbed(key: PRNGKeyArray, n: int, nominal: Vehicle, widths: dict[str, Any
     return plant
 
 
-def around(
+def deviations(key: PRNGKeyArray, n: int, posterior: Posterior, dtype: Any) -> Float[Array, "n d"]:
+    """Deviations of vehicles that are as likely as their file says."""
+    return posterior.deviation(jax.random.normal(key, (n, posterior.root.shape[1]), dtype))
+
+
+def delays(
     key: PRNGKeyArray,
-    n: int,
-    vehicle: Vehicle,
+    bounds: Float[Array | np.ndarray, "2"],
+    nominal: Any,
     posterior: Posterior,
-    latency_range: Float[Array | np.ndarray, "2"],
-    late: Float[Array, " n"],
-) -> tuple[dict[str, Array], Float[Array, " n"]]:
-    """Vehicles as likely as their file says, and their delays.
+    deviation: Float[Array, "n d"],
+) -> Float[Array, " n"]:
+    """Delays, s: uniform within bounds, but for the posterior's part of them, which goes with the other deviations.
 
     Args:
-        key: of the draw.
-        n: how many.
-        vehicle: of the file.
-        posterior: what the file says of its errors.
-        latency_range: of the delay, the posterior's part included, s.
-        late: delays that are uniform in it, s.
-
-    Returns:
-        Parameters by name, each (n, ...), and delays, s: what `late` is without the posterior's part, moved by a
-        deviation that goes with those of the parameters.
+        key: of the uniform part.
+        bounds: of the whole, s. The lower one may have been cut off at zero.
+        nominal: the vehicle's, s.
+        posterior: of the vehicle.
+        deviation: of its entries.
     """
-    dtype = late.dtype
-    deviation = posterior.deviation(jax.random.normal(key, (n, len(posterior.entries)), dtype))
-    plant = {name: value.astype(dtype) for name, value in posterior.values(vehicle, deviation).items()}
-    reached = plant.pop("latency", None)
-    if reached is None:
-        return plant, late
-    low, high = latency_range
-    middle, margin = (low + high) / 2, WIDEST * posterior.latency_sigma
-    width = jnp.maximum((high - low) / 2, 1e-12)
-    inner = middle + (late - middle) * jnp.maximum(width - margin, 0.0) / width
-    return plant, jnp.clip(inner + reached - vehicle.latency, low, high)
+    n = deviation.shape[0]
+    if posterior.latency is None:
+        return between(key, n, bounds)
+    low, high = bounds
+    margin = WIDEST * posterior.latency_sigma
+    spread = jnp.stack([jnp.minimum(low + margin, nominal), high - margin])
+    return jnp.clip(between(key, n, spread) + deviation[:, posterior.latency], low, high)

@@ -29,7 +29,7 @@ from e2efly.config import (
 from e2efly.control import COMMAND_MODES
 from e2efly.env import disturbance, expert
 from e2efly.env.check import check
-from e2efly.env.draws import around, between, perturbed
+from e2efly.env.draws import between, delays, deviations, perturbed
 from e2efly.env.limits import latencies_of, limits_of, posterior_of
 from e2efly.env.state import EnvState, Step
 from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field, past_actions
@@ -129,15 +129,15 @@ class Env:
                 believed, config.command_mode, config.integrator, config.control_rate, config.largest_step, dtype
             )
             physics = physics if flown.as_believed else physics.flying(body, dtype)
-        check(config, task, body)
+        posterior = posterior_of(config)
+        check(config, task, body, posterior)
         rewards.check(reward.weights, reward.parameters)
-        late = config.action_latency or latencies_of(config, body, family if flown is None else None)
+        late = config.action_latency or latencies_of(config, body, family if flown is None else None, posterior)
         frames = latency.frames(late[1], period)
         seen = frames if config.past_actions is None else config.past_actions
         mode, (low, high) = COMMAND_MODES[config.command_mode], limits_of(config)
         noisy = config.noise != NoiseConfig()
         shape = Shape(body.feet_height, body.radius)
-        drawn = posterior_of(config)
         oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
         return Env(
             physics=physics,
@@ -150,7 +150,7 @@ class Env:
             latency_range=np.asarray(late, dtype),
             observation_latency_range=np.asarray(config.observation_latency, dtype),
             randomize={name: width for name, width in config.randomize.items() if name != IDENTIFIED},
-            posterior=drawn and dataclasses.replace(drawn, root=drawn.root.astype(dtype)),
+            posterior=posterior and dataclasses.replace(posterior, root=posterior.root.astype(dtype)),
             wind=config.wind or None,
             disturbance=None if config.disturbance == DisturbanceConfig() else config.disturbance,
             noise=config.noise if noisy else None,
@@ -379,11 +379,13 @@ class Env:
             family = jax.random.uniform(jax.random.fold_in(plant_key, 2), (n, DRAWN), self.center.dtype)
         flown = self._physics(family).flown
         disturbed, plant = None, perturbed(plant_key, n, self.physics.flown, self.randomize, flown)
-        late = between(action_key, n, self.latency_range)
-        if self.posterior is not None:
-            identified = jax.random.fold_in(plant_key, 3)
-            values, late = around(identified, n, self.physics.flown, self.posterior, self.latency_range, late)
-            plant |= values
+        if self.posterior is None:
+            late = between(action_key, n, self.latency_range)
+        else:
+            deviation = deviations(jax.random.fold_in(plant_key, 3), n, self.posterior, self.center.dtype)
+            plant |= self.posterior.values(self.physics.flown, deviation)
+            nominal = self.physics.flown.latency
+            late = delays(action_key, self.latency_range, nominal, self.posterior, deviation)
         if self.disturbance is not None:
             disturbed_key, mass_key = jax.random.split(jax.random.fold_in(plant_key, 1))
             disturbed = disturbance.draw(self.disturbance, disturbed_key, n)

@@ -7,6 +7,9 @@ from e2efly.control import COMMAND_MODES, command_limits
 from e2efly.vehicles import Family, Vehicle, load_family, load_vehicle
 from e2efly.vehicles.posterior import IDENTIFIED, WIDEST, Posterior, load_posterior
 
+MOST = 10.0
+"""Times the standard deviations of an identified vehicle that episodes may draw from."""
+
 
 def limits_of(config: EnvConfig) -> np.ndarray:
     """Smallest and largest command, (2, 4): of the nominal vehicle, or all vehicles of a family together.
@@ -21,20 +24,33 @@ def limits_of(config: EnvConfig) -> np.ndarray:
     return command_limits(mode, load_vehicle(config.vehicle), config.position_range)
 
 
-def latencies_of(config: EnvConfig, vehicle: Vehicle, family: Family | None) -> tuple[float, float]:
+def latencies_of(
+    config: EnvConfig, vehicle: Vehicle, family: Family | None, posterior: Posterior | None
+) -> tuple[float, float]:
     """Seconds from observation to command where the configuration does not say."""
     low, high = (vehicle.latency,) * 2 if family is None else family.ranges.latency
     sooner, later = config.latency_spread
-    if (drawn := posterior_of(config)) is not None:
-        sooner, later = (x + WIDEST * float(drawn.latency_sigma) for x in (sooner, later))
-    return max(low - sooner, 0.0), high + later
+    margin = 0.0 if posterior is None else WIDEST * float(posterior.latency_sigma)
+    return max(low - sooner - margin, 0.0), high + later + margin
 
 
 def posterior_of(config: EnvConfig) -> Posterior | None:
     """The distribution about the vehicle's file that episodes draw from; None: they do not.
 
     Raises:
-        ValueError: for a file that has no standard deviations.
+        ValueError: for a file that has no standard deviations, a factor out of range, and a parameter that is drawn in
+            another way, too.
     """
     width = config.randomize.get(IDENTIFIED, 0.0)
-    return load_posterior(config.vehicle).times(width) if width else None
+    if not 0 <= width <= MOST:
+        raise ValueError(f"env.randomize.{IDENTIFIED} is {width}; accepted: 0 to {MOST:g} times the file's sigma")
+    if not width:
+        return None
+    posterior = load_posterior(config.vehicle).times(width)
+    for entry in posterior.entries:
+        if config.randomize.get(entry.field):
+            raise ValueError(
+                f"env.randomize has {IDENTIFIED} and {entry.field}, and {config.vehicle} has a sigma of {entry.name}; "
+                "accepted: one of the two"
+            )
+    return posterior if config.action_latency is None else posterior.without_latency()

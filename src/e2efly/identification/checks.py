@@ -249,10 +249,10 @@ def _on_one_clock(record: Record) -> Record:
     if not record.has("body_rate", "quaternion"):
         return record
     start, end = record.span
-    thirds = [poses_behind(record.during(a, a + (end - start) / 3)) for a in (start, end - (end - start) / 3)]
-    whole = poses_behind(record)
-    if whole is None:
-        return record
+    thirds = [_behind(record.during(a, a + (end - start) / 3)) for a in (start, end - (end - start) / 3)]
+    whole = _behind(record)
+    if whole is None:  # nor does anybody know their age, then
+        return replace(record, pose_age=None)
     known = [x for x in thirds if x is not None]
     if len(known) == 2 and abs(known[1] - known[0]) > DRIFT:
         raise ValueError(
@@ -272,7 +272,7 @@ def _on_one_clock(record: Record) -> Record:
     return replace(record, streams={**record.streams, **poses}, notes=(*record.notes, note), pose_age=age)
 
 
-def poses_behind(record: Record) -> float | None:
+def _behind(record: Record) -> float | None:
     """Seconds by which the poses come after the gyroscope; None where they see no common motion."""
     if not record.has("body_rate", "quaternion"):
         return None

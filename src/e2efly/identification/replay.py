@@ -102,11 +102,9 @@ def _replayed(model: Model, p: Array, windows: dict[str, Any]) -> dict[str, Arra
 
 def _rotors(model: Model, p: Array, window: dict[str, Any]) -> Array:
     """Rotor speeds at the start, (4,) rad/s: the motors follow what the rate loop asked for at the measured rates."""
-    vehicle, past, before = vehicle_of(model, p), past_steps(), window["before"]
+    vehicle, before = vehicle_of(model, p), window["before"]
     plant = Plant.of(vehicle, STEP)
-    known = window["driven"][: past + 1]
-    held = known[0] + (known[1] - known[0]) * jnp.arange(-past, 0)[:, None]  # the first command held, before it
-    _, asked = commanded(model, vehicle, jnp.concatenate([held, known]))
+    asked, _ = commanded(model, vehicle, window["driven"])
     law = control_law(COMMAND_MODES["ctbr"])
     controller = model.controller(vehicle)
 

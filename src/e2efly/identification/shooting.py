@@ -108,7 +108,10 @@ def _fit(
     if "velocity" not in windows.measured and "position" not in windows.measured:
         prior_q[FORCE] = 1e-6
     p = np.zeros(u) if p0 is None else np.array(p0)
-    least = np.array([-float(model.base.latency) if x.field == "latency" else -np.inf for x in unknowns])
+    # motors never answer before their outputs; commands may seem to, which shows clocks that do not fit together
+    least = np.full(u, -np.inf)
+    if model.driver in ("motor", "motor_and_rate"):
+        least[[x.field == "latency" for x in unknowns]] = -float(model.base.latency)
     q, starts = np.zeros((flights, v)), np.zeros((windows.count, START))
     noise = {name: NOISE[name] for name in windows.measured}
     data = _data(model, windows)

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from e2efly.control import COMMAND_MODES, Quat, Vec3
-from e2efly.control.excitation import DURATION, doublets, lines
+from e2efly.control.cascade import limited
+from e2efly.control.excitation import DURATION, doublets, lines, softened, trimmed
 from e2efly.identification.record import Record, Stream
 from e2efly.validation.log import motion_streams
 from e2efly.validation.plant import Delay, Known, Plant, RigidState
@@ -16,10 +17,9 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 RATE, POSES, COMMANDS = 250.0, 100.0, 50.0
 """Samples of gyroscope, accelerometer and rotor speeds, of the poses, and of the commands, Hz."""
-
 LIFT, WEAKEST = 2.0, 8.0
-"""Thrust over mass that is added a second for each m/s of error of the climb, 1/s^2, and the most of it, m/s^2: the
-flight controller may believe in far more thrust than there is, and the vehicle is not to sink into the ground."""
+"""Growth and largest of the trim, 1/s^2 and m/s^2: the flight controller may believe in far more thrust than there is,
+and the vehicle is not to sink into the ground."""
 
 
 @dataclass(frozen=True)
@@ -74,18 +74,13 @@ def fly_excitation(
         pulses: whether doublets are added.
         start: position, m.
     """
-    steer = dataclasses.replace(
-        believed,
-        attitude_gain=np.minimum(believed.attitude_gain, [4.0, 2.0]),
-        velocity_gain=np.minimum(believed.velocity_gain, [1.3, 1.3, 3.0]),
-        tilt_max=min(believed.tilt_max, 0.6),
-    )
+    steer = softened(believed)
     wanted = COMMAND_MODES["velocity"].controller
     assert wanted is not None
     hover = np.array([GRAVITY, 0.0, 0.0, 0.0])
     plant.reset(RigidState(np.array(start), np.zeros(3), np.eye(4)[0], np.zeros(3)))
     delay, ticks = Delay.of(latency, hover), round(RATE / COMMANDS)
-    states, rotors, commands, climb = [], [], [], 0.0
+    states, rotors, commands, trim = [], [], [], 0.0
     for k in range(round(seconds * RATE)):
         now, then = k / RATE, (k + 1) / RATE
         state = plant.state
@@ -97,12 +92,9 @@ def fly_excitation(
             motion = Known(Vec3(*state.position), Vec3(*state.velocity), Quat(*state.quaternion))
             found = wanted(steer, motion, (*lines(now, speed), 0.0))
             rates, thrust = doublets(now) if pulses else (np.zeros(3), 0.0)
-            climb = float(
-                np.clip(climb + LIFT * (lines(now, speed)[2] - state.velocity[2]) / COMMANDS, -WEAKEST, WEAKEST)
-            )
-            rates = rates + np.array([found.rate.x, found.rate.y, found.rate.z])
-            rates = np.clip(rates, -believed.body_rate_max, believed.body_rate_max)
-            command = np.array([max(float(found.thrust) + thrust + climb, 0.0), *rates])
+            trim = trimmed(trim, lines(now, speed)[2] - state.velocity[2], 1 / COMMANDS, LIFT, WEAKEST)
+            sent = limited(believed, max(float(found.thrust) + thrust + trim, 0.0), found.rate + Vec3(*rates))
+            command = np.array([sent.thrust, sent.rate.x, sent.rate.y, sent.rate.z])
             commands.append((now, command))
             delay = delay.send(command, now)
         delay, parts = delay.until(now, then)
@@ -110,8 +102,8 @@ def fly_excitation(
             plant.step(command, held)
     time = np.arange(len(states)) / RATE
     streams = motion_streams(time, states, np.array(rotors))
-    sent = np.array([t for t, _ in commands]), np.array([c for _, c in commands])
-    return Record(Path("excitation.csv"), streams | {"command": Stream(*sent)})
+    times, values = zip(*commands, strict=True)
+    return Record(Path("excitation.csv"), streams | {"command": Stream(np.array(times), np.array(values))})
 
 
 def sensed(record: Record, sensors: Sensors, seed: int) -> Record:

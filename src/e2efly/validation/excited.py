@@ -19,6 +19,7 @@ from e2efly.validation.firmware import Firmware
 from e2efly.validation.rehearsal import LINK_S
 from e2efly.validation.rig import BLACKBOX, Rig
 from e2efly.validation.session import Flown, Session
+from e2efly.validation.sitl import FirmwareState
 from e2efly.vehicles import Vehicle
 
 STEP_S = 0.001
@@ -83,13 +84,13 @@ def fly_excited(
             ages: list[float] = []
             rates: list[tuple[float, np.ndarray]] = []
             commands: list[tuple[float, ...]] = []
-            newest, moved = 0.0, rig.step
+            newest = 0.0
 
-            def step(dt: float) -> None:
-                moved(dt)
-                rates.append((rig.now(), rig.state.body_rate))
+            def felt(state: FirmwareState) -> FirmwareState:
+                rates.append((rig.now() + STEP_S, state.body_rate))  # of the step that begins now
+                return state
 
-            rig.step = step  # type: ignore[method-assign]
+            rig.felt = felt
 
             def poses(now: float) -> Sequence[Sample]:
                 nonlocal newest

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.vehicles.tables import read_table, shown
-from e2efly.vehicles.vehicle import CORRELATION, Vehicle, load_vehicle, quantities, read_sigmas, terms, vehicle_file
+from e2efly.vehicles.vehicle import CORRELATION, Vehicle, load_vehicle, quantities, sigmas_of, terms, vehicle_file
 
 IDENTIFIED = "identified"
 """What `randomize` calls this distribution."""
@@ -67,13 +67,22 @@ class Posterior:
     entries: tuple[Entry, ...]
     """What is uncertain."""
     root: np.ndarray
-    """(d, d) lower triangular; times a vector of standard normal numbers it gives the deviations."""
+    """(d, m) times a vector of m standard normal numbers it gives the deviations."""
+
+    @property
+    def latency(self) -> int | None:
+        """Which entry the delay is; None: the file does not say."""
+        return next((i for i, entry in enumerate(self.entries) if entry.field in ADDED), None)
 
     @property
     def latency_sigma(self) -> Any:
         """Standard deviation of the delay, s; 0 where the file does not say."""
-        at = [i for i, entry in enumerate(self.entries) if entry.field == "latency"]
-        return (self.root[at[0]] ** 2).sum() ** 0.5 if at else 0.0
+        return 0.0 if self.latency is None else (self.root[self.latency] ** 2).sum() ** 0.5
+
+    def without_latency(self) -> "Posterior":
+        """The distribution of all else."""
+        kept = [i for i, entry in enumerate(self.entries) if entry.field not in ADDED]
+        return Posterior(tuple(self.entries[i] for i in kept), self.root[kept])
 
     @property
     def thrust_sigma(self) -> float:
@@ -92,14 +101,14 @@ class Posterior:
         return {e.name: float(np.linalg.norm(row)) for e, row in zip(self.entries, self.root, strict=True)}
 
     def deviation(self, normal: Any) -> Any:
-        """Deviations of the entries, (n, d), of standard normal numbers, (n, d), NumPy's or JAX's.
+        """Deviations of the entries, (n, d), of standard normal numbers, (n, m), NumPy's or JAX's.
 
         Each number counts up to `WIDEST`, so that no episode has an absurd vehicle.
         """
         return normal.clip(-WIDEST, WIDEST) @ self.root.T
 
     def values(self, vehicle: Vehicle, deviation: Any) -> dict[str, Any]:
-        """Fields of the vehicles that have these deviations, each (n, ...).
+        """Fields of the vehicles that have these deviations, each (n, ...); the delay is none of them.
 
         Args:
             vehicle: at whose values the deviations are zero.
@@ -107,14 +116,13 @@ class Posterior:
         """
         drawn: dict[str, list[Any]] = {}
         for i, entry in enumerate(self.entries):
-            drawn.setdefault(entry.field, []).append((entry.index, deviation[:, i]))
+            if entry.field not in ADDED:
+                drawn.setdefault(entry.field, []).append((entry.index, deviation[:, i]))
         out: dict[str, Any] = {}
         for field, moved in drawn.items():
             base, (index, first) = getattr(vehicle, field), moved[0]
             library = first.__array_namespace__()
-            if field in ADDED:
-                out[field] = (base + first).clip(0.0)
-            elif index is None:
+            if index is None:
                 for name in (field, *TOGETHER.get(field, ())):
                     own = getattr(vehicle, name)
                     out[name] = library.exp(first).reshape(-1, *(1,) * np.ndim(own)) * own
@@ -125,15 +133,6 @@ class Posterior:
         return out
 
 
-def covariance_of(entries: dict[str, float], names: list[str], correlation: np.ndarray) -> np.ndarray:
-    """Covariance, (d, d), of entries with these standard deviations; those that `names` leaves out are independent."""
-    order = list(entries)
-    sigma, whole = np.array(list(entries.values())), np.eye(len(order))
-    at = [order.index(name) for name in names]
-    whole[np.ix_(at, at)] = correlation
-    return whole * np.outer(sigma, sigma)
-
-
 def load_posterior(name_or_path: str | Path) -> Posterior:
     """What a vehicle's file says of its uncertainty.
 
@@ -141,8 +140,8 @@ def load_posterior(name_or_path: str | Path) -> Posterior:
         ValueError: naming the file and what is wrong with it; for a file without a single standard deviation.
     """
     path = vehicle_file(name_or_path)
-    vehicle, sigmas, table = load_vehicle(path), read_sigmas(path), read_table(path)
-    known = _relative(vehicle, sigmas, str(path))
+    vehicle, table = load_vehicle(path), read_table(path)
+    known = _relative(vehicle, sigmas_of(vehicle, table, str(path)), str(path))
     if not known:
         raise ValueError(
             f"env.randomize is identified, but {path} has no sigma; accepted: a vehicle file whose entries have "
@@ -152,9 +151,10 @@ def load_posterior(name_or_path: str | Path) -> Posterior:
     for name in names:
         if name not in known:
             raise ValueError(f"{path}: correlation.of names {name!r}, which has no sigma; accepted: {', '.join(known)}")
-    covariance = covariance_of(known, names, correlation)
-    entries = tuple(map(Entry.of, known))
-    return Posterior(entries, np.linalg.cholesky(covariance))
+    order, sigma, whole = list(known), np.array(list(known.values())), np.eye(len(known))
+    at = [order.index(name) for name in names]
+    whole[np.ix_(at, at)] = correlation
+    return Posterior(tuple(map(Entry.of, order)), np.linalg.cholesky(whole) * sigma[:, None])
 
 
 def _relative(vehicle: Vehicle, sigmas: dict[str, np.ndarray], where: str) -> dict[str, float]:

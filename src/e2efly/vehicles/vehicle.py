@@ -43,7 +43,7 @@ def _quantity(unit: str, shape: tuple[int, ...] = (), at_least: float | None = N
 
 def _term(unit: str, shape: tuple[int, ...] = (), at_least: float | None = None, above: float | None = None) -> Any:
     """A vehicle value that a file may leave out: the physics is then without what it describes."""
-    return field(default=None, metadata={"unit": unit, "shape": shape, "at_least": at_least, "above": above})
+    return field(default=None, metadata=_quantity(unit, shape, at_least, above).metadata)
 
 
 @dataclass(frozen=True)
@@ -353,8 +353,12 @@ def read_sigmas(name_or_path: str | Path) -> dict[str, np.ndarray]:
         ValueError: as of `load_vehicle`.
     """
     path = vehicle_file(name_or_path)
-    vehicle, table = load_vehicle(path), read_table(path)
-    return {f.name: _read_sigma(str(path), f, table[f.name]) for f in quantities(vehicle)}
+    return sigmas_of(load_vehicle(path), read_table(path), str(path))
+
+
+def sigmas_of(vehicle: Vehicle, table: dict[str, Any], where: str) -> dict[str, np.ndarray]:
+    """As `read_sigmas`, of a file that was read."""
+    return {f.name: _read_sigma(where, f, table[f.name]) for f in quantities(vehicle)}
 
 
 def check(vehicle: Vehicle, where: str = "vehicle") -> None:

@@ -4,16 +4,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from e2efly.control import Quat
 from e2efly.drawing import INK
 from e2efly.identification.align import LEAD_S, Alignment, clearest
 from e2efly.identification.record import Record
 from e2efly.identification.replay import SIGNALS, Stretches, replay, stretches, thrust_is_told
 from e2efly.identification.windows import REACH, STEP
+from e2efly.physics.rotation import yaw_pitch_roll
 from e2efly.view.style import BLUE, GREY, PALE, VERMILLION, figure, say
 
 STEPPED = ("thrust (m/s²)", "roll rate (rad/s)", "pitch rate (rad/s)", "yaw rate (rad/s)")
@@ -152,11 +153,8 @@ def _shown(values: np.ndarray, stream: str) -> np.ndarray:
     """Numbers as they are drawn: an attitude by its angles, deg, without jumps of a full turn."""
     if stream != "quaternion":
         return values
-    q = Quat.of(values)
-    roll = np.arctan2(2 * (q.w * q.x + q.y * q.z), 1 - 2 * (q.x**2 + q.y**2))
-    pitch = np.arcsin(np.clip(2 * (q.w * q.y - q.z * q.x), -1, 1))
-    yaw = np.arctan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y**2 + q.z**2))
-    return np.degrees(np.unwrap(np.stack([roll, pitch, yaw], -1), axis=1))
+    angles = np.asarray(yaw_pitch_roll(jnp.asarray(values)))[..., ::-1]
+    return np.degrees(np.unwrap(angles, axis=1))
 
 
 def plot_errors(path: Path, alignment: Alignment) -> None:
