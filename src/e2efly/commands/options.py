@@ -1,6 +1,7 @@
 """How options of a command are read."""
 
 from decimal import Decimal
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -58,7 +59,7 @@ def _once(arguments: list[str]) -> list[str]:
     """`--env.randomize identified` with the factor that it leaves out: once the file's standard deviations."""
     out: list[str] = []
     flag = ""
-    for argument, following in zip(arguments, [*arguments[1:], "--"], strict=True):
+    for argument, following in pairwise([*arguments, "--"]):
         flag = argument if argument.startswith("--") else flag
         out.append(argument)
         if flag == "--env.randomize" and argument == IDENTIFIED and not _is_number(following):
