@@ -9,7 +9,6 @@ from e2efly import presets
 from e2efly.config import ALGORITHMS, AlgorithmConfig, EnvConfig, NetworkConfig, RewardConfig, TaskConfig, TrainConfig
 from e2efly.device import prepare
 from e2efly.tasks import TASKS
-from e2efly.zoo import policy_file
 
 TaskLike = str | type[TaskConfig] | TaskConfig
 """A name, a reference (`path/to/file.py:Name`), a class of options, or options."""
@@ -100,7 +99,8 @@ def train(
         given["reward"] = reward if isinstance(reward, RewardConfig) else RewardConfig(reward, config.reward.parameters)
     config = dataclasses.replace(config, **{name: value for name, value in given.items() if value is not None})
     if start_from is not None:
-        config = dataclasses.replace(config, start_from=str(policy_file(start_from, vehicle).absolute()))
+        config = dataclasses.replace(config, start_from=os.fspath(start_from))
+    config = presets.begun(config)
     prepare(device)
     from e2efly.learn.programs import traced_folder
     from e2efly.learn.rundir import run_folder

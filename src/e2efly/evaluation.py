@@ -21,6 +21,7 @@ from e2efly.device import prepare
 from e2efly.env import UNSEEN, Env, random_key
 from e2efly.episodes import Act, Episodes, rows, run_stepwise, summary
 from e2efly.learn.rundir import RunDirectory, run_of
+from e2efly.observation import PAST_ACTIONS
 from e2efly.physics import State
 from e2efly.vehicles import Controller, Flown, family_names, load_family, load_vehicle, vehicle_names
 from e2efly.zoo import policy_file
@@ -211,10 +212,15 @@ def with_changes(own: EnvConfig, changes: Mapping[str, Any]) -> EnvConfig:
 
 
 def pinned(env: EnvConfig, policy: Policy) -> EnvConfig:
-    """The same environment, which keeps rate and past actions whatever else of it changes."""
+    """The same environment, which keeps rate, commands and past actions whatever else of it changes."""
     c = policy.contract
     seen = {f.name: f.size for f in c.observation}
-    return dataclasses.replace(env, control_rate=c.control_rate_hz, past_actions=seen.get("past_actions", 0) // 4)
+    return dataclasses.replace(
+        env,
+        control_rate=c.control_rate_hz,
+        command_range=c.action.command_range,
+        past_actions=seen.get(PAST_ACTIONS, 0) // 4,
+    )
 
 
 @dataclass(frozen=True)
@@ -429,7 +435,8 @@ def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[Ta
         control_rate=c.control_rate_hz,
         action_latency=None if one else latency,  # one vehicle of a family has its own
         observation_latency=(c.observation_latency_range_s[0], c.observation_latency_range_s[1]),
-        past_actions=counts.get("past_actions", 0) // 4,
+        command_range=c.action.command_range,
+        past_actions=counts.get(PAST_ACTIONS, 0) // 4,
         imu=ImuConfig(observed="gyroscope" in counts),
         cameras=tuple(_camera(image) for image in c.images),
     )

@@ -28,6 +28,10 @@ GYROSCOPE = Field("gyroscope", 3, "body", "rad/s", 4.0, "measured angular veloci
 ACCELEROMETER = Field("accelerometer", 3, "body", "m/s^2", 10.0, "measured specific force (level at rest: 0, 0, 9.81)")
 
 
+PAST_ACTIONS = "past_actions"
+"""The name of the field of the policy's own last outputs."""
+
+
 def past_actions(count: int) -> Field:
     """The policy's last outputs."""
-    return Field("past_actions", 4 * count, "none", "1", 1.0, "the policy's last outputs in [-1, 1], newest first")
+    return Field(PAST_ACTIONS, 4 * count, "none", "1", 1.0, "the policy's last outputs in [-1, 1], newest first")

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from e2efly import zoo
 from e2efly.config import (
     ALGORITHMS,
     ABPTConfig,
@@ -20,12 +21,17 @@ from e2efly.config import (
     TaskConfig,
     TrainConfig,
 )
+from e2efly.deploy.policy.loader import load_policy
+from e2efly.observation import PAST_ACTIONS
 from e2efly.registry import is_shipped
 from e2efly.tasks import TASKS
 from e2efly.vehicles import load_family, load_vehicle, posterior
 from e2efly.vehicles.names import unknown
+from e2efly.zoo import policy_file
 
 ROBUST, IDENTIFIED, NOMINAL, PAPER = "robust", "identified", "nominal", "paper"
+FAMILY = "any"
+"""The family whose policies of the zoo the preset `identified` begins with."""
 OTHERS = EnvConfig(
     latency_spread=(0.04, 0.05),
     randomize={
@@ -42,8 +48,9 @@ AROUND = EnvConfig(
     disturbance=DisturbanceConfig(gust=0.5, thrust=0.05, rotor=0.03, sag=0.12, centre_of_mass=0.002),
 )
 """The vehicles of the preset `identified`: what the file's standard deviations leave open, and what no file knows."""
-ONE_OF_A_FAMILY = 4
-"""By this the steps are fewer that the preset `identified` learns in than the recipe for a family."""
+ONE_OF_A_FAMILY = 5
+"""By this the steps are fewer that the preset `identified` learns in than the recipe for a family, with whose policy it
+begins."""
 BESIDE_CAMERA = {"angle_spread": 0.06, "position_spread": 0.012, "fov_spread": 0.04}
 """What the preset `robust` draws of cameras beside what the task says of them ..."""
 OLDER = 0.05
@@ -130,8 +137,10 @@ def _adaptive(task: type[TaskConfig], config: TrainConfig, name: str) -> TrainCo
     algo = config.algo.name
     given = task.robust.get(algo)
     if name == IDENTIFIED and (other := task.family.get(algo)):
-        # the vehicle may be as weak as any of a family, which that recipe learns to fly; but it is one, nearly known
+        # the zoo's policy of any quadrotor flies this one, too, and learns what is its own in a few steps
         given = dataclasses.replace(other, steps=other.steps // ONE_OF_A_FAMILY)
+        if task.name in zoo.contents().get(FAMILY, {}):
+            config = dataclasses.replace(config, start_from=f"{FAMILY}/{task.name}")
     if given is None:
         raise ValueError(
             f"preset {name!r}: accepted for {_having('robust')}; not for {task.name} by {config.algo.name}"
@@ -214,6 +223,27 @@ def _narrower(share: float) -> EnvConfig:
         randomize={**OTHERS.randomize, "mass": share * OTHERS.randomize["mass"]},
         disturbance=dataclasses.replace(d, thrust=share * d.thrust, rotor=share * d.rotor, sag=share * d.sag),
     )
+
+
+def begun(config: TrainConfig) -> TrainConfig:
+    """A configuration with the file of the policy that it begins with, and with what that policy sees and commands.
+
+    It sees as many past actions as that policy, where the configuration does not say. Actions of a policy of many
+    vehicles go on to mean the commands that they mean there; those of another one mean shares of the vehicle's own.
+
+    Raises:
+        ValueError: for a policy that there is not, or that cannot be read.
+    """
+    if config.start_from is None:
+        return config
+    file = policy_file(config.start_from, config.env.vehicle)
+    contract, env = load_policy(file).contract, config.env
+    if env.past_actions is None:
+        seen = sum(field.size for field in contract.observation if field.name == PAST_ACTIONS)
+        env = dataclasses.replace(env, past_actions=seen // len(contract.action.low))
+    if contract.vehicle_ranges is not None and env.command_range is None and contract.action.mode == env.command_mode:
+        env = dataclasses.replace(env, command_range=contract.action.command_range)
+    return dataclasses.replace(config, env=env, start_from=str(file.absolute()))
 
 
 def gentle(config: TrainConfig) -> TrainConfig:

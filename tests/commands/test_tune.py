@@ -31,6 +31,10 @@ def test_a_log_becomes_a_policy_for_the_vehicle_that_it_shows(tmp_path: Path) ->
     assert (high - low) / 2 == pytest.approx(2.5 * load_posterior(file).sigma["latency"], rel=1e-3)
     config = json.loads((out / "run" / "config.json").read_text())
     assert config["env"]["randomize"] == {"identified": 1.0}
+    # it began with the zoo's policy of any quadrotor, and means the same by its actions
+    assert policy.contract.action.command_range == e2efly.load_policy("any/hover").contract.action.command_range
+    alone = e2efly.evaluate(out / "policy.onnx", episodes=50, vehicle=str(file))  # it left its run's folder
+    assert np.mean(alone.flown["hover"].success) > 0.9
     assert set(json.loads((out / "stress.json").read_text())["stress"]) >= {"nominal", "mass x1.25"}
     assert run(asked) == 2  # nothing is lost: the run is there
 

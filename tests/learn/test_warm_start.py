@@ -16,6 +16,7 @@ from e2efly.learn.checkpoint import read_arrays
 from e2efly.learn.export import random_images, random_observations
 from e2efly.learn.setup import Setup
 from e2efly.learn.warm_start import started_from
+from e2efly.presets import begun
 from e2efly.zoo import policy_file
 
 SMALL = {"steps": 4096, "chunk": 1, "eval_episodes": 10, "preset_name": "nominal"}
@@ -44,6 +45,30 @@ def test_a_run_begins_where_the_policy_was(tmp_path: Path) -> None:
     more = e2efly.train(task, algo, out=tmp_path / "more", start_from=tmp_path / "run", **options)
     assert more["shipped"][task]["success"] > 0.9
     assert e2efly.train(task, algo, out=tmp_path / "fresh", **options)["shipped"][task]["success"] < 0.5
+
+
+def test_actions_of_a_policy_of_many_vehicles_go_on_to_mean_the_same_commands() -> None:
+    many = e2efly.load_policy("any/hover").contract
+    fresh = e2efly.preset("hover", "bptt", "robust")
+    config = begun(replace(fresh, start_from="any/hover"))
+    env = Setup.of(config).env
+    np.testing.assert_allclose(env.center - env.half, many.action.low, atol=1e-5)
+    np.testing.assert_allclose(env.center + env.half, many.action.high, rtol=1e-6)
+    assert env.fields[-1] == many.observation[-1]  # it sees as many past actions
+    # those of one vehicle are shares of what the vehicle can do
+    other = begun(replace(fresh, start_from="hover", env=replace(fresh.env, vehicle="crazyflie")))
+    assert other.env.command_range is None
+    # what the configuration says stands
+    own = replace(config.env, command_range=((0.0, -9.0, -9.0, -3.0), (40.0, 9.0, 9.0, 3.0)), past_actions=5)
+    assert begun(replace(config, env=own)).env == own
+
+
+@pytest.mark.parametrize("largest", [-12.0, float("nan"), float("inf")])
+def test_a_range_that_is_none_is_named(largest: float) -> None:
+    given = ((0.0, -12.0, -12.0, -5.0), (50.0, largest, 12.0, 5.0))
+    config = e2efly.preset("hover")
+    with pytest.raises(ValueError, match=r"env.command_range is .*; accepted: four finite numbers, and four"):
+        Setup.of(replace(config, env=replace(config.env, command_range=given)))
 
 
 def test_what_does_not_fit_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

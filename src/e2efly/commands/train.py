@@ -21,7 +21,6 @@ from e2efly.supervised import is_watched, watched
 from e2efly.tasks import TASKS
 from e2efly.terminal import Terminal, TerminalProgress, console_table, seconds
 from e2efly.vehicles.posterior import IDENTIFIED, load_posterior
-from e2efly.zoo import policy_file
 
 _FLOWN = {"nominal": "best, nominal", "stress": "best, stress", "shipped": "best", "last": "last"}
 """Parts of a summary that say how a policy flew, and what the table calls them."""
@@ -161,7 +160,7 @@ def _options(config: TrainConfig, preset: str) -> tuple[type, Any]:
         ("seed", _help(int, "Seed of everything random.")),
         ("out", _help(Path | None, "Run directory; left out: runs/TASK-ALGO-SEED, or runs/TASK-ALGO-VEHICLE-SEED.")),
         ("resume", _help(bool, "Go on with the run in --out. `e2efly train --resume DIR` is enough.")),
-        ("start_from", _help(str | None, f"Begin with the weights of {_POLICY}.", name="from")),
+        ("start_from", _help(str | None, f"Begin with the weights of {_POLICY}; None: with fresh ones.", name="from")),
         ("overwrite", _help(bool, "Delete the run that is in --out, and begin anew.")),
         ("device", _help(Literal["cpu", "gpu"] | None, "Where to compute.")),
         ("plots", _help(bool, "Evaluate and draw plots at the end.")),
@@ -213,11 +212,9 @@ def _config(options: Any, config: TrainConfig) -> TrainConfig:
         own = {name: width for name, width in own.items() if name not in known}
     randomize = _changed(own, options.env.randomize)
     shared["env"] = dataclasses.replace(options.env, randomize=randomize)
-    if options.start_from is not None:
-        shared["start_from"] = str(policy_file(options.start_from, options.vehicle).absolute())
     if options.vehicle != config.env.vehicle:
         shared["env"] = dataclasses.replace(shared["env"], vehicle=options.vehicle)
-    return dataclasses.replace(config, **shared)
+    return presets.begun(dataclasses.replace(config, **shared))
 
 
 def _changed(preset: Mapping[str, float], given: Mapping[str, float]) -> dict[str, float]:

@@ -208,7 +208,7 @@ class TrainConfig:
     network: NetworkConfig = NetworkConfig()
     """The networks."""
     start_from: str | None = None
-    """The policy.onnx whose weights it begins with; left out: fresh ones."""
+    """The policy whose weights it begins with, as a name of the zoo or a file; left out: fresh ones."""
     seed: int = 0
     """Seed of everything random."""
     steps: int = 2_000_000

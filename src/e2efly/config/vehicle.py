@@ -163,6 +163,9 @@ class EnvConfig:
     action_latency is left out (the second sets shapes)."""
     observation_latency: tuple[float, float] = (0.0, 0.0)
     """Age of the observed state, s, uniform per episode (its top sets shapes)."""
+    command_range: tuple[tuple[float, float, float, float], tuple[float, float, float, float]] | None = None
+    """Commands that actions of -1 and of 1 stand for, in the units of the command mode; the vehicle's own limits when
+    left out. What is beyond those the flight controller clips."""
     past_actions: int | None = None
     """How many past actions the policy sees; as many as the latency holds when left out (sets shapes)."""
     randomize: dict[str, float] = field(default_factory=dict)

@@ -12,11 +12,19 @@ MOST = 10.0
 
 
 def limits_of(config: EnvConfig) -> np.ndarray:
-    """Smallest and largest command, (2, 4): of the nominal vehicle, or all vehicles of a family together.
+    """Smallest and largest command, (2, 4): of the nominal vehicle, or all vehicles of a family together, where the
+    configuration does not say.
 
     Raises:
-        ValueError: for a family in a command mode that its vehicles do not share.
+        ValueError: for a family in a command mode that its vehicles do not share, and for a range that is none.
     """
+    if config.command_range is not None:
+        given = np.asarray(config.command_range, np.float64)
+        if not (np.all(np.isfinite(given)) and np.all(given[0] < given[1])):
+            raise ValueError(
+                f"env.command_range is {config.command_range}; accepted: four finite numbers, and four that are larger"
+            )
+        return given
     family = load_family(config.vehicle)
     if family is not None:
         return np.asarray(family.limits(config.command_mode), np.float64)

@@ -54,6 +54,12 @@ class Action:
     mapping: str = ACTION_MAPPING
     """How an action becomes a command."""
 
+    @property
+    def command_range(self) -> tuple[tuple[float, float, float, float], tuple[float, float, float, float]]:
+        """Smallest and largest command, in `units`."""
+        (a, b, c, d), (e, f, g, h) = self.low, self.high
+        return (a, b, c, d), (e, f, g, h)
+
 
 @dataclass(frozen=True)
 class Contract:
