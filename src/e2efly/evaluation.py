@@ -30,7 +30,16 @@ SEED = 1_000_000
 """Seed of the starts unless told."""
 BATCH = 250
 """Starts that are flown at once."""
-FIXED = ("vehicle", "command_mode", "control_rate", "past_actions", "position_range", "imu.observed", "cameras")
+FIXED = (
+    "vehicle",
+    "command_mode",
+    "command_range",
+    "control_rate",
+    "past_actions",
+    "position_range",
+    "imu.observed",
+    "cameras",
+)
 """Options of the environment that the contract fixes."""
 FIXED_OF_CAMERAS = ("sees", "of", "width", "height", "projection", "encoding", "reach")
 """The same, of a camera: what its numbers mean, and how many there are."""

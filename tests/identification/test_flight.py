@@ -190,6 +190,7 @@ def test_the_command_writes_a_vehicle_that_loads_and_says_what_it_did(
     assert np.isnan(sigma["radius"])
     assert {p.name for p in out.iterdir()} >= {
         "vehicle.toml", "identified.json", "parameters.png", "flight_prediction.png", "flight_fit.png",
+        "posterior.png",
     }  # fmt: skip
     assert "thrust_map[0]" in capsys.readouterr().out
     bad = ["identify", "flight", str(tmp_path / "gone.csv"), "--out", str(tmp_path / "none")]

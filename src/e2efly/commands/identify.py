@@ -14,6 +14,7 @@ from rich.table import Table
 from e2efly.storage import write_json
 from e2efly.terminal import Terminal
 from e2efly.vehicles import Vehicle, load_vehicle, unknown
+from e2efly.vehicles.posterior import load_posterior
 
 if TYPE_CHECKING:
     from e2efly.identification.estimate import Estimate
@@ -107,8 +108,16 @@ def run(options: Identify) -> int:
             style="dim",
         )
     from e2efly.view.identification import plot_identified
+    from e2efly.view.posterior import plot_posterior
 
     plots = plot_identified(options.out, base, fused, found, outside)
+    try:
+        posterior = load_posterior(file)
+    except ValueError as error:  # a value may be too vague to be drawn from
+        console.print(f"There is no posterior.png: {error}.", style="dim")
+    else:
+        plots.append(options.out / "posterior.png")
+        plot_posterior(plots[-1], posterior)
     console.print(
         f"Vehicle: {file}. Report: {options.out / 'identified.json'}. Plots: {', '.join(p.name for p in plots)}"
     )

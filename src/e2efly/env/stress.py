@@ -63,17 +63,16 @@ class Row:
     def alters(self) -> frozenset[str]:
         """What a plant has to change for it behind the flight controller's back: `e2efly.validation.plant.EVERYTHING`.
 
-        Delay, noise and drift lie between plant and policy: every plant can be flown with them.
+        Delay, noise, drift and cameras lie between plant and policy: every plant can be flown with them.
         """
         if self.name == ALL:
             others = frozenset().union(*(row.alters for row in ROWS.values() if row.name != ALL))
-            return others - {"plain_mixer", "cameras"}
+            return others - {"plain_mixer"}
         beside = {
             "rotor_position": self.centre_of_mass,
             "wind": self.wind or self.gust,
             "rotor_share": self.sag or self.rotor,
             "plain_mixer": self.plain_mixer,
-            "cameras": self.camera.there,
         }
         return frozenset(self.factors) | {name for name, there in beside.items() if there}
 

@@ -7,10 +7,11 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.deploy.policy.runtime import Runtime
-from e2efly.device import cores
+from e2efly.device import compute_at_once, cores, prepare
 from e2efly.goal import Course
 from e2efly.tasks import TASKS
 from e2efly.validation.flight import Trajectory, fly
@@ -18,6 +19,9 @@ from e2efly.validation.plant import RigidState
 from e2efly.validation.plants import find_plant
 from e2efly.validation.reality import Reality, check_realities
 from e2efly.vehicles import Vehicle
+
+if TYPE_CHECKING:
+    from e2efly.validation.sight import Sight
 
 WORTH = 20
 """Flights below which processes of their own, which take a second to start, do not pay."""
@@ -53,6 +57,8 @@ class Flight:
     """What to fly."""
     reality: Reality
     """What it meets."""
+    sight: "Sight | None" = None
+    """What it sees, for a policy that sees."""
 
 
 def fly_all(
@@ -81,7 +87,9 @@ def fly_all(
         return _collect(_fly(mission, flights), done)
     chunks = [flights[i : i + CHUNK] for i in range(0, len(flights), CHUNK)]
     context = multiprocessing.get_context("spawn")  # a fork would copy JAX's threads in an unknown state
-    pool = ProcessPoolExecutor(min(count, len(chunks)), context, _prepare, (load_policy(mission.policy).contract.task,))
+    contract = load_policy(mission.policy).contract
+    told = contract.task, bool(contract.images)
+    pool = ProcessPoolExecutor(min(count, len(chunks)), context, _prepare, told)
     try:
         pending = [pool.submit(_fly_chunk, mission, chunk) for chunk in chunks]
         return _collect((trajectory for each in pending for trajectory in each.result()), done)
@@ -110,12 +118,17 @@ def _fly(mission: Mission, flights: Sequence[Flight]) -> Iterator[Trajectory]:
             if met != (meets := (reality.body.hash, reality.plain_mixer)):
                 plant.meet(reality.body, reality.plain_mixer)
                 met = meets
-            runtime = Runtime.of(policy, flight.course, mission.trained, imu=True)
+            sight = flight.sight
+            runtime = Runtime.of(policy, flight.course, mission.trained, imu=True, images=sight is not None)
             latency = max(reality.latency - kind.latency, 0.0)
-            yield fly(runtime, plant, flight.start, mission.duration, latency, reality.air, mission.sample)
+            images = None if sight is None else sight.begin().images
+            yield fly(runtime, plant, flight.start, mission.duration, latency, reality.air, mission.sample, images)
 
 
-def _prepare(task: str) -> None:
-    """Import the task, whose file may be the user's own; leave Ctrl-C to the parent."""
+def _prepare(task: str, sees: bool) -> None:
+    """Import the task, whose file may be the user's own, and what renders; leave Ctrl-C to the parent."""
     TASKS.find(task)
+    if sees:
+        compute_at_once()
+        prepare("cpu")
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,6 +1,7 @@
 """Fly a policy on a plant, and record it. Imports no JAX."""
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,6 +71,7 @@ def fly(
     latency: float,
     air: Air | None = None,
     sample: float | None = None,
+    images: Callable[[int, Sequence[RigidState]], Sequence[np.ndarray]] | None = None,
 ) -> Trajectory:
     """Fly one start until the time is out, or the task is done or has failed.
 
@@ -81,6 +83,7 @@ def fly(
         latency: seconds from observation to command.
         air: wind, thrust and what the policy sees from step to step; None: still, full, and the truth.
         sample: seconds between two samples, at most; None: none are kept.
+        images: of the cameras, by control step and the states until then (`e2efly.validation.sight.Watch.images`).
 
     Returns:
         The flight. A policy that refuses its observation, or a plant that fails, ends it with a `fault`.
@@ -106,7 +109,8 @@ def fly(
             truth = states[-1].odometry(now)
             measured = imu_of(states[max(k - 1, 0)], states[k], period)
             seen = None if air is None else air.seen(k, truth)
-            memory, decision = act(runtime, memory, truth, now, measured, seen=seen)
+            shown = () if images is None else images(k, states)
+            memory, decision = act(runtime, memory, truth, now, measured, seen=seen, images=shown)
             if memory.done or memory.failure:
                 break
             delay, parts = delay.send(decision.command, now).until(now, then)

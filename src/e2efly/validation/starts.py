@@ -10,12 +10,16 @@ from jaxtyping import Array
 
 from e2efly.config import TaskConfig
 from e2efly.env import UNSEEN, Env, random_key
+from e2efly.env.stress_cameras import CameraDraw, with_noise
 from e2efly.evaluation import drawn_by
 from e2efly.goal import Course
 from e2efly.physics import State
+from e2efly.scenes.scene import Scene
+from e2efly.sensors.eyes import Eye
 from e2efly.tasks.route import goal_of
 from e2efly.tasks.task import Task
 from e2efly.validation.plant import RigidState
+from e2efly.validation.sight import Sight
 
 BATCH = 250
 """Starts that are drawn at once: as `e2efly eval` does, so that they are the same."""
@@ -31,6 +35,8 @@ class Starts:
     """What each is to fly, for the runtime."""
     memory: Any
     """The task's own state, each leaf (n, ...), for the judge: the references drawn, for instance."""
+    eyes: tuple[Eye, ...] = ()
+    """How the cameras of each sit on the vehicle, each leaf (n, ...)."""
     drawn: dict[str, np.ndarray] = field(default_factory=dict)
     """What the episodes have of their own beside where they begin, for reports: columns (n, ...)."""
 
@@ -39,26 +45,53 @@ class Starts:
 
     def of(self, rows: list[int]) -> "Starts":
         """Some of them, in the order named."""
-        memory = jax.tree.map(lambda x: x[np.array(rows)], self.memory)
-        return Starts(tuple(self.states[i] for i in rows), tuple(self.courses[i] for i in rows if self.courses), memory)
+        memory, eyes = jax.tree.map(lambda x: x[np.array(rows)], (self.memory, self.eyes))
+        courses = tuple(self.courses[i] for i in rows if self.courses)
+        return Starts(tuple(self.states[i] for i in rows), courses, memory, eyes)
+
+    def sights(self, env: Env, seed: int, changed: CameraDraw | None = None) -> list[Sight | None]:
+        """What each of them sees in an environment; None for a policy that sees nothing.
+
+        Args:
+            env: from which they were drawn.
+            seed: of the images' noise.
+            changed: what a row of the stress draws of their cameras; None: they are those that the starts have drawn.
+        """
+        if not env.cameras:
+            return [None] * len(self)
+        cameras, eyes = env.cameras, self.eyes
+        if changed is not None:
+            cameras, eyes = with_noise(cameras), changed.eyes(cameras, eyes, env.control_period)
+        scene, eyes = jax.tree.map(np.asarray, (_scene(env.task, self.memory), eyes))
+        oldest = max(float(eye.latency.max()) for eye in eyes)
+        period, sights = float(env.control_period), []
+        for i in range(len(self)):
+            own_eyes, own_scene = jax.tree.map(lambda x: x[i : i + 1], (eyes, scene))  # noqa: B023
+            sights.append(Sight(cameras, own_eyes, own_scene, period, oldest, seed + i))
+        return sights
 
 
 def draw_starts(env: Env, n: int, seed: int) -> Starts:
     """The first `n` starts of a seed: those of `e2efly eval`."""
     drawn = [_draw(env, random_key(seed, UNSEEN, i)) for i in range(-(-n // BATCH))]
-    vehicle, memory = jax.tree.map(lambda *x: np.concatenate(x)[:n], *drawn)
+    vehicle, memory, eyes = jax.tree.map(lambda *x: np.concatenate(x)[:n], *drawn)
     fields = (vehicle.position, vehicle.velocity, vehicle.quaternion, vehicle.body_rate)
     states = tuple(RigidState(*(x[i].astype(np.float64) for x in fields)) for i in range(n))
     every = Starts(states, (), memory)
     courses = tuple(course_of(env.task, every.of([i]).memory, states[i].position) for i in range(n))
     drawn = jax.tree.map(np.asarray, drawn_by(env.task, memory))
-    return Starts(states, courses, memory, drawn)
+    return Starts(states, courses, memory, eyes, drawn)
 
 
 @jax.jit
-def _draw(env: Env, key: Array) -> tuple[State, Any]:
+def _draw(env: Env, key: Array) -> tuple[State, Any, tuple[Eye, ...]]:
     state = env.reset(key, BATCH)[0]
-    return state.vehicle, state.memory
+    return state.vehicle, state.memory, state.eyes
+
+
+@jax.jit
+def _scene(task: Task, memory: Any) -> Scene:
+    return task.scene(memory)
 
 
 def course_of(task: Task, memory: Any, start: np.ndarray) -> Course:

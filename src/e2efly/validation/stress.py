@@ -12,7 +12,7 @@ import numpy as np
 from e2efly.budget import check_memory
 from e2efly.device import compute_at_once, prepare
 from e2efly.env import UNSEEN, disturbance, random_key
-from e2efly.env.stress import ROWS, Row, check_rows, check_seen, rows_for
+from e2efly.env.stress import ROWS, Draw, Row, check_rows, check_seen, rows_for
 from e2efly.evaluation import SEED, settling
 from e2efly.stress import Report, draws
 from e2efly.validation.fleet import Flight, Mission, fly_all
@@ -86,8 +86,10 @@ def stress(
         begins = list(zip(starts.states, starts.courses, strict=True))
         asked = []
         for row in chosen:
-            meets = realities(ROWS[row], flown, seed, episodes, steps, env.control_period)
-            asked += [Flight(*begin, reality) for begin, reality in zip(begins, meets, strict=True)]
+            drawn = draws(ROWS[row], flown, seed, episodes)
+            meets = realities(drawn, flown, seed, steps, env.control_period)
+            seen = starts.sights(env, seed, drawn.camera)
+            asked += [Flight(*begin, *met) for begin, *met in zip(begins, meets, seen, strict=True)]
         mission, total = Mission(found.file, plant_name(plant), own, believed, float(suite.episode_s)), len(asked)
         flights = fly_all(mission, asked, lambda done: progress(name, done, total))  # noqa: B023
         for i, row in enumerate(chosen):
@@ -100,19 +102,17 @@ def lacking(kind: type[Plant], row: Row) -> str:
     return ", ".join(sorted(row.alters - kind.alters))
 
 
-def realities(row: Row, vehicle: Vehicle, seed: int, n: int, steps: int, period: float) -> list[Reality]:
-    """What the first n flights of a row meet.
+def realities(drawn: Draw, vehicle: Vehicle, seed: int, steps: int, period: float) -> list[Reality]:
+    """What the flights of a row meet.
 
     Args:
-        row: of `ROWS`.
+        drawn: what the row draws.
         vehicle: of the nominal row.
         seed: of the starts.
-        n: flights.
-        steps: control steps of the longest.
+        steps: control steps of the longest flight.
         period: of control, s.
     """
-    drawn = draws(row, vehicle, seed, n)
-    key = random_key(seed, UNSEEN, 0)
+    key, n = random_key(seed, UNSEEN, 0), len(drawn.latency)
     gust, drift, share = (np.asarray(x, np.float64) for x in _tracks(drawn.disturbance, key, steps, period))
     noise = np.stack([np.asarray(x, np.float64)[:, 0] for x in vars(drawn.noise).values()], axis=1)  # (n, 4)
     white = np.random.default_rng([seed, UNSEEN, n]).standard_normal((steps, n, 12))

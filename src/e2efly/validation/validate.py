@@ -186,7 +186,8 @@ def validate(
         starts = draw_starts(env, episodes, seed)
         sample = None if log is None else SAMPLE
         mission = Mission(found.file, name, own, found.flown.believed, float(suite.episode_s), sample)
-        asked = [Flight(*start, reality) for start in zip(starts.states, starts.courses, strict=True)]
+        begins = zip(starts.states, starts.courses, starts.sights(env, seed), strict=True)
+        asked = [Flight(start, course, reality, sight) for start, course, sight in begins]
         flights = fly_all(mission, asked, lambda done: progress(criterion, done, episodes))  # noqa: B023
         if log is not None:
             _write_logs(Path(log), criterion, flights, found.policy.contract.action.mode)
@@ -232,6 +233,6 @@ def flyable(
             "as a plant has one flight controller"
         )
     own = load_vehicle(found.env.vehicle) if contract.vehicle_ranges is None else found.flown.body
-    if reasons := check(contract, own, fields_of(contract), imu=True):
+    if reasons := check(contract, own, fields_of(contract), imu=True, images=True):
         raise ValueError("\n".join(reasons))
     return found, kind, own

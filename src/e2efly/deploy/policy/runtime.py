@@ -16,13 +16,11 @@ from e2efly.control import COMMAND_MODES
 from e2efly.deploy.odometry import Odometry, tilt_of, yaw_of
 from e2efly.deploy.policy.contract import ACTION_SIZE, Contract
 from e2efly.goal import Course, Outcome
-from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field
+from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, PAST_ACTIONS, VELOCITY, Field
 from e2efly.vehicles import Vehicle
 
 MODES = tuple(name for name, mode in COMMAND_MODES.items() if mode.controller is not None)
 """Command modes that become collective thrust and body rates; a flight controller takes no rotor thrusts."""
-PAST_ACTIONS = "past_actions"
-"""The observation field of the policy's last actions."""
 _STATE_FIELDS = (ATTITUDE, VELOCITY, BODY_RATE, GYROSCOPE, ACCELEROMETER)
 _IMU_FIELDS = (GYROSCOPE.name, ACCELEROMETER.name)
 _ROUNDING = 1e-6
@@ -93,6 +91,7 @@ class Runtime:
         *,
         envelope: Envelope | None = None,
         imu: bool = False,
+        images: bool = False,
     ) -> "Runtime":
         """Check that they fit together.
 
@@ -103,12 +102,13 @@ class Runtime:
             control_rate: at which the policy will be asked, Hz; None: as it was trained.
             envelope: in which state it may take over.
             imu: whether `act` will be given measurements of an IMU.
+            images: whether `act` will be given the images that the contract asks for.
 
         Raises:
             ValueError: naming all that does not fit, one a line.
         """
         contract, envelope = policy.contract, envelope or Envelope()
-        reasons = check(contract, vehicle, course.goal.fields, control_rate, imu=imu)
+        reasons = check(contract, vehicle, course.goal.fields, control_rate, imu=imu, images=images)
         for name, value in dataclasses.asdict(envelope).items():
             if value is not None and not value > 0:
                 reasons += (f"envelope.{name} is {value}; accepted: more than 0",)
@@ -179,6 +179,7 @@ def check(
     control_rate: float | None = None,
     *,
     imu: bool = False,
+    images: bool = False,
 ) -> tuple[str, ...]:
     """Why a policy cannot fly here; empty: it can.
 
@@ -188,6 +189,7 @@ def check(
         shown: the task's own fields of the observation.
         control_rate: at which the policy will be asked, Hz; None: as it was trained.
         imu: whether there are measurements of an IMU.
+        images: whether there are the images that the contract asks for.
     """
     reasons = list(contract.refusals(vehicle))
     rate = contract.control_rate_hz
@@ -198,7 +200,7 @@ def check(
             f"action.mode of the policy is {contract.action.mode!r}; accepted: {' or '.join(map(repr, MODES))}, "
             "which become collective thrust and body rates"
         )
-    for image in contract.images:
+    for image in contract.images if not images else ():
         reasons.append(
             f"image {image.name!r} ({image.sees}, {image.height} rows, {image.width} columns): there is no camera; "
             "accepted: a policy without images (from Python, `Policy.act` takes them)"
@@ -257,6 +259,7 @@ def act(
     imu: Imu | None = None,
     *,
     seen: Odometry | None = None,
+    images: Sequence[np.ndarray] = (),
 ) -> tuple[RuntimeState, Decision]:
     """Ask the policy once.
 
@@ -267,6 +270,7 @@ def act(
         now: s on the monotonic clock; at or after `due`. Whole periods that have passed since count as missed.
         imu: the newest measurement, for a policy that sees it.
         seen: what the policy sees, where a simulation judges by the truth and shows it with an error; None: `odometry`.
+        images: the newest of each camera, in the contract's order.
 
     Raises:
         ValueError: whatever goes wrong, naming the field where there is one: a non-finite observation or action, an
@@ -280,7 +284,7 @@ def act(
     observation = observe(runtime, shown, state.past_actions, local, imu)
     started = time.perf_counter()
     try:
-        action, recurrent = runtime.policy.act(observation, memory=state.recurrent)
+        action, recurrent = runtime.policy.act(observation, images, memory=state.recurrent)
     except ValueError:
         raise
     except Exception as error:  # ONNX Runtime's errors share no other base

@@ -1,0 +1,89 @@
+"""What a vehicle on a plant sees: the world of its task, rendered at the plant's true pose. Imports JAX.
+
+Rate, age, mounting and noise of the images are those of the training's environment, whose cameras draw them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, PRNGKeyArray
+
+from e2efly.config import CameraConfig
+from e2efly.physics import State
+from e2efly.scenes.scene import Scene
+from e2efly.sensors.eyes import Eye, see, steps_between
+from e2efly.sensors.latency import delayed_state, frames
+from e2efly.validation.plant import RigidState
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The cameras of one flight and the world that they look at. All numbers are NumPy's: processes hand it on."""
+
+    cameras: tuple[CameraConfig, ...]
+    """In the order of the contract's images."""
+    eyes: tuple[Eye, ...]
+    """How each sits on this vehicle: leaves (1, ...)."""
+    scene: Scene
+    """One world; it moves with the time since the start."""
+    period: float
+    """Control period, s."""
+    oldest: float
+    """Largest age of an image of all flights, s: it sets shapes."""
+    seed: int
+    """Of the noise."""
+
+    def begin(self) -> "Watch":
+        """For a flight that begins."""
+        return Watch(self)
+
+
+@dataclass
+class Watch:
+    """The images of a flight, from control step to control step."""
+
+    sight: Sight
+    """What is seen."""
+    shown: list[np.ndarray] = field(default_factory=list)
+    """The last image of each camera."""
+
+    def images(self, k: int, states: Sequence[RigidState]) -> list[np.ndarray]:
+        """What the policy is shown in control step `k`: of each camera the newest image, (h, w) or (h, w, 3).
+
+        Args:
+            k: the step; they are asked for in order.
+            states: of the vehicle, one per control step until now; the last is that of now.
+        """
+        sight = self.sight
+        for i, (camera, eye) in enumerate(zip(sight.cameras, sight.eyes, strict=True)):
+            every = steps_between(camera, sight.period) if eye.every is None else int(eye.every[0])
+            if k % every and self.shown:
+                continue
+            past = _past(states, frames(sight.oldest, sight.period) + 1)
+            key = jax.random.fold_in(jax.random.fold_in(jax.random.key(sight.seed), k), i)
+            image = np.asarray(_see(camera, eye, sight.scene, past, k * sight.period, sight.period, key))[0]
+            self.shown[i : i + 1] = [image]
+        return self.shown
+
+
+def _past(states: Sequence[RigidState], count: int) -> State:
+    """States with a second axis of samples, the newest first; before the start, the vehicle was where it began."""
+    rows = [states[max(len(states) - 1 - i, 0)] for i in range(count)]
+
+    def column(name: str) -> np.ndarray:
+        return np.array([[getattr(row, name) for row in rows]], np.float32)
+
+    rotors = np.zeros((1, count, 4), np.float32)  # no camera looks at them
+    return State(column("position"), column("velocity"), column("quaternion"), column("body_rate"), rotors)
+
+
+@jax.jit
+def _see(
+    camera: CameraConfig, eye: Eye, scene: Scene, past: State, now: Array, period: Array, key: PRNGKeyArray
+) -> Array:
+    """The image of a camera, as the environment renders it: of the pose and the world that were there a latency ago."""
+    then = jnp.maximum(now - eye.latency, 0.0)
+    return see(camera, eye, scene.at(then), delayed_state(past, eye.latency, period), key)

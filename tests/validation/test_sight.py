@@ -1,0 +1,118 @@
+"""What a vehicle on a plant sees is what the environment shows at the same pose, and policies fly by it."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import numpy as np
+import pytest
+
+import e2efly
+from e2efly.config import CameraConfig
+from e2efly.env import Env
+from e2efly.env.stress import ALL, ROWS
+from e2efly.evaluation import SEED, candidate
+from e2efly.scenes.scene import Scene
+from e2efly.stress import draws
+from e2efly.validation.plant import RigidState
+from e2efly.validation.sight import Sight, Watch
+from e2efly.validation.starts import Starts, draw_starts
+from e2efly.validation.stress import stress
+from e2efly.vehicles import load_vehicle
+
+STEPS = 12
+
+
+def flown(env: Env, actions: np.ndarray) -> tuple[list[RigidState], list[list[np.ndarray]], Any]:
+    """States of one vehicle, and what the environment showed it at each."""
+    state, _ = env.reset(jax.random.key(3), 1)
+    first, states, shown = state, [], []
+    for action in actions:
+        v = state.vehicle
+        rows = [np.asarray(x, np.float64)[0] for x in (v.position, v.velocity, v.quaternion, v.body_rate)]
+        states.append(RigidState(*rows))
+        shown.append([np.asarray(image)[0] for image in state.images])
+        state, _ = env.step(state, action[None], restart=False)
+    return states, shown, first
+
+
+@pytest.mark.parametrize(
+    ("task", "camera"),
+    [
+        ("land_visual", {}),
+        ("avoid", {"latency": (0.05, 0.05)}),
+        ("race_clutter", {"rate": 15.0, "latency": (0.0, 0.06), "fov_spread": 0.05, "angle_spread": 0.1}),
+    ],
+)
+def test_images_are_those_of_the_environment_at_the_same_pose(task: str, camera: dict[str, Any]) -> None:
+    """To rounding: the age of the images, their rate and how the camera sits included."""
+    config = candidate(task)
+    cameras = tuple(dataclasses.replace(c, **camera) for c in config.env.cameras)
+    env = Env.of(config.task, e2efly.preset(task).reward, dataclasses.replace(config.env, cameras=cameras))
+    rng = np.random.default_rng(0)
+    states, shown, first = flown(env, np.clip(np.asarray(env.hover) + 0.2 * rng.standard_normal((STEPS, 4)), -1, 1))
+    starts = Starts((states[0],), (), first.memory, first.eyes)
+    (sight,) = starts.sights(env, 0)
+    assert sight is not None
+    watch = sight.begin()
+    for k in range(STEPS):
+        for ours, theirs in zip(watch.images(k, states[: k + 1]), shown[k], strict=True):
+            np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-5, err_msg=f"step {k}")
+    assert any((a[0] != b[0]).any() for a, b in zip(shown, shown[2:], strict=False))  # it did see something move
+
+
+@pytest.mark.parametrize("plant", ["simulator", "mujoco"])
+def test_a_policy_flies_by_what_the_plant_sees(plant: str) -> None:
+    found = e2efly.validate("land_visual", plant, 8)
+    assert found.criteria["land_visual"].flown.success.all()
+
+
+def test_a_policy_that_is_shown_nothing_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing(self: Watch, k: int, states: Any) -> list[np.ndarray]:
+        del k, states
+        return [np.full((c.height, c.width), 0.0, np.float32) for c in self.sight.cameras]
+
+    monkeypatch.setattr(Watch, "images", nothing)
+    found = e2efly.validate("land_visual", "simulator", 4)
+    assert not found.criteria["land_visual"].flown.success.any()
+
+
+def test_rows_of_cameras_change_what_the_plant_sees() -> None:
+    found = candidate("avoid")
+    suite = found.task.criteria()["avoid_5"]
+    env = found.environment(suite)
+    starts, vehicle = draw_starts(env, 3, SEED), load_vehicle("vis_r")
+
+    def seen(row: str, at: int = 0) -> np.ndarray:
+        sight = starts.sights(env, 0, draws(ROWS[row], vehicle, SEED, 3).camera)[at]
+        assert sight is not None
+        moved = dataclasses.replace(starts.states[at], position=starts.states[at].position + np.array([2.0, 0, 0]))
+        watch = sight.begin()
+        watch.images(0, [starts.states[at]])
+        return watch.images(1, [starts.states[at], moved])[0].copy()
+
+    nominal = seen("nominal")
+    for row in ("camera 3 degrees and 1 cm off", "field of view x0.97", "images 40 ms older", "images half as often"):
+        assert (seen(row) != nominal).mean() > 0.1, row
+    noisy = seen("noise of a D435i")
+    assert (noisy != nominal).mean() > 0.1
+    assert np.median(np.abs(noisy - nominal)) < 0.2
+    report = stress("avoid", "simulator", 1, rows=("images 40 ms older", "nominal"))
+    assert set(report.flown) == {"images 40 ms older", "nominal"}
+    assert ALL not in report.left_out
+
+
+def test_a_sight_is_small_and_travels() -> None:
+    """A flight is handed to another process with the world that it sees."""
+    import pickle
+
+    found = candidate("race_clutter")
+    env = found.environment(next(iter(found.task.criteria().values())))
+    sight = draw_starts(env, 2, SEED).sights(env, SEED)[1]
+    assert isinstance(sight, Sight)
+    packed = pickle.dumps(sight)
+    assert len(packed) < 50_000
+    again = pickle.loads(packed)
+    assert isinstance(again.scene, Scene)
+    assert isinstance(again.cameras[0], CameraConfig)
+    assert all(isinstance(leaf, np.ndarray) for leaf in jax.tree.leaves((again.scene, again.eyes)))
