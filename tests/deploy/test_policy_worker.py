@@ -149,7 +149,7 @@ def test_an_odometry_of_nan_is_a_problem(workers: Workers) -> None:
 def test_whatever_a_policy_raises_is_a_problem(
     error: Exception, workers: Workers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def act(*_: Any) -> None:
+    def act(*_: Any, **__: Any) -> None:
         raise error
 
     worker = workers()
@@ -171,10 +171,10 @@ def test_a_slow_policy_is_late_then_busy_and_never_holds_up_the_loop(
 ) -> None:
     go_on, asked = threading.Event(), []
 
-    def act(*args: Any) -> Any:
+    def act(*args: Any, **named: Any) -> Any:
         asked.append(args)
         go_on.wait(30.0)
-        return runtime.act(*args)
+        return runtime.act(*args, **named)
 
     worker = workers(timeout=0.02)
     misbehave(monkeypatch, act)
@@ -215,8 +215,8 @@ def test_a_goal_that_can_no_longer_be_reached_is_a_problem_and_one_that_is_reach
     asked = worker_module.act
     said = {"failure": "gate 2 missed"}
 
-    def answer(*question: Any) -> Any:
-        state, decision = asked(*question)
+    def answer(*question: Any, **images: Any) -> Any:
+        state, decision = asked(*question, **images)
         return dataclasses.replace(state, **said), decision
 
     monkeypatch.setattr(worker_module, "act", answer)
@@ -233,7 +233,7 @@ def test_a_policy_that_never_answers_does_not_keep_the_program_from_ending() -> 
 import threading
 from types import SimpleNamespace
 from e2efly.deploy.policy import worker as worker_module
-worker_module.act = lambda *_: threading.Event().wait()
+worker_module.act = lambda *_, **__: threading.Event().wait()
 worker_module.due = lambda *_: 0.0
 worker = worker_module.PolicyWorker(None, 0.01)
 worker.state = SimpleNamespace()

@@ -37,6 +37,9 @@ from e2efly.deploy.pose.source import PoseSource
 from e2efly.deploy.pose.sources import open_source
 from e2efly.deploy.settings import FlightSettings
 from e2efly.deploy.settings import check as check_settings
+from e2efly.deploy.sight.source import ImageSource
+from e2efly.deploy.sight.sources import open_cameras
+from e2efly.deploy.sight.watch import Seen
 from e2efly.deploy.terminal import Speaker, Stop, printable
 from e2efly.learn.rundir import run_of
 from e2efly.process import raise_at_interrupt
@@ -66,6 +69,9 @@ class Fly:
     pose: str = "udp:9870"
     """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic, ros2:/topic, or a source of your
     own, path/to/file.py:Name[:...]."""
+    image: tuple[str, ...] = ()
+    """Where a policy that sees gets each image of its contract: image_0=shm:NAME, what another program publishes in
+    shared memory, or a source of your own, image_0=path/to/file.py:Name[:...]."""
     vehicle: str | None = None
     """A shipped vehicle or a .toml file; left out: the policy's."""
     check: bool = False
@@ -135,18 +141,23 @@ def run(options: Fly) -> int:
     body = load_vehicle(options.vehicle or _own_vehicle(policy, loaded))
     runtime = None
     if loaded is not None:
-        if reasons := check(loaded.contract, body, fields_of(loaded.contract), imu=True):
+        if reasons := check(loaded.contract, body, fields_of(loaded.contract), imu=True, images=True):
             raise ValueError("\n".join(reasons))
         course = course_for(loaded.contract, body, options.goal)
-        runtime = Runtime.of(loaded, course, body, envelope=options.envelope, imu=True)
+        runtime = Runtime.of(loaded, course, body, envelope=options.envelope, imu=True, images=True)
     if excited:
         acts, course = excitation(body, settings, options.excitation, options.latency)
         runtime = Runtime.of(acts, course, body, envelope=options.envelope)
     contract = runtime.policy.contract if runtime else None
     saved = options.throttle_map
     known = throttle_map.from_json(_read(saved, "--throttle-map"), body) if saved else None
+    if options.image and loaded is None:
+        raise ValueError(f"--image is {options.image[0]!r}; accepted: none, as no policy sees it")
+    cameras = [] if loaded is None else open_cameras(options.image, loaded.contract)
     open_link(options.link).close()  # a wrong text is refused here rather than by the watchdog
     with ExitStack() as stack:
+        for camera in cameras:
+            stack.callback(camera.close)
         source = open_source(options.pose)
         stack.callback(source.close)
         held: Link = WatchedLink(options.link) if options.watchdog and not options.check else open_link(options.link)
@@ -160,7 +171,7 @@ def run(options: Fly) -> int:
             stack.callback(worker.close)
         bridge = Bridge(
             client, info, source, body, settings, worker=worker, latency=options.latency,
-            settings_problems=problems(rows), throttle_map=known,
+            settings_problems=problems(rows), throttle_map=known, cameras=cameras,
         )  # fmt: skip
         source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:
@@ -273,6 +284,8 @@ def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row,
         table.add_row("", _cell(f"position {o.position.round(3).tolist()} m, roll {roll:+.2f}, pitch {pitch:+.2f} rad"))
         if poses and poses[-1].stamp is not None:
             table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")
+    for camera, seen in zip(bridge.cameras, bridge.seen, strict=True):
+        table.add_row("image", _cell(_image(camera, seen, time.monotonic())))
     pilot = bridge.inputs.pilot
     heard = "not heard"
     if pilot is not None:
@@ -288,6 +301,18 @@ def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row,
     for refusal in refusals:
         console.print(f"  - {printable(refusal)}")
     return 1 if problems(rows) or o is None else 0
+
+
+def _image(camera: ImageSource, seen: Seen, now: float) -> str:
+    """What a camera shows, in words."""
+    said = seen.problem(now)
+    if said is not None or seen.frame is None:
+        return f"not to be flown by, from {camera.describe()}: {said}"
+    image, age = seen.frame.image, 1e3 * (now - seen.frame.time)
+    values = f"values {image.min():.2f} to {image.max():.2f}, mean {image.mean():.2f}"
+    low, high = (1e3 * x for x in seen.camera.latency_range_s)
+    trained = f"{age:.0f} ms old (trained with {low:.0f} to {high:.0f})"
+    return f"{seen.camera.name} from {camera.describe()}: {values}; {trained}"
 
 
 def _record_meta(log: Telemetry, bridge: Bridge, body: Vehicle, contract: str, rows: tuple[Row, ...]) -> None:

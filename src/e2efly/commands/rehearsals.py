@@ -8,23 +8,29 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from e2efly.deploy.policy.loader import Policy
+from e2efly.evaluation import Candidate
 from e2efly.validation import firmware
 from e2efly.validation.rehearsal import Rehearsal, rehearse
+from e2efly.validation.scenery import Scenery
 from e2efly.vehicles import Vehicle
 
 
-def fly_whole(policy: Policy, vehicle: Vehicle, count: int, console: Console, seed: int = 0) -> list[Rehearsal]:
+def fly_whole(found: Candidate, vehicle: Vehicle, count: int, console: Console, seed: int = 0) -> list[Rehearsal]:
     """Take off, hover, hand over to the policy, land: so many times, from another place each.
+
+    A policy that sees flies in another world of its training's environment each time, of the first criterion.
 
     Raises:
         OSError: when the firmware cannot be built or started.
     """
+    suite = next(iter(found.task.criteria().values()))
+    env = found.environment(suite) if found.policy.contract.images else None
     built, flights = firmware.chosen(), []
     with console.status("whole flights through the firmware") as status:
         for i in range(count):
             status.update(f"whole flight {i + 1} of {count} through the firmware")
-            flights.append(rehearse(built, policy, vehicle, seed=seed + i))
+            scenery = None if env is None else Scenery.draw(env, seed + i)
+            flights.append(rehearse(built, found.policy, vehicle, seed=seed + i, scenery=scenery))
     return flights
 
 

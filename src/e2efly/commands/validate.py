@@ -198,7 +198,7 @@ def _whole_flights(found: "Validation", count: int, console: Console) -> bool:
     body, policy = load_vehicle(found.candidate.vehicle), found.candidate.policy
     if not found.plant.whole_flights or not count or policy.contract.refusals(body):
         return True
-    flights = fly_whole(policy, body, count, console)
+    flights = fly_whole(found.candidate, body, count, console)
     console.print(flights_table(flights))
     return all(flight.complete for flight in flights)
 

@@ -1,6 +1,7 @@
 """The bridge: at each control step, from poses and the flight controller's answers to the sticks that it is sent."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -35,6 +36,9 @@ from e2efly.deploy.pose.checks import Checks
 from e2efly.deploy.pose.pace import pace_problem
 from e2efly.deploy.pose.source import PoseSource
 from e2efly.deploy.settings import FlightSettings
+from e2efly.deploy.sight import watch
+from e2efly.deploy.sight.source import ImageSource
+from e2efly.deploy.sight.watch import Seen
 from e2efly.vehicles.vehicle import Vehicle
 
 ATTITUDE_S, BLIND_ATTITUDE_S = 0.1, 0.5
@@ -66,6 +70,7 @@ class Bridge:
         latency: float | None = None,
         settings_problems: tuple[str, ...] = (),
         throttle_map: ThrottleMap | None = None,
+        cameras: Sequence[ImageSource] = (),
     ) -> None:
         """Make a bridge on the ground.
 
@@ -80,6 +85,7 @@ class Bridge:
             latency: from the vehicle's motion to its rate loop, s; None: the vehicle file's.
             settings_problems: why the controller's settings forbid a take-off.
             throttle_map: learned in earlier flights; None: the vehicle file's.
+            cameras: what the policy sees, in the order of its contract's images.
         """
         delay: float = vehicle.latency if latency is None else latency
         self.client, self.source, self.vehicle, self.settings = client, source, vehicle, settings
@@ -87,6 +93,10 @@ class Bridge:
         """The vehicle with the gains of take-off, hover and landing."""
         self.worker, self.log, self.land_now = worker, log, False
         """`land_now`: the operator asks for a landing, as the pilot does by the mission switch."""
+        self.cameras = tuple(cameras)
+        images = () if worker is None else worker.runtime.policy.contract.images
+        self.seen = tuple(Seen(image) for image, _ in zip(images, self.cameras, strict=True))
+        """What is known of each camera."""
         self.instruments = Instruments(client, settings)
         self.adopt(info, settings_problems)
         self.flight, self.inputs = Flight(home=settings.ground_height), Inputs()
@@ -156,6 +166,11 @@ class Bridge:
         self.client.poll(now)
         samples, attitude = self.source.read(now), self.client.message(AttitudeReply.CODE, now, ATTITUDE_S)
         self.estimate = estimate.see(self.estimate, samples, self.flight, attitude, now, self.source.problem or "")
+        odometry = self.odometry if self.flying else None
+        self.seen = tuple(
+            watch.see(seen, camera.read(now), now, odometry, self.settings.ground_height)
+            for seen, camera in zip(self.seen, self.cameras, strict=True)
+        )
         reading = self.instruments.read(now, self.info, land=self.land_now, sends=sends)
         self.inputs = self._judge(now, reading, sends=sends)
         self._feel(now, reading)
@@ -177,7 +192,7 @@ class Bridge:
             pilot=reading.pilot,
             voltage=reading.voltage,
             settings_problems=self.settings_problems + probed + reading.meddling + ((slow,) if slow else ()),
-            policy_problem=reading.meddling[0] if reading.meddling else None,
+            policy_problem=reading.meddling[0] if reading.meddling else self._blindness(now),
             attitude_error=told.attitude_error(reading.attitude),
             heading_error=told.heading_error,
             missed_deadlines=len(self._late),
@@ -187,6 +202,10 @@ class Bridge:
             touched=told.inertial.touch.carried,
             supported=told.inertial.touch.rests and now - told.inertial.time < FRESH_S,
         )
+
+    def _blindness(self, now: float) -> str | None:
+        """Why a policy that sees must not act on the newest images."""
+        return next((problem for seen in self.seen if (problem := seen.problem(now))), None)
 
     def _feel(self, now: float, reading: Reading) -> None:
         """Take in the inertial sensors: in the air they teach the throttle map, and carry the velocity on."""
@@ -244,8 +263,11 @@ class Bridge:
             worker.stop()
 
     def _ask(self, worker: PolicyWorker, now: float, slack: float, odometry: Odometry) -> None:
-        if worker.step(odometry, now, slack, self.imu) and self.log is not None:
-            record_policy(self.log, now, worker)
+        if self._blindness(now) is None:
+            frames = [seen.frame for seen in self.seen if seen.frame is not None]
+            images = [frame.image.astype(np.float32) for frame in frames]
+            if worker.step(odometry, now, slack, self.imu, images) and self.log is not None:
+                record_policy(self.log, now, worker, [now - frame.time for frame in frames])
         self.inputs = dataclasses.replace(
             self.inputs, policy_problem=self.inputs.policy_problem or worker.problem, policy_done=worker.done,
             policy_lands=worker.runtime.course.goal.lands,

@@ -1,7 +1,9 @@
 """Whole flights through the real firmware: take-off, hover, policy, landing, with a pilot who only moves switches."""
 
+import dataclasses
 import math
 import tempfile
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,10 +13,13 @@ from e2efly.deploy.log.record import Log
 from e2efly.deploy.pilot.flight_state import Mode, Reason
 from e2efly.deploy.policy.loader import Policy
 from e2efly.deploy.policy.runtime import RuntimeState
+from e2efly.deploy.sight.source import ImageSource
 from e2efly.goal import Course, Outcome
 from e2efly.tasks.route import course_for, route_of
 from e2efly.validation.firmware import Firmware
+from e2efly.validation.plant import RigidState
 from e2efly.validation.rig import Rig
+from e2efly.validation.scenery import Scenery
 from e2efly.validation.session import Flown, Session, rehearsal_settings
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -22,6 +27,8 @@ PARKED = 0.3
 """The vehicle stands within this of where the policy's course begins, m per axis."""
 ASKEW = 0.05
 """How far a race's heading at the start is off, rad."""
+REACH_IN_SIGHT = 100.0
+"""Of the fence about the origin, for the long worlds of policies that see, m."""
 LAST_S = 0.25
 """What counts as the end of a policy's flight, s: the poses tell of a touch so much later."""
 LINK_S = 0.01
@@ -75,6 +82,8 @@ def rehearse(
     seed: int = 0,
     log: Log | None = None,
     folder: Path | None = None,
+    scenery: Scenery | None = None,
+    wrap: Callable[[ImageSource], ImageSource] = lambda camera: camera,
 ) -> Rehearsal:
     """One whole flight.
 
@@ -86,22 +95,41 @@ def rehearse(
         seed: of where it stands and of the poses' noise.
         log: keeps the flight's record.
         folder: of the firmware's files; left out: a temporary one.
+        scenery: the world that a policy sees; None: it sees nothing.
+        wrap: what to put between each camera and the bridge.
     """
     course = whole_course(policy, vehicle) if course is None else course
+    course = course if scenery is None else scenery.on(course)
     with tempfile.TemporaryDirectory(prefix="e2efly-") as temporary:
         latency = max(policy.contract.latency_of(vehicle) - LINK_S, 0.0)
         with Rig(firmware, folder or Path(temporary), vehicle, latency=latency, seed=seed) as rig:
-            return _fly(rig, policy, course, seed, log)
+            sources = [] if scenery is None else scenery.sources(lambda: RigidState.of(rig.state), course.origin)
+            flight = _fly(rig, policy, course, seed, log, [wrap(source) for source in sources])
+    return flight if scenery is None else _unhurt(flight, scenery, course, vehicle.radius)
 
 
-def _fly(rig: Rig, policy: Policy, course: Course, seed: int, log: Log | None) -> Rehearsal:
+def _unhurt(flight: Rehearsal, scenery: Scenery, course: Course, radius: float) -> Rehearsal:
+    """The flight, which has no success where it came too near to what stands in its world."""
+    flown = flight.flown
+    where = flown.where(Mode.POLICY)
+    near = scenery.nearest([flown.position[i] for i in where], [flown.time[i] for i in where], course.origin)
+    if near > radius:
+        return flight
+    told = f"{flight.told}, hit something"
+    return dataclasses.replace(flight, success=False, told=told)
+
+
+def _fly(
+    rig: Rig, policy: Policy, course: Course, seed: int, log: Log | None, cameras: Sequence[ImageSource]
+) -> Rehearsal:
     random = np.random.default_rng(seed)
     first = course.origin.points(course.start)
     x, y = first[:2] + random.uniform(-PARKED, PARKED, 2)
     rig.state = rig.world.at_rest(x, y, _heading(course, random))
     rig.sleep(0.5)
-    settings = rehearsal_settings(first[2] - rig.world.vehicle.feet_height)
-    session = Session(rig, settings, policy=policy, course=course, log=log)
+    height = first[2] - rig.world.vehicle.feet_height
+    settings = rehearsal_settings(height, REACH_IN_SIGHT) if cameras else rehearsal_settings(height)
+    session = Session(rig, settings, policy=policy, course=course, log=log, cameras=cameras)
     try:
         up = session.take_off(3.0)
         rig.set(mission="policy")

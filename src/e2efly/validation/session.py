@@ -1,7 +1,7 @@
 """The bridge flying the firmware on a rig, in one process and in virtual time: the pilot is a script."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from e2efly.deploy.policy.runtime import Acting, Envelope, Runtime
 from e2efly.deploy.policy.worker import PolicyWorker
 from e2efly.deploy.pose.source import PlantSource
 from e2efly.deploy.settings import Fence, FlightSettings
+from e2efly.deploy.sight.source import ImageSource
 from e2efly.goal import Course
 from e2efly.validation.rig import Rig
 
@@ -77,6 +78,7 @@ class Session:
         link: Link | None = None,
         wrap_worker: Callable[[PolicyWorker], Any] | None = None,
         source: Any = None,
+        cameras: Sequence[ImageSource] = (),
         schedule: Mapping[int, float] = SCHEDULE,
     ) -> None:
         vehicle = rig.world.vehicle
@@ -87,13 +89,13 @@ class Session:
         rate = CONTROL_HZ
         if policy is not None and course is not None:
             rate = loop_rate(policy.contract.control_rate_hz)
-            runtime = Runtime.of(policy, course, vehicle, envelope=Envelope(speed=8.0), imu=True)
+            runtime = Runtime.of(policy, course, vehicle, envelope=Envelope(speed=8.0), imu=True, images=bool(cameras))
             self.worker = PolicyWorker(runtime, PATIENCE_S)
         self.period = 1 / rate
         self.source = source or PlantSource(rig.poses, "rig")
         self.bridge = Bridge(
             self.client, self.info, self.source, vehicle, settings,
-            worker=self.worker, log=log, latency=rig.latency + 0.01,
+            worker=self.worker, log=log, latency=rig.latency + 0.01, cameras=cameras,
         )  # fmt: skip
         self.flown = Flown()
         self.lateness = 0.0

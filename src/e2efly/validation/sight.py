@@ -62,28 +62,45 @@ class Watch:
             every = steps_between(camera, sight.period) if eye.every is None else int(eye.every[0])
             if k % every and self.shown:
                 continue
-            past = _past(states, frames(sight.oldest, sight.period) + 1)
+            newest = [states[max(len(states) - 1 - age, 0)] for age in range(frames(sight.oldest, sight.period) + 1)]
             key = jax.random.fold_in(jax.random.fold_in(jax.random.key(sight.seed), k), i)
-            image = np.asarray(_see(camera, eye, sight.scene, past, k * sight.period, sight.period, key))[0]
+            image = rendered(camera, eye, sight.scene, newest, k * sight.period, sight.period, key)
             self.shown[i : i + 1] = [image]
         return self.shown
 
 
-def _past(states: Sequence[RigidState], count: int) -> State:
-    """States with a second axis of samples, the newest first; before the start, the vehicle was where it began."""
-    rows = [states[max(len(states) - 1 - i, 0)] for i in range(count)]
+def rendered(
+    camera: CameraConfig,
+    eye: Eye,
+    scene: Scene,
+    states: Sequence[RigidState],
+    now: float,
+    period: float,
+    key: PRNGKeyArray,
+) -> np.ndarray:
+    """The image of a camera, as the environment renders it: of the pose and the world that were there a latency ago.
 
-    def column(name: str) -> np.ndarray:
-        return np.array([[getattr(row, name) for row in rows]], np.float32)
+    Args:
+        camera: the camera.
+        eye: how it sits on the vehicle: leaves (1, ...).
+        scene: one world.
+        states: of the vehicle, a period apart, the newest first, until the eye's latency ago.
+        now: time of the newest, s.
+        period: s.
+        key: of the noise.
+    """
 
-    rotors = np.zeros((1, count, 4), np.float32)  # no camera looks at them
-    return State(column("position"), column("velocity"), column("quaternion"), column("body_rate"), rotors)
+    def column(name: str) -> Array:
+        return jnp.asarray([[getattr(state, name) for state in states]], jnp.float32)
+
+    rotors = jnp.zeros((1, len(states), 4), jnp.float32)  # no camera looks at them
+    past = State(column("position"), column("velocity"), column("quaternion"), column("body_rate"), rotors)
+    return np.asarray(_see(camera, eye, scene, past, now, period, key))[0]
 
 
 @jax.jit
 def _see(
-    camera: CameraConfig, eye: Eye, scene: Scene, past: State, now: Array, period: Array, key: PRNGKeyArray
+    camera: CameraConfig, eye: Eye, scene: Scene, past: State, now: float, period: float, key: PRNGKeyArray
 ) -> Array:
-    """The image of a camera, as the environment renders it: of the pose and the world that were there a latency ago."""
     then = jnp.maximum(now - eye.latency, 0.0)
     return see(camera, eye, scene.at(then), delayed_state(past, eye.latency, period), key)

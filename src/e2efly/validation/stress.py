@@ -89,7 +89,7 @@ def stress(
             drawn = draws(ROWS[row], flown, seed, episodes)
             meets = realities(drawn, flown, seed, steps, env.control_period)
             seen = starts.sights(env, seed, drawn.camera)
-            asked += [Flight(*begin, *met) for begin, *met in zip(begins, meets, seen, strict=True)]
+            asked += [Flight(*begin, met, sees) for begin, met, sees in zip(begins, meets, seen, strict=True)]
         mission, total = Mission(found.file, plant_name(plant), own, believed, float(suite.episode_s)), len(asked)
         flights = fly_all(mission, asked, lambda done: progress(name, done, total))  # noqa: B023
         for i, row in enumerate(chosen):

@@ -48,8 +48,8 @@ def _matrix(ax: Axes, posterior: Posterior, matrix: np.ndarray) -> None:
     ax.set_xticks(places, [_label(name) for name in posterior.sigma], rotation=90)
     ax.set_yticks(places, [f"{_label(name)}  {_size(name, sigma)}" for name, sigma in posterior.sigma.items()])
     ax.grid(visible=False)
-    for i in places:
-        for j in places[:i]:
+    for i in range(len(matrix)):
+        for j in range(i):
             if abs(matrix[i, j]) >= 0.1:
                 dark = abs(matrix[i, j]) > 0.6
                 ax.text(j, i, f"{matrix[i, j]:.1f}", ha="center", va="center", size=7, color="white" if dark else INK)

@@ -132,6 +132,7 @@ _ALL = (
         ("action", "numbers", "1", "in [-1, 1], 4"),
         ("inference_s", "number", "s", "time that the network took"),
         ("step", "number", "1", "steps since the policy took over"),
+        ("image_age", "numbers", "s", "time from the exposure of each camera's image to this step"),
     ),
     _channel(
         "timing",

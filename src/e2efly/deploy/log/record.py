@@ -1,5 +1,6 @@
 """What is kept of each control step: the messages of `e2efly.deploy.log.channels`."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -46,13 +47,13 @@ def record_mode(log: Log, now: float, before: Flight, flight: Flight) -> None:
     })  # fmt: skip
 
 
-def record_policy(log: Log, now: float, worker: PolicyWorker) -> None:
-    """Keep what the policy saw and wants."""
+def record_policy(log: Log, now: float, worker: PolicyWorker, image_ages: Sequence[float] = ()) -> None:
+    """Keep what the policy saw and wants; of each camera's image, how old it was, s."""
     d, state = worker.decision, worker.state
     if d is not None:
         log.record("policy", now, {
             "observation": d.observation.tolist(), "action": d.action.tolist(), "inference_s": d.inference_s,
-            "step": state.steps if state is not None else 0,
+            "step": state.steps if state is not None else 0, "image_age": list(image_ages),
         })  # fmt: skip
 
 

@@ -3,11 +3,14 @@
 import os
 import threading
 import time
+from collections.abc import Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as Late
 from contextlib import suppress
 from queue import SimpleQueue
 from typing import Any
+
+import numpy as np
 
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.policy.runtime import Decision, Imu, Runtime, RuntimeState, act, begin, due, outside
@@ -59,7 +62,9 @@ class PolicyWorker:
         """It flies no more."""
         self.state = self.decision = None
 
-    def step(self, odometry: Odometry, now: float, slack: float, imu: Imu | None) -> bool:
+    def step(
+        self, odometry: Odometry, now: float, slack: float, imu: Imu | None, images: Sequence[np.ndarray] = ()
+    ) -> bool:
         """Ask it, where it is due within `slack` s; whether it has decided anew. What goes wrong is in `problem`."""
         state = self.state
         if state is None or now + slack < due(self.runtime, state):
@@ -69,7 +74,7 @@ class PolicyWorker:
             return False
         started = time.perf_counter()
         self._running = Future()
-        self._questions.put((self._running, (self.runtime, state, odometry, now, imu)))
+        self._questions.put((self._running, (self.runtime, state, odometry, now, imu, images)))
         try:
             state, self.decision = self._running.result(self.timeout)
         except Late:
@@ -96,6 +101,7 @@ class PolicyWorker:
         while (question := self._questions.get()) is not None:
             future, asked = question
             try:
-                future.set_result(act(*asked))
+                *known, images = asked
+                future.set_result(act(*known, images=images))
             except Exception as error:  # told to whoever waits for it
                 future.set_exception(error)

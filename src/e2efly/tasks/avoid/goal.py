@@ -1,6 +1,7 @@
 """High-speed obstacle avoidance: the goal, and where it is flown. Imports no JAX."""
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -83,6 +84,14 @@ class AvoidGoal(Goal):
         ends = left | (hit & (c.collisions_end > 0)) | (x >= c.forest.length)
         error = (c.forest.length - x).clip(0.0)
         return memory, Outcome(terminated=ends, success=success, arrived=success, crashed=crashed, error=error)
+
+    def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
+        """When it was through, or how far it came."""
+        del mean_error, speed
+        length = float(self.config.forest.length)
+        if arrivals:
+            return f"{length:g} m in {arrivals[-1]:.2f} s"
+        return f"{max(length - final_error, 0.0):.1f} of {length:g} m"
 
 
 @dataclass(frozen=True)

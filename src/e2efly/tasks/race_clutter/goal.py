@@ -1,6 +1,7 @@
 """Racing in clutter: the goal, and where it is flown. Imports no JAX."""
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -94,6 +95,11 @@ class RaceClutterGoal(Goal):
             terminated=ends, success=finished & ~crashed, arrived=passed, crashed=crashed, error=error,
             signals={"missed": missed},
         )  # fmt: skip
+
+    def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
+        """How many gates, and when the last."""
+        del mean_error, final_error, speed
+        return f"{len(arrivals)} gates in {arrivals[-1]:.2f} s" if arrivals else "no gate"
 
     def failure(self, memory: Memory, outcome: Outcome) -> str:
         """Which gate was missed, if that is why."""

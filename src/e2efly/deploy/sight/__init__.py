@@ -1,0 +1,1 @@
+"""Images for a policy that sees: where they come from, and whether they can be believed. Imports no JAX."""

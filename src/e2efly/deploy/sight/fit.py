@@ -1,0 +1,81 @@
+"""An image of a camera, cut and resampled to the camera that a policy was trained with."""
+
+import math
+
+import numpy as np
+
+from e2efly.deploy.policy.images import Image
+
+NARROWER = 0.02
+"""By how much of the field of view a camera may see less than the policy's."""
+
+
+def fitted(image: np.ndarray, fov: tuple[float, float], camera: Image, where: str) -> np.ndarray:
+    """The image as the policy's camera would have taken it.
+
+    Each value is of a cell of the policy's image: of depth the nearest valid one of the cell, as the camera's pooling
+    in training, 0 where all are holes; of a mask whether half of the cell shows it; of colours the mean.
+
+    Args:
+        image: (h, w) or (h, w, 3): depth in m (0: a hole), a mask or colours in [0, 1].
+        fov: its horizontal and vertical field of view, rad, pinhole; zeros: that of the policy's camera.
+        camera: of the policy's contract.
+        where: whose image it is, for errors.
+
+    Raises:
+        ValueError: naming what does not fit: colours for depth, a camera that sees less, or one with fewer pixels.
+    """
+    if len(image.shape) != len(camera.shape):
+        raise ValueError(f"{where} has images of shape {image.shape}; accepted: {camera.shape} or larger")
+    if image.shape == camera.shape and (not any(fov) or np.allclose(fov, camera.fov_rad, atol=1e-3)):
+        return _within(image, camera)
+    shares = (1.0, 1.0)
+    if any(fov):
+        if camera.projection != "pinhole":
+            raise ValueError(f"{where} is a pinhole camera; accepted: {camera.projection} images of {camera.shape}")
+        shares = _share(camera.fov_rad[0], fov[0]), _share(camera.fov_rad[1], fov[1])
+        for axis, share, has, wants in zip(("across", "down"), shares, fov, camera.fov_rad, strict=True):
+            if share > 1 + NARROWER:
+                raise ValueError(f"{where} sees {has:.3f} rad {axis}; accepted: {wants:.3f} rad or more")
+    rows, columns = _edges(image.shape[0], camera.height, shares[1]), _edges(image.shape[1], camera.width, shares[0])
+    if rows is None or columns is None:
+        raise ValueError(
+            f"{where} has {image.shape[0]} rows and {image.shape[1]} columns; accepted: so many that each of the "
+            f"policy's {camera.height} rows and {camera.width} columns has one of its own"
+        )
+    if camera.sees in ("depth", "range"):
+        filled = np.where(image > 0, image, np.inf)
+        cells = np.minimum.reduceat(
+            np.minimum.reduceat(filled[: rows[-1]], rows[:-1], 0)[:, : columns[-1]], columns[:-1], 1
+        )
+        return _within(np.where(np.isfinite(cells), cells, 0.0), camera)
+    sums = np.add.reduceat(np.add.reduceat(image[: rows[-1]], rows[:-1], 0)[:, : columns[-1]], columns[:-1], 1)
+    area = np.outer(np.diff(rows), np.diff(columns)).reshape(camera.height, camera.width, *[1] * (image.ndim - 2))
+    mean = sums / area
+    return (mean >= 0.5).astype(np.float32) if camera.sees == "mask" else mean.astype(np.float32)
+
+
+def _share(wants: float, has: float) -> float:
+    """Of a pinhole image's width: the part that a narrower one takes."""
+    return math.tan(wants / 2) / math.tan(has / 2)
+
+
+def _edges(pixels: int, cells: int, share: float) -> np.ndarray | None:
+    """First pixel of each cell, and the one behind the last; None: there are too few pixels."""
+    share = min(share, 1.0)
+    edges = np.round(pixels / 2 + pixels / 2 * share * np.linspace(-1, 1, cells + 1)).astype(int)
+    return edges if np.all(np.diff(edges) > 0) else None
+
+
+def _by_cell(together: np.ufunc, image: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """One value of each cell, whose first pixels these are; the last entries stand behind the last cell."""
+    inside = image[: rows[-1], : columns[-1]]
+    return together.reduceat(together.reduceat(inside, rows[:-1], axis=0), columns[:-1], axis=1)
+
+
+def _within(depth: np.ndarray, camera: Image) -> np.ndarray:
+    """Depth as the policy's camera tells it: nothing nearer than its reach, and nothing farther."""
+    if camera.sees not in ("depth", "range"):
+        return depth.astype(np.float32)
+    near, far = camera.reach_m
+    return np.where(depth < near, 0.0, np.minimum(depth, far)).astype(np.float32)

@@ -1,0 +1,157 @@
+"""What goes wrong with a camera in flight, put between it and the bridge, and what becomes of the policy's flight."""
+
+import dataclasses
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from e2efly.deploy.pilot.flight_state import Mode
+from e2efly.deploy.sight.source import Frame, ImageSource
+from e2efly.evaluation import Candidate
+from e2efly.validation.firmware import Firmware
+from e2efly.validation.plant import RigidState
+from e2efly.validation.rehearsal import REACH_IN_SIGHT, whole_course
+from e2efly.validation.rig import Rig
+from e2efly.validation.scenery import Scenery
+from e2efly.validation.session import Session, rehearsal_settings
+from e2efly.vehicles import Vehicle
+
+LATE_S = 0.15
+"""By how much the fault `late` holds images back, s."""
+
+
+def _as(change: Callable[[Frame], Frame]) -> Callable[[Frame, Frame], Frame]:
+    return lambda frame, last: change(frame)
+
+
+FAULTS: dict[str, tuple[Callable[[Frame, Frame], Frame | None], str]] = {
+    "late": (_as(lambda f: dataclasses.replace(f, time=f.time - LATE_S)), "before the one before"),
+    "silent": (lambda f, last: None, "ms old; accepted: at most"),
+    "frozen": (lambda f, last: dataclasses.replace(f, image=last.image), "equal images in a row"),
+    "all holes": (_as(lambda f: dataclasses.replace(f, image=np.zeros_like(f.image))), "holes everywhere"),
+    "wrong size": (_as(lambda f: dataclasses.replace(f, image=f.image[1:])), "has shape"),
+    "not finite": (_as(lambda f: dataclasses.replace(f, image=f.image * np.nan)), "has the value nan"),
+    "clock jumps back": (_as(lambda f: dataclasses.replace(f, time=f.time - 1.0)), "before the one before"),
+    "clock jumps ahead": (_as(lambda f: dataclasses.replace(f, time=f.time + 1.0)), "ms from now"),
+}
+"""What becomes of a frame, given the last good one, and a part of the reason that ends POLICY."""
+UPSIDE_DOWN = "upside down"
+"""The fault that is there from the start: HOVER must not hand over."""
+
+
+class FaultyCamera:
+    """An image source whose frames go through a fault once it is told one."""
+
+    def __init__(self, inner: ImageSource) -> None:
+        self.inner = inner
+        self.fault: str | None = None
+        self._last: Frame | None = None
+
+    @property
+    def problem(self) -> str | None:
+        """The source's own."""
+        return self.inner.problem
+
+    def read(self, now: float) -> list[Frame]:
+        """The frames, changed."""
+        found = []
+        for frame in self.inner.read(now):
+            if self.fault is None or self._last is None:
+                self._last, changed = frame, frame
+            elif self.fault == UPSIDE_DOWN:
+                changed = dataclasses.replace(frame, image=frame.image[::-1].copy())
+            else:
+                changed = FAULTS[self.fault][0](frame, self._last)
+            found += [] if changed is None else [changed]
+        return found
+
+    def close(self) -> None:
+        """Close the source."""
+        self.inner.close()
+
+    def describe(self) -> str:
+        """The source's name, and the fault's."""
+        return f"{self.inner.describe()}, {self.fault or 'no fault'}"
+
+
+@dataclass(frozen=True)
+class Ended:
+    """What became of a flight."""
+
+    mode: str
+    """After the fault; policy: nothing was noticed."""
+    reason: str
+    """Why."""
+    after_s: float
+    """From the first frame that the fault changed, or should have come, to the change of mode, s."""
+    noticed_s: float
+    """From the control step in which the images stopped being good to the change of mode, s."""
+    landed: bool
+    """Whether it then landed without help."""
+
+
+def fly_with(
+    firmware: Firmware, found: Candidate, vehicle: Vehicle, fault: str, seed: int = 0, flies_s: float = 1.0
+) -> Ended:
+    """Take off, hand over to a policy that sees, break its camera, and see who flies then.
+
+    Args:
+        firmware: the built firmware.
+        found: the policy.
+        vehicle: of the world and of the bridge.
+        fault: of `FAULTS`, or `UPSIDE_DOWN`.
+        seed: of the world and of the poses' noise.
+        flies_s: how long the policy flies before the fault, s.
+    """
+    suite = next(iter(found.task.criteria().values()))
+    scenery = Scenery.draw(found.environment(suite), seed)
+    assert scenery is not None
+    course = scenery.on(whole_course(found.policy, vehicle))
+    with (
+        tempfile.TemporaryDirectory(prefix="e2efly-") as folder,
+        Rig(firmware, Path(folder), vehicle, seed=seed) as rig,
+    ):
+        cameras = [FaultyCamera(c) for c in scenery.sources(lambda: RigidState.of(rig.state), course.origin)]
+        first = course.origin.points(course.start)
+        heading = (course.heading or 0.0) + course.origin.yaw
+        rig.state = rig.world.at_rest(*first[:2], heading)
+        rig.sleep(0.5)
+        settings = rehearsal_settings(first[2] - vehicle.feet_height, REACH_IN_SIGHT)
+        session = Session(rig, settings, policy=found.policy, course=course, cameras=cameras)
+        try:
+            return _broken(session, cameras, fault, flies_s)
+        finally:
+            session.close()
+
+
+def _broken(session: Session, cameras: list[FaultyCamera], fault: str, flies_s: float) -> Ended:
+    rig, bridge = session.rig, session.bridge
+    from_start = fault == UPSIDE_DOWN
+    if from_start:
+        for camera in cameras:
+            camera.fault = fault
+    assert session.take_off(3.0)
+    rig.set(mission="policy")
+    session.fly(0.5, session.in_mode(Mode.POLICY))
+    broken = noticed = rig.now()
+    if not from_start:
+        session.fly(flies_s)
+        assert bridge.flight.mode is Mode.POLICY, bridge.flight.reasons
+        for camera in cameras:
+            camera.fault = fault
+        broken = noticed = rig.now()
+
+    def ended() -> bool:
+        nonlocal noticed
+        if all(seen.problem(rig.now()) is None for seen in bridge.seen):
+            noticed = rig.now()
+        return bridge.flight.mode is not Mode.POLICY
+
+    session.fly(1.0, ended)
+    mode, reasons, at = bridge.flight.mode, bridge.flight.reasons, rig.now()
+    rig.set(mission="hover")
+    session.fly(2.0)
+    return Ended(str(mode), "; ".join(map(str, reasons)), at - broken, at - noticed, session.land())
