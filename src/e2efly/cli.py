@@ -23,6 +23,7 @@ _EXAMPLES = {
     "export RUN": "write policy.onnx from a checkpoint again",
     "validate POLICY": "fly it on another physics, or through the real firmware",
     "fly POLICY": "fly it on a Betaflight quadrotor",
+    "hil POLICY": "put a real vehicle into a virtual world: poses in, images out",
     "fly-report LOG": "draw a flight",
     "identify flight LOG": "a vehicle file from flights, parts, a pendulum, a thrust stand",
     "tune LOG --task race": "from logs of your vehicle to a policy for it",

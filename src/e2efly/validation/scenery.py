@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from e2efly.config import CameraConfig
 from e2efly.courses.origin import Origin
@@ -70,8 +72,13 @@ class Scenery:
             return np.inf
         scene = dataclasses.replace(self.scene, solids=solids)
         points = np.asarray(origin.seen(np.stack(position)), np.float32)
-        every = jax.vmap(lambda p, t: gaps(scene, p[None], t[None])[0, 1:])(points, np.asarray(time, np.float32))
-        return float(np.min(np.asarray(every)))
+        return float(_nearest(scene, points, np.asarray(time, np.float32)))
+
+
+@jax.jit
+def _nearest(scene: Scene, points: Array, times: Array) -> Array:
+    """The smallest distance of any of the points (n, 3), each at its time, to a solid of one world, m."""
+    return jnp.min(jax.vmap(lambda point, at: gaps(scene, point[None], at[None])[0, 1:])(points, times))
 
 
 class SceneCamera:

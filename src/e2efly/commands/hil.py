@@ -1,0 +1,157 @@
+"""`e2efly hil`: hardware in the loop."""
+
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+
+from e2efly.courses.origin import Origin
+from e2efly.process import raise_at_interrupt
+from e2efly.terminal import Terminal
+from e2efly.vehicles import load_vehicle
+
+_ROW = "six numbers, room_x,room_y,room_z,x,y,z"
+FASTEST = 240.0
+"""Largest rate of images, Hz."""
+
+
+@dataclass(frozen=True)
+class Hil:
+    """Put a real vehicle into a virtual world: images of it, rendered at the poses that a motion capture system sees.
+
+    Fly the policy beside it with `e2efly fly POLICY --image NAME=shm:...`, which reads the images. See docs/hil.md.
+    """
+
+    policy: tyro.conf.Positional[Path]
+    """Whose cameras and world are rendered: a policy.onnx, a run directory, or a task of the zoo."""
+    pose: str = "udp:9870"
+    """Pose source, as of `e2efly fly`."""
+    image: tuple[str, ...] = ()
+    """Where each image goes, image_0=shm:NAME."""
+    vehicle: str | None = None
+    """A shipped vehicle or a .toml file; left out: the policy's."""
+    seed: int = 0
+    """Of the world."""
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the origin of the world lies in the room, m; as --goal.origin of `e2efly fly`."""
+    origin_yaw: float = 0.0
+    """By how much its x axis is turned from the room's about up, rad."""
+    points: Path | None = None
+    """In place of both: a CSV file with a row room_x,room_y,room_z,x,y,z for each point measured in the room, m."""
+    rate: float | None = None
+    """Images per second; the contract's when left out."""
+    seconds: float | None = None
+    """End after so long; left out: at Ctrl-C."""
+
+
+def run(options: Hil) -> int:
+    """Render until the time is out.
+
+    Raises:
+        ValueError: naming the option, its value and what is accepted.
+        OSError: when the shared memory cannot be written.
+    """
+    o, console = options, Terminal()
+    if o.rate is not None and not 1 <= o.rate <= FASTEST:
+        raise ValueError(f"--rate is {o.rate}; accepted: 1 to {FASTEST:g} Hz")
+    if o.seconds is not None and not o.seconds > 0:
+        raise ValueError(f"--seconds is {o.seconds}; accepted: more than 0")
+    origin = Origin(o.origin, o.origin_yaw) if o.points is None else _measured(o.points)
+    from e2efly.deploy.pose.sources import open_source
+    from e2efly.deploy.sight.shared import SharedImages
+    from e2efly.device import compute_at_once, prepare
+    from e2efly.evaluation import candidate
+    from e2efly.validation.hil import Node
+    from e2efly.validation.scenery import Scenery
+
+    raise_at_interrupt()
+    compute_at_once()
+    prepare("cpu")
+    found = candidate(o.policy, o.vehicle)
+    images = found.policy.contract.images
+    if not images:
+        raise ValueError(f"policy {o.policy} sees nothing; accepted: a policy with images")
+    names = _names(o.image, [image.name for image in images])
+    suite = next(iter(found.task.criteria().values()))
+    with console.status("drawing the world"):
+        scenery = Scenery.draw(found.environment(suite), o.seed)
+    assert scenery is not None
+    with ExitStack() as stack:
+        source = open_source(o.pose)
+        stack.callback(source.close)
+        outputs = [SharedImages(name, image.shape) for name, image in zip(names, images, strict=True)]
+        for output in outputs:
+            stack.callback(output.close)
+        rate, body = o.rate or images[0].rate_hz, load_vehicle(found.vehicle)
+        node = Node(scenery, source, outputs, origin, rate, float(body.radius))
+        node.warm()
+        (x, y, z), yaw = origin.position, origin.yaw
+        given = " ".join(f"--image {image.name}=shm:{name}" for image, name in zip(images, names, strict=True))
+        console.print(f"{rate:g} Hz, poses from {source.describe()}. Fly it with:")
+        console.print(f"  --goal.origin {x:g} {y:g} {z:g} --goal.origin-yaw {yaw:g} {given}")
+        try:
+            _loop(node, o.seconds, console)
+        except KeyboardInterrupt:
+            console.print("Ended.")
+        _tell(node, console)
+    return 0
+
+
+def _loop(node: Any, seconds: float | None, console: Terminal) -> None:  # type: ignore[name-defined]
+    end, told = time.monotonic() + (seconds or float("inf")), None
+    while (now := time.monotonic()) < end:
+        said = node.step(now, time.monotonic)
+        if said is not None and said != told:
+            console.print(said)
+            told = said
+        time.sleep(0.001)
+
+
+def _tell(node: Any, console: Terminal) -> None:  # type: ignore[name-defined]
+    if not node.latencies:
+        console.print("No image was published.")
+        return
+    ms = 1e3 * np.array(node.latencies)
+    middle, late = np.quantile(ms, (0.5, 0.99))
+    console.print(
+        f"{len(ms)} images; from the newest pose to the image {middle:.1f} ms (median), {late:.1f} ms (p99), "
+        f"{ms.max():.1f} ms at most; {node.collisions} virtual collisions."
+    )
+
+
+def _names(texts: tuple[str, ...], images: list[str]) -> list[str]:
+    """The shared memory of each image."""
+    chosen: dict[str, str] = {}
+    for text in texts:
+        image, _, where = text.partition("=")
+        kind, _, name = where.partition(":")
+        if image not in images or kind != "shm" or not name:
+            raise ValueError(f"--image is {text!r}; accepted: NAME=shm:NAME, the first of {', '.join(images)}")
+        if image in chosen or name in chosen.values():
+            raise ValueError(f"--image has {image} or shm:{name} twice; accepted: each once")
+        chosen[image] = name
+    if lacking := [image for image in images if image not in chosen]:
+        raise ValueError(f"--image lacks {lacking[0]}; accepted: --image {lacking[0]}=shm:NAME")
+    return [chosen[image] for image in images]
+
+
+def _measured(path: Path) -> Origin:
+    """The origin by measured points.
+
+    Raises:
+        ValueError: naming the file and what is wrong with it.
+    """
+    try:
+        rows = np.loadtxt(path, delimiter=",", ndmin=2)
+    except (OSError, ValueError) as error:
+        raise ValueError(f"--points {path}: {error}; accepted: rows of {_ROW}") from None
+    if rows.shape[1:] != (6,):
+        raise ValueError(f"--points {path}: has rows of {rows.shape[1]} numbers; accepted: {_ROW}")
+    try:
+        return Origin.fitted(rows[:, :3], rows[:, 3:])
+    except ValueError as error:
+        raise ValueError(f"--points {path}: {error}") from None

@@ -1,0 +1,111 @@
+"""A real vehicle in a virtual world: poses in, images of the world at those poses out, in real time."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import jax
+import numpy as np
+
+from e2efly.control import Quat
+from e2efly.courses.origin import Origin
+from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.pose.checks import Checks
+from e2efly.deploy.pose.source import PoseSource
+from e2efly.deploy.pose.tracking import Track, track
+from e2efly.deploy.sight.shared import SharedImages
+from e2efly.validation.plant import RigidState
+from e2efly.validation.scenery import Scenery
+from e2efly.validation.sight import rendered
+
+LOST_S = 0.1
+"""A pose older than this shows nothing any more, s."""
+STRUCK_S = 1.0
+"""For so long after a virtual collision there are no images, s: the policy's flight ends."""
+
+
+@dataclass
+class Node:
+    """Renders what the vehicle's cameras would see, and publishes it."""
+
+    scenery: Scenery
+    source: PoseSource
+    outputs: Sequence[SharedImages]
+    """One for each camera."""
+    origin: Origin
+    """Of the scenery's world, in the room."""
+    rate: float
+    """Images per second."""
+    radius: float
+    """Of the vehicle, m."""
+    checks: Checks = field(default_factory=lambda: Checks(max_age=LOST_S))
+    """What a pose must satisfy."""
+    latencies: list[float] = field(default_factory=list)
+    """Of each image: from the arrival of the newest pose to its publication, s."""
+    collisions: int = 0
+    refused: str | None = None
+    """Why the newest pose was refused; None: it was not."""
+    _track: Track = Track()
+    _odometry: Odometry | None = None
+    _received: float = -math.inf
+    _due: float = -math.inf
+    _blind_until: float = -math.inf
+    _count: int = 0
+
+    def warm(self) -> None:
+        """Compile, so that the first image of a flight is not late."""
+        state = RigidState(np.zeros(3), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3))
+        self._images(state, 0.0)
+        self.scenery.nearest([np.zeros(3)], [0.0], self.origin)
+
+    def step(self, now: float, clock: Callable[[], float]) -> str | None:
+        """Take in poses, and publish where it is time to.
+
+        Args:
+            now: this machine's monotonic clock, s.
+            clock: the same, to be read again once an image is out.
+
+        Returns:
+            What happened, for people; None: nothing new.
+        """
+        for sample in self.source.read(now):
+            self._track, odometry, self.refused = track(self.checks, self._track, sample)
+            if odometry is not None:
+                self._odometry, self._received = odometry, sample.received
+        if now < self._due:
+            return None
+        self._due = max(self._due + 1 / self.rate, now) if math.isfinite(self._due) else now + 1 / self.rate
+        if now < self._blind_until:
+            return "no images: a virtual collision"
+        if self._odometry is None or now - self._odometry.time > LOST_S:
+            return f"no images: no good pose{f' ({self.refused})' if self.refused else ''}"
+        local = ahead(self._odometry, now).seen_from(self.origin)
+        if self.scenery.nearest([local.position], [now], Origin()) < self.radius:
+            self.collisions, self._blind_until = self.collisions + 1, now + STRUCK_S
+            return f"virtual collision at {local.position.round(2).tolist()} m of the scene"
+        for output, image in zip(self.outputs, self._images(RigidState.of(local), now), strict=True):
+            output.publish(now, image)
+        self.latencies.append(clock() - self._received)
+        return "images"
+
+    def _images(self, state: RigidState, now: float) -> list[np.ndarray]:
+        self._count += 1
+        keys = (jax.random.fold_in(jax.random.key(i), self._count) for i in range(len(self.scenery.cameras)))
+        eyes = [replace(eye, latency=0 * eye.latency) for eye in self.scenery.eyes]
+        return [
+            rendered(camera, eye, self.scenery.scene, [state], now, 1.0, key)
+            for camera, eye, key in zip(self.scenery.cameras, eyes, keys, strict=True)
+        ]
+
+
+def ahead(odometry: Odometry, now: float) -> Odometry:
+    """Where a vehicle is at `now`, s, by the last that is known: it goes on as it flew, and turns as it turned."""
+    dt = min(max(now - odometry.time, 0.0), LOST_S)
+    w, x, y, z = (1.0, *(0.5 * dt * odometry.body_rate).tolist())
+    turned = Quat.of(odometry.quaternion).compose(Quat(w, x, y, z)).normalized()
+    return replace(
+        odometry,
+        time=odometry.time + dt,
+        position=odometry.position + dt * odometry.velocity,
+        quaternion=np.array([float(part) for part in turned.stack()]),
+    )
