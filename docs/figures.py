@@ -79,9 +79,9 @@ Success: within 0.1 m for the last second of 8 s. What stands in which row:
 [any quadrotor](any-vehicle.md).""",
     "identify": """
 30 s in MuJoCo each, with noise, biases, gaps, late poses and sag; errors are absolute values, of
-inertia per axis. The structural part of sigma (`STRUCTURE`) was set on these same vehicles: with
-0.4 % in the place of 1 % for the motors' lag, 40 % of its intervals held the truth. So the last
-column is no independent test. [How it is done](identification.md).""",
+inertia per axis. The structural part of sigma (`STRUCTURE`) was set on other vehicles than these. It
+makes the intervals of thrust, lag, delay and roll and pitch inertia wider than MuJoCo needs: real firmware and real
+logs differ from the model by more. [How it is done](identification.md).""",
     "step_response": """
 VIS-R; mean of four steps of each command. Time until 10 % and 63 % of the step, and overshoot (of
 thrust, which an accelerometer shakes, none). [How it is done, and the picture](identification.md#align).""",
