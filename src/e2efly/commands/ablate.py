@@ -82,7 +82,7 @@ def _ablate(options: Ablate, configs: dict[tuple[str, str], TrainConfig], consol
 
 
 def _config(options: Ablate, task: str, algo: str) -> TrainConfig:
-    config = dataclasses.replace(presets.preset(task, algo, options.preset), curriculum=())
+    config = dataclasses.replace(presets.preset(task, algo, options.preset), curriculum=(), start_from=None)
     if options.steps is not None:
         config = dataclasses.replace(config, steps=options.steps)
     presets.check(config)

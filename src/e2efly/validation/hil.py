@@ -20,6 +20,8 @@ from e2efly.validation.sight import rendered
 
 LOST_S = 0.1
 """A pose older than this shows nothing any more, s."""
+RESTART_S = 1.0
+"""After so long without a good pose tracking starts anew, s."""
 STRUCK_S = 1.0
 """For so long after a virtual collision there are no images, s: the policy's flight ends."""
 
@@ -40,17 +42,19 @@ class Node:
     """Of the vehicle, m."""
     checks: Checks = field(default_factory=lambda: Checks(max_age=LOST_S))
     """What a pose must satisfy."""
-    latencies: list[float] = field(default_factory=list)
+    latencies: list[float] = field(default_factory=list, init=False)
     """Of each image: from the arrival of the newest pose to its publication, s."""
-    collisions: int = 0
-    refused: str | None = None
+    collisions: int = field(default=0, init=False)
+    """Virtual ones so far."""
+    refused: str | None = field(default=None, init=False)
     """Why the newest pose was refused; None: it was not."""
-    _track: Track = Track()
-    _odometry: Odometry | None = None
-    _received: float = -math.inf
-    _due: float = -math.inf
-    _blind_until: float = -math.inf
-    _count: int = 0
+    _track: Track = field(default=Track(), init=False)
+    _odometry: Odometry | None = field(default=None, init=False)
+    _received: float = field(default=-math.inf, init=False)
+    _began: float | None = field(default=None, init=False)
+    _due: float = field(default=-math.inf, init=False)
+    _blind_until: float = field(default=-math.inf, init=False)
+    _count: int = field(default=0, init=False)
 
     def warm(self) -> None:
         """Compile, so that the first image of a flight is not late."""
@@ -68,6 +72,9 @@ class Node:
         Returns:
             What happened, for people; None: nothing new.
         """
+        began = self._began = now if self._began is None else self._began
+        if self._track.fault and now - self._received > RESTART_S:
+            self._track = Track()  # it may have been carried elsewhere; the policy's flight has ended by now
         for sample in self.source.read(now):
             self._track, odometry, self.refused = track(self.checks, self._track, sample)
             if odometry is not None:
@@ -80,20 +87,20 @@ class Node:
         if self._odometry is None or now - self._odometry.time > LOST_S:
             return f"no images: no good pose{f' ({self.refused})' if self.refused else ''}"
         local = ahead(self._odometry, now).seen_from(self.origin)
-        if self.scenery.nearest([local.position], [now], Origin()) < self.radius:
+        if self.scenery.nearest([local.position], [now - began], Origin()) < self.radius:
             self.collisions, self._blind_until = self.collisions + 1, now + STRUCK_S
             return f"virtual collision at {local.position.round(2).tolist()} m of the scene"
-        for output, image in zip(self.outputs, self._images(RigidState.of(local), now), strict=True):
+        for output, image in zip(self.outputs, self._images(RigidState.of(local), now - began), strict=True):
             output.publish(now, image)
         self.latencies.append(clock() - self._received)
         return "images"
 
-    def _images(self, state: RigidState, now: float) -> list[np.ndarray]:
+    def _images(self, state: RigidState, time: float) -> list[np.ndarray]:
         self._count += 1
         keys = (jax.random.fold_in(jax.random.key(i), self._count) for i in range(len(self.scenery.cameras)))
         eyes = [replace(eye, latency=0 * eye.latency) for eye in self.scenery.eyes]
         return [
-            rendered(camera, eye, self.scenery.scene, [state], now, 1.0, key)
+            rendered(camera, eye, self.scenery.scene, [state], time, 1.0, key)
             for camera, eye, key in zip(self.scenery.cameras, eyes, keys, strict=True)
         ]
 
