@@ -7,8 +7,9 @@ register by entry points, which are looked at when a name is unknown (`load_inst
 import hashlib
 import importlib
 import importlib.util
+import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib import metadata
 from pathlib import Path
@@ -18,6 +19,7 @@ from typing import Any, Generic, TypeVar
 from e2efly.vehicles.names import unknown
 
 T = TypeVar("T")
+_REFERENCE = re.compile(r"(?P<reference>(?:.+\.py|[\w.]+):[A-Za-z_]\w*)(?::(?P<where>.*))?")
 
 
 class Registry(Generic[T], Mapping[str, T]):
@@ -113,6 +115,24 @@ def load(reference: str) -> Any:
             raise ValueError(f"{where} has no {name} yet: it imports itself") from None
         names = sorted(n for n, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__)
         raise ValueError(unknown(f"name in {where}", name, names)) from None
+
+
+def referenced(text: str) -> tuple[str, str] | None:
+    """A reference and what stands behind another colon, `path/to/file.py:Name:TEXT`; None: the text is no reference."""
+    found = _REFERENCE.fullmatch(text)
+    if found is None or not ("." in text.partition(":")[0] or ".py:" in text):
+        return None
+    return found["reference"], found["where"] or ""
+
+
+def check_methods(thing: Any, methods: Sequence[str]) -> None:
+    """Refuse what lacks a method.
+
+    Raises:
+        ValueError: naming where it is from, what it lacks and what it must have.
+    """
+    if lacking := [name for name in methods if not hasattr(thing, name)]:
+        raise ValueError(f"{origin(type(thing))} has no {', '.join(lacking)}; accepted: all of {', '.join(methods)}")
 
 
 def origin(thing: Any) -> str:

@@ -138,9 +138,13 @@ def test_what_cannot_be_rendered_is_named(tmp_path: Path, capsys: pytest.Capture
         (["avoid"], "--image lacks image_0; accepted: --image image_0=shm:NAME"),
         (
             ["avoid", "--image", "front=shm:x"],
-            "--image is 'front=shm:x'; accepted: NAME=shm:NAME, the first of image_0",
+            "--image is 'front=shm:x'; accepted: NAME=URI, NAME one of image_0",
         ),
-        (["avoid", "--image", "image_0=shm:x", "image_0=shm:y"], "--image has image_0 or shm:y twice"),
+        (
+            ["avoid", "--image", "image_0=shm:x", "image_0=shm:y"],
+            "image_0 is 'shm:x' and 'shm:y'; accepted: one URI for each",
+        ),
+        (["avoid", "--image", "image_0=udp:x"], "--image is image_0=udp:x; accepted: image_0=shm:NAME"),
         (["avoid", "--rate", "0"], "--rate is 0.0; accepted: 1 to 240 Hz"),
         (["avoid", "--seconds", "0"], "--seconds is 0.0; accepted: more than 0"),
         (

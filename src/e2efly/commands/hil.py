@@ -4,7 +4,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import tyro
@@ -13,6 +13,10 @@ from e2efly.courses.origin import Origin
 from e2efly.process import raise_at_interrupt
 from e2efly.terminal import Terminal
 from e2efly.vehicles import load_vehicle
+
+if TYPE_CHECKING:
+    from e2efly.deploy.policy.contract import Contract
+    from e2efly.validation.hil import Node
 
 _ROW = "six numbers, room_x,room_y,room_z,x,y,z"
 FASTEST = 240.0
@@ -75,7 +79,7 @@ def run(options: Hil) -> int:
     images = found.policy.contract.images
     if not images:
         raise ValueError(f"policy {o.policy} sees nothing; accepted: a policy with images")
-    names = _names(o.image, [image.name for image in images])
+    names = _names(o.image, found.policy.contract)
     suite = next(iter(found.task.criteria().values()))
     with console.status("drawing the world"):
         scenery = Scenery.draw(found.environment(suite), o.seed)
@@ -101,7 +105,7 @@ def run(options: Hil) -> int:
     return 0
 
 
-def _loop(node: Any, seconds: float | None, console: Terminal) -> None:  # type: ignore[name-defined]
+def _loop(node: "Node", seconds: float | None, console: Terminal) -> None:
     end, told = time.monotonic() + (seconds or float("inf")), None
     while (now := time.monotonic()) < end:
         said = node.step(now, time.monotonic)
@@ -111,7 +115,7 @@ def _loop(node: Any, seconds: float | None, console: Terminal) -> None:  # type:
         time.sleep(0.001)
 
 
-def _tell(node: Any, console: Terminal) -> None:  # type: ignore[name-defined]
+def _tell(node: "Node", console: Terminal) -> None:
     if not node.latencies:
         console.print("No image was published.")
         return
@@ -123,20 +127,20 @@ def _tell(node: Any, console: Terminal) -> None:  # type: ignore[name-defined]
     )
 
 
-def _names(texts: tuple[str, ...], images: list[str]) -> list[str]:
+def _names(texts: tuple[str, ...], contract: "Contract") -> list[str]:
     """The shared memory of each image."""
-    chosen: dict[str, str] = {}
-    for text in texts:
-        image, _, where = text.partition("=")
-        kind, _, name = where.partition(":")
-        if image not in images or kind != "shm" or not name:
-            raise ValueError(f"--image is {text!r}; accepted: NAME=shm:NAME, the first of {', '.join(images)}")
-        if image in chosen or name in chosen.values():
-            raise ValueError(f"--image has {image} or shm:{name} twice; accepted: each once")
-        chosen[image] = name
-    if lacking := [image for image in images if image not in chosen]:
-        raise ValueError(f"--image lacks {lacking[0]}; accepted: --image {lacking[0]}=shm:NAME")
-    return [chosen[image] for image in images]
+    from e2efly.deploy.sight.sources import by_image
+
+    chosen, names = by_image(texts, contract), list[str]()
+    for image in contract.images:
+        if image.name not in chosen:
+            raise ValueError(f"--image lacks {image.name}; accepted: --image {image.name}=shm:NAME")
+        kind, _, name = chosen[image.name].partition(":")
+        if kind != "shm" or not name or name in names:
+            said = f"--image is {image.name}={chosen[image.name]}"
+            raise ValueError(f"{said}; accepted: {image.name}=shm:NAME, another name for each image")
+        names.append(name)
+    return names
 
 
 def _measured(path: Path) -> Origin:

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-import jax
 import numpy as np
 
 from e2efly.control import Quat
@@ -16,7 +15,6 @@ from e2efly.deploy.pose.tracking import Track, track
 from e2efly.deploy.sight.shared import SharedImages
 from e2efly.validation.plant import RigidState
 from e2efly.validation.scenery import Scenery
-from e2efly.validation.sight import rendered
 
 LOST_S = 0.1
 """A pose older than this shows nothing any more, s."""
@@ -97,12 +95,7 @@ class Node:
 
     def _images(self, state: RigidState, time: float) -> list[np.ndarray]:
         self._count += 1
-        keys = (jax.random.fold_in(jax.random.key(i), self._count) for i in range(len(self.scenery.cameras)))
-        eyes = [replace(eye, latency=0 * eye.latency) for eye in self.scenery.eyes]
-        return [
-            rendered(camera, eye, self.scenery.scene, [state], time, 1.0, key)
-            for camera, eye, key in zip(self.scenery.cameras, eyes, keys, strict=True)
-        ]
+        return [self.scenery.image(i, state, time, self._count) for i in range(len(self.scenery.cameras))]
 
 
 def ahead(odometry: Odometry, now: float) -> Odometry:

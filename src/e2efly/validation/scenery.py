@@ -56,8 +56,20 @@ class Scenery:
             state: the vehicle's true state now, in the room.
             origin: of the task's world in the room.
         """
-        pairs = zip(self.cameras, self.eyes, strict=True)
-        return [SceneCamera(camera, eye, self.scene, state, origin, i) for i, (camera, eye) in enumerate(pairs)]
+        return [SceneCamera(self, i, state, origin) for i in range(len(self.cameras))]
+
+    def image(self, which: int, state: RigidState, time: float, count: int) -> np.ndarray:
+        """What a camera shows at once, whatever the age of its images when they are delivered.
+
+        Args:
+            which: of the cameras.
+            state: of the vehicle, in this world.
+            time: of the world, s.
+            count: of the images so far: the noise of each is another.
+        """
+        eye = dataclasses.replace(self.eyes[which], latency=0 * self.eyes[which].latency)
+        key = jax.random.fold_in(jax.random.key(which), count)
+        return rendered(self.cameras[which], eye, self.scene, [state], time, 1.0, key)
 
     def nearest(self, position: Sequence[np.ndarray], time: Sequence[float], origin: Origin) -> float:
         """How near a path comes to what stands in this world and is not to be landed on, m; infinite: to nothing.
@@ -84,33 +96,21 @@ def _nearest(scene: Scene, points: Array, times: Array) -> Array:
 class SceneCamera:
     """A camera in a rendered world, as an image source: exposes at its rate, and delivers a latency later."""
 
-    def __init__(
-        self,
-        camera: CameraConfig,
-        eye: Eye,
-        scene: Scene,
-        state: Callable[[], RigidState],
-        origin: Origin,
-        seed: int = 0,
-    ) -> None:
+    def __init__(self, scenery: Scenery, which: int, state: Callable[[], RigidState], origin: Origin) -> None:
         """Mount it.
 
         Args:
-            camera: the camera.
-            eye: how it sits: leaves (1, ...); its latency is that of the images.
-            scene: one world.
+            scenery: what it sees.
+            which: of the scenery's cameras.
             state: the vehicle's true state now, in the room.
-            origin: of the task's world in the room.
-            seed: of the noise.
+            origin: of the scenery's world in the room.
         """
         self.problem: str | None = None
-        self._camera, self._scene = camera, scene
-        self._eye = dataclasses.replace(eye, latency=0 * eye.latency)  # of what is rendered; it is delivered later
-        self._state, self._origin = state, origin
-        self._latency = float(eye.latency[0])
-        self._period = 1 / camera.rate if camera.rate else 0.0
-        self._next = -np.inf
-        self._key, self._count = jax.random.key(seed), 0
+        self._scenery, self._which, self._state, self._origin = scenery, which, state, origin
+        self._camera = scenery.cameras[which]
+        self._latency = float(scenery.eyes[which].latency[0])
+        self._period = 1 / self._camera.rate if self._camera.rate else 0.0
+        self._next, self._count = -np.inf, 0
         self._waiting: deque[Frame] = deque()
 
     def read(self, now: float) -> list[Frame]:
@@ -133,5 +133,4 @@ class SceneCamera:
     def _image(self, now: float) -> np.ndarray:
         local = self._state().odometry(now).seen_from(self._origin)
         self._count += 1
-        key = jax.random.fold_in(self._key, self._count)
-        return rendered(self._camera, self._eye, self._scene, [RigidState.of(local)], now, 1.0, key)
+        return self._scenery.image(self._which, RigidState.of(local), now, self._count)

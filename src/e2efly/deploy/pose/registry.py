@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from e2efly.deploy.pose.source import PoseSource
-from e2efly.registry import Registry, origin
+from e2efly.registry import Registry, check_methods
 
 METHODS = ("refused", "problem", "read", "close", "describe")
 """What a pose source must have."""
@@ -59,8 +59,7 @@ def opened(kind: Kind, text: str, where: str) -> PoseSource:
         source = kind.open(where)
     except MalformedError:
         raise ValueError(f"pose source is {text!r}; accepted: {kind.form}") from None
-    if lacking := [name for name in METHODS if not hasattr(source, name)]:
-        raise ValueError(f"{origin(type(source))} has no {', '.join(lacking)}; accepted: all of {', '.join(METHODS)}")
+    check_methods(source, METHODS)
     return source
 
 

@@ -1,19 +1,17 @@
 """Which camera shows what of a policy's contract: `--image NAME=URI`."""
 
-import re
 from collections.abc import Sequence
 
 from e2efly.deploy.policy.contract import Contract
 from e2efly.deploy.policy.images import Image
 from e2efly.deploy.sight.shared import SharedCamera
 from e2efly.deploy.sight.source import ImageSource
-from e2efly.registry import load, origin
+from e2efly.registry import check_methods, load, referenced
 
 METHODS = ("problem", "read", "close", "describe")
 """What an image source must have."""
 FORMS = "shm:NAME; or path/to/file.py:Name[:...]"
 """How sources are written."""
-_REFERENCE = re.compile(r"(?P<reference>(?:.+\.py|[\w.]+):[A-Za-z_]\w*)(?::(?P<where>.*))?")
 
 
 def open_cameras(texts: Sequence[str], contract: Contract) -> list[ImageSource]:
@@ -26,7 +24,23 @@ def open_cameras(texts: Sequence[str], contract: Contract) -> list[ImageSource]:
     Raises:
         ValueError: naming the image or the text and what is accepted.
     """
-    wanted = {image.name: image for image in contract.images}
+    chosen = by_image(texts, contract)
+    if lacking := [image for image in contract.images if image.name not in chosen]:
+        image = lacking[0]
+        raise ValueError(
+            f"image {image.name!r} ({image.sees}, {image.height} rows, {image.width} columns): there is no camera; "
+            f"accepted: --image {image.name}=URI, with URI {FORMS}"
+        )
+    return [_opened(chosen[image.name], image) for image in contract.images]
+
+
+def by_image(texts: Sequence[str], contract: Contract) -> dict[str, str]:
+    """NAME=URI of each image as URI by name.
+
+    Raises:
+        ValueError: naming the text and what is accepted: no such image, or one twice.
+    """
+    wanted = [image.name for image in contract.images]
     chosen: dict[str, str] = {}
     for text in texts:
         name, _, where = text.partition("=")
@@ -34,25 +48,17 @@ def open_cameras(texts: Sequence[str], contract: Contract) -> list[ImageSource]:
             accepted = f"NAME=URI, NAME one of {', '.join(wanted)}" if wanted else "none, as the policy sees nothing"
             raise ValueError(f"--image is {text!r}; accepted: {accepted}")
         if name in chosen:
-            raise ValueError(f"--image {name} is {chosen[name]!r} and {where!r}; accepted: one source for each image")
+            raise ValueError(f"--image {name} is {chosen[name]!r} and {where!r}; accepted: one URI for each image")
         chosen[name] = where
-    if lacking := [image for name, image in wanted.items() if name not in chosen]:
-        image = lacking[0]
-        raise ValueError(
-            f"image {image.name!r} ({image.sees}, {image.height} rows, {image.width} columns): there is no camera; "
-            f"accepted: --image {image.name}=URI, with URI {FORMS}"
-        )
-    return [_opened(chosen[name], image) for name, image in wanted.items()]
+    return chosen
 
 
 def _opened(text: str, image: Image) -> ImageSource:
     kind, _, where = text.partition(":")
     if kind == "shm":
         return SharedCamera(where, image)
-    if (found := _REFERENCE.fullmatch(text)) and ("." in kind or ".py:" in text):
-        source = load(found["reference"])(found["where"] or "", image)
-        if lacking := [name for name in METHODS if not hasattr(source, name)]:
-            named = origin(type(source))
-            raise ValueError(f"{named} has no {', '.join(lacking)}; accepted: all of {', '.join(METHODS)}")
+    if found := referenced(text):
+        source = load(found[0])(found[1], image)
+        check_methods(source, METHODS)
         return source
     raise ValueError(f"--image {image.name} is {text!r}; accepted: {FORMS}")

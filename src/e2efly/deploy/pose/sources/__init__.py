@@ -2,16 +2,13 @@
 
 import importlib
 import pkgutil
-import re
 
 from e2efly.deploy.pose.registry import SOURCES, Kind, opened
 from e2efly.deploy.pose.source import PoseSource
-from e2efly.registry import load, load_installed
+from e2efly.registry import load, load_installed, referenced
 
 for _file in pkgutil.iter_modules(__path__, f"{__name__}."):
     importlib.import_module(_file.name)
-
-_REFERENCE = re.compile(r"(?P<reference>(?:.+\.py|[\w.]+):[A-Za-z_]\w*)(?::(?P<where>.*))?")
 
 
 def open_source(text: str) -> PoseSource:
@@ -30,9 +27,9 @@ def open_source(text: str) -> PoseSource:
         load_installed()
     if name in SOURCES:
         return opened(SOURCES[name], text, where)
-    if (found := _REFERENCE.fullmatch(text)) and ("." in name or ".py:" in text):
-        own = load(found["reference"])
-        known = next((kind for kind in SOURCES.values() if kind.open is own), Kind(own, f"{found['reference']}[:...]"))
-        return opened(known, text, found["where"] or "")
+    if found := referenced(text):
+        own = load(found[0])
+        known = next((kind for kind in SOURCES.values() if kind.open is own), Kind(own, f"{found[0]}[:...]"))
+        return opened(known, text, found[1])
     forms = "; ".join(kind.form for kind in SOURCES.values())
     raise ValueError(f"pose source is {text!r}; accepted: {forms}; or path/to/file.py:Name[:...]")
