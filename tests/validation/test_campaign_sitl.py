@@ -57,6 +57,18 @@ def test_what_ended_badly_once_breaks_no_rule(name: str, policy_of: Callable[...
     assert flown.ended
 
 
+@pytest.mark.parametrize("shift", [0.0, 0.13, 0.26, 0.52])
+def test_what_drifted_while_nothing_was_heard_stops_there_and_lands(
+    shift: float, policy_of: Callable[..., Path], tmp_path: Path
+) -> None:
+    """It does not fly back to where it was: it would touch the ground on its way, at up to 2 m/s."""
+    scenario = Scenario("", "hover", (Strike("link: silent", 2.0 + shift, 3.0),), 0.8)
+    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware.chosen(), tmp_path)
+    assert flown.violations == ()
+    assert flown.touch_speed < 0.8
+    assert flown.ended
+
+
 def test_every_kind_can_strike_and_end(policy_of: Callable[..., Path], tmp_path: Path) -> None:
     policy, vehicle = load_policy(policy_of("hover")), load_vehicle("vis_r")
     goal = course_for(policy.contract, vehicle, HoverRoute(target=TARGET))

@@ -105,17 +105,20 @@ def _see(settings: FlightSettings, flight: Flight, odometry: Odometry) -> Flight
 
 
 def _unheard(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
-    """While the link is down: it goes on landing, as its commands may arrive, but no clock of the landing runs."""
+    """While the link is down: it goes on landing, as its commands may arrive, but no clock of the landing runs.
+
+    It may drift far meanwhile, so its target goes with it: once heard again it stops there, and does not fly back.
+    """
     if inputs.seen is None:
         flight = dataclasses.replace(flight, still_since=None)
         if not flight.blind or flight.lost is None:
             return _blindly(settings, flight, inputs, *flight.reasons)
         return dataclasses.replace(flight, lost=(flight.lost[0] + dt, *flight.lost[1:]))
-    flight = _see(settings, flight, inputs.seen) if flight.blind else flight
+    flight = _see(settings, flight, inputs.seen)
     assert flight.target is not None
     x, y, _ = flight.target.position
     target = Target((x, y, float(inputs.seen.position[2])), flight.target.yaw, -UNHEARD_SINK)
-    return dataclasses.replace(flight, target=target, still_since=None)
+    return dataclasses.replace(flight, target=target, since=flight.since + dt)
 
 
 def _looked(flight: Flight, inputs: Inputs) -> Flight:
