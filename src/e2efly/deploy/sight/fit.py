@@ -45,11 +45,9 @@ def fitted(image: np.ndarray, fov: tuple[float, float], camera: Image, where: st
         )
     if camera.sees in ("depth", "range"):
         filled = np.where(image > 0, image, np.inf)
-        cells = np.minimum.reduceat(
-            np.minimum.reduceat(filled[: rows[-1]], rows[:-1], 0)[:, : columns[-1]], columns[:-1], 1
-        )
+        cells = _by_cell(np.minimum, filled, rows, columns)
         return _within(np.where(np.isfinite(cells), cells, 0.0), camera)
-    sums = np.add.reduceat(np.add.reduceat(image[: rows[-1]], rows[:-1], 0)[:, : columns[-1]], columns[:-1], 1)
+    sums = _by_cell(np.add, image, rows, columns)
     area = np.outer(np.diff(rows), np.diff(columns)).reshape(camera.height, camera.width, *[1] * (image.ndim - 2))
     mean = sums / area
     return (mean >= 0.5).astype(np.float32) if camera.sees == "mask" else mean.astype(np.float32)
