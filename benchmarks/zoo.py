@@ -40,10 +40,10 @@ from e2efly.zoo import FOLDER, USUAL, contents
 
 VARIANTS = {"race_any": ("race", "any_track")}
 """Policies of a task by a preset of its own: task and preset."""
-USUAL_ALONE = ("land_visual", "avoid", *VARIANTS)
-"""For the usual vehicle alone: they take minutes, and what a camera sees depends little on who carries it."""
-NOT_FOR = ("crazyflie", "race_clutter")
-"""The task that a vehicle has no policy of: it carries no depth camera, and is no racer."""
+USUAL_ALONE = tuple(VARIANTS)
+"""For the usual vehicle alone."""
+SEEING = (USUAL, "vis_h")
+"""Vehicles that have policies by sight: the paper's, one with a camera and one in virtual worlds."""
 SEEN = 250
 """Starts per row of the stress of a policy that sees, which takes minutes; of the others 1000."""
 ENOUGH, ENOUGH_STRESSED, WORTH = 0.995, 0.97, 0.5
@@ -164,7 +164,9 @@ def main() -> None:
             rows.append(keep(vehicle, task, out / "policy.onnx", about))
     for vehicle in () if options.runs else options.vehicles:
         for task in options.tasks:
-            if (task in USUAL_ALONE and vehicle != USUAL) or (vehicle, task) == NOT_FOR:
+            if task in USUAL_ALONE and vehicle != USUAL:
+                continue
+            if task in TASKS and TASKS[task].cameras and vehicle not in SEEING:
                 continue
             if vehicle in family_names() and TASKS[task].best not in TASKS[task].family:
                 continue
