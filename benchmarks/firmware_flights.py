@@ -37,7 +37,6 @@ def main() -> None:
             "hover error, worst": f"{100 * max(f.hover_error for f in flown):.1f} cm",
             "the policy, each flight": "; ".join(f.told for f in flown),
             "top speed": f"{max(f.top_speed for f in flown):.1f} m/s",
-            "real time": f"{took:.0f} s",
         })  # fmt: skip
         print(f"{task}: {rows[-1]['complete']} complete in {took:.0f} s", flush=True)
         for flight in flown:
