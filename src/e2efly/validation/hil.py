@@ -95,7 +95,7 @@ class Node:
 
     def _images(self, state: RigidState, time: float) -> list[np.ndarray]:
         self._count += 1
-        return [self.scenery.image(i, state, time, self._count) for i in range(len(self.scenery.cameras))]
+        return self.scenery.images(state, time, self._count)
 
 
 def ahead(odometry: Odometry, now: float) -> Odometry:
