@@ -1,5 +1,6 @@
 """Programs that fly together in real time, each a process: a room with a vehicle, a bridge, and the pilot's hands."""
 
+import dataclasses
 import json
 import math
 import os
@@ -13,7 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 START_S = 60.0
 """How long a process may take to be ready on a busy machine, s."""
@@ -27,11 +28,42 @@ _LIFT, _CLIMB_GAIN, _BRAKE = 0.1, 0.25, 0.12
 """Of his throttle stick: where the vehicle about hovers; per m/s; of the others per m/s."""
 
 
+Victim = Literal["mocap", "hil", "bridge", "watchdog"]
+"""The processes of hardware in the loop that can be killed in flight."""
+
+
 def free_port() -> int:
     """A UDP port of the loopback interface that nobody listens to now."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
+
+
+def flags(prefix: str, options: Any, default: Any = None) -> list[str]:
+    """A configuration as options of a command: those fields that are not the default's.
+
+    Args:
+        prefix: of their names, such as `goal`.
+        options: a frozen dataclass of numbers, texts, flags, tuples of them, and such dataclasses.
+        default: another one; None: that of the class.
+    """
+    default, found = type(options)() if default is None else default, list[str]()
+    for field in dataclasses.fields(options):
+        value, usual = getattr(options, field.name), getattr(default, field.name)
+        name = f"{prefix}.{field.name.replace('_', '-')}"
+        if dataclasses.is_dataclass(value):
+            found += flags(name, value, usual)
+        elif value == usual:
+            continue
+        elif isinstance(value, bool):
+            found.append(f"--{name}" if value else f"--{prefix}.no-{field.name.replace('_', '-')}")
+        else:
+            found += [f"--{name}", *map(_text, value if isinstance(value, tuple) else (value,))]
+    return found
+
+
+def _text(value: Any) -> str:
+    return f"{value:.9g}" if isinstance(value, float) else str(value)
 
 
 class Program:
@@ -67,8 +99,9 @@ class Program:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def heard(self, text: str, seconds: float) -> bool:
-        """Whether it says something, from now on, within so long."""
+    def heard(self, text: str | tuple[str, ...], seconds: float) -> bool:
+        """Whether it says something, from now on, within so long; of several texts, one of them."""
+        texts = (text,) if isinstance(text, str) else text
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
             try:
@@ -79,11 +112,11 @@ class Program:
                 self._lines.put(None)
                 return False
             self.said.append(line)
-            if text in line:
+            if any(part in line for part in texts):
                 return True
         return False
 
-    def wait_for(self, text: str, seconds: float) -> str:
+    def wait_for(self, text: str | tuple[str, ...], seconds: float) -> str:
         """Wait until it says something; the line.
 
         Raises:
