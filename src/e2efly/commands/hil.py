@@ -1,9 +1,8 @@
 """`e2efly hil`: hardware in the loop."""
 
 import dataclasses
-import os
 import time
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +12,7 @@ import tyro
 
 from e2efly.commands.hil_rehearsal import check_rehearsal, rehearse
 from e2efly.courses.origin import Origin
-from e2efly.process import raise_at_interrupt
+from e2efly.process import be_punctual, raise_at_interrupt
 from e2efly.storage import write_json
 from e2efly.tasks.route import route_of
 from e2efly.terminal import Terminal
@@ -25,6 +24,8 @@ if TYPE_CHECKING:
     from e2efly.validation.hil import Node
 
 _ROW = "six numbers, room_x,room_y,room_z,x,y,z"
+PRIORITY = 4
+"""Real-time priority of the rendering: below the bridge's."""
 FASTEST = 240.0
 """Largest rate of images, Hz."""
 
@@ -95,8 +96,6 @@ def run(options: Hil) -> int:
     from e2efly.validation.scenery import Scenery
 
     raise_at_interrupt()
-    with suppress(OSError):  # images must not wait; where it is not allowed to, it is as good as others
-        os.nice(-10)
     compute_at_once()
     prepare("cpu")
     found = candidate(o.policy, o.vehicle)
@@ -120,6 +119,7 @@ def run(options: Hil) -> int:
         rate = o.rate or images[0].rate_hz
         node = Node(scenery, source, outputs, origin, rate, float(body.radius))
         node.warm()
+        be_punctual(PRIORITY)
         given = [f"--image {image.name}=shm:{name}" for image, name in zip(images, names, strict=True)]
         console.print(f"{rate:g} Hz, poses from {source.describe()}. Fly it with:")
         console.print(f"  {' '.join([*goal, *given])}")

@@ -15,11 +15,12 @@ import socket
 import sys
 import time
 from collections import deque
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
+from e2efly.process import be_punctual
 
 DELAY_S = 0.004
 """What cameras and network take, s."""
@@ -108,8 +109,7 @@ def main() -> None:
     parser.add_argument("--gaps", type=float, default=GAPS_HZ, help="how often the markers are hidden, Hz")
     parser.add_argument("--seed", type=int, default=0, help="of noise and gaps")
     options = parser.parse_args()
-    with suppress(OSError):  # it stands for a machine of its own; where it is not allowed to, it is as good as others
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    be_punctual(PRIORITY)  # it stands for a machine of its own
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as inlet:
         inlet.bind(("127.0.0.1", 0))
         print(json.dumps({"from": inlet.getsockname()[1]}), flush=True)

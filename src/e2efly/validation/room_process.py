@@ -17,7 +17,6 @@ import socket
 import sys
 import tempfile
 import time
-from contextlib import suppress
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -25,12 +24,15 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.odometry import tilt_of, yaw_of
+from e2efly.process import be_punctual
 from e2efly.validation.firmware import chosen
 from e2efly.validation.rig import POSE_NOISE, Rig, Transmitter
 from e2efly.vehicles import load_vehicle
 
 ROUND_S = 0.004
 """Between two looks at the control connection, s."""
+PRIORITY = 5
+"""Real-time priority: below that of all that flies in it."""
 RECORDED = (
     "machine_time", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "motor", "behind",
 )  # fmt: skip
@@ -165,8 +167,7 @@ def main() -> None:
     parser.add_argument("--exact", action="store_true", help="poses without noise")
     parser.add_argument("--record", type=Path, default=None, help="CSV file of the true motion, written at the end")
     options = parser.parse_args()
-    with suppress(OSError):  # the world must not wait; where it is not allowed to, it is as good as others
-        os.nice(-15)
+    be_punctual(PRIORITY)  # the world does not wait: with all that this thread starts, the firmware among it
     noise = (0.0,) * len(POSE_NOISE) if options.exact else POSE_NOISE
     with (
         tempfile.TemporaryDirectory(prefix="e2efly-") as temporary,
