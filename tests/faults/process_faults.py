@@ -123,7 +123,7 @@ def _flight(fault: str, room: Room, flies: Program, tap: Tap, log: Path, moment:
         problems.append(f"an exception escaped: {flies.said}")
     if not state["standing"] or not state["touches"]:
         problems.append("it is not on the ground")
-    speed, tilt = state["touches"][-1] if state["touches"] else (math.nan, math.nan)
+    speed, tilt, _ = state["touches"][-1] if state["touches"] else (math.nan,) * 3
     return ProcessOutcome(
         fault, reaction, allowed, speed, tilt, state["largest_tilt"], tuple(flies.said[-5:]), tuple(problems)
     )  # fmt: skip

@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from e2efly.deploy.log.flight_log import FlightLog, read_log
 from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.pilot.flight_state import Reason
 from e2efly.goal import Course
 from e2efly.validation.room import Victim
 from e2efly.validation.room_process import RECORDED
@@ -18,7 +19,7 @@ from e2efly.validation.scenery import Scenery
 GRACE_S = 0.15
 """The truth is judged for so long after the bridge has ended the policy's flight: its poses are late, s."""
 TOUCH = 2.5
-"""A landing that touches the ground faster than this was no landing, m/s."""
+"""A landing that touches the ground sinking faster than this was no landing, m/s."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,9 @@ class Lap:
     reaction: float = math.nan
     """From the kill to the bridge's next change of mode, s; NaN without either."""
     touch_speed: float = math.nan
-    """Of the last touch of the ground, m/s."""
+    """Of the hardest touch of the ground, m/s."""
+    touch_sink: float = math.nan
+    """The part of it that points down, m/s."""
     problems: tuple[str, ...] = ()
     """What was not as it is to be; empty: all was."""
     truth: Truth | None = None
@@ -140,7 +143,8 @@ class Lap:
         spreads = ("pose_to_image", "image_age", "pose_age", "lateness", "behind")
         return {
             **{name: getattr(self, name) for name in (
-                "seed", "kill", "success", "told", "nearest", "policy_s", "top_speed", "reaction", "touch_speed",
+                "seed", "kill", "success", "told", "nearest", "policy_s", "top_speed", "reaction",
+                "touch_speed", "touch_sink",
             )},
             **{f"{name}_s": vars(getattr(self, name)) for name in spreads},
             "modes": [[change.time, change.mode, list(change.reasons)] for change in self.changes],
@@ -232,7 +236,7 @@ class Heard:
     struck: float = math.nan
     """When a process was killed."""
     touches: list[list[float]] = field(default_factory=list)
-    """Speed, m/s, and tilt, rad."""
+    """As `room_process.State` has them."""
     problems: list[str] = field(default_factory=list)
 
 
@@ -266,6 +270,11 @@ def lap_of(
     if motion is not None and math.isfinite(begin):
         flown = motion.between(begin, end + GRACE_S)
         judged = verdict(course, scenery, flown, told.get("began") or begin, period, radius)
+    broke_off = next((c for c in changes if c.time == end and str(Reason.POLICY_DONE) not in c.reasons), None)
+    if broke_off is not None:
+        judged = replace(
+            judged, success=False, told=f"ended after {end - begin:.1f} s by {'; '.join(broke_off.reasons)}"
+        )
     shift = clock_of(log)
     poses, steps, timing = log["odometry"], log["policy"], log["timing"]
     flying = 1e-9 * poses.stamp - shift
@@ -273,6 +282,7 @@ def lap_of(
     up = next((c.time for c in changes if c.mode == "takeoff"), math.nan)
     on = motion.between(up, math.inf).behind if motion is not None and math.isfinite(up) else []
     width = steps.width("image_age")
+    touch = max(heard.touches, key=lambda x: x[2]) if heard.touches else [math.nan] * 3
     return Lap(
         seed, kill, judged.success, judged.told,
         judged.nearest if math.isfinite(judged.nearest) else math.nan,
@@ -283,7 +293,7 @@ def lap_of(
         lateness=Spread.of(timing.numbers("lateness_s")[1e-9 * timing.stamp - shift >= up] if len(timing) else []),
         behind=Spread.of(on),
         reaction=after[0] - heard.struck if after else math.nan,
-        touch_speed=heard.touches[-1][0] if heard.touches else math.nan,
+        touch_speed=touch[0], touch_sink=touch[2],
         problems=tuple(heard.problems), truth=motion, window=(begin, end),
     )  # fmt: skip
 

@@ -120,8 +120,10 @@ def rehearse(plan: Plan, seed: int, folder: Path, kill: Victim | None = None) ->
         What came of it; a program that fails stands in its problems with its last words.
 
     Raises:
-        ValueError: as `draw`.
+        ValueError: as `draw`; where the folder holds an earlier flight.
     """
+    if (folder / "flight.mcap").exists():
+        raise ValueError(f"folder {folder} holds an earlier flight; accepted: another one")
     folder.mkdir(parents=True, exist_ok=True)
     drawn = draw(plan, seed, folder / "track.toml")
     heard = Heard()
@@ -138,8 +140,8 @@ def rehearse(plan: Plan, seed: int, folder: Path, kill: Victim | None = None) ->
 def unlike(lap: Lap) -> list[str]:
     """What a flight's records have that is not as it is documented."""
     found = []
-    if lap.touch_speed > TOUCH:
-        found.append(f"touched the ground at {lap.touch_speed:.1f} m/s")
+    if lap.touch_sink > TOUCH:
+        found.append(f"touched the ground sinking at {lap.touch_sink:.1f} m/s")
     if lap.kill is None or lap.kill not in DOCUMENTED:
         return found
     wanted, reason = DOCUMENTED[lap.kill]
@@ -225,13 +227,13 @@ class _Flight:
 
     def _strike(self, kill: Victim, watchdog: int | None) -> None:
         room, flies, heard = self.room, self.flies, self.heard
+        heard.struck = heard.ended = time.monotonic()
         if kill == "watchdog":
             if watchdog is None:
                 raise RuntimeError("the bridge has no watchdog process")
             os.kill(watchdog, signal.SIGKILL)
         else:
             {"mocap": self.mocap, "hil": self.node, "bridge": flies}[kill].process.kill()
-        heard.struck = heard.ended = time.monotonic()
         if kill == "bridge":
             if not room.down(FLIGHT_S):
                 heard.problems.append("it did not land, or the throttle was not closed")
@@ -256,12 +258,11 @@ class _Flight:
 
     def _end(self, kill: Victim | None, watchdog: int | None) -> None:
         room, heard = self.room, self.heard
-        state = room.set(armed=False)
-        time.sleep(0.5)
-        if not state["standing"]:
+        if not room.until(3.0, lambda state: state["standing"]):  # it may bounce
             heard.problems.append("it is not on the ground")
-        heard.touches = state["touches"]
-        if kill != "bridge" and (status := self.flies.end(15.0)) != 0 and kill != "watchdog":
+        heard.touches = room.set(armed=False)["touches"]
+        time.sleep(0.5)
+        if kill != "bridge" and (status := self.flies.end(5.0)) != 0 and kill != "watchdog":
             heard.problems.append(f"the bridge ended with status {status}{self.flies.end_told()}")
         if kill != "hil" and (status := self.node.end(15.0)) != 0:
             heard.problems.append(f"the HIL node ended with status {status}{self.node.end_told()}")

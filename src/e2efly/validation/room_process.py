@@ -60,8 +60,8 @@ class State:
     """On the ground."""
     largest_tilt: float
     """rad."""
-    touches: tuple[tuple[float, float], ...]
-    """Speed, m/s, and tilt, rad, just before each touch of the ground."""
+    touches: tuple[tuple[float, float, float], ...]
+    """Speed, m/s, tilt, rad, and the part of the speed that points down, m/s, just before each touch of the ground."""
 
 
 class _Watch:
@@ -77,7 +77,8 @@ class _Watch:
         rig, state, before = self.rig, self.rig.state, self._before
         self.largest_tilt = max(self.largest_tilt, tilt_of(state.quaternion))
         if state.position[2] <= self._feet < before.position[2]:
-            self.touches.append((float(np.linalg.norm(before.velocity)), tilt_of(before.quaternion)))
+            speed, sink = float(np.linalg.norm(before.velocity)), -float(before.velocity[2])
+            self.touches.append((speed, tilt_of(before.quaternion), sink))
         self._before = state
         if record:
             at, motor = rig.machine_time(rig.now()), float(rig.sitl.motors().max())
