@@ -5,6 +5,7 @@ import json
 import math
 import os
 import queue
+import re
 import signal
 import socket
 import subprocess
@@ -20,8 +21,9 @@ START_S = 60.0
 """How long a process may take to be ready on a busy machine, s."""
 FLIGHT_S = 40.0
 """How long each part of a flight may take on a busy machine, s."""
-LAST_LINES = 8
-"""So many are told of a program that fails."""
+LAST_LINES = 6
+"""So many different ones are told of a program that fails."""
+_TIME = re.compile(r"^ *[0-9.]+ +")
 SINK = 0.5
 """Speed at which a pilot without a bridge comes down, m/s."""
 _LIFT, _CLIMB_GAIN, _BRAKE = 0.1, 0.25, 0.12
@@ -130,7 +132,8 @@ class Program:
         """How it has ended, if it has, and its last words."""
         status = self.process.poll()
         ended = "" if status is None else f" and ended with status {status}"
-        return f"{ended}; it said: {[line for _, line in self.told[-LAST_LINES:]]}"
+        lines = dict.fromkeys(_TIME.sub("", line) for _, line in self.told)
+        return f"{ended}; it said: {list(lines)[-LAST_LINES:]}"
 
     def end(self, seconds: float, by: int = signal.SIGINT) -> int | None:
         """Ask it to end, as Ctrl-C does; its exit status, or None where it had to be killed."""
