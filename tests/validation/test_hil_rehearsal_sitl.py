@@ -23,9 +23,9 @@ def built() -> None:
     firmware.build()
 
 
-def left_behind(folder: Path) -> list[str]:
-    """Processes whose command names a folder, or a rehearsal's images."""
-    found = [str(file) for file in place("x").parent.glob("e2efly_rehearsal_*")]
+def left_behind(folder: Path, rehearses: int) -> list[str]:
+    """Processes whose command names a folder, and the images of the process that rehearses."""
+    found = [str(file) for file in place("x").parent.glob(f"e2efly_rehearsal_{rehearses}_*")]
     for process in Path("/proc").glob("[0-9]*/cmdline"):
         try:
             command = process.read_bytes().replace(b"\0", b" ").decode(errors="replace")
@@ -48,16 +48,16 @@ def test_a_whole_flight_by_sight(tmp_path: Path) -> None:
     assert 0 < lap.pose_to_image.median < 0.2  # how long, a busy machine decides
     assert 0 <= lap.image_age.median < 0.15
     assert lap.touch_sink < 2.0
-    assert left_behind(tmp_path) == []
+    assert left_behind(tmp_path, os.getpid()) == []
 
 
 def test_an_interrupted_rehearsal_leaves_nothing_behind(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "e2efly", "hil", "land_visual", "--rehearse", "--out", str(tmp_path / "out")]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as running:
         end = time.monotonic() + 100
-        while time.monotonic() < end and not any("room_process" in line for line in left_behind(tmp_path)):
+        while time.monotonic() < end and not any("room_process" in line for line in left_behind(tmp_path, running.pid)):
             time.sleep(0.2)
         running.send_signal(signal.SIGTERM)
         assert running.wait(30.0) != 0
     time.sleep(1.0)
-    assert left_behind(tmp_path) == []
+    assert left_behind(tmp_path, running.pid) == []
