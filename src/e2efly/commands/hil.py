@@ -1,5 +1,6 @@
 """`e2efly hil`: hardware in the loop."""
 
+import dataclasses
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -9,9 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import tyro
 
+from e2efly.commands.hil_rehearsal import check_rehearsal, rehearse
 from e2efly.courses.origin import Origin
-from e2efly.process import raise_at_interrupt
+from e2efly.process import be_punctual, raise_at_interrupt
+from e2efly.storage import write_json
+from e2efly.tasks.route import route_of
 from e2efly.terminal import Terminal
+from e2efly.validation.room import Victim, flags
 from e2efly.vehicles import load_vehicle
 
 if TYPE_CHECKING:
@@ -19,6 +24,8 @@ if TYPE_CHECKING:
     from e2efly.validation.hil import Node
 
 _ROW = "six numbers, room_x,room_y,room_z,x,y,z"
+PRIORITY = 4
+"""Real-time priority of the rendering: below the bridge's."""
 FASTEST = 240.0
 """Largest rate of images, Hz."""
 
@@ -50,6 +57,19 @@ class Hil:
     """Images per second; the contract's when left out."""
     seconds: float | None = None
     """End after so long; left out: at Ctrl-C."""
+    track: Path = Path("flights") / "hil-track.toml"
+    """Where to write the gates of a drawn race, for --goal.track of `e2efly fly`; other tasks write nothing."""
+    json: Path | None = None
+    """Write at the end what was measured to this file."""
+    rehearse: bool = False
+    """Fly it first without hardware: a simulated motion capture system, this command, `e2efly fly` and the real
+    firmware as processes, in real time. The options below are its own."""
+    laps: int = 1
+    """Flights of the rehearsal, each in another world, from --seed on."""
+    kill: Victim | None = None
+    """Kill one of the processes in each flight while the policy flies, to see what happens then."""
+    out: Path | None = None
+    """Folder of the rehearsal's report; left out: a new one in the folder `rehearsals`."""
 
 
 def run(options: Hil) -> int:
@@ -60,11 +80,14 @@ def run(options: Hil) -> int:
         OSError: when the shared memory cannot be written.
     """
     o, console = options, Terminal()
+    check_rehearsal(o)
     if o.rate is not None and not 1 <= o.rate <= FASTEST:
         raise ValueError(f"--rate is {o.rate}; accepted: 1 to {FASTEST:g} Hz")
     if o.seconds is not None and not o.seconds > 0:
         raise ValueError(f"--seconds is {o.seconds}; accepted: more than 0")
     origin = Origin(o.origin, o.origin_yaw) if o.points is None else _measured(o.points)
+    if o.rehearse:
+        return rehearse(o, origin)
     from e2efly.deploy.pose.sources import open_source
     from e2efly.deploy.sight.shared import SharedImages
     from e2efly.device import compute_at_once, prepare
@@ -79,29 +102,35 @@ def run(options: Hil) -> int:
     images = found.policy.contract.images
     if not images:
         raise ValueError(f"policy {o.policy} sees nothing; accepted: a policy with images")
-    names = _names(o.image, found.policy.contract)
+    names, body = _names(o.image, found.policy.contract), load_vehicle(found.vehicle)
     suite = next(iter(found.task.criteria().values()))
     with console.status("drawing the world"):
         scenery = Scenery.draw(found.environment(suite), o.seed)
     assert scenery is not None
+    goal = flags("goal", dataclasses.replace(
+        route_of(found.policy.contract).drawn(scenery.course, o.track), origin=origin.position, origin_yaw=origin.yaw,
+    ))  # fmt: skip
     with ExitStack() as stack:
         source = open_source(o.pose)
         stack.callback(source.close)
         outputs = [SharedImages(name, image.shape) for name, image in zip(names, images, strict=True)]
         for output in outputs:
             stack.callback(output.close)
-        rate, body = o.rate or images[0].rate_hz, load_vehicle(found.vehicle)
+        rate = o.rate or images[0].rate_hz
         node = Node(scenery, source, outputs, origin, rate, float(body.radius))
         node.warm()
-        (x, y, z), yaw = origin.position, origin.yaw
-        given = " ".join(f"--image {image.name}=shm:{name}" for image, name in zip(images, names, strict=True))
+        be_punctual(PRIORITY)
+        given = [f"--image {image.name}=shm:{name}" for image, name in zip(images, names, strict=True)]
         console.print(f"{rate:g} Hz, poses from {source.describe()}. Fly it with:")
-        console.print(f"  --goal.origin {x:g} {y:g} {z:g} --goal.origin-yaw {yaw:g} {given}")
+        console.print(f"  {' '.join([*goal, *given])}")
         try:
             _loop(node, o.seconds, console)
         except KeyboardInterrupt:
             console.print("Ended.")
         _tell(node, console)
+        if o.json:
+            measured = {"began": node.began, "pose_to_image_s": node.latencies, "collisions": node.collisions}
+            write_json(o.json, measured)
     return 0
 
 
