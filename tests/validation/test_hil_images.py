@@ -63,9 +63,14 @@ def test_an_image_is_that_of_the_environment_at_the_pose_bit_for_bit(sees: str) 
             position=jnp.asarray(pose.position[None], jnp.float32),
             quaternion=jnp.asarray(pose.quaternion[None], jnp.float32),
         )
-        past = jax.tree.map(lambda old, x: jnp.broadcast_to(x[:, None], old.shape), start.past, vehicle)  # noqa: B023
+        past = jax.tree.map(lambda old, x: jnp.broadcast_to(x[:, None], old.shape), start.past, vehicle)
         state = dataclasses.replace(
-            start, vehicle=vehicle, past=past, memory=episode.memory, eyes=young, time=jnp.full(1, 0.01 * k, jnp.float32)
+            start,
+            vehicle=vehicle,
+            past=past,
+            memory=episode.memory,
+            eyes=young,
+            time=jnp.full(1, 0.01 * k, jnp.float32),
         )
         wanted = np.asarray(look(env, state, jnp.ones(1, bool)).images[0])[0]
         time, image = kept.images[k]

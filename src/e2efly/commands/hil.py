@@ -1,6 +1,8 @@
 """`e2efly hil`: hardware in the loop."""
 
 import dataclasses
+import os
+import socket
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -20,7 +22,8 @@ from e2efly.validation.room import Victim, flags
 from e2efly.vehicles import load_vehicle
 
 if TYPE_CHECKING:
-    from e2efly.deploy.policy.contract import Contract
+    from e2efly.deploy.child import Child
+    from e2efly.deploy.sight.give import Output
     from e2efly.validation.hil import Node
 
 _ROW = "six numbers, room_x,room_y,room_z,x,y,z"
@@ -42,7 +45,10 @@ class Hil:
     pose: str = "udp:9870"
     """Pose source, as of `e2efly fly`."""
     image: tuple[str, ...] = ()
-    """Where each image goes, image_0=shm:NAME."""
+    """Where each image goes, as often as wanted: image_0=shm:NAME, tcp:PORT (tcp:PORT:exact: not rounded to mm),
+    ros1:/topic, ros2:/topic."""
+    host: str = "127.0.0.1"
+    """Address on which tcp is served; 0.0.0.0: to every computer of the network."""
     vehicle: str | None = None
     """A shipped vehicle or a .toml file; left out: the policy's."""
     seed: int = 0
@@ -89,6 +95,7 @@ def run(options: Hil) -> int:
     if o.rehearse:
         return rehearse(o, origin)
     from e2efly.deploy.pose.sources import open_source
+    from e2efly.deploy.sight.give import give, outputs
     from e2efly.deploy.sight.shared import SharedImages
     from e2efly.device import compute_at_once, prepare
     from e2efly.evaluation import candidate
@@ -102,7 +109,8 @@ def run(options: Hil) -> int:
     images = found.policy.contract.images
     if not images:
         raise ValueError(f"policy {o.policy} sees nothing; accepted: a policy with images")
-    names, body = _names(o.image, found.policy.contract), load_vehicle(found.vehicle)
+    chosen, body = outputs(o.image, found.policy.contract), load_vehicle(found.vehicle)
+    names = [_memory(image.name, chosen[image.name]) for image in images]
     suite = next(iter(found.task.criteria().values()))
     with console.status("drawing the world"):
         scenery = Scenery.draw(found.environment(suite), o.seed)
@@ -113,18 +121,29 @@ def run(options: Hil) -> int:
     with ExitStack() as stack:
         source = open_source(o.pose)
         stack.callback(source.close)
-        outputs = [SharedImages(name, image.shape) for name, image in zip(names, images, strict=True)]
-        for output in outputs:
-            stack.callback(output.close)
+        published, givers, given = list[SharedImages](), dict[str, Child](), list[str]()
+        for image, name in zip(images, names, strict=True):
+            published.append(SharedImages(name, image.shape))
+            stack.callback(published[-1].close)
+            for output in chosen[image.name]:
+                where = f"{output.kind}:{output.where}"
+                if output.kind == "shm":
+                    given.append(f"--image {image.name}={where}")
+                    continue
+                givers[f"{image.name}={where}"] = child = give(image, name, output, o.host)
+                stack.callback(child.close)
+                seen = f"hil:{_reached(o.host)}:{output.where}" if output.kind == "tcp" else where
+                given.append(f"--image {image.name}={seen}")
+            if all(output.kind != "shm" for output in chosen[image.name]):
+                stack.callback(published[-1].path.unlink, missing_ok=True)  # nobody else knows the name
         rate = o.rate or images[0].rate_hz
-        node = Node(scenery, source, outputs, origin, rate, float(body.radius))
+        node = Node(scenery, source, published, origin, rate, float(body.radius))
         node.warm()
         be_punctual(PRIORITY)
-        given = [f"--image {image.name}=shm:{name}" for image, name in zip(images, names, strict=True)]
         console.print(f"{rate:g} Hz, poses from {source.describe()}. Fly it with:")
         console.print(f"  {' '.join([*goal, *given])}")
         try:
-            _loop(node, o.seconds, console)
+            _loop(node, o.seconds, console, givers)
         except KeyboardInterrupt:
             console.print("Ended.")
         _tell(node, console)
@@ -134,13 +153,15 @@ def run(options: Hil) -> int:
     return 0
 
 
-def _loop(node: "Node", seconds: float | None, console: Terminal) -> None:
+def _loop(node: "Node", seconds: float | None, console: Terminal, givers: dict[str, "Child"]) -> None:
     end, told = time.monotonic() + (seconds or float("inf")), None
     while (now := time.monotonic()) < end:
         said = node.step(now, time.monotonic)
         if said is not None and said != told:
             console.print(said)
             told = said
+        for name in [name for name, giver in givers.items() if giver.lines() is not None and giver.ended]:
+            console.print(f"{name}: {givers.pop(name).ended}; the others go on")
         time.sleep(0.001)
 
 
@@ -156,20 +177,14 @@ def _tell(node: "Node", console: Terminal) -> None:
     )
 
 
-def _names(texts: tuple[str, ...], contract: "Contract") -> list[str]:
-    """The shared memory of each image."""
-    from e2efly.deploy.sight.sources import by_image
+def _memory(image: str, outputs: "list[Output]") -> str:
+    """Name of the shared memory of an image: the one that was given, or one of this process."""
+    return next((output.where for output in outputs if output.kind == "shm"), f"hil-{os.getpid()}-{image}")
 
-    chosen, names = by_image(texts, contract), list[str]()
-    for image in contract.images:
-        if image.name not in chosen:
-            raise ValueError(f"--image lacks {image.name}; accepted: --image {image.name}=shm:NAME")
-        kind, _, name = chosen[image.name].partition(":")
-        if kind != "shm" or not name or name in names:
-            said = f"--image is {image.name}={chosen[image.name]}"
-            raise ValueError(f"{said}; accepted: {image.name}=shm:NAME, another name for each image")
-        names.append(name)
-    return names
+
+def _reached(host: str) -> str:
+    """The address by which others reach this computer, as far as it is known."""
+    return socket.gethostname() if host in ("0.0.0.0", "::") else host
 
 
 def _measured(path: Path) -> Origin:

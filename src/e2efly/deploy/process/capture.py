@@ -104,6 +104,7 @@ def run(module: str, function: str) -> Any:
 
 
 KINDS = {
+    "hil": run("capture_hil", "capture"),
     "ros1": run("capture_ros", "capture_ros1"),
     "ros2": run("capture_ros", "capture_ros2"),
     "v4l2": run("capture_video", "capture"),
