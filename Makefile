@@ -22,11 +22,11 @@ demo: $(READY)
 # The tests that fly it build it, too, but one after another; here it is built beside the linting.
 FIRMWARE := case ",$$E2EFLY_WITHOUT," in *,sitl,*) ;; *) $(BIN)/e2efly firmware >/dev/null 2>&1;; esac
 # What runs in real time, in several processes, has both cores to itself.
-REAL_TIME := tests/validation/test_process_faults_sitl.py
+REAL_TIME := tests/validation/test_process_faults_sitl.py tests/validation/test_hil_rehearsal_sitl.py
 
 test: $(TEST_READY)
 	@$(FIRMWARE) & $(MAKE) --no-print-directory lint && wait
-	$(BIN)/python -m pytest -n 2 --max-worker-restart 0 --durations 25 --dist loadfile --no-loadscope-reorder --ignore=$(REAL_TIME)
+	$(BIN)/python -m pytest -n 2 --max-worker-restart 0 --durations 25 --dist loadfile --no-loadscope-reorder $(REAL_TIME:%=--ignore=%)
 	$(BIN)/python -m pytest $(REAL_TIME)
 
 lint: $(TEST_READY)

@@ -16,11 +16,12 @@ from pathlib import Path
 import numpy as np
 from common import arguments, table, write
 from fault_table import hover_policy
-from tests.faults.process_faults import BridgeProcess, RigClient, take_off
+from tests.faults.process_faults import bridge_of
 
 from e2efly.deploy.flight_loop import LOOP_PRIORITY
 from e2efly.deploy.log.flight_log import read_log
 from e2efly.deploy.settings import FlightSettings
+from e2efly.validation.room import Program, Room, take_off
 
 TARGET = (0.0, 0.0, 2.0)
 BARE_S = 30.0
@@ -37,19 +38,19 @@ def main() -> None:
         log, began = folder / "flight.mcap", time.monotonic()
         alone = bare_loop(cores[0], BARE_S)
         os.sched_setaffinity(0, cores[1:] or cores)
-        with RigClient() as rig:
+        with Room() as room:
             os.sched_setaffinity(0, cores[:1])
             options = ("--flight.takeoff-height", "1.5", "--goal.target", *map(str, TARGET))
             usual = FlightSettings()  # what a busy machine is let off in the tests counts here
             options += ("--flight.odometry-timeout", str(usual.odometry_timeout))
             options += ("--flight.link-timeout", str(usual.link_timeout))
-            bridge = BridgeProcess(policy, rig, log, options=options)
+            flies = bridge_of(policy, room, log, options=options)
             os.sched_setaffinity(0, cores)
             stolen = stolen_s()
             try:
-                errors = fly(rig, bridge, args.seconds)
+                errors = fly(room, flies, args.seconds)
             finally:
-                bridge.close()
+                flies.close()
             stolen = stolen_s() - stolen
         print(f"flown for {time.monotonic() - began:.0f} s")
         content = read_log(log)
@@ -100,21 +101,21 @@ def stolen_s() -> float:
     return int(Path("/proc/stat").read_text().split()[8]) / os.sysconf("SC_CLK_TCK")
 
 
-def fly(rig: RigClient, bridge: BridgeProcess, seconds: float) -> list[float]:
+def fly(room: Room, flies: Program, seconds: float) -> list[float]:
     """Take off, let the policy fly for `seconds`, land; the distances to the target, m."""
-    take_off(rig, bridge)
+    take_off(room, flies)
     time.sleep(2.0)
-    rig.set(mission="policy")
-    bridge.wait_for("POLICY", 5.0)
+    room.set(mission="policy")
+    flies.wait_for("POLICY", 5.0)
     time.sleep(3.0)
     errors, end = [], time.monotonic() + seconds
     while time.monotonic() < end:
         time.sleep(0.1)
-        errors.append(float(np.linalg.norm(np.subtract(rig.set()["position"], TARGET))))
-    rig.set(mission="land")
-    bridge.wait_for("DONE", 20.0)
-    rig.set(armed=False)
-    bridge.end(10.0)
+        errors.append(float(np.linalg.norm(np.subtract(room.set()["position"], TARGET))))
+    room.set(mission="land")
+    flies.wait_for("DONE", 20.0)
+    room.set(armed=False)
+    flies.end(10.0)
     return errors
 
 

@@ -135,16 +135,16 @@ def test_what_cannot_be_rendered_is_named(tmp_path: Path, capsys: pytest.Capture
     points.write_text("1,2,3\n")
     for given, said in (
         (["hover"], "policy hover sees nothing; accepted: a policy with images"),
-        (["avoid"], "--image lacks image_0; accepted: --image image_0=shm:NAME"),
+        (["avoid"], "--image lacks image_0; accepted: --image image_0=URI, with URI shm:NAME, tcp:PORT"),
         (
             ["avoid", "--image", "front=shm:x"],
             "--image is 'front=shm:x'; accepted: NAME=URI, NAME one of image_0",
         ),
         (
             ["avoid", "--image", "image_0=shm:x", "image_0=shm:y"],
-            "image_0 is 'shm:x' and 'shm:y'; accepted: one URI for each",
+            "--image is image_0=shm:y; accepted: one shm:NAME for each image",
         ),
-        (["avoid", "--image", "image_0=udp:x"], "--image is image_0=udp:x; accepted: image_0=shm:NAME"),
+        (["avoid", "--image", "image_0=udp:x"], "--image is image_0=udp:x; accepted: shm:NAME, tcp:PORT"),
         (["avoid", "--rate", "0"], "--rate is 0.0; accepted: 1 to 240 Hz"),
         (["avoid", "--seconds", "0"], "--seconds is 0.0; accepted: more than 0"),
         (

@@ -1,5 +1,8 @@
 """`e2efly hil`: hardware in the loop."""
 
+import dataclasses
+import os
+import socket
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -9,16 +12,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 import tyro
 
+from e2efly.commands.hil_rehearsal import check_rehearsal, rehearse
 from e2efly.courses.origin import Origin
-from e2efly.process import raise_at_interrupt
+from e2efly.process import be_punctual, raise_at_interrupt
+from e2efly.storage import write_json
+from e2efly.tasks.route import route_of
 from e2efly.terminal import Terminal
+from e2efly.validation.room import Victim, flags
 from e2efly.vehicles import load_vehicle
 
 if TYPE_CHECKING:
-    from e2efly.deploy.policy.contract import Contract
+    from e2efly.deploy.child import Child
+    from e2efly.deploy.sight.give import Output
     from e2efly.validation.hil import Node
 
 _ROW = "six numbers, room_x,room_y,room_z,x,y,z"
+PRIORITY = 4
+"""Real-time priority of the rendering: below the bridge's."""
 FASTEST = 240.0
 """Largest rate of images, Hz."""
 
@@ -35,7 +45,10 @@ class Hil:
     pose: str = "udp:9870"
     """Pose source, as of `e2efly fly`."""
     image: tuple[str, ...] = ()
-    """Where each image goes, image_0=shm:NAME."""
+    """Where each image goes, as often as wanted: image_0=shm:NAME, tcp:PORT (tcp:PORT:exact: not rounded to mm),
+    ros1:/topic, ros2:/topic."""
+    host: str = "127.0.0.1"
+    """Address on which tcp is served; 0.0.0.0: to every computer of the network."""
     vehicle: str | None = None
     """A shipped vehicle or a .toml file; left out: the policy's."""
     seed: int = 0
@@ -50,6 +63,19 @@ class Hil:
     """Images per second; the contract's when left out."""
     seconds: float | None = None
     """End after so long; left out: at Ctrl-C."""
+    track: Path = Path("flights") / "hil-track.toml"
+    """Where to write the gates of a drawn race, for --goal.track of `e2efly fly`; other tasks write nothing."""
+    json: Path | None = None
+    """Write at the end what was measured to this file."""
+    rehearse: bool = False
+    """Fly it first without hardware: a simulated motion capture system, this command, `e2efly fly` and the real
+    firmware as processes, in real time. The options below are its own."""
+    laps: int = 1
+    """Flights of the rehearsal, each in another world, from --seed on."""
+    kill: Victim | None = None
+    """Kill one of the processes in each flight while the policy flies, to see what happens then."""
+    out: Path | None = None
+    """Folder of the rehearsal's report; left out: a new one in the folder `rehearsals`."""
 
 
 def run(options: Hil) -> int:
@@ -60,12 +86,16 @@ def run(options: Hil) -> int:
         OSError: when the shared memory cannot be written.
     """
     o, console = options, Terminal()
+    check_rehearsal(o)
     if o.rate is not None and not 1 <= o.rate <= FASTEST:
         raise ValueError(f"--rate is {o.rate}; accepted: 1 to {FASTEST:g} Hz")
     if o.seconds is not None and not o.seconds > 0:
         raise ValueError(f"--seconds is {o.seconds}; accepted: more than 0")
     origin = Origin(o.origin, o.origin_yaw) if o.points is None else _measured(o.points)
+    if o.rehearse:
+        return rehearse(o, origin)
     from e2efly.deploy.pose.sources import open_source
+    from e2efly.deploy.sight.give import give, outputs
     from e2efly.deploy.sight.shared import SharedImages
     from e2efly.device import compute_at_once, prepare
     from e2efly.evaluation import candidate
@@ -79,39 +109,59 @@ def run(options: Hil) -> int:
     images = found.policy.contract.images
     if not images:
         raise ValueError(f"policy {o.policy} sees nothing; accepted: a policy with images")
-    names = _names(o.image, found.policy.contract)
+    chosen, body = outputs(o.image, found.policy.contract), load_vehicle(found.vehicle)
+    names = [_memory(image.name, chosen[image.name]) for image in images]
     suite = next(iter(found.task.criteria().values()))
     with console.status("drawing the world"):
         scenery = Scenery.draw(found.environment(suite), o.seed)
     assert scenery is not None
+    goal = flags("goal", dataclasses.replace(
+        route_of(found.policy.contract).drawn(scenery.course, o.track), origin=origin.position, origin_yaw=origin.yaw,
+    ))  # fmt: skip
     with ExitStack() as stack:
         source = open_source(o.pose)
         stack.callback(source.close)
-        outputs = [SharedImages(name, image.shape) for name, image in zip(names, images, strict=True)]
-        for output in outputs:
-            stack.callback(output.close)
-        rate, body = o.rate or images[0].rate_hz, load_vehicle(found.vehicle)
-        node = Node(scenery, source, outputs, origin, rate, float(body.radius))
+        published, givers, given = list[SharedImages](), dict[str, Child](), list[str]()
+        for image, name in zip(images, names, strict=True):
+            published.append(SharedImages(name, image.shape))
+            stack.callback(published[-1].close)
+            for output in chosen[image.name]:
+                where = f"{output.kind}:{output.where}"
+                if output.kind == "shm":
+                    given.append(f"--image {image.name}={where}")
+                    continue
+                givers[f"{image.name}={where}"] = child = give(image, name, output, o.host)
+                stack.callback(child.close)
+                seen = f"hil:{_reached(o.host)}:{output.where}" if output.kind == "tcp" else where
+                given.append(f"--image {image.name}={seen}")
+            if all(output.kind != "shm" for output in chosen[image.name]):
+                stack.callback(published[-1].path.unlink, missing_ok=True)  # nobody else knows the name
+        rate = o.rate or images[0].rate_hz
+        node = Node(scenery, source, published, origin, rate, float(body.radius))
         node.warm()
-        (x, y, z), yaw = origin.position, origin.yaw
-        given = " ".join(f"--image {image.name}=shm:{name}" for image, name in zip(images, names, strict=True))
+        be_punctual(PRIORITY)
         console.print(f"{rate:g} Hz, poses from {source.describe()}. Fly it with:")
-        console.print(f"  --goal.origin {x:g} {y:g} {z:g} --goal.origin-yaw {yaw:g} {given}")
+        console.print(f"  {' '.join([*goal, *given])}")
         try:
-            _loop(node, o.seconds, console)
+            _loop(node, o.seconds, console, givers)
         except KeyboardInterrupt:
             console.print("Ended.")
         _tell(node, console)
+        if o.json:
+            measured = {"began": node.began, "pose_to_image_s": node.latencies, "collisions": node.collisions}
+            write_json(o.json, measured)
     return 0
 
 
-def _loop(node: "Node", seconds: float | None, console: Terminal) -> None:
+def _loop(node: "Node", seconds: float | None, console: Terminal, givers: dict[str, "Child"]) -> None:
     end, told = time.monotonic() + (seconds or float("inf")), None
     while (now := time.monotonic()) < end:
         said = node.step(now, time.monotonic)
         if said is not None and said != told:
             console.print(said)
             told = said
+        for name in [name for name, giver in givers.items() if giver.lines() is not None and giver.ended]:
+            console.print(f"{name}: {givers.pop(name).ended}; the others go on")
         time.sleep(0.001)
 
 
@@ -127,20 +177,14 @@ def _tell(node: "Node", console: Terminal) -> None:
     )
 
 
-def _names(texts: tuple[str, ...], contract: "Contract") -> list[str]:
-    """The shared memory of each image."""
-    from e2efly.deploy.sight.sources import by_image
+def _memory(image: str, outputs: "list[Output]") -> str:
+    """Name of the shared memory of an image: the one that was given, or one of this process."""
+    return next((output.where for output in outputs if output.kind == "shm"), f"hil-{os.getpid()}-{image}")
 
-    chosen, names = by_image(texts, contract), list[str]()
-    for image in contract.images:
-        if image.name not in chosen:
-            raise ValueError(f"--image lacks {image.name}; accepted: --image {image.name}=shm:NAME")
-        kind, _, name = chosen[image.name].partition(":")
-        if kind != "shm" or not name or name in names:
-            said = f"--image is {image.name}={chosen[image.name]}"
-            raise ValueError(f"{said}; accepted: {image.name}=shm:NAME, another name for each image")
-        names.append(name)
-    return names
+
+def _reached(host: str) -> str:
+    """The address by which others reach this computer, as far as it is known."""
+    return socket.gethostname() if host in ("0.0.0.0", "::") else host
 
 
 def _measured(path: Path) -> Origin:

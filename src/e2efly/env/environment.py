@@ -214,7 +214,7 @@ class Env:
             The state and the first observation.
         """
         state = self._start(key, n, jnp.zeros((), jnp.int32))
-        return self._look(state, jnp.ones(n, bool)), self._observe(state)
+        return self.look(state, jnp.ones(n, bool)), self._observe(state)
 
     def step(
         self, state: EnvState, action: Float[Array, "n 4"], *, restart: bool = True, privileged: bool = False
@@ -234,14 +234,18 @@ class Env:
         if privileged:
             out = dataclasses.replace(out, final_privileged=self.privileged(reached))
         if not restart:
-            return self._look(reached, jnp.zeros_like(out.terminated)), out
+            return self.look(reached, jnp.zeros_like(out.terminated)), out
         reached, out = self._restart(reached, out)
-        return self._look(reached, out.done), out
+        return self.look(reached, out.done), out
 
-    def _look(self, state: EnvState, renewed: Bool[Array, " n"]) -> EnvState:
+    def look(self, state: EnvState, renewed: Bool[Array, " n"]) -> EnvState:
         """The state with the images that are there to act on.
 
         New are those of cameras whose turn it is, and those of vehicles whose episode is new.
+
+        Args:
+            state: of the vehicles, with the images so far.
+            renewed: whose episode is new.
         """
         if not self.cameras:
             return state

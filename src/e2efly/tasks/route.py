@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -53,6 +54,20 @@ class Route:
     def course_of(self, contract: Contract, shape: Shape) -> Course:
         """The course for a policy; for a task that shows its policies different things, what this one is shown."""
         return self.course(shape, 1 / contract.control_rate_hz)
+
+    @classmethod
+    def drawn(cls, course: Course, file: Path) -> "Route":
+        """The options that ask for a course which an environment of the training has drawn.
+
+        Args:
+            course: as drawn.
+            file: a .toml that is written where the options need one: a track.
+
+        Raises:
+            OSError: when the file cannot be written.
+        """
+        del course, file
+        return cls()
 
     def unused(self) -> tuple[str, ...]:
         """Names of the options that have no effect, as another option is set."""

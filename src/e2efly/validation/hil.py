@@ -46,10 +46,11 @@ class Node:
     """Virtual ones so far."""
     refused: str | None = field(default=None, init=False)
     """Why the newest pose was refused; None: it was not."""
+    began: float | None = field(default=None, init=False)
+    """When the world's time was 0, on the monotonic clock, s; None: it has not begun."""
     _track: Track = field(default=Track(), init=False)
     _odometry: Odometry | None = field(default=None, init=False)
     _received: float = field(default=-math.inf, init=False)
-    _began: float | None = field(default=None, init=False)
     _due: float = field(default=-math.inf, init=False)
     _blind_until: float = field(default=-math.inf, init=False)
     _count: int = field(default=0, init=False)
@@ -70,7 +71,7 @@ class Node:
         Returns:
             What happened, for people; None: nothing new.
         """
-        began = self._began = now if self._began is None else self._began
+        began = self.began = now if self.began is None else self.began
         if self._track.fault and now - self._received > RESTART_S:
             self._track = Track()  # it may have been carried elsewhere; the policy's flight has ended by now
         for sample in self.source.read(now):
@@ -95,7 +96,7 @@ class Node:
 
     def _images(self, state: RigidState, time: float) -> list[np.ndarray]:
         self._count += 1
-        return [self.scenery.image(i, state, time, self._count) for i in range(len(self.scenery.cameras))]
+        return self.scenery.images(state, time, self._count)
 
 
 def ahead(odometry: Odometry, now: float) -> Odometry:

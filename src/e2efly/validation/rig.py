@@ -107,7 +107,8 @@ class Rig:
     """One firmware in its world. Use it as a context manager: inside, the thread and the firmware share one core.
 
     Time is virtual; with `real_time` it keeps pace with the machine's clock, as for a bridge in another process. `step`
-    is how often sensors are told and motors heard, s, a whole number of ms; `settings` are added to `SETTINGS`.
+    is how often sensors are told and motors heard, s, a whole number of ms; `settings` are added to `SETTINGS`;
+    `pose_noise` is in place of `POSE_NOISE`.
     """
 
     def __init__(
@@ -122,6 +123,7 @@ class Rig:
         seed: int = 0,
         step: float = STEP_S,
         settings: tuple[str, ...] = (),
+        pose_noise: tuple[float, ...] = POSE_NOISE,
     ) -> None:
         compute_at_once()
         self._step, self._settings = step, (*SETTINGS, *settings)
@@ -142,7 +144,7 @@ class Rig:
         """What the firmware's sensors make of the truth; None: the truth."""
         self.heard = True
         """Whether the pilot's receiver hears the transmitter."""
-        self._pose_period = 1 / pose_rate
+        self._pose_period, self._pose_noise = 1 / pose_rate, pose_noise
         self._poses: deque[Sample] = deque()
         self._next_pose = self._next_rc = 0.0
         self._left = 0.0
@@ -274,9 +276,9 @@ class Rig:
         s, noise = self.state, self._noise
         position, velocity, rate = (
             np.asarray(x) + sigma * noise.normal(size=3)
-            for x, sigma in zip((s.position, s.velocity, s.body_rate), POSE_NOISE[:3], strict=True)
+            for x, sigma in zip((s.position, s.velocity, s.body_rate), self._pose_noise[:3], strict=True)
         )
-        quaternion = np.asarray(s.quaternion) + POSE_NOISE[3] / 2 * noise.normal(size=4)
+        quaternion = np.asarray(s.quaternion) + self._pose_noise[3] / 2 * noise.normal(size=4)
         return Sample(now, position, quaternion / np.linalg.norm(quaternion), now, velocity, rate)
 
 

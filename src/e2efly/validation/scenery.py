@@ -17,8 +17,8 @@ from e2efly.env import Env
 from e2efly.goal import Course
 from e2efly.scenes.scene import Scene, gaps
 from e2efly.sensors.eyes import Eye
+from e2efly.validation.outlook import Outlook
 from e2efly.validation.plant import RigidState
-from e2efly.validation.sight import rendered
 from e2efly.validation.starts import draw_starts
 
 LANDING = ("pad",)
@@ -37,13 +37,18 @@ class Scenery:
     """One world."""
     course: Course
     """What the task drew to be flown in it."""
+    outlook: Outlook
+    """The same world as the environment's own program shows it."""
 
     @staticmethod
     def draw(env: Env, seed: int) -> "Scenery | None":
         """A world of the training's environment; None where its policies see nothing."""
         starts = draw_starts(env, 1, seed)
         (sight,) = starts.sights(env, seed)
-        return None if sight is None else Scenery(sight.cameras, sight.eyes, sight.scene, starts.courses[0])
+        if sight is None:
+            return None
+        outlook = Outlook.of(env, starts.memory, starts.eyes, seed)
+        return Scenery(sight.cameras, sight.eyes, sight.scene, starts.courses[0], outlook)
 
     def on(self, course: Course) -> Course:
         """A course of the same task, as its policy is to fly it in this world."""
@@ -59,7 +64,7 @@ class Scenery:
         return [SceneCamera(self, i, state, origin) for i in range(len(self.cameras))]
 
     def image(self, which: int, state: RigidState, time: float, count: int) -> np.ndarray:
-        """What a camera shows at once, whatever the age of its images when they are delivered.
+        """What a camera shows at once, whatever the age of its images when they are delivered: `Env.look`'s bits.
 
         Args:
             which: of the cameras.
@@ -67,9 +72,11 @@ class Scenery:
             time: of the world, s.
             count: of the images so far: the noise of each is another.
         """
-        eye = dataclasses.replace(self.eyes[which], latency=0 * self.eyes[which].latency)
-        key = jax.random.fold_in(jax.random.key(which), count)
-        return rendered(self.cameras[which], eye, self.scene, [state], time, 1.0, key)
+        return self.outlook.images(state, time, count, (which,))[0]
+
+    def images(self, state: RigidState, time: float, count: int) -> list[np.ndarray]:
+        """The same of all cameras, at the price of one call."""
+        return self.outlook.images(state, time, count, tuple(range(len(self.cameras))))
 
     def nearest(self, position: Sequence[np.ndarray], time: Sequence[float], origin: Origin) -> float:
         """How near a path comes to what stands in this world and is not to be landed on, m; infinite: to nothing.

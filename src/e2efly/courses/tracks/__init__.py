@@ -85,6 +85,27 @@ def load_track(name_or_path: str) -> RaceTrack:
     )
 
 
+def track_text(track: RaceTrack) -> str:
+    """A track as the text of a .toml file for `load_track`; angles to a microradian, lengths to a micrometre."""
+
+    def row(values: np.ndarray) -> str:
+        return "[" + ", ".join(f"{float(x):.6f}" for x in values) + "]"
+
+    def degrees(yaw: float) -> str:
+        return f"{math.degrees(float(yaw)):.5f}"
+
+    gates = (
+        f"  {{ position = {row(p)}, yaw = {degrees(yaw)}, opening = {row(o)} }},"
+        for p, yaw, o in zip(track.position, track.yaw, track.opening, strict=True)
+    )
+    return "\n".join([
+        "# Angles in degrees, lengths in metres, world ENU.",
+        f"closed = {str(bool(track.closed)).lower()}",
+        f"start = {{ position = {row(track.start)}, yaw = {degrees(track.start_yaw)} }}",
+        "gates = [", *gates, "]", "",
+    ])  # fmt: skip
+
+
 def _keys(path: Path, where: str, table: Any, wanted: set[str]) -> None:
     if not isinstance(table, dict) or set(table) != wanted:
         found = sorted(table) if isinstance(table, dict) else shown(table)

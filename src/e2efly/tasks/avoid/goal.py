@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -102,6 +103,12 @@ class AvoidRoute(Route):
 
     speed: float = number(5.0, above=0)
     """Commanded speed, m/s."""
+
+    @classmethod
+    def drawn(cls, course: Course, file: Path) -> "AvoidRoute":
+        """As fast as was drawn."""
+        del file
+        return cls(speed=float(course.memory.speed[0]))
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The lane, in its direction."""

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,9 +11,10 @@ import numpy as np
 from e2efly.config import number
 from e2efly.control.vectors import Array, namespace
 from e2efly.courses.gates import Tracks
-from e2efly.courses.tracks import RaceTrack, load_track
+from e2efly.courses.tracks import RaceTrack, load_track, track_text
 from e2efly.goal import Course, Goal, Outcome, Shape
 from e2efly.observation import Field
+from e2efly.storage import write_atomically
 from e2efly.tasks.race import any_goal
 from e2efly.tasks.race.any_goal import Ahead
 from e2efly.tasks.race_clutter import RaceClutterConfig
@@ -115,16 +117,26 @@ class RaceClutterRoute(Route):
     longest_s: ClassVar = 40.0
 
     track: str = "s_shaped"
-    """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file; drawn twice as large on the ground."""
+    """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file."""
+    scale: float = number(2.0, above=0)
+    """The track's ground plan is this many times larger."""
     laps: int = number(1, high=LARGEST)
     """Laps to fly; 0: on and on."""
     speed: float = number(6.0, above=0)
     """Commanded speed, m/s."""
 
+    @classmethod
+    def drawn(cls, course: Course, file: Path) -> "RaceClutterRoute":
+        """The gates where they were drawn, in a file of their own, and as fast."""
+        memory: Memory = course.memory
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(file, track_text(memory.tracks.track(0)).encode())
+        return cls(track=str(file), scale=1.0, laps=int(course.goal.config.laps), speed=float(memory.speed[0]))
+
     def course(self, shape: Shape, control_period: float) -> Course:
         """The track, from its start in its heading."""
         config = dataclasses.replace(RaceClutterConfig(), laps=self.laps)
-        track = drawn_larger(load_track(self.track), config.scale)
+        track = drawn_larger(load_track(self.track), self.scale)
         memory = Memory(Tracks.of(track), np.zeros(1, int), np.array([self.speed]))
         lowest = float((track.position[:, 2] - track.opening[:, 1] / 2).min())
         return Course(

@@ -1,0 +1,156 @@
+"""`e2efly hil --rehearse`."""
+
+import math
+import signal
+import time
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.table import Table
+from rich.text import Text
+
+from e2efly.budget import check_time
+from e2efly.courses.origin import Origin
+from e2efly.process import raise_at_interrupt
+from e2efly.storage import held, write_json
+from e2efly.terminal import Terminal
+
+if TYPE_CHECKING:
+    from e2efly.commands.hil import Hil
+    from e2efly.validation.hil_lap import Lap, Spread
+
+LAP_S = 30.0
+"""What a flight takes with the start of its processes, at least, s."""
+WANTED_S = 0.015
+"""From a pose to its image in 99 of 100, s: more is told of."""
+LATE_S = 0.01
+"""Control steps and a room that are later than this in 99 of 100 say that the machine is too slow or busy, s."""
+STALL_S = 0.05
+"""... and so do single ones later than this, s."""
+REHEARSALS, OWN = ("laps", "kill", "out"), ("pose", "image", "seconds", "json", "track")
+"""Options that only a rehearsal has, and those that it sets itself."""
+
+
+def check_rehearsal(o: "Hil") -> None:
+    """Refuse options that have no effect, and numbers out of range.
+
+    Raises:
+        ValueError: naming the option, its value and what is accepted.
+    """
+    usual = {f.name: f.default for f in fields(o) if f.default is not MISSING}
+    for name in OWN if o.rehearse else REHEARSALS:
+        if (value := getattr(o, name)) != usual[name]:
+            said = "left out with" if o.rehearse else "only with"
+            raise ValueError(f"--{name} is {value}; accepted: {said} --rehearse")
+    if o.laps < 1:
+        raise ValueError(f"--laps is {o.laps}; accepted: 1 or more")
+    check_time({f"--laps is {o.laps}": o.laps * LAP_S}, f"at {LAP_S:g} s each")
+
+
+def rehearse(o: "Hil", origin: Origin) -> int:
+    """Fly, print a table, write report and pictures.
+
+    Returns:
+        0, or 1 when a flight was not as it is to be.
+
+    Raises:
+        ValueError: naming the option, its value and what is accepted.
+    """
+    from e2efly.device import prepare
+    from e2efly.evaluation import candidate
+    from e2efly.validation import firmware
+    from e2efly.validation.hil_rehearsal import Plan, draw
+    from e2efly.validation.hil_rehearsal import rehearse as fly
+    from e2efly.view.hil_rehearsal import plot_lap, plot_times
+
+    raise_at_interrupt()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # the flight's processes end with this one
+    prepare("cpu")
+    plan, console = Plan(candidate(o.policy, o.vehicle), origin, o.rate), Terminal()
+    if not plan.found.policy.contract.images:
+        raise ValueError(f"policy {o.policy} sees nothing; accepted: a policy with images")
+    folder = o.out or Path("rehearsals") / time.strftime("%Y-%m-%d_%H-%M-%S")
+    with held(folder):
+        if (report := folder / "report.json").exists():
+            raise ValueError(f"--out {folder} holds an earlier rehearsal; accepted: another folder")
+        firmware.chosen()  # built now rather than in a process that is waited for
+        laps = list["Lap"]()
+        with console.status("") as status:
+            for i in range(o.laps):
+                seed = o.seed + i
+                status.update(f"flight {i + 1} of {o.laps}, in real time")
+                lap = fly(plan, seed, folder / f"flight-{seed}", o.kill)
+                laps.append(lap)
+                drawn = draw(plan, seed, folder / f"flight-{seed}" / "track.toml")
+                plot_lap(lap, drawn.scenery.scene, drawn.course.origin, folder / f"flight-{seed}.png")
+                write_json(report, as_json(laps))
+        plot_times(laps, folder / "times.png")
+    console.print(laps_table(laps))
+    for line in told(laps):
+        console.print(line)
+    console.print(f"Report and pictures: {folder}")
+    return 0 if all(lap.good for lap in laps) else 1
+
+
+def as_json(laps: "list[Lap]") -> dict[str, Any]:
+    """The report."""
+    good = sum(lap.success for lap in laps)
+    return {"flights": len(laps), "success": good, "laps": [lap.as_json() for lap in laps]}
+
+
+def laps_table(laps: "list[Lap]") -> Table:
+    """A row for every flight."""
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    headings = "world", "", "policy", "top speed", "pose to image", "image age", "steps late", "room behind"
+    for heading in headings:
+        table.add_column(heading, overflow="fold")
+    for lap in laps:
+        mark = Text("ok", "green") if lap.good else Text("no", "bold red")
+        spreads = lap.pose_to_image, lap.image_age, lap.lateness, lap.behind
+        table.add_row(str(lap.seed), mark, Text(lap.told), f"{lap.top_speed:.1f} m/s", *map(_ms, spreads))
+    return table
+
+
+def told(laps: "list[Lap]") -> list[str]:
+    """What there is to say under the table."""
+    lines = ["Times: 99 % of them are shorter, ms. Medians and maxima are in the report."]
+    if any(lap.kill is None for lap in laps):
+        whole = [lap for lap in laps if lap.kill is None]
+        lines.append(f"{sum(lap.success for lap in whole)} of {len(whole)} flights with success.")
+    for lap in laps:
+        if lap.kill is not None:
+            lines.append(f"world {lap.seed}, {lap.kill} killed: {_ended(lap)}")
+        lines += [f"world {lap.seed}: {problem}" for problem in lap.problems]
+    slow = [lap for lap in laps if _busy(lap)]
+    late = [lap for lap in laps if lap.pose_to_image.p99 > WANTED_S]
+    if slow:
+        lines.append(
+            f"The machine was too slow or too busy in {len(slow)} of {len(laps)} flights: control steps or the room "
+            f"were late by more than {1e3 * LATE_S:g} ms (p99), or once by more than {1e3 * STALL_S:g} ms. What went "
+            "wrong there says little of the policy."
+        )
+    elif late:
+        share = f"{len(late)} of {len(laps)} flights"
+        lines.append(f"Images came later than {1e3 * WANTED_S:g} ms after their pose (p99) in {share}.")
+    return lines
+
+
+def _ended(lap: "Lap") -> str:
+    """What happened after a kill."""
+    after = [f"{c.mode.upper()} ({'; '.join(c.reasons)})" for c in lap.changes if c.time > lap.window[0]]
+    first = f"after {1e3 * lap.reaction:.0f} ms " if math.isfinite(lap.reaction) else ""
+    return (
+        f"{first}{', then '.join(after[:4]) or 'no word of the bridge'}; "
+        f"touched the ground at {lap.touch_speed:.1f} m/s, sinking at {lap.touch_sink:.1f} m/s"
+    )
+
+
+def _ms(spread: "Spread") -> str:
+    return "none" if math.isnan(spread.p99) else f"{1e3 * spread.p99:.1f}"
+
+
+def _busy(lap: "Lap") -> bool:
+    """Whether the machine was too slow or too busy for a flight."""
+    both = lap.lateness, lap.behind
+    return max(x.p99 for x in both) > LATE_S or max(x.largest for x in both) > STALL_S

@@ -1,0 +1,27 @@
+"""Images of `e2efly hil` on another computer."""
+
+import sys
+
+from e2efly.deploy.policy.images import Image
+from e2efly.deploy.sight.capture import Captured, open_captured
+from e2efly.deploy.sight.registry import register
+
+ADVICE = "start e2efly hil with --image IMAGE=tcp:PORT and --host there first"
+"""What to do when it does not open."""
+
+
+@register("hil", "hil:HOST:PORT")
+def open_hil(text: str, image: Image) -> Captured:
+    """Receive the stream of a node. Times of exposure are told by this computer's clock.
+
+    Args:
+        text: HOST:PORT.
+        image: the camera of the policy's contract.
+
+    Raises:
+        ValueError: for another text, or when nobody serves there.
+    """
+    host, _, port = text.rpartition(":")
+    if not host or not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):
+        raise ValueError(f"image source is hil:{text}; accepted: hil:HOST:PORT, with a port of 1 to 65535")
+    return open_captured(f"hil:{text}", image, [sys.executable], ADVICE, text)

@@ -1,0 +1,304 @@
+"""The rehearsal of hardware in the loop: all of its processes in real time, but the vehicle and its room simulated.
+
+A motion capture system, the HIL node, the bridge with its watchdog, and the real firmware in a room are a process each,
+and speak over the loopback interface and shared memory, as they would in the lab.
+"""
+
+import json
+import os
+import signal
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from e2efly.courses.origin import Origin
+from e2efly.deploy.sight.shared import place
+from e2efly.evaluation import Candidate
+from e2efly.goal import Course
+from e2efly.tasks.route import Route, course_for, route_of
+from e2efly.validation.hil_lap import TOUCH, Heard, Lap, lap_of
+from e2efly.validation.rehearsal import REACH_IN_SIGHT
+from e2efly.validation.room import FLIGHT_S, START_S, Program, Room, Victim, bridge, flags, free_port, take_off
+from e2efly.validation.scenery import Scenery
+from e2efly.validation.session import rehearsal_settings
+from e2efly.vehicles import Vehicle, load_vehicle
+
+SETTLE_S = 3.0
+"""How long the bridge hovers before the policy takes over, s."""
+STRIKES_S = (0.4, 1.2)
+"""How long the policy has flown when a process is killed, s: at random within."""
+PILOT_S = 0.5
+"""What a pilot takes to see that nobody flies, s."""
+WATCHDOG_S = 15.0
+"""How long the watchdog of a bridge may take to end after the pilot has disarmed, s."""
+ENDED = ("HOVER:", "LAND:", "DONE:", "PILOT:", "INIT:")
+"""The bridge's word on another mode than the policy's."""
+DOCUMENTED: dict[Victim, tuple[str, str]] = {
+    "mocap": ("land", "no good odometry"),
+    "hil": ("hover", "policy: image"),
+    "watchdog": ("", "no link to the flight controller"),
+}
+"""The bridge's next mode after a kill, empty for any, and how its reason begins; a bridge that was killed says none."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is rehearsed."""
+
+    found: Candidate
+    """The policy."""
+    origin: Origin = Origin()
+    """Of the world, in the room."""
+    rate: float | None = None
+    """Images per second; None: the contract's."""
+    options: tuple[str, ...] = ()
+    """More of `e2efly fly`."""
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """What flies."""
+        return load_vehicle(self.found.vehicle)
+
+    @property
+    def period(self) -> float:
+        """Of the policy's control steps, s."""
+        return 1 / self.found.policy.contract.control_rate_hz
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A world and what is flown in it."""
+
+    scenery: Scenery
+    route: Route
+    """As `e2efly fly` is told it."""
+    course: Course
+    """As the bridge makes it of that."""
+
+
+def draw(plan: Plan, seed: int, track: Path) -> Drawn:
+    """The world of a seed, as `e2efly hil` draws it, and the course in it.
+
+    Args:
+        plan: what is rehearsed.
+        seed: of the world.
+        track: a .toml file that is written where the task's gates are drawn.
+
+    Raises:
+        ValueError: for a policy that sees nothing, and for a task whose options cannot ask for the course drawn.
+    """
+    found, contract = plan.found, plan.found.policy.contract
+    scenery = Scenery.draw(found.environment(next(iter(found.task.criteria().values()))), seed)
+    if scenery is None:
+        raise ValueError(f"policy {found.file} sees nothing; accepted: a policy with images")
+    route = replace(
+        route_of(contract).drawn(scenery.course, track), origin=plan.origin.position, origin_yaw=plan.origin.yaw
+    )
+    course = course_for(contract, plan.vehicle, route)
+    start = np.zeros(1)
+    own, wanted = (np.asarray(c.goal.goal(c.memory, start)) for c in (course, scenery.course))
+    if not np.allclose(own, wanted, atol=1e-3):
+        said = f"goal of task {contract.task!r} was drawn at {wanted[0].tolist()} m"
+        raise ValueError(f"{said}, but options of `e2efly fly` lead to {own[0].tolist()}; accepted: a task with both")
+    return Drawn(scenery, route, course)
+
+
+def rehearse(plan: Plan, seed: int, folder: Path, kill: Victim | None = None) -> Lap:
+    """One flight, from take-off to landing, in processes of its own.
+
+    Args:
+        plan: what is rehearsed.
+        seed: of the world, of the poses' noise, of where the vehicle stands and of the moment of a kill.
+        folder: of the flight's record; made.
+        kill: the process that is killed while the policy flies.
+
+    Returns:
+        What came of it; a program that fails stands in its problems with its last words.
+
+    Raises:
+        ValueError: as `draw`; where the folder holds an earlier flight.
+    """
+    if (folder / "flight.mcap").exists():
+        raise ValueError(f"folder {folder} holds an earlier flight; accepted: another one")
+    folder.mkdir(parents=True, exist_ok=True)
+    drawn = draw(plan, seed, folder / "track.toml")
+    heard = Heard()
+    try:
+        with ExitStack() as stack:
+            _Flight(plan, drawn, seed, folder, heard, stack).fly(kill)
+    except (RuntimeError, OSError) as error:
+        heard.problems.append(str(error))
+    radius = float(plan.vehicle.radius)
+    lap = lap_of(heard, drawn.course, drawn.scenery, plan.period, radius, folder, seed, kill)
+    return replace(lap, problems=(*lap.problems, *unlike(lap)))
+
+
+def unlike(lap: Lap) -> list[str]:
+    """What a flight's records have that is not as it is documented."""
+    found = []
+    if lap.touch_sink > TOUCH:
+        found.append(f"touched the ground sinking at {lap.touch_sink:.1f} m/s")
+    if lap.kill is None or lap.kill not in DOCUMENTED:
+        return found
+    wanted, reason = DOCUMENTED[lap.kill]
+    after = [change for change in lap.changes if change.time > lap.window[0]]
+    if not after:
+        return [*found, f"after the kill the bridge changed no mode; documented: {wanted or 'any'}, {reason}"]
+    if wanted not in ("", after[0].mode) or not any(text.startswith(reason) for text in after[0].reasons):
+        said = f"{after[0].mode} ({'; '.join(after[0].reasons)})"
+        found.append(f"after the kill came {said}; documented: {wanted or 'any mode'} ({reason})")
+    return found
+
+
+class _Flight:
+    """The processes of one flight, and the pilot."""
+
+    def __init__(self, plan: Plan, drawn: Drawn, seed: int, folder: Path, heard: Heard, stack: ExitStack) -> None:
+        self.plan, self.drawn, self.folder, self.heard = plan, drawn, folder, heard
+        self.random = np.random.default_rng([seed, 2])
+        contract, cores = plan.found.policy.contract, sorted(os.sched_getaffinity(0))
+        ports = [free_port(), free_port()]
+        names = [f"rehearsal_{os.getpid()}_{i}" for i in range(len(contract.images))]
+        stack.callback(_forget, names)
+        image = [f"{image.name}=shm:{name}" for image, name in zip(contract.images, names, strict=True)]
+        to = ["--to", *map(str, ports), "--seed", str(seed)]
+        self.mocap = Program("motion capture", ["-m", "e2efly.validation.mocap_process", *to])
+        stack.enter_context(self.mocap)
+        inlet = json.loads(self.mocap.wait_for('"from"', START_S))["from"]
+        node = ["--pose", f"udp:{ports[0]}", "--seed", str(seed), "--json", str(folder / "node.json")]
+        node += ["--track", str(folder / "track.toml"), "--image", *image]
+        node += ["--origin", *(f"{x:.9g}" for x in plan.origin.position), "--origin-yaw", f"{plan.origin.yaw:.9g}"]
+        node += [] if plan.rate is None else ["--rate", f"{plan.rate:g}"]
+        flies = ["--vehicle", plan.found.vehicle]
+        # rendering takes one core and no more: the firmware and the bridge need the others
+        policy = str(plan.found.file)
+        self.node = Program("the HIL node", ["-m", "e2efly", "hil", policy, *node, *flies], cores[-1])
+        stack.enter_context(self.node)
+        self.node.wait_for("Fly it with", 2 * START_S)
+        stands = ["--at", *(f"{x:.6g}" for x in self._stand()), "--exact", "--record", str(folder / "truth.csv")]
+        self.room = Room(plan.found.vehicle, seed, stands, cores[0], inlet)
+        stack.enter_context(self.room)
+        settings = rehearsal_settings(self._height(), REACH_IN_SIGHT)
+        options = [*flags("flight", settings), "--image", *image, "--envelope.speed", "8"]
+        options += [*flags("goal", drawn.route), *flies, *plan.options]
+        log = folder / "flight.mcap"
+        self.flies = bridge(Path(policy), self.room, log, options, pose=f"udp:{ports[1]}")
+        stack.enter_context(self.flies)
+
+    def _first(self) -> np.ndarray:
+        return self.drawn.course.origin.points(self.drawn.course.start)
+
+    def _stand(self) -> tuple[float, float, float]:
+        """Where the vehicle is put down: x, y, m, and heading, rad."""
+        course, (x, y) = self.drawn.course, self._first()[:2] + self.random.uniform(-0.2, 0.2, 2)
+        yaw = self.random.uniform(-0.05, 0.05) + course.origin.yaw + (course.heading or 0.0)
+        return float(x), float(y), float(yaw)
+
+    def _height(self) -> float:
+        """Of the hover before the policy, over where the vehicle stood, m."""
+        return float(self._first()[2] - self.plan.vehicle.feet_height)
+
+    def fly(self, kill: Victim | None) -> None:
+        """The pilot flies, and one process is killed where one is to be."""
+        room, flies, heard = self.room, self.flies, self.heard
+        take_off(room, flies)
+        time.sleep(SETTLE_S)
+        room.set(mission="policy")
+        flies.wait_for("POLICY:", 5.0)
+        heard.began = time.monotonic()
+        watchdog = _child(flies.process.pid)
+        if kill is None:
+            longest = route_of(self.plan.found.policy.contract).longest_s
+            ended = flies.heard(ENDED, longest)
+            heard.ended = time.monotonic()
+            if not ended:
+                heard.problems.append(f"the policy was still at it after {longest:g} s")
+            self._land()
+        else:
+            time.sleep(float(self.random.uniform(*STRIKES_S)))
+            if flies.heard(ENDED, 0.001):
+                heard.problems.append(f"the policy's flight was over before the kill: {flies.said[-1]}")
+            self._strike(kill, watchdog)
+        self._end(kill, watchdog)
+
+    def _strike(self, kill: Victim, watchdog: int | None) -> None:
+        room, flies, heard = self.room, self.flies, self.heard
+        heard.struck = heard.ended = time.monotonic()
+        if kill == "watchdog":
+            if watchdog is None:
+                raise RuntimeError("the bridge has no watchdog process")
+            os.kill(watchdog, signal.SIGKILL)
+        else:
+            {"mocap": self.mocap, "hil": self.node, "bridge": flies}[kill].process.kill()
+        if kill == "bridge":
+            if not room.down(FLIGHT_S):
+                heard.problems.append("it did not land, or the throttle was not closed")
+        elif kill == "watchdog":
+            time.sleep(PILOT_S)
+            if not room.land_by_hand(FLIGHT_S):
+                heard.problems.append("the pilot could not land it")
+        else:
+            if not flies.heard(ENDED, 5.0):
+                heard.problems.append("the bridge went on")
+            self._land()
+
+    def _land(self) -> None:
+        """Hover for a moment, unless it lands already; then the pilot asks for the landing."""
+        room, flies = self.room, self.flies
+        if flies.said[-1].startswith("HOVER:") and not self.drawn.course.goal.lands:
+            room.set(mission="hover")
+            time.sleep(1.5)
+        room.set(mission="land")
+        if not flies.said[-1].startswith("DONE:") and not flies.heard("DONE:", FLIGHT_S):
+            self.heard.problems.append(f"it did not land{flies.end_told()}")
+
+    def _end(self, kill: Victim | None, watchdog: int | None) -> None:
+        room, heard = self.room, self.heard
+        if not room.until(3.0, lambda state: state["standing"]):  # it may bounce
+            heard.problems.append("it is not on the ground")
+        heard.touches = room.set(armed=False)["touches"]
+        time.sleep(0.5)
+        if kill != "bridge" and (status := self.flies.end(5.0)) != 0 and kill != "watchdog":
+            heard.problems.append(f"the bridge ended with status {status}{self.flies.end_told()}")
+        if kill != "hil" and (status := self.node.end(15.0)) != 0:
+            heard.problems.append(f"the HIL node ended with status {status}{self.node.end_told()}")
+        if kill != "mocap" and (status := self.mocap.leave()) != 0:
+            heard.problems.append(f"motion capture ended with status {status}{self.mocap.end_told()}")
+        if watchdog is not None and not _gone(watchdog, WATCHDOG_S):
+            heard.problems.append("the watchdog did not end")
+            with suppress(OSError):
+                os.kill(watchdog, signal.SIGKILL)
+
+
+def _child(process: int) -> int | None:
+    """The process that a bridge has started: its watchdog."""
+    for task in Path(f"/proc/{process}/task").glob("*/children"):
+        if found := task.read_text().split():
+            return int(found[0])
+    return None
+
+
+def _gone(process: int, seconds: float) -> bool:
+    """Whether a process ends within so long; one that its parent has not asked for its status counts as ended."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        try:
+            state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            return True
+        if state == "Z":
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def _forget(names: Sequence[str]) -> None:
+    """Take the rehearsal's images out of the machine's memory."""
+    for name in names:
+        file = place(name)
+        for left in [file, *file.parent.glob(f"{file.name}.*")]:
+            left.unlink(missing_ok=True)

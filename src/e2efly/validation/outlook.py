@@ -1,0 +1,78 @@
+"""A world of the training's environment, looked at from any pose by the environment's own program. Imports JAX.
+
+The images are `Env.look`'s bit for bit, as they come of the same function, compiled as it stands. All that stays as it
+is between images stays on the device: an image costs one call, whatever the world has.
+"""
+
+import dataclasses
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from e2efly.env import UNSEEN, Env, random_key
+from e2efly.env.state import EnvState
+from e2efly.sensors.eyes import Eye
+from e2efly.validation.plant import RigidState
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """One world of an environment, and its cameras with images that are not late."""
+
+    env: Env
+    """Numbers on the device."""
+    state: EnvState
+    """Of one vehicle; where it is matters to nobody."""
+
+    @staticmethod
+    def of(env: Env, memory: Any, eyes: tuple[Eye, ...], seed: int) -> "Outlook":
+        """The world of an episode.
+
+        Args:
+            env: the training's environment.
+            memory: the task's state at its start, leaves (1, ...).
+            eyes: how the cameras sit, leaves (1, ...).
+            seed: of the noise.
+        """
+        shapes = jax.eval_shape(lambda key: env.reset(key, 1)[0], jax.random.key(0))
+        blank = dataclasses.replace(shapes, key=None, memory=None, eyes=None)
+        zeros = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), blank)
+        young = tuple(dataclasses.replace(eye, latency=jnp.zeros_like(eye.latency)) for eye in eyes)
+        state = dataclasses.replace(zeros, key=random_key(seed, UNSEEN, 0), memory=memory, eyes=young)
+        return Outlook(*jax.device_put((env, state)))
+
+    def images(self, state: RigidState, time: float, count: int, which: tuple[int, ...]) -> list[np.ndarray]:
+        """What cameras show at once.
+
+        Args:
+            state: of the vehicle, in this world.
+            time: of the world, s.
+            count: of the images so far: the noise of each is another.
+            which: of the cameras.
+
+        Returns:
+            Of each: (h, w), or (h, w, 3) of colours.
+        """
+        place, turn = (np.asarray(part, np.float32)[None] for part in (state.position, state.quaternion))
+        vehicle, past = dataclasses.replace(self.state.vehicle, position=place, quaternion=turn), self.state.past
+        if past is not None:  # it has been there for long
+            vehicle = jax.tree.map(np.asarray, vehicle)
+            past = jax.tree.map(lambda old, x: np.broadcast_to(x[:, None], old.shape), past, vehicle)
+        world = np.full(1, time, np.float32)
+        there = dataclasses.replace(self.state, vehicle=vehicle, past=past, time=world, tick=np.int32(count))
+        seen = _look(self.env, there, _RENEWED, which)
+        return [np.asarray(image)[0] for image in seen]
+
+
+_RENEWED = np.ones(1, bool)
+
+
+@partial(jax.jit, static_argnames="which")
+def _look(env: Env, state: EnvState, renewed: np.ndarray, which: tuple[int, ...]) -> list[Array]:
+    images = env.look(state, renewed).images
+    return [images[i] for i in which]

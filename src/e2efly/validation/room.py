@@ -1,0 +1,310 @@
+"""Programs that fly together in real time, each a process: a room with a vehicle, a bridge, and the pilot's hands."""
+
+import dataclasses
+import json
+import math
+import os
+import queue
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Literal
+
+START_S = 60.0
+"""How long a process may take to be ready on a busy machine, s."""
+FLIGHT_S = 40.0
+"""How long each part of a flight may take on a busy machine, s."""
+LAST_LINES = 6
+"""So many different ones are told of a program that fails."""
+_TIME = re.compile(r"^ *[0-9.]+ +")
+SINK = 0.5
+"""Speed at which a pilot without a bridge comes down, m/s."""
+_LIFT, _CLIMB_GAIN, _BRAKE = 0.1, 0.25, 0.12
+"""Of his throttle stick: where the vehicle about hovers; per m/s; of the others per m/s."""
+
+
+Victim = Literal["mocap", "hil", "bridge", "watchdog"]
+"""The processes of hardware in the loop that can be killed in flight."""
+
+
+def free_port() -> int:
+    """A UDP port of the loopback interface that nobody listens to now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def flags(prefix: str, options: Any, default: Any = None) -> list[str]:
+    """A configuration as options of a command: those fields that are not the default's.
+
+    Args:
+        prefix: of their names, such as `goal`.
+        options: a frozen dataclass of numbers, texts, flags, tuples of them, and such dataclasses.
+        default: another one; None: that of the class.
+    """
+    default, found = type(options)() if default is None else default, list[str]()
+    for field in dataclasses.fields(options):
+        value, usual = getattr(options, field.name), getattr(default, field.name)
+        name = f"{prefix}.{field.name.replace('_', '-')}"
+        if dataclasses.is_dataclass(value):
+            found += flags(name, value, usual)
+        elif value == usual:
+            continue
+        elif isinstance(value, bool):
+            found.append(f"--{name}" if value else f"--{prefix}.no-{field.name.replace('_', '-')}")
+        else:
+            found += [f"--{name}", *map(_text, value if isinstance(value, tuple) else (value,))]
+    return found
+
+
+def _text(value: Any) -> str:
+    return f"{value:.9g}" if isinstance(value, float) else str(value)
+
+
+class Program:
+    """A program as a process, and what it says. Use it as a context manager: it is killed at the end, if it runs on."""
+
+    def __init__(self, name: str, command: Sequence[str], core: int | None = None) -> None:
+        """Start it.
+
+        Args:
+            name: for errors.
+            command: what follows `python`.
+            core: the only one that it may use; None: any.
+        """
+        self.name = name
+        self.process = subprocess.Popen(
+            [sys.executable, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            text=True, errors="replace", env={**os.environ, "COLUMNS": "400", "PYTHONUNBUFFERED": "1"},
+        )  # fmt: skip
+        if core is not None and hasattr(os, "sched_setaffinity"):
+            with suppress(OSError):  # it has ended already, which is found out soon
+                os.sched_setaffinity(self.process.pid, {core})
+        self.said: list[str] = []
+        """The lines that were listened to."""
+        self.told: list[tuple[float, str]] = []
+        """All lines, and when each came, s on the monotonic clock."""
+        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def __enter__(self) -> "Program":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def heard(self, text: str | tuple[str, ...], seconds: float) -> bool:
+        """Whether it says something, from now on, within so long; of several texts, one of them."""
+        texts = (text,) if isinstance(text, str) else text
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            try:
+                line = self._lines.get(timeout=left)
+            except queue.Empty:
+                return False
+            if line is None:
+                self._lines.put(None)
+                return False
+            self.said.append(line)
+            if any(part in line for part in texts):
+                return True
+        return False
+
+    def wait_for(self, text: str | tuple[str, ...], seconds: float) -> str:
+        """Wait until it says something; the line.
+
+        Raises:
+            RuntimeError: when it does not, with its last words.
+        """
+        if not self.heard(text, seconds):
+            raise RuntimeError(f"{self.name} did not come to {text!r}{self.end_told()}")
+        return self.said[-1]
+
+    def end_told(self) -> str:
+        """How it has ended, if it has, and its last words."""
+        status = self.process.poll()
+        ended = "" if status is None else f" and ended with status {status}"
+        lines = dict.fromkeys(_TIME.sub("", line) for _, line in self.told)
+        return f"{ended}; it said: {list(lines)[-LAST_LINES:]}"
+
+    def end(self, seconds: float, by: int = signal.SIGINT) -> int | None:
+        """Ask it to end, as Ctrl-C does; its exit status, or None where it had to be killed."""
+        self.process.send_signal(by)
+        try:
+            return self.process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return None
+        finally:
+            self.close()
+
+    def leave(self, seconds: float = 10.0) -> int | None:
+        """Close its standard input, at which the programs of a room end; its exit status, or None as with `end`."""
+        assert self.process.stdin is not None
+        with suppress(OSError):
+            self.process.stdin.close()
+        try:
+            return self.process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return None
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Kill it, where it still runs, and read the last it has said."""
+        self.process.kill()
+        self.process.wait()
+        self._reader.join(1.0)
+        assert self.process.stdin is not None
+        with suppress(OSError):
+            self.process.stdin.close()
+        while not self._lines.empty():
+            if (line := self._lines.get()) is not None:
+                self.said.append(line)
+        self._lines.put(None)
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        with self.process.stdout as stream:
+            for line in stream:
+                self.told.append((time.monotonic(), line.rstrip()))
+                self._lines.put(line.rstrip())
+        self._lines.put(None)
+
+
+class Room:
+    """A room with a vehicle and its firmware, and the pilot's hands on it. Use it as a context manager."""
+
+    def __init__(
+        self, vehicle: str = "vis_r", seed: int = 0, options: Sequence[str] = (), core: int | None = None,
+        pose_port: int | None = None,
+    ) -> None:  # fmt: skip
+        """Start it and wait until the firmware can be armed.
+
+        Args:
+            vehicle: a name or a .toml file.
+            seed: of the poses' noise.
+            options: more of `room_process`.
+            core: the only one that it and the firmware may use; None: one of any.
+            pose_port: UDP port that is to take its poses; None: a free one.
+
+        Raises:
+            RuntimeError: when it does not start, with its last words.
+        """
+        self.pose_port = free_port() if pose_port is None else pose_port
+        """Where its poses go."""
+        command = ["-m", "e2efly.validation.room_process", "--pose-port", str(self.pose_port)]
+        self.program = Program("the room", [*command, "--vehicle", vehicle, "--seed", str(seed), *options], core)
+        try:
+            told = json.loads(self.program.wait_for('"link"', START_S))
+            self.link: str = told["link"]
+            """The firmware's."""
+            self._control = socket.create_connection(("127.0.0.1", told["control"]), timeout=30.0)
+        except BaseException:
+            self.program.close()
+            raise
+        self._lines = self._control.makefile("rb")
+
+    def __enter__(self) -> "Room":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._lines.close()
+        self._control.close()
+        self.program.leave()
+
+    def set(self, **changes: object) -> dict[str, Any]:
+        """Move the pilot's sticks and switches, fields of `rig.Transmitter`; the fields of `room_process.State`.
+
+        Raises:
+            RuntimeError: when the room has ended, with its last words.
+        """
+        try:
+            self._control.sendall(json.dumps(changes).encode() + b"\n")
+            return json.loads(self._lines.readline())
+        except (OSError, ValueError):
+            raise RuntimeError(f"the room does not answer{self.program.end_told()}") from None
+
+    def until(self, seconds: float, good: Callable[[dict[str, Any]], bool]) -> bool:
+        """Whether the true state becomes so within so long."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            if good(self.set()):
+                return True
+            time.sleep(0.02)
+        return False
+
+    def down(self, seconds: float) -> bool:
+        """Whether it comes to stand, its throttle closed, within so long."""
+        return self.until(seconds, lambda state: state["standing"] and max(state["motors"]) < 0.12)
+
+    def land_by_hand(self, seconds: float) -> bool:
+        """Take the vehicle over and land it, as a pilot who looks at it; whether it stands within so long."""
+        end = time.monotonic() + seconds
+        self.set(override=False, mission="land")
+        while time.monotonic() < end:
+            state = self.set()
+            if state["standing"]:
+                self.set(throttle=-1.0, roll=0.0, pitch=0.0)
+                return True
+            (u, v, w), yaw = state["velocity"], state["yaw"]
+            ahead, left = math.cos(yaw) * u + math.sin(yaw) * v, math.cos(yaw) * v - math.sin(yaw) * u
+            self.set(
+                throttle=_stick(_LIFT - _CLIMB_GAIN * (w + SINK)),
+                pitch=_stick(-_BRAKE * ahead),
+                roll=_stick(_BRAKE * left),
+            )
+            time.sleep(0.03)
+        return False
+
+
+def _stick(x: float) -> float:
+    return min(max(x, -1.0), 1.0)
+
+
+def bridge(
+    policy: Path, room: Room, log: Path, options: Sequence[str] = (), link: str | None = None, pose: str | None = None
+) -> Program:
+    """`e2efly fly` as a process.
+
+    Args:
+        policy: a policy.onnx, or what else the command takes.
+        room: the world.
+        log: of the flight.
+        options: more of the command's; they come last.
+        link: to the firmware; None: straight.
+        pose: its source; None: the room itself.
+    """
+    command = ["-m", "e2efly", "fly", str(policy), "--link", link or room.link, "--log", str(log)]
+    command += ["--pose", pose or f"udp:{room.pose_port}", "--flight.battery-unknown"]
+    return Program("the bridge", [*command, *options])
+
+
+def take_off(room: Room, flies: Program) -> None:
+    """Hand over, arm, and hover; what a busy machine makes fail, the pilot tries again.
+
+    Raises:
+        RuntimeError: when the bridge does not take off, with its last words.
+    """
+    flies.wait_for("INIT", START_S)
+    room.set(override=True, throttle=0.0)
+    end = time.monotonic() + START_S
+    while True:
+        time.sleep(0.5)
+        room.set(armed=True)
+        if flies.heard("ready", 3.0):
+            room.set(mission="hover")
+            if flies.heard("HOVER", 10.0):
+                return
+        room.set(mission="land")
+        room.until(FLIGHT_S, lambda state: state["standing"])
+        room.set(armed=False)
+        if time.monotonic() > end or flies.process.poll() is not None:
+            raise RuntimeError(f"the bridge did not take off{flies.end_told()}")
