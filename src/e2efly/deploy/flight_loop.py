@@ -174,7 +174,7 @@ def _status(bridge: Bridge) -> str:
 def _no_pauses(bridge: Bridge) -> Iterator[None]:
     """No garbage collection in flight, threads that give way at once, real-time scheduling where it is allowed."""
     threads = {0: LOOP_PRIORITY}
-    if bridge.worker is not None:
+    if bridge.worker is not None and bridge.worker.native_id is not None:
         threads[bridge.worker.native_id] = POLICY_PRIORITY
     before = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_S)

@@ -1,13 +1,14 @@
-"""A pose source that runs in a process of its own and passes lines on: `process/pose_relay.py`."""
+"""A source that runs in a process of its own and passes lines on: `process/pose_relay.py`."""
 
 import os
 import select
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, Generic, TypeVar
 
-from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pose.json_source import Lines, parse_pose
 from e2efly.deploy.pose.source import Inbox
 from e2efly.deploy.terminal import printable
@@ -18,25 +19,35 @@ OPENING = 15.0
 """Longest time until a relay is ready, s."""
 READS = 2
 """Most reads of one look, of 64 KiB each: what a pipe holds, and more."""
+T = TypeVar("T")
 SYSTEM_PYTHON = "/usr/bin/python3"
 """The system's interpreter, where Debian and Ubuntu install ROS."""
 
 
-class RelaySource:
-    """Poses of a relay. Reading them takes neither a thread nor the packages of the peer in this process."""
+class RelaySource(Generic[T]):
+    """Messages of a relay. Reading them takes neither a thread nor the packages of the peer in this process."""
 
-    def __init__(self, name: str, python: str, *arguments: str) -> None:
+    def __init__(
+        self,
+        name: str,
+        python: str,
+        *arguments: str,
+        parse: Callable[[bytes, float], Any] = parse_pose,
+        what: str = "pose",
+    ) -> None:
         """Start the relay and wait until it is ready.
 
         Args:
             name: what to call the source.
             python: the interpreter that has the package of the peer.
             arguments: of the relay: its kind, and what it needs to know.
+            parse: what a message says; takes it and the time of its arrival, s.
+            what: to call its messages.
 
         Raises:
             ValueError: what the relay says of its failure, or that it does not answer in time.
         """
-        self._inbox = Inbox(_parse)
+        self._inbox: Inbox[T] = Inbox(_timed(parse))
         self._lines = Lines()
         self._name, self._detail = name, ""
         self._ended: str | None = None
@@ -64,7 +75,7 @@ class RelaySource:
             self._pump(time.monotonic())
         if self._ended:
             self.close()
-            raise ValueError(f"pose source {name}: {self._ended}")
+            raise ValueError(f"{what} source {name}: {self._ended}")
 
     @property
     def refused(self) -> int:
@@ -76,8 +87,8 @@ class RelaySource:
         """Why the relay has ended, or else what was wrong with a message last."""
         return f"{self._name}: {self._ended}" if self._ended else self._inbox.problem
 
-    def read(self, now: float) -> list[Sample]:
-        """Poses since the last call; `received` is when the relay took them."""
+    def read(self, now: float) -> list[T]:
+        """What came since the last call; `received` is when the relay took them."""
         if self._ended is None:
             self._pump(now)
         return self._inbox.take()
@@ -121,7 +132,7 @@ class RelaySource:
 
     def _take(self, line: bytes, now: float) -> None:
         kind, _, rest = line.partition(b" ")
-        if kind == b"pose":
+        if kind == b"message":
             self._inbox.put(rest, now)
         elif kind == b"ready":
             self._detail = _text(rest)
@@ -131,11 +142,15 @@ class RelaySource:
             self._inbox.refuse(f"{self._name}: {_text(rest)}")
 
 
-def _parse(message: bytes, now: float) -> Sample:
-    """`RECEIVED JSON`; the monotonic clock is the same one in all processes of a machine."""
-    received, _, content = message.partition(b" ")
-    waited = time.monotonic() - float(received)
-    return parse_pose(content, now - max(waited, 0.0))
+def _timed(parse: Callable[[bytes, float], Any]) -> Callable[[bytes, float], Any]:
+    """Reads `RECEIVED JSON`; the monotonic clock is the same one in all processes of a machine."""
+
+    def parsed(message: bytes, now: float) -> Any:
+        received, _, content = message.partition(b" ")
+        waited = time.monotonic() - float(received)
+        return parse(content, now - max(waited, 0.0))
+
+    return parsed
 
 
 def _text(said: bytes) -> str:
@@ -151,7 +166,14 @@ def _available(descriptor: int) -> bytes | None:
         return None
 
 
-def open_relay(name: str, pythons: list[str], advice: str, *arguments: str) -> RelaySource:
+def open_relay(
+    name: str,
+    pythons: list[str],
+    advice: str,
+    *arguments: str,
+    parse: Callable[[bytes, float], Any] = parse_pose,
+    what: str = "pose",
+) -> RelaySource[Any]:
     """Start a relay by the first interpreter that has its package.
 
     Raises:
@@ -163,7 +185,7 @@ def open_relay(name: str, pythons: list[str], advice: str, *arguments: str) -> R
             problems.append(f"{python} does not exist")
             continue
         try:
-            return RelaySource(name, python, *arguments)
+            return RelaySource(name, python, *arguments, parse=parse, what=what)
         except ValueError as error:
             problems.append(f"{python}: {error}")
             if "ImportError" not in str(error) and "ModuleNotFoundError" not in str(error):
