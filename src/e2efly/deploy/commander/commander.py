@@ -114,8 +114,9 @@ class Commander:
         if refused > self._counted:
             self.stream = refuse(self.stream, self.source.problem or "malformed", now, refused - self._counted)
             self._counted = refused
+        flying = self.state is not None
         for command in commands:
-            self.stream = take(self.stream, command, self.limits, odometry, now, self.timeout)
+            self.stream = take(self.stream, command, self.limits, odometry, now, self.timeout, flying=flying)
         if self.stream.accepted == now:
             self._known = self.source.problem
 

@@ -44,7 +44,14 @@ class Stream:
 
 
 def take(
-    stream: Stream, command: Command, limits: Limits, odometry: Odometry | None, now: float, timeout: float
+    stream: Stream,
+    command: Command,
+    limits: Limits,
+    odometry: Odometry | None,
+    now: float,
+    timeout: float,
+    *,
+    flying: bool = False,
 ) -> Stream:
     """Take a message in.
 
@@ -55,8 +62,10 @@ def take(
         odometry: where the vehicle is; None: not known.
         now: s on the local monotonic clock.
         timeout: an older command is too old, s.
+        flying: whether the commander flies: only while it does not may a stream that was silent begin anew, with
+            another clock or another sender. Otherwise stamps that stand would be accepted once every time-out.
     """
-    silent = stream.age(now) > timeout
+    silent = stream.age(now) > timeout and not flying
     first = command.sender if silent or stream.command is None else stream.command.sender
     try:
         if command.sender != first:
