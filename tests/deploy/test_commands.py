@@ -217,9 +217,7 @@ def test_it_takes_over_only_while_commands_come_steadily_and_the_vehicle_is_calm
     commander.hear(STILL, now)
     assert "accepted: 0.3 (command: position is 9 m in z" in str(commander.readiness(STILL, now))
     silent = str(commander.readiness(STILL, now + 1.0))
-    assert silent.startswith(
-        "no good command for 1.01 s; accepted: 0.2 (command: position is 9 m in z; accepted: 0.3 to"
-    )
+    assert silent.startswith("no good command for 1.01 s; accepted: 0.2 (command: position is 9 m in z; ")
 
 
 def test_silence_ends_it_after_the_time_out_and_a_command_stands_until_then() -> None:
