@@ -23,6 +23,8 @@ from e2efly.deploy.betaflight.controller import ControllerInfo, identify
 from e2efly.deploy.betaflight.link import Link, open_link
 from e2efly.deploy.betaflight.watchdog import WatchedLink
 from e2efly.deploy.bridge import Bridge
+from e2efly.deploy.commander.commander import Commander, CommandSource
+from e2efly.deploy.commander.sources import open_commands
 from e2efly.deploy.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
 from e2efly.deploy.excitation import NAME as EXCITATION
 from e2efly.deploy.flight_loop import LOWEST_RATE, fly, loop_rate
@@ -72,6 +74,9 @@ class Fly:
     image: tuple[str, ...] = ()
     """Where a policy that sees gets each image of its contract: image_0=shm:NAME, what another program publishes in
     shared memory, or a source of your own, image_0=path/to/file.py:Name[:...]."""
+    commands: str | None = None
+    """Another program that flies in place of a policy, by commands: udp:PORT, ros1:/topic, ros2:/topic, or a source of
+    your own, path/to/file.py:Name[:...]."""
     vehicle: str | None = None
     """A shipped vehicle or a .toml file; left out: the policy's."""
     check: bool = False
@@ -131,6 +136,11 @@ def run(options: Fly) -> int:
     excited = options.policy == Path(EXCITATION)
     policy = None if options.policy is None or excited else policy_file(options.policy, options.vehicle)
     loaded = None if policy is None else load_policy(policy)
+    if options.commands is not None and options.policy is not None:
+        accepted = "one of them: either a policy flies, or another program"
+        raise ValueError(
+            f"--commands is {options.commands!r}, and POLICY {str(options.policy)!r}; accepted: {accepted}"
+        )
     if loaded is None and options.vehicle is None:
         raise ValueError("--vehicle is left out; accepted: a vehicle's name or .toml file, as no policy names one")
     if loaded is not None and loaded.contract.vehicle_ranges is not None and options.vehicle is None:
@@ -160,13 +170,16 @@ def run(options: Fly) -> int:
             stack.callback(camera.close)
         source = open_source(options.pose)
         stack.callback(source.close)
+        commands = None if options.commands is None else open_commands(options.commands)
+        if commands is not None:
+            stack.callback(commands.close)
         held: Link = WatchedLink(options.link) if options.watchdog and not options.check else open_link(options.link)
         stack.callback(held.close)
         client = Client(held, dict(EXCITATION_SCHEDULE if excited else SCHEDULE))
         info = _connect(client, options.link)
         rows = examine(info, body, settings, contract)
         console.print(_table(rows))
-        worker = PolicyWorker(runtime, settings.policy_timeout) if runtime else None
+        worker = _worker(runtime, commands, body, options)
         if worker is not None:
             stack.callback(worker.close)
         bridge = Bridge(
@@ -207,6 +220,16 @@ def run(options: Fly) -> int:
             say(f"Next: e2efly identify flight {path} --vehicle {options.vehicle} --mass KG SIGMA")
         say(f"Next: e2efly fly-report {path}; throttle map: {path.with_suffix('.throttle.json')}")
         return 0
+
+
+def _worker(
+    runtime: Runtime | None, commands: CommandSource | None, body: Vehicle, options: Fly
+) -> PolicyWorker | Commander | None:
+    """What flies in mode POLICY; None: nothing does."""
+    settings = options.flight
+    if commands is not None:
+        return Commander(commands, body, settings, envelope=options.envelope, latency=options.latency)
+    return None if runtime is None else PolicyWorker(runtime, settings.policy_timeout)
 
 
 def _own_vehicle(policy: Path | None, loaded: Policy | None) -> str:
@@ -286,6 +309,8 @@ def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row,
             table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")
     for camera, seen in zip(bridge.cameras, bridge.seen, strict=True):
         table.add_row("image", _cell(_image(camera, seen, time.monotonic())))
+    if isinstance(bridge.worker, Commander):
+        table.add_row("commands", _cell(_commands(bridge.worker, bridge)))
     pilot = bridge.inputs.pilot
     heard = "not heard"
     if pilot is not None:
@@ -313,6 +338,16 @@ def _image(camera: ImageSource, seen: Seen, now: float) -> str:
     low, high = (1e3 * x for x in seen.camera.latency_range_s)
     trained = f"{age:.0f} ms old (trained with {low:.0f} to {high:.0f})"
     return f"{seen.camera.name} from {camera.describe()}: {values}; {trained}"
+
+
+def _commands(commander: Commander, bridge: Bridge) -> str:
+    """What comes from a commander, in words."""
+    stream, now, where = commander.stream, time.monotonic(), commander.source.describe()
+    counted = f"{stream.taken} accepted, {stream.refused} refused, from {where}"
+    if bridge.odometry is not None and (problem := commander.readiness(bridge.odometry, now)):
+        return f"{counted}; it could not take over now: {problem}"
+    mode = f"; the newest: {stream.command.mode}, {1e3 * stream.age(now):.0f} ms old" if stream.command else ""
+    return f"{counted}{mode}"
 
 
 def _record_meta(log: Telemetry, bridge: Bridge, body: Vehicle, contract: str, rows: tuple[Row, ...]) -> None:

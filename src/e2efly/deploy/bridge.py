@@ -31,7 +31,7 @@ from e2efly.deploy.pilot.inertial import FRESH_S, Measurement
 from e2efly.deploy.pilot.landing import has_stood
 from e2efly.deploy.pilot.throttle_map import ThrottleHistory, ThrottleMap, learn
 from e2efly.deploy.policy.runtime import Decision, Imu
-from e2efly.deploy.policy.worker import PolicyWorker
+from e2efly.deploy.policy.worker import Worker
 from e2efly.deploy.pose.checks import Checks
 from e2efly.deploy.pose.pace import pace_problem
 from e2efly.deploy.pose.source import PoseSource
@@ -65,7 +65,7 @@ class Bridge:
         vehicle: Vehicle,
         settings: FlightSettings,
         *,
-        worker: PolicyWorker | None = None,
+        worker: Worker | None = None,
         log: Log | None = None,
         latency: float | None = None,
         settings_problems: tuple[str, ...] = (),
@@ -80,7 +80,7 @@ class Bridge:
             source: delivers poses.
             vehicle: as loaded.
             settings: what the flight may do.
-            worker: asks the policy; None: hover alone.
+            worker: asks the policy, or hears a commander outside; None: hover alone.
             log: the flight's record; None: none is kept.
             latency: from the vehicle's motion to its rate loop, s; None: the vehicle file's.
             settings_problems: why the controller's settings forbid a take-off.
@@ -94,7 +94,7 @@ class Bridge:
         self.worker, self.log, self.land_now = worker, log, False
         """`land_now`: the operator asks for a landing, as the pilot does by the mission switch."""
         self.cameras = tuple(cameras)
-        images = () if worker is None else worker.runtime.policy.contract.images
+        images = () if worker is None else worker.images
         self.seen = tuple(Seen(image) for image, _ in zip(images, self.cameras, strict=True))
         """What is known of each camera."""
         self.instruments = Instruments(client, settings)
@@ -157,7 +157,7 @@ class Bridge:
     def setpoint(self) -> tuple[list[float] | None, float | None]:
         """Where the vehicle is to be, world, m, and its yaw, rad."""
         if (decision := self.decision) is not None:
-            return decision.position.tolist(), None
+            return None if decision.position is None else decision.position.tolist(), None
         target = self.flight.target
         return (None, None) if target is None else (list(target.position), target.yaw)
 
@@ -166,6 +166,8 @@ class Bridge:
         self.client.poll(now)
         samples, attitude = self.source.read(now), self.client.message(AttitudeReply.CODE, now, ATTITUDE_S)
         self.estimate = estimate.see(self.estimate, samples, self.flight, attitude, now, self.source.problem or "")
+        if self.worker is not None:
+            self.worker.hear(self.odometry, now)
         odometry = self.odometry if self.flying else None
         self.seen = tuple(
             watch.see(seen, camera.read(now), now, odometry, self.settings.ground_height, camera.problem)
@@ -262,7 +264,7 @@ class Bridge:
         if self.flight.mode is not Mode.POLICY:
             worker.stop()
 
-    def _ask(self, worker: PolicyWorker, now: float, slack: float, odometry: Odometry) -> None:
+    def _ask(self, worker: Worker, now: float, slack: float, odometry: Odometry) -> None:
         if self._blindness(now) is None:
             frames = [seen.frame for seen in self.seen if seen.frame is not None]
             images = [frame.image.astype(np.float32) for frame in frames]
@@ -270,7 +272,7 @@ class Bridge:
                 record_policy(self.log, now, worker, [now - frame.time for frame in frames])
         self.inputs = dataclasses.replace(
             self.inputs, policy_problem=self.inputs.policy_problem or worker.problem, policy_done=worker.done,
-            policy_lands=worker.runtime.course.goal.lands,
+            policy_lands=worker.lands,
         )  # fmt: skip
 
     def _step(self, now: float) -> None:
@@ -287,9 +289,9 @@ class Bridge:
         flight, odometry, decision = self.flight, self.odometry, self.decision
         if flight.mode in GROUNDED:
             return "closed", None
-        if decision is not None:
+        if decision is not None and self.worker is not None:
             assert odometry is not None
-            return "policy", controlled(self.vehicle, decision.mode, odometry, decision.command)
+            return self.worker.name, controlled(self.vehicle, decision.mode, odometry, decision.command)
         if flight.target is None or odometry is None or flight.blind:
             attitude = self.client.message(AttitudeReply.CODE, now, BLIND_ATTITUDE_S)
             command, self.trim, told = guidance.descend(flight, self.estimate.inertial, attitude, self.trim, now, dt)

@@ -103,7 +103,7 @@ def fly(
                 watchdog.plan(plan_of(bridge))
             if (line := _told(bridge)) != told:
                 told = line
-                _say(say, line)
+                _say(say, _told(bridge, in_full=True))
             elif now - last_status >= STATUS_PERIOD:
                 last_status = now
                 _say(say, watchdog.taken_over + TAKEN if watchdog and watchdog.taken_over else _status(bridge))
@@ -154,10 +154,11 @@ def _say(say: Callable[[str], None], line: str) -> None:
         say(line)
 
 
-def _told(bridge: Bridge) -> str:
-    """The mode and its reasons without their numbers, which change all the time."""
+def _told(bridge: Bridge, *, in_full: bool = False) -> str:
+    """The mode and its reasons, unless in full without their numbers, which change all the time."""
     flight = bridge.flight
-    return f"{flight.mode.upper()}: " + "; ".join(printable(str(reason).split(": ")[0]) for reason in flight.reasons)
+    reasons = [str(reason) if in_full else str(reason).split(": ")[0] for reason in flight.reasons]
+    return f"{flight.mode.upper()}: " + "; ".join(map(printable, reasons))
 
 
 def _status(bridge: Bridge) -> str:
@@ -174,7 +175,7 @@ def _status(bridge: Bridge) -> str:
 def _no_pauses(bridge: Bridge) -> Iterator[None]:
     """No garbage collection in flight, threads that give way at once, real-time scheduling where it is allowed."""
     threads = {0: LOOP_PRIORITY}
-    if bridge.worker is not None:
+    if bridge.worker is not None and bridge.worker.native_id is not None:
         threads[bridge.worker.native_id] = POLICY_PRIORITY
     before = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_S)

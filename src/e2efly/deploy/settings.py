@@ -60,6 +60,8 @@ class FlightSettings:
     """Silence of the flight controller after which the link is lost, s."""
     policy_timeout: float = number(0.01, above=0)
     """How long a control step waits for the policy, s."""
+    command_timeout: float = number(0.2, above=0, high=1.0)
+    """Commands from outside that are older end their flight, s."""
     missed_deadlines: int = number(3, low=1)
     """So many late control steps within a second end a policy's flight."""
     lateness: float = number(0.02, above=0)

@@ -12,6 +12,7 @@ from e2efly.deploy.betaflight.client import SCHEDULE, Client
 from e2efly.deploy.betaflight.controller import identify
 from e2efly.deploy.betaflight.link import Link, open_link
 from e2efly.deploy.bridge import Bridge
+from e2efly.deploy.commander.commander import Commander, CommandSource
 from e2efly.deploy.log.record import Log
 from e2efly.deploy.pilot.flight_state import Mode
 from e2efly.deploy.policy.runtime import Acting, Envelope, Runtime
@@ -79,23 +80,27 @@ class Session:
         wrap_worker: Callable[[PolicyWorker], Any] | None = None,
         source: Any = None,
         cameras: Sequence[ImageSource] = (),
+        commands: CommandSource | None = None,
         schedule: Mapping[int, float] = SCHEDULE,
     ) -> None:
         vehicle = rig.world.vehicle
         self.rig, self.settings = rig, settings
         self.client = Client(link or open_link(rig.sitl.msp), dict(schedule))
         self.info = identify(self.client, 3.0, clock=rig)
-        self.worker = None
+        self.worker: PolicyWorker | None = None
         rate = CONTROL_HZ
         if policy is not None and course is not None:
             rate = loop_rate(policy.contract.control_rate_hz)
             runtime = Runtime.of(policy, course, vehicle, envelope=Envelope(speed=8.0), imu=True, images=bool(cameras))
             self.worker = PolicyWorker(runtime, PATIENCE_S)
+        late = rig.latency + 0.01
+        self.commander = None if commands is None else Commander(commands, vehicle, settings, latency=late)
+        """Flies in place of a policy."""
         self.period = 1 / rate
         self.source = source or PlantSource(rig.poses, "rig")
         self.bridge = Bridge(
             self.client, self.info, self.source, vehicle, settings,
-            worker=self.worker, log=log, latency=rig.latency + 0.01, cameras=cameras,
+            worker=self.commander or self.worker, log=log, latency=late, cameras=cameras,
         )  # fmt: skip
         self.flown = Flown()
         self.lateness = 0.0

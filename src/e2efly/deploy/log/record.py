@@ -9,12 +9,13 @@ from e2efly.deploy.betaflight.client import Client, Reply
 from e2efly.deploy.betaflight.controller import ControllerInfo
 from e2efly.deploy.betaflight.instruments import ARM
 from e2efly.deploy.betaflight.messages import AttitudeReply, BatteryState, Motor, RawImu, Rc, StatusEx
+from e2efly.deploy.commander.commander import Commander
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.pilot.flight_state import Flight
 from e2efly.deploy.pilot.hover import rates_of
 from e2efly.deploy.pilot.throttle_map import ThrottleMap
 from e2efly.deploy.policy.runtime import Imu
-from e2efly.deploy.policy.worker import PolicyWorker
+from e2efly.deploy.policy.worker import Worker
 
 
 class Log(Protocol):
@@ -47,13 +48,26 @@ def record_mode(log: Log, now: float, before: Flight, flight: Flight) -> None:
     })  # fmt: skip
 
 
-def record_policy(log: Log, now: float, worker: PolicyWorker, image_ages: Sequence[float] = ()) -> None:
-    """Keep what the policy saw and wants; of each camera's image, how old it was, s."""
+def record_policy(log: Log, now: float, worker: Worker, image_ages: Sequence[float] = ()) -> None:
+    """Keep what the policy saw and wants, or what the commander said; of each camera's image, how old it was, s."""
+    if isinstance(worker, Commander):
+        _record_commander(log, now, worker)
+        return
     d, state = worker.decision, worker.state
     if d is not None:
         log.record("policy", now, {
             "observation": d.observation.tolist(), "action": d.action.tolist(), "inference_s": d.inference_s,
             "step": state.steps if state is not None else 0, "image_age": list(image_ages),
+        })  # fmt: skip
+
+
+def _record_commander(log: Log, now: float, commander: Commander) -> None:
+    stream, command = commander.stream, commander.stream.command
+    if command is not None:
+        log.record("commander", now, {
+            "mode": command.mode, "numbers": command.main.tolist(), "thrust": command.thrust,
+            "altitude": command.altitude, "yaw": command.yaw, "yaw_rate": command.yaw_rate, "age": stream.age(now),
+            "taken": stream.taken, "refused": stream.refused, "clipped": stream.clipped, "problem": stream.problem,
         })  # fmt: skip
 
 

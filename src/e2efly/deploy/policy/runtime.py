@@ -164,8 +164,8 @@ class Decision:
     """(4,) in `contract.action.units`."""
     mode: str
     """The command mode."""
-    position: np.ndarray
-    """(3,) where the goal is, world, m."""
+    position: np.ndarray | None
+    """(3,) where the goal is, world, m; None: there is no place to be."""
     late_s: float
     """By how much the question came after it was due, s."""
     inference_s: float
@@ -395,6 +395,11 @@ def outside(runtime: Runtime, odometry: Odometry, now: float, state: RuntimeStat
             ("distance", float(np.linalg.norm(local.position - course.start)), envelope.start, "m from the start"),
             ("heading", abs(off), envelope.heading, f"rad from the start's, {told:.0f} deg"),
         )
+    return beyond(limits)
+
+
+def beyond(limits: Sequence[tuple[str, float, float, str]]) -> tuple[str, ...]:
+    """Which values are beyond their limits, in words, of (name, value, limit, unit)."""
     return tuple(
         f"{name} is {value:.3g} {unit}; accepted: at most {limit:.3g}"
         for name, value, limit, unit in limits

@@ -8,16 +8,78 @@ from concurrent.futures import Future
 from concurrent.futures import TimeoutError as Late
 from contextlib import suppress
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.policy.images import Image
 from e2efly.deploy.policy.runtime import Decision, Imu, Runtime, RuntimeState, act, begin, due, outside
+
+
+class Worker(Protocol):
+    """What flies in mode POLICY: a policy, or a commander outside (`e2efly.deploy.commander`). Nothing here raises."""
+
+    name: str
+    """What the log calls it."""
+    state: Any
+    """Of the flight under way; None: it does not fly."""
+    decision: Decision | None
+    """The last one: it is flown until the next."""
+    problem: str | None
+    """Why it failed in this flight."""
+
+    @property
+    def native_id(self) -> int | None:
+        """Of its thread, as the operating system knows it; None: it has none."""
+        ...
+
+    @property
+    def images(self) -> tuple[Image, ...]:
+        """What it sees."""
+        ...
+
+    @property
+    def lands(self) -> bool:
+        """Its task is to land."""
+        ...
+
+    @property
+    def done(self) -> bool:
+        """Its task is over."""
+        ...
+
+    def hear(self, odometry: Odometry | None, now: float) -> None:
+        """At every control step, whoever flies: take in what has come for it."""
+        ...
+
+    def readiness(self, odometry: Odometry, now: float) -> str | None:
+        """Why it must not take over now; None: it may."""
+        ...
+
+    def start(self, odometry: Odometry, now: float) -> None:
+        """It takes over."""
+        ...
+
+    def stop(self) -> None:
+        """It flies no more."""
+        ...
+
+    def step(
+        self, odometry: Odometry, now: float, slack: float, imu: Imu | None, images: Sequence[np.ndarray] = ()
+    ) -> bool:
+        """Let it decide; whether there is something new to record."""
+        ...
+
+    def close(self) -> None:
+        """Let go of everything."""
+        ...
 
 
 class PolicyWorker:
     """The policy of a flight. None of its methods raises for what the policy does."""
+
+    name = "policy"
 
     def __init__(self, runtime: Runtime, timeout: float) -> None:
         self.runtime, self.timeout = runtime, timeout
@@ -43,9 +105,22 @@ class PolicyWorker:
         return self._thread.native_id
 
     @property
+    def images(self) -> tuple[Image, ...]:
+        """What its contract says that it sees."""
+        return self.runtime.policy.contract.images
+
+    @property
+    def lands(self) -> bool:
+        """Its task is to land."""
+        return self.runtime.course.goal.lands
+
+    @property
     def done(self) -> bool:
         """Its task is over."""
         return self.state is not None and self.state.done
+
+    def hear(self, odometry: Odometry | None, now: float) -> None:
+        """Nothing comes for a policy."""
 
     def readiness(self, odometry: Odometry, now: float) -> str | None:
         """Why it must not take over now; None: it may."""

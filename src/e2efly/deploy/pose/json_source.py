@@ -30,49 +30,85 @@ def parse_pose(message: bytes, received: float) -> Sample:
     Raises:
         ValueError: naming the key, the value and what is accepted.
     """
-    if len(message) > LONGEST:
-        raise ValueError(f"pose: {len(message)} bytes; accepted: at most {LONGEST}")
-    try:
-        content = json.loads(message.decode(), object_pairs_hook=unique, parse_constant=_no_constant)
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"pose: not JSON: {error}") from None
-    if not isinstance(content, dict):
-        raise ValueError(f"pose: {_short(content)}; accepted: an object with {', '.join(KEYS)}")
-    for key in content:
-        if key not in KEYS:
-            guess = nearest(key[:LONGEST_GUESS], KEYS)
-            hint = f"; did you mean {guess!r}?" if guess else ""
-            raise ValueError(f"pose: unknown key {_short(key)}{hint} (accepted: {', '.join(KEYS)})")
+    content = object_of("pose", message, KEYS)
     if missing := [key for key in ("position", "quaternion") if key not in content]:
         raise ValueError(f"pose: missing key {', '.join(map(repr, missing))}")
-    arrays = {key: _array(key, content[key], size) for key, size in ARRAYS.items() if key in content}
-    stamp = _number("stamp", content["stamp"], "a finite number of seconds") if "stamp" in content else None
-    frame = content.get("frame", "")
-    if not isinstance(frame, str):
-        raise ValueError(f"pose: frame is {_short(frame)}; accepted: a text")
+    arrays = {key: array_of("pose", key, content[key], size) for key, size in ARRAYS.items() if key in content}
+    stamp, frame = header_of("pose", content)
     return Sample(received=received, stamp=stamp, frame=frame, **arrays)
 
 
-def _array(key: str, value: Any, size: int) -> np.ndarray:
+def object_of(what: str, message: bytes, keys: tuple[str, ...]) -> dict[str, Any]:
+    """The JSON object that a message is.
+
+    Args:
+        what: to call the message.
+        message: in UTF-8.
+        keys: that are known.
+
+    Raises:
+        ValueError: for what is no such object, naming the key where there is one.
+    """
+    if len(message) > LONGEST:
+        raise ValueError(f"{what}: {len(message)} bytes; accepted: at most {LONGEST}")
+    try:
+        content = json.loads(message.decode(), object_pairs_hook=unique, parse_constant=_no_constant)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{what}: not JSON: {error}") from None
+    if not isinstance(content, dict):
+        raise ValueError(f"{what}: {short(content)}; accepted: an object with {', '.join(keys)}")
+    for key in content:
+        if key not in keys:
+            guess = nearest(key[:LONGEST_GUESS], keys)
+            hint = f"; did you mean {guess!r}?" if guess else ""
+            raise ValueError(f"{what}: unknown key {short(key)}{hint} (accepted: {', '.join(keys)})")
+    return content
+
+
+def header_of(what: str, content: dict[str, Any]) -> tuple[float | None, str]:
+    """The stamp of a message, s, None where it has none, and its frame, empty where it has none.
+
+    Raises:
+        ValueError: naming the key, the value and what is accepted.
+    """
+    stamp = number_of(what, "stamp", content["stamp"], "a finite number of seconds") if "stamp" in content else None
+    frame = content.get("frame", "")
+    if not isinstance(frame, str):
+        raise ValueError(f"{what}: frame is {short(frame)}; accepted: a text")
+    return stamp, frame
+
+
+def array_of(what: str, key: str, value: Any, size: int) -> np.ndarray:
+    """A list of finite numbers, (size,).
+
+    Raises:
+        ValueError: naming the key, the value and what is accepted.
+    """
     accepted = f"a list of {size} finite numbers"
     if not isinstance(value, list) or len(value) != size:
-        raise ValueError(f"pose: {key} is {_short(value)}; accepted: {accepted}")
-    return np.array([_number(key, entry, accepted) for entry in value])
+        raise ValueError(f"{what}: {key} is {short(value)}; accepted: {accepted}")
+    return np.array([number_of(what, key, entry, accepted) for entry in value])
 
 
-def _number(key: str, value: Any, accepted: str) -> float:
+def number_of(what: str, key: str, value: Any, accepted: str = "a finite number") -> float:
+    """A finite number.
+
+    Raises:
+        ValueError: naming the key, the value and what is accepted.
+    """
     if type(value) in (int, float):  # not bool, which is an int to Python
         with contextlib.suppress(OverflowError):
             number = float(value)
             if math.isfinite(number):
                 return number
-    raise ValueError(f"pose: {key} is {_short(value)}; accepted: {accepted}")
+    raise ValueError(f"{what}: {key} is {short(value)}; accepted: {accepted}")
 
 
 def _no_constant(name: str) -> float:
     raise ValueError(f"{name} is no number; accepted: finite numbers")
 
 
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
+    """A value of a message, in few characters."""
     text = repr(value)
     return text if len(text) <= 80 else f"{text[:77]}..."

@@ -1,32 +1,45 @@
-"""A pose source that runs in a process of its own and passes lines on: `process/pose_relay.py`."""
+"""A source that runs in a process of its own and passes lines on: `process/pose_relay.py`."""
 
 import time
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
 
 from e2efly.deploy.child import Child, first_opened, text_of
-from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pose.json_source import parse_pose
 from e2efly.deploy.pose.source import Inbox
 
+T = TypeVar("T")
 
-class RelaySource:
-    """Poses of a relay."""
 
-    def __init__(self, name: str, python: str, *arguments: str) -> None:
+class RelaySource(Generic[T]):
+    """Messages of a relay. Reading them takes neither a thread nor the packages of the peer in this process."""
+
+    def __init__(
+        self,
+        name: str,
+        python: str,
+        *arguments: str,
+        parse: Callable[[bytes, float], Any] = parse_pose,
+        what: str = "pose",
+    ) -> None:
         """Start the relay and wait until it is ready.
 
         Args:
             name: what to call the source.
             python: the interpreter that has the package of the peer.
             arguments: of the relay: its kind, and what it needs to know.
+            parse: what a message says; takes it and the time of its arrival, s.
+            what: to call its messages.
 
         Raises:
             ValueError: what the relay says of its failure, or that it does not answer in time.
         """
-        self._inbox, self._name = Inbox(_parse), name
+        self._inbox: Inbox[T] = Inbox(_timed(parse))
+        self._name = name
         try:
             self._child = Child(python, "pose_relay.py", *arguments)
         except ValueError as error:
-            raise ValueError(f"pose source {name}: {error}") from None
+            raise ValueError(f"{what} source {name}: {error}") from None
 
     @property
     def refused(self) -> int:
@@ -39,11 +52,11 @@ class RelaySource:
         ended = self._child.ended
         return f"{self._name}: {ended}" if ended else self._inbox.problem
 
-    def read(self, now: float) -> list[Sample]:
-        """Poses since the last call; `received` is when the relay took them."""
+    def read(self, now: float) -> list[T]:
+        """What came since the last call; `received` is when the relay took them."""
         for line in self._child.lines():
             kind, _, rest = line.partition(b" ")
-            if kind == b"pose":
+            if kind == b"message":
                 self._inbox.put(rest, now)
             else:
                 self._inbox.refuse(f"{self._name}: {text_of(rest)}")
@@ -58,17 +71,30 @@ class RelaySource:
         return f"{self._name} ({self._child.detail})"
 
 
-def _parse(message: bytes, now: float) -> Sample:
-    """`RECEIVED JSON`; the monotonic clock is the same one in all processes of a machine."""
-    received, _, content = message.partition(b" ")
-    waited = time.monotonic() - float(received)
-    return parse_pose(content, now - max(waited, 0.0))
+def _timed(parse: Callable[[bytes, float], Any]) -> Callable[[bytes, float], Any]:
+    """Reads `RECEIVED JSON`; the monotonic clock is the same one in all processes of a machine."""
+
+    def parsed(message: bytes, now: float) -> Any:
+        received, _, content = message.partition(b" ")
+        waited = time.monotonic() - float(received)
+        return parse(content, now - max(waited, 0.0))
+
+    return parsed
 
 
-def open_relay(name: str, pythons: list[str], advice: str, *arguments: str) -> RelaySource:
+def open_relay(
+    name: str,
+    pythons: list[str],
+    advice: str,
+    *arguments: str,
+    parse: Callable[[bytes, float], Any] = parse_pose,
+    what: str = "pose",
+) -> RelaySource[Any]:
     """Start a relay by the first interpreter that has its package.
 
     Raises:
         ValueError: with what each interpreter says, and the advice.
     """
-    return first_opened(pythons, advice, lambda python: RelaySource(name, python, *arguments))
+    return first_opened(
+        pythons, advice, lambda python: RelaySource(name, python, *arguments, parse=parse, what=what)
+    )

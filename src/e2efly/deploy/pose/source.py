@@ -2,10 +2,11 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 from e2efly.deploy.odometry import Sample
 
+T = TypeVar("T")
 LARGEST_BATCH = 16
 """Most messages that one `read` parses: of a flood the newest, so that the control loop stays in time."""
 
@@ -70,40 +71,45 @@ class PlantSource:
         return self._name
 
 
-class Inbox:
+class Inbox(Generic[T]):
     """Messages as they came, parsed when read: the part that all sources of bytes share."""
 
-    def __init__(self, parse: Callable[[bytes, float], Sample]) -> None:
-        """Start empty; `parse` takes a message and its time of arrival, and raises ValueError for a malformed one."""
+    def __init__(self, parse: Callable[..., T]) -> None:
+        """Start empty.
+
+        Args:
+            parse: takes a message, its time of arrival, s, and, where `put` was told it, who sent it; raises ValueError
+                for a malformed message.
+        """
         self.refused = 0
         self.problem: str | None = None
         self._parse = parse
-        self._messages: deque[tuple[bytes, float]] = deque(maxlen=LARGEST_BATCH)
+        self._messages: deque[tuple[bytes, float, tuple[str, ...]]] = deque(maxlen=LARGEST_BATCH)
         self._come = 0
 
-    def put(self, message: bytes, received: float) -> None:
+    def put(self, message: bytes, received: float, *sender: str) -> None:
         """Keep a message; of too many the oldest go."""
         self._come += 1
-        self._messages.append((message, received))
+        self._messages.append((message, received, sender))
 
     def extend(self, messages: list[bytes], received: float, dropped: int) -> None:
         """Keep messages that were read together, before which others were dropped; of too many the oldest go."""
         self._come += len(messages) + dropped
-        self._messages.extend((message, received) for message in messages)
+        self._messages.extend((message, received, ()) for message in messages)
 
     def refuse(self, problem: str, count: int = 1) -> None:
         """Count messages that are no samples."""
         self.refused, self.problem = self.refused + count, problem
 
-    def take(self) -> list[Sample]:
-        """The samples of all messages, oldest first."""
+    def take(self) -> list[T]:
+        """What all messages say, oldest first."""
         if dropped := self._come - len(self._messages):
             self.refuse(f"more than {LARGEST_BATCH} messages at once; the oldest were dropped", dropped)
         self._come, samples = 0, []
         while self._messages:
-            message, received = self._messages.popleft()
+            message, received, sender = self._messages.popleft()
             try:
-                samples.append(self._parse(message, received))
+                samples.append(self._parse(message, received, *sender))
             except ValueError as error:
                 self.refuse(str(error))
         return samples

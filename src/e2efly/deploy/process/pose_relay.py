@@ -1,24 +1,35 @@
-"""Passes the poses of ROS 1, ROS 2 or a motion capture system on to the bridge, as lines of text.
+"""Passes the poses of ROS 1, ROS 2 or a motion capture system, or commands of ROS, on to the bridge as lines of text.
 
 It runs as a script in a process of its own: `rospy`, `rclpy` and `motioncapture` block, start threads, handle signals
 and can crash, and none of that may happen in the control loop. It needs nothing but Python (3.8 or newer) and the
 package that it speaks for, so that any interpreter which has that package can run it, such as the system's for ROS.
 
-It writes the lines of `speech.py`, `problem TEXT` for what is no pose, and for each pose `pose RECEIVED JSON`, with the
-time of arrival on the monotonic clock, s, and the message of `docs/pose-sources.md`.
+It writes the lines of `speech.py`, `problem TEXT` for what is no pose or no command, and for each that is
+`message RECEIVED JSON`, with the time of arrival on the monotonic clock, s, and the message of `docs/pose-sources.md`
+or of `docs/commands.md`.
 """
 
 from __future__ import annotations
 
 import importlib
 import json
+import math
 import os
 import sys
 import time
-from typing import Any
+from typing import Any, Callable  # noqa: UP035  # Python 3.8
 
 TYPES = ("nav_msgs/Odometry", "geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped")
 """Message types of ROS that carry a pose."""
+COMMAND_TYPES = (
+    "geometry_msgs/PoseStamped",
+    "geometry_msgs/TwistStamped",
+    "geometry_msgs/AccelStamped",
+    "std_msgs/String",
+)
+"""Message types of ROS that carry a command."""
+LENGTH_ERROR = 0.01
+"""How far the length of a quaternion may be from 1."""
 
 
 def pose_of(message: Any) -> dict[str, Any]:
@@ -35,11 +46,46 @@ def pose_of(message: Any) -> dict[str, Any]:
         v, w = message.twist.twist.linear, message.twist.twist.angular
         content["velocity"] = turn([q.w, q.x, q.y, q.z], [v.x, v.y, v.z])
         content["body_rate"] = [w.x, w.y, w.z]
+    return {**content, **header_of(message)}
+
+
+def header_of(message: Any) -> dict[str, Any]:
+    """Stamp, where there is one, and frame of a message of ROS 1 or 2."""
     stamp = message.header.stamp
     seconds, nanoseconds = (stamp.sec, stamp.nanosec) if hasattr(stamp, "sec") else (stamp.secs, stamp.nsecs)
-    if seconds or nanoseconds:
-        content["stamp"] = seconds + nanoseconds * 1e-9
-    return {**content, "frame": message.header.frame_id}
+    said = {"stamp": seconds + nanoseconds * 1e-9} if seconds or nanoseconds else {}
+    return {**said, "frame": message.header.frame_id}
+
+
+def command_of(message: Any) -> str:
+    """One message of ROS 1 or 2, of any of `COMMAND_TYPES`, as a message of the JSON format of `docs/commands.md`.
+
+    A PoseStamped is a position and its yaw, a TwistStamped a velocity and a yaw rate, an AccelStamped an acceleration,
+    in the axes of the world; a String is passed on as it is.
+
+    Raises:
+        ValueError: for what a mode has no use for, where it is not zero.
+    """
+    if hasattr(message, "data"):
+        return message.data
+    if hasattr(message, "pose"):
+        p, q = message.pose.position, message.pose.orientation
+        length = math.hypot(q.w, q.x, q.y, q.z)
+        if not abs(length - 1) <= LENGTH_ERROR:  # nobody has set it: zeros
+            raise ValueError(f"the length of the orientation is {length:.3g}; accepted: 1")
+        yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
+        content = {"mode": "position", "position": [p.x, p.y, p.z], "yaw": yaw}
+    elif hasattr(message, "twist"):
+        v, w = message.twist.linear, message.twist.angular
+        content = {"mode": "velocity", "velocity": [v.x, v.y, v.z], "yaw_rate": w.z}
+        if w.x or w.y:
+            raise ValueError(f"twist.angular is {w.x:g}, {w.y:g} about x and y; accepted: 0, as only yaw can be turned")
+    else:
+        a, w = message.accel.linear, message.accel.angular
+        content = {"mode": "acceleration", "acceleration": [a.x, a.y, a.z]}
+        if w.x or w.y or w.z:
+            raise ValueError(f"accel.angular is {w.x:g}, {w.y:g}, {w.z:g}; accepted: 0, as the heading is held")
+    return json.dumps({**content, **header_of(message)})
 
 
 def turn(q: list[float], v: list[float]) -> list[float]:
@@ -55,10 +101,11 @@ def cross(a: list[float], b: list[float]) -> list[float]:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def relay_ros1(speech: Any, topic: str) -> None:
+def relay_ros1(speech: Any, topic: str, what: str = "pose") -> None:
     """Subscribe to a topic of ROS 1, whatever its type turns out to be."""
     rospy, rosgraph = importlib.import_module("rospy"), importlib.import_module("rosgraph")
-    classes = {name: ros_class(name, ".msg") for name in TYPES}
+    types, text_of = CONTENTS[what]
+    classes = {name: ros_class(name, ".msg") for name in types}
     if not rosgraph.is_master_online():
         uri = os.environ.get("ROS_MASTER_URI", "not set")
         raise RuntimeError(f"no ROS master answers (ROS_MASTER_URI is {uri}); start roscore")
@@ -66,30 +113,31 @@ def relay_ros1(speech: Any, topic: str) -> None:
     def receive(raw: Any) -> None:
         received, kind = time.monotonic(), raw._connection_header["type"]
         if kind not in classes:
-            speech.say("problem", f"{topic} is {kind!r}; accepted: {', '.join(TYPES)}")
+            speech.say("problem", f"{topic} is {kind!r}; accepted: {', '.join(types)}")
             return
-        speech.say("pose", repr(received), json.dumps(pose_of(classes[kind]().deserialize(raw._buff))))
+        pass_on(speech.say, topic, received, text_of, classes[kind]().deserialize(raw._buff))
 
-    rospy.init_node("e2efly_pose", anonymous=True, disable_signals=True)
+    rospy.init_node(f"e2efly_{what}", anonymous=True, disable_signals=True)
     rospy.Subscriber(topic, rospy.AnyMsg, receive, queue_size=10, tcp_nodelay=True)
     speech.say("ready", f"rospy of {sys.executable}")
     speech.closing.wait()
     rospy.signal_shutdown("closed")
 
 
-def relay_ros2(speech: Any, topic: str) -> None:
+def relay_ros2(speech: Any, topic: str, what: str = "pose") -> None:
     """Subscribe to a topic of ROS 2, as soon as somebody publishes it."""
     rclpy, qos = importlib.import_module("rclpy"), importlib.import_module("rclpy.qos")
     executors, signals = importlib.import_module("rclpy.executors"), importlib.import_module("rclpy.signals")
-    classes = {name.replace("/", "/msg/"): ros_class(name, ".msg") for name in TYPES}
+    types, text_of = CONTENTS[what]
+    classes = {name.replace("/", "/msg/"): ros_class(name, ".msg") for name in types}
     rclpy.init(signal_handler_options=signals.SignalHandlerOptions.NO)
-    node = rclpy.create_node(f"e2efly_pose_{os.getpid()}")
+    node = rclpy.create_node(f"e2efly_{what}_{os.getpid()}")
     executor = executors.SingleThreadedExecutor()
     executor.add_node(node)
 
     def receive(message: Any) -> None:
         received = time.monotonic()
-        speech.say("pose", repr(received), json.dumps(pose_of(message)))
+        pass_on(speech.say, topic, received, text_of, message)
 
     speech.say("ready", f"rclpy of {sys.executable}")
     said, subscribed = "", False
@@ -110,6 +158,16 @@ def relay_ros2(speech: Any, topic: str) -> None:
     rclpy.shutdown()
 
 
+def pass_on(say: Callable[..., None], topic: str, received: float, text_of: Callable[[Any], str], message: Any) -> None:
+    """One message, or what is wrong with it."""
+    try:
+        text = text_of(message)
+    except ValueError as error:
+        say("problem", f"{topic}: {error}")
+    else:
+        say("message", repr(received), text)
+
+
 def ros_class(name: str, module: str) -> Any:
     """The class of a message type, such as "nav_msgs/Odometry"."""
     package, kind = name.split("/")
@@ -126,13 +184,20 @@ def relay_mocap(speech: Any, system: str, host: str, body: str) -> None:
         received, bodies = time.monotonic(), connection.rigidBodies
         if body in bodies:
             p, q = [float(x) for x in bodies[body].position], bodies[body].rotation
-            speech.say("pose", repr(received), json.dumps({"position": p, "quaternion": [q.w, q.x, q.y, q.z]}))
+            speech.say("message", repr(received), json.dumps({"position": p, "quaternion": [q.w, q.x, q.y, q.z]}))
         elif received - warned > 1:  # once per second is enough
             warned = received
             speech.say(
                 "problem",
                 f"rigid body {body!r} is not tracked; there are: {', '.join(map(repr, sorted(bodies))) or 'none'}",
             )
+
+
+CONTENTS: dict[str, tuple[tuple[str, ...], Callable[[Any], str]]] = {
+    "pose": (TYPES, lambda message: json.dumps(pose_of(message))),
+    "command": (COMMAND_TYPES, command_of),
+}
+"""What a topic may carry: the message types, and what makes JSON of them."""
 
 
 if __name__ == "__main__":

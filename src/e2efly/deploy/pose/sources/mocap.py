@@ -2,6 +2,7 @@
 
 import sys
 
+from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pose.registry import part_of, register
 from e2efly.deploy.pose.relay import RelaySource, open_relay
 
@@ -14,7 +15,7 @@ ADVICE = (
 
 
 @register("mocap", "mocap:TYPE:HOST:RIGID_BODY")
-def open_mocap(where: str) -> RelaySource:
+def open_mocap(where: str) -> RelaySource[Sample]:
     """Follow one rigid body.
 
     Args:

@@ -1,6 +1,11 @@
 """Odometry and pose topics of ROS 1 and ROS 2."""
 
+from collections.abc import Callable
+from typing import Any
+
 from e2efly.deploy.child import ROS_PYTHON, pythons
+from e2efly.deploy.odometry import Sample
+from e2efly.deploy.pose.json_source import parse_pose
 from e2efly.deploy.pose.registry import part_of, register
 from e2efly.deploy.pose.relay import RelaySource, open_relay
 
@@ -14,19 +19,21 @@ ADVICE = {
 
 
 @register("ros1", "ros1:/topic")
-def open_ros1(topic: str) -> RelaySource:
+def open_ros1(topic: str) -> RelaySource[Sample]:
     """Subscribe by ROS 1; see `open_ros`."""
     return open_ros(1, part_of(topic))
 
 
 @register("ros2", "ros2:/topic")
-def open_ros2(topic: str) -> RelaySource:
+def open_ros2(topic: str) -> RelaySource[Sample]:
     """Subscribe by ROS 2; see `open_ros`."""
     return open_ros(2, part_of(topic))
 
 
-def open_ros(version: int, topic: str) -> RelaySource:
-    """Subscribe to a topic of nav_msgs/Odometry, geometry_msgs/PoseStamped or geometry_msgs/PoseWithCovarianceStamped.
+def open_ros(
+    version: int, topic: str, parse: Callable[[bytes, float], Any] = parse_pose, what: str = "pose"
+) -> RelaySource[Any]:
+    """Subscribe to a topic, of one of the types that carry what is asked for: see `process/pose_relay.py`.
 
     ROS 1 and ROS 2 have packages of the same names, so that one Python environment holds either; the relay therefore
     runs in whichever of this interpreter and the system's has the one asked for, or in the one that `E2EFLY_ROS_PYTHON`
@@ -35,6 +42,8 @@ def open_ros(version: int, topic: str) -> RelaySource:
     Args:
         version: 1 or 2.
         topic: name of the topic, from the root: "/odometry".
+        parse: what a message says, which the relay has made JSON; takes it and the time of its arrival, s.
+        what: "pose" or "command".
 
     Raises:
         ValueError: for a topic that is not from the root, a package that is not installed, a ROS master that does not
@@ -42,7 +51,8 @@ def open_ros(version: int, topic: str) -> RelaySource:
     """
     if not topic.startswith("/"):
         raise ValueError(
-            f"pose source ros{version}: topic is {topic!r}; accepted: a name from the root, such as '/odometry'"
+            f"{what} source ros{version}: topic is {topic!r}; accepted: a name from the root, such as '/odometry'"
         )
     advice = f"{ADVICE[version]}, or name an interpreter that has it in {ROS_PYTHON}"
-    return open_relay(f"ros{version}:{topic}", pythons(ROS_PYTHON), advice, f"ros{version}", topic)
+    name = f"ros{version}"
+    return open_relay(f"{name}:{topic}", pythons(ROS_PYTHON), advice, name, topic, what, parse=parse, what=what)

@@ -4,6 +4,8 @@ import contextlib
 import socket
 import struct
 import time
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
 
 from e2efly.deploy.lines import LONGEST
 from e2efly.deploy.odometry import Sample
@@ -15,30 +17,52 @@ BUFFER = 32 << 10
 """Bytes that the kernel is asked to keep between two reads, some 80 poses. It keeps the oldest: the less, the newer."""
 DRAIN = 128
 """Most datagrams that one `read` takes, which is more than the buffer holds; most are thrown away unread."""
+T = TypeVar("T")
 _TIMESTAMP = 35  # SO_TIMESTAMPNS of Linux, which Python's socket module does not name
 
 
 @register("udp", "udp:PORT or udp:HOST:PORT, with HOST an address of this machine; without it 127.0.0.1")
-def open_udp(where: str) -> "UdpSource":
+def open_udp(where: str) -> "UdpSource[Sample]":
     """Listen at [HOST:]PORT."""
+    return UdpSource(*address_of(where))
+
+
+def address_of(where: str) -> tuple[str, int]:
+    """Where to listen, by [HOST:]PORT.
+
+    Raises:
+        MalformedError: when it is not written so.
+    """
     host, _, port = where.rpartition(":")
-    return UdpSource(host or "127.0.0.1", port_of(port))
+    return host or "127.0.0.1", port_of(port)
 
 
-class UdpSource:
+class UdpSource(Generic[T]):
     """One JSON object per datagram; bound to an address of this machine."""
 
-    def __init__(self, host: str, port: int) -> None:
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        parse: Callable[..., Any] = parse_pose,
+        what: str = "pose",
+        *,
+        tells_sender: bool = False,
+    ) -> None:
         """Bind.
 
         Args:
             host: address of this machine; 0.0.0.0 listens to the whole network.
             port: 0 takes a free one.
+            parse: what a datagram says; takes it and the time of its arrival, s.
+            what: to call a datagram in messages.
+            tells_sender: whether `parse` is told the address that a datagram came from, too.
 
         Raises:
             ValueError: when it cannot be bound.
         """
-        self._inbox = Inbox(parse_pose)
+        self._inbox: Inbox[T] = Inbox(parse)
+        self._what, self._tells_sender = what, tells_sender
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
@@ -49,7 +73,7 @@ class UdpSource:
         except OSError as error:
             self._socket.close()
             raise ValueError(
-                f"pose source udp:{host}:{port} cannot be bound: {error.strerror}; accepted: an address of this "
+                f"{what} source udp:{host}:{port} cannot be bound: {error.strerror}; accepted: an address of this "
                 "machine and a port that no other program listens to"
             ) from None
         self.address: tuple[str, int] = self._socket.getsockname()
@@ -64,22 +88,25 @@ class UdpSource:
         """What was wrong last."""
         return self._inbox.problem
 
-    def read(self, now: float) -> list[Sample]:
+    def read(self, now: float) -> list[T]:
         """Datagrams since the last call; `received` is when the kernel took them, not when they were read."""
         del now
         for _ in range(DRAIN):
             try:
-                message, extra, flags, _ = self._socket.recvmsg(LONGEST, 64)
+                message, extra, flags, address = self._socket.recvmsg(LONGEST, 64)
             except BlockingIOError:
                 break
             except OSError as error:
                 self._inbox.refuse(f"{self.describe()}: {error.strerror or error}")
                 break
             if flags & socket.MSG_TRUNC:
-                self._inbox.refuse(f"pose: a datagram of more than {LONGEST} bytes; accepted: at most {LONGEST}")
+                self._inbox.refuse(
+                    f"{self._what}: a datagram of more than {LONGEST} bytes; accepted: at most {LONGEST}"
+                )
             else:
                 # not `now`: this process may have been held up since, and a time too early would spoil the clock map
-                self._inbox.put(message, time.monotonic() - _waited(extra))
+                sender = (f"{address[0]}:{address[1]}",) if self._tells_sender else ()
+                self._inbox.put(message, time.monotonic() - _waited(extra), *sender)
         return self._inbox.take()
 
     def close(self) -> None:

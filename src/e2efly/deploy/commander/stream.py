@@ -1,0 +1,129 @@
+"""What is known of a stream of commands: the newest that can be flown by, how old it is, what was refused. Pure."""
+
+import math
+from dataclasses import dataclass, replace
+
+from e2efly.deploy.commander.command import Command, Limits, within
+from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.pose.clock import ClockMap, follow_clock, start_clock
+
+STEADY_S = 0.3
+"""Commands must have come for so long, s, none of them refused and none too late, before a commander takes over."""
+CLOCK_JUMP = 0.05
+"""Steps forward of the sender's clock larger than this are refused, s."""
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Commands so far. `Stream()` before the first."""
+
+    command: Command | None = None
+    """The newest that was accepted, within the limits."""
+    time: float = -math.inf
+    """When it was made, or where it does not say, when it arrived, s on the local monotonic clock."""
+    accepted: float = -math.inf
+    """When it was, s."""
+    since: float = math.inf
+    """Since when commands have been coming without a gap or a refusal, s; infinite: they do not."""
+    clock: ClockMap | None = None
+    """From the sender's clock to this machine's."""
+    taken: int = 0
+    """Commands that were accepted."""
+    refused: int = 0
+    """Messages that were not."""
+    clipped: int = 0
+    """Commands with a number beyond the vehicle's limits."""
+    problem: str = ""
+    """Why the last message was refused that was."""
+    problem_time: float = -math.inf
+    """When it was, s."""
+
+    def age(self, now: float) -> float:
+        """Of the newest command, s; infinite before the first."""
+        return now - self.time
+
+
+def take(
+    stream: Stream,
+    command: Command,
+    limits: Limits,
+    odometry: Odometry | None,
+    now: float,
+    timeout: float,
+    *,
+    flying: bool = False,
+) -> Stream:
+    """Take a message in.
+
+    Args:
+        stream: so far.
+        command: as it was read.
+        limits: of the flight.
+        odometry: where the vehicle is; None: not known.
+        now: s on the local monotonic clock.
+        timeout: an older command is too old, s.
+        flying: whether the commander flies: only while it does not may a stream that was silent begin anew, with
+            another clock or another sender. Otherwise stamps that stand would be accepted once every time-out.
+    """
+    silent = stream.age(now) > timeout and not flying
+    first = command.sender if silent or stream.command is None else stream.command.sender
+    try:
+        if command.sender != first:
+            raise ValueError(f"command: from {command.sender}, while {first} commands; accepted: one commander")
+        clock, time = _dated(None if silent else stream.clock, command)
+        if not now - time <= timeout:
+            raise ValueError(f"command: it is {now - time:.3f} s old; accepted: at most {timeout:g}")
+        fitting = within(limits, command, odometry)
+    except ValueError as error:
+        return refuse(stream, str(error), now)
+    since = time if silent else min(stream.since, time)
+    return replace(
+        stream, command=fitting, time=time, accepted=now, since=since, clock=clock, taken=stream.taken + 1,
+        clipped=stream.clipped + fitting.clipped,
+    )  # fmt: skip
+
+
+def _dated(clock: ClockMap | None, command: Command) -> tuple[ClockMap | None, float]:
+    """The clock's map with a command, and when it was made, s on the local monotonic clock."""
+    received, stamp = command.received, command.stamp
+    if stamp is None:
+        return clock, received
+    if clock is None:
+        return start_clock(received, stamp), received
+    said = f"command: stamp is {stamp:.3f} s"
+    if stamp <= clock.stamp:
+        raise ValueError(f"{said}; accepted: later than that of the one before, {clock.stamp:.3f}")
+    if (jump := clock.offset - (received - stamp)) > CLOCK_JUMP:
+        raise ValueError(f"{said}, a jump of the sender's clock by {jump:.3f}; accepted: a steady clock")
+    return follow_clock(clock, received, stamp)
+
+
+def refuse(stream: Stream, problem: str, now: float, count: int = 1) -> Stream:
+    """Count messages that are no commands: they move nothing."""
+    return replace(stream, since=math.inf, refused=stream.refused + count, problem=problem, problem_time=now)
+
+
+def silence(stream: Stream, now: float, timeout: float, source_problem: str | None = None) -> str | None:
+    """Why there is no command to fly by now; None: there is one.
+
+    Args:
+        stream: so far.
+        now: s.
+        timeout: an older command is too old, s.
+        source_problem: what ails the source.
+    """
+    age = stream.age(now)
+    if age <= timeout:
+        return None
+    none = "no command has come yet" if math.isinf(age) else f"no good command for {age:.2f} s; accepted: {timeout:g}"
+    why = stream.problem if stream.problem_time > stream.accepted else source_problem
+    return f"{none} ({why})" if why else none
+
+
+def unsteady(stream: Stream, now: float) -> str | None:
+    """Why a commander that is heard must not take over yet; None: it may."""
+    going = now - stream.since
+    if going >= STEADY_S:
+        return None
+    why = f" ({stream.problem})" if now - stream.problem_time < STEADY_S else ""
+    return f"good commands have come for {max(going, 0.0):.2f} s; accepted: {STEADY_S:g}{why}"

@@ -1,0 +1,117 @@
+"""Commanders in tests: commands as bytes, through the real parser, or over a real socket in a rig's time."""
+
+import dataclasses
+import json
+import math
+import socket
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from e2efly.deploy.commander.command import Command
+from e2efly.deploy.commander.sources import open_commands
+
+
+def encode(**content: Any) -> bytes:
+    return json.dumps(content).encode()
+
+
+class Loopback:
+    """A real UDP source and its sender; what has arrived counts as arrived at the time of the next `read`."""
+
+    def __init__(self) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port = probe.getsockname()[1]
+        self.source = open_commands(f"udp:{self.port}")
+        self.sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+
+    def __enter__(self) -> "Loopback":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def send(self, message: bytes) -> None:
+        self.sender.sendto(message, ("127.0.0.1", self.port))
+
+    @property
+    def refused(self) -> int:
+        return self.source.refused
+
+    @property
+    def problem(self) -> str | None:
+        return self.source.problem
+
+    def read(self, now: float) -> list[Command]:
+        return [dataclasses.replace(command, received=now) for command in self.source.read(now)]
+
+    def close(self) -> None:
+        self.sender.close()
+        self.source.close()
+
+    def describe(self) -> str:
+        return self.source.describe()
+
+
+def _is_position(command: Command) -> None:
+    np.testing.assert_array_equal(command.main, [1, 0, 1.5])
+    assert command.yaw is not None
+    assert abs(command.yaw - math.pi / 2) < 1e-9
+    assert (command.mode, command.stamp) == ("position", 1700000000.5)
+
+
+def _is_velocity(command: Command) -> None:
+    np.testing.assert_array_equal(command.main, [0.5, 0, 0])
+    assert (command.mode, command.yaw_rate, command.altitude) == ("velocity", -0.25, None)
+
+
+def _is_acceleration(command: Command) -> None:
+    np.testing.assert_array_equal(command.main, [0, 2, 0])
+    assert (command.mode, command.yaw, command.yaw_rate) == ("acceleration", None, None)
+
+
+def _is_ctbr(command: Command) -> None:
+    np.testing.assert_array_equal(command.main, [0, 0.5, 0])
+    assert (command.mode, command.thrust, command.stamp) == ("ctbr", 9.5, 4.25)
+
+
+TOPICS: dict[str, Callable[[Command], None]] = {
+    "/position": _is_position,
+    "/velocity": _is_velocity,
+    "/acceleration": _is_acceleration,
+    "/json": _is_ctbr,
+}
+"""The topics of the publishers of ROS 1 and ROS 2 that are commands, and what each is to say."""
+
+
+def first(text: str) -> Command:
+    """The first command that a source delivers."""
+    source = open_commands(text)
+    try:
+        deadline = time.monotonic() + 20
+        while time.monotonic() < deadline:
+            if commands := source.read(time.monotonic()):
+                assert 0 <= time.monotonic() - commands[0].received < 5
+                return commands[0]
+            time.sleep(0.01)
+        raise AssertionError(f"{source.describe()} delivered nothing: {source.problem}")
+    finally:
+        source.close()
+
+
+def refused(text: str) -> str:
+    """What a source says of a stream of which nothing is accepted."""
+    source = open_commands(text)
+    try:
+        deadline = time.monotonic() + 20
+        while source.problem is None and time.monotonic() < deadline:
+            assert source.read(time.monotonic()) == []
+            time.sleep(0.01)
+        assert source.refused >= 1
+        return str(source.problem)
+    finally:
+        source.close()
