@@ -32,7 +32,12 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> FlightLog:
             telemetry.record("imu", now, {"gyro": [1.0, 2.0, 3.0], "specific_force": [0.0, 0.1, 9.81]})
             telemetry.record("imu", now, {"attitude": [0.0, 0.0, 0.1]})
             telemetry.record("command", now, {"collective_thrust": 12.0, "body_rate": [0.0, -1.0, 0.5], "yaw": 0.0})
-            policy = {"observation": [0.5, None, -2.0], "action": [0.1, -0.2, 0.3, -0.4], "inference_s": 1e-4, "step": i}
+            policy = {
+                "observation": [0.5, None, -2.0],
+                "action": [0.1, -0.2, 0.3, -0.4],
+                "inference_s": 1e-4,
+                "step": i,
+            }
             telemetry.record("policy", now, policy)
             telemetry.record("rc", now, {"channels": [1500, 1000, 2000, 1750]})
         telemetry.record("battery", start, {"voltage": 15.5, "current": 8.0, "cells": 4})

@@ -5,13 +5,16 @@ import select
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pose.json_source import Lines, parse_pose
 from e2efly.deploy.pose.source import Inbox
 from e2efly.deploy.terminal import printable
 
+T = TypeVar("T")
 SCRIPT = Path(__file__).parent / "process" / "pose_relay.py"
 """What runs in the process."""
 OPENING = 15.0
@@ -157,13 +160,27 @@ def open_relay(name: str, pythons: list[str], advice: str, *arguments: str) -> R
     Raises:
         ValueError: with what each interpreter says, and the advice.
     """
+    return first_that_opens(pythons, advice, lambda python: RelaySource(name, python, *arguments))
+
+
+def first_that_opens(pythons: list[str], advice: str, start: Callable[[str], T]) -> T:
+    """Start something by the first interpreter that has its package.
+
+    Args:
+        pythons: interpreters to try.
+        advice: what to do where none has it.
+        start: starts it by an interpreter; it raises ValueError with what the interpreter says.
+
+    Raises:
+        ValueError: with what each interpreter says, and the advice.
+    """
     problems = []
     for python in dict.fromkeys(pythons):
         if not Path(python).exists():
             problems.append(f"{python} does not exist")
             continue
         try:
-            return RelaySource(name, python, *arguments)
+            return start(python)
         except ValueError as error:
             problems.append(f"{python}: {error}")
             if "ImportError" not in str(error) and "ModuleNotFoundError" not in str(error):

@@ -22,7 +22,8 @@ MAGIC = b"E2EIMG01"
 TYPES = (np.dtype("<f4"), np.dtype("u1"), np.dtype("<u2"))
 """By number: the value itself; 255 for 1; millimetres."""
 _HEADER, _SEQUENCE, _SLOT = struct.Struct("<8s4I2d"), struct.Struct("<Q"), struct.Struct("<Qd")
-_AT_SEQUENCE, _AT_SLOTS = 40, 48
+AT_SEQUENCE, AT_SLOTS = 40, 48
+"""Where the number of the newest image is, and the first of the two places for images."""
 _TRIES = 3
 """How often a reader begins anew where the publisher has overtaken it."""
 
@@ -53,7 +54,7 @@ class Layout:
     @property
     def size(self) -> int:
         """Bytes of all."""
-        return _AT_SLOTS + 2 * self.slot
+        return AT_SLOTS + 2 * self.slot
 
     def packed(self) -> bytes:
         """The header."""
@@ -119,7 +120,7 @@ class SharedImages:
         self.layout = Layout.of(wanted.packed(), "shape")
         self.path = place(name)
         self._memory = self._taken() or self._made()
-        (self._count,) = _SEQUENCE.unpack_from(self._memory, _AT_SEQUENCE)
+        (self._count,) = _SEQUENCE.unpack_from(self._memory, AT_SEQUENCE)
 
     def _taken(self) -> mmap.mmap | None:
         """The room of an earlier publisher, where its images are the same: who reads them goes on."""
@@ -155,11 +156,11 @@ class SharedImages:
                 f"image has shape {image.shape} and type {image.dtype}; accepted: {self.layout.shape} and {dtype.name}"
             )
         self._count += 1
-        at = _AT_SLOTS + (self._count % 2) * self.layout.slot
+        at = AT_SLOTS + (self._count % 2) * self.layout.slot
         _SLOT.pack_into(self._memory, at, self._count, time)  # first: who reads the old image sees that it goes
         content = np.ascontiguousarray(image).tobytes()
         self._memory[at + _SLOT.size : at + _SLOT.size + len(content)] = content
-        _SEQUENCE.pack_into(self._memory, _AT_SEQUENCE, self._count)
+        _SEQUENCE.pack_into(self._memory, AT_SEQUENCE, self._count)
 
     def close(self) -> None:
         """Let go; what was published stays until the machine restarts, and grows too old to be flown by."""
@@ -199,11 +200,11 @@ class SharedCamera:
         """The newest image, where it is new."""
         del now
         for _ in range(_TRIES):
-            (count,) = _SEQUENCE.unpack_from(self._memory, _AT_SEQUENCE)
+            (count,) = _SEQUENCE.unpack_from(self._memory, AT_SEQUENCE)
             if count == self._last:
                 return []
             layout = self._layout
-            at = _AT_SLOTS + (count % 2) * layout.slot
+            at = AT_SLOTS + (count % 2) * layout.slot
             begun, time = _SLOT.unpack_from(self._memory, at)
             size = layout.height * layout.width * layout.channels
             raw = np.frombuffer(self._memory, TYPES[layout.kind], size, at + _SLOT.size).copy()
