@@ -205,6 +205,25 @@ def test_a_process_that_stands_still_costs_the_loop_nothing_and_the_log_no_messa
     assert "/mode" in topics and "/odometry" in topics
 
 
+def test_a_browser_that_stalls_holds_up_neither_the_process_nor_another_browser(lives: list[Live]) -> None:
+    live = Live(targets_of(["foxglove:0"]), [CAMERA])
+    lives.append(live)
+    port, image = int(live.outlets[0].detail.rpartition(":")[2]), f"/image/{CAMERA.name}"
+    stalled, other = FoxgloveClient("127.0.0.1", port), FoxgloveClient("127.0.0.1", port)
+    stalled.subscribe(image)  # and never reads again
+    other.subscribe("odometry")
+    told = 0
+    for i in range(1500):  # more than the sockets between them keep
+        live.show([Seen(CAMERA, Frame(time.monotonic(), picture(1 + i / 1500)))])
+        live.record("odometry", time.monotonic(), {**ODOMETRY, "age": float(i)})
+        time.sleep(0.001)
+    while told < 1499:
+        told = json.loads(other.message("odometry")[1])["age"]
+    assert live.outlets[0].dropped == 0
+    stalled.close()
+    other.close()
+
+
 def test_a_process_that_is_killed_is_told_once_and_another_goes_on(tmp_path: Path, lives: list[Live]) -> None:
     said: list[str] = []
     live = Live(targets_of(["foxglove:0", f"bag:{tmp_path / 'live.bag'}"]))

@@ -80,9 +80,9 @@ class Fly:
     """Only look: print every setting that matters, what it is, what is needed and what mends it. Sends no sticks."""
     log: Path | None = None
     """Flight log to write; flights/DATE.mcap when left out."""
-    live: tuple[str, ...] = ()
+    live: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Where to publish the flight while it lasts: foxglove[:[HOST:]PORT], ros1[:/PREFIX], ros2[:/PREFIX],
-    mcap:FILE.mcap, bag:FILE.bag; several are allowed. See docs/telemetry.md."""
+    mcap:FILE.mcap or bag:FILE.bag; may be repeated. See docs/telemetry.md."""
     throttle_map: Path | None = None
     """Throttle map that an earlier flight learned (.throttle.json)."""
     watchdog: bool = True

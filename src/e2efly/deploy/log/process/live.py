@@ -99,7 +99,7 @@ def main(text: str) -> None:
         peer = make(config, put)
         say("ready", peer.detail)
     except Exception as error:
-        say("failed", "%s: %s" % (type(error).__name__, error))  # noqa: UP031
+        say("failed", f"{type(error).__name__}: {error}")
         os._exit(1)
     threading.Thread(target=receive, daemon=True).start()
     going, flushed = True, time.monotonic()
@@ -116,7 +116,7 @@ def main(text: str) -> None:
                 flushed = time.monotonic()
                 peer.flush()
         except Exception as error:  # of one record: the next may do
-            problem = "%s: %s" % (type(error).__name__, error)  # noqa: UP031
+            problem = f"{type(error).__name__}: {error}"
             if problem not in told and len(told) < PROBLEMS:
                 told.add(problem)
                 say("problem", problem[:300])
@@ -124,7 +124,7 @@ def main(text: str) -> None:
         peer.close()
         say("lost", str(lost[0]))
     except Exception as error:
-        say("problem", "at the end: %s: %s" % (type(error).__name__, error))  # noqa: UP031
+        say("problem", f"at the end: {type(error).__name__}: {error}")
     os._exit(0)  # without the packages' own farewells, which may hang
 
 
