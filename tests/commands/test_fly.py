@@ -13,6 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
 
 from e2efly.commands.fly import Fly, parse
 from e2efly.commands.fly import run as fly_command
@@ -61,8 +63,11 @@ def test_hostile_datagrams_forge_no_line_and_a_hang_up_ends_it_with_a_closed_log
     port, terminal, log = free_port(), Terminal(), tmp_path / "flight.mcap"
     with controller(recorded) as client, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         command = [sys.executable, "-m", "e2efly", "fly", "--vehicle", "vis_r", "--link", client.link.name]  # type: ignore
+        live = ("--live", f"mcap:{tmp_path / 'live.mcap'}", "--live", f"bag:{tmp_path / 'live.bag'}")
         process = subprocess.Popen(
-            [*command, "--pose", f"udp:{port}", "--log", str(log)], stdout=terminal.theirs, stderr=terminal.theirs
+            [*command, "--pose", f"udp:{port}", "--log", str(log), *live],
+            stdout=terminal.theirs,
+            stderr=terminal.theirs,
         )
         os.close(terminal.theirs)
         try:
@@ -84,6 +89,11 @@ def test_hostile_datagrams_forge_no_line_and_a_hang_up_ends_it_with_a_closed_log
     read = read_log(log)
     assert read.cut_off == ""
     assert len(read["command"]) > 20
+    with (tmp_path / "live.mcap").open("rb") as file:  # what was published live, by processes that have ended too
+        topics = [channel.topic for _, channel, _ in make_reader(file).iter_messages()]
+    assert abs(topics.count("/command") - len(read["command"])) <= 0.01 * len(read["command"])
+    with AnyReader([tmp_path / "live.bag"]) as reader:
+        assert reader.topics["/command"].msgcount > 20
 
 
 def test_a_craft_s_name_is_neither_markup_nor_an_escape_sequence(capsys: pytest.CaptureFixture) -> None:

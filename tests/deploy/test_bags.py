@@ -10,8 +10,10 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from e2efly.deploy.log.bags import BODY_FRAME, TOPICS, WORLD_FRAME, export_bag
-from e2efly.deploy.log.flight_log import FlightLog, read_log
+from e2efly.deploy.log.bags import export_bag
+from e2efly.deploy.log.channels import CHANNELS
+from e2efly.deploy.log.flight_log import FlightLog, Series, read_log
+from e2efly.deploy.log.process.ros_topics import BODY_FRAME, TOPICS, WORLD_FRAME
 from e2efly.deploy.log.telemetry import Telemetry
 
 HALF = math.sqrt(0.5)
@@ -30,6 +32,13 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> FlightLog:
             telemetry.record("imu", now, {"gyro": [1.0, 2.0, 3.0], "specific_force": [0.0, 0.1, 9.81]})
             telemetry.record("imu", now, {"attitude": [0.0, 0.0, 0.1]})
             telemetry.record("command", now, {"collective_thrust": 12.0, "body_rate": [0.0, -1.0, 0.5], "yaw": 0.0})
+            policy = {
+                "observation": [0.5, None, -2.0],
+                "action": [0.1, -0.2, 0.3, -0.4],
+                "inference_s": 1e-4,
+                "step": i,
+            }
+            telemetry.record("policy", now, policy)
             telemetry.record("rc", now, {"channels": [1500, 1000, 2000, 1750]})
         telemetry.record("battery", start, {"voltage": 15.5, "current": 8.0, "cells": 4})
         change = {"mode": "POLICY", "previous": "HOVER", "reasons": ["switch", "inside its envelope"]}
@@ -54,7 +63,8 @@ def test_a_bag_says_what_the_log_says_in_ros_s_words(tmp_path: Path, log: Flight
     counts = export_bag(log, path, version)
     bag = read(path, version)
     assert counts == {topic: len(messages) for topic, messages in bag.items()}
-    assert counts == {"/odometry": 21, "/imu": 20, "/command": 20, "/rc": 20, "/battery": 1, "/mode": 1}
+    assert counts == {"/odometry": 21, "/imu": 20, "/command": 20, "/rc": 20, "/battery": 1, "/mode": 1,
+                      "/policy/observation": 20, "/policy/action": 20}  # fmt: skip
 
     stamp, odometry = bag["/odometry"][3]
     assert stamp == log["odometry"].stamp[3]
@@ -76,6 +86,8 @@ def test_a_bag_says_what_the_log_says_in_ros_s_words(tmp_path: Path, log: Flight
     battery = bag["/battery"][0][1]
     assert (battery.voltage, battery.current, len(battery.cell_voltage)) == (15.5, -8.0, 4)
     np.testing.assert_allclose(bag["/rc"][0][1].axes, [0.0, -1.0, 1.0, 0.5])
+    np.testing.assert_allclose(bag["/policy/observation"][0][1].data, [0.5, math.nan, -2.0])
+    np.testing.assert_allclose(bag["/policy/action"][0][1].data, [0.1, -0.2, 0.3, -0.4], rtol=1e-6)
     assert bag["/mode"][0][1].data == "HOVER -> POLICY: switch; inside its envelope"
 
 
@@ -93,5 +105,13 @@ def test_what_cannot_be_written_is_refused_by_name(tmp_path: Path, log: FlightLo
     assert list(tmp_path.iterdir()) == []
 
 
-def test_every_topic_is_made_of_a_channel_of_its_own() -> None:
-    assert len({topic.name for topic in TOPICS}) == len({topic.channel for topic in TOPICS}) == len(TOPICS)
+def test_every_topic_has_a_name_of_its_own_and_a_channel_of_the_log() -> None:
+    assert len({topic.name for topic in TOPICS}) == len(TOPICS)
+    assert {topic.channel for topic in TOPICS} <= set(CHANNELS)
+
+
+def test_a_message_that_is_not_of_its_schema_is_named(tmp_path: Path, log: FlightLog) -> None:
+    bad = Series("rc", log["rc"].stamp[:1], log["rc"].time[:1], ({"channels": ["left"]},))
+    with pytest.raises(ValueError, match=r"flight log: rc has \{'channels': \['left'\]\}"):
+        export_bag(FlightLog(log.path, {"rc": bad}, {}, ""), tmp_path / "c", 2)
+    assert list(tmp_path.iterdir()) == []

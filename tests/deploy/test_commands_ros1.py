@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from e2efly.deploy.child import SYSTEM_PYTHON
 from e2efly.deploy.commander.sources import open_commands
-from e2efly.deploy.pose.relay import SYSTEM_PYTHON
 from tests.deploy.command_streams import TOPICS, first, refused
 from tests.deploy.test_pose_ros1 import ros  # noqa: F401
 

@@ -343,7 +343,7 @@ def recorded(code: int) -> bytes:
 def controller(reply: Callable[[int], bytes]) -> Iterator[Client]:
     """A client connected by TCP to a peer that answers as `reply` says, one connection after the other."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        listener.settimeout(10.0)
+        listener.settimeout(60.0)  # a client may first start processes of its own, on a busy machine
 
         def serve() -> None:
             while True:

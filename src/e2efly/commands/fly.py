@@ -28,6 +28,8 @@ from e2efly.deploy.commander.sources import open_commands
 from e2efly.deploy.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
 from e2efly.deploy.excitation import NAME as EXCITATION
 from e2efly.deploy.flight_loop import LOWEST_RATE, fly, loop_rate
+from e2efly.deploy.log.live import Live, targets_of
+from e2efly.deploy.log.record import Log, Logs
 from e2efly.deploy.log.telemetry import Telemetry
 from e2efly.deploy.pilot import throttle_map
 from e2efly.deploy.pilot.hover import roll_pitch
@@ -83,6 +85,9 @@ class Fly:
     """Only look: print every setting that matters, what it is, what is needed and what mends it. Sends no sticks."""
     log: Path | None = None
     """Flight log to write; flights/DATE.mcap when left out."""
+    live: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    """Where to publish the flight while it lasts: foxglove[:[HOST:]PORT], ros1[:/PREFIX], ros2[:/PREFIX],
+    mcap:FILE.mcap or bag:FILE.bag; may be repeated. See docs/telemetry.md."""
     throttle_map: Path | None = None
     """Throttle map that an earlier flight learned (.throttle.json)."""
     watchdog: bool = True
@@ -163,11 +168,14 @@ def run(options: Fly) -> int:
     known = throttle_map.from_json(_read(saved, "--throttle-map"), body) if saved else None
     if options.image and loaded is None:
         raise ValueError(f"--image is {options.image[0]!r}; accepted: none, as no policy sees it")
+    targets = targets_of(options.live)
     cameras = [] if loaded is None else open_cameras(options.image, loaded.contract)
     open_link(options.link).close()  # a wrong text is refused here rather than by the watchdog
     with ExitStack() as stack:
         for camera in cameras:
             stack.callback(camera.close)
+        live = Live(() if options.check else targets, contract.images if contract else ())
+        stack.callback(live.close)
         source = open_source(options.pose)
         stack.callback(source.close)
         commands = None if options.commands is None else open_commands(options.commands)
@@ -193,21 +201,26 @@ def run(options: Fly) -> int:
         stack.callback(stop.restore)
         path = options.log or Path("flights") / time.strftime("%Y-%m-%d_%H-%M-%S.mcap")
         telemetry = stack.enter_context(Telemetry(path))
-        bridge.log = telemetry
-        _record_meta(telemetry, bridge, body, contract.to_json() if contract else "", rows)
+        log = Logs((telemetry, live)) if targets else telemetry
+        bridge.log = log
+        _record_meta(log, bridge, body, contract.to_json() if contract else "", rows)
         rate = loop_rate(contract.control_rate_hz) if contract else LOWEST_RATE
         say = Speaker(sys.stdout)
         stack.callback(say.close)
+        live.say = say
 
         def again() -> ControllerInfo | None:
             return _identify_again(bridge, body, settings, contract, say)
 
+        for line in live.describe():
+            say(f"live {line}")
         say(f"{rate:g} Hz, log {path}. Ctrl-C lands.")
         timing = fly(
-            bridge, rate, log=telemetry, watchdog=held if isinstance(held, WatchedLink) else None, say=say,
+            bridge, rate, log=log, live=live, watchdog=held if isinstance(held, WatchedLink) else None, say=say,
             stop=stop, identify_again=again,
         )  # fmt: skip
         telemetry.close()
+        live.close()
         late = sorted(timing.lateness)
         p99 = 1e3 * late[int(0.99 * (len(late) - 1))] if late else 0.0
         say(f"{timing.rounds} control steps, late by {p99:.1f} ms (p99), {timing.missed} missed.")
@@ -215,6 +228,8 @@ def run(options: Fly) -> int:
             say(f"log: {problem} ({count} times)")
         if telemetry.missing:
             say(f"log: {telemetry.missing}")
+        for problem in live.problems:
+            say(f"live {problem}")
         path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map), encoding="utf-8")
         if excited:
             say(f"Next: e2efly identify flight {path} --vehicle {options.vehicle} --mass KG SIGMA")
@@ -350,7 +365,7 @@ def _commands(commander: Commander, bridge: Bridge) -> str:
     return f"{counted}{mode}"
 
 
-def _record_meta(log: Telemetry, bridge: Bridge, body: Vehicle, contract: str, rows: tuple[Row, ...]) -> None:
+def _record_meta(log: Log, bridge: Bridge, body: Vehicle, contract: str, rows: tuple[Row, ...]) -> None:
     settings = {
         "flight": dataclasses.asdict(bridge.settings),
         "controller": {row.setting: row.value for row in rows},

@@ -15,6 +15,7 @@ from e2efly.deploy.betaflight.instruments import CLOSED
 from e2efly.deploy.betaflight.watchdog import Plan, WatchedLink
 from e2efly.deploy.bridge import Bridge
 from e2efly.deploy.clock import MONOTONIC, Clock
+from e2efly.deploy.log.live import Live
 from e2efly.deploy.log.record import Log
 from e2efly.deploy.pilot.flight_state import Mode
 from e2efly.deploy.pilot.hover import blind, blind_time, sink_time
@@ -57,6 +58,7 @@ def fly(
     rate: float,
     *,
     log: Log | None = None,
+    live: Live | None = None,
     watchdog: WatchedLink | None = None,
     say: Callable[[str], None] = print,
     stop: Callable[[], bool] = lambda: False,
@@ -69,6 +71,7 @@ def fly(
         bridge: what to run.
         rate: control steps a second, Hz.
         log: the flight's record.
+        live: shows what the policy sees while it flies; its records come by `log`.
         watchdog: told what to do should this process fall silent.
         say: takes lines for people; it must not block. What it raises is lost with its line.
         stop: whether to end; a vehicle in the air is landed first.
@@ -98,6 +101,8 @@ def fly(
                 due = now = clock.now()
                 late = 0.0
             bridge.tick(now, late, slack=period / 2)
+            if live is not None:
+                live.show(bridge.seen)
             if watchdog is not None and now - last_plan >= PLAN_PERIOD:
                 last_plan = now
                 watchdog.plan(plan_of(bridge))

@@ -38,7 +38,7 @@ class McapFile:
         Raises:
             ValueError: when it cannot be written.
         """
-        data = _encode(values)
+        data = encode(values)
         if not 0 <= when < 1 << 63:
             raise ValueError(f"log time {when} ns; accepted: 0 or more, below 2^63")
         if channel not in self._channels:
@@ -70,7 +70,7 @@ class McapFile:
         block.take()  # the file begins with it already
         known = dict.fromkeys((*self._channels, "event"))  # in their order, so that each has the number that it had
         numbers = {channel: _register(writer, channel) for channel in known}
-        writer.add_message(numbers["event"], when, _encode(event), when, number & 0xFFFFFFFF)
+        writer.add_message(numbers["event"], when, encode(event), when, number & 0xFFFFFFFF)
         writer.flush()
         data = block.take()
         try:
@@ -150,7 +150,12 @@ def _text(value: Any) -> str:
     return text.encode("utf-8", "backslashreplace").decode()
 
 
-def _encode(values: Mapping[str, Any]) -> bytes:
+def encode(values: Mapping[str, Any] | list[Any]) -> bytes:
+    """A record as JSON, with null for a number that is not finite.
+
+    Raises:
+        TypeError: for what JSON has not.
+    """
     try:
         return json.dumps(values, allow_nan=False, default=_plain, separators=(",", ":")).encode()
     except ValueError:  # a number that is not finite, which is rare: the fast way is tried first

@@ -27,6 +27,19 @@ class Log(Protocol):
 
 
 @dataclass(frozen=True)
+class Logs:
+    """Several logs as one."""
+
+    logs: tuple[Log, ...]
+    """Each gets every message."""
+
+    def record(self, channel: str, time: float, values: dict[str, Any]) -> None:
+        """Keep a message of a channel in each."""
+        for log in self.logs:
+            log.record(channel, time, values)
+
+
+@dataclass(frozen=True)
 class Sent:
     """What a control step sent."""
 

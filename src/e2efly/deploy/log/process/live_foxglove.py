@@ -1,0 +1,97 @@
+"""A flight's records for Foxglove, by a WebSocket server of the package `foxglove-sdk`.
+
+The channels are those of the flight log, under the same names, so that a layout made for one shows the other. Beside
+them: `/tf`, where the vehicle is, for the 3D panel, and `/image/NAME`, what the policy sees.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+from typing import Any, Callable  # noqa: UP035  # Python 3.8
+
+RARE = ("mode", "event", "meta")
+"""Channels whose last message is sent again to whoever subscribes: the next may be long in coming."""
+BACKLOG = 256
+"""Messages that wait for a slow browser; the oldest are thrown away first."""
+
+
+class Foxglove:
+    """The server."""
+
+    def __init__(self, config: dict[str, Any], put: Callable[[Any], None]) -> None:
+        foxglove = importlib.import_module("foxglove")
+        self._messages, channels = (
+            importlib.import_module("foxglove.messages"),
+            importlib.import_module("foxglove.channels"),
+        )
+        self._words = importlib.import_module("ros_topics")
+        foxglove.set_log_level("ERROR")
+        self._channels = {
+            name: foxglove.Channel(
+                name,
+                message_encoding="json",
+                schema=foxglove.Schema(name=f"e2efly.{name}", encoding="jsonschema", data=json.dumps(schema).encode()),
+            )
+            for name, schema in config["schemas"].items()
+        }
+        self._last: dict[str, tuple[int, dict[str, Any]]] = {}
+        self._transform = channels.FrameTransformChannel("/tf")
+        self._images = {
+            name: (layout, channels.RawImageChannel(f"/image/{name}")) for name, layout in config["images"].items()
+        }
+
+        class Listener(importlib.import_module("foxglove.websocket").ServerListener):
+            def on_subscribe(self, client: Any, channel: Any) -> None:
+                if channel.topic in RARE:
+                    put(("again", 0.0, {"channel": channel.topic}))
+
+        self._server = foxglove.start_server(
+            name="e2efly", host=config["host"], port=config["port"], server_listener=Listener(),
+            message_backlog_size=BACKLOG,
+        )  # fmt: skip
+        self.detail = f"ws://{config['host']}:{self._server.port}"
+
+    def write(self, channel: str, stamp: int, values: dict[str, Any]) -> None:
+        """Publish a record."""
+        if channel == "again":
+            channel = values["channel"]
+            if channel not in self._last:
+                return
+            stamp, values = self._last[channel]
+        elif channel in RARE:
+            self._last[channel] = stamp, values
+        self._channels[channel].log(values, log_time=stamp)
+        if channel == "odometry":
+            self._place(stamp, values)
+
+    def show(self, name: str, stamp: int, data: bytes) -> None:
+        """Publish an image."""
+        layout, channel = self._images[name]
+        size = {key: layout[key] for key in ("width", "height", "encoding", "step")}
+        image = self._messages.RawImage(timestamp=self._time(stamp), frame_id=layout["frame"], data=data, **size)
+        channel.log(image, log_time=stamp)
+
+    def flush(self) -> None:
+        """Nothing waits."""
+
+    def close(self) -> None:
+        """End the server."""
+        self._server.stop()
+
+    def _place(self, stamp: int, values: dict[str, Any]) -> None:
+        position, q = self._words.numbers(values, "position", 3), self._words.numbers(values, "quaternion", 4)
+        if all(map(math.isfinite, position + q)):
+            w, x, y, z = q
+            moved = self._messages.FrameTransform(
+                timestamp=self._time(stamp),
+                parent_frame_id=self._words.WORLD_FRAME,
+                child_frame_id=self._words.BODY_FRAME,
+                translation=self._messages.Vector3(x=position[0], y=position[1], z=position[2]),
+                rotation=self._messages.Quaternion(x=x, y=y, z=z, w=w),
+            )
+            self._transform.log(moved, log_time=stamp)
+
+    def _time(self, stamp: int) -> Any:
+        return self._messages.Timestamp(*divmod(stamp, 10**9))

@@ -1,0 +1,95 @@
+"""Live topics of ROS 1 and ROS 2."""
+
+from __future__ import annotations
+
+import array
+import importlib
+import os
+import sys
+import time
+from typing import Any
+
+Topics: Any = importlib.import_module("live_topics").Topics
+QUEUE = 20
+"""Messages of a topic that wait for a slow subscriber; the oldest are thrown away first."""
+
+
+def fill(message: Any, tree: dict[str, Any]) -> Any:
+    """Set the fields of a message of ROS 1 or 2."""
+    for name, value in tree.items():
+        known = getattr(message, name)
+        if name == "stamp":
+            seconds, rest = divmod(value, 10**9)
+            fill(
+                known, {"sec": seconds, "nanosec": rest} if hasattr(known, "sec") else {"secs": seconds, "nsecs": rest}
+            )
+        elif isinstance(value, dict):
+            fill(known, value)
+        elif isinstance(known, array.array):  # ROS 2, which would look at every entry of a list
+            setattr(message, name, array.array(known.typecode, value))
+        else:
+            setattr(message, name, value)
+    return message
+
+
+def ros_class(kind: str) -> Any:
+    """The class of a message type, such as "nav_msgs/Odometry"."""
+    package, name = kind.split("/")
+    return getattr(importlib.import_module(package + ".msg"), name)
+
+
+class Ros1(Topics):
+    """Publishes by rospy."""
+
+    def __init__(self, config: dict[str, Any]) -> None:
+        self._rospy, rosgraph = importlib.import_module("rospy"), importlib.import_module("rosgraph")
+        ros_class("sensor_msgs/Imu")  # a missing package comes before a missing master
+        if not rosgraph.is_master_online():
+            uri = os.environ.get("ROS_MASTER_URI", "not set")
+            raise RuntimeError(f"no ROS master answers (ROS_MASTER_URI is {uri}); start roscore")
+        self._rospy.init_node("e2efly_live", anonymous=True, disable_signals=True)
+        super().__init__(config)
+        self.detail = f"topics {config['prefix']}/..., rospy of {sys.executable}"
+
+    def advertise(self, topic: str, kind: str, latched: bool) -> Any:
+        """Announce a topic."""
+        return self._rospy.Publisher(topic, ros_class(kind), queue_size=QUEUE, latch=latched)
+
+    def send(self, handle: Any, kind: str, stamp: int, tree: dict[str, Any]) -> None:
+        """Publish; a thread of rospy waits for the subscribers."""
+        handle.publish(fill(ros_class(kind)(), tree))
+
+    def close(self) -> None:
+        """Leave the master."""
+        time.sleep(0.2)  # for rospy's threads to send the last
+        self._rospy.signal_shutdown("the flight has ended")
+
+
+class Ros2(Topics):
+    """Publishes by rclpy."""
+
+    def __init__(self, config: dict[str, Any]) -> None:
+        self._rclpy, self._qos = importlib.import_module("rclpy"), importlib.import_module("rclpy.qos")
+        signals = importlib.import_module("rclpy.signals")
+        self._rclpy.init(signal_handler_options=signals.SignalHandlerOptions.NO)
+        self._node = self._rclpy.create_node(f"e2efly_live_{os.getpid()}")
+        super().__init__(config)
+        self.detail = f"topics {config['prefix']}/..., rclpy of {sys.executable}"
+
+    def advertise(self, topic: str, kind: str, latched: bool) -> Any:
+        """Announce a topic; reliable, so that subscribers of either reliability hear it."""
+        durability = self._qos.DurabilityPolicy
+        profile = self._qos.QoSProfile(
+            depth=1 if latched else QUEUE,
+            durability=durability.TRANSIENT_LOCAL if latched else durability.VOLATILE,
+        )
+        return self._node.create_publisher(ros_class(kind), topic, profile)
+
+    def send(self, handle: Any, kind: str, stamp: int, tree: dict[str, Any]) -> None:
+        """Publish."""
+        handle.publish(fill(ros_class(kind)(), tree))
+
+    def close(self) -> None:
+        """Leave."""
+        self._node.destroy_node()
+        self._rclpy.shutdown()

@@ -1,0 +1,155 @@
+"""What a real subscriber of ROS 1 or 2 hears of a flight: both tests' common part."""
+
+import json
+import subprocess
+import threading
+import time
+from typing import Any
+
+import numpy as np
+
+import e2efly
+from e2efly.deploy.log.live import Live, targets_of
+from e2efly.deploy.sight.source import Frame
+from e2efly.deploy.sight.watch import Seen
+
+CAMERA = e2efly.load_policy("avoid").contract.images[0]
+HALF = float(np.sqrt(0.5))
+IMAGE = np.linspace(0.5, 2.5, CAMERA.height * CAMERA.width, dtype=np.float32).reshape(CAMERA.shape)
+MODE = {"mode": "POLICY", "previous": "HOVER", "reasons": ["switch"]}
+LONGEST = 30.0
+"""How long a subscriber may take to hear everything, s."""
+
+TAKE = """
+import json, sys
+from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import BatteryState, Image, Imu, Joy
+from std_msgs.msg import Float32MultiArray, String
+def seconds(stamp):
+    return stamp.sec + 1e-9 * stamp.nanosec if hasattr(stamp, "sec") else stamp.to_sec()
+kinds = {"odometry": Odometry, "imu": Imu, "command": TwistStamped, "battery": BatteryState, "rc": Joy, "mode": String,
+         "policy/observation": Float32MultiArray, "policy/action": Float32MultiArray, "image/" + sys.argv[2]: Image}
+missing = set(kinds)
+def take(name, m):
+    if name not in missing:
+        return
+    missing.discard(name)
+    stamp = seconds(m.header.stamp) if hasattr(m, "header") else None
+    if name == "odometry":
+        v, p = m.twist.twist.linear, m.pose.pose.position
+        said = [p.x, p.y, p.z, v.x, v.y, v.z, m.header.frame_id, m.child_frame_id]
+    elif name == "imu":
+        said = [m.linear_acceleration.z, m.angular_velocity.x, m.orientation_covariance[0]]
+    elif name == "command":
+        said = [m.twist.linear.z, m.twist.angular.y]
+    elif name == "battery":
+        said = [m.voltage, m.current, len(m.cell_voltage)]
+    elif name == "rc":
+        said = list(m.axes)
+    elif name.startswith("image"):
+        said = [m.height, m.width, m.encoding, m.step, bytes(m.data).hex()]
+    else:
+        said = m.data if name == "mode" else list(m.data)
+    print(json.dumps([name, stamp, said]), flush=True)
+"""
+"""A subscriber's program but for the subscribing: `kinds` by topic, and `take`, which prints the first of each."""
+
+Heard = dict[str, tuple[float | None, Any]]
+
+
+class Subscriber:
+    """A process that prints each topic's first message as JSON."""
+
+    def __init__(self, command: list[str]) -> None:
+        self.heard: Heard = {}
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True)
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def wait_for(self, count: int, deadline: float) -> bool:
+        """Whether it has heard so many topics."""
+        while len(self.heard) < count and time.monotonic() < deadline and self.process.poll() is None:
+            time.sleep(0.01)
+        return len(self.heard) >= count
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        self._reader.join(5)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            name, stamp, said = json.loads(line)
+            self.heard[name] = stamp, said
+
+
+def heard(target: str, prefix: str, command: list[str]) -> Heard:
+    """Fly until a subscriber has heard a message of each topic."""
+    live = Live(targets_of([target]), [CAMERA])
+    subscriber = Subscriber([*command, prefix, CAMERA.name])
+    try:
+        end = time.monotonic() + LONGEST
+        while subscriber.process.poll() is None and time.monotonic() < end:
+            now = time.monotonic()
+            live.record("odometry", now, {
+                "age": 0.0, "position": [1.0, 2.0, 3.0], "velocity": [4.0, 0.0, 0.5],
+                "quaternion": [HALF, 0.0, 0.0, HALF], "body_rate": [0.1, 0.2, 0.3],
+            })  # fmt: skip
+            live.record("imu", now, {"gyro": [1.0, 2.0, 3.0], "specific_force": [0.0, 0.0, 9.81]})
+            live.record("command", now, {"collective_thrust": 12.0, "body_rate": [0.0, -1.0, 0.5]})
+            live.record("battery", now, {"voltage": 15.5, "current": 8.0, "cells": 4})
+            live.record("rc", now, {"channels": [1500, 1000, 2000, 1750]})
+            live.record("policy", now, {"observation": [0.5, None], "action": [0.25, 0.0, 0.0, -1.0], "step": 1})
+            live.record("mode", now, MODE)
+            live.show([Seen(CAMERA, Frame(now, IMAGE))])
+            time.sleep(0.02)
+        subscriber.wait_for(10, time.monotonic() + 2)
+        live.close()
+        assert live.problems == []
+        return subscriber.heard
+    finally:
+        subscriber.close()
+        live.close()
+
+
+def check(said: Heard) -> None:
+    """What `heard` flew, in ROS's words."""
+    values = {name: value for name, (_, value) in said.items()}
+    image = f"image/{CAMERA.name}"
+    assert set(values) == {
+        "ready", "odometry", "imu", "command", "battery", "rc", "mode", "policy/observation", "policy/action", image,
+    }  # fmt: skip
+    for name, (stamp, _) in said.items():
+        assert stamp is None or abs(stamp - time.time()) < 120, name
+    np.testing.assert_allclose(values["odometry"][:6], [1, 2, 3, 0, -4, 0.5], atol=1e-9)
+    assert values["odometry"][6:] == ["map", "base_link"]
+    assert values["imu"] == [9.81, 1.0, -1.0]
+    assert values["command"] == [12.0, -1.0]
+    assert values["battery"] == [15.5, -8.0, 4]
+    assert values["rc"] == [0.0, -1.0, 1.0, 0.5]
+    assert values["mode"] == "HOVER -> POLICY: switch"
+    np.testing.assert_array_equal(values["policy/observation"], [0.5, np.nan])
+    np.testing.assert_array_equal(values["policy/action"], [0.25, 0.0, 0.0, -1.0])
+    height, width, encoding, step, data = values[image]
+    assert (height, width, encoding, step) == (*CAMERA.shape, "32FC1", 4 * CAMERA.width)
+    np.testing.assert_array_equal(np.frombuffer(bytes.fromhex(data), "<f4").reshape(CAMERA.shape), IMAGE)
+
+
+def latched(target: str, prefix: str, command: list[str]) -> Heard:
+    """A subscriber that comes after the only change of mode."""
+    live = Live(targets_of([target]))
+    try:
+        live.record("mode", time.monotonic(), MODE)
+        time.sleep(0.5)
+        subscriber = Subscriber([*command, prefix, CAMERA.name])
+        try:
+            assert subscriber.wait_for(2, time.monotonic() + LONGEST)
+            return subscriber.heard
+        finally:
+            subscriber.close()
+    finally:
+        live.close()
