@@ -23,8 +23,14 @@ _CUT_S = 0.002
 """Wait for a command that was cut short, before it is cut again, s."""
 _SHY = 0.1
 """Of a physics step by which less is asked for than is wanted: AirSim takes the step in which the time ends, too."""
-_TRIES = 400
-"""Of letting the simulator go on, before its clock is said to stand."""
+_LONGER = 1.5
+"""The next time is longer by this factor where none passed: a computer that is busy comes too late to take a step."""
+_TRIES = 30
+"""Of letting the simulator go on in vain, before its clock is said to stand."""
+_STEP_ENDS_S = 0.02
+"""After which a physics step that was under way is over, s."""
+_SAMPLES = 6
+"""Of the clock, of which the smallest change is the physics step."""
 _REST_S, _REST_SPEED = 3.0, 0.02
 """A vehicle stands that was slower than so many m/s at the end of so many seconds at most."""
 
@@ -54,7 +60,6 @@ class Session:
         self._wall = 1 / max(float(self.settings.get("ClockSpeed", 1.0)), 1e-3)
         self.take_over()
         self.step = self._physics_step()
-        self._due = self._now()
 
     def take_over(self) -> None:
         """Put the simulation back to its beginning, take control, arm, pause.
@@ -72,6 +77,8 @@ class Session:
         self._call("simPause", True)
         if not self._call("simIsPaused"):
             raise RpcError(f"{self.rpc.where}: does not pause")
+        time.sleep(_STEP_ENDS_S)
+        self._due = self._now()  # to which the vehicle is to be brought, by the simulator's clock, ns
 
     def state(self) -> RigidState:
         """The vehicle now, ENU and FLU, about the place where AirSim has put it.
@@ -118,13 +125,9 @@ class Session:
         """
         began, self._due = self._now(), self._due + round(seconds * 1e9)
         now = began
-        for _ in range(_TRIES):
-            steps = round((self._due - now) / (self.step * 1e9))
-            if steps <= 0:
-                return (now - began) / 1e9
-            self._go_on((steps - _SHY) * self.step)
-            now = self._now()
-        raise RpcError(f"{self.rpc.where}: the simulator's clock does not go on when simContinueForTime tells it to")
+        while (steps := round((self._due - now) / (self.step * 1e9))) > 0:
+            now = self._later(now, (steps - _SHY) * self.step)
+        return (now - began) / 1e9
 
     def settle(self) -> RigidState | None:
         """Let the vehicle come to rest with its rotors off; None: it falls, as there is no ground.
@@ -173,13 +176,28 @@ class Session:
             RpcError: when the clock runs while the simulator is paused, or never.
         """
         before = self._now()
-        time.sleep(0.02)
+        time.sleep(_STEP_ENDS_S)
         if self._now() != before:
             raise RpcError(f"{self.rpc.where}: the clock runs in a pause; accepted: ClockType SteppableClock in settings")
+        changes = []
+        for _ in range(_SAMPLES):
+            now = self._later(before, 0.0005)
+            changes.append(now - before)
+            before = now
+        return min(changes) / 1e9
+
+    def _later(self, now: int, seconds: float) -> int:
+        """Let the simulator run for about so many of its seconds, longer where its clock then stands as it did; returns
+        the clock, ns.
+
+        Raises:
+            RpcError: when it does not go on.
+        """
         for _ in range(_TRIES):
-            self._go_on(0.0005)
-            if (passed := self._now() - before) > 0:
-                return passed / 1e9
+            self._go_on(seconds)
+            if (later := self._now()) != now:
+                return later
+            seconds *= _LONGER if seconds < 1.0 else 1.0
         raise RpcError(f"{self.rpc.where}: the simulator's clock does not go on when simContinueForTime tells it to")
 
 
