@@ -1,13 +1,14 @@
 """A server that speaks AirSim's RPC, over MuJoCo's body: for tests and benchmarks where no AirSim runs.
 
-What it takes from AirSim's sources: methods with their parameter counts and rpclib's words for a wrong one; one thread a
-request, answers in any order; NED and FRD; a clock of physics steps that `simContinueForTime` lets go on by the wall
+What it takes from AirSim's sources: methods with their parameter counts and rpclib's words for a wrong one; a thread
+for a move, answers in any order; NED and FRD; a clock of physics steps that `simContinueForTime` lets go on by the wall
 clock, so that one step more or less is taken; a move that blocks until its duration has passed on that clock or another
 call cuts it short, and whose command stays; SimpleFlight's rate loop as gains times error over the vehicle's authority.
 """
 
 import argparse
 import contextlib
+import dataclasses
 import json
 import math
 import socketserver
@@ -84,7 +85,8 @@ class World:
         turned = _quaternion(FLIP @ _matrix(s.quaternion) @ TURN)
         none = _vector(np.zeros(3))
         return {
-            "position": _vector(FLIP @ s.position), "orientation": dict(zip(("w_val", "x_val", "y_val", "z_val"), turned)),
+            "position": _vector(FLIP @ s.position),
+            "orientation": dict(zip(("w_val", "x_val", "y_val", "z_val"), turned, strict=True)),
             "linear_velocity": _vector(FLIP @ s.velocity), "angular_velocity": _vector(TURN @ s.body_rate),
             "linear_acceleration": none, "angular_acceleration": none,
         }  # fmt: skip
@@ -215,8 +217,6 @@ def settings(**changes: Any) -> dict[str, Any]:
 
 
 def _with(vehicle: Vehicle, rate_gain: np.ndarray) -> Vehicle:
-    import dataclasses
-
     return dataclasses.replace(vehicle, rate_gain=rate_gain)
 
 

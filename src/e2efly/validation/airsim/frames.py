@@ -1,7 +1,7 @@
 """AirSim's frames and ours: world NED and body FRD there, world ENU and body FLU here.
 
-East is our x, north our y. Both changes are half turns: the world's about (1, 1, 0) / sqrt 2, the body's about x. A half
-turn is its own inverse, so each function here goes both ways.
+East is our x, north our y. Both changes are half turns: the world's about (1, 1, 0) / sqrt 2, the body's about x. A
+half turn is its own inverse, so each function here goes both ways.
 """
 
 import numpy as np

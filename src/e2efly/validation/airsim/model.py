@@ -47,8 +47,8 @@ class Model:
     lag: float
     """Time in which thrust follows 63 % of a step of throttle, s."""
     turn: np.ndarray
-    """(3,) angular acceleration about the body's axes per unit of the mixer's input, rad/s^2: a rate gain of 1 gives the
-    rate loop a bandwidth of so many 1/s."""
+    """(3,) angular acceleration about the body's axes per unit of the mixer's input, rad/s^2: a rate gain of 1 gives
+    the rate loop a bandwidth of so many 1/s."""
     drag: np.ndarray
     """(3,) deceleration at `SPEED` along the body's axes, m/s^2."""
 
@@ -130,7 +130,7 @@ _SMALL = {"m/s^2": 0.05, "s": 0.003, "rad/s^2": 1.0}
 
 
 def _lag_of(vehicle: Vehicle) -> float:
-    """Seconds after which a vehicle's thrust has followed 63 % of the step that `measure` flies: its rotors' speed lags."""
+    """Seconds after which a vehicle's thrust has followed 63 % of the step that `measure` flies: its rotors lag."""
     (k2, k1, k0), high = vehicle.thrust_map, vehicle.thrust_range[1]
     begin = float(vehicle.mass) * GRAVITY / 4
     end = _SHARE * high + (1 - _SHARE) * begin
@@ -165,7 +165,8 @@ def _lag(session: Session, start: RigidState, hover: float) -> float:
     speed = session.state().velocity[2]
     while passed < SPUN_S:
         session.command(_STILL, more)
-        seconds = session.advance(session.step)
+        if not (seconds := session.advance(session.step)):
+            continue  # AirSim has gone a step too far before
         now = session.state().velocity[2]
         times.append(passed + seconds / 2)
         thrusts.append((now - speed) / seconds)

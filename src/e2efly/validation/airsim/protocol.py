@@ -70,7 +70,7 @@ def kinematics(state: RigidState) -> dict[str, Any]:
     w, x, y, z = frames.attitude(state.quaternion).tolist()
     return {
         "position": vector(frames.world(state.position)),
-        "orientation": {"w_val": w, "x_val": x, "y_val": y, "z_val": z},
+        "orientation": {"x_val": x, "y_val": y, "z_val": z, "w_val": w},
         "linear_velocity": vector(frames.world(state.velocity)),
         "angular_velocity": vector(frames.body(state.body_rate)),
         "linear_acceleration": vector((0.0, 0.0, 0.0)),

@@ -60,6 +60,7 @@ class Session:
         self._wall = 1 / max(float(self.settings.get("ClockSpeed", 1.0)), 1e-3)
         self.take_over()
         self.step = self._physics_step()
+        self._due = self._now()
 
     def take_over(self) -> None:
         """Put the simulation back to its beginning, take control, arm, pause.
@@ -103,8 +104,9 @@ class Session:
     def command(self, rates: np.ndarray, throttle: float) -> None:
         """Set body rates, FLU, rad/s, and throttle, 0 to 1, from now until the next command.
 
-        The server's method sets them when it begins, and then waits for its duration, which does not pass in a pause. So
-        it is sent, cut short by `cancelLastTask`, and its answer is the proof that it had begun. What it has set stays.
+        The server's method sets them when it begins, and then waits for its duration, which does not pass in a pause.
+        So it is sent, cut short by `cancelLastTask`, and its answer is the proof that it had begun. What it has set
+        stays.
         """
         p, q, r = frames.body(rates).tolist()
         number = self.rpc.send("moveByAngleRatesThrottle", p, q, r, float(throttle), HELD_S, self.vehicle)
@@ -118,7 +120,10 @@ class Session:
                 raise RpcError(f"{self.rpc.where}: moveByAngleRatesThrottle does not end when it is cancelled")
 
     def advance(self, seconds: float) -> float:
-        """Let so many seconds pass, to within half a physics step of all that were ever asked for; returns how many did.
+        """Let so many seconds pass; returns how many did.
+
+        All that were ever asked for have passed to within half a physics step, and one more where the simulator's
+        computer was too busy to take a step in time.
 
         Raises:
             RpcError: when the simulator's clock does not go on.
@@ -178,7 +183,9 @@ class Session:
         before = self._now()
         time.sleep(_STEP_ENDS_S)
         if self._now() != before:
-            raise RpcError(f"{self.rpc.where}: the clock runs in a pause; accepted: ClockType SteppableClock in settings")
+            raise RpcError(
+                f"{self.rpc.where}: the clock runs in a pause; accepted: ClockType SteppableClock in settings"
+            )
         changes = []
         for _ in range(_SAMPLES):
             now = self._later(before, 0.0005)

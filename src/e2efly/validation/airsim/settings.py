@@ -62,7 +62,11 @@ def unsaid(vehicle: Vehicle, images: Sequence[Image] = ()) -> list[tuple[str, st
             f"{vehicle.motor_time_constant:g} s of the speed",
             "params.rotor_params.control_signal_filter_tc, of the thrust",
         ),
-        ("rotor_speed_min", f"{vehicle.thrust_range[0]:.3g} N at least", "nowhere: AirSim's rotors stand at no throttle"),
+        (
+            "rotor_speed_min",
+            f"{vehicle.thrust_range[0]:.3g} N at least",
+            "nowhere: AirSim's rotors stand at no throttle",
+        ),
         ("drag_linear", f"{_list(vehicle.drag_linear)} N*s/m", "nowhere: AirSim's drag is quadratic"),
         (
             "drag_quadratic",

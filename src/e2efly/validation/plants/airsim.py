@@ -21,7 +21,7 @@ OUTER_S = 0.01
 
 @register("airsim")
 class AirsimPlant(Plant):
-    """One vehicle of a running AirSim. Thrust over mass becomes throttle, by a measured line; body rates go as they are.
+    """One vehicle of a running AirSim. Thrust over mass becomes throttle, by a measured line; body rates stay.
 
     The proportional gains of SimpleFlight's rate loop are set so that its bandwidth is the vehicle's `rate_gain`.
     """
@@ -58,7 +58,9 @@ class AirsimPlant(Plant):
         """
         plant = cls.of(vehicle, contract)
         try:
-            told = [] if plant.grounded else ["AirSim's vehicle has no ground to stand on: it falls with its rotors off."]
+            told = (
+                [] if plant.grounded else ["AirSim's vehicle has no ground to stand on: it falls with its rotors off."]
+            )
             return told + differences(plant.model, vehicle)
         finally:
             plant.close()
