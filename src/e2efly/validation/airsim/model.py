@@ -149,8 +149,8 @@ def _spin(session: Session, start: RigidState, throttle: float) -> None:
 def _acceleration(session: Session, rates: np.ndarray, throttle: float) -> np.ndarray:
     """Mean acceleration over a few physics steps, world, m/s^2.
 
-    The first steps do not count: in the first one AirSim takes the mean of the acceleration and of the one before, which
-    is none where a vehicle has just been placed.
+    The first steps do not count: in the first one AirSim takes the mean of the acceleration and of the one before,
+    which is none where a vehicle has just been placed.
     """
     hold(session, rates, throttle, LONG_S / 4)
     before = session.state().velocity
