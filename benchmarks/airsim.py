@@ -20,9 +20,7 @@ def main() -> None:
     """Fly, print the table, write the figures."""
     from tests.validation.airsim_server import Server, World, settings
 
-    args = arguments(
-        __doc__ or "", vehicle="vis_r", tasks=["hover", "land", "track", "race"], episodes=20, address=""
-    )
+    args = arguments(__doc__ or "", vehicle="vis_r", tasks=["hover", "land", "track", "race"], episodes=20, address="")
     rows, differences = [], []
     with ExitStack() as stack:
         address, what = args.address, "an AirSim"

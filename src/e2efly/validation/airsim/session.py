@@ -56,8 +56,7 @@ class Session:
             known = ", ".join(f"{number} ({each.name})" for number, each in protocol.DIALECTS.items())
             raise ValueError(f"{rpc.where}: getServerVersion is {version!r}; accepted: {known}")
         self.dialect = protocol.DIALECTS[version]
-        self.settings = _settings(self._call("getSettingsString"))
-        self._wall = 1 / max(float(self.settings.get("ClockSpeed", 1.0)), 1e-3)
+        self._wall = 1 / _clock_speed(self._call("getSettingsString"))
         self.take_over()
         self.step = self._physics_step()
         self._due = self._now()
@@ -208,9 +207,11 @@ class Session:
         raise RpcError(f"{self.rpc.where}: the simulator's clock does not go on when simContinueForTime tells it to")
 
 
-def _settings(text: Any) -> dict[str, Any]:
-    """What stands in settings.json; nothing where it cannot be read."""
+def _clock_speed(text: Any) -> float:
+    """The simulator's seconds in a second of the wall clock, by the text of its settings; 1 where it does not say."""
+    speed = None
     with contextlib.suppress(ValueError, TypeError):
         read = json.loads(text)
-        return read if isinstance(read, dict) else {}
-    return {}
+        speed = read.get("ClockSpeed") if isinstance(read, dict) else None
+    number = isinstance(speed, int | float) and not isinstance(speed, bool)
+    return float(speed) if number and 1e-3 <= speed <= 1e3 else 1.0

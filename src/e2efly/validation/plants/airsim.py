@@ -79,6 +79,10 @@ class AirsimPlant(Plant):
         rpc = Rpc(self.host, self.port)
         try:
             self._session = Session(rpc, self.named)
+        except BaseException:
+            rpc.close()
+            raise
+        try:
             begin = self._session.state()
             rest = self._session.settle()
             self.grounded = rest is not None
@@ -88,7 +92,7 @@ class AirsimPlant(Plant):
             self.model = measure(self._session)
             self._session.set_gains(self.model.gains(vehicle.rate_gain))
         except BaseException:
-            rpc.close()
+            self.close()
             raise
         self.reset(RigidState(np.array([0.0, 0.0, vehicle.feet_height]), np.zeros(3), np.eye(4)[0], np.zeros(3)))
 
