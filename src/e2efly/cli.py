@@ -30,6 +30,7 @@ _EXAMPLES = {
     "align LOG": "fit delay and rate loop to a flight, lay its replay over it",
     "render forest": "what cameras and LiDARs see of a world: pictures and a video",
     "firmware": "build the real Betaflight firmware for this machine",
+    "airsim-settings VEHICLE": "AirSim's settings.json for a vehicle",
     "bench": "how fast this machine simulates and learns",
     "list": "tasks, algorithms, vehicles, tracks, plants, reward terms",
 }

@@ -39,9 +39,9 @@ class Validate:
     vehicle, and else VIS-R's; `any/hover` is that of any vehicle."""
     plant: str = "mujoco"
     """What flies: simulator (our own, by the bridge's runtime), mujoco, betaflight (the real firmware over our rigid
-    body), or one of your own: path/to/plant.py:Name."""
+    body), airsim:HOST:PORT (an AirSim that runs), or one of your own: path/to/plant.py:Name."""
     episodes: int | None = None
-    """Starts of each criterion; when left out 200, of betaflight 20, and 10 in each row of --stress."""
+    """Starts of each criterion; when left out 200, of betaflight and airsim 20, and 10 in each row of --stress."""
     flights: int = 3
     """With the firmware: whole flights, from take-off to landing, besides; not with --stress."""
     out: Path | None = None

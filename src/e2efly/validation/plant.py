@@ -90,6 +90,8 @@ class Plant(ABC):
     """Starts of each criterion that `validate` flies unless told."""
     whole_flights: ClassVar[bool] = False
     """Whether `e2efly validate` also flies whole flights through the real firmware."""
+    takes_address: ClassVar[bool] = False
+    """Whether another program simulates it, and `validate` finds that by NAME:ADDRESS."""
     alters: ClassVar[frozenset[str]] = frozenset()
     """What `meet` and `disturb` can change without the flight controller's knowledge: fields of the vehicle, and
     names of `BESIDE`."""
@@ -103,6 +105,25 @@ class Plant(ABC):
             OSError: when it cannot be started.
         """
         return cls(vehicle, contract.action.mode)  # type: ignore[call-arg]
+
+    @classmethod
+    def at(cls, address: str) -> type[Self]:
+        """The plant that another program simulates at an address.
+
+        Raises:
+            ValueError: for an address that it does not take.
+        """
+        raise ValueError(f"--plant is {cls.name}:{address}; accepted: {cls.name}, which takes no address")
+
+    @classmethod
+    def differences(cls, vehicle: Vehicle, contract: Contract) -> list[str]:
+        """In what the plant's vehicle is not the one that it is made for, a sentence each; asked before the flights.
+
+        Raises:
+            ValueError: for what it cannot simulate.
+            OSError: when it cannot be started.
+        """
+        return []
 
     @property
     @abstractmethod

@@ -78,6 +78,8 @@ class Validation:
     """Points of success by which the plant may lie under the training simulator."""
     criteria: dict[str, Comparison]
     """By name."""
+    differences: tuple[str, ...] = ()
+    """In what the plant's vehicle is not the policy's, as the plant says."""
 
     @property
     def worst(self) -> str:
@@ -107,7 +109,7 @@ class Validation:
             notes.append(f"Trained with a latency of {low:g} to {high:g} s; the plant flies with {flies:g} s.")
         if (own := self.plant.latency) > self.candidate.latency:
             notes.append(f"The plant itself takes {own:g} s from command to rate loop, longer than that.")
-        return notes + self.candidate.notes
+        return [*notes, *self.differences, *self.candidate.notes]
 
     def as_json(self) -> dict[str, Any]:
         """The report that `e2efly validate --json` writes."""
@@ -122,6 +124,7 @@ class Validation:
             "latency_s": self.candidate.latency,
             "seed": self.seed,
             "max_drop": self.max_drop,
+            "differences": list(self.differences),
             "units": UNITS | {"drop": drop},
             "criteria": {name: each.as_json(plant, suites[name]) for name, each in self.criteria.items()},
         }
@@ -146,7 +149,8 @@ def validate(
 
     Args:
         policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
-        plant: its name, its reference `path/to/file.py:Name` or `module:Name`, or a registered class.
+        plant: its name, with its address where it has one (`airsim:HOST:PORT`), its reference `path/to/file.py:Name` or
+            `module:Name`, or a registered class.
         episodes: starts of each criterion; left out: the plant's `episodes`.
         vehicle: what the plant flies, a name or a .toml file; left out: the policy's own vehicle.
         controller: policy: the plant's flight controller believes in the policy's own vehicle, whatever flies; plant:
@@ -175,6 +179,7 @@ def validate(
     found, kind, own = flyable(policy, plant, vehicle, controller, task)
     reality = Reality(found.flown.body, found.latency)
     check_realities(kind, found.flown.believed, [reality])
+    differences = tuple(kind.differences(found.flown.believed, found.policy.contract))
     suites = found.task.criteria()
     longest = max(float(suite.episode_s) for suite in suites.values())
     kept = ROW + KEPT * int(longest * found.policy.contract.control_rate_hz)
@@ -193,7 +198,7 @@ def validate(
             _write_logs(Path(log), criterion, flights, found.policy.contract.action.mode)
         verdicts = judge(env, starts, flights, settling(suite))
         criteria[criterion] = Comparison(trained[criterion], verdicts, starts, flights)
-    return Validation(found, kind, seed, max_drop, criteria)
+    return Validation(found, kind, seed, max_drop, criteria, differences)
 
 
 def _write_logs(folder: Path, criterion: str, flights: list[Trajectory], mode: str) -> None:

@@ -12,12 +12,18 @@ for _file in pkgutil.iter_modules(__path__, f"{__name__}."):
 
 
 def find_plant(name: str) -> type[Plant]:
-    """A class of plants by its name or its reference, `path/to/file.py:Name` or `module:Name`.
+    """A class of plants by its name, its name and address, `NAME:ADDRESS`, or its reference, `path/to/file.py:Name` or
+    `module:Name`.
 
     Raises:
-        ValueError: for an unknown name, with all there are; for a plant that needs a package that is not installed.
+        ValueError: for an unknown name, with all there are; for an address that the plant does not take; for a plant
+            that needs a package that is not installed.
     """
-    plant = PLANTS.find(name)
+    known, colon, address = name.partition(":")
+    if colon and known in PLANTS and PLANTS[known].takes_address:
+        plant = PLANTS[known].at(address)
+    else:
+        plant = PLANTS.find(name)
     for package, install in plant.needs.items():
         if importlib.util.find_spec(package) is None:
             raise ValueError(f"plant {plant.name!r} needs the package {package}: pip install '{install}'")

@@ -1,0 +1,58 @@
+"""`e2efly airsim-settings`: AirSim's settings.json for a vehicle."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+from rich.table import Table
+
+from e2efly.storage import write_json
+from e2efly.terminal import Terminal
+
+
+@dataclass(frozen=True)
+class AirsimSettings:
+    """Write AirSim's settings.json for a vehicle, and say what it cannot tell AirSim of it."""
+
+    vehicle: tyro.conf.Positional[str] = "vis_r"
+    """A vehicle's name or a .toml file."""
+    policy: Path | None = None
+    """A run directory, a policy.onnx, or a task of the zoo: its cameras are written, too."""
+    out: Path = Path("settings.json")
+    """The file; AirSim reads Documents/AirSim/settings.json."""
+    port: int = 41451
+    """On which AirSim listens, on its own machine only."""
+
+
+def run(options: AirsimSettings) -> int:
+    """Write the file.
+
+    Raises:
+        ValueError: for an unknown vehicle or policy, or a port that is none. Nothing is written then.
+    """
+    from e2efly.deploy.policy.loader import load_policy
+    from e2efly.validation.airsim.settings import settings, unsaid
+    from e2efly.vehicles import load_vehicle
+    from e2efly.zoo import policy_file
+
+    if not 1 <= options.port <= 65535:
+        raise ValueError(f"--port is {options.port}; accepted: 1 to 65535")
+    vehicle = load_vehicle(options.vehicle)
+    images = ()
+    if options.policy is not None:
+        images = load_policy(policy_file(options.policy, options.vehicle)).contract.images
+    console = Terminal()
+    write_json(options.out, settings(vehicle, images, options.port))
+    console.print(f"Settings: {options.out}")
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for heading in ("what settings.json cannot say", vehicle.name, "where AirSim has it"):
+        table.add_column(heading, overflow="fold")
+    for row in unsaid(vehicle, images):
+        table.add_row(*row)
+    console.print(table)
+    console.print(
+        "AirSim flies its own numbers unless its source is changed in these places; `e2efly validate` measures what it "
+        "flies and names the differences.",
+        style="dim",
+    )
+    return 0

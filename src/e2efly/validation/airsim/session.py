@@ -1,0 +1,217 @@
+"""AirSim in lockstep: it stands still but while it is told to go on, and each command is known to be set before that.
+
+AirSim's clock (SteppableClock) moves by one physics step at a time, but `simContinueForTime` counts seconds of the wall
+clock (`ScheduledExecutor::executorLoop`), so that a time that is asked for may end a step early or late. The session
+reads the simulator's clock after each stretch, asks for what is missing, and carries what is less than half a step over
+into the next one.
+"""
+
+import contextlib
+import json
+import time
+from typing import Any
+
+import numpy as np
+
+from e2efly.validation.airsim import frames, protocol
+from e2efly.validation.airsim.rpc import Rpc, RpcError
+from e2efly.validation.plant import RigidState
+
+HELD_S = 1.0
+"""A rate command is sent for so long; it is cut short once it is known to be set."""
+_CUT_S = 0.002
+"""Wait for a command that was cut short, before it is cut again, s."""
+_SHY = 0.1
+"""Of a physics step by which less is asked for than is wanted: AirSim takes the step in which the time ends, too."""
+_LONGER = 1.5
+"""The next time is longer by this factor where none passed: a computer that is busy comes too late to take a step."""
+_TRIES = 30
+"""Of letting the simulator go on in vain, before its clock is said to stand."""
+_STEP_ENDS_S = 0.02
+"""After which a physics step that was under way is over, s."""
+_SAMPLES = 6
+"""Of the clock, of which the smallest change is the physics step."""
+_REST_S, _REST_SPEED = 3.0, 0.02
+"""A vehicle stands that was slower than so many m/s at the end of so many seconds at most."""
+
+
+class Session:
+    """One vehicle of one AirSim, under control, armed, paused."""
+
+    def __init__(self, rpc: Rpc, vehicle: str = "") -> None:
+        """Take over.
+
+        Args:
+            rpc: connected.
+            vehicle: its name in the settings; empty: the only one.
+
+        Raises:
+            RpcError: naming what the server refuses, or that its clock cannot be stepped.
+            ValueError: for a server of a dialect that is not known.
+        """
+        self.rpc, self.vehicle = rpc, vehicle
+        self._call("ping")
+        version = self._call("getServerVersion")
+        if version not in protocol.DIALECTS:
+            known = ", ".join(f"{number} ({each.name})" for number, each in protocol.DIALECTS.items())
+            raise ValueError(f"{rpc.where}: getServerVersion is {version!r}; accepted: {known}")
+        self.dialect = protocol.DIALECTS[version]
+        self._wall = 1 / _clock_speed(self._call("getSettingsString"))
+        self.take_over()
+        self.step = self._physics_step()
+        self._due = self._now()
+
+    def take_over(self) -> None:
+        """Put the simulation back to its beginning, take control, arm, pause.
+
+        Raises:
+            RpcError: naming what the server refuses.
+        """
+        self._call("simPause", False)  # AirSim resets within a frame of the game, of which there are none in a pause
+        self._call("reset")
+        self._call("enableApiControl", True, self.vehicle)
+        if not self._call("isApiControlEnabled", self.vehicle):
+            raise RpcError(f"{self.rpc.where}: gives no control; accepted: settings.json with AllowAPIAlways true")
+        if not self._call("armDisarm", True, self.vehicle):
+            raise RpcError(f"{self.rpc.where}: does not arm")
+        self._call("simPause", True)
+        if not self._call("simIsPaused"):
+            raise RpcError(f"{self.rpc.where}: does not pause")
+        time.sleep(_STEP_ENDS_S)
+        self._due = self._now()  # to which the vehicle is to be brought, by the simulator's clock, ns
+
+    def state(self) -> RigidState:
+        """The vehicle now, ENU and FLU, about the place where AirSim has put it.
+
+        Raises:
+            ValueError: for an answer that is no state.
+        """
+        try:
+            return protocol.rigid_state(self._call("simGetGroundTruthKinematics", self.vehicle))
+        except ValueError as error:
+            raise ValueError(f"{self.rpc.where}: simGetGroundTruthKinematics: {error}") from None
+
+    def place(self, state: RigidState) -> None:
+        """Put the vehicle there with its velocities; the rotors turn as they did."""
+        self._call("simSetKinematics", protocol.kinematics(state), True, self.vehicle)
+
+    def set_gains(self, gains: np.ndarray) -> None:
+        """Proportional gains of the rate loop about x, y and z, throttle per rad/s; no integral, no derivative part."""
+        none = [0.0, 0.0, 0.0]
+        self._call("setAngleRateControllerGains", [float(gain) for gain in gains], none, none, self.vehicle)
+
+    def command(self, rates: np.ndarray, throttle: float) -> None:
+        """Set body rates, FLU, rad/s, and throttle, 0 to 1, from now until the next command.
+
+        The server's method sets them when it begins, and then waits for its duration, which does not pass in a pause.
+        So it is sent, cut short by `cancelLastTask`, and its answer is the proof that it had begun. What it has set
+        stays.
+        """
+        p, q, r = frames.body(rates).tolist()
+        number = self.rpc.send("moveByAngleRatesThrottle", p, q, r, float(throttle), HELD_S, self.vehicle)
+        until = time.monotonic() + 10.0
+        while True:
+            self._call("cancelLastTask", self.vehicle)
+            if self.rpc.arrived(number, _CUT_S):
+                self.rpc.result(number)
+                return
+            if time.monotonic() > until:
+                raise RpcError(f"{self.rpc.where}: moveByAngleRatesThrottle does not end when it is cancelled")
+
+    def advance(self, seconds: float) -> float:
+        """Let so many seconds pass; returns how many did.
+
+        All that were ever asked for have passed to within half a physics step, and one more where the simulator's
+        computer was too busy to take a step in time.
+
+        Raises:
+            RpcError: when the simulator's clock does not go on.
+        """
+        began, self._due = self._now(), self._due + round(seconds * 1e9)
+        now = began
+        while (steps := round((self._due - now) / (self.step * 1e9))) > 0:
+            now = self._later(now, (steps - _SHY) * self.step)
+        return (now - began) / 1e9
+
+    def settle(self) -> RigidState | None:
+        """Let the vehicle come to rest with its rotors off; None: it falls, as there is no ground.
+
+        The command is that of an armed vehicle that was told nothing.
+        """
+        for _ in range(round(_REST_S / 0.3)):
+            self.advance(0.3)
+            state = self.state()
+            if np.linalg.norm(state.velocity) < _REST_SPEED:
+                return state
+        return None
+
+    def close(self) -> None:
+        """Give back control, and let the simulation run on."""
+        with contextlib.suppress(OSError):
+            self._call("enableApiControl", False, self.vehicle)
+            self._call("simPause", False)
+        self.rpc.close()
+
+    def _call(self, method: str, *parameters: Any, timeout: float | None = None) -> Any:
+        assert len(parameters) == len(protocol.METHODS[method])
+        return self.rpc.call(method, *parameters, timeout=timeout)
+
+    def _now(self) -> int:
+        """The simulator's clock, ns."""
+        state = self._call("getMultirotorState", self.vehicle)
+        stamp = state.get("timestamp") if isinstance(state, dict) else None
+        if isinstance(stamp, bool) or not isinstance(stamp, int):
+            raise RpcError(f"{self.rpc.where}: getMultirotorState.timestamp is {stamp!r}; accepted: nanoseconds")
+        return stamp
+
+    def _go_on(self, seconds: float) -> None:
+        """Let the simulator run for about so many of its seconds."""
+        wall = seconds * self._wall
+        self._call("simContinueForTime", wall, timeout=wall + 10.0)
+        until = time.monotonic() + wall + 10.0
+        while not self._call("simIsPaused"):  # AirSim answers when it is over; other servers need not
+            if time.monotonic() > until:
+                raise RpcError(f"{self.rpc.where}: does not pause again after simContinueForTime({wall:g})")
+
+    def _physics_step(self) -> float:
+        """Seconds by which the simulator's clock moves at once.
+
+        Raises:
+            RpcError: when the clock runs while the simulator is paused, or never.
+        """
+        before = self._now()
+        time.sleep(_STEP_ENDS_S)
+        if self._now() != before:
+            raise RpcError(
+                f"{self.rpc.where}: the clock runs in a pause; accepted: ClockType SteppableClock in settings"
+            )
+        changes = []
+        for _ in range(_SAMPLES):
+            now = self._later(before, 0.0005)
+            changes.append(now - before)
+            before = now
+        return min(changes) / 1e9
+
+    def _later(self, now: int, seconds: float) -> int:
+        """Let the simulator run for about so many of its seconds, longer where its clock then stands as it did; returns
+        the clock, ns.
+
+        Raises:
+            RpcError: when it does not go on.
+        """
+        for _ in range(_TRIES):
+            self._go_on(seconds)
+            if (later := self._now()) != now:
+                return later
+            seconds *= _LONGER if seconds < 1.0 else 1.0
+        raise RpcError(f"{self.rpc.where}: the simulator's clock does not go on when simContinueForTime tells it to")
+
+
+def _clock_speed(text: Any) -> float:
+    """The simulator's seconds in a second of the wall clock, by the text of its settings; 1 where it does not say."""
+    speed = None
+    with contextlib.suppress(ValueError, TypeError):
+        read = json.loads(text)
+        speed = read.get("ClockSpeed") if isinstance(read, dict) else None
+    number = isinstance(speed, int | float) and not isinstance(speed, bool)
+    return float(speed) if number and 1e-3 <= speed <= 1e3 else 1.0

@@ -1,0 +1,134 @@
+"""AirSim as a plant: its vehicle, its flight controller SimpleFlight and its physics, in lockstep over its RPC."""
+
+from typing import ClassVar, Self
+
+import numpy as np
+
+from e2efly.control import COMMAND_MODES
+from e2efly.deploy.pilot.hover import controlled, rates_of
+from e2efly.deploy.policy.contract import Contract
+from e2efly.validation.airsim.model import LONG_S, SPUN_S, differences, hold, measure
+from e2efly.validation.airsim.rpc import PORT, Rpc
+from e2efly.validation.airsim.session import Session
+from e2efly.validation.plant import Plant, RigidState, check_mode
+from e2efly.validation.plants.registry import register
+from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import GRAVITY
+
+OUTER_S = 0.01
+"""Longest time between two commands of a mode above body rates, s: its controller runs here."""
+
+
+@register("airsim")
+class AirsimPlant(Plant):
+    """One vehicle of a running AirSim. Thrust over mass becomes throttle, by a measured line; body rates stay.
+
+    The proportional gains of SimpleFlight's rate loop are set so that its bandwidth is the vehicle's `rate_gain`.
+    """
+
+    needs = {"msgpack": "e2efly[airsim]"}
+    parallel, episodes, takes_address = False, 20, True
+    host: ClassVar[str] = "127.0.0.1"
+    port: ClassVar[int] = PORT
+    named: ClassVar[str] = ""
+
+    @classmethod
+    def at(cls, address: str) -> type[Self]:
+        """AirSim at HOST, HOST:PORT or HOST:PORT:VEHICLE, the name of a vehicle in its settings; an empty host is this
+        machine.
+
+        Raises:
+            ValueError: naming the address and what is accepted.
+        """
+        host, *more = address.split(":")
+        accepted = "accepted: airsim:HOST, airsim:HOST:PORT or airsim:HOST:PORT:VEHICLE, a port of 1 to 65535"
+        port = more[0] if more else str(PORT)
+        if len(more) > 2 or not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):
+            raise ValueError(f"--plant is airsim:{address}; {accepted}")
+        where = {"host": host or cls.host, "port": int(port), "named": more[1] if len(more) > 1 else ""}
+        return type(cls.__name__, (cls,), {**where, "__module__": cls.__module__, "__doc__": cls.__doc__})
+
+    @classmethod
+    def differences(cls, vehicle: Vehicle, contract: Contract) -> list[str]:
+        """In what AirSim's vehicle is not the one that its flight controller is to believe in: what was measured.
+
+        Raises:
+            ValueError: for a command mode that is no body rates and thrust in the end, or answers that make no sense.
+            OSError: naming the address, when AirSim does not answer or refuses.
+        """
+        plant = cls.of(vehicle, contract)
+        try:
+            told = (
+                [] if plant.grounded else ["AirSim's vehicle has no ground to stand on: it falls with its rotors off."]
+            )
+            return told + differences(plant.model, vehicle)
+        finally:
+            plant.close()
+
+    def __init__(self, vehicle: Vehicle, mode: str) -> None:
+        """Connect, put AirSim back to its beginning, look where the vehicle stands, and measure it.
+
+        Raises:
+            ValueError: for a command mode that is no body rates and thrust in the end, or answers that make no sense.
+            OSError: naming the address, when AirSim does not answer or refuses.
+        """
+        check_mode(mode, self.name)
+        if COMMAND_MODES[mode].controller is None:
+            raise ValueError(f"plant 'airsim' takes no {mode!r} commands; accepted: policies of other modes")
+        self.vehicle, self.mode = vehicle, mode
+        rpc = Rpc(self.host, self.port)
+        try:
+            self._session = Session(rpc, self.named)
+        except BaseException:
+            rpc.close()
+            raise
+        try:
+            begin = self._session.state()
+            rest = self._session.settle()
+            self.grounded = rest is not None
+            stands = begin if rest is None else rest
+            self._origin = stands.position - np.array([0.0, 0.0, vehicle.feet_height])
+            self._session.take_over()
+            self.model = measure(self._session)
+            self._session.set_gains(self.model.gains(vehicle.rate_gain))
+        except BaseException:
+            self.close()
+            raise
+        self.reset(RigidState(np.array([0.0, 0.0, vehicle.feet_height]), np.zeros(3), np.eye(4)[0], np.zeros(3)))
+
+    @property
+    def state(self) -> RigidState:
+        """The vehicle now; its ground is at no height, its first place over the world's origin."""
+        return self._state
+
+    def reset(self, state: RigidState) -> None:
+        """Bring the rotors to hover in level flight a metre above, and put the vehicle there."""
+        above = RigidState(state.position + np.array([0.0, 0.0, 1.0]), np.zeros(3), np.eye(4)[0], np.zeros(3))
+        self._place(above)
+        hold(self._session, np.zeros(3), self.model.throttle(GRAVITY), SPUN_S)
+        self._place(state)
+        self._look()
+
+    def step(self, command: np.ndarray, dt: float) -> None:
+        """Hold a command for `dt` s, to within half of AirSim's physics step, which later steps make up for."""
+        longest = LONG_S if self.mode == "ctbr" else OUTER_S
+        count = max(int(np.ceil(dt / longest - 1e-9)), 1)
+        limit = np.asarray(self.vehicle.body_rate_max, float)
+        for _ in range(count):
+            wanted = controlled(self.vehicle, self.mode, self.state.odometry(0.0), command)
+            rates = np.clip(rates_of(wanted), -limit, limit)
+            self._session.command(rates, self.model.throttle(float(wanted.thrust)))
+            self._session.advance(dt / count)
+            self._look()
+
+    def close(self) -> None:
+        """Give AirSim back its vehicle, and let it run on."""
+        self._session.close()
+
+    def _place(self, state: RigidState) -> None:
+        position = state.position + self._origin
+        self._session.place(RigidState(position, state.velocity, state.quaternion, state.body_rate))
+
+    def _look(self) -> None:
+        s = self._session.state()
+        self._state = RigidState(s.position - self._origin, s.velocity, s.quaternion, s.body_rate)
