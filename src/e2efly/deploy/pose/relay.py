@@ -95,4 +95,8 @@ def open_relay(
     Raises:
         ValueError: with what each interpreter says, and the advice.
     """
-    return first_opened(pythons, advice, lambda python: RelaySource(name, python, *arguments, parse=parse, what=what))
+
+    def opened(python: str) -> RelaySource[Any]:
+        return RelaySource(name, python, *arguments, parse=parse, what=what)
+
+    return first_opened(pythons, advice, opened, always=True)
