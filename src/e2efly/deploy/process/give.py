@@ -24,6 +24,7 @@ class Given:
 
     def __init__(self, speech: Any, name: str, sees: str, reach: str, fov: str) -> None:
         """Open the shared memory."""
+        self._numpy = importlib.import_module("numpy")
         self.speech, self.sees, self.reach = speech, sees, float(reach)
         across, _, down = fov.partition("x")
         self.fov = float(across), float(down)
@@ -43,7 +44,7 @@ class Given:
         """Values of float32 in another type: rounded to mm, or to 1/255."""
         if kind == "float32":
             return raw
-        numpy = importlib.import_module("numpy")
+        numpy = self._numpy
         scale, most = (1000.0, 65535) if kind == "uint16" else (255.0, 255)
         numbers = numpy.rint(numpy.frombuffer(raw, "<f4") * scale).clip(0, most)
         return numbers.astype({"uint16": "<u2", "uint8": "u1"}[kind]).tobytes()
