@@ -78,6 +78,8 @@ class Hil:
     """Flights of the rehearsal, each in another world, from --seed on."""
     kill: Victim | None = None
     """Kill one of the processes in each flight while the policy flies, to see what happens then."""
+    pose_delay: float = 0.004
+    """How late the poses of the rehearsal come, s: what cameras and network of your room take."""
     out: Path | None = None
     """Folder of the rehearsal's report; left out: a new one in the folder `rehearsals`."""
 

@@ -272,9 +272,10 @@ def lap_of(
         judged = verdict(course, scenery, flown, told.get("began") or begin, period, radius)
     broke_off = next((c for c in changes if c.time == end and str(Reason.POLICY_DONE) not in c.reasons), None)
     if broke_off is not None:
-        judged = replace(
-            judged, success=False, told=f"ended after {end - begin:.1f} s by {'; '.join(broke_off.reasons)}"
-        )
+        hit = "hit something" if told.get("collisions") else "ended"
+        judged = replace(judged, success=False, told=f"{hit} after {end - begin:.1f} s")
+        if kill is None:
+            heard.problems.append(f"the policy was ended by {broke_off.mode}: {'; '.join(broke_off.reasons)}")
     shift = clock_of(log)
     poses, steps, timing = log["odometry"], log["policy"], log["timing"]
     flying = 1e-9 * poses.stamp - shift

@@ -21,6 +21,7 @@ from e2efly.evaluation import Candidate
 from e2efly.goal import Course
 from e2efly.tasks.route import Route, course_for, route_of
 from e2efly.validation.hil_lap import TOUCH, Heard, Lap, lap_of
+from e2efly.validation.mocap_process import DELAY_S
 from e2efly.validation.rehearsal import REACH_IN_SIGHT
 from e2efly.validation.room import FLIGHT_S, START_S, Program, Room, Victim, bridge, flags, free_port, take_off
 from e2efly.validation.scenery import Scenery
@@ -55,6 +56,8 @@ class Plan:
     """Of the world, in the room."""
     rate: float | None = None
     """Images per second; None: the contract's."""
+    pose_delay: float = DELAY_S
+    """How late poses come, s."""
     options: tuple[str, ...] = ()
     """More of `e2efly fly`."""
 
@@ -165,7 +168,7 @@ class _Flight:
         names = [f"rehearsal_{os.getpid()}_{i}" for i in range(len(contract.images))]
         stack.callback(_forget, names)
         image = [f"{image.name}=shm:{name}" for image, name in zip(contract.images, names, strict=True)]
-        to = ["--to", *map(str, ports), "--seed", str(seed)]
+        to = ["--to", *map(str, ports), "--seed", str(seed), "--delay", f"{plan.pose_delay:.6g}"]
         self.mocap = Program("motion capture", ["-m", "e2efly.validation.mocap_process", *to])
         stack.enter_context(self.mocap)
         inlet = json.loads(self.mocap.wait_for('"from"', START_S))["from"]

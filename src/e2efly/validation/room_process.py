@@ -176,6 +176,7 @@ def main() -> None:
         Rig(chosen(), options.folder or Path(temporary), load_vehicle(options.vehicle), real_time=True,
             seed=options.seed, pose_noise=noise) as rig,
     ):  # fmt: skip
+        be_punctual(PRIORITY)
         if options.at is not None:
             rig.state = rig.world.at_rest(*options.at)
         print(json.dumps({"link": rig.sitl.msp, "control": listener.getsockname()[1]}), flush=True)
