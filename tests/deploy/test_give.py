@@ -47,9 +47,9 @@ def received(source: object, images: SharedImages, seed: int) -> tuple[Frame, fl
         at, shown = time.monotonic(), depth(seed)
         images.publish(at, shown)
         time.sleep(0.1)
-        if frames := source.read(0.0):  # pyright: ignore
-            if abs(frames[-1].time - at) < 0.05:
-                return frames[-1], at, shown
+        frames = source.read(0.0)  # pyright: ignore
+        if frames and abs(frames[-1].time - at) < 0.05:
+            return frames[-1], at, shown
         seed += 1
     raise AssertionError(source.problem)  # pyright: ignore
 

@@ -73,7 +73,7 @@ def test_an_image_is_that_of_the_environment_at_the_pose_bit_for_bit(sees: str) 
             time=jnp.full(1, 0.01 * k, jnp.float32),
         )
         wanted = np.asarray(look(env, state, jnp.ones(1, bool)).images[0])[0]
-        time, image = kept.images[k]
-        assert time == now
+        shown, image = kept.images[k]
+        assert shown == now
         np.testing.assert_array_equal(image, wanted)
     assert np.ptp(kept.images[0][1]) > 0

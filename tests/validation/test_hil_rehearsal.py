@@ -143,6 +143,7 @@ def test_options_without_effect_are_refused(capsys: pytest.CaptureFixture[str]) 
         (["avoid", "--laps", "3"], "--laps is 3; accepted: only with --rehearse"),
         (["avoid", "--kill", "hil"], "--kill is hil; accepted: only with --rehearse"),
         (["avoid", "--rehearse", "--pose", "udp:1"], "--pose is udp:1; accepted: left out with --rehearse"),
+        (["avoid", "--rehearse", "--pose-delay", "0.5"], "--pose-delay is 0.5; accepted: 0 to 0.2 s"),
         (["avoid", "--rehearse", "--laps", "0"], "--laps is 0; accepted: 1 or more"),
         (["hover", "--rehearse"], "policy hover sees nothing; accepted: a policy with images"),
     ):

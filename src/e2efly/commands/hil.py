@@ -65,6 +65,10 @@ class Hil:
     """End after so long; left out: at Ctrl-C."""
     track: Path = Path("flights") / "hil-track.toml"
     """Where to write the gates of a drawn race, for --goal.track of `e2efly fly`; other tasks write nothing."""
+    record: Path | None = None
+    """A new .mcap file with the images, their poses, latencies and virtual collisions."""
+    report: Path | None = None
+    """Folder for a histogram of the latencies, latency.png, and their numbers, latency.json."""
     json: Path | None = None
     """Write at the end what was measured to this file."""
     rehearse: bool = False
@@ -74,6 +78,8 @@ class Hil:
     """Flights of the rehearsal, each in another world, from --seed on."""
     kill: Victim | None = None
     """Kill one of the processes in each flight while the policy flies, to see what happens then."""
+    pose_delay: float = 0.004
+    """How late the poses of the rehearsal come, s: what cameras and network of your room take."""
     out: Path | None = None
     """Folder of the rehearsal's report; left out: a new one in the folder `rehearsals`."""
 
@@ -94,8 +100,10 @@ def run(options: Hil) -> int:
     origin = Origin(o.origin, o.origin_yaw) if o.points is None else _measured(o.points)
     if o.rehearse:
         return rehearse(o, origin)
+    from e2efly.deploy.child import Child
     from e2efly.deploy.pose.sources import open_source
     from e2efly.deploy.sight.give import give, outputs
+    from e2efly.deploy.sight.record import Recorder
     from e2efly.deploy.sight.shared import SharedImages
     from e2efly.device import compute_at_once, prepare
     from e2efly.evaluation import candidate
@@ -138,6 +146,10 @@ def run(options: Hil) -> int:
                 stack.callback(published[-1].path.unlink, missing_ok=True)  # nobody else knows the name
         rate = o.rate or images[0].rate_hz
         node = Node(scenery, source, published, origin, rate, float(body.radius))
+        if o.record is not None:
+            recorder = Recorder(o.record, images, names)
+            stack.callback(recorder.close)
+            givers[f"--record {o.record}"], node.tell = recorder.child, recorder.tell
         node.warm()
         be_punctual(PRIORITY)
         console.print(f"{rate:g} Hz, poses from {source.describe()}. Fly it with:")
@@ -147,6 +159,8 @@ def run(options: Hil) -> int:
         except KeyboardInterrupt:
             console.print("Ended.")
         _tell(node, console)
+        if o.report is not None:
+            _report(node, o.report)
         if o.json:
             measured = {"began": node.began, "pose_to_image_s": node.latencies, "collisions": node.collisions}
             write_json(o.json, measured)
@@ -159,6 +173,7 @@ def _loop(node: "Node", seconds: float | None, console: Terminal, givers: dict[s
         said = node.step(now, time.monotonic)
         if said is not None and said != told:
             console.print(said)
+            node.tell("event", {"time": now, "text": said})
             told = said
         for name in [name for name, giver in givers.items() if giver.lines() is not None and giver.ended]:
             console.print(f"{name}: {givers.pop(name).ended}; the others go on")
@@ -175,6 +190,20 @@ def _tell(node: "Node", console: Terminal) -> None:
         f"{len(ms)} images; from the newest pose to the image {middle:.1f} ms (median), {late:.1f} ms (p99), "
         f"{ms.max():.1f} ms at most; {node.collisions} virtual collisions."
     )
+
+
+def _report(node: "Node", folder: Path) -> None:
+    """The latencies as a picture and as JSON."""
+    from e2efly.view.latency import plot_latencies
+
+    if len(node.times) < 2:
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    late, rate = np.array(node.latencies), (len(node.times) - 1) / (node.times[-1] - node.times[0])
+    plot_latencies(late, rate, folder / "latency.png")
+    p50, p99 = np.quantile(late, (0.5, 0.99))
+    numbers = {"images": len(late), "rate_hz": rate, "p50_s": p50, "p99_s": p99, "max_s": late.max()}
+    write_json(folder / "latency.json", {name: float(x) if name != "images" else x for name, x in numbers.items()})
 
 
 def _memory(image: str, outputs: "list[Output]") -> str:

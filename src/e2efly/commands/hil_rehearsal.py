@@ -22,13 +22,15 @@ if TYPE_CHECKING:
 
 LAP_S = 30.0
 """What a flight takes with the start of its processes, at least, s."""
+LATEST_S = 0.2
+"""Largest `--pose-delay`, s."""
 WANTED_S = 0.015
 """From a pose to its image in 99 of 100, s: more is told of."""
 LATE_S = 0.01
 """Control steps and a room that are later than this in 99 of 100 say that the machine is too slow or busy, s."""
 STALL_S = 0.05
 """... and so do single ones later than this, s."""
-REHEARSALS, OWN = ("laps", "kill", "out"), ("pose", "image", "seconds", "json", "track")
+REHEARSALS, OWN = ("laps", "kill", "pose_delay", "out"), ("pose", "image", "seconds", "json", "track")
 """Options that only a rehearsal has, and those that it sets itself."""
 
 
@@ -42,9 +44,11 @@ def check_rehearsal(o: "Hil") -> None:
     for name in OWN if o.rehearse else REHEARSALS:
         if (value := getattr(o, name)) != usual[name]:
             said = "left out with" if o.rehearse else "only with"
-            raise ValueError(f"--{name} is {value}; accepted: {said} --rehearse")
+            raise ValueError(f"--{name.replace('_', '-')} is {value}; accepted: {said} --rehearse")
     if o.laps < 1:
         raise ValueError(f"--laps is {o.laps}; accepted: 1 or more")
+    if not 0 <= o.pose_delay <= LATEST_S:
+        raise ValueError(f"--pose-delay is {o.pose_delay}; accepted: 0 to {LATEST_S:g} s")
     check_time({f"--laps is {o.laps}": o.laps * LAP_S}, f"at {LAP_S:g} s each")
 
 
@@ -67,7 +71,7 @@ def rehearse(o: "Hil", origin: Origin) -> int:
     raise_at_interrupt()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the flight's processes end with this one
     prepare("cpu")
-    plan, console = Plan(candidate(o.policy, o.vehicle), origin, o.rate), Terminal()
+    plan, console = Plan(candidate(o.policy, o.vehicle), origin, o.rate, o.pose_delay), Terminal()
     if not plan.found.policy.contract.images:
         raise ValueError(f"policy {o.policy} sees nothing; accepted: a policy with images")
     folder = o.out or Path("rehearsals") / time.strftime("%Y-%m-%d_%H-%M-%S")

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -40,8 +41,12 @@ class Node:
     """Of the vehicle, m."""
     checks: Checks = field(default_factory=lambda: Checks(max_age=LOST_S))
     """What a pose must satisfy."""
+    tell: Callable[[str, dict[str, Any]], None] = lambda topic, message: None
+    """Told each image's pose (`shown`), and by who runs it what else happens (`event`); it must not wait."""
     latencies: list[float] = field(default_factory=list, init=False)
     """Of each image: from the arrival of the newest pose to its publication, s."""
+    times: list[float] = field(default_factory=list, init=False)
+    """Of each image: when it was published, s."""
     collisions: int = field(default=0, init=False)
     """Virtual ones so far."""
     refused: str | None = field(default=None, init=False)
@@ -85,13 +90,20 @@ class Node:
             return "no images: a virtual collision"
         if self._odometry is None or now - self._odometry.time > LOST_S:
             return f"no images: no good pose{f' ({self.refused})' if self.refused else ''}"
-        local = ahead(self._odometry, now).seen_from(self.origin)
+        shown = ahead(self._odometry, now)
+        local = shown.seen_from(self.origin)
         if self.scenery.nearest([local.position], [now - began], Origin()) < self.radius:
             self.collisions, self._blind_until = self.collisions + 1, now + STRUCK_S
             return f"virtual collision at {local.position.round(2).tolist()} m of the scene"
         for output, image in zip(self.outputs, self._images(RigidState.of(local), now - began), strict=True):
             output.publish(now, image)
-        self.latencies.append(clock() - self._received)
+        self.times.append(clock())
+        self.latencies.append(self.times[-1] - self._received)
+        self.tell("shown", {
+            "time": now, "position": shown.position.tolist(), "quaternion": shown.quaternion.tolist(),
+            "scene_position": local.position.tolist(), "scene_quaternion": np.asarray(local.quaternion).tolist(),
+            "scene_time": now - began, "pose_to_image": self.latencies[-1],
+        })  # fmt: skip
         return "images"
 
     def _images(self, state: RigidState, time: float) -> list[np.ndarray]:

@@ -22,7 +22,7 @@ from e2efly.goal import Course
 from e2efly.tasks.route import Route, course_for, route_of
 from e2efly.validation.hil_lap import TOUCH, Heard, Lap, lap_of
 from e2efly.validation.mocap_process import DELAY_S
-from e2efly.validation.rehearsal import LINK_S, REACH_IN_SIGHT
+from e2efly.validation.rehearsal import REACH_IN_SIGHT
 from e2efly.validation.room import FLIGHT_S, START_S, Program, Room, Victim, bridge, flags, free_port, take_off
 from e2efly.validation.scenery import Scenery
 from e2efly.validation.session import rehearsal_settings
@@ -56,6 +56,8 @@ class Plan:
     """Of the world, in the room."""
     rate: float | None = None
     """Images per second; None: the contract's."""
+    pose_delay: float = DELAY_S
+    """How late poses come, s."""
     options: tuple[str, ...] = ()
     """More of `e2efly fly`."""
 
@@ -63,11 +65,6 @@ class Plan:
     def vehicle(self) -> Vehicle:
         """What flies."""
         return load_vehicle(self.found.vehicle)
-
-    @property
-    def pose_delay(self) -> float:
-        """How late poses come, s: with what link and firmware take, as late as the policy was trained with."""
-        return max(self.found.policy.contract.latency_of(self.vehicle) - LINK_S, DELAY_S)
 
     @property
     def period(self) -> float:

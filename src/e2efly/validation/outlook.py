@@ -74,5 +74,5 @@ _RENEWED = np.ones(1, bool)
 
 @partial(jax.jit, static_argnames="which")
 def _look(env: Env, state: EnvState, renewed: np.ndarray, which: tuple[int, ...]) -> list[Array]:
-    images = env.look(state, renewed).images
+    images = env.look(state, jnp.asarray(renewed)).images
     return [images[i] for i in which]

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import importlib
 import sys
+from array import array
+from contextlib import suppress
 from typing import Any
 
 LOOK_S = 0.001
@@ -22,8 +24,12 @@ MILLIMETRES = 65.535
 class Given:
     """The images that are given."""
 
+    _numpy: Any = None
+
     def __init__(self, speech: Any, name: str, sees: str, reach: str, fov: str) -> None:
         """Open the shared memory."""
+        with suppress(ImportError):  # the system's Python may lack it, with ROS
+            self._numpy = importlib.import_module("numpy")
         self.speech, self.sees, self.reach = speech, sees, float(reach)
         across, _, down = fov.partition("x")
         self.fov = float(across), float(down)
@@ -43,8 +49,11 @@ class Given:
         """Values of float32 in another type: rounded to mm, or to 1/255."""
         if kind == "float32":
             return raw
-        numpy = importlib.import_module("numpy")
         scale, most = (1000.0, 65535) if kind == "uint16" else (255.0, 255)
+        numpy = self._numpy
+        if numpy is None:
+            whole = [min(max(round(scale * x), 0), most) for x in array("f", raw)]
+            return array({"uint16": "H", "uint8": "B"}[kind], whole).tobytes()
         numbers = numpy.rint(numpy.frombuffer(raw, "<f4") * scale).clip(0, most)
         return numbers.astype({"uint16": "<u2", "uint8": "u1"}[kind]).tobytes()
 

@@ -96,10 +96,10 @@ def serve(given: Any, host: str, port: str, exact: str) -> None:
                         continue
                     connection.setblocking(False)
                     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                    peers[connection] = Peer(connection, stream.header(layout))
-                    events.register(connection, selectors.EVENT_READ)
-            elif not peers[key.fileobj].hear(stream):
-                drop(key.fileobj)
+                    peers[connection] = peer = Peer(connection, stream.header(layout))
+                    events.register(connection, selectors.EVENT_READ, peer)
+            elif not key.data.hear(stream):
+                drop(key.data.connection)
         new = given.images.take()
         if new is not None and any(not peer.waiting for peer in peers.values()):
             number, moment, raw = new

@@ -20,9 +20,8 @@ class Reader:
         with shared.place(name).open("rb") as file:
             self.layout = shared.Layout.of(file.read(shared.HEADER.size), name)
             self._memory = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        (self._last,) = shared.SEQUENCE.unpack_from(
-            self._memory, shared.AT_SEQUENCE
-        )  # what is there is of an earlier run
+        # what is there is of an earlier run
+        (self._last,) = shared.SEQUENCE.unpack_from(self._memory, shared.AT_SEQUENCE)
 
     def take(self) -> tuple[int, float, bytes] | None:
         """Number, time of exposure and values of the newest image; None: there is no new one."""
