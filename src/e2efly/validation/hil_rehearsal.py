@@ -23,7 +23,7 @@ from e2efly.tasks.route import Route, course_for, route_of
 from e2efly.validation.hil_lap import TOUCH, Heard, Lap, lap_of
 from e2efly.validation.mocap_process import DELAY_S
 from e2efly.validation.rehearsal import REACH_IN_SIGHT
-from e2efly.validation.room import FLIGHT_S, START_S, Program, Room, Victim, bridge, flags, free_port, take_off
+from e2efly.validation.room import FLIGHT_S, START_S, TAKEN, Program, Room, Victim, bridge, flags, free_port, take_off
 from e2efly.validation.scenery import Scenery
 from e2efly.validation.session import rehearsal_settings
 from e2efly.vehicles import Vehicle, load_vehicle
@@ -36,8 +36,8 @@ PILOT_S = 0.5
 """What a pilot takes to see that nobody flies, s."""
 WATCHDOG_S = 15.0
 """How long the watchdog of a bridge may take to end after the pilot has disarmed, s."""
-ENDED = ("HOVER:", "LAND:", "DONE:", "PILOT:", "INIT:")
-"""The bridge's word on another mode than the policy's."""
+ENDED = ("HOVER:", "LAND:", "DONE:", "PILOT:", "INIT:", TAKEN)
+"""The bridge's word on another mode than the policy's, and on the watchdog."""
 DOCUMENTED: dict[Victim, tuple[str, str]] = {
     "mocap": ("land", "no good odometry"),
     "hil": ("hover", "policy: image"),
@@ -189,7 +189,7 @@ class _Flight:
         options = [*flags("flight", settings), "--image", *image, "--envelope.speed", "8"]
         options += [*flags("goal", drawn.route), *flies, *plan.options]
         log = folder / "flight.mcap"
-        self.flies = bridge(Path(policy), self.room, log, options, pose=f"udp:{ports[1]}")
+        self.flies = bridge(Path(policy), self.room, log, options, pose=f"udp:{ports[1]}", urgent=True)
         stack.enter_context(self.flies)
 
     def _first(self) -> np.ndarray:
@@ -252,11 +252,16 @@ class _Flight:
     def _land(self) -> None:
         """Hover for a moment, unless it lands already; then the pilot asks for the landing."""
         room, flies = self.room, self.flies
-        if flies.said[-1].startswith("HOVER:") and not self.drawn.course.goal.lands:
+        if "HOVER:" in flies.said[-1] and not self.drawn.course.goal.lands:
             room.set(mission="hover")
             time.sleep(1.5)
         room.set(mission="land")
-        if not flies.said[-1].startswith("DONE:") and not flies.heard("DONE:", FLIGHT_S):
+        if "DONE:" not in flies.said[-1] and TAKEN not in flies.said[-1]:
+            flies.heard(("DONE:", TAKEN), FLIGHT_S)
+        if TAKEN in flies.said[-1]:
+            self.heard.problems.append(flies.said[-1].strip())
+            room.down(FLIGHT_S)
+        elif "DONE:" not in flies.said[-1]:
             self.heard.problems.append(f"it did not land{flies.end_told()}")
 
     def _end(self, kill: Victim | None, watchdog: int | None) -> None:

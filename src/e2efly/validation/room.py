@@ -24,6 +24,10 @@ FLIGHT_S = 40.0
 LAST_LINES = 6
 """So many different ones are told of a program that fails."""
 _TIME = re.compile(r"^ *[0-9.]+ +")
+URGENT = -15
+"""Niceness of an urgent program."""
+TAKEN = "the watchdog has taken over"
+"""The bridge's word on that."""
 SINK = 0.5
 """Speed at which a pilot without a bridge comes down, m/s."""
 _LIFT, _CLIMB_GAIN, _BRAKE = 0.1, 0.25, 0.12
@@ -71,13 +75,14 @@ def _text(value: Any) -> str:
 class Program:
     """A program as a process, and what it says. Use it as a context manager: it is killed at the end, if it runs on."""
 
-    def __init__(self, name: str, command: Sequence[str], core: int | None = None) -> None:
+    def __init__(self, name: str, command: Sequence[str], core: int | None = None, *, urgent: bool = False) -> None:
         """Start it.
 
         Args:
             name: for errors.
             command: what follows `python`.
             core: the only one that it may use; None: any.
+            urgent: whether it goes before usual programs, where that is allowed, with all its threads.
         """
         self.name = name
         self.process = subprocess.Popen(
@@ -87,6 +92,9 @@ class Program:
         if core is not None and hasattr(os, "sched_setaffinity"):
             with suppress(OSError):  # it has ended already, which is found out soon
                 os.sched_setaffinity(self.process.pid, {core})
+        if urgent:
+            with suppress(OSError):
+                os.setpriority(os.PRIO_PROCESS, self.process.pid, URGENT)
         self.said: list[str] = []
         """The lines that were listened to."""
         self.told: list[tuple[float, str]] = []
@@ -270,7 +278,14 @@ def _stick(x: float) -> float:
 
 
 def bridge(
-    policy: Path, room: Room, log: Path, options: Sequence[str] = (), link: str | None = None, pose: str | None = None
+    policy: Path,
+    room: Room,
+    log: Path,
+    options: Sequence[str] = (),
+    link: str | None = None,
+    pose: str | None = None,
+    *,
+    urgent: bool = False,
 ) -> Program:
     """`e2efly fly` as a process.
 
@@ -281,10 +296,11 @@ def bridge(
         options: more of the command's; they come last.
         link: to the firmware; None: straight.
         pose: its source; None: the room itself.
+        urgent: as `Program` takes it.
     """
     command = ["-m", "e2efly", "fly", str(policy), "--link", link or room.link, "--log", str(log)]
     command += ["--pose", pose or f"udp:{room.pose_port}", "--flight.battery-unknown"]
-    return Program("the bridge", [*command, *options])
+    return Program("the bridge", [*command, *options], urgent=urgent)
 
 
 def take_off(room: Room, flies: Program) -> None:
