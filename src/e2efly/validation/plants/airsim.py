@@ -16,8 +16,8 @@ from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
 FLOOR_M = 0.02
-"""AirSim's floor lies so far below ours, m: a touch is to count though its collisions end a descent a bit above the place
-where the vehicle had come to rest."""
+"""AirSim's floor lies so far below ours, m: its collisions end a descent a bit above the place where the vehicle had
+come to rest, and that touch is to count."""
 OUTER_S = 0.01
 """Longest time between two commands of a mode above body rates, s: its controller runs here."""
 
