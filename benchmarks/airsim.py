@@ -10,7 +10,7 @@ flies the AirSim that runs there. The starts are those of `e2efly eval`.
 import time
 from contextlib import ExitStack
 
-from common import arguments, table, write
+from common import arguments, table, with_earlier, write
 
 import e2efly
 from e2efly.vehicles import load_vehicle
@@ -46,6 +46,7 @@ def main() -> None:
             print(f"{time.perf_counter() - began:.0f} s", flush=True)
     print(table(rows))
     print("\n".join(differences) or "No differences between the vehicles are measured.")
+    rows = with_earlier("airsim", args.json, "table", ("criterion",), rows)
     write("airsim", args.json, {"flown": what, "table": rows, "differences": differences})
 
 

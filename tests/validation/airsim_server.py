@@ -174,7 +174,10 @@ class Server(socketserver.ThreadingTCPServer):
 
 
 class _Connection(socketserver.BaseRequestHandler):
-    server: Server
+    @property
+    def _served(self) -> Server:
+        assert isinstance(self.server, Server)
+        return self.server
 
     def handle(self) -> None:
         unpacker, writing = msgpack.Unpacker(), threading.Lock()
@@ -189,7 +192,7 @@ class _Connection(socketserver.BaseRequestHandler):
 
     def _answer(self, message: list[Any], writing: threading.Lock) -> None:
         _, number, method, parameters = message
-        self.server.calls.append((method, parameters))
+        self._served.calls.append((method, parameters))
         error, result = None, None
         if method not in METHODS:
             count = len(parameters)
@@ -200,7 +203,7 @@ class _Connection(socketserver.BaseRequestHandler):
                 f"Expected: {wanted}, got: {len(parameters)}"
             )
         else:
-            result = self.server.world.call(method, parameters)
+            result = self._served.world.call(method, parameters)
         with writing, contextlib.suppress(OSError):
             self.request.sendall(msgpack.packb([1, number, error, result], use_single_float=True))
 

@@ -60,6 +60,12 @@ def connect() -> Iterator[Callable[..., Rpc]]:
         rpc.close()
 
 
+def flown(server: Server, vehicle: Vehicle) -> AirsimPlant:
+    kind = find_plant(f"airsim:127.0.0.1:{server.port}")
+    assert issubclass(kind, AirsimPlant)
+    return kind(vehicle, "ctbr")
+
+
 class Tap(socketserver.ThreadingTCPServer):
     """Hands a connection on to a server, and keeps what the client sends."""
 
@@ -86,10 +92,16 @@ class Tap(socketserver.ThreadingTCPServer):
         unpacker.feed(bytes(self.sent))
         for kind, number, method, _ in unpacker:
             whole = bytes(self.sent[begin : unpacker.tell()])
-            head = b"\x94" + msgpack.packb(kind) + msgpack.packb(number)
+            head = b"\x94" + packed(kind) + packed(number)
             assert whole.startswith(head)
             found[method], begin = whole[len(head) :], unpacker.tell()
         return found
+
+
+def packed(value: Any) -> bytes:
+    data = msgpack.packb(value)
+    assert isinstance(data, bytes)
+    return data
 
 
 def _pump(source: socket.socket, sink: socket.socket, kept: bytearray) -> None:
@@ -150,12 +162,19 @@ def test_every_request_is_byte_for_byte_that_of_the_published_client(server: Ser
     theirs, ours = Tap(server.port), Tap(server.port)
     state = dataclasses.replace(TILTED, position=np.array([1.0, 2.0, 5.0]))
     with published(theirs.port) as client:
-        client.ping(), client.getServerVersion(), client.getSettingsString()
-        client.simPause(False), client.reset()
-        client.enableApiControl(True, DRONE), client.isApiControlEnabled(DRONE), client.armDisarm(True, DRONE)
-        client.simPause(True), client.simIsPause()
+        client.ping()
+        client.getServerVersion()
+        client.getSettingsString()
+        client.simPause(False)
+        client.reset()
+        client.enableApiControl(True, DRONE)
+        client.isApiControlEnabled(DRONE)
+        client.armDisarm(True, DRONE)
+        client.simPause(True)
+        client.simIsPause()
         client.simSetKinematics(their_kinematics(state), True, DRONE)
-        client.simGetGroundTruthKinematics(DRONE), client.getMultirotorState(DRONE)
+        client.simGetGroundTruthKinematics(DRONE)
+        client.getMultirotorState(DRONE)
         gains = [cosysairsim.PIDGains(kp, 0.0, 0.0) for kp in (0.03, 0.04, 0.08)]
         client.setAngleRateControllerGains(cosysairsim.AngleRateControllerGains(*gains), DRONE)
         future = client.moveByAngleRatesThrottleAsync(0.1, -0.2, 0.3, 0.5, 1.0, DRONE)
@@ -186,7 +205,10 @@ def test_the_same_calls_by_both_clients_give_the_same_states(vis_r: Vehicle, con
     ends = []
     for ours in (False, True):
         with Server(World(vis_r, 4, settings(), seed=3)) as server, published(server.port) as client:
-            client.reset(), client.enableApiControl(True), client.armDisarm(True), client.simPause(True)
+            client.reset()
+            client.enableApiControl(True)
+            client.armDisarm(True)
+            client.simPause(True)
             if ours:
                 rpc = connect(server.port)
                 rpc.call("simSetKinematics", protocol.kinematics(TILTED), True, "")
@@ -206,7 +228,7 @@ def test_the_same_calls_by_both_clients_give_the_same_states(vis_r: Vehicle, con
                 future.join()
                 for seconds in stretches:
                     client.simContinueForTime(seconds)
-                k = client.simGetGroundTruthKinematics()
+                k: Any = client.simGetGroundTruthKinematics()
                 position, rate = (FLIP, k.position), (TURN, k.angular_velocity)
                 ends.append([m @ v.to_numpy_array() for m, v in (position, rate)])
     (position, rate), flown = ends
@@ -250,8 +272,7 @@ def test_a_command_acts_from_the_first_physics_step_on(server: Server, connect: 
 
 
 def test_a_flight_is_that_of_mujoco_behind_it(server: Server, vis_r: Vehicle) -> None:
-    plant, mujoco = find_plant(f"airsim:127.0.0.1:{server.port}")(vis_r, "ctbr"), MujocoPlant(vis_r)
-    assert isinstance(plant, AirsimPlant)
+    plant, mujoco = flown(server, vis_r), MujocoPlant(vis_r)
     start = dataclasses.replace(TILTED, quaternion=unit(0.95, 0.1, 0.2, 0.2))
     ends, rng = [], np.random.default_rng(0)
     commands = rng.uniform([7, -2, -2, -1], [13, 2, 2, 1], (15, 4))
@@ -274,7 +295,7 @@ def test_a_flight_is_that_of_mujoco_behind_it(server: Server, vis_r: Vehicle) ->
 
 
 def test_what_is_measured_is_what_the_vehicle_has(server: Server, vis_r: Vehicle) -> None:
-    plant = find_plant(f"airsim:127.0.0.1:{server.port}")(vis_r, "ctbr")
+    plant = flown(server, vis_r)
     measured = plant.model
     assert measured.thrust == pytest.approx(4 * vis_r.thrust_range[1] / vis_r.mass, rel=0.01)
     np.testing.assert_allclose(measured.turn, server.world._authority, rtol=0.03)

@@ -72,6 +72,8 @@ def test_a_plant_that_is_not_whole_is_refused_before_anything_flies(code: str, m
 
 
 def test_an_unregistered_class_is_named() -> None:
-    with pytest.raises(ValueError, match=r"Plant is no registered plant; accepted: betaflight, mujoco, simulator"):
+    with pytest.raises(
+        ValueError, match=r"Plant is no registered plant; accepted: airsim, betaflight, mujoco, simulator"
+    ):
         e2efly.validate("hover", e2efly.Plant)
     assert find_plant("simulator").name == "simulator"

@@ -213,5 +213,6 @@ def _clock_speed(text: Any) -> float:
     with contextlib.suppress(ValueError, TypeError):
         read = json.loads(text)
         speed = read.get("ClockSpeed") if isinstance(read, dict) else None
-    number = isinstance(speed, int | float) and not isinstance(speed, bool)
-    return float(speed) if number and 1e-3 <= speed <= 1e3 else 1.0
+    if isinstance(speed, int | float) and not isinstance(speed, bool) and 1e-3 <= speed <= 1e3:
+        return float(speed)
+    return 1.0

@@ -1,6 +1,6 @@
 """AirSim as a plant: its vehicle, its flight controller SimpleFlight and its physics, in lockstep over its RPC."""
 
-from typing import ClassVar, Self
+from typing import ClassVar, Self, cast
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
+FLOOR_M = 0.02
+"""AirSim's floor lies so far below ours, m: its collisions end a descent a bit above the place where the vehicle had
+come to rest, and that touch is to count."""
 OUTER_S = 0.01
 """Longest time between two commands of a mode above body rates, s: its controller runs here."""
 
@@ -46,7 +49,8 @@ class AirsimPlant(Plant):
         if len(more) > 2 or not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):
             raise ValueError(f"--plant is airsim:{address}; {accepted}")
         where = {"host": host or cls.host, "port": int(port), "named": more[1] if len(more) > 1 else ""}
-        return type(cls.__name__, (cls,), {**where, "__module__": cls.__module__, "__doc__": cls.__doc__})
+        made = type(cls.__name__, (cls,), {**where, "__module__": cls.__module__, "__doc__": cls.__doc__})
+        return cast("type[Self]", made)
 
     @classmethod
     def differences(cls, vehicle: Vehicle, contract: Contract) -> list[str]:
@@ -87,7 +91,7 @@ class AirsimPlant(Plant):
             rest = self._session.settle()
             self.grounded = rest is not None
             stands = begin if rest is None else rest
-            self._origin = stands.position - np.array([0.0, 0.0, vehicle.feet_height])
+            self._origin = stands.position - np.array([0.0, 0.0, vehicle.feet_height - FLOOR_M])
             self._session.take_over()
             self.model = measure(self._session)
             self._session.set_gains(self.model.gains(vehicle.rate_gain))
@@ -98,7 +102,7 @@ class AirsimPlant(Plant):
 
     @property
     def state(self) -> RigidState:
-        """The vehicle now; its ground is at no height, its first place over the world's origin."""
+        """The vehicle now; its first place is over the world's origin, and AirSim's floor `FLOOR_M` below ours."""
         return self._state
 
     def reset(self, state: RigidState) -> None:
