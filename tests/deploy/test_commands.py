@@ -2,6 +2,9 @@
 
 import dataclasses
 import math
+import re
+import socket
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -22,6 +25,7 @@ from e2efly.deploy.settings import FlightSettings
 from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 from tests.deploy.command_streams import Loopback, encode
+from tests.deploy.test_msp_client import controller, recorded
 
 VEHICLE = load_vehicle("vis_r")
 SETTINGS = FlightSettings()
@@ -264,6 +268,10 @@ def test_a_yaw_rate_turns_the_heading_and_leads_the_vehicle_by_no_more_than_a_le
     assert turned == pytest.approx(LEASH)
     kept = parse_command(said("acceleration"), 7.0)
     assert heading(kept, Heading(0.7, 100.0), STILL, 100.05) == 0.7
+    rates = parse_command(said("ctbr"), 7.0)  # afterwards the vehicle's own heading is held
+    assert heading(rates, Heading(0.7, 100.0), STILL, 100.05) == 0
+    tilted = parse_command(said("attitude"), 7.0)
+    assert heading(tilted, Heading(0.7, 100.0), STILL, 100.05) == 3.0
 
 
 # UDP and the command line
@@ -290,6 +298,32 @@ def test_datagrams_are_read_with_their_sender_and_malformed_ones_counted() -> No
 def test_what_names_no_source_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r"--commands is .*; accepted: udp:PORT; .*ros2:/topic"):
         open_commands(text)
+
+
+def test_check_shows_what_comes_from_a_commander(capsys: pytest.CaptureFixture) -> None:
+    with Loopback() as free, Loopback() as other:
+        port, poses = free.port, other.port
+    done = threading.Event()
+
+    def send() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            while not done.wait(0.01):
+                sender.sendto(said("velocity", stamp=time.monotonic()), ("127.0.0.1", port))
+                sender.sendto(b"{}", ("127.0.0.1", port))
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    try:
+        with controller(recorded) as client:
+            link: Any = client.link
+            fly_command(Fly(vehicle="vis_r", link=link.name, pose=f"udp:{poses}", commands=f"udp:{port}", check=True))
+    finally:
+        done.set()
+        thread.join()
+    told = " ".join(capsys.readouterr().out.split())
+    found = re.search(rf"(\d+) accepted, (\d+) refused, from udp:127.0.0.1:{port}", told)
+    assert found is not None, told
+    assert min(map(int, found.groups())) > 10
 
 
 def test_a_policy_and_a_commander_at_once_are_refused() -> None:
