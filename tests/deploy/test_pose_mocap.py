@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.deploy.pose import relay
+from e2efly.deploy import child
 from e2efly.deploy.pose.relay import RelaySource
 from e2efly.deploy.pose.sources import open_source
 
@@ -115,7 +115,7 @@ def test_a_rigid_body_of_optitrack_is_followed(server: Server) -> None:
     samples = []
     until(lambda: samples.extend(source.read(time.monotonic())) or len(samples) >= 5, source)
     source.close()
-    assert source._process.returncode == 0
+    assert source._child.process.returncode == 0
     for sample in samples:
         np.testing.assert_array_equal(sample.position[:2], [1, 2])
         np.testing.assert_allclose(sample.quaternion, [0.8, 0, 0, 0.6], atol=1e-7)
@@ -148,7 +148,7 @@ def test_a_body_of_another_name_is_named(server: Server) -> None:
 
 def test_a_client_that_dies_is_silent_and_says_so(server: Server) -> None:
     source = opened(f"mocap:optitrack:{server.host}:quad")
-    os.kill(source._process.pid, signal.SIGKILL)
+    os.kill(source._child.process.pid, signal.SIGKILL)
     until(lambda: source.read(time.monotonic()) is not None and "process has ended" in str(source.problem), source)
     assert source.read(time.monotonic()) == []
     source.close()
@@ -163,7 +163,7 @@ def test_the_client_s_own_errors_are_told() -> None:
 
 
 def test_a_system_that_does_not_answer_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(relay, "OPENING", 0.5)
+    monkeypatch.setattr(child, "OPENING", 0.5)
     with pytest.raises(ValueError, match=r"no answer within 0\.5 s; .*check that the system streams to this machine"):
         open_source("mocap:optitrack:127.0.0.1:quad")
 
@@ -173,14 +173,14 @@ def test_closing_ends_a_client_that_waits_for_a_frame(server: Server) -> None:
     until(lambda: bool(source.read(time.monotonic())), source)
     server.stop()
     source.close()
-    assert source._process.returncode == 0
+    assert source._child.process.returncode == 0
 
 
 def test_the_client_ends_with_the_bridge_however_that_ends() -> None:
     code = (
         "import os, signal\n"
         "from e2efly.deploy.pose.sources import open_source\n"
-        "print(open_source('mocap:mock:localhost:quad')._process.pid, flush=True)\n"
+        "print(open_source('mocap:mock:localhost:quad')._child.process.pid, flush=True)\n"
         "os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from e2efly.deploy.child import SYSTEM_PYTHON
 from e2efly.deploy.odometry import Sample
-from e2efly.deploy.pose.relay import SYSTEM_PYTHON, RelaySource
+from e2efly.deploy.pose.relay import RelaySource
 from e2efly.deploy.pose.source import PoseSource
 from e2efly.deploy.pose.sources import open_source
 
@@ -140,7 +141,7 @@ def test_closing_ends_the_process(ros: None) -> None:
     assert isinstance(source, RelaySource)
     assert source.describe().startswith("ros1:/pose (rospy of ")
     source.close()
-    assert source._process.returncode == 0
+    assert source._child.process.returncode == 0
     assert source.read(time.monotonic()) == []
 
 

@@ -105,14 +105,14 @@ def test_a_topic_of_another_type_is_named(ros: None) -> None:
         assert "nav_msgs/msg/Odometry" in source.problem
     finally:
         source.close()
-    assert source._process.returncode == 0  # type: ignore[attr-defined]
+    assert source._child.process.returncode == 0  # type: ignore[attr-defined]
 
 
 def test_an_odometry_without_twist_gives_no_velocity() -> None:
     from geometry_msgs.msg import TwistWithCovariance
     from nav_msgs.msg import Odometry
 
-    from e2efly.deploy.pose.process.pose_relay import pose_of
+    from e2efly.deploy.process.pose_relay import pose_of
 
     twist = TwistWithCovariance()
     twist.covariance[0] = -1.0

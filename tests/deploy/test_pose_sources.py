@@ -14,8 +14,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from e2efly.deploy.lines import LONGEST, Lines
 from e2efly.deploy.odometry import Sample
-from e2efly.deploy.pose.json_source import LONGEST, Lines, parse_pose
+from e2efly.deploy.pose.json_source import parse_pose
 from e2efly.deploy.pose.relay import RelaySource
 from e2efly.deploy.pose.source import LARGEST_BATCH, PlantSource, PoseSource
 from e2efly.deploy.pose.sources import open_source

@@ -168,7 +168,7 @@ class Bridge:
         self.estimate = estimate.see(self.estimate, samples, self.flight, attitude, now, self.source.problem or "")
         odometry = self.odometry if self.flying else None
         self.seen = tuple(
-            watch.see(seen, camera.read(now), now, odometry, self.settings.ground_height)
+            watch.see(seen, camera.read(now), now, odometry, self.settings.ground_height, camera.problem)
             for seen, camera in zip(self.seen, self.cameras, strict=True)
         )
         reading = self.instruments.read(now, self.info, land=self.land_now, sends=sends)

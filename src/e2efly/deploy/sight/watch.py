@@ -51,16 +51,19 @@ class Seen:
     """Whether the newest shows nothing."""
     wrong: int = 0
     """Images in a row that contradict where the ground is."""
+    trouble: str | None = None
+    """What the source says was wrong last: why none come, if it knows."""
 
     def problem(self, now: float) -> str | None:
         """Why no policy may act on the newest image; None: it may."""
         name, frame = f"image {self.camera.name!r}", self.frame
+        why = f" ({self.trouble})" if self.trouble else ""
         if self.fault is not None:
             return f"{name}: {self.fault}"
         if frame is None:
-            return f"{name}: none came yet"
+            return f"{name}: none came yet{why}"
         if (age := now - frame.time) > self.oldest:
-            return f"{name}: is {1e3 * age:.0f} ms old; accepted: at most {1e3 * self.oldest:.0f} ms"
+            return f"{name}: is {1e3 * age:.0f} ms old; accepted: at most {1e3 * self.oldest:.0f} ms{why}"
         if self.same >= FROZEN:
             return f"{name}: frozen: {self.same} equal images in a row"
         if self.empty:
@@ -80,7 +83,14 @@ _EMPTY = {
 }  # fmt: skip
 
 
-def see(seen: Seen, frames: Iterable[Frame], now: float, odometry: Odometry | None = None, ground: float = 0.0) -> Seen:
+def see(
+    seen: Seen,
+    frames: Iterable[Frame],
+    now: float,
+    odometry: Odometry | None = None,
+    ground: float = 0.0,
+    trouble: str | None = None,
+) -> Seen:
     """Take in new frames, oldest first.
 
     Args:
@@ -89,7 +99,10 @@ def see(seen: Seen, frames: Iterable[Frame], now: float, odometry: Odometry | No
         now: this machine's monotonic clock, s.
         odometry: the vehicle's motion in the air: it tells where the ground is in an image; None: it is not known.
         ground: height of the ground, world, m.
+        trouble: what the source says was wrong last.
     """
+    if trouble != seen.trouble:
+        seen = dataclasses.replace(seen, trouble=trouble)
     for frame in frames:
         fault = _fault(seen, frame, now)
         if fault is not None:

@@ -1,10 +1,9 @@
 """Odometry and pose topics of ROS 1 and ROS 2."""
 
+from e2efly.deploy.child import ROS_PYTHON, pythons
 from e2efly.deploy.pose.registry import part_of, register
-from e2efly.deploy.pose.relay import RelaySource, open_relay, pythons
+from e2efly.deploy.pose.relay import RelaySource, open_relay
 
-PYTHON = "E2EFLY_ROS_PYTHON"
-"""Environment variable that names the interpreter which has ROS."""
 ADVICE = {
     1: "install the package rospy (Debian: apt-get install python3-rospy python3-nav-msgs python3-geometry-msgs) and "
     "have roscore running",
@@ -45,5 +44,5 @@ def open_ros(version: int, topic: str) -> RelaySource:
         raise ValueError(
             f"pose source ros{version}: topic is {topic!r}; accepted: a name from the root, such as '/odometry'"
         )
-    advice = f"{ADVICE[version]}, or name an interpreter that has it in {PYTHON}"
-    return open_relay(f"ros{version}:{topic}", pythons(PYTHON), advice, f"ros{version}", topic)
+    advice = f"{ADVICE[version]}, or name an interpreter that has it in {ROS_PYTHON}"
+    return open_relay(f"ros{version}:{topic}", pythons(ROS_PYTHON), advice, f"ros{version}", topic)

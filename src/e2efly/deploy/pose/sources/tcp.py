@@ -3,8 +3,9 @@
 import math
 import socket
 
+from e2efly.deploy.lines import LONGEST, Lines
 from e2efly.deploy.odometry import Sample
-from e2efly.deploy.pose.json_source import LONGEST, Lines, parse_pose
+from e2efly.deploy.pose.json_source import parse_pose
 from e2efly.deploy.pose.registry import part_of, port_of, register
 from e2efly.deploy.pose.source import LARGEST_BATCH, Inbox
 

@@ -5,8 +5,9 @@ import socket
 import struct
 import time
 
+from e2efly.deploy.lines import LONGEST
 from e2efly.deploy.odometry import Sample
-from e2efly.deploy.pose.json_source import LONGEST, parse_pose
+from e2efly.deploy.pose.json_source import parse_pose
 from e2efly.deploy.pose.registry import port_of, register
 from e2efly.deploy.pose.source import Inbox
 

@@ -4,9 +4,8 @@ It runs as a script in a process of its own: `rospy`, `rclpy` and `motioncapture
 and can crash, and none of that may happen in the control loop. It needs nothing but Python (3.8 or newer) and the
 package that it speaks for, so that any interpreter which has that package can run it, such as the system's for ROS.
 
-Lines that it writes: `ready TEXT` once, `failed TEXT` instead, `problem TEXT` for what is no pose, and for each pose
-`pose RECEIVED JSON`, with the time of arrival on the monotonic clock, s, and the message of `docs/pose-sources.md`. It
-ends when its standard input does, that is with the bridge, however that ends.
+It writes the lines of `speech.py`, `problem TEXT` for what is no pose, and for each pose `pose RECEIVED JSON`, with the
+time of arrival on the monotonic clock, s, and the message of `docs/pose-sources.md`.
 """
 
 from __future__ import annotations
@@ -15,13 +14,11 @@ import importlib
 import json
 import os
 import sys
-import threading
 import time
-from typing import Any, Callable  # noqa: UP035  # Python 3.8
+from typing import Any
 
 TYPES = ("nav_msgs/Odometry", "geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped")
 """Message types of ROS that carry a pose."""
-closing = threading.Event()
 
 
 def pose_of(message: Any) -> dict[str, Any]:
@@ -58,7 +55,7 @@ def cross(a: list[float], b: list[float]) -> list[float]:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def relay_ros1(say: Callable[..., None], topic: str) -> None:
+def relay_ros1(speech: Any, topic: str) -> None:
     """Subscribe to a topic of ROS 1, whatever its type turns out to be."""
     rospy, rosgraph = importlib.import_module("rospy"), importlib.import_module("rosgraph")
     classes = {name: ros_class(name, ".msg") for name in TYPES}
@@ -69,18 +66,18 @@ def relay_ros1(say: Callable[..., None], topic: str) -> None:
     def receive(raw: Any) -> None:
         received, kind = time.monotonic(), raw._connection_header["type"]
         if kind not in classes:
-            say("problem", f"{topic} is {kind!r}; accepted: {', '.join(TYPES)}")
+            speech.say("problem", f"{topic} is {kind!r}; accepted: {', '.join(TYPES)}")
             return
-        say("pose", repr(received), json.dumps(pose_of(classes[kind]().deserialize(raw._buff))))
+        speech.say("pose", repr(received), json.dumps(pose_of(classes[kind]().deserialize(raw._buff))))
 
     rospy.init_node("e2efly_pose", anonymous=True, disable_signals=True)
     rospy.Subscriber(topic, rospy.AnyMsg, receive, queue_size=10, tcp_nodelay=True)
-    say("ready", f"rospy of {sys.executable}")
-    closing.wait()
+    speech.say("ready", f"rospy of {sys.executable}")
+    speech.closing.wait()
     rospy.signal_shutdown("closed")
 
 
-def relay_ros2(say: Callable[..., None], topic: str) -> None:
+def relay_ros2(speech: Any, topic: str) -> None:
     """Subscribe to a topic of ROS 2, as soon as somebody publishes it."""
     rclpy, qos = importlib.import_module("rclpy"), importlib.import_module("rclpy.qos")
     executors, signals = importlib.import_module("rclpy.executors"), importlib.import_module("rclpy.signals")
@@ -92,11 +89,11 @@ def relay_ros2(say: Callable[..., None], topic: str) -> None:
 
     def receive(message: Any) -> None:
         received = time.monotonic()
-        say("pose", repr(received), json.dumps(pose_of(message)))
+        speech.say("pose", repr(received), json.dumps(pose_of(message)))
 
-    say("ready", f"rclpy of {sys.executable}")
+    speech.say("ready", f"rclpy of {sys.executable}")
     said, subscribed = "", False
-    while not closing.is_set():
+    while not speech.closing.is_set():
         if not subscribed:
             kinds = dict(node.get_topic_names_and_types()).get(topic, [])
             known = [kind for kind in kinds if kind in classes]
@@ -106,7 +103,7 @@ def relay_ros2(say: Callable[..., None], topic: str) -> None:
                 subscribed = True
             elif kinds and kinds != said:
                 said = kinds
-                say("problem", f"{topic} is {', '.join(map(repr, kinds))}; accepted: {', '.join(classes)}")
+                speech.say("problem", f"{topic} is {', '.join(map(repr, kinds))}; accepted: {', '.join(classes)}")
         executor.spin_once(timeout_sec=0.05)
     executor.shutdown()
     node.destroy_node()
@@ -119,53 +116,25 @@ def ros_class(name: str, module: str) -> Any:
     return getattr(importlib.import_module(package + module), kind)
 
 
-def relay_mocap(say: Callable[..., None], system: str, host: str, body: str) -> None:
+def relay_mocap(speech: Any, system: str, host: str, body: str) -> None:
     """Wait for frames of a motion capture system and pass one rigid body on."""
     connection = importlib.import_module("motioncapture").connect(system, {"hostname": host})
-    say("ready", f"motioncapture of {sys.executable}")
+    speech.say("ready", f"motioncapture of {sys.executable}")
     warned = float("-inf")
-    while not closing.is_set():
+    while not speech.closing.is_set():
         connection.waitForNextFrame()
         received, bodies = time.monotonic(), connection.rigidBodies
         if body in bodies:
             p, q = [float(x) for x in bodies[body].position], bodies[body].rotation
-            say("pose", repr(received), json.dumps({"position": p, "quaternion": [q.w, q.x, q.y, q.z]}))
+            speech.say("pose", repr(received), json.dumps({"position": p, "quaternion": [q.w, q.x, q.y, q.z]}))
         elif received - warned > 1:  # once per second is enough
             warned = received
-            say(
+            speech.say(
                 "problem",
                 f"rigid body {body!r} is not tracked; there are: {', '.join(map(repr, sorted(bodies))) or 'none'}",
             )
 
 
-def main(kind: str, *arguments: str) -> None:
-    """Run one relay until the standard input ends."""
-    lines = os.fdopen(os.dup(1), "w", errors="backslashreplace")
-    os.dup2(2, 1)  # the packages print there, too
-    lock = threading.Lock()
-
-    def say(*words: str) -> None:
-        with lock:
-            lines.write(" ".join(words).replace("\n", " ") + "\n")
-            lines.flush()
-
-    def watch() -> None:
-        while os.read(0, 1024):
-            pass
-        closing.set()
-        time.sleep(1)  # for a clean end; what still blocks then is cut off
-        os._exit(0)
-
-    threading.Thread(target=watch, daemon=True).start()
-    try:
-        {"ros1": relay_ros1, "ros2": relay_ros2, "mocap": relay_mocap}[kind](say, *arguments)
-    except BrokenPipeError:
-        pass  # the bridge is gone
-    except Exception as error:
-        say("failed", f"{type(error).__name__}: {error}")
-        os._exit(1)
-    os._exit(0)  # without the packages' own farewells, which may hang
-
-
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    relays = {"ros1": relay_ros1, "ros2": relay_ros2, "mocap": relay_mocap}
+    importlib.import_module("speech").main(relays, sys.argv[1:])

@@ -1,0 +1,42 @@
+"""Colours of a V4L2 device or of a video file, by OpenCV."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from typing import Any
+
+RECENT_S = 1.0
+"""A device's stamp that is older, s, is of another clock than the monotonic one."""
+
+
+def capture(output: Any, path: str) -> None:
+    """Publish each image; a file's at its own rate, so that its end is like an unplugged camera.
+
+    Raises:
+        RuntimeError: when the device or the file cannot be opened, or gives no more images.
+    """
+    cv2 = importlib.import_module("cv2")
+    device = path.startswith("/dev/")
+    video = cv2.VideoCapture(path, cv2.CAP_V4L2 if device else cv2.CAP_FFMPEG)
+    if not video.isOpened():
+        raise RuntimeError(f"{path} cannot be opened; accepted: a camera's /dev/videoN or the file of a video")
+    if device:
+        video.set(cv2.CAP_PROP_BUFFERSIZE, 1)  # the newest image rather than all
+    period = 1.0 / (video.get(cv2.CAP_PROP_FPS) or 30.0)
+    began, count = time.monotonic(), 0
+    while not output.speech.closing.is_set():
+        there, image = video.read()
+        if not there:
+            end = "gives no more images: it is unplugged" if device else "has ended"
+            raise RuntimeError(f"{path} {end}" if count else f"{path} gives no image")
+        if device:
+            now, stamp = time.monotonic(), 1e-3 * video.get(cv2.CAP_PROP_POS_MSEC)  # the driver's, on the same clock
+            moment = stamp if now - RECENT_S < stamp <= now else now
+        else:
+            moment = began + count * period
+            output.speech.closing.wait(max(moment - time.monotonic(), 0.0))
+        colours = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+        output.put(moment, colours.tobytes(), colours.shape, "uint8", None, f"OpenCV {cv2.__version__}")
+        count += 1
+    video.release()
