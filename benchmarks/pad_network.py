@@ -1,7 +1,7 @@
 """The small network of `mask:onnx`: its layers, its training on `pad_renders`, and its file.
 
-Colours, less their mean and over their deviation, go down three halvings and up again, each way up beside what came down
-(Ronneberger, Fischer, Brox: "U-Net", 2015); what comes out is the probability that a pixel shows a pad.
+Colours, less their mean and over their deviation, go down three halvings and up again, each way up beside what came
+down (Ronneberger, Fischer, Brox: "U-Net", 2015); what comes out is the probability that a pixel shows a pad.
 """
 
 from collections.abc import Iterator
@@ -55,9 +55,7 @@ def logits(weights: Weights, colours: Float[Array, "n h w 3"]) -> Float[Array, "
         kernel, bias = weights[name]
         before = (kernel.shape[0] - 1) // 2
         pad = [(before, before)] * 2
-        y = jax.lax.conv_general_dilated(
-            x, kernel, (stride, stride), pad, dimension_numbers=("NHWC", "HWIO", "NHWC")
-        )
+        y = jax.lax.conv_general_dilated(x, kernel, (stride, stride), pad, dimension_numbers=("NHWC", "HWIO", "NHWC"))
         return y + bias
 
     n, h, w, _ = colours.shape
@@ -141,7 +139,7 @@ def learned(
     for i, (x, y) in zip(range(steps), _batches(np.random.default_rng(seed), colours, masks, size), strict=False):
         weights, state, value = step(weights, state, x, y)
         mean = 0.98 * mean + 0.02 * float(value)
-        if (i + 1) % 200 == 0:
+        if (i + 1) % 100 == 0:
             told(f"step {i + 1}: loss {mean / (1 - 0.98 ** (i + 1)):.4f}")
     return weights
 

@@ -14,9 +14,9 @@ from jaxtyping import Array, Float, PRNGKeyArray, UInt8
 
 from e2efly.sensors.image_noise import gaussian, speckle
 
-SIDE = 96
+SIDE = 64
 """Rows and columns of a picture."""
-FINE = 2
+FINE = 3
 """Rays across a pixel: colours are their mean, and a pixel shows the pad where half of its rays meet it."""
 LEVELS = 4
 """Heights at which the outline of a prism is looked at: between them the mantle shows."""
@@ -69,8 +69,7 @@ def _marking(which: Array, x: Array, y: Array, size: Array, scale: Array) -> Arr
         which,
         [
             lambda: jnp.zeros(x.shape, bool),
-            lambda: (jnp.abs(jnp.abs(x) - 0.35) < bar) & (jnp.abs(y) < 0.5)
-            | (jnp.abs(y) < bar) & (jnp.abs(x) < 0.35),
+            lambda: (jnp.abs(jnp.abs(x) - 0.35) < bar) & (jnp.abs(y) < 0.5) | (jnp.abs(y) < bar) & (jnp.abs(x) < 0.35),
             lambda: jnp.abs(jnp.sqrt(x * x + y * y + 1e-9) - 0.55) < bar,
             lambda: _hash(jnp.floor(x * cells), jnp.floor(y * cells), scale * 7.0) < 0.5,
             lambda: size > 1 - 1.5 * bar,
@@ -188,7 +187,7 @@ def _picture(key: PRNGKeyArray, variety: Variety) -> tuple[Float[Array, "h w 3"]
     tx, ty = _turned(gx + 10 * u[12], gy + 10 * u[13], 2 * jnp.pi * u[14])
     share = _ground(ground, tx, ty, jax.random.uniform(keys[5], (4,)))[..., None]
     colour = base[0] * (1 - share) + second[0] * share
-    sx, sy = _turned(gx - aim_x, gy - aim_y, 2 * jnp.pi * u[15])
+    sx, _ = _turned(gx - aim_x, gy - aim_y, 2 * jnp.pi * u[15])
     strip = (jnp.abs(sx - _between(u[16], -1.5, 1.5)) < _between(u[17], 0.01, 0.06)) & (u[18] < 0.5)
     stain = (_smooth(2 * tx, 2 * ty, u[19]) > 0.72) & (u[20] < 0.4)
     px, py = 5 * tx, 5 * ty
@@ -211,7 +210,7 @@ def _picture(key: PRNGKeyArray, variety: Variety) -> tuple[Float[Array, "h w 3"]
     colour = jnp.where(mantle[..., None], paint * _between(u[30], 0.3, 0.9), colour)
     colour = jnp.where(top[..., None], face, colour)
     # light
-    cx, cy = _turned(gx, gy, 2 * jnp.pi * u[31])
+    cx, _ = _turned(gx, gy, 2 * jnp.pi * u[31])
     shade = jax.nn.sigmoid((cx - height * _between(u[32], -1, 1)) / (0.02 + 0.2 * u[33]))
     shade = jnp.where(u[34] < 0.4, 1 - shade * _between(u[35], 0.2, 0.7), 1.0)
     shade *= 1 + _between(u[36], -0.3, 0.3) * across / spread

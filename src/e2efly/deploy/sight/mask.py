@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.policy.images import NONE, Image
-from e2efly.deploy.sight.segment import Segmenter, chosen, opencv
-from e2efly.deploy.sight.source import Frame
+from e2efly.deploy.sight.segment import chosen, opencv
+from e2efly.deploy.sight.watch import Seen, see
 
 WAIT_S = 0.001
 """Between two looks for a new image, s."""
@@ -43,51 +43,43 @@ def colours_for(image: Image) -> Image:
     return dataclasses.replace(image, sees="rgb", of=NONE, encoding=NONE, width=0, height=0, pool=(0, 0))
 
 
-def segmented(frame: Frame, segmenter: Segmenter) -> np.ndarray:
-    """The mask of a frame, uint8 (h, w), 255 for 1.
-
-    Args:
-        frame: colours in [0, 1], (h, w, 3); grey, (h, w), is taken as colours.
-        segmenter: makes the mask.
-
-    Raises:
-        ValueError: for values that are no colours.
-    """
-    image = frame.image if frame.image.ndim == 3 else np.repeat(frame.image[..., None], 3, axis=-1)
-    if not (image.min() >= 0 and image.max() <= 1):  # false for NaN
-        raise ValueError(f"gives values from {image.min():g} to {image.max():g}; accepted: colours in [0, 1]")
-    return 255 * segmenter(np.round(255 * image).astype(np.uint8))
-
-
 def capture(output: Any, where: str) -> None:
     """What the process does: a kind of `process/capture.py`.
+
+    A camera that is covered or frozen would give masks that look like those of a ground without the object, so colours
+    are checked as those of a policy would be: of what does not pass there is no mask.
 
     Args:
         output: of that script.
         where: JSON: `segmenter`, `uri` and `image`, the camera of the policy's contract.
 
     Raises:
-        ValueError: where either does not open, or the other source gives no colours.
+        ValueError: where either does not open.
     """
     from e2efly.deploy.sight.sources import open_image  # which imports this module's source
 
     asked = json.loads(where)
-    image = Image.of_json(asked["image"], "image")
-    segmenter = chosen(asked["segmenter"])
+    camera, segmenter = colours_for(Image.of_json(asked["image"], "image")), chosen(asked["segmenter"])
     opencv().setNumThreads(1)  # more would take the cores of the control loop
-    source = open_image(asked["uri"], colours_for(image))
+    source, told = open_image(asked["uri"], camera), None
     try:
-        told = None
+        seen = Seen(camera)
         while not output.speech.closing.is_set():
-            frames = source.read(time.monotonic())
-            if source.problem != told and source.problem:
-                output.speech.say("problem", source.problem)
-            told = source.problem
+            now = time.monotonic()
+            frames = source.read(now)[-1:]
+            if frames and seen.frame is None:
+                height, width = frames[0].image.shape[:2]
+                seen = Seen(dataclasses.replace(camera, height=height, width=width))
+            seen = see(seen, frames, now, trouble=source.problem)
+            problem = seen.problem(now) if frames else source.problem
+            if problem != told and problem:
+                output.speech.say("problem", problem)
+            told = problem
+            if frames and not problem and seen.frame is not None:
+                mask = 255 * segmenter(np.round(255 * seen.frame.image).astype(np.uint8))
+                detail = f"{segmenter.describe()}; {source.describe()}"
+                output.put(seen.frame.time, mask.tobytes(), mask.shape, "uint8", (0.0, 0.0), detail)
             if not frames:
                 output.speech.closing.wait(WAIT_S)
-                continue
-            mask = segmented(frames[-1], segmenter)
-            detail = f"{segmenter.describe()}; {source.describe()}"
-            output.put(frames[-1].time, mask.tobytes(), mask.shape, "uint8", (0.0, 0.0), detail)
     finally:
         source.close()

@@ -9,7 +9,7 @@ from e2efly.deploy.sight.segment import SEGMENTERS, opencv
 
 OWN = Path(__file__).parent / "pad.onnx"
 """The network that comes with the package; `benchmarks/pad_masks.py` trains it."""
-LONGER_SIDE, STEP = 96, 16
+LONGER_SIDE, STEP = 64, 16
 """Of what a network is shown that takes any size: pixels of the longer side; sides are multiples of the step."""
 ACCEPTED = (
     "an ONNX file with one input, float32 (n, h, w, 3), red, green, blue in [0, 1], and one output, float32 (n, h, w), "
