@@ -95,7 +95,7 @@ class Stamps:
 
 
 def run(module: str, function: str) -> Any:
-    """A kind: a function of a module beside this one, given an output and where the images are from."""
+    """A kind: a function of a module, mostly of one beside this one, given an output and where the images are from."""
 
     def started(speech: Any, name: str, sees: str, fov: str, where: str) -> None:
         getattr(importlib.import_module(module), function)(Output(speech, name, sees, fov), where)
@@ -109,6 +109,7 @@ KINDS = {
     "ros2": run("capture_ros", "capture_ros2"),
     "v4l2": run("capture_video", "capture"),
     "realsense": run("capture_realsense", "capture"),
+    "mask": run("e2efly.deploy.sight.mask", "capture"),
 }
 
 if __name__ == "__main__":

@@ -14,7 +14,8 @@ def fitted(image: np.ndarray, fov: tuple[float, float], camera: Image, where: st
     """The image as the policy's camera would have taken it.
 
     Each value is of a cell of the policy's image: of depth the nearest valid one of the cell, as the camera's pooling
-    in training, 0 where all are holes; of a mask whether half of the cell shows it; of colours the mean.
+    in training, 0 where all are holes; of a mask whether half of the cell shows it; of colours the mean. A camera of no
+    rows and columns takes each pixel as it is, and grey as a colour.
 
     Args:
         image: (h, w) or (h, w, 3): depth in m (0: a hole), a mask or colours in [0, 1].
@@ -25,6 +26,9 @@ def fitted(image: np.ndarray, fov: tuple[float, float], camera: Image, where: st
     Raises:
         ValueError: naming what does not fit: colours for depth, a camera that sees less, or one with fewer pixels.
     """
+    whole = camera.width == 0 and camera.height == 0
+    if whole and camera.sees == "rgb" and image.ndim == 2:
+        image = np.repeat(image[..., None], 3, axis=-1)
     if len(image.shape) != len(camera.shape):
         raise ValueError(f"{where} has images of shape {image.shape}; accepted: {camera.shape} or larger")
     if image.shape == camera.shape and (not any(fov) or np.allclose(fov, camera.fov_rad, atol=1e-3)):
@@ -37,6 +41,8 @@ def fitted(image: np.ndarray, fov: tuple[float, float], camera: Image, where: st
         for axis, share, has, wants in zip(("across", "down"), shares, fov, camera.fov_rad, strict=True):
             if share > 1 + NARROWER:
                 raise ValueError(f"{where} sees {has:.3f} rad {axis}; accepted: {wants:.3f} rad or more")
+    if whole:
+        return _within(_middle(image, shares), camera)
     rows, columns = _edges(image.shape[0], camera.height, shares[1]), _edges(image.shape[1], camera.width, shares[0])
     if rows is None or columns is None:
         raise ValueError(
@@ -56,6 +62,12 @@ def fitted(image: np.ndarray, fov: tuple[float, float], camera: Image, where: st
 def _share(wants: float, has: float) -> float:
     """Of a pinhole image's width: the part that a narrower one takes."""
     return math.tan(wants / 2) / math.tan(has / 2)
+
+
+def _middle(image: np.ndarray, shares: tuple[float, float]) -> np.ndarray:
+    """The part of an image that a camera sees which takes these shares of its width and height."""
+    across, down = (round(n * (1 - min(share, 1.0)) / 2) for n, share in zip(image.shape[1::-1], shares, strict=True))
+    return image[down : image.shape[0] - down, across : image.shape[1] - across]
 
 
 def _edges(pixels: int, cells: int, share: float) -> np.ndarray | None:

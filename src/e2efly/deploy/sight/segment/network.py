@@ -1,0 +1,91 @@
+"""Masks by a network that has learned what pads look like."""
+
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+
+from e2efly.deploy.sight.segment import SEGMENTERS, opencv
+
+OWN = Path(__file__).parent / "pad.onnx"
+"""The network that comes with the package; `benchmarks/pad_masks.py` trains it."""
+LONGER_SIDE, STEP = 64, 16
+"""Of what a network is shown that takes any size: pixels of the longer side; sides are multiples of the step."""
+ACCEPTED = (
+    "an ONNX file with one input, float32 (n, h, w, 3), red, green, blue in [0, 1], and one output, float32 (n, h, w), "
+    "the probability that a pixel shows the pad"
+)
+
+
+class Network:
+    """A mask where the probability of a network is more than a half."""
+
+    def __init__(self, path: Path) -> None:
+        """Load it, and try it on a black image.
+
+        Raises:
+            ValueError: naming the file, and in what it is not as `ACCEPTED` says.
+        """
+        self.path = path
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = 4  # what is wrong is in the exception
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise ValueError(f"{path}: {error.strerror}; accepted: {ACCEPTED}") from None
+        try:
+            self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+            (given,), (_,) = self._session.get_inputs(), self._session.get_outputs()
+            self._name, (_, *sides, channels) = given.name, given.shape
+            self._sides = tuple(side if isinstance(side, int) else 0 for side in sides)  # 0: any
+            if len(self._sides) != 2 or channels != 3:
+                raise ValueError(f"its input has the shape {given.shape}")
+            self.probability(np.zeros((LONGER_SIDE, LONGER_SIDE, 3), np.uint8))
+        except Exception as error:  # of many kinds: whatever ONNX Runtime refuses, or a number of inputs or outputs
+            said = str(error).strip().partition("\n")[0]
+            raise ValueError(f"{path}: {said}; accepted: {ACCEPTED}") from None
+
+    def __call__(self, colours: np.ndarray) -> np.ndarray:
+        """The mask: see `Segmenter`."""
+        cv2 = opencv()
+        height, width, _ = colours.shape
+        larger = cv2.resize(self.probability(colours), (width, height), interpolation=cv2.INTER_LINEAR)
+        return (larger > 0.5).astype(np.uint8)
+
+    def probability(self, colours: np.ndarray) -> np.ndarray:
+        """That a pixel shows the pad, float32, at the size that the network is shown.
+
+        Args:
+            colours: uint8 (h, w, 3), red first.
+
+        Raises:
+            ValueError: where what the network gives is not of that size.
+        """
+        cv2 = opencv()
+        longer = max(colours.shape[:2])
+        rows, columns = (
+            own or max(STEP, round(side / longer * LONGER_SIDE / STEP) * STEP)
+            for own, side in zip(self._sides, colours.shape, strict=False)
+        )
+        seen = cv2.resize(colours, (columns, rows), interpolation=cv2.INTER_AREA).astype(np.float32) / 255
+        found = self._session.run(None, {self._name: seen[None]})[0]
+        if np.shape(found) != (1, rows, columns):
+            raise ValueError(f"its output has the shape {np.shape(found)} for an image of {rows} x {columns}")
+        return np.asarray(found[0], np.float32)
+
+    def describe(self) -> str:
+        """Which file."""
+        return "the package's network of pads" if self.path == OWN else f"network {self.path}"
+
+
+def open_onnx(text: str) -> Network:
+    """Load FILE; left out: the network that comes with the package.
+
+    Raises:
+        ValueError: naming the file and what is accepted.
+    """
+    return Network(Path(text).expanduser() if text else OWN)
+
+
+SEGMENTERS.add("onnx", open_onnx)

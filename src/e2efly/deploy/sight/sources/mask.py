@@ -1,0 +1,32 @@
+"""Masks of what is seen by another source."""
+
+import dataclasses
+import json
+import sys
+
+from e2efly.deploy.policy.images import Image
+from e2efly.deploy.sight.capture import Captured, open_captured
+from e2efly.deploy.sight.mask import FORM, colours_for, parts_of
+from e2efly.deploy.sight.registry import register
+from e2efly.deploy.sight.segment import chosen
+
+ADVICE = f"accepted: {FORM}, with the URI of a source of colours"
+
+
+@register("mask", "mask:SEGMENTER@URI")
+def open_mask(text: str, image: Image) -> Captured:
+    """Open the other source in a process that makes masks of its images.
+
+    Args:
+        text: SEGMENTER@URI, see `e2efly.deploy.sight.mask.FORM`.
+        image: the camera of the policy's contract; it has to be a mask.
+
+    Raises:
+        ValueError: for a policy that sees no mask, what is wrong with the segmenter, and what the process says of the
+            other source.
+    """
+    segmenter, uri = parts_of(text)
+    colours_for(image)
+    chosen(segmenter)  # what is wrong with it is said before a process starts
+    where = json.dumps({"segmenter": segmenter, "uri": uri, "image": dataclasses.asdict(image)})
+    return open_captured(f"mask:{text}", image, [sys.executable], ADVICE, where, "policy")
