@@ -78,8 +78,8 @@ class Fly:
     own, path/to/file.py:Name[:...]."""
     image: tuple[str, ...] = ()
     """Where a policy that sees gets each image of its contract: image_0=realsense:[SERIAL], v4l2:/dev/videoN?fov=AxB,
-    ros1:/topic, ros2:/topic, hil:HOST:PORT, shm:NAME (what another program publishes in shared memory), a mask of one of
-    these, mask:...@URI, or a source of your own, path/to/file.py:Name[:...]. See docs/image-sources.md."""
+    ros1:/topic, ros2:/topic, hil:HOST:PORT, shm:NAME (what another program publishes in shared memory), mask:...@URI (a
+    mask of one of these), or a source of your own, path/to/file.py:Name[:...]. See docs/image-sources.md."""
     commands: str | None = None
     """Another program that flies in place of a policy, by commands: udp:PORT, ros1:/topic, ros2:/topic, or a source of
     your own, path/to/file.py:Name[:...]."""
