@@ -68,6 +68,19 @@ def test_what_another_process_publishes_arrives_whole_and_in_order() -> None:
     camera.close()
 
 
+def test_an_image_that_came_while_the_loop_was_held_up_is_for_the_next_step() -> None:
+    images, camera = SharedImages(NAME, CAMERA.shape), SharedCamera(NAME, CAMERA)
+    begun = time.monotonic()
+    time.sleep(0.02)
+    exposed = time.monotonic()
+    images.publish(exposed, np.ones(CAMERA.shape, np.float32))
+    assert camera.read(begun) == []
+    assert [frame.time for frame in camera.read(time.monotonic())] == [exposed]
+    images.publish(exposed + 60.0, np.ones(CAMERA.shape, np.float32))  # a clock that is ahead is not hidden
+    assert [frame.time for frame in camera.read(time.monotonic())] == [exposed + 60.0]
+    camera.close()
+
+
 def test_a_wider_camera_is_cut_to_what_the_policy_sees() -> None:
     """A picture whose value is the direction that a pixel looks in."""
     height, width, fov = 360, 640, (1.7, 1.2)
@@ -109,7 +122,9 @@ def test_what_does_not_fit_is_named(tmp_path: Path) -> None:
     refused(["front=shm:x"], "--image is 'front=shm:x'; accepted: NAME=URI, NAME one of image_0")
     refused(["image_0"], "--image is 'image_0'; accepted")
     refused(["image_0=shm:x", "image_0=shm:y"], "image_0 is 'shm:x' and 'shm:y'; accepted: one URI for each image")
-    refused(["image_0=webcam:0"], "--image image_0 is 'webcam:0'; accepted: shm:NAME")
+    refused(
+        ["image_0=webcam:0"], "--image image_0 is 'webcam:0'; accepted: realsense:.*; shm:NAME; .*; or path/to/file"
+    )
     refused([f"image_0=shm:{NAME}"], "No such file or directory; accepted: images that a running program publishes")
     refused(["image_0=shm:../x"], "name of shared images is '../x'; accepted: letters")
     place(NAME).write_bytes(b"short")

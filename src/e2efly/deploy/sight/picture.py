@@ -51,7 +51,7 @@ def blocks(pixels: np.ndarray, columns: int = COLUMNS) -> Text:
             upper = "rgb({},{},{})".format(*small[y, x])
             under = " on rgb({},{},{})".format(*small[y + 1, x]) if y + 1 < small.shape[0] else ""
             text.append("\u2580", upper + under)
-        text.append("\n")
+        text.append("\n" if y + 2 < small.shape[0] else "")
     return text
 
 

@@ -5,6 +5,7 @@ bridge reads the newest image and never waits. The layout is in docs/image-sourc
 """
 
 import mmap
+from time import monotonic
 
 import numpy as np
 
@@ -25,6 +26,8 @@ from e2efly.deploy.sight.source import Frame
 
 __all__ = ["SharedCamera", "SharedImages", "place"]
 _TYPES = tuple(np.dtype(name).newbyteorder("<") for name in TYPES)
+_HELD_UP_S = 1.0
+"""So long the reading loop may have been held up since its `now`, s, and images may have come since."""
 _TRIES = 3
 """How often a reader begins anew where the publisher has overtaken it."""
 
@@ -103,8 +106,7 @@ class SharedCamera:
         fitted(np.zeros(self._layout.shape, np.float32), self._layout.fov, camera, where)  # refused here, not in flight
 
     def read(self, now: float) -> list[Frame]:
-        """The newest image, where it is new."""
-        del now
+        """The newest image, where it is new; one that was exposed after `now` is for the next time."""
         for _ in range(_TRIES):
             (count,) = SEQUENCE.unpack_from(self._memory, AT_SEQUENCE)
             if count == self._last:
@@ -115,6 +117,8 @@ class SharedCamera:
             size = layout.height * layout.width * layout.channels
             raw = np.frombuffer(self._memory, _TYPES[layout.kind], size, at + SLOT.size).copy()
             if begun == count == SLOT.unpack_from(self._memory, at)[0]:
+                if now < time <= monotonic() < now + _HELD_UP_S:  # no clock has jumped
+                    return []
                 self._last = count
                 return [Frame(time, self._fitted(raw.reshape(layout.shape)))]
         self.problem = f"{self._name}: the publisher was faster than the reader"
