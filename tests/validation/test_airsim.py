@@ -313,12 +313,12 @@ def test_what_is_measured_is_what_the_vehicle_has(server: Server, vis_r: Vehicle
     assert "angular acceleration" not in told
 
 
-def test_hover_flies_there_as_in_training(server: Server) -> None:
-    found = e2efly.validate("hover", f"airsim:127.0.0.1:{server.port}", episodes=1)
+def test_a_race_is_flown_there_as_in_training(server: Server) -> None:
+    found = e2efly.validate("race", f"airsim:127.0.0.1:{server.port}", episodes=1)
     assert found.passed
     assert found.plant.name == "airsim"
     assert found.differences == ()
-    assert "airsim" in found.as_json()["criteria"]["hover"]
+    assert "airsim" in found.as_json()["criteria"]["race"]
 
 
 def answering(reply: Callable[[list[Any]], bytes]) -> socketserver.ThreadingTCPServer:
