@@ -74,6 +74,20 @@ def test_reasons_from_outside_forge_no_line() -> None:
     ]  # fmt: skip
 
 
+def test_a_change_is_told_with_its_numbers_and_once_although_they_change() -> None:
+    said: list[str] = []
+    bridge = Grounded(mode=Mode.DONE)
+    step = bridge.tick
+
+    def tick(now: float, lateness: float, slack: float) -> None:
+        step(now, lateness, slack)
+        bridge.flight = Flight(Mode.DONE, reasons=(f"policy: no good command for {bridge.steps} s",))
+
+    bridge.tick = tick
+    looped(bridge, said.append, 0.5)
+    assert said == ["DONE: policy: no good command for 1 s"]
+
+
 @pytest.mark.parametrize("mode", [Mode.INIT, Mode.DONE])
 def test_it_ends_on_the_ground_only_when_the_pilot_has_disarmed(mode: Mode) -> None:
     """A bridge that left an armed vehicle would leave its motors to the throttle stick, which rests in its middle."""
