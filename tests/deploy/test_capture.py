@@ -121,7 +121,7 @@ def test_what_is_no_camera_of_the_policy_is_named(tmp_path: Path) -> None:
         (f"{path}?size=3", COLOURS, "option is 'size=3'; accepted: fov="),
         (f"{path}?fov=0.9x0.8", COLOURS, "sees 0.900 rad across; accepted: 1.000 rad or more"),
         (f"v4l2:{broken}?fov=policy", COLOURS, "broken.mp4 cannot be opened; accepted: a camera's /dev/videoN or the"),
-        (f"v4l2:{tmp_path}/none.mp4?fov=policy", COLOURS, "none.mp4 cannot be opened.*pip install"),
+        (f"v4l2:{tmp_path}/none.mp4?fov=policy", COLOURS, "none.mp4 cannot be opened; accepted"),
     ):
         with pytest.raises(ValueError, match=said):
             open_image(text, image)

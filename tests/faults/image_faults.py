@@ -1,14 +1,24 @@
 """What goes wrong with a camera in flight, put between it and the bridge, and what becomes of the policy's flight."""
 
 import dataclasses
+import os
+import signal
+import socket
+import sys
 import tempfile
+import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
 from e2efly.deploy.pilot.flight_state import Mode
+from e2efly.deploy.policy.images import Image
+from e2efly.deploy.sight import capture
+from e2efly.deploy.sight.capture import Captured
 from e2efly.deploy.sight.source import Frame, ImageSource
 from e2efly.evaluation import Candidate
 from e2efly.validation.firmware import Firmware
@@ -18,6 +28,7 @@ from e2efly.validation.rig import Rig
 from e2efly.validation.scenery import Scenery
 from e2efly.validation.session import Session, rehearsal_settings
 from e2efly.vehicles import Vehicle
+from tests.faults.camera_process import FRAME
 
 LATE_S = 0.15
 """By how much the fault `late` holds images back, s."""
@@ -36,8 +47,12 @@ FAULTS: dict[str, tuple[Callable[[Frame, Frame], Frame | None], str]] = {
     "not finite": (_as(lambda f: dataclasses.replace(f, image=f.image * np.nan)), "has the value nan"),
     "clock jumps back": (_as(lambda f: dataclasses.replace(f, time=f.time - 1.0)), "before the one before"),
     "clock jumps ahead": (_as(lambda f: dataclasses.replace(f, time=f.time + 1.0)), "ms from now"),
+    "capture killed": (_as(lambda f: f), "its process has ended: killed by SIGKILL"),
+    "camera unplugged": (_as(lambda f: f), "the camera is unplugged"),
 }
 """What becomes of a frame, given the last good one, and a part of the reason that ends POLICY."""
+OF_THE_PROCESS = ("capture killed", "camera unplugged")
+"""Faults of a real capture process, through which the images go."""
 UPSIDE_DOWN = "upside down"
 """The fault that is there from the start: HOVER must not hand over."""
 
@@ -77,6 +92,82 @@ class FaultyCamera:
         return f"{self.inner.describe()}, {self.fault or 'no fault'}"
 
 
+class ProcessCamera:
+    """Images that go through a real capture process and its shared memory; virtual time waits for them."""
+
+    def __init__(self, inner: ImageSource, camera: Image) -> None:
+        self._inner, self._struck = inner, False
+        self._folder = tempfile.TemporaryDirectory(prefix="e2efly-")
+        path = str(Path(self._folder.name) / "camera")
+        with socket.socket(socket.AF_UNIX) as server:
+            server.bind(path)
+            server.listen(1)
+            with mock.patch.object(capture, "SCRIPT", str(Path(__file__).with_name("camera_process.py"))):
+                self._pending: list[socket.socket] = []
+                self._source = _opened(server, camera, path, self._pending)
+        (self._cable,) = self._pending
+        self._source.read(0.0)  # the first image came before the flight
+
+    @property
+    def problem(self) -> str | None:
+        return self._source.problem
+
+    def read(self, now: float) -> list[Frame]:
+        if self._struck:
+            return self._source.read(now)
+        found = []
+        for frame in self._inner.read(now):
+            _send(self._cable, frame)
+            end = time.monotonic() + 20.0
+            while not (come := self._source.read(now)):
+                assert time.monotonic() < end, self.problem
+                time.sleep(1e-4)
+            found += come
+        return found
+
+    def strike(self, fault: str) -> None:
+        """Kill the process, or pull the cable; returns when that has happened."""
+        self._struck = True
+        if fault == "capture killed":
+            os.kill(self._source._child.process.pid, signal.SIGKILL)
+        else:
+            self._cable.shutdown(socket.SHUT_RDWR)
+        end = time.monotonic() + 20.0
+        while FAULTS[fault][1] not in str(self.problem):
+            assert time.monotonic() < end, self.problem
+            self._source.read(0.0)
+            time.sleep(1e-3)
+
+    def close(self) -> None:
+        self._source.close()
+        self._cable.close()
+        self._folder.cleanup()
+
+    def describe(self) -> str:
+        return self._source.describe()
+
+
+def _opened(server: socket.socket, camera: Image, path: str, pending: list[socket.socket]) -> Captured:
+    """The source, once the process has connected and got a first image."""
+
+    def feed() -> None:
+        server.settimeout(20.0)
+        cable, _ = server.accept()
+        _send(cable, Frame(-1.0, np.ones(camera.shape, np.float32)))
+        pending.append(cable)
+
+    thread = threading.Thread(target=feed)
+    thread.start()
+    try:
+        return Captured("socket", camera, sys.executable, "socket", path, "policy")
+    finally:
+        thread.join()
+
+
+def _send(cable: socket.socket, frame: Frame) -> None:
+    cable.sendall(FRAME.pack(frame.time, *frame.image.shape) + frame.image.astype("<f4").tobytes())
+
+
 @dataclass(frozen=True)
 class Ended:
     """What became of a flight."""
@@ -114,7 +205,11 @@ def fly_with(
         tempfile.TemporaryDirectory(prefix="e2efly-") as folder,
         Rig(firmware, Path(folder), vehicle, seed=seed) as rig,
     ):
-        cameras = [FaultyCamera(c) for c in scenery.sources(lambda: RigidState.of(rig.state), course.origin)]
+        sources: list[ImageSource] = list(scenery.sources(lambda: RigidState.of(rig.state), course.origin))
+        if fault in OF_THE_PROCESS:
+            images = found.policy.contract.images
+            sources = [ProcessCamera(c, image) for c, image in zip(sources, images, strict=True)]
+        cameras = [FaultyCamera(c) for c in sources]
         first = course.origin.points(course.start)
         heading = (course.heading or 0.0) + course.origin.yaw
         rig.state = rig.world.at_rest(*first[:2], heading)
@@ -125,6 +220,8 @@ def fly_with(
             return _broken(session, cameras, fault, flies_s)
         finally:
             session.close()
+            for camera in cameras:
+                camera.close()
 
 
 def _broken(session: Session, cameras: list[FaultyCamera], fault: str, flies_s: float) -> Ended:
@@ -142,6 +239,8 @@ def _broken(session: Session, cameras: list[FaultyCamera], fault: str, flies_s: 
         assert bridge.flight.mode is Mode.POLICY, bridge.flight.reasons
         for camera in cameras:
             camera.fault = fault
+            if isinstance(camera.inner, ProcessCamera):
+                camera.inner.strike(fault)
         broken = noticed = rig.now()
 
     def ended() -> bool:

@@ -60,7 +60,7 @@ def test_a_policy_lands_on_a_pad_that_it_only_sees(tmp_path: Path) -> None:
     assert max(ages) <= camera.latency_range_s[1] + 1 / camera.rate_hz + 0.011  # and a round of the bridge
 
 
-@pytest.mark.parametrize("fault", ["silent", "all holes"])
+@pytest.mark.parametrize("fault", ["silent", "all holes", "capture killed"])
 def test_a_camera_that_breaks_in_flight_ends_in_hover_within_a_control_step(fault: str) -> None:
     ended = fly_with(firmware.chosen(), candidate("avoid"), VEHICLE, fault)
     assert ended.mode == "hover"

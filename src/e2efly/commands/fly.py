@@ -37,6 +37,7 @@ from e2efly.deploy.pose.source import PoseSource
 from e2efly.deploy.pose.sources import open_source
 from e2efly.deploy.settings import FlightSettings
 from e2efly.deploy.settings import check as check_settings
+from e2efly.deploy.sight.picture import blocks, colours, write_png
 from e2efly.deploy.sight.source import ImageSource
 from e2efly.deploy.sight.sources import open_cameras
 from e2efly.deploy.sight.watch import Seen
@@ -52,6 +53,8 @@ CONNECT_S = 5.0
 """How long the controller may take to answer first, s."""
 LOOK_S = 1.5
 """How long `--check` watches poses and receiver, s."""
+PICTURES = Path("flights")
+"""Where `--check` puts pictures of what the network is shown."""
 SLOWEST = 0.5
 """Largest `--latency`, s: behind more no gains hold a hover."""
 
@@ -70,8 +73,9 @@ class Fly:
     """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic, ros2:/topic, or a source of your
     own, path/to/file.py:Name[:...]."""
     image: tuple[str, ...] = ()
-    """Where a policy that sees gets each image of its contract: image_0=shm:NAME, what another program publishes in
-    shared memory, or a source of your own, image_0=path/to/file.py:Name[:...]."""
+    """Where a policy that sees gets each image of its contract: image_0=realsense:[SERIAL], v4l2:/dev/videoN?fov=AxB,
+    ros1:/topic, ros2:/topic, shm:NAME (what another program publishes in shared memory), or a source of your own,
+    path/to/file.py:Name[:...]. See docs/image-sources.md."""
     vehicle: str | None = None
     """A shipped vehicle or a .toml file; left out: the policy's."""
     check: bool = False
@@ -268,8 +272,11 @@ def _cell(text: str) -> Text:
 def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row, ...]) -> int:
     """Watch poses, receiver and attitude for a while, and say what forbids a take-off. Sends no sticks."""
     end, poses = time.monotonic() + LOOK_S, []
+    times: list[set[float]] = [set() for _ in bridge.cameras]
     while (now := time.monotonic()) < end:
         poses += bridge.look(now)
+        for taken, seen in zip(times, bridge.seen, strict=True):
+            taken |= {seen.frame.time} if seen.frame is not None else set()
         time.sleep(0.005)
     table = Table(box=None, show_header=False, pad_edge=False)
     o = bridge.odometry
@@ -284,8 +291,14 @@ def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row,
         table.add_row("", _cell(f"position {o.position.round(3).tolist()} m, roll {roll:+.2f}, pitch {pitch:+.2f} rad"))
         if poses and poses[-1].stamp is not None:
             table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")
-    for camera, seen in zip(bridge.cameras, bridge.seen, strict=True):
-        table.add_row("image", _cell(_image(camera, seen, time.monotonic())))
+    now = time.monotonic()
+    for camera, seen, taken in zip(bridge.cameras, bridge.seen, times, strict=True):
+        table.add_row("image", _cell(_image(camera, seen, now, len(taken) / LOOK_S)))
+        if seen.frame is not None:
+            pixels, path = colours(seen.frame.image, seen.camera), PICTURES / f"check_{seen.camera.name}.png"
+            write_png(path, pixels)
+            table.add_row("", blocks(pixels))
+            table.add_row("", _cell(f"what the network is shown, larger: {path}"))
     pilot = bridge.inputs.pilot
     heard = "not heard"
     if pilot is not None:
@@ -303,7 +316,7 @@ def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row,
     return 1 if problems(rows) or o is None else 0
 
 
-def _image(camera: ImageSource, seen: Seen, now: float) -> str:
+def _image(camera: ImageSource, seen: Seen, now: float, rate: float) -> str:
     """What a camera shows, in words."""
     said = seen.problem(now)
     if said is not None or seen.frame is None:
@@ -311,8 +324,9 @@ def _image(camera: ImageSource, seen: Seen, now: float) -> str:
     image, age = seen.frame.image, 1e3 * (now - seen.frame.time)
     values = f"values {image.min():.2f} to {image.max():.2f}, mean {image.mean():.2f}"
     low, high = (1e3 * x for x in seen.camera.latency_range_s)
-    trained = f"{age:.0f} ms old (trained with {low:.0f} to {high:.0f})"
-    return f"{seen.camera.name} from {camera.describe()}: {values}; {trained}"
+    trained = f"{age:.0f} ms old (trained with {low:.0f} to {high:.0f}), {rate:.0f} Hz ({seen.camera.rate_hz:g})"
+    note = f"; {camera.problem}" if camera.problem else ""
+    return f"{seen.camera.name} from {camera.describe()}: {values}; {trained}{note}"
 
 
 def _record_meta(log: Telemetry, bridge: Bridge, body: Vehicle, contract: str, rows: tuple[Row, ...]) -> None:

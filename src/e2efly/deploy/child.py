@@ -47,6 +47,7 @@ class Child:
         self.detail = ""
         """What it said when it was ready."""
         self._ended: str | None = None
+        self._waiting = ""  # for what, until it is ready
         self._silent = False  # it has ended, and has not said why
         self._lines = Lines()
         self._kept: list[bytes] = []
@@ -69,8 +70,8 @@ class Child:
             left = deadline - time.monotonic()
             if left <= 0:
                 self._ended = f"no answer within {seconds:g} s"
-                if self._kept:
-                    self._ended += f": {text_of(self._kept[-1].partition(b' ')[2])}"
+                if self._waiting:
+                    self._ended += f": {self._waiting}"
                 break
             select.select([self._out], [], [], left)
             self._kept += self._pump()
@@ -92,7 +93,7 @@ class Child:
         return self._ended
 
     def lines(self) -> list[bytes]:
-        """What it has written since the last call, oldest first, but for what `ended` and `detail` tell."""
+        """What it has written since the last call, oldest first, but for what this class tells."""
         kept, self._kept = self._kept, []
         return kept if self._ended is not None else kept + self._pump()
 
@@ -129,6 +130,8 @@ class Child:
                 kind, _, rest = line.partition(b" ")
                 if kind == b"ready":
                     self.detail = text_of(rest)
+                elif kind == b"waiting":
+                    self._waiting = text_of(rest)
                 elif kind == b"failed":
                     self._ended = text_of(rest)
                 else:
@@ -150,16 +153,17 @@ def _available(descriptor: int) -> bytes | None:
         return None
 
 
-def first_opened(pythons: list[str], advice: str, opens: Callable[[str], T]) -> T:
+def first_opened(pythons: list[str], advice: str, opens: Callable[[str], T], *, always: bool = False) -> T:
     """What the first interpreter opens that has the package of the peer.
 
     Args:
         pythons: to try.
-        advice: what to do when none of them opens it.
+        advice: what to do when none of them has it.
         opens: opens it, given the interpreter; raises ValueError.
+        always: give the advice also where one has it, and does not open it.
 
     Raises:
-        ValueError: with what each interpreter says, and the advice.
+        ValueError: what the one that has the package says; or what all say, and the advice.
     """
     problems = []
     for python in dict.fromkeys(pythons):
@@ -169,9 +173,12 @@ def first_opened(pythons: list[str], advice: str, opens: Callable[[str], T]) -> 
         try:
             return opens(python)
         except ValueError as error:
-            problems.append(f"{python}: {error}")
             if "ImportError" not in str(error) and "ModuleNotFoundError" not in str(error):
+                if not always:
+                    raise
+                problems.append(f"{python}: {error}")
                 break  # it has the package: another interpreter would fare no better
+            problems.append(f"{python}: {error}")
     raise ValueError("; ".join(problems) + f"; {advice}")
 
 

@@ -71,4 +71,4 @@ def open_relay(name: str, pythons: list[str], advice: str, *arguments: str) -> R
     Raises:
         ValueError: with what each interpreter says, and the advice.
     """
-    return first_opened(pythons, advice, lambda python: RelaySource(name, python, *arguments))
+    return first_opened(pythons, advice, lambda python: RelaySource(name, python, *arguments), always=True)

@@ -10,6 +10,9 @@ from e2efly.deploy.policy.images import Image
 from e2efly.deploy.sight.shared import SharedCamera, place
 from e2efly.deploy.sight.source import Frame
 
+SCRIPT = "capture.py"
+"""What runs in the process."""
+
 
 class Captured:
     """Images of a capture process. Reading them takes neither a thread nor the camera's driver in this process."""
@@ -34,7 +37,7 @@ class Captured:
         self._problem: str | None = None
         self._closed = False
         try:
-            self._child = Child(python, "capture.py", kind, self._memory, image.sees, fov, where)
+            self._child = Child(python, SCRIPT, kind, self._memory, image.sees, fov, where)
         except ValueError as error:
             self._forget()
             raise ValueError(f"image source {name}: {error}") from None

@@ -130,4 +130,7 @@ class SharedCamera:
 
     def _fitted(self, raw: np.ndarray) -> np.ndarray:
         value = raw.astype(np.float32) * (1.0, 1 / 255, 1e-3)[self._layout.kind]
+        if raw.dtype == _TYPES[0] and self._camera.sees in ("depth", "range"):  # what ROS says of holes and of the sky
+            far = self._camera.reach_m[1]
+            value = np.nan_to_num(value, copy=False, nan=0.0, posinf=far, neginf=0.0)
         return fitted(value, self._layout.fov, self._camera, self._name)

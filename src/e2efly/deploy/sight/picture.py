@@ -1,0 +1,82 @@
+"""What a policy's network is shown, for people: a picture in the terminal, and a PNG."""
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+from rich.text import Text
+
+from e2efly.deploy.policy.images import Image
+
+HOLE = (90, 0, 60)
+"""Where depth has no value: red, green, blue, 0 to 255."""
+COLUMNS = 64
+"""Widest picture of the terminal, characters."""
+PIXELS = 512
+"""A PNG is magnified by a whole number to about this width, pixels."""
+
+
+def colours(image: np.ndarray, camera: Image) -> np.ndarray:
+    """An image as red, green and blue, (h, w, 3) uint8.
+
+    Depth is bright near and dark far, over the camera's reach, and `HOLE` where it is 0; normals are laid from [-1, 1]
+    to [0, 1].
+
+    Args:
+        image: of the camera, as `Image.check` accepts it.
+        camera: of the policy's contract.
+    """
+    low, high = camera.limits
+    share = np.clip((image - low) / (high - low), 0.0, 1.0)
+    if camera.sees in ("depth", "range"):
+        grey = np.round(255 * (1.0 - share)).astype(np.uint8)
+        return np.where((image > 0)[..., None], grey[..., None], np.array(HOLE, np.uint8))
+    shown = np.round(255 * share).astype(np.uint8)
+    return shown if shown.ndim == 3 else np.repeat(shown[..., None], 3, axis=2)
+
+
+def blocks(pixels: np.ndarray, columns: int = COLUMNS) -> Text:
+    """A picture for the terminal: each character is two pixels, one above the other.
+
+    Args:
+        pixels: (h, w, 3) uint8.
+        columns: the widest that it may be, characters; of a wider picture every second, third, ... pixel is left.
+    """
+    step = -(-pixels.shape[1] // columns)
+    small = pixels[::step, ::step].astype(int)
+    text = Text()
+    for y in range(0, small.shape[0], 2):
+        for x in range(small.shape[1]):
+            upper = "rgb({},{},{})".format(*small[y, x])
+            under = " on rgb({},{},{})".format(*small[y + 1, x]) if y + 1 < small.shape[0] else ""
+            text.append("\u2580", upper + under)
+        text.append("\n")
+    return text
+
+
+def write_png(path: Path, pixels: np.ndarray) -> None:
+    """Write a picture, magnified (ISO/IEC 15948: 8 bits, colour type 2, no filter).
+
+    Args:
+        path: of the file; its folder is made.
+        pixels: (h, w, 3) uint8.
+
+    Raises:
+        OSError: when it cannot be written.
+    """
+    times = max(PIXELS // pixels.shape[1], 1)
+    large = pixels.repeat(times, axis=0).repeat(times, axis=1)
+    height, width = large.shape[:2]
+    rows = np.concatenate([np.zeros((height, 1), np.uint8), large.reshape(height, -1)], axis=1)  # 0: no filter
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0))
+        + chunk(b"IDAT", zlib.compress(rows.tobytes()))
+        + chunk(b"IEND", b"")
+    )

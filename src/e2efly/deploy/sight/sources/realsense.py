@@ -1,0 +1,25 @@
+"""Depth or colours of an Intel RealSense camera, by pyrealsense2."""
+
+import sys
+
+from e2efly.deploy.policy.images import Image
+from e2efly.deploy.sight.capture import Captured, field_of_view, open_captured
+from e2efly.deploy.sight.registry import register
+
+ADVICE = 'install the package pyrealsense2 (pip install "e2efly[realsense]"; Debian: apt-get install libusb-1.0-0)'
+"""What to do when it cannot be imported."""
+
+
+@register("realsense", "realsense:[SERIAL]")
+def open_realsense(text: str, image: Image) -> Captured:
+    """Read the camera with a serial number, or the only one: depth or colours, as the policy sees.
+
+    Args:
+        text: the serial number, or nothing.
+        image: the camera of the policy's contract.
+
+    Raises:
+        ValueError: for a camera that is not there or does not show what the policy sees, a missing package.
+    """
+    serial, fov = field_of_view(text, f"realsense:{text}")
+    return open_captured(f"realsense:{serial}", image, [sys.executable], ADVICE, serial, fov)
