@@ -29,6 +29,7 @@ from e2efly.deploy.policy.contract import Contract
 from e2efly.deploy.sight.shared import place
 from e2efly.deploy.sight.source import Frame
 from e2efly.deploy.sight.watch import Seen
+from tests.conftest import NetworkTrace
 from tests.deploy.foxglove_client import FoxgloveClient
 
 CONTRACT: Contract = e2efly.load_policy("avoid").contract
@@ -77,7 +78,9 @@ def stamp_of(moment: float) -> int:
     return time.time_ns() - round((time.monotonic() - moment) * 1e9)
 
 
-def test_foxglove_hears_the_channels_of_the_log_the_pose_and_the_image(lives: list[Live]) -> None:
+def test_foxglove_hears_the_channels_of_the_log_the_pose_and_the_image(
+    lives: list[Live], network: NetworkTrace
+) -> None:
     live = Live(targets_of(["foxglove:0"]), [CAMERA])
     lives.append(live)
     (address,) = [outlet.detail for outlet in live.outlets]
@@ -110,6 +113,7 @@ def test_foxglove_hears_the_channels_of_the_log_the_pose_and_the_image(lives: li
     live.close()
     client.close()
     assert live.problems == []
+    assert network.left() == []
 
 
 def test_an_mcap_file_says_in_ros_2_s_words_what_was_recorded(tmp_path: Path, lives: list[Live]) -> None:

@@ -62,7 +62,6 @@ def main(text: str) -> None:
     config = json.loads(text)
     lines = os.fdopen(os.dup(1), "w", errors="backslashreplace")
     os.dup2(2, 1)  # the packages print there, too
-    os.nice(10)  # the control loop comes first where both have one core
     waiting: queue.SimpleQueue[Any] = queue.SimpleQueue()
     lost, told = [0], set()
 
@@ -98,6 +97,7 @@ def main(text: str) -> None:
         images = {name: SharedImage(layout) for name, layout in config["images"].items()}
         peer = make(config, put)
         say("ready", peer.detail)
+        os.nice(10)  # from here on the control loop comes first, where both have one core
     except Exception as error:
         say("failed", f"{type(error).__name__}: {error}")
         os._exit(1)
