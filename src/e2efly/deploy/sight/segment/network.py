@@ -8,7 +8,7 @@ import onnxruntime
 from e2efly.deploy.sight.segment import SEGMENTERS, opencv
 
 OWN = Path(__file__).parent / "pad.onnx"
-"""The network that comes with the package; `benchmarks/pad_masks.py` trains it."""
+"""What is loaded where no file is named; `benchmarks/pad_masks.py --train` writes it. The package has none yet."""
 LONGER_SIDE, STEP = 64, 16
 """Of what a network is shown that takes any size: pixels of the longer side; sides are multiples of the step."""
 ACCEPTED = (
@@ -76,11 +76,11 @@ class Network:
 
     def describe(self) -> str:
         """Which file."""
-        return "the package's network of pads" if self.path == OWN else f"network {self.path}"
+        return "the network of pads of benchmarks/pad_masks.py" if self.path == OWN else f"network {self.path}"
 
 
 def open_onnx(text: str) -> Network:
-    """Load FILE; left out: the network that comes with the package.
+    """Load FILE; left out: `OWN`.
 
     Raises:
         ValueError: naming the file and what is accepted.
