@@ -1,6 +1,7 @@
 """Masks by a network that has learned what pads look like."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnxruntime
@@ -69,7 +70,7 @@ class Network:
             for own, side in zip(self._sides, colours.shape, strict=False)
         )
         seen = cv2.resize(colours, (columns, rows), interpolation=cv2.INTER_AREA).astype(np.float32) / 255
-        found = self._session.run(None, {self._name: seen[None]})[0]
+        found: Any = self._session.run(None, {self._name: seen[None]})[0]
         if np.shape(found) != (1, rows, columns):
             raise ValueError(f"its output has the shape {np.shape(found)} for an image of {rows} x {columns}")
         return np.asarray(found[0], np.float32)
