@@ -1,23 +1,15 @@
-"""Masks of colours: tags, colours, a network. The truth is a drawn polygon or a rendered label."""
+"""Masks of colours: tags, colours, a network. The truth is a drawn polygon."""
 
-import math
 from pathlib import Path
 
 import cv2
-import jax
-import jax.numpy as jnp
 import numpy as np
-import onnx
 import pytest
 from onnx import TensorProto, helper
 
-from e2efly.config import CameraConfig
 from e2efly.deploy.sight.segment import chosen
 from e2efly.deploy.sight.segment.apriltag import FAMILIES, enlarged
-from e2efly.deploy.sight.segment.network import OWN, Network
-from e2efly.scenes.camera import look, mount
-from e2efly.scenes.cast import usual_light
-from e2efly.scenes.scene import Scene, Solids
+from e2efly.deploy.sight.segment.network import Network
 
 WIDE, HIGH = 640, 480
 CORNERS = np.array([[250.0, 120.0], [410.0, 150.0], [395.0, 330.0], [230.0, 290.0]], np.float32)
@@ -133,31 +125,6 @@ def test_bounds_of_saturation_and_value_are_percent() -> None:
     assert np.array_equal(np.flatnonzero(found), np.arange(102, 154))
 
 
-def rendered(height: float, side: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Colours and mask of a white pad from above, by the package's renderer of scenes."""
-    camera = CameraConfig("rgb", 192, 192, fov=(math.pi / 2, math.pi / 2), pitch=math.pi / 2)
-    solids = Solids.of("pad", jnp.array([[[0.2, -0.1, 0.1]]]), jnp.array([side / 2, 0.1, seed % 3]), yaw=0.3 + seed)
-    scene = Scene.of({"pad": solids}, 1)
-    at, level = jnp.array([[0.0, 0.0, 0.2 + height]]), jnp.array([[1.0, 0.0, 0.0, 0.0]])
-    colours = look(camera, scene, mount(camera, 1), at, level, usual_light(1))
-    noise = 0.02 * jax.random.normal(jax.random.key(seed), colours.shape)
-    shown = look(CameraConfig("mask", 192, 192, fov=camera.fov, pitch=camera.pitch), scene, mount(camera, 1), at, level)
-    values = np.asarray(jnp.clip(colours + noise, 0, 1))[0]
-    return np.round(255 * values).astype(np.uint8), np.asarray(shown, np.uint8)[0]
-
-
-def test_the_packages_network_finds_pads_of_another_renderer() -> None:
-    network = chosen("onnx")
-    found = [(network(colours), mask) for colours, mask in (rendered(0.8 + 0.3 * i, 0.5, i) for i in range(6))]
-    assert min(overlap(mask, truth) for mask, truth in found) > 0.9
-    assert OWN.stat().st_size < 300_000
-
-
-def test_a_network_of_a_fixed_size_and_a_picture_of_another_shape() -> None:
-    wide = np.zeros((120, 320, 3), np.uint8)
-    assert chosen("onnx")(wide).shape == (120, 320)
-
-
 def model(shape: list[int | str], out: list[int | str], axes: list[int]) -> bytes:
     nodes = [helper.make_node("ReduceMean", ["x"], ["y"], axes=axes, keepdims=0)]
     given, gives = (helper.make_tensor_value_info(n, TensorProto.FLOAT, s) for n, s in (("x", shape), ("y", out)))
@@ -218,4 +185,3 @@ def test_the_same_picture_gives_the_same_mask() -> None:
     picture = tag(7)
     first, second = (chosen("apriltag:36h11:7")(picture) for _ in range(2))
     assert np.array_equal(first, second)
-    assert onnx.load(OWN).graph.input[0].name == "colours"

@@ -31,7 +31,7 @@ class AprilTags:
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR  # best on drawn tags of 24 to 160 pixels
         parameters.errorCorrectionRate = 1.0  # all bits that the family corrects: a small tag may cover some
-        parameters.minMarkerPerimeterRate = 0.02  # of the longer side: a tag of 4 pixels in 640 could not be read
+        parameters.minMarkerPerimeterRate = 0.02  # of the longer side: tags of a few pixels are never read
         detector = cv2.aruco.ArucoDetector(_dictionary(cv2, self.family), parameters)
         object.__setattr__(self, "_detector", detector)
 

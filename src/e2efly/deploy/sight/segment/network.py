@@ -1,6 +1,7 @@
 """Masks by a network that has learned what pads look like."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnxruntime
@@ -8,7 +9,7 @@ import onnxruntime
 from e2efly.deploy.sight.segment import SEGMENTERS, opencv
 
 OWN = Path(__file__).parent / "pad.onnx"
-"""The network that comes with the package; `benchmarks/pad_masks.py` trains it."""
+"""What is loaded where no file is named; `benchmarks/pad_masks.py --train` writes it. The package has none yet."""
 LONGER_SIDE, STEP = 64, 16
 """Of what a network is shown that takes any size: pixels of the longer side; sides are multiples of the step."""
 ACCEPTED = (
@@ -69,18 +70,18 @@ class Network:
             for own, side in zip(self._sides, colours.shape, strict=False)
         )
         seen = cv2.resize(colours, (columns, rows), interpolation=cv2.INTER_AREA).astype(np.float32) / 255
-        found = self._session.run(None, {self._name: seen[None]})[0]
+        found: Any = self._session.run(None, {self._name: seen[None]})[0]
         if np.shape(found) != (1, rows, columns):
             raise ValueError(f"its output has the shape {np.shape(found)} for an image of {rows} x {columns}")
         return np.asarray(found[0], np.float32)
 
     def describe(self) -> str:
         """Which file."""
-        return "the package's network of pads" if self.path == OWN else f"network {self.path}"
+        return "the network of pads of benchmarks/pad_masks.py" if self.path == OWN else f"network {self.path}"
 
 
 def open_onnx(text: str) -> Network:
-    """Load FILE; left out: the network that comes with the package.
+    """Load FILE; left out: `OWN`.
 
     Raises:
         ValueError: naming the file and what is accepted.
