@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation
 
 from e2efly.deploy.log.bags import export_bag
 from e2efly.deploy.log.channels import CHANNELS
 from e2efly.deploy.log.flight_log import FlightLog, Series, read_log
-from e2efly.deploy.log.process.ros_topics import BODY_FRAME, TOPICS, WORLD_FRAME
+from e2efly.deploy.log.process.ros_topics import BODY_FRAME, TOPICS, WORLD_FRAME, into_body
 from e2efly.deploy.log.telemetry import Telemetry
 
 HALF = math.sqrt(0.5)
@@ -103,6 +104,15 @@ def test_what_cannot_be_written_is_refused_by_name(tmp_path: Path, log: FlightLo
     with pytest.raises(ValueError, match="has no message of odometry, imu"):
         export_bag(FlightLog(log.path, {}, {}, ""), tmp_path / "b", 2)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_vector_is_turned_into_the_body_s_axes() -> None:
+    random = np.random.default_rng(0)
+    for _ in range(20):
+        q, v = random.normal(size=4), random.normal(size=3)
+        q /= np.linalg.norm(q)
+        turned = Rotation.from_quat(q, scalar_first=True).inv().apply(v)
+        np.testing.assert_allclose(into_body(q.tolist(), v.tolist()), turned, atol=1e-12)
 
 
 def test_every_topic_has_a_name_of_its_own_and_a_channel_of_the_log() -> None:

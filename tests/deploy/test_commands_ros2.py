@@ -98,8 +98,8 @@ def test_a_relay_that_ends_is_the_reason_of_the_silence(ros: None) -> None:
             commander.hear(still, time.monotonic())
             time.sleep(0.01)
         assert commander.stream.command is not None
-        source._process.kill()
-        source._process.wait(10)
+        source._child.process.kill()
+        source._child.process.wait(10)
         ended = time.monotonic()
         while time.monotonic() < ended + 0.4:
             commander.hear(still, time.monotonic())
