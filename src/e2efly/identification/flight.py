@@ -4,12 +4,13 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import jax.numpy as jnp
 import numpy as np
 
 from e2efly.identification.blackbox import DELAY_SIGMA, setpoint_delay
 from e2efly.identification.coarse import begin
 from e2efly.identification.estimate import Estimate
-from e2efly.identification.model import NUISANCES, UNKNOWNS, Model, Unknown
+from e2efly.identification.model import NUISANCES, UNKNOWNS, Model, Unknown, vehicle_of
 from e2efly.identification.record import MOTORS, Record
 from e2efly.identification.shooting import Fit, fit
 from e2efly.identification.windows import LENGTH, LENGTHS, REACH, Windows, cut, join
@@ -42,8 +43,12 @@ class Refusal:
     unknown: Unknown
     sigma: float
     """Standard deviation after the fit, s or relative."""
+    impossible: bool = False
+    """No rigid body has what the fit found."""
 
     def __str__(self) -> str:
+        if self.impossible:
+            return f"{self.unknown.name} is not taken from the flights: no rigid body has it; fly: {self.unknown.fly}"
         unit = " s" if self.unknown.field == "latency" else ""
         how = f"+- {self.sigma:.2g}{unit}" if unit else f"+- {100 * self.sigma:.0f} %"
         return f"{self.unknown.name} is not taken from the flights ({how}); fly: {self.unknown.fly}"
@@ -179,7 +184,8 @@ def identify(
     seen = windows.some(~held_out)
     found = fit(model, seen, begin(model, seen), told=told)
     sigma = sigmas(model, found)
-    refused = np.array([_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)])
+    impossible = _impossible(model, found.p)
+    refused = impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
     p = _given(found.p, _whole_covariance(found, sigma), refused)
     for _ in range(REFITS):
         if not refused.any() or np.all(np.abs(p - found.p)[~refused] < NEAR * sigma[~refused]):
@@ -188,7 +194,8 @@ def identify(
         found = fit(model, seen, np.where(refused, 0.0, found.p), told=told, fixed=refused)
         sigma = np.where(refused, sigma, sigmas(model, found))
         p = np.where(refused, 0.0, found.p)
-        more = refused | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
+        impossible |= _impossible(model, p)
+        more = refused | impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
         if np.all(more == refused):
             break
         refused, p = more, _given(found.p, _whole_covariance(found, sigma), more)
@@ -196,7 +203,7 @@ def identify(
     if structures:
         spread = np.sqrt(np.mean([(each - p) ** 2 for each in structures.values()], 0))
         sigma = np.where(refused, sigma, np.hypot(sigma, spread))
-    refusals = [Refusal(model.unknowns[i], float(sigma[i])) for i in np.flatnonzero(refused)]
+    refusals = [Refusal(model.unknowns[i], float(sigma[i]), bool(impossible[i])) for i in np.flatnonzero(refused)]
     source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
     estimates = _estimates(model, p, sigma, refused, source)
     if not step:  # steps show the time from command to response alone
@@ -260,6 +267,17 @@ def _is_vague(unknown: Unknown, sigma: float) -> bool:
     """Whether the flights say too little of an unknown."""
     limit = next((v for name, v in EXACT.items() if unknown.field.startswith(name)), EXACT_ELSE)
     return bool(sigma > min(limit, SHOWN * unknown.prior))
+
+
+def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
+    """Of a body whose moments of inertia, (3,), contradict the triangle inequality: the one that is too large, (u,).
+
+    A torque that the model explains by something else, such as the rotors' own inertia, leaves a moment without bound.
+    """
+    moments = np.asarray(vehicle_of(model, jnp.asarray(p)).inertia, float)
+    largest = int(np.argmax(moments))
+    at = np.array([u.field == "inertia" and u.entries == (largest,) for u in model.unknowns])
+    return at & (2 * moments[largest] > moments.sum())
 
 
 def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> np.ndarray:

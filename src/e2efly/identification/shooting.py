@@ -5,7 +5,9 @@ weights (P. J. Huber, "Robust Estimation of a Location Parameter", 1964), and by
 Multiple shooting: H. G. Bock, "Numerical treatment of inverse problems in chemical reaction kinetics", 1981.
 """
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -41,7 +43,7 @@ rotors that have not come to rest yet, and the lag for as long as they last."""
 STILL = 0.02
 """Standard deviations below which a step of all unknowns is the last."""
 BATCH = 32
-"""Windows that are computed together."""
+"""Windows that are computed together: one program for flights of any length, on each core another batch."""
 
 
 @dataclass(frozen=True)
@@ -181,21 +183,33 @@ def cost(model: Model, windows: Windows, p: np.ndarray) -> float:
     """How badly windows are explained at `p`, their starts as measured."""
     with jax.enable_x64(True):
         noise = {name: NOISE[name] for name in windows.measured}
-        return float(np.sum(np.asarray(_costs(model, p, _data(model, windows), noise))))
+        return float(np.sum(_by_batch(partial(_costs, model, p, noise), _data(model, windows))))
 
 
 @jax.jit
-def _costs(model: Model, p: Array, data: dict[str, Any], noise: dict[str, Any]) -> Array:
+def _costs(model: Model, p: Array, noise: dict[str, Any], data: dict[str, Any]) -> Array:
     still = jnp.zeros(len(NUISANCES))
 
     def one(data: dict[str, Any]) -> Array:
         left = _residuals(model, p, still, jnp.zeros(START), data, noise)
         return sum(jnp.sum(_huber((left[name] / noise[name]).ravel())) for name in noise) * data["counts"]
 
-    return jax.lax.map(one, data, batch_size=BATCH)
+    return jax.vmap(one)(data)
 
 
-def _data(model: Model, windows: Windows) -> dict[str, Any]:
+def _by_batch(computed: Callable[[Any], Any], data: dict[str, np.ndarray]) -> Any:
+    """A compiled function of a batch of windows, of all of them: leaves (whole batches, ...), NumPy."""
+    batches = [{k: x[i : i + BATCH] for k, x in data.items()} for i in range(0, len(data["counts"]), BATCH)]
+
+    def one(batch: dict[str, np.ndarray]) -> Any:
+        with jax.enable_x64(True):  # of each thread
+            return jax.tree.map(np.asarray, computed(batch))
+
+    with ThreadPoolExecutor(os.cpu_count()) as cores:
+        return jax.tree.map(lambda *parts: np.concatenate(parts), *cores.map(one, batches))
+
+
+def _data(model: Model, windows: Windows) -> dict[str, np.ndarray]:
     """Arrays of all windows, filled up to whole batches, with a guess of where each starts."""
     n, hover = windows.count, float(model.hover)
     full = -(-n // BATCH) * BATCH
@@ -235,35 +249,27 @@ def _terms(
 ) -> dict[str, Any]:
     n, full = len(starts), len(data["counts"])
     padded = np.concatenate([starts, np.zeros((full - n, START))])
-    found = jax.tree.map(np.asarray, _computed(model, p, q, padded, data, noise, free))
-    spreads = {k: v for k, v in found.items() if k.startswith("spread/")}
-    return {k: x[:n] for k, x in found.items() if k not in spreads} | spreads
+    found = _by_batch(partial(_computed, model, p, q, noise, free), {**data, "moved": padded})
+    for name in noise:
+        # of the windows that have this sensor
+        squares, there = found.pop(f"square/{name}"), found.pop(f"sum/{name}")
+        mean = np.where(there > 0, squares / np.maximum(there, 1), np.nan)
+        found[f"spread/{name}"] = np.sqrt(np.nanquantile(mean, CALM))
+    return {k: x if k.startswith("spread/") else x[:n] for k, x in found.items()}
 
 
 @jax.jit
 def _computed(
-    model: Model, p: Array, q: Array, starts: Array, data: dict[str, Any], noise: dict[str, Any], free: Array
+    model: Model, p: Array, q: Array, noise: dict[str, Any], free: Array, data: dict[str, Any]
 ) -> dict[str, Array]:
-    batches = jax.tree.map(lambda x: x.reshape(-1, BATCH, *x.shape[1:]), (starts, data))
-
-    def batch(args: Any) -> Any:
-        return jax.vmap(partial(_window, model, p, q, noise, free))(*args)
-
-    found = jax.lax.map(batch, batches)
-    found = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), found)
-    for name in noise:
-        # of the windows that have this sensor
-        squares, there = found.pop(f"square/{name}"), found.pop(f"sum/{name}")
-        mean = jnp.where(there > 0, squares / jnp.maximum(there, 1), jnp.nan)
-        found[f"spread/{name}"] = jnp.sqrt(jnp.nanquantile(mean, CALM))
-    return found
+    return jax.vmap(partial(_window, model, p, q, noise, free))(data)
 
 
 def _window(
-    model: Model, p: Array, q: Array, noise: dict[str, Any], free: Array, start: Array, data: dict[str, Any]
+    model: Model, p: Array, q: Array, noise: dict[str, Any], free: Array, data: dict[str, Any]
 ) -> dict[str, Array]:
     """Cost, gradient and curvature of one window, its start eliminated."""
-    u, v = p.shape[0], q.shape[1]
+    u, v, start = p.shape[0], q.shape[1], data["moved"]
 
     def residuals(z: Array) -> dict[str, Array]:
         return _residuals(model, z[:u], z[u : u + v], z[u + v :], data, noise)

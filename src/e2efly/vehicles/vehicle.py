@@ -371,13 +371,13 @@ def check(vehicle: Vehicle, where: str = "vehicle") -> None:
     if ix <= 0:
         raise ValueError(
             f"{where}: inertia_products.value is {vehicle.inertia_products.tolist()} and inertia.value is "
-            f"{list(vehicle.inertia)}; accepted: a tensor of which every principal moment is positive"
+            f"{np.asarray(vehicle.inertia).tolist()}; accepted: a tensor of which every principal moment is positive"
         )
     if ix + iy < iz:
         products = "" if vehicle.inertia_products is None else f" with products {vehicle.inertia_products.tolist()}"
         raise ValueError(
-            f"{where}: inertia.value is {list(vehicle.inertia)}{products}; accepted: no principal moment larger than "
-            "the sum of the other two (the triangle inequality of every rigid body)"
+            f"{where}: inertia.value is {np.asarray(vehicle.inertia).tolist()}{products}; accepted: no principal "
+            "moment larger than the sum of the other two (the triangle inequality of every rigid body)"
         )
     if sorted(vehicle.rotor_spin) != [-1, -1, 1, 1]:
         raise ValueError(f"{where}: rotor_spin.value is {list(vehicle.rotor_spin)}; accepted: two of +1 and two of -1")
