@@ -21,7 +21,7 @@ LONGEST = 30.0
 """How long a subscriber may take to hear everything, s."""
 
 TAKE = """
-import json, sys
+import json, sys, threading
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, Image, Imu, Joy
@@ -30,11 +30,13 @@ def seconds(stamp):
     return stamp.sec + 1e-9 * stamp.nanosec if hasattr(stamp, "sec") else stamp.to_sec()
 kinds = {"odometry": Odometry, "imu": Imu, "command": TwistStamped, "battery": BatteryState, "rc": Joy, "mode": String,
          "policy/observation": Float32MultiArray, "policy/action": Float32MultiArray, "image/" + sys.argv[2]: Image}
-missing = set(kinds)
+missing, one = set(kinds), threading.Lock()  # topics come by threads of their own
 def take(name, m):
-    if name not in missing:
-        return
-    missing.discard(name)
+    with one:
+        if name in missing:
+            tell(name, m)
+            missing.discard(name)
+def tell(name, m):
     stamp = seconds(m.header.stamp) if hasattr(m, "header") else None
     if name == "odometry":
         v, p = m.twist.twist.linear, m.pose.pose.position

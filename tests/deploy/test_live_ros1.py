@@ -22,7 +22,8 @@ import rospy
 rospy.init_node("subscriber", disable_signals=True)
 for name, kind in kinds.items():
     rospy.Subscriber(sys.argv[1] + "/" + name, kind, lambda m, name=name: take(name, m), queue_size=10)
-print(json.dumps(["ready", None, None]), flush=True)
+with one:
+    print(json.dumps(["ready", None, None]), flush=True)
 while missing:
     rospy.sleep(0.05)
 """

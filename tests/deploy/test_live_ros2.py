@@ -19,7 +19,8 @@ latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 for name, kind in kinds.items():
     quality = latched if name == "mode" else qos_profile_sensor_data if name == "imu" else 10
     node.create_subscription(kind, sys.argv[1] + "/" + name, lambda m, name=name: take(name, m), quality)
-print(json.dumps(["ready", None, None]), flush=True)
+with one:
+    print(json.dumps(["ready", None, None]), flush=True)
 while missing:
     rclpy.spin_once(node, timeout_sec=0.1)
 """
