@@ -15,12 +15,14 @@ import numpy as np
 import pytest
 
 from e2efly.cli import run
+from e2efly.commands.hil import parse
 from e2efly.courses.origin import Origin
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.sight.shared import SharedCamera, place
 from e2efly.evaluation import candidate
 from e2efly.validation.hil import ahead
 from e2efly.validation.plant import RigidState
+from e2efly.validation.room import flags
 from e2efly.validation.scenery import Scenery
 from e2efly.validation.sight import rendered
 
@@ -156,3 +158,13 @@ def test_what_cannot_be_rendered_is_named(tmp_path: Path, capsys: pytest.Capture
         assert run(["hil", *given]) == 2
         error = " ".join(capsys.readouterr().err.split())
         assert said in error, (given, error)
+
+
+def test_the_world_is_the_task_s_with_options_of_it() -> None:
+    asked = parse(["race_clutter", "--task.speed", "4", "5", "--image", "image_0=shm:x"])
+    assert asked.task == {"speed": (4.0, 5.0)}
+    assert flags("task", candidate("race_clutter", task=asked.task).task, candidate("race_clutter").task) == [
+        "--task.speed", "4", "5",
+    ]  # fmt: skip
+    with pytest.raises(ValueError, match="hil begins with --task.speed; accepted: the policy first"):
+        parse(["--task.speed", "4", "5", "race_clutter"])

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from e2efly.commands.validate import Asked, Validate, run
+from e2efly.commands.policies import Asked
+from e2efly.commands.validate import Validate, run
 from e2efly.config import ImuConfig
 from e2efly.validation.validate import validate
 from e2efly.vehicles import load_vehicle, vehicle

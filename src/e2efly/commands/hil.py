@@ -13,6 +13,8 @@ import numpy as np
 import tyro
 
 from e2efly.commands.hil_rehearsal import check_rehearsal, rehearse
+from e2efly.commands.policies import Asked, asked_of
+from e2efly.config import TaskConfig
 from e2efly.courses.origin import Origin
 from e2efly.process import be_punctual, raise_at_interrupt
 from e2efly.storage import write_json
@@ -53,6 +55,9 @@ class Hil:
     """A shipped vehicle or a .toml file; left out: the policy's."""
     seed: int = 0
     """Of the world."""
+    task: TaskConfig = TaskConfig()
+    """The world, in place of what the policy's run or contract says: options of its task, as `train` has them
+    (--task.track my.toml, --task.speed 4 5, --task.clutter.obstacles 8)."""
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the origin of the world lies in the room, m; as --goal.origin of `e2efly fly`."""
     origin_yaw: float = 0.0
@@ -84,14 +89,23 @@ class Hil:
     """Folder of the rehearsal's report; left out: a new one in the folder `rehearsals`."""
 
 
-def run(options: Hil) -> int:
+def parse(arguments: list[str]) -> Asked:
+    """The options of `hil`; the defaults of `--task` are what the policy's run or contract says.
+
+    Raises:
+        ValueError: for unknown names, and for a policy that is not there.
+    """
+    return asked_of(Hil, "hil", arguments)
+
+
+def run(asked: Asked) -> int:
     """Render until the time is out.
 
     Raises:
         ValueError: naming the option, its value and what is accepted.
         OSError: when the shared memory cannot be written.
     """
-    o, console = options, Terminal()
+    o, console = asked.options, Terminal()
     check_rehearsal(o)
     if o.rate is not None and not 1 <= o.rate <= FASTEST:
         raise ValueError(f"--rate is {o.rate}; accepted: 1 to {FASTEST:g} Hz")
@@ -99,7 +113,7 @@ def run(options: Hil) -> int:
         raise ValueError(f"--seconds is {o.seconds}; accepted: more than 0")
     origin = Origin(o.origin, o.origin_yaw) if o.points is None else _measured(o.points)
     if o.rehearse:
-        return rehearse(o, origin)
+        return rehearse(o, asked.task, origin)
     from e2efly.deploy.child import Child
     from e2efly.deploy.pose.sources import open_source
     from e2efly.deploy.sight.give import give, outputs
@@ -113,7 +127,7 @@ def run(options: Hil) -> int:
     raise_at_interrupt()
     compute_at_once()
     prepare("cpu")
-    found = candidate(o.policy, o.vehicle)
+    found = candidate(o.policy, o.vehicle, task=asked.task)
     images = found.policy.contract.images
     if not images:
         raise ValueError(f"policy {o.policy} sees nothing; accepted: a policy with images")

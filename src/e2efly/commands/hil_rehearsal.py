@@ -52,8 +52,13 @@ def check_rehearsal(o: "Hil") -> None:
     check_time({f"--laps is {o.laps}": o.laps * LAP_S}, f"at {LAP_S:g} s each")
 
 
-def rehearse(o: "Hil", origin: Origin) -> int:
+def rehearse(o: "Hil", task: dict[str, Any], origin: Origin) -> int:
     """Fly, print a table, write report and pictures.
+
+    Args:
+        o: the options.
+        task: values of the task that are not the policy's own, by dotted name.
+        origin: of the world, in the room.
 
     Returns:
         0, or 1 when a flight was not as it is to be.
@@ -66,12 +71,14 @@ def rehearse(o: "Hil", origin: Origin) -> int:
     from e2efly.validation import firmware
     from e2efly.validation.hil_rehearsal import Plan, draw
     from e2efly.validation.hil_rehearsal import rehearse as fly
+    from e2efly.validation.room import flags
     from e2efly.view.hil_rehearsal import plot_lap, plot_times
 
     raise_at_interrupt()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the flight's processes end with this one
     prepare("cpu")
-    plan, console = Plan(candidate(o.policy, o.vehicle), origin, o.rate, o.pose_delay), Terminal()
+    found, console = candidate(o.policy, o.vehicle, task=task), Terminal()
+    plan = Plan(found, origin, o.rate, o.pose_delay, flags("task", found.task, candidate(o.policy, o.vehicle).task))
     if not plan.found.policy.contract.images:
         raise ValueError(f"policy {o.policy} sees nothing; accepted: a policy with images")
     folder = o.out or Path("rehearsals") / time.strftime("%Y-%m-%d_%H-%M-%S")

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import tyro
 from rich.console import Console
@@ -13,8 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 
 from e2efly.budget import check_time
-from e2efly.commands.options import parse as parse_options
-from e2efly.commands.policies import named_first, values, with_task
+from e2efly.commands.policies import Asked, asked_of
 from e2efly.commands.rows import check_stress, report_stress
 from e2efly.config import TaskConfig
 from e2efly.storage import write_json
@@ -71,31 +70,16 @@ class Validate:
     """Exit status 1 when a row of --stress succeeds less often than this, such as 0.9."""
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What `e2efly validate` is asked to do."""
-
-    options: Validate
-    """As given."""
-    task: dict[str, Any]
-    """Values of `--task`, by dotted name, that are not the policy's own."""
-
-
 def parse(arguments: list[str]) -> Asked:
     """The options of `validate`; the defaults of `--task` are what the policy's run or contract says.
 
     Raises:
         ValueError: for unknown names, and for a policy that is not there.
     """
-    given = [argument for argument in arguments if argument.startswith("--task.")]
-    if not given or "--help" in arguments:
-        return Asked(parse_options(Validate, "validate", arguments), {})
-    found = named_first("validate", arguments, given[0])
-    kind = with_task(Validate, found.task)
-    options = parse_options(kind, "validate", arguments, default=kind(tyro.MISSING, task=found.task))
-    if options.stress:
-        raise ValueError(f"{given[0]} is given with --stress; accepted: one of them")
-    return Asked(options, values(found.task, options.task))
+    asked = asked_of(Validate, "validate", arguments)
+    if asked.task and asked.options.stress:
+        raise ValueError(f"--task.{next(iter(asked.task))} is given with --stress; accepted: one of them")
+    return asked
 
 
 def run(asked: Asked) -> int:

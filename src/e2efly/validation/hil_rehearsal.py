@@ -58,6 +58,8 @@ class Plan:
     """Images per second; None: the contract's."""
     pose_delay: float = DELAY_S
     """How late poses come, s."""
+    world: Sequence[str] = ()
+    """Options of `e2efly hil` that say which world: `--task.*`."""
     options: tuple[str, ...] = ()
     """More of `e2efly fly`."""
 
@@ -179,7 +181,7 @@ class _Flight:
         flies = ["--vehicle", plan.found.vehicle]
         # rendering takes one core and no more: the firmware and the bridge need the others
         policy = str(plan.found.file)
-        self.node = Program("the HIL node", ["-m", "e2efly", "hil", policy, *node, *flies], cores[-1])
+        self.node = Program("the HIL node", ["-m", "e2efly", "hil", policy, *node, *flies, *plan.world], cores[-1])
         stack.enter_context(self.node)
         self.node.wait_for("Fly it with", 2 * START_S)
         stands = ["--at", *(f"{x:.6g}" for x in self._stand()), "--exact", "--record", str(folder / "truth.csv")]
