@@ -3,12 +3,13 @@
     python benchmarks/firmware_flights.py [--vehicle vis_r] [--flights 5] [--tasks hover land ...] [--json FILE]
 
 All nine tasks; what policies by sight see is rendered at the body's true pose, in another world of the training's
-each time. Time is virtual: the figures do not depend on the machine. The firmware is built where need be.
+each time. Time is virtual: the figures do not depend on the machine. The firmware is built where need be. Rows of tasks
+that are not named stay as they are in the file.
 """
 
 import time
 
-from common import arguments, table, write
+from common import arguments, table, with_earlier, write
 from rich.console import Console
 
 from e2efly.commands.rehearsals import flight_row, fly_whole
@@ -43,7 +44,9 @@ def main() -> None:
             if not flight.complete:
                 print(f"  not complete: {flight.modes} {flight.reasons}", flush=True)
     print(table(rows))
-    write("firmware_flights", args.json, {"table": rows, "flights": flights})
+    whole = with_earlier("firmware_flights", args.json, "table", ("task",), rows)
+    whole.sort(key=lambda row: tasks.index(row["task"]))
+    write("firmware_flights", args.json, {"table": whole, "flights": flights})
 
 
 if __name__ == "__main__":

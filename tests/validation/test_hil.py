@@ -166,5 +166,5 @@ def test_the_world_is_the_task_s_with_options_of_it() -> None:
     assert flags("task", candidate("race_clutter", task=asked.task).task, candidate("race_clutter").task) == [
         "--task.speed", "4", "5",
     ]  # fmt: skip
-    with pytest.raises(ValueError, match="hil begins with --task.speed; accepted: the policy first"):
+    with pytest.raises(ValueError, match=r"hil begins with --task\.speed; accepted: the policy first"):
         parse(["--task.speed", "4", "5", "race_clutter"])
