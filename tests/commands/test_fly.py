@@ -112,3 +112,7 @@ def test_the_policy_of_the_goal_s_options_is_looked_for_in_no_device(tmp_path: P
     os.mkfifo(tmp_path / "port")
     options = parse(["--link", str(tmp_path / "port"), "hover", "--goal.target", "0", "0", "2"])
     assert isinstance(options.goal, HoverRoute)
+
+
+def test_each_image_has_an_option_of_its_own() -> None:
+    assert parse(["avoid", "--image", "a=shm:x", "--image", "b=shm:y"]).image == ("a=shm:x", "b=shm:y")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from e2efly.commands.fly import _table
+from e2efly.commands.fly_check import settings_table
 from e2efly.deploy.betaflight import messages, settings_by_name
 from e2efly.deploy.betaflight.check import NOT_TOLD, Row, examine, problems
 from e2efly.deploy.betaflight.client import MESSAGES, Client
@@ -219,7 +219,7 @@ def test_the_sticks_keep_angle_off_on_its_own_channel() -> None:
 
 
 def test_the_table_says_which_settings_the_pilot_has_to_look_at(capsys: pytest.CaptureFixture[str]) -> None:
-    Console(width=200).print(_table(examine(recorded("2025.12.5"), VEHICLE, FlightSettings())))
+    Console(width=200).print(settings_table(examine(recorded("2025.12.5"), VEHICLE, FlightSettings())))
     lines = {line.split()[1]: line for line in capsys.readouterr().out.splitlines() if len(line.split()) > 1}
     assert lines["mixer_type"].startswith("look ") and "set mixer_type=LEGACY" in lines["mixer_type"]
     assert lines["thrust_linear"].startswith("ok ") and "set " not in lines["thrust_linear"]

@@ -143,7 +143,7 @@ def test_what_cannot_be_rendered_is_named(tmp_path: Path, capsys: pytest.Capture
             "--image is 'front=shm:x'; accepted: NAME=URI, NAME one of image_0",
         ),
         (
-            ["avoid", "--image", "image_0=shm:x", "image_0=shm:y"],
+            ["avoid", "--image", "image_0=shm:x", "--image", "image_0=shm:y"],
             "--image is image_0=shm:y; accepted: one shm:NAME for each image",
         ),
         (["avoid", "--image", "image_0=udp:x"], "--image is image_0=udp:x; accepted: shm:NAME, tcp:PORT"),

@@ -11,11 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import tyro
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from e2efly import __version__
+from e2efly.commands.fly_check import look, settings_table
 from e2efly.commands.options import parse as parse_options
 from e2efly.deploy.betaflight.check import Row, examine, problems
 from e2efly.deploy.betaflight.client import SCHEDULE, Client
@@ -32,20 +30,14 @@ from e2efly.deploy.log.live import Live, targets_of
 from e2efly.deploy.log.record import Log, Logs
 from e2efly.deploy.log.telemetry import Telemetry
 from e2efly.deploy.pilot import throttle_map
-from e2efly.deploy.pilot.hover import roll_pitch
-from e2efly.deploy.pilot.refusals import take_off_refusals
 from e2efly.deploy.policy.loader import Policy, load_policy
 from e2efly.deploy.policy.runtime import Envelope, Runtime, check
 from e2efly.deploy.policy.worker import PolicyWorker
-from e2efly.deploy.pose.source import PoseSource
 from e2efly.deploy.pose.sources import open_source
 from e2efly.deploy.settings import FlightSettings
 from e2efly.deploy.settings import check as check_settings
-from e2efly.deploy.sight.picture import blocks, colours, write_png
-from e2efly.deploy.sight.source import ImageSource
 from e2efly.deploy.sight.sources import open_cameras
-from e2efly.deploy.sight.watch import Seen
-from e2efly.deploy.terminal import Speaker, Stop, printable
+from e2efly.deploy.terminal import Speaker, Stop
 from e2efly.learn.rundir import run_of
 from e2efly.process import raise_at_interrupt
 from e2efly.tasks.route import Route, course_for, fields_of, route_of
@@ -55,10 +47,6 @@ from e2efly.zoo import policy_file
 
 CONNECT_S = 5.0
 """How long the controller may take to answer first, s."""
-LOOK_S = 1.5
-"""How long `--check` watches poses and receiver, s."""
-PICTURES = Path("flights")
-"""Where `--check` puts pictures of what the network is shown."""
 SLOWEST = 0.5
 """Largest `--latency`, s: behind more no gains hold a hover."""
 
@@ -76,7 +64,7 @@ class Fly:
     pose: str = "udp:9870"
     """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic, ros2:/topic, or a source of your
     own, path/to/file.py:Name[:...]."""
-    image: tuple[str, ...] = ()
+    image: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Where a policy that sees gets each image of its contract: image_0=realsense:[SERIAL], v4l2:/dev/videoN?fov=AxB,
     ros1:/topic, ros2:/topic, hil:HOST:PORT, shm:NAME (what another program publishes in shared memory), mask:...@URI (a
     mask of one of these), or a source of your own, path/to/file.py:Name[:...]. See docs/image-sources.md."""
@@ -190,7 +178,7 @@ def run(options: Fly) -> int:
         client = Client(held, dict(EXCITATION_SCHEDULE if excited else SCHEDULE))
         info = _connect(client, options.link)
         rows = examine(info, body, settings, contract)
-        console.print(_table(rows))
+        console.print(settings_table(rows))
         worker = _worker(runtime, commands, body, options)
         if worker is not None:
             stack.callback(worker.close)
@@ -200,7 +188,7 @@ def run(options: Fly) -> int:
         )  # fmt: skip
         source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:
-            return _look(bridge, source, console, rows)
+            return look(bridge, source, console, rows)
         stop = Stop()
         stack.callback(stop.restore)
         path = options.log or Path("flights") / time.strftime("%Y-%m-%d_%H-%M-%S.mcap")
@@ -288,95 +276,6 @@ def _identify_again(
         return None
     say("the controller was connected anew; its settings were read again")
     return info
-
-
-def _table(rows: tuple[Row, ...]) -> Table:
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in ("", "setting", "is", "needed", "mend with"):
-        table.add_column(heading, overflow="fold")
-    for row in rows:
-        mark = Text("ok", "green") if row.good else Text("no", "bold red")
-        mark = mark if row.told else Text("look", "yellow")
-        mend = "" if row.good and row.told else row.mend
-        table.add_row(mark, *map(_cell, (row.setting, row.value, row.needed, mend)))
-    return table
-
-
-def _cell(text: str) -> Text:
-    """What may come from outside, such as a craft's name: no escape sequences."""
-    return Text(printable(text))
-
-
-def _look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row, ...]) -> int:
-    """Watch poses, receiver and attitude for a while, and say what forbids a take-off. Sends no sticks."""
-    end, poses = time.monotonic() + LOOK_S, []
-    times: list[set[float]] = [set() for _ in bridge.cameras]
-    while (now := time.monotonic()) < end:
-        poses += bridge.look(now)
-        for taken, seen in zip(times, bridge.seen, strict=True):
-            taken |= {seen.frame.time} if seen.frame is not None else set()
-        time.sleep(0.005)
-    table = Table(box=None, show_header=False, pad_edge=False)
-    o = bridge.odometry
-    if o is None:
-        table.add_row("poses", _cell(f"none good from {source.describe()}: {bridge.inputs.odometry_problem}"))
-    else:
-        roll, pitch = roll_pitch(o.quaternion)
-        age = sum(s.received - (s.stamp or s.received) for s in poses) / max(len(poses), 1)
-        pace = bridge.estimate.pace
-        said = f"{pace.rate:.0f} Hz from {source.describe()}, refused {source.refused}"
-        table.add_row("poses", _cell(f"{said}; the newest was up to {1e3 * pace.oldest:.0f} ms old"))
-        table.add_row("", _cell(f"position {o.position.round(3).tolist()} m, roll {roll:+.2f}, pitch {pitch:+.2f} rad"))
-        if poses and poses[-1].stamp is not None:
-            table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")
-    now = time.monotonic()
-    for camera, seen, taken in zip(bridge.cameras, bridge.seen, times, strict=True):
-        table.add_row("image", _cell(_image(camera, seen, now, len(taken) / LOOK_S)))
-        if seen.frame is not None:
-            pixels, path = colours(seen.frame.image, seen.camera), PICTURES / f"check_{seen.camera.name}.png"
-            write_png(path, pixels)
-            table.add_row("", blocks(pixels))
-            table.add_row("", _cell(f"what the network is shown, larger: {path}"))
-    if isinstance(bridge.worker, Commander):
-        table.add_row("commands", _cell(_commands(bridge.worker, bridge)))
-    pilot = bridge.inputs.pilot
-    heard = "not heard"
-    if pilot is not None:
-        sticks = ", ".join(f"{name} {getattr(pilot, name):+.2f}" for name in ("roll", "pitch", "throttle", "yaw"))
-        heard = f"mission {pilot.mission}; {sticks}"
-    table.add_row("receiver", heard)
-    table.add_row("battery", f"{bridge.inputs.voltage:.2f} V per cell" if bridge.inputs.voltage else "unknown")
-    error = bridge.inputs.attitude_error
-    table.add_row("attitude", "not heard" if error is None else f"controller and poses differ by {error:.3f} rad")
-    console.print(table)
-    refusals = take_off_refusals(bridge.settings, bridge.flight, bridge.inputs)
-    console.print("What stands against a take-off now:" if refusals else "Nothing stands against a take-off.")
-    for refusal in refusals:
-        console.print(f"  - {printable(refusal)}")
-    return 1 if problems(rows) or o is None else 0
-
-
-def _image(camera: ImageSource, seen: Seen, now: float, rate: float) -> str:
-    """What a camera shows, in words."""
-    said = seen.problem(now)
-    if said is not None or seen.frame is None:
-        return f"not to be flown by, from {camera.describe()}: {said}"
-    image, age = seen.frame.image, 1e3 * (now - seen.frame.time)
-    values = f"values {image.min():.2f} to {image.max():.2f}, mean {image.mean():.2f}"
-    low, high = (1e3 * x for x in seen.camera.latency_range_s)
-    trained = f"{age:.0f} ms old (trained with {low:.0f} to {high:.0f}), {rate:.0f} Hz ({seen.camera.rate_hz:g})"
-    note = f"; {camera.problem}" if camera.problem else ""
-    return f"{seen.camera.name} from {camera.describe()}: {values}; {trained}{note}"
-
-
-def _commands(commander: Commander, bridge: Bridge) -> str:
-    """What comes from a commander, in words."""
-    stream, now, where = commander.stream, time.monotonic(), commander.source.describe()
-    counted = f"{stream.taken} accepted, {stream.refused} refused, from {where}"
-    if bridge.odometry is not None and (problem := commander.readiness(bridge.odometry, now)):
-        return f"{counted}; it could not take over now: {problem}"
-    mode = f"; the newest: {stream.command.mode}, {1e3 * stream.age(now):.0f} ms old" if stream.command else ""
-    return f"{counted}{mode}"
 
 
 def _record_meta(log: Log, bridge: Bridge, body: Vehicle, contract: str, rows: tuple[Row, ...]) -> None:

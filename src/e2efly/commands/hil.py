@@ -46,7 +46,7 @@ class Hil:
     """Whose cameras and world are rendered: a policy.onnx, a run directory, or a task of the zoo."""
     pose: str = "udp:9870"
     """Pose source, as of `e2efly fly`."""
-    image: tuple[str, ...] = ()
+    image: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Where each image goes, as often as wanted: image_0=shm:NAME, tcp:PORT (tcp:PORT:exact: not rounded to mm),
     ros1:/topic, ros2:/topic."""
     host: str = "127.0.0.1"

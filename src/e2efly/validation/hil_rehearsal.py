@@ -169,13 +169,14 @@ class _Flight:
         ports = [free_port(), free_port()]
         names = [f"rehearsal_{os.getpid()}_{i}" for i in range(len(contract.images))]
         stack.callback(_forget, names)
-        image = [f"{image.name}=shm:{name}" for image, name in zip(contract.images, names, strict=True)]
+        pairs = zip(contract.images, names, strict=True)
+        images = [word for image, name in pairs for word in ("--image", f"{image.name}=shm:{name}")]
         to = ["--to", *map(str, ports), "--seed", str(seed), "--delay", f"{plan.pose_delay:.6g}"]
         self.mocap = Program("motion capture", ["-m", "e2efly.validation.mocap_process", *to])
         stack.enter_context(self.mocap)
         inlet = json.loads(self.mocap.wait_for('"from"', START_S))["from"]
         node = ["--pose", f"udp:{ports[0]}", "--seed", str(seed), "--json", str(folder / "node.json")]
-        node += ["--track", str(folder / "track.toml"), "--image", *image]
+        node += ["--track", str(folder / "track.toml"), *images]
         node += ["--origin", *(f"{x:.9g}" for x in plan.origin.position), "--origin-yaw", f"{plan.origin.yaw:.9g}"]
         node += [] if plan.rate is None else ["--rate", f"{plan.rate:g}"]
         flies = ["--vehicle", plan.found.vehicle]
@@ -188,7 +189,7 @@ class _Flight:
         self.room = Room(plan.found.vehicle, seed, stands, cores[0], inlet)
         stack.enter_context(self.room)
         settings = rehearsal_settings(self._height(), REACH_IN_SIGHT)
-        options = [*flags("flight", settings), "--image", *image, "--envelope.speed", "8"]
+        options = [*flags("flight", settings), *images, "--envelope.speed", "8"]
         options += [*flags("goal", drawn.route), *flies, *plan.options]
         log = folder / "flight.mcap"
         self.flies = bridge(Path(policy), self.room, log, options, pose=f"udp:{ports[1]}", urgent=True)

@@ -1,0 +1,133 @@
+"""What `e2efly fly` shows before a flight: the controller's settings, and with `--check` all that it hears."""
+
+import time
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from e2efly.deploy.betaflight.check import Row, problems
+from e2efly.deploy.bridge import Bridge
+from e2efly.deploy.commander.commander import Commander
+from e2efly.deploy.odometry import Sample
+from e2efly.deploy.pilot.hover import roll_pitch
+from e2efly.deploy.pilot.refusals import take_off_refusals
+from e2efly.deploy.pose.source import PoseSource
+from e2efly.deploy.sight.picture import blocks, colours, write_png
+from e2efly.deploy.sight.source import ImageSource
+from e2efly.deploy.sight.watch import Seen
+from e2efly.deploy.terminal import printable
+
+LOOK_S = 1.5
+"""How long `--check` watches poses and receiver, s."""
+PICTURES = Path("flights")
+"""Where `--check` puts pictures of what the network is shown."""
+
+
+def settings_table(rows: tuple[Row, ...]) -> Table:
+    """Each setting of the controller: what it is, what is needed, what mends it."""
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for heading in ("", "setting", "is", "needed", "mend with"):
+        table.add_column(heading, overflow="fold")
+    for row in rows:
+        mark = Text("ok", "green") if row.good else Text("no", "bold red")
+        mark = mark if row.told else Text("look", "yellow")
+        mend = "" if row.good and row.told else row.mend
+        table.add_row(mark, *map(_cell, (row.setting, row.value, row.needed, mend)))
+    return table
+
+
+def look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row, ...]) -> int:
+    """Watch poses, images, receiver and attitude for a while, and say what forbids a take-off. Sends no sticks.
+
+    Args:
+        bridge: that would fly.
+        source: of its poses.
+        console: for the table.
+        rows: the controller's settings.
+
+    Returns:
+        1 when a setting or missing poses forbid a take-off, else 0.
+    """
+    end, poses = time.monotonic() + LOOK_S, list[Sample]()
+    times: list[set[float]] = [set() for _ in bridge.cameras]
+    while (now := time.monotonic()) < end:
+        poses += bridge.look(now)
+        for taken, seen in zip(times, bridge.seen, strict=True):
+            taken |= {seen.frame.time} if seen.frame is not None else set()
+        time.sleep(0.005)
+    table = Table(box=None, show_header=False, pad_edge=False)
+    _add_poses(table, bridge, source, poses)
+    _add_images(table, bridge, [len(taken) / LOOK_S for taken in times])
+    if isinstance(bridge.worker, Commander):
+        table.add_row("commands", _cell(_commands(bridge.worker, bridge)))
+    pilot = bridge.inputs.pilot
+    heard = "not heard"
+    if pilot is not None:
+        sticks = ", ".join(f"{name} {getattr(pilot, name):+.2f}" for name in ("roll", "pitch", "throttle", "yaw"))
+        heard = f"mission {pilot.mission}; {sticks}"
+    table.add_row("receiver", heard)
+    table.add_row("battery", f"{bridge.inputs.voltage:.2f} V per cell" if bridge.inputs.voltage else "unknown")
+    error = bridge.inputs.attitude_error
+    table.add_row("attitude", "not heard" if error is None else f"controller and poses differ by {error:.3f} rad")
+    console.print(table)
+    refusals = take_off_refusals(bridge.settings, bridge.flight, bridge.inputs)
+    console.print("What stands against a take-off now:" if refusals else "Nothing stands against a take-off.")
+    for refusal in refusals:
+        console.print(f"  - {printable(refusal)}")
+    return 1 if problems(rows) or bridge.odometry is None else 0
+
+
+def _add_poses(table: Table, bridge: Bridge, source: PoseSource, poses: list[Sample]) -> None:
+    o = bridge.odometry
+    if o is None:
+        table.add_row("poses", _cell(f"none good from {source.describe()}: {bridge.inputs.odometry_problem}"))
+        return
+    roll, pitch = roll_pitch(o.quaternion)
+    age = sum(s.received - (s.stamp or s.received) for s in poses) / max(len(poses), 1)
+    pace = bridge.estimate.pace
+    said = f"{pace.rate:.0f} Hz from {source.describe()}, refused {source.refused}"
+    table.add_row("poses", _cell(f"{said}; the newest was up to {1e3 * pace.oldest:.0f} ms old"))
+    table.add_row("", _cell(f"position {o.position.round(3).tolist()} m, roll {roll:+.2f}, pitch {pitch:+.2f} rad"))
+    if poses and poses[-1].stamp is not None:
+        table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")
+
+
+def _add_images(table: Table, bridge: Bridge, rates: list[float]) -> None:
+    now = time.monotonic()
+    for camera, seen, rate in zip(bridge.cameras, bridge.seen, rates, strict=True):
+        table.add_row("image", _cell(_image(camera, seen, now, rate)))
+        if seen.frame is not None:
+            pixels, path = colours(seen.frame.image, seen.camera), PICTURES / f"check_{seen.camera.name}.png"
+            write_png(path, pixels)
+            table.add_row("", blocks(pixels))
+            table.add_row("", _cell(f"what the network is shown, larger: {path}"))
+
+
+def _image(camera: ImageSource, seen: Seen, now: float, rate: float) -> str:
+    """What a camera shows, in words."""
+    said = seen.problem(now)
+    if said is not None or seen.frame is None:
+        return f"not to be flown by, from {camera.describe()}: {said}"
+    image, age = seen.frame.image, 1e3 * (now - seen.frame.time)
+    values = f"values {image.min():.2f} to {image.max():.2f}, mean {image.mean():.2f}"
+    low, high = (1e3 * x for x in seen.camera.latency_range_s)
+    trained = f"{age:.0f} ms old (trained with {low:.0f} to {high:.0f}), {rate:.0f} Hz ({seen.camera.rate_hz:g})"
+    note = f"; {camera.problem}" if camera.problem else ""
+    return f"{seen.camera.name} from {camera.describe()}: {values}; {trained}{note}"
+
+
+def _commands(commander: Commander, bridge: Bridge) -> str:
+    """What comes from a commander, in words."""
+    stream, now, where = commander.stream, time.monotonic(), commander.source.describe()
+    counted = f"{stream.taken} accepted, {stream.refused} refused, from {where}"
+    if bridge.odometry is not None and (problem := commander.readiness(bridge.odometry, now)):
+        return f"{counted}; it could not take over now: {problem}"
+    mode = f"; the newest: {stream.command.mode}, {1e3 * stream.age(now):.0f} ms old" if stream.command else ""
+    return f"{counted}{mode}"
+
+
+def _cell(text: str) -> Text:
+    """What may come from outside, such as a craft's name: no escape sequences."""
+    return Text(printable(text))
