@@ -36,6 +36,7 @@ TITLES = {
     "step_response": "Steps of the real firmware, and the simulator's before and after alignment",
     "identify_betaflight": "Identification of hidden vehicles behind the real firmware",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
+    "airsim": "The same policies over AirSim's RPC, 20 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
     "plants_by_sight": "Policies that see, on plants that render",
     "image_faults": "Cameras that break in flight",
@@ -120,8 +121,9 @@ nominal vehicle, 1000 unseen forests each, at 5 / 8 / 10 m/s: 99.7 / 99.3 / 98.7
 and 99.4 / 98.8 / 98.4 %, the 40 m from a standing start in 9.1, 7.5 and 7.7 s, 87, 67 and 52 % of
 what is commanded; the first was trained in 273 s.""",
     "firmware_flights": """
-The zoo's policies of VIS-R, as they ship; all tasks that need no camera. Success is the
-task's own verdict, by the code that judges training. All are of the preset `robust`.""",
+The zoo's policies of VIS-R, as they ship; all nine tasks. Success is the task's own verdict,
+by the code that judges training. All are of the preset `robust`. What the last three see is
+rendered at the body's true pose, in another world each time; touching a solid is no success.""",
     "firmware_faults": """
 Five times each, on the packaged Betaflight 4.6. On a SITL of 2026.6.1, built from its source
 and flown by `e2efly firmware --binary`, each of the 35 ended as documented, 2 of 2.""",
