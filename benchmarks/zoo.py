@@ -4,6 +4,7 @@
     python benchmarks/zoo.py --digests
     python benchmarks/zoo.py --again
     python benchmarks/zoo.py --runs DIR ...
+    python benchmarks/zoo.py --images
 
 The preset is `robust` where the task has it. The best of at most `seeds` runs by each algorithm is kept, if it succeeds
 more often than not; none more is made once one meets 99.5 %, or a robust one 97 % in its worst row of the stress. What
@@ -13,6 +14,7 @@ vehicles in still air. The success that is stated is that of the lone ONNX file,
 
 `--again` trains nothing: it flies the robust policies that are there in all rows of the stress.
 `--runs` trains nothing: it keeps the policies of finished runs, by the presets that are meant here.
+`--images` trains nothing: it keeps images of the starts of the policies that see, which have none beside them.
 `--digests` trains nothing: it gives the files that are there their digests, where they have none, and writes the digest
 of each file into zoo.json.
 """
@@ -27,10 +29,14 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import jax
+import numpy as np
 from common import arguments, table
 
 from e2efly.deploy.policy.onnx_file import is_sealed
+from e2efly.deploy.sight.samples import COUNT, packed, samples_file
 from e2efly.env.stress import ALL
+from e2efly.evaluation import candidate
 from e2efly.learn.judge import worst_success
 from e2efly.learn.rundir import RunDirectory
 from e2efly.storage import write_json
@@ -119,6 +125,8 @@ def keep(vehicle: str, task: str, policy: Path, about: dict[str, Any]) -> dict[s
     kept = FOLDER / vehicle / f"{task}.onnx"
     kept.parent.mkdir(exist_ok=True)
     shutil.copy(policy, kept)
+    if (seen := samples_file(policy)).is_file():
+        shutil.copy(seen, samples_file(kept))
     zoo = contents() if (FOLDER / "zoo.json").exists() else {}
     zoo.setdefault(vehicle, {})[task] = about
     write(zoo)
@@ -126,6 +134,16 @@ def keep(vehicle: str, task: str, policy: Path, about: dict[str, Any]) -> dict[s
     line = {"vehicle": vehicle, "task": task, "success, %": success, "kB": kept.stat().st_size // 1000}
     print(line, flush=True)
     return line
+
+
+def starts_of(policy: Path) -> dict[str, np.ndarray]:
+    """What a policy sees at starts of its first criterion, by the names of its images; empty: nothing."""
+    found = candidate(policy)
+    if not (images := found.policy.contract.images):
+        return {}
+    env = found.environment(next(iter(found.task.criteria().values())))
+    state, _ = env.reset(jax.random.key(0), COUNT)
+    return {image.name: np.asarray(x) for image, x in zip(images, state.images, strict=True)}
 
 
 def write(zoo: dict[str, dict[str, dict[str, Any]]]) -> None:
@@ -139,12 +157,19 @@ def write(zoo: dict[str, dict[str, dict[str, Any]]]) -> None:
 def main() -> None:
     """Train, keep the policies and zoo.json, print a table."""
     every, policies = [*vehicle_names(), *family_names()], [*TASKS, *VARIANTS]
-    options = arguments(__doc__ or "", vehicles=every, tasks=policies, seeds=3, digests=False, again=False, runs=[])
+    options = arguments(
+        __doc__ or "", vehicles=every, tasks=policies, seeds=3, digests=False, again=False, images=False, runs=[]
+    )
     if options.digests:
         for file in FOLDER.glob("*/*.onnx"):
             if not is_sealed(file.read_bytes()):
                 run("export", str(file))
         write(contents())
+        return
+    if options.images:
+        for file in FOLDER.glob("*/*.onnx"):
+            if not samples_file(file).exists() and (images := starts_of(file)):
+                samples_file(file).write_bytes(packed(images))
         return
     if options.again:
         zoo = contents()

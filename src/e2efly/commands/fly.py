@@ -188,7 +188,7 @@ def run(options: Fly) -> int:
         )  # fmt: skip
         source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:
-            return look(bridge, source, console, rows)
+            return look(bridge, source, console, rows, policy)
         stop = Stop()
         stack.callback(stop.restore)
         path = options.log or Path("flights") / time.strftime("%Y-%m-%d_%H-%M-%S.mcap")

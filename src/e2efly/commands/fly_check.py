@@ -14,7 +14,8 @@ from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pilot.hover import roll_pitch
 from e2efly.deploy.pilot.refusals import take_off_refusals
 from e2efly.deploy.pose.source import PoseSource
-from e2efly.deploy.sight.picture import blocks, colours, write_png
+from e2efly.deploy.sight.picture import blocks, colours, sheet, write_png
+from e2efly.deploy.sight.samples import read_samples
 from e2efly.deploy.sight.source import ImageSource
 from e2efly.deploy.sight.watch import Seen
 from e2efly.deploy.terminal import printable
@@ -38,7 +39,9 @@ def settings_table(rows: tuple[Row, ...]) -> Table:
     return table
 
 
-def look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row, ...]) -> int:
+def look(
+    bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row, ...], policy: Path | None = None
+) -> int:
     """Watch poses, images, receiver and attitude for a while, and say what forbids a take-off. Sends no sticks.
 
     Args:
@@ -46,6 +49,7 @@ def look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row, 
         source: of its poses.
         console: for the table.
         rows: the controller's settings.
+        policy: its file, beside which images of its training may lie; None: there is none.
 
     Returns:
         1 when a setting or missing poses forbid a take-off, else 0.
@@ -59,7 +63,7 @@ def look(bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row, 
         time.sleep(0.005)
     table = Table(box=None, show_header=False, pad_edge=False)
     _add_poses(table, bridge, source, poses)
-    _add_images(table, bridge, [len(taken) / LOOK_S for taken in times])
+    _add_images(table, bridge, [len(taken) / LOOK_S for taken in times], policy)
     if isinstance(bridge.worker, Commander):
         table.add_row("commands", _cell(_commands(bridge.worker, bridge)))
     pilot = bridge.inputs.pilot
@@ -94,15 +98,18 @@ def _add_poses(table: Table, bridge: Bridge, source: PoseSource, poses: list[Sam
         table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")
 
 
-def _add_images(table: Table, bridge: Bridge, rates: list[float]) -> None:
+def _add_images(table: Table, bridge: Bridge, rates: list[float], policy: Path | None) -> None:
     now = time.monotonic()
     for camera, seen, rate in zip(bridge.cameras, bridge.seen, rates, strict=True):
         table.add_row("image", _cell(_image(camera, seen, now, rate)))
         if seen.frame is not None:
             pixels, path = colours(seen.frame.image, seen.camera), PICTURES / f"check_{seen.camera.name}.png"
-            write_png(path, pixels)
-            table.add_row("", blocks(pixels))
-            table.add_row("", _cell(f"what the network is shown, larger: {path}"))
+            trained = None if policy is None else read_samples(policy, seen.camera)
+            shown = [] if trained is None else [colours(image, seen.camera) for image in trained]
+            write_png(path, sheet(pixels, shown))
+            table.add_row("", blocks(sheet(pixels, shown[:1])))
+            beside = "; beside it, what it was shown in training" if shown else "; of its training no images are kept"
+            table.add_row("", _cell(f"what the network is shown{beside}; larger: {path}"))
 
 
 def _image(camera: ImageSource, seen: Seen, now: float, rate: float) -> str:

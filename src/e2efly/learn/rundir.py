@@ -27,7 +27,7 @@ from e2efly.tasks import TASKS
 
 _FILES = (
     "config.json", "versions.json", "inputs.json", "metrics.csv", "checkpoint.safetensors", "policy.onnx",
-    "summary.json",
+    "policy.images.npz", "summary.json",
 )  # fmt: skip
 _FOLDERS = ("inputs", "events", "plots")
 """All that a run writes into its folder."""

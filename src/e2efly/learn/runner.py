@@ -19,6 +19,8 @@ import jax
 import numpy as np
 
 from e2efly.config import TrainConfig
+from e2efly.deploy.policy.contract import Contract
+from e2efly.deploy.sight.samples import packed, samples_file
 from e2efly.env import Env, random_key
 from e2efly.episodes import Episodes
 from e2efly.episodes import summary as summary_of
@@ -33,6 +35,7 @@ from e2efly.learn.networks import Weights
 from e2efly.learn.programs import Programs, start_program
 from e2efly.learn.rundir import RunDirectory, differences, different_values, from_json, to_json, versions
 from e2efly.learn.setup import Setup
+from e2efly.storage import write_atomically
 
 REPORT_EPISODES = 1000
 
@@ -259,10 +262,19 @@ def _finish(
         if setup.env.family is None:  # the rows of the stress lie about one vehicle
             summary["stress"] = told(stressed(setup, best, REPORT_EPISODES))
     if hosts.first():
-        export_policy(run.policy, best, setup.actor, contract_of(setup.env, config))
+        contract = contract_of(setup.env, config)
+        export_policy(run.policy, best, setup.actor, contract)
+        if contract.images:
+            write_atomically(samples_file(run.policy), packed(_seen(state, contract)))
         run.write_json("summary.json", summary)
     reporter.ended(setup, by_best)
     return summary
+
+
+def _seen(state: TrainState, contract: Contract) -> dict[str, np.ndarray]:
+    """What the policy saw last in training, by the names of its images."""
+    seen = (image.addressable_data(0) if isinstance(image, jax.Array) else image for image in state.env.images)
+    return {image.name: np.asarray(x).reshape(-1, *image.shape) for image, x in zip(contract.images, seen, strict=True)}
 
 
 def policy_of(state: TrainState) -> Weights:

@@ -2,6 +2,7 @@
 
 import struct
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ COLUMNS = 64
 """Widest picture of the terminal, characters."""
 PIXELS = 512
 """A PNG is magnified by a whole number to about this width, pixels."""
+GAP = 2
+"""Between a picture and others beside it, pixels."""
 
 
 def colours(image: np.ndarray, camera: Image) -> np.ndarray:
@@ -34,6 +37,29 @@ def colours(image: np.ndarray, camera: Image) -> np.ndarray:
         return np.where((image > 0)[..., None], grey[..., None], np.array(HOLE, np.uint8))
     shown = np.round(255 * share).astype(np.uint8)
     return shown if shown.ndim == 3 else np.repeat(shown[..., None], 3, axis=2)
+
+
+def sheet(shown: np.ndarray, others: Sequence[np.ndarray]) -> np.ndarray:
+    """A picture with others of its size to its right, two rows of them, behind a gap.
+
+    Args:
+        shown: (h, w, 3) uint8.
+        others: (h, w, 3) uint8 each; none: the picture alone.
+
+    Returns:
+        (h or 2 h, ..., 3) uint8; the picture stands in the upper left.
+    """
+    if not len(others):
+        return shown
+    h, w, _ = shown.shape
+    rows = 1 if len(others) == 1 else 2
+    columns = -(-len(others) // rows)
+    whole = np.full((rows * h, GAP + (columns + 1) * w, 3), 255, np.uint8)
+    whole[:h, :w] = shown
+    for i, other in enumerate(others):
+        y, x = i // columns * h, GAP + (1 + i % columns) * w
+        whole[y : y + h, x : x + w] = other
+    return whole
 
 
 def blocks(pixels: np.ndarray, columns: int = COLUMNS) -> Text:

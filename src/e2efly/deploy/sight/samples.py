@@ -1,0 +1,50 @@
+"""Images that a policy saw in training, beside its file: `fly --check` shows them next to what a camera shows."""
+
+import io
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from e2efly.deploy.policy.images import Image
+
+COUNT = 6
+"""How many are kept of each of a policy's images."""
+
+
+def samples_file(policy: Path) -> Path:
+    """Where they are: policy.images.npz beside policy.onnx."""
+    return policy.with_suffix(".images.npz")
+
+
+def packed(images: Mapping[str, np.ndarray]) -> bytes:
+    """The content of such a file.
+
+    Args:
+        images: by the names of the contract, (k, h, w) or (k, h, w, 3), of which the first `COUNT` are kept.
+    """
+    content = io.BytesIO()
+    kept: Any = {name: np.asarray(seen[:COUNT], np.float16) for name, seen in images.items()}
+    np.savez_compressed(content, **kept)
+    return content.getvalue()
+
+
+def read_samples(policy: Path, image: Image) -> np.ndarray | None:
+    """What a policy saw of one of its images: (k, h, w) or (k, h, w, 3) float32; None: nothing is kept of it.
+
+    Raises:
+        ValueError: naming the file, where it does not hold images of this shape.
+    """
+    path = samples_file(policy)
+    if not path.is_file():
+        return None
+    try:
+        with np.load(path, allow_pickle=False) as content:
+            found = content[image.name].astype(np.float32) if image.name in content else None
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise ValueError(f"{path}: {error}; accepted: what a training has written, or no such file") from None
+    if found is not None and (found.shape[1:] != image.shape or not len(found)):
+        raise ValueError(f"{path}: {image.name} has shape {found.shape}; accepted: images of shape {image.shape}")
+    return found
