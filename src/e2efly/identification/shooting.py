@@ -5,9 +5,7 @@ weights (P. J. Huber, "Robust Estimation of a Location Parameter", 1964), and by
 Multiple shooting: H. G. Bock, "Numerical treatment of inverse problems in chemical reaction kinetics", 1981.
 """
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -43,7 +41,8 @@ rotors that have not come to rest yet, and the lag for as long as they last."""
 STILL = 0.02
 """Standard deviations below which a step of all unknowns is the last."""
 BATCH = 32
-"""Windows that are computed together: one program for flights of any length, on each core another batch."""
+"""Windows that are computed together: one program for flights of any length. One batch after the other: programs that
+several threads start at once wait for each other for ever, as they share XLA's own threads."""
 
 
 @dataclass(frozen=True)
@@ -200,13 +199,8 @@ def _costs(model: Model, p: Array, noise: dict[str, Any], data: dict[str, Any]) 
 def _by_batch(computed: Callable[[Any], Any], data: dict[str, np.ndarray]) -> Any:
     """A compiled function of a batch of windows, of all of them: leaves (whole batches, ...), NumPy."""
     batches = [{k: x[i : i + BATCH] for k, x in data.items()} for i in range(0, len(data["counts"]), BATCH)]
-
-    def one(batch: dict[str, np.ndarray]) -> Any:
-        with jax.enable_x64(True):  # of each thread
-            return jax.tree.map(np.asarray, computed(batch))
-
-    with ThreadPoolExecutor(os.cpu_count()) as cores:
-        return jax.tree.map(lambda *parts: np.concatenate(parts), *cores.map(one, batches))
+    found = [jax.tree.map(np.asarray, computed(batch)) for batch in batches]
+    return jax.tree.map(lambda *parts: np.concatenate(parts), *found)
 
 
 def _data(model: Model, windows: Windows) -> dict[str, np.ndarray]:
