@@ -2,8 +2,6 @@
 
 import json
 import math
-import shutil
-import socket
 import subprocess
 import time
 from pathlib import Path
@@ -11,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.deploy.child import SYSTEM_PYTHON, Child
+from e2efly.deploy.child import SYSTEM_PYTHON
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.deploy.sight.give import Output, give
 from e2efly.deploy.sight.shared import SharedImages, place
 from e2efly.zoo import policy_file
+from tests.deploy.ros_master import ros_master
 
-PACKAGES = "apt install python3-rospy python3-roslaunch python3-sensor-msgs"
 CAMERA = load_policy(policy_file("avoid")).contract.images[0]
 NAME = "e2efly-test-give-ros1"
 SUBSCRIBER = """
@@ -30,55 +28,27 @@ print(json.dumps({"image": image, "info": [list(info.K), info.height, info.width
 """
 
 
-def started() -> Child:
-    """The giver, as soon as the master answers."""
-    end = time.monotonic() + 60
-    while True:
-        try:
-            return give(CAMERA, NAME, Output("ros1", "/front/image"), "")
-        except ValueError as error:
-            if "no ROS master" not in str(error) or time.monotonic() > end:
-                raise
-
-
 def test_depth_is_published_in_metres_with_its_camera(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    roscore = shutil.which("roscore")
-    if roscore is None or not Path(SYSTEM_PYTHON).exists():
-        pytest.fail(f"needs ROS 1: {PACKAGES}; or E2EFLY_WITHOUT=ros1 to go without these tests")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    settings = {"ROS_MASTER_URI": f"http://127.0.0.1:{port}", "ROS_IP": "127.0.0.1", "ROS_HOME": str(tmp_path)}
-    for key, value in settings.items():
-        monkeypatch.setenv(key, value)
     monkeypatch.setenv("E2EFLY_ROS_PYTHON", SYSTEM_PYTHON)
     place(NAME).unlink(missing_ok=True)
     shared = SharedImages(NAME, CAMERA.shape)
     shown = np.random.default_rng(0).uniform(0, 10, CAMERA.shape).astype(np.float32)
-    master = subprocess.Popen(
-        [roscore, "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
-    try:
-        giver = started()
-    except BaseException:
-        master.terminate()
-        raise
-    subscriber = subprocess.Popen([SYSTEM_PYTHON, "-c", SUBSCRIBER], stdout=subprocess.PIPE, text=True)
-    try:
-        end = time.monotonic() + 60
-        while subscriber.poll() is None and time.monotonic() < end:
-            shared.publish(time.monotonic() - 0.5, shown)
-            time.sleep(0.05)
-        assert subscriber.stdout is not None
-        got = json.loads(subscriber.stdout.readline())
-    finally:
-        subscriber.kill()
-        subscriber.communicate()
-        giver.close()
-        master.terminate()
-        master.wait(20)
-        shared.close()
-        place(NAME).unlink()
+    with ros_master(tmp_path):
+        giver = give(CAMERA, NAME, Output("ros1", "/front/image"), "")
+        subscriber = subprocess.Popen([SYSTEM_PYTHON, "-c", SUBSCRIBER], stdout=subprocess.PIPE, text=True)
+        try:
+            end = time.monotonic() + 60
+            while subscriber.poll() is None and time.monotonic() < end:
+                shared.publish(time.monotonic() - 0.5, shown)
+                time.sleep(0.05)
+            assert subscriber.stdout is not None
+            got = json.loads(subscriber.stdout.readline())
+        finally:
+            subscriber.kill()
+            subscriber.communicate()
+            giver.close()
+            shared.close()
+            place(NAME).unlink()
     encoding, height, width, step, frame, stamp, data = got["image"]
     assert (encoding, height, width, step, frame) == ("32FC1", *CAMERA.shape, 4 * CAMERA.width, "image_0")
     assert 0.4 < time.time() - stamp < 10  # of the exposure, by the wall clock

@@ -1,8 +1,6 @@
 """Image topics of ROS 1: a real roscore, a real rospy publisher in a process of its own."""
 
 import os
-import shutil
-import socket
 import subprocess
 import time
 from collections.abc import Iterator
@@ -22,9 +20,8 @@ from tests.deploy.ros_images import (
     check_topic,
     first,
 )
-from tests.deploy.test_pose_ros1 import answers, wait_for
+from tests.deploy.ros_master import ros_master
 
-PACKAGES = "apt-get install python3-roslaunch python3-rosmaster python3-rospy python3-sensor-msgs"
 PUBLISHER = (
     PUBLISHED
     + """
@@ -50,34 +47,21 @@ while True:
 
 @pytest.fixture(scope="module")
 def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[subprocess.Popen]:
-    """A ROS master on a free port, and a publisher."""
-    roscore = shutil.which("roscore")
-    if roscore is None or not Path(SYSTEM_PYTHON).exists():
-        pytest.fail(f"needs ROS 1: {PACKAGES}; or E2EFLY_WITHOUT=ros1 to go without these tests")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    folder = tmp_path_factory.mktemp("ros1")
-    settings = {
-        "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
-        "ROS_IP": "127.0.0.1",
-        "ROS_HOME": str(folder),
-        "ROS_LOG_DIR": str(folder),
-        ROS_PYTHON: SYSTEM_PYTHON,
-    }
-    started: list[subprocess.Popen] = []
-    with pytest.MonkeyPatch.context() as patch, (folder / "output").open("w") as output:
-        for key, value in settings.items():
-            patch.setenv(key, value)
+    """A ROS master, and a publisher."""
+    with (
+        ros_master(tmp_path_factory.mktemp("ros1")) as said,
+        said.open("a") as output,
+        pytest.MonkeyPatch.context() as patch,
+    ):
+        patch.setenv(ROS_PYTHON, SYSTEM_PYTHON)
+        publisher = subprocess.Popen(
+            [SYSTEM_PYTHON, "-c", PUBLISHER], stdout=output, stderr=output, start_new_session=True
+        )
         try:
-            for command in ((roscore, "-p", str(port)), (SYSTEM_PYTHON, "-c", PUBLISHER)):
-                started.append(subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True))
-                wait_for(lambda: answers(port), "roscore", folder / "output")
-            yield started[1]
+            yield publisher
         finally:
-            for process in reversed(started):
-                process.terminate()
-                process.wait(10)
+            publisher.terminate()
+            publisher.wait(10)
 
 
 @pytest.mark.parametrize(("topic", "sees"), TOPICS)

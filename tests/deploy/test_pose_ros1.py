@@ -1,10 +1,8 @@
 """Topics of ROS 1: a real roscore, a real rospy publisher in a process of its own."""
 
-import shutil
-import socket
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +13,8 @@ from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pose.relay import RelaySource
 from e2efly.deploy.pose.source import PoseSource
 from e2efly.deploy.pose.sources import open_source
+from tests.deploy.ros_master import ros_master
 
-PACKAGES = "apt-get install python3-roslaunch python3-rosmaster python3-rospy python3-nav-msgs python3-geometry-msgs"
 PUBLISHER = """
 import math, rospy
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
@@ -44,49 +42,16 @@ while True:
 
 @pytest.fixture(scope="module")
 def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """A ROS master on a free port, and a publisher."""
-    roscore = shutil.which("roscore")
-    if roscore is None or not Path(SYSTEM_PYTHON).exists():
-        pytest.fail(f"needs ROS 1: {PACKAGES}; or E2EFLY_WITHOUT=ros1 to go without these tests")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    folder = tmp_path_factory.mktemp("ros1")
-    settings = {
-        "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
-        "ROS_IP": "127.0.0.1",
-        "ROS_HOME": str(folder),
-        "ROS_LOG_DIR": str(folder),
-    }
-    started: list[subprocess.Popen] = []
-    with pytest.MonkeyPatch.context() as patch, (folder / "output").open("w") as output:
-        for key, value in settings.items():
-            patch.setenv(key, value)
-
-        def start(*command: str) -> None:
-            started.append(subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True))
-
+    """A ROS master, and a publisher."""
+    with ros_master(tmp_path_factory.mktemp("ros1")) as said, said.open("a") as output:
+        publisher = subprocess.Popen(
+            [SYSTEM_PYTHON, "-c", PUBLISHER], stdout=output, stderr=output, start_new_session=True
+        )
         try:
-            start(roscore, "-p", str(port))
-            wait_for(lambda: answers(port), "roscore", folder / "output")
-            start(SYSTEM_PYTHON, "-c", PUBLISHER)
             yield
         finally:
-            for process in reversed(started):
-                process.terminate()
-                process.wait(10)
-
-
-def answers(port: int) -> bool:
-    with socket.socket() as probe:
-        return probe.connect_ex(("127.0.0.1", port)) == 0
-
-
-def wait_for(ready: Callable[[], bool], what: str, output: Path) -> None:
-    deadline = time.monotonic() + 20
-    while not ready():
-        assert time.monotonic() < deadline, f"{what} did not start: {output.read_text()}"
-        time.sleep(0.05)
+            publisher.terminate()
+            publisher.wait(10)
 
 
 def first(source: PoseSource) -> Sample:
