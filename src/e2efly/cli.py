@@ -18,6 +18,7 @@ _EXAMPLES = {
     "train hover": "learn to hover, evaluate, export policy.onnx",
     "train race --algo bptt": "another task, another algorithm",
     "eval runs/hover-bptt-0": "fly a policy from 1000 unseen starts, draw plots",
+    "watch hover": "fly a policy in a browser: drag its goal, throw it, change the wind",
     "ablate hover": "what each reward term is good for: a figure and a table",
     "sweep hover --seeds 5": "over seeds and options, side by side on Ray",
     "export RUN": "write policy.onnx from a checkpoint again",

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 from rich.console import Console
@@ -21,6 +21,9 @@ from e2efly.supervised import is_watched, watched
 from e2efly.tasks import TASKS
 from e2efly.terminal import Terminal, TerminalProgress, console_table, seconds
 from e2efly.vehicles.posterior import IDENTIFIED, load_posterior
+
+if TYPE_CHECKING:
+    from e2efly.watch.beside import Beside
 
 _FLOWN = {"nominal": "best, nominal", "stress": "best, stress", "shipped": "best", "last": "last"}
 """Parts of a summary that say how a policy flew, and what the table calls them."""
@@ -46,6 +49,8 @@ class Train:
     """Evaluate and draw at the end."""
     hosts: Hosts
     """The processes of the run."""
+    watch: int | None
+    """Port of the page on which it can be watched; None: there is none."""
     arguments: list[str]
     """As given, for the process that a run on several hosts is."""
 
@@ -84,7 +89,7 @@ def parse(arguments: list[str]) -> Train:
         raise ValueError("--resume and --overwrite are both given; accepted: one of them")
     return Train(
         config, parsed.out or run_folder(config), parsed.resume, parsed.overwrite, parsed.device, parsed.plots,
-        parsed.hosts, arguments,
+        parsed.hosts, parsed.watch, arguments,
     )  # fmt: skip
 
 
@@ -98,15 +103,65 @@ def _again(o: Train) -> str:
 
 
 def _train(o: Train, again: str, console: Console) -> int:
-    from e2efly.learn.clock import since_process_start
     from e2efly.learn.programs import traced_folder
     from e2efly.learn.rundir import RunDirectory
     from e2efly.learn.runner import train
 
+    page = _page(o)
     if o.resume and not RunDirectory(o.out).checkpoint.exists():
         console.print("There is no checkpoint yet: the run begins at its beginning.")
-    with TerminalProgress(console, f"{o.config.task.name} by {o.config.algo.name}") as progress:
-        summary = train(o.config, o.out, progress, o.resume, o.overwrite, traced=traced_folder(o.config))
+    if page is not None:
+        console.print(f"Watch it at {page.address} once it flies: the page has the time that the training leaves.")
+    try:
+        with TerminalProgress(console, f"{o.config.task.name} by {o.config.algo.name}") as progress:
+            reporter = progress if page is None else _Shown(progress, page)
+            summary = train(o.config, o.out, reporter, o.resume, o.overwrite, traced=traced_folder(o.config))
+        status = _tell(o, again, console, summary, progress)
+        if page is not None and status == 0:
+            console.print(f"Watch it at {page.address} (Ctrl-C ends it)")
+            page.wait()
+        return status
+    finally:
+        if page is not None:
+            page.close()
+
+
+def _page(o: Train) -> "Beside | None":
+    """The page of `--watch`.
+
+    Raises:
+        ValueError: for a port that there is not, or that is in use; where viser is not installed.
+    """
+    if o.watch is None or o.hosts.index > 0:
+        return None
+    if not 0 <= o.watch <= 65535:
+        raise ValueError(f"--watch is {o.watch}; accepted: a port, 1 to 65535, or 0 for any")
+    from e2efly.watch.beside import Beside
+
+    return Beside(o.out, "127.0.0.1", o.watch)
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """The terminal's progress, and a page that begins with the first policy."""
+
+    bar: TerminalProgress
+    page: "Beside"
+
+    def compiling(self) -> None:
+        self.bar.compiling()
+
+    def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
+        self.page.begin()
+        self.bar.progress(steps, total, rate, success, best, stage)
+
+    def ended(self, *end: Any) -> None:
+        self.bar.ended(*end)
+
+
+def _tell(o: Train, again: str, console: Console, summary: dict[str, Any], progress: TerminalProgress) -> int:
+    from e2efly.learn.clock import since_process_start
+
     _report(console, summary, o.config.stop_at)
     if summary["stopped_by_user"]:
         console.print(f"Stopped; {again}")
@@ -171,6 +226,10 @@ def _options(config: TrainConfig, preset: str) -> tuple[type, Any]:
         ("fast_compile", _help(bool, "On a CPU: compile faster, run slower; right for runs of seconds.")),
         ("curriculum", _help(bool, "Go through the stages of the preset's curriculum, if it has one.")),
         ("stop_at", _help(float | None, "Stop once the success on 1000 starts is at least this.")),
+        (
+            "watch",
+            _help(int | None, "Serve a page with the policy in flight, as it learns, on this port of 127.0.0.1."),
+        ),
         ("hosts", Hosts),
         ("env", EnvConfig),
         ("task", Annotated[type(config.task), tyro.conf.arg(name="task")]),
@@ -190,8 +249,8 @@ def _options(config: TrainConfig, preset: str) -> tuple[type, Any]:
     parts |= {"reward": RewardConfig(), "env": dataclasses.replace(config.env, randomize={})}
     defaults = options(
         task_name=tyro.MISSING, algo_name=algo, preset=preset, vehicle=config.env.vehicle, out=None, resume=False,
-        start_from=config.start_from, overwrite=False, device=None, plots=True, curriculum=True, hosts=Hosts(), **top,
-        **parts,
+        start_from=config.start_from, overwrite=False, device=None, plots=True, curriculum=True, watch=None,
+        hosts=Hosts(), **top, **parts,
     )  # fmt: skip
     return options, defaults
 

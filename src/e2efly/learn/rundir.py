@@ -1,7 +1,7 @@
 """The run directory: everything needed to reproduce a run and to fly its policy.
 
-config.json  versions.json  inputs.json  inputs/  metrics.csv  events/  checkpoint.safetensors  plots/  policy.onnx
-summary.json
+config.json  versions.json  inputs.json  inputs/  metrics.csv  events/  checkpoint.safetensors  history/  plots/
+policy.onnx  summary.json
 """
 
 import csv
@@ -20,6 +20,7 @@ from typing import Any
 
 from e2efly.config import ALGORITHMS, EnvConfig, TrainConfig
 from e2efly.config.reading import read
+from e2efly.learn import history
 from e2efly.learn.inputs import Kept, by_content, content_of, input_files, replaced, sha256, value_at
 from e2efly.presets import preset
 from e2efly.storage import held, write_atomically, write_json
@@ -29,7 +30,7 @@ _FILES = (
     "config.json", "versions.json", "inputs.json", "metrics.csv", "checkpoint.safetensors", "policy.onnx",
     "policy.images.npz", "summary.json",
 )  # fmt: skip
-_FOLDERS = ("inputs", "events", "plots")
+_FOLDERS = ("inputs", "events", "history", "plots")
 """All that a run writes into its folder."""
 _PACKAGES = ("e2efly", "jax", "jaxlib", "numpy", "optax", "onnx", "onnxruntime")
 
@@ -54,6 +55,11 @@ class RunDirectory:
     def metrics(self) -> Path:
         """A line for every update."""
         return self.path / "metrics.csv"
+
+    @property
+    def history(self) -> Path:
+        """Policies on the way: see `e2efly.learn.history`."""
+        return self.path / "history"
 
     @property
     def plots(self) -> Path:
@@ -247,9 +253,12 @@ class RunDirectory:
             file.write(text.getvalue())
 
     def forget_after(self, update: int) -> None:
-        """Drop metrics of updates that a resumed run will do again, and files that a killed one had not finished."""
-        for part in self.path.glob("*.part"):
+        """Drop metrics and policies of updates that a resumed run will do again, and files that a killed one had not
+        finished.
+        """
+        for part in (*self.path.glob("*.part"), *self.history.glob("*.part")):
             part.unlink()
+        history.forget_after(self.history, update)
         header, *lines = self._whole_lines() or [""]
         if header:
             kept = [line for line in lines if int(line.split(",", 1)[0]) <= update]

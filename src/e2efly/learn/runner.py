@@ -24,7 +24,7 @@ from e2efly.deploy.sight.samples import packed, samples_file
 from e2efly.env import Env, random_key
 from e2efly.episodes import Episodes
 from e2efly.episodes import summary as summary_of
-from e2efly.learn import hosts
+from e2efly.learn import history, hosts
 from e2efly.learn.algorithm import TrainState
 from e2efly.learn.checkpoint import load_checkpoint, read_about, save_checkpoint
 from e2efly.learn.clock import peak_memory, since_process_start
@@ -198,6 +198,8 @@ def _loop(
                 best = weights
             write(_rows(setup, metrics, progress, rate, flown, number))
             _save(run, config, state, best, progress)
+            if hosts.first() and history.is_kept(update, config.chunk, setup.updates):
+                history.keep(run.history, update, weights, last)
             reporter.progress(
                 progress.update * setup.steps_per_update,
                 setup.updates * setup.steps_per_update,

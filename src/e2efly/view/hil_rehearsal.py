@@ -9,10 +9,11 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 
 from e2efly.courses.origin import Origin
+from e2efly.scenes.faces import Body, bodies
 from e2efly.scenes.scene import Scene
 from e2efly.validation.hil_lap import Lap
 from e2efly.view.style import BLUE, FAILURE, GREY, START, VERMILLION, figure, say
-from e2efly.view.worlds import Body, bodies, draw_plan
+from e2efly.view.worlds import draw_plan
 
 _MARGIN = 0.8
 """About what is drawn, m."""

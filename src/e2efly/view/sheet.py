@@ -10,6 +10,7 @@ from jaxtyping import PRNGKeyArray
 from matplotlib.axes import Axes
 
 from e2efly.config import CameraConfig, ImageNoiseConfig
+from e2efly.scenes.faces import bodies
 from e2efly.scenes.scene import Scene
 from e2efly.sensors.image_noise import SYNTHETIC, add_image_noise
 from e2efly.view.cloud import plan_of
@@ -17,7 +18,7 @@ from e2efly.view.images import SENSORS, Sight, classes, scale, shape_of, show
 from e2efly.view.places import Place
 from e2efly.view.style import VERMILLION, WIDTH, figure, say
 from e2efly.view.tour import Tour
-from e2efly.view.worlds import bodies, draw_plan
+from e2efly.view.worlds import draw_plan
 
 DEPTH_NOISES = {
     "Inverse depth, 0.01 1/m": ImageNoiseConfig(inverse_depth=0.01),

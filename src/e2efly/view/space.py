@@ -21,10 +21,11 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from e2efly.config import TaskConfig
 from e2efly.drawing import INK, Face, Line, Mark, Thing
+from e2efly.scenes.faces import Body
 from e2efly.view.flights import Flights
 from e2efly.view.scene import scene
 from e2efly.view.style import FAILURE, GREY, MARK, PALE, SPEED, START, figure
-from e2efly.view.worlds import Body, draw_plan, draw_space
+from e2efly.view.worlds import draw_plan, draw_space
 
 Corner = Float[np.ndarray, "3"]
 Solid = Any

@@ -1,5 +1,6 @@
-"""Videos of flights from the vehicle's eyes: GIF by Pillow, MP4 where the program ffmpeg is there."""
+"""Videos of flights: from the vehicle's eyes, frame by frame, and files of any frames."""
 
+import importlib.util
 import shutil
 import subprocess
 from collections.abc import Iterable, Iterator
@@ -18,6 +19,8 @@ from e2efly.view.tour import Tour
 PANELS = {"rgb": "Colour", "depth": "Depth", "label": "Class"}
 HEAD, GAP = 20, 6
 """Room of a title over a panel, and between panels, pixels."""
+FILMS = (".gif", ".mp4", ".webm", ".png")
+"""Endings of the names of what `write_film` writes."""
 STRETCHED = 3.0
 """Pictures wider than so many times their height are stacked, others stand side by side."""
 
@@ -72,13 +75,73 @@ def write_video(film: Iterable[Frame], path: Path, period: float) -> list[Path]:
         OSError: where ffmpeg is there and fails: what it says.
     """
     kept = [np.asarray(frame) for frame in film]
+    gif = _gif(kept, path.with_suffix(".gif"), period)
+    return [gif, _mp4(kept, path.with_suffix(".mp4"), period)] if shutil.which("ffmpeg") else [gif]
+
+
+def check_film(path: Path) -> None:
+    """Refuse a file that `write_film` cannot write.
+
+    Raises:
+        ValueError: naming the file and what is accepted here.
+    """
+    if path.suffix not in FILMS:
+        raise ValueError(f"--video is {path}; accepted: a name that ends in {', '.join(FILMS)}")
+    opencv = importlib.util.find_spec("cv2") is not None
+    if path.suffix == ".mp4" and not shutil.which("ffmpeg"):
+        raise ValueError(
+            f"--video {path} needs the program ffmpeg; accepted: that, or a name that ends in .webm or .gif"
+        )
+    if path.suffix == ".webm" and not opencv:
+        raise ValueError(f"--video {path} needs OpenCV: pip install 'e2efly[video]'; accepted: that, or .gif")
+
+
+def write_film(film: Iterable[Frame], path: Path, period: float) -> None:
+    """Write pictures as one file, by its suffix: GIF, MP4 (H.264 by the program ffmpeg), WebM (VP9 by OpenCV), or PNG
+    of the last one.
+
+    Args:
+        film: the frames, all of one size.
+        path: the file; see `check_film`.
+        period: seconds from frame to frame.
+
+    Raises:
+        OSError: when it cannot be written.
+    """
+    match path.suffix:
+        case ".png":
+            *_, last = film
+            Image.fromarray(last).save(path)
+        case ".webm":
+            _webm(film, path, period)
+        case ".mp4":
+            _mp4([np.asarray(frame) for frame in film], path, period)
+        case _:
+            _gif([np.asarray(frame) for frame in film], path, period)
+
+
+def _gif(kept: list[Frame], path: Path, period: float) -> Path:
     palette = Image.fromarray(np.concatenate(kept[:: max(1, len(kept) // 8)])).quantize(
         128, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE
     )
     pages = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in kept]
-    gif = path.with_suffix(".gif")
-    pages[0].save(gif, save_all=True, append_images=pages[1:], duration=round(1000 * period), loop=0, optimize=False)
-    return [gif, _mp4(kept, path.with_suffix(".mp4"), period)] if shutil.which("ffmpeg") else [gif]
+    pages[0].save(path, save_all=True, append_images=pages[1:], duration=round(1000 * period), loop=0, optimize=False)
+    return path
+
+
+def _webm(film: Iterable[Frame], path: Path, period: float) -> None:
+    import cv2
+
+    writer = None
+    for frame in film:
+        if writer is None:
+            code = cv2.VideoWriter.fourcc(*"VP90")
+            writer = cv2.VideoWriter(str(path), code, 1 / period, (frame.shape[1], frame.shape[0]))
+            if not writer.isOpened():
+                raise OSError(f"OpenCV cannot write {path}")
+        writer.write(np.ascontiguousarray(frame[..., ::-1]))
+    if writer is not None:
+        writer.release()
 
 
 def _mp4(film: list[Frame], path: Path, period: float) -> Path:

@@ -2,12 +2,10 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
@@ -16,65 +14,10 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-from e2efly.physics.rotation import to_matrix
-from e2efly.scenes.scene import WALL, Scene
-from e2efly.scenes.shapes import DISC, SQUARE
+from e2efly.scenes.faces import Body, bodies
+from e2efly.scenes.scene import Scene
 from e2efly.view.flights import Flights
 from e2efly.view.style import FAILURE, GREY, MARK, SPEED, START, WIDTH, figure
-
-Quads = Float[np.ndarray, "f 4 3"]
-
-_SIDES = 20
-"""Of what is drawn for a circle."""
-
-
-@dataclass(frozen=True)
-class Body:
-    """A solid as it is drawn."""
-
-    quads: Quads
-    """Its faces, world, m; a triangle repeats a corner."""
-    colour: Float[np.ndarray, "3"]
-    """RGB in [0, 1]."""
-    path: Float[np.ndarray, "m 3"] | None
-    """Where its centre moves, world, m; None: it stands still."""
-
-    @property
-    def outline(self) -> Float[np.ndarray, "k 2"]:
-        """What it covers, seen from above: the convex hull, m."""
-        from scipy.spatial import ConvexHull  # a third of a second that only plots of obstacles need
-
-        points = self.quads[..., :2].reshape(-1, 2)
-        return points[ConvexHull(points).vertices]
-
-
-def bodies(scene: Scene, world: int = 0, time: float = 0.0, ceilings: bool = False) -> list[Body]:
-    """What stands in one world at a time, s.
-
-    Args:
-        scene: the worlds.
-        world: which of them.
-        time: of what moves, s.
-        ceilings: whether level walls, which hide everything from above, are among them.
-    """
-    found = []
-    for kind in scene.kinds:
-        s = scene.solids[kind]
-        turned = np.asarray(to_matrix(s.quaternion[world]), float)
-        centre, cosine, sine, rate, size, colour = (
-            np.asarray(x[world], float) for x in (s.centre, s.cosine, s.sine, s.rate, s.size, s.colour)
-        )
-        label = np.asarray(s.label[world])
-        for i in np.flatnonzero(np.asarray(s.active[world])):
-            quads = _quads(kind, size[i]) @ turned[i].T
-            low = quads.reshape(-1, 3).min(axis=0)
-            if label[i] == WALL and not ceilings and low[2] == low.max():
-                continue
-            angle = np.append(rate[i] * time, np.linspace(0, 2 * np.pi, 49))[:, None]
-            way = centre[i] + cosine[i] * np.cos(angle) + sine[i] * np.sin(angle)
-            moves = rate[i] != 0 and bool(np.ptp(way, axis=0).any())
-            found.append(Body(quads + way[0], colour[i], way[1:] if moves else None))
-    return found
 
 
 def draw_plan(ax: Axes, things: Sequence[Body]) -> None:
@@ -171,61 +114,3 @@ def _bounds(tracks: list[np.ndarray], worlds: list[list[Body]]) -> tuple[np.ndar
 def _pale(colour: np.ndarray, share: float) -> tuple[float, ...]:
     """A colour mixed with a share of white."""
     return tuple((1 - share) * colour + share)
-
-
-def _quads(kind: str, size: np.ndarray) -> Quads:
-    """The faces of a solid in its own frame, m."""
-    match kind:
-        case "box":
-            return _box(size[:3])
-        case "sphere":
-            return _capsule(size[0], 0.0)
-        case "capsule":
-            return _capsule(size[0], size[1])
-        case "cylinder":
-            return _cylinder(size[0], size[1])
-        case "gate":
-            width, height, bar, half = size
-            upright, across = _box([half, bar / 2, height + bar]), _box([half, width, bar / 2])
-            aside, above = np.array([0, width + bar / 2, 0]), np.array([0, 0, height + bar / 2])
-            return np.concatenate([upright + aside, upright - aside, across + above, across - above])
-        case _:
-            half, height, outline = size[:3]
-            if outline == DISC:
-                return _cylinder(half, height)
-            if outline == SQUARE:
-                return _box([half, half, height])
-            corners = half * np.array([[-1.0, -1.0], [1.0, -1.0], [0.0, 2.0]]) * [1.0, 1.0 / np.sqrt(3.0)]
-            return _prism(corners, height)
-
-
-def _box(half: Any) -> Quads:
-    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    return _prism(corners * np.asarray(half)[:2], half[2])
-
-
-def _cylinder(radius: float, half: float) -> Quads:
-    return _turned(np.array([[0.0, -half], [radius, -half], [radius, half], [0.0, half]]))
-
-
-def _capsule(radius: float, half: float) -> Quads:
-    angle = np.linspace(-np.pi / 2, np.pi / 2, 9)
-    up = radius * np.sin(angle)
-    rising = np.append(up[:5] - half, up[4:] + half)
-    across = radius * np.cos(angle)
-    return _turned(np.stack([np.append(across[:5], across[4:]), rising], axis=1))
-
-
-def _turned(profile: Float[np.ndarray, "k 2"]) -> Quads:
-    """What a line of (radius, height) sweeps about z."""
-    angle = np.linspace(0, 2 * np.pi, _SIDES + 1)
-    rings = np.stack([profile[:, :1] * np.cos(angle), profile[:, :1] * np.sin(angle), profile[:, 1:] + 0 * angle], -1)
-    return np.stack([rings[:-1, :-1], rings[:-1, 1:], rings[1:, 1:], rings[1:, :-1]], axis=2).reshape(-1, 4, 3)
-
-
-def _prism(corners: Float[np.ndarray, "k 2"], half: float) -> Quads:
-    """Between z of -half and half, over 3 or 4 corners."""
-    low, high = (np.column_stack([corners, np.full(len(corners), z)]) for z in (-half, half))
-    sides = [np.stack([low[i - 1], low[i], high[i], high[i - 1]]) for i in range(len(corners))]
-    ends = [np.concatenate([end, end[-1:]])[:4] for end in (low, high)]
-    return np.stack([*sides, *ends])

@@ -1,0 +1,194 @@
+"""`e2efly watch`: flights in a browser, live."""
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import tyro
+
+from e2efly.terminal import Terminal
+
+if TYPE_CHECKING:
+    from e2efly.watch.frames import Source
+
+MOST = 1024
+"""Vehicles at most."""
+LOGS = (".mcap", ".csv", ".bbl", ".bfl", ".bf", ".ulg", ".bag")
+"""Endings of the names of flight logs."""
+WAIT_S = 600.0
+"""How long a run's first policy is waited for, s."""
+USUAL = "vis_r"
+"""How the vehicle of a log that does not say is drawn."""
+FILM_S, FILM_HZ = 8.0, 25.0
+"""Of a video, unless told; pictures per second."""
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Watch flights in a browser: a policy, live; a training as it goes; flight logs.
+
+    A policy flies in the simulator: drag its goal, throw it, change wind, mass, thrust and delay while it flies. See
+    docs/watch.md.
+    """
+
+    what: tyro.conf.Positional[tuple[str, ...]]
+    """A task (the zoo's policy of it), a policy.onnx, a run's folder; or flight logs, as many as wanted: the first is
+    followed, the others are its ghosts."""
+    vehicle: str | None = None
+    """A shipped vehicle or a .toml file; left out: the policy's, or the log's."""
+    criterion: str | None = None
+    """Of the task; its first when left out."""
+    count: int = 1
+    """Vehicles that fly at once."""
+    seed: int = 0
+    """Of the starts."""
+    host: str = "127.0.0.1"
+    """Address on which the page is served; 0.0.0.0: to every computer of the network."""
+    port: int = 8080
+    """Of the page; 0: any that is free."""
+    seconds: float | None = None
+    """End after so long; left out: at Ctrl-C. Of a video, its length; left out: 8 s, or the log's."""
+    video: Path | None = None
+    """Draw no page, but this file: .gif, .mp4, .webm, or .png, a picture of the last moment."""
+    camera: Literal["follow", "orbit", "first person"] = "follow"
+    """Of the video."""
+
+
+def run(options: Watch) -> int:
+    """Serve the page, or draw the video.
+
+    Raises:
+        ValueError: naming the option, its value and what is accepted.
+        OSError: for an address that this machine does not have; when the video cannot be written.
+    """
+    o, console = options, Terminal()
+    if not 1 <= o.count <= MOST:
+        raise ValueError(f"--count is {o.count}; accepted: 1 to {MOST}")
+    if not 0 <= o.port <= 65535:
+        raise ValueError(f"--port is {o.port}; accepted: 0 to 65535")
+    if o.seconds is not None and not 0 < o.seconds < math.inf:
+        raise ValueError(f"--seconds is {o.seconds}; accepted: more than 0")
+    logs = _logs(o.what)
+    if o.video is not None:
+        return _draw(o, o.video, logs, console)
+    from e2efly.watch.viewer import serve
+
+    server = serve(o.host, o.port, f"e2efly watch {' '.join(o.what)}")
+    console.print(f"Look at http://{server.get_host()}:{server.get_port()} (Ctrl-C ends it)")
+    try:
+        _serve(o, server, logs)
+    except KeyboardInterrupt:
+        console.print("Ended.")
+    finally:
+        server.stop()
+    return 0
+
+
+def _logs(what: tuple[str, ...]) -> list[Path]:
+    """The flight logs among what is to be watched: all of it, or none.
+
+    Raises:
+        ValueError: for several things that are not all logs.
+    """
+    logs = [Path(text) for text in what if Path(text).suffix.lower() in LOGS]
+    if len(what) > 1 and len(logs) < len(what):
+        raise ValueError(f"WHAT is {' '.join(what)}; accepted: one policy or run, or several flight logs")
+    for path in logs:
+        if not path.exists():
+            raise ValueError(f"flight log {str(path)!r} does not exist")
+    return logs
+
+
+def _serve(o: Watch, server: Any, logs: list[Path]) -> None:
+    from e2efly.watch.loop import run as loop
+    from e2efly.watch.panels import Panel, hands_on, policies_on, times_on
+    from e2efly.watch.viewer import Viewer
+
+    end = time.monotonic() + (np.inf if o.seconds is None else o.seconds)
+    panel = Panel(Viewer(server, len(logs) or o.count, ghosts=len(logs) > 1))
+    if logs:
+        recording = _recording(o, logs)
+        between = times_on(panel, recording)
+        loop(recording, panel.viewer, panel, lambda: time.monotonic() > end, between)
+        return
+    with _flown(o, Terminal()) as (simulation, progress):
+        hands_on(panel, simulation)
+        between = (lambda: None) if progress is None else policies_on(panel, progress)
+        loop(simulation, panel.viewer, panel, lambda: time.monotonic() > end, between)
+
+
+def _draw(o: Watch, path: Path, logs: list[Path], console: Terminal) -> int:
+    from e2efly.view.video import check_film, write_film
+    from e2efly.watch.film import film
+
+    check_film(path)
+    if logs:
+        recording = _recording(o, logs)
+        source: Source = recording
+        seconds = o.seconds or recording.length * recording.period
+    else:
+        with _flown(o, console) as (source, _):
+            seconds = o.seconds or FILM_S
+    with console.status(f"Drawing {seconds:g} s of flight"):
+        write_film(film(source, seconds, FILM_HZ, o.camera), path, 1 / FILM_HZ)
+    console.print(f"Video: {path}")
+    return 0
+
+
+def _recording(o: Watch, logs: list[Path]) -> Any:
+    from e2efly.vehicles import load_vehicle
+    from e2efly.watch.recording import Recording, read_flight, vehicle_of
+
+    vehicle = load_vehicle(o.vehicle) if o.vehicle else vehicle_of(logs[0]) or load_vehicle(USUAL)
+    return Recording([read_flight(path, vehicle) for path in logs], vehicle)
+
+
+@contextmanager
+def _flown(o: Watch, console: Terminal) -> Iterator[tuple[Any, Any]]:
+    """The simulation of a policy, and the progress of its run where it is one."""
+    from e2efly.device import prepare
+
+    prepare("cpu")
+    from e2efly.evaluation import act_of, candidate
+    from e2efly.learn.rundir import RunDirectory
+    from e2efly.watch.simulation import Simulation
+
+    what = Path(o.what[0])
+    if (what / "config.json").is_file() and o.vehicle is None:
+        from e2efly.watch.training import of_run
+
+        progress = of_run(RunDirectory(what))
+        if progress.look() is False and not progress.updates:
+            console.print("There is no policy yet; waiting for the first.")
+        if not progress.wait(WAIT_S):
+            raise ValueError(f"{what} has no policy after {WAIT_S:g} s; accepted: a run that trains, or has trained")
+        judges, suites = progress.setup.judges, progress.setup.config.task.criteria()
+        name = _criterion(o.criterion, judges)
+        env = judges[name]
+        vehicle = env.physics.flown
+        yield (
+            Simulation(env, vehicle, suites.get(name, progress.setup.config.task), progress.act, o.count, o.seed),
+            progress,
+        )
+        return
+    found = candidate(o.what[0], o.vehicle)
+    suites = found.task.criteria()
+    name = _criterion(o.criterion, suites)
+    env = found.environment(suites[name])
+    yield Simulation(env, env.physics.flown, suites[name], act_of(found.policy), o.count, o.seed), None
+
+
+def _criterion(asked: str | None, there: Any) -> str:
+    """The criterion that is flown.
+
+    Raises:
+        ValueError: for one that the task does not have.
+    """
+    if asked is not None and asked not in there:
+        raise ValueError(f"--criterion is {asked!r}; accepted: {', '.join(there)}")
+    return asked or next(iter(there))

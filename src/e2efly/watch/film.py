@@ -1,0 +1,220 @@
+"""The same pictures without a browser: a still or a video, drawn by casting rays at triangles. Needs the extra `mesh`.
+
+Light is a hemisphere's: a face is bright by how far it looks up and towards the sun; there are no shadows.
+"""
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from e2efly.drawing import Face, Line
+from e2efly.scenes.faces import box, cylinder
+from e2efly.scenes.meshes.engine import needed
+from e2efly.watch.frames import Frame, Source, Stage
+from e2efly.watch.shapes import Mesh, mesh_of, quadrotor, spun, turned
+
+SIZE = (360, 640)
+"""Rows and columns of a picture."""
+SPREAD = 0.55
+"""Half of the vertical field of view over the distance."""
+SKY, GROUND, GRID = np.array([222, 230, 238]) / 255, np.array([236, 238, 240]) / 255, np.array([0.72, 0.74, 0.77])
+"""RGB of the background, of the ground and of its lines."""
+SUN = np.array([0.35, 0.25, 0.9]) / np.linalg.norm([0.35, 0.25, 0.9])
+CELL, LINE = 1.0, 0.012
+"""Distance and half width of the lines on the ground, m."""
+TRAIL = 90
+"""Frames of which the trail is shown."""
+SLOWEST = 40.0
+"""Rotors are drawn turning at this part of their speed."""
+
+
+BEHIND = np.array([-1.3, -1.3, 0.7])
+"""Where the eye is that follows, m from the vehicle."""
+NOSE = 0.15
+"""How far before the centre of mass the first person's eye is, m."""
+THICK = 0.012
+"""Of a trail and of lines, m."""
+
+
+@dataclass(frozen=True)
+class Soup:
+    """Triangles with a colour each."""
+
+    triangles: Float[np.ndarray, "f 3 3"]
+    """World, m."""
+    colour: Float[np.ndarray, "f 3"]
+    """RGB in [0, 1]."""
+
+    @staticmethod
+    def of(meshes: Iterable[Mesh]) -> "Soup":
+        """Of meshes in the world."""
+        parts = [(m.vertices[m.faces], np.tile(m.colour, (len(m.faces), 1))) for m in meshes]
+        if not parts:
+            return Soup(np.zeros((0, 3, 3)), np.zeros((0, 3)))
+        return Soup(*(np.concatenate(x) for x in zip(*parts, strict=True)))
+
+    def __add__(self, other: "Soup") -> "Soup":
+        return Soup(np.concatenate([self.triangles, other.triangles]), np.concatenate([self.colour, other.colour]))
+
+
+def picture(soup: Soup, eye: np.ndarray, look_at: np.ndarray, ground: bool, size: tuple[int, int] = SIZE) -> Any:
+    """(h, w, 3) uint8, of what an eye sees that looks at a point; up is up."""
+    rows, columns = size
+    ahead = (look_at - eye) / np.linalg.norm(look_at - eye)
+    right = np.cross(ahead, [0, 0, 1.0])
+    right /= max(float(np.linalg.norm(right)), 1e-9)
+    down = np.cross(ahead, right)
+    y, x = np.meshgrid(
+        ((np.arange(rows) + 0.5) / rows * 2 - 1) * SPREAD,
+        ((np.arange(columns) + 0.5) / columns * 2 - 1) * SPREAD * columns / rows,
+        indexing="ij",
+    )
+    ray = (ahead + x[..., None] * right + y[..., None] * down).reshape(-1, 3)
+    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+    seen = np.tile(SKY, (len(ray), 1))
+    far = np.full(len(ray), np.inf)
+    if ground:
+        falls = ray[:, 2] < -1e-4
+        far[falls] = -eye[2] / ray[falls, 2] if eye[2] > 0 else np.inf
+        hit = np.isfinite(far) & (far < 80)
+        place = eye + far[hit, None] * ray[hit]
+        width = np.maximum(LINE, 0.0012 * far[hit])[:, None]
+        on_line = (np.abs((place[:, :2] / CELL + 0.5) % 1 - 0.5) * CELL < width).any(axis=1)
+        haze = np.clip(far[hit] / 60, 0, 1)[:, None]
+        seen[hit] = (1 - haze) * np.where(on_line[:, None], GRID, GROUND) + haze * SKY
+    if len(soup.triangles):
+        with needed("mesh"):
+            from e2efly.scenes.meshes.embree import Embree
+        start = np.broadcast_to(eye, ray.shape).astype(np.float32)
+        distance, index = Embree(soup.triangles.astype(np.float32)).first(start, ray.astype(np.float32))
+        near = (index >= 0) & (distance < far)
+        a, b, c = (soup.triangles[:, i] for i in range(3))
+        normal = np.cross(b - a, c - a)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        n = normal[index[near]]
+        n = n * -np.sign((n * ray[near]).sum(axis=1, keepdims=True))
+        bright = 0.55 + 0.2 * n[:, 2] + 0.3 * np.maximum(n @ SUN, 0)
+        seen[near] = np.clip(soup.colour[index[near]] * bright[:, None], 0, 1)
+    return np.rint(255 * seen).astype(np.uint8).reshape(rows, columns, 3)
+
+
+def film(
+    source: Source, seconds: float, rate: float, camera: str = "follow", size: tuple[int, int] = SIZE
+) -> Iterator[Any]:
+    """Pictures of a source, (h, w, 3) uint8.
+
+    Args:
+        source: of the frames; the first vehicle is followed.
+        seconds: of the flight.
+        rate: pictures per second of the flight.
+        camera: of `viewer.CAMERAS`; the one that stays looks at the first vehicle from where that began.
+        size: rows and columns.
+    """
+    stage: Stage | None = None
+    still = Soup.of(())
+    angle, past, eye = np.zeros((1, 4)), deque[np.ndarray](maxlen=TRAIL), np.zeros(3)
+    flown, shown = 0.0, -np.inf
+    while flown < seconds - 1e-9:
+        frame = source.step(0)
+        flown += source.period
+        stage, before = source.stage_of(0), stage
+        if stage is not before:
+            still = _standing(stage)
+        if frame.fresh:
+            past.clear()
+        here = frame.position[0]
+        eye = here + BEHIND if not past and camera == "orbit" else eye
+        past.append(here.copy())
+        shape = quadrotor(stage.vehicle)
+        angle = (angle + shape.spin * frame.rotor_speed / SLOWEST * source.period) % (2 * np.pi)
+        if flown - shown < 1 / rate - 1e-9:
+            continue
+        shown = flown
+        moved = Soup(still.triangles + source.origin, still.colour)
+        soup = moved + _moving(stage, frame.time, source.origin) + _flying(stage, frame, angle) + _trail(past)
+        ahead = turned(frame.quaternion[0], np.array([1.0, 0.0, 0.0]))
+        match camera:
+            case "first person":
+                yield picture(soup, here + NOSE * ahead, here + ahead, stage.ground, size)
+            case "orbit":
+                yield picture(soup, eye, here, stage.ground, size)
+            case _:
+                yield picture(soup, here + BEHIND, here, stage.ground, size)
+
+
+def _standing(stage: Stage) -> Soup:
+    """All that stands still."""
+    meshes = [mesh_of(body.quads, body.colour) for body in stage.bodies if body.path is None]
+    for thing in stage.things:
+        if isinstance(thing, Face):
+            meshes.append(_fan(np.asarray(thing.points, float) + np.array([0, 0, 0.004]), _hex(thing.color)))
+        elif isinstance(thing, Line):
+            meshes += _tube(np.asarray(thing.points, float), _hex(thing.color))
+    soup = Soup.of(meshes)
+    if stage.triangles is not None:
+        s = stage.triangles
+        soup += Soup(s.vertices[s.faces], s.colours[s.faces].mean(axis=1))
+    return soup
+
+
+def _moving(stage: Stage, time: float, origin: np.ndarray) -> Soup:
+    return Soup.of(
+        mesh_of(body.quads + body.moved(time) + origin, body.colour) for body in stage.bodies if body.path is not None
+    )
+
+
+def _flying(stage: Stage, frame: Frame, angle: np.ndarray) -> Soup:
+    """The vehicles, and the goal of the first."""
+    shape, meshes = quadrotor(stage.vehicle), []
+    for p, q in zip(frame.position, frame.quaternion, strict=True):
+        for mesh in shape.body:
+            meshes.append(
+                Mesh(p + turned(np.broadcast_to(q, (len(mesh.vertices), 4)), mesh.vertices), mesh.faces, mesh.colour)
+            )
+    places, attitudes = spun(shape, frame.position, frame.quaternion, angle)
+    rotor = shape.rotor
+    for p, q in zip(places, attitudes, strict=True):
+        meshes.append(
+            Mesh(p + turned(np.broadcast_to(q, (len(rotor.vertices), 4)), rotor.vertices), rotor.faces, rotor.colour)
+        )
+    if frame.goal is not None and np.isfinite(frame.goal[0]).all():
+        size = 0.25 * float(np.max(stage.vehicle.radius))
+        meshes.append(mesh_of(cylinder(size, size) + frame.goal[0], (0.93, 0.45, 0.13)))
+    return Soup.of(meshes)
+
+
+def _trail(past: Iterable[np.ndarray]) -> Soup:
+    points = np.array(list(past))
+    return Soup.of(_tube(points, (0.13, 0.57, 0.55)) if len(points) > 1 else ())
+
+
+def _tube(points: np.ndarray, colour: tuple[float, float, float]) -> list[Mesh]:
+    """Bars along a curve."""
+    meshes = []
+    for a, b in pairwise(points):
+        way = b - a
+        length = float(np.linalg.norm(way))
+        if length < 1e-6:
+            continue
+        x = way / length
+        y = np.cross([0, 0, 1.0] if abs(x[2]) < 0.9 else [1.0, 0, 0], x)
+        y /= np.linalg.norm(y)
+        meshes.append(
+            mesh_of(box([length / 2, THICK / 2, THICK / 2]) @ np.stack([x, y, np.cross(x, y)]) + (a + b) / 2, colour)
+        )
+    return meshes
+
+
+def _fan(corners: np.ndarray, colour: tuple[float, float, float]) -> Mesh:
+    faces = np.array([[0, i, i + 1] for i in range(1, len(corners) - 1)], np.uint32)
+    return Mesh(corners, faces, colour)
+
+
+def _hex(colour: str) -> tuple[float, float, float]:
+    red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    return red, green, blue

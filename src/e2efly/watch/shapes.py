@@ -1,0 +1,124 @@
+"""What vehicles and solids look like, as triangles: for the viewer and for films. NumPy alone."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from e2efly.scenes.faces import Quads, box, cylinder
+from e2efly.vehicles import Vehicle
+
+DARK, FRONT, METAL = (0.16, 0.17, 0.2), (0.93, 0.45, 0.13), (0.55, 0.57, 0.6)
+"""RGB of body and rear arms, of the arms in front, and of motors."""
+BLADE = (0.25, 0.28, 0.33)
+"""RGB of rotors."""
+REACH = 0.46
+"""Radius of a rotor over the distance of the nearest two."""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles of one colour."""
+
+    vertices: Float[np.ndarray, "v 3"]
+    """m."""
+    faces: Int[np.ndarray, "f 3"]
+    """Indices of corners, counter-clockwise from outside."""
+    colour: tuple[float, float, float]
+    """RGB in [0, 1]."""
+
+
+@dataclass(frozen=True)
+class Quadrotor:
+    """A vehicle's meshes."""
+
+    body: tuple[Mesh, ...]
+    """In the body's frame."""
+    rotor: Mesh
+    """Two blades about the origin; turns about z."""
+    rotors: Float[np.ndarray, "4 3"]
+    """Where the rotors are, body frame, m."""
+    spin: Float[np.ndarray, "4"]
+    """Sign of the turning about body z, seen from above counter-clockwise positive."""
+
+
+def mesh_of(quads: Quads, colour: Sequence[float] | Float[np.ndarray, "3"]) -> Mesh:
+    """Of faces with four corners, of which two may be the same.
+
+    Args:
+        quads: (f, 4, 3), m.
+        colour: RGB in [0, 1].
+    """
+    quads = np.asarray(quads, np.float32)
+    first = 4 * np.arange(len(quads))[:, None]
+    faces = np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])])
+    corners = quads.reshape(-1, 3)
+    a, b, c = (corners[faces[:, i]] for i in range(3))
+    whole = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0
+    red, green, blue = (float(x) for x in colour)
+    return Mesh(corners, faces[whole].astype(np.uint32), (red, green, blue))
+
+
+def quadrotor(vehicle: Vehicle) -> Quadrotor:
+    """Arms from the middle to the rotors, those in front in orange; sizes follow the rotors' places."""
+    places = np.asarray(vehicle.rotor_position, float).reshape(-1, 4, 2)[0]
+    apart = min(float(np.linalg.norm(a - b)) for i, a in enumerate(places) for b in places[:i])
+    thick, reach = 0.07 * apart, REACH * apart
+    front = places[:, 0] > places[:, 0].mean()
+    middle = places.mean(axis=0)
+    arms = {True: [], False: []}
+    motors = []
+    for place, ahead in zip(places, front, strict=True):
+        arms[bool(ahead)].append(_bar(middle, place, thick))
+        motors.append(cylinder(thick * 0.9, 0.5 * thick) + np.array([*place, 0.5 * thick]))
+    plate = box([0.24 * apart, 0.16 * apart, 0.6 * thick]) + np.array([*middle, 0.0])
+    pack = box([0.2 * apart, 0.11 * apart, 0.7 * thick]) + np.array([*middle, 1.2 * thick])
+    body = (
+        mesh_of(np.concatenate([plate, pack, *arms[False]]), DARK),
+        mesh_of(np.concatenate(arms[True] or [plate]), FRONT),
+        mesh_of(np.concatenate(motors), METAL),
+    )
+    blade = box([reach / 2, 0.06 * apart, 0.08 * thick])
+    blades = np.concatenate([blade + np.array([side * reach / 2, 0, 0]) for side in (-1, 1)])
+    height = np.full((4, 1), 1.15 * thick)
+    # the reaction torque on the body turns against the rotor
+    spin = -np.sign(np.asarray(vehicle.rotor_spin, float).reshape(-1, 4)[0])
+    return Quadrotor(body, mesh_of(blades, BLADE), np.concatenate([places, height], axis=1), spin)
+
+
+def _bar(start: np.ndarray, end: np.ndarray, thick: float) -> Quads:
+    """A level bar between two points of the x-y plane."""
+    way = end - start
+    length = float(np.linalg.norm(way))
+    cos, sin = way / length
+    turned = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    return box([length / 2, thick / 2, thick / 3]) @ turned.T + np.array([*(start + end) / 2, 0.0])
+
+
+def turned(quaternion: Float[np.ndarray, "*n 4"], vector: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+    """Vectors of the body in the world's axes; the quaternions are unit, wxyz."""
+    w, axis = quaternion[..., :1], quaternion[..., 1:]
+    across = 2 * np.cross(axis, vector)
+    return vector + w * across + np.cross(axis, across)
+
+
+def spun(
+    shape: Quadrotor,
+    position: Float[np.ndarray, "n 3"],
+    quaternion: Float[np.ndarray, "n 4"],
+    angle: Float[np.ndarray, "n 4"],
+) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, "m 4"]]:
+    """Places and attitudes of the rotors of n vehicles, m = 4 n, in the world.
+
+    Args:
+        shape: of the vehicles.
+        position: m.
+        quaternion: wxyz, body to world.
+        angle: of each rotor about body z, rad.
+    """  # fmt: skip
+    places = position[:, None] + turned(quaternion[:, None], shape.rotors[None])
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)[:, :, None]
+    c, s = np.cos(angle / 2), np.sin(angle / 2)
+    attitude = np.stack([w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s], axis=-1)
+    return places.reshape(-1, 3), attitude.reshape(-1, 4)

@@ -1,0 +1,248 @@
+"""A policy in the training's simulator, with hands on it: wind, mass, thrust, delay, throws, a moved goal.
+
+What the hands do is told to one compiled program as numbers, so that nothing is compiled anew while it flies.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from e2efly.config import TaskConfig
+from e2efly.device import fast_compile, wide_vectors
+from e2efly.drawing import Face
+from e2efly.env import Env, EnvState, random_key
+from e2efly.env.stress import with_longer_queue
+from e2efly.episodes import Act
+from e2efly.scenes.faces import bodies
+from e2efly.vehicles import Vehicle
+from e2efly.watch.frames import Frame, Stage
+
+HELD = ("mass", "inertia", "thrust_map")
+"""Parameters of the vehicle that hands change."""
+LATEST = 0.2
+"""Largest delay, s."""
+THROW_SPEED, THROW_RATE = 3.0, 8.0
+"""Of a throw, m/s and rad/s: standard deviations per axis."""
+LAST = 100
+"""Episodes of which the success is told."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Hands:
+    """What is done to all vehicles. NaN: as the episode has drawn it."""
+
+    wind: Float[Array | np.ndarray, "3"] = field(default_factory=lambda: np.full(3, np.nan, np.float32))
+    """World, m/s."""
+    mass: float = np.nan
+    """Mass and inertia over the vehicle file's."""
+    thrust: float = np.nan
+    """Thrust of the rotors at a speed over the vehicle file's."""
+    delay: float = np.nan
+    """From observation to command, s; at most `LATEST`."""
+
+
+def held(env: Env) -> Env:
+    """The environment with room for `Hands`: the same programs fly it whatever they do."""
+    env = with_longer_queue(env)
+    widths = {name: env.randomize.get(name, 0.0) for name in sorted({*HELD, *env.randomize})}
+    wind = 0.0 if env.wind is None else env.wind
+    frames = int(np.ceil(LATEST / env.control_period)) + 2
+    return replace(env, randomize=widths, wind=wind, queue=max(env.queue, frames))
+
+
+def under(env: Env, state: EnvState, hands: Hands) -> EnvState:
+    """The state of n vehicles with what the hands do."""
+
+    def chosen(own: Array, wanted: Any) -> Array:
+        wanted = jnp.broadcast_to(jnp.asarray(wanted, own.dtype), own.shape)
+        return jnp.where(jnp.isnan(wanted), own, wanted)
+
+    nominal = env.physics.nominal
+    n = state.time.shape[0]
+    plant = dict(state.plant)
+    for name, factor in (("mass", hands.mass), ("inertia", hands.mass), ("thrust_map", hands.thrust)):
+        value = jnp.asarray(getattr(nominal, name), plant[name].dtype)
+        plant[name] = chosen(plant[name], jnp.broadcast_to(value, plant[name].shape) * factor)
+    assert state.wind is not None
+    wind = chosen(state.wind, jnp.broadcast_to(hands.wind, (n, 3)))
+    return replace(state, plant=plant, wind=wind, action_latency=chosen(state.action_latency, hands.delay))
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Push:
+    """What happens to n vehicles in one step."""
+
+    shift: Float[Array | np.ndarray, "3"]
+    """Of the places, m."""
+    speed: Float[Array | np.ndarray, "n 3"]
+    """Added to the velocities, world, m/s."""
+    rate: Float[Array | np.ndarray, "n 3"]
+    """Added to the body rates, rad/s."""
+
+
+def _pushed(state: EnvState, push: Push) -> EnvState:
+    s = state.vehicle
+    s = replace(
+        s, position=s.position + push.shift, velocity=s.velocity + push.speed, body_rate=s.body_rate + push.rate
+    )
+    past = state.past
+    if past is not None:
+        past = replace(past, position=past.position + push.shift)
+    return replace(state, vehicle=s, past=past)
+
+
+def _advance(
+    env: Env, state: EnvState, action: Array, hands: Hands, push: Push
+) -> tuple[EnvState, Array, dict[str, Array]]:
+    state = under(env, _pushed(state, push), hands)
+    reached, out = env.step(state, action)
+    s = reached.vehicle
+    seen = {
+        "position": s.position, "quaternion": s.quaternion, "velocity": s.velocity, "rotor_speed": s.rotor_speed,
+        "body_rate": s.body_rate, "goal": env.task.goal(reached.memory, reached.time), "time": reached.time,
+        "command": env.command(action), "done": out.done, "success": out.success,
+    }  # fmt: skip
+    return reached, out.observation, seen
+
+
+@dataclass
+class Simulation:
+    """A source of frames: n vehicles, each in one episode after the other."""
+
+    env: Env
+    """Of the criterion that is flown."""
+    vehicle: Vehicle
+    """What flies, as it is drawn."""
+    task: TaskConfig
+    """Of the criterion."""
+    act: Act
+    """The policy; may be replaced by another of the same kind at any time."""
+    count: int
+    """Vehicles."""
+    seed: int = 0
+    """Of the starts."""
+    hands: Hands = field(default_factory=Hands)
+    """What is done to the vehicles; may be replaced at any time."""
+
+    def __post_init__(self) -> None:
+        self.env = held(self.env)
+        self.period = self.env.control_period
+        options = wide_vectors(self.count) | ({} if self.env.cameras else fast_compile())
+        self._step = jax.jit(_advance, compiler_options=options)
+        self._begin = jax.jit(partial(Env.reset, n=self.count), compiler_options=options)
+        self._random = np.random.default_rng(self.seed)
+        self._ends: list[bool] = []
+        self._origin = np.zeros(3)  # of the task's world in the viewer's: a moved goal moves the world
+        self._stage: tuple[int, Stage] | None = None
+        self._push = self._none()
+        self.begin()
+
+    def begin(self) -> None:
+        """Start all episodes anew, each from another place than before."""
+        self._state, observation = self._begin(self.env, random_key(int(self._random.integers(1 << 31))))
+        self._observation = np.asarray(observation)
+        self._memory = self.act.begin(self.count)
+        self._stage, self._ends, self._began = None, [], True
+
+    def throw(self) -> None:
+        """Push and spin all vehicles at random."""
+        rate = THROW_RATE * self._random.standard_normal((self.count, 3)).astype(np.float32)
+        speed = THROW_SPEED * self._random.standard_normal((self.count, 3)).astype(np.float32)
+        self._push = replace(self._push, speed=speed, rate=rate)
+
+    def move(self, by: np.ndarray) -> None:
+        """Move what the policy is to fly to, and the task's world with it, by (3,) m: the vehicles stay where they are.
+
+        A policy is shown no place but by the way to its goal, so that this is all that moving a goal can be.
+        """
+        self._origin = self._origin + by
+        self._push = replace(self._push, shift=self._push.shift - np.asarray(by, np.float32))
+
+    @property
+    def levels(self) -> bool:
+        """Whether the goal may be moved level only: there is something to hit, or the ground to land on."""
+        return bool(self.env.cameras) or getattr(self.env.task, "lands", False) or bool(self._scene().kinds)
+
+    def step(self, followed: int) -> Frame:
+        """A control step later."""
+        images = tuple(np.asarray(image) for image in self._state.images)
+        action, self._memory = self.act.act(self._observation, images, self._memory)
+        push, self._push = self._push, self._none()
+        self._state, observation, seen = self._step(self.env, self._state, jnp.asarray(action), self.hands, push)
+        self._observation = np.asarray(observation)
+        seen = {name: np.asarray(value) for name, value in seen.items()}
+        done = seen["done"]
+        if done.any():
+            self._memory = np.where(done[:, None], np.asarray(self.act.begin(self.count)), np.asarray(self._memory))
+            self._ends = [*self._ends, *seen["success"][done].tolist()][-LAST:]
+        fresh = bool(done[followed]) or self._began
+        self._began = False
+        if done[followed]:
+            self._stage = None
+        return Frame(
+            time=float(seen["time"][followed]),
+            position=seen["position"] + self._origin,
+            quaternion=seen["quaternion"],
+            velocity=seen["velocity"],
+            rotor_speed=seen["rotor_speed"],
+            goal=seen["goal"] + self._origin,
+            images=self._images(followed),
+            series=self._series(followed, seen),
+            fresh=fresh,
+            note=self._note(followed, seen),
+        )
+
+    @property
+    def origin(self) -> np.ndarray:
+        """(3,) of the task's world in the viewer's, m."""
+        return self._origin
+
+    def goal_now(self, followed: int) -> np.ndarray:
+        """(3,) where a vehicle is to be, m."""
+        state = self._state
+        return np.asarray(self.env.task.goal(state.memory, state.time))[followed] + self._origin
+
+    def stage_of(self, followed: int) -> Stage:
+        """What stands in a vehicle's world, in the task's own coordinates; the same object until it changes."""
+        if self._stage is None or self._stage[0] != followed:
+            drawn = self.task.drawing() or ()
+            solids = bodies(self._scene(), followed, ceilings=True)
+            things = [thing for thing in drawn if not (solids and isinstance(thing, Face))]  # solids are such faces
+            self._stage = followed, Stage(self.vehicle, solids, things)
+        return self._stage[1]
+
+    def _scene(self) -> Any:
+        return self.env.task.scene(self._state.memory)
+
+    def _none(self) -> Push:
+        return Push(np.zeros(3, np.float32), *np.zeros((2, self.count, 3), np.float32))
+
+    def _images(self, followed: int) -> dict[str, np.ndarray]:
+        return {
+            f"{camera.sees} {i}": np.asarray(image[followed])
+            for i, (camera, image) in enumerate(zip(self.env.cameras, self._state.images, strict=True))
+        }
+
+    def _series(self, followed: int, seen: dict[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+        found: dict[str, tuple[float, ...]] = {"speed (m/s)": (float(np.linalg.norm(seen["velocity"][followed])),)}
+        if self.env.physics.command_mode == "ctbr":
+            command, rate = seen["command"][followed], seen["body_rate"][followed]
+            for i, axis in enumerate(("roll", "pitch", "yaw")):
+                found[f"{axis} rate (rad/s)"] = float(command[1 + i]), float(rate[i])
+        return found
+
+    def _note(self, followed: int, seen: dict[str, np.ndarray]) -> str:
+        off = np.linalg.norm(seen["goal"][followed] - seen["position"][followed])
+        told = f"**{seen['time'][followed]:.1f} s**, {np.linalg.norm(seen['velocity'][followed]):.1f} m/s, "
+        told += f"{off:.2f} m from its goal"
+        if self._ends:
+            share = 100 * float(np.mean(self._ends))
+            told += f"  \n{share:.0f} % of the last {len(self._ends)} episodes succeeded"
+        return told

@@ -1,0 +1,96 @@
+"""The policies of a run, as it goes or afterwards: the newest one flies as soon as it is written."""
+
+import time
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import jax
+import numpy as np
+
+from e2efly.episodes import Act
+from e2efly.learn import history
+from e2efly.learn.networks import Actor
+from e2efly.learn.rundir import RunDirectory
+from e2efly.learn.setup import Setup
+
+LOOK_S = 0.5
+"""Between two looks at the run's folder, s."""
+
+
+@dataclass
+class Progress:
+    """Which policies a run has, and which of them flies."""
+
+    run: RunDirectory
+    """The run."""
+    setup: Setup
+    """What its configuration comes to."""
+    update: int = -1
+    """Of the policy that flies; -1: there is none yet."""
+    newest: bool = True
+    """Whether the newest flies, whichever that is."""
+    updates: list[int] = field(default_factory=list)
+    """Of the policies that there are."""
+
+    def __post_init__(self) -> None:
+        config = self.setup.config
+        parameters = self.setup.algorithm.init(self.setup.env, config.algo, config.seed)
+        self._like = parameters.policy
+        self._act = jax.jit(partial(_act, self.setup.actor))
+        self._weights: Any = None
+        self._looked = -np.inf
+
+    @property
+    def act(self) -> Act:
+        """The policy that flies, whichever that is when it is asked."""
+
+        def asked(observation: Any, images: Any, memory: Any) -> tuple[Any, Any]:
+            action, memory = self._act(self._weights, observation, images, memory)
+            return np.asarray(action), np.asarray(memory)
+
+        return Act(asked, self.setup.actor.memory)
+
+    def look(self) -> bool:
+        """Whether there is something new: look at the folder, where it is time to, and take the newest if asked to."""
+        now = time.monotonic()
+        if now - self._looked < LOOK_S:
+            return False
+        self._looked = now
+        updates = history.kept(self.run.history)
+        if updates == self.updates:
+            return False
+        self.updates = updates
+        if updates and self.newest:
+            self.fly(updates[-1])
+        return True
+
+    def fly(self, update: int) -> None:
+        """Let another policy fly.
+
+        Raises:
+            ValueError: when its file is damaged.
+        """
+        self._weights = history.policy_at(self.run.history, update, self._like)
+        self.update = update
+
+    def wait(self, seconds: float) -> bool:
+        """Whether there is a policy within so long."""
+        end = time.monotonic() + seconds
+        while self.update < 0 and time.monotonic() < end:
+            self.look()
+            time.sleep(0.1)
+        return self.update >= 0
+
+
+def _act(actor: Actor, weights: Any, observation: Any, images: Any, memory: Any) -> tuple[Any, Any]:
+    return actor(weights, actor.features(observation, images), memory)
+
+
+def of_run(run: RunDirectory) -> Progress:
+    """What there is to watch of a run.
+
+    Raises:
+        ValueError: when the folder holds no run, or one of another version.
+    """
+    return Progress(run, Setup.of(run.config()))

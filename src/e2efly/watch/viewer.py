@@ -1,0 +1,304 @@
+"""The page in the browser: a stage and its vehicles in viser's scene. Needs the extra `watch`."""
+
+import contextlib
+import errno
+import importlib.util
+import io
+import socket
+from collections import deque
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from e2efly.drawing import Face, Line, Mark
+from e2efly.scenes.faces import Body
+from e2efly.watch.frames import Frame, Stage
+from e2efly.watch.shapes import Mesh, mesh_of, quadrotor, spun, turned
+
+PORT = 8080
+"""On which the page is served."""
+Camera = Literal["follow", "orbit", "first person"]
+CAMERAS: tuple[Camera, ...] = ("follow", "orbit", "first person")
+"""How the page looks at the followed vehicle: moving along, about it as the mouse says; from where the mouse says;
+from its nose."""
+TRAIL_S, TRAIL_POINTS = 4.0, 120
+"""Of the followed vehicle's path, how long it is shown, and in how many pieces."""
+MANY = 32
+"""Of more vehicles, goals are drawn for the followed one alone."""
+SLOWEST = 40.0
+"""Rotors are drawn turning at this part of their speed: faster would look like standing still."""
+FAR_OFF = np.array([[0, 0, 3000], [0, 0, -3000]], np.float32)
+"""Places of two more instances of each mesh, m: three.js draws none of a mesh whose first places are out of view."""
+LEVEL = np.array([1, 0, 0, 0], np.float32)
+ANCHOR = np.array([0.0, 0.0, 1.0])
+"""Where the followed vehicle is in the page's space."""
+BEHIND = np.array([-1.1, -1.1, 0.6])
+"""Where the page's camera is at first, seen from there, m."""
+BEHIND = np.array([-1.1, -1.1, 0.6])
+"""Where the page's camera is at first, seen from there, m."""
+NOSE = 0.12
+"""How far before the centre of mass the first person's eye is, m."""
+SKY = (222, 230, 238)
+"""RGB of the background."""
+GHOST = (120, 140, 165)
+"""RGB of all vehicles but the followed one, where there are several plants."""
+
+
+def free_port(host: str, port: int) -> int:
+    """The port, or a free one for 0.
+
+    Raises:
+        ValueError: where viser is not installed; where the port is in use.
+        OSError: for an address that this machine does not have.
+    """
+    if importlib.util.find_spec("viser") is None:
+        raise ValueError("the viewer needs viser; accepted: pip install 'e2efly[watch]'")
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            if error.errno == errno.EADDRINUSE:
+                raise ValueError(f"--port {port} is in use on {host}; accepted: a free one, or 0 for any") from None
+            raise OSError(f"--host {host}, --port {port}: {error.strerror}") from error
+        return probe.getsockname()[1]
+
+
+def serve(host: str, port: int, title: str) -> Any:
+    """A server of viser.
+
+    Raises:
+        ValueError: where viser is not installed; where the port is in use.
+        OSError: for an address that this machine does not have.
+    """
+    port = free_port(host, port)
+    import viser
+
+    with contextlib.redirect_stdout(io.StringIO()):  # it draws a box about its address
+        server = viser.ViserServer(host, port, title, verbose=False)
+    scene, first = server.scene, server.initial_camera
+    scene.set_up_direction("+z")
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(False)
+    scene.add_light_hemisphere("/light/sky", ground_color=(150, 150, 155), intensity=1.6)
+    scene.add_light_directional("/light/sun", intensity=1.6, position=(3.0, 2.0, 8.0))
+    scene.set_background_image(np.full((2, 2, 3), SKY, np.uint8), format="png")
+    server.gui.main_panel.dock_right()
+    first.position, first.look_at = tuple(ANCHOR + BEHIND), tuple(ANCHOR)
+    return server
+
+
+class Viewer:
+    """Shows frames to all who look at the page. Nothing here waits for a browser."""
+
+    def __init__(self, server: Any, count: int, ghosts: bool = False) -> None:
+        """Show `count` vehicles.
+
+        Args:
+            server: of `serve`.
+            count: vehicles of each frame.
+            ghosts: whether all but the followed one are pale.
+        """
+        self.server, self.count, self.ghosts = server, count, ghosts
+        self.followed, self.camera = 0, CAMERAS[0]
+        self._scene = server.scene
+        self._world = self._scene.add_frame("/world", show_axes=False)
+        self._root = self._scene.add_frame("/world/task", show_axes=False)
+        self._stage: Stage | None = None
+        self._standing: Any = None
+        self._moving: list[tuple[Body, Any]] = []
+        self._bodies: list[Any] = []
+        self._rotors: Any = None
+        self._goals: Any = None
+        self._angle = np.zeros((count, 4))
+        self._trail: deque[tuple[np.ndarray, float]] = deque(maxlen=TRAIL_POINTS + 1)
+        self._line: Any = None
+        self._offset, self._placed = np.zeros(3), False
+
+    def show(self, stage: Stage, origin: Float[np.ndarray, "3"], frame: Frame, elapsed: float) -> None:
+        """Show a frame.
+
+        Args:
+            stage: of the followed vehicle's world.
+            origin: of that world in the frame's, m.
+            frame: the moment.
+            elapsed: since the last frame, s of the flight.
+        """
+        with self.server.atomic():
+            if stage is not self._stage:
+                self._set(stage)
+            self._root.position = tuple(map(float, origin))
+            for body, node in self._moving:
+                node.position = tuple(map(float, body.moved(frame.time)))
+            self._look(frame)
+            self._fly(frame, elapsed)
+            self._draw_trail(frame)
+
+    def _set(self, stage: Stage) -> None:
+        """Draw what stands."""
+        new = self._stage is None or stage.vehicle is not self._stage.vehicle
+        self._stage = stage
+        if self._standing is not None:
+            self._standing.remove()
+        self._standing = self._scene.add_frame("/world/task/stage", show_axes=False)
+        if stage.ground:
+            self._scene.add_grid(
+                "/world/task/stage/ground", 60.0, 60.0, cell_size=0.5, section_size=5.0, fade_distance=45.0,
+                plane_color=(236, 238, 240), plane_opacity=1.0, cell_color=(214, 217, 221),
+                section_color=(180, 184, 190), position=(0.0, 0.0, -0.002),
+            )  # fmt: skip
+        self._moving = []
+        still: dict[tuple[float, ...], list[np.ndarray]] = {}
+        for i, body in enumerate(stage.bodies):
+            if body.path is None:
+                still.setdefault(tuple(body.colour.tolist()), []).append(body.quads)
+            else:
+                self._moving.append(
+                    (body, self._mesh(f"/world/task/stage/moving_{i}", mesh_of(body.quads, body.colour)))
+                )
+        for i, (colour, quads) in enumerate(still.items()):
+            self._mesh(f"/world/task/stage/solids_{i}", mesh_of(np.concatenate(quads), colour))
+        for i, thing in enumerate(stage.things):
+            self._thing(f"/world/task/stage/thing_{i}", thing)
+        if stage.triangles is not None:
+            import trimesh
+
+            s = stage.triangles
+            self._scene.add_mesh_trimesh(
+                "/world/task/stage/scan", trimesh.Trimesh(s.vertices, s.faces, vertex_colors=s.colours, process=False)
+            )
+        if new:
+            self._make_vehicles(stage)
+
+    def _make_vehicles(self, stage: Stage) -> None:
+        shape = self._shape = quadrotor(stage.vehicle)
+        self._bodies = [self._batch(f"/vehicles/body_{i}", mesh) for i, mesh in enumerate(shape.body)]
+        self._rotors = self._batch("/vehicles/rotors", shape.rotor, len(shape.rotors))
+        size = 0.25 * float(np.max(stage.vehicle.radius))
+        self._goals = [
+            self._scene.add_icosphere(f"/world/goals/goal_{i}", size, color=(238, 115, 33), opacity=0.5, subdivisions=2)
+            for i in range(self.count if self.count <= MANY else 1)
+        ]
+
+    def _batch(self, name: str, mesh: Mesh, each: int = 1) -> Any:
+        """So many instances for each vehicle."""
+        count = each * self.count
+        colours = np.tile(_rgb(mesh.colour), (count + len(FAR_OFF), 1))
+        if self.ghosts:
+            colours[each:] = GHOST
+        place, level = np.zeros((count, 3), np.float32), np.tile(LEVEL, (count, 1))
+        return self._scene.add_batched_meshes_simple(
+            name, mesh.vertices, mesh.faces, *_and_far_off(level, place), batched_colors=colours, lod="off",
+            flat_shading=True, side="double",
+        )  # fmt: skip
+
+    def _mesh(self, name: str, mesh: Mesh) -> Any:
+        return self._scene.add_mesh_simple(
+            name, mesh.vertices, mesh.faces, color=_rgb(mesh.colour), flat_shading=True, side="double"
+        )
+
+    def _thing(self, name: str, thing: Line | Face | Mark) -> None:
+        match thing:
+            case Face():
+                corners = np.asarray(thing.points, np.float32) + np.array([0, 0, 0.004], np.float32)
+                faces = np.array([[0, i, i + 1] for i in range(1, len(corners) - 1)], np.uint32)
+                self._scene.add_mesh_simple(name, corners, faces, color=_hex(thing.color), side="double")
+            case Line():
+                points = np.asarray(thing.points, np.float32)
+                pieces = np.stack([points[:-1], points[1:]], axis=1)
+                self._scene.add_line_segments(
+                    name, pieces, _hex(thing.color), thickness=2 * thing.width, thickness_units="screen"
+                )
+            case Mark():
+                if thing.text:
+                    place = tuple(map(float, thing.point))
+                    self._scene.add_label(name, thing.text, position=place, anchor="center-center")
+
+    def _fly(self, frame: Frame, elapsed: float) -> None:
+        p = np.asarray(frame.position + self._offset, np.float32)
+        q = np.asarray(frame.quaternion, np.float32)
+        self._angle = (self._angle + self._shape.spin * frame.rotor_speed / SLOWEST * max(elapsed, 0.0)) % (2 * np.pi)
+        places, attitudes = spun(self._shape, p, q, self._angle.astype(np.float32))
+        for node in self._bodies:
+            node.batched_wxyzs, node.batched_positions = _and_far_off(q, p)
+        self._rotors.batched_wxyzs, self._rotors.batched_positions = _and_far_off(attitudes, places)
+        rows = range(self.count) if self.count <= MANY else [self.followed]
+        for node, row in zip(self._goals, rows, strict=True):
+            known = frame.goal is not None and bool(np.isfinite(frame.goal[row]).all())
+            if node.visible != known:
+                node.visible = known
+            if known and frame.goal is not None:
+                node.position = tuple(map(float, frame.goal[row]))
+
+    def _draw_trail(self, frame: Frame) -> None:
+        if frame.fresh:
+            self._trail.clear()
+        here, speed = frame.position[self.followed].copy(), float(np.linalg.norm(frame.velocity[self.followed]))
+        self._trail.append((here, speed))
+        points = np.stack([place for place, _ in self._trail])
+        points = np.concatenate([np.repeat(points[:1], TRAIL_POINTS + 1 - len(points), 0), points]).astype(np.float32)
+        speeds = np.array([speed for _, speed in self._trail])
+        speeds = np.concatenate([np.zeros(TRAIL_POINTS + 1 - len(speeds)), speeds])
+        pieces, colours = np.stack([points[:-1], points[1:]], axis=1), coloured(speeds)
+        colours = np.stack([colours[:-1], colours[1:]], axis=1)
+        if self._line is None:
+            self._line = self._scene.add_line_segments(
+                "/world/trail", pieces, colours, thickness=3.0, thickness_units="screen"
+            )
+        else:
+            self._line.points, self._line.colors = pieces, colours
+
+    def follow(self, row: int) -> None:
+        """Follow another vehicle."""
+        self.followed = row
+        self._trail.clear()
+
+    def _look(self, frame: Frame) -> None:
+        """Keep the followed vehicle in view: the world moves past it, so that people's cameras stay theirs to move.
+
+        The vehicles are no part of that world: a busy browser draws its parts at different times.
+        """
+        here, q = frame.position[self.followed], frame.quaternion[self.followed]
+        if self.camera != "orbit" or not self._placed:
+            self._offset, self._placed = ANCHOR - here, True
+            self._world.position = tuple(map(float, self._offset))
+        if self.camera == "first person":
+            for client in self.server.get_clients().values():
+                with contextlib.suppress(AssertionError, ValueError):  # it has not told of its camera yet
+                    _look_ahead(client.camera, ANCHOR, q)
+
+
+def _look_ahead(camera: Any, here: np.ndarray, q: np.ndarray) -> None:
+    ahead, up = turned(q[None], np.eye(3)[[0, 2]])
+    eye = here + NOSE * ahead
+    camera.up_direction = up
+    camera.position = eye
+    camera.look_at = eye + ahead
+
+
+def _and_far_off(attitude: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Attitudes and places with those of the instances that are never seen."""
+    more = np.tile(LEVEL, (len(FAR_OFF), 1))
+    return np.concatenate([attitude, more]), np.concatenate([place, FAR_OFF])
+
+
+def coloured(speed: Float[np.ndarray, " n"], fastest: float | None = None) -> np.ndarray:
+    """(n, 3) uint8: from blue, at rest, over green to yellow, at the fastest speed, m/s; left out: that of them."""
+    share = np.clip(np.asarray(speed, float) / max(fastest or float(np.max(speed, initial=0.0)), 0.5), 0, 1)
+    stops = np.array([[68, 60, 140], [33, 145, 140], [94, 201, 98], [253, 200, 37]], float)
+    at = share * (len(stops) - 1)
+    low = np.minimum(at.astype(int), len(stops) - 2)
+    part = (at - low)[:, None]
+    return np.rint((1 - part) * stops[low] + part * stops[low + 1]).astype(np.uint8)
+
+
+def _rgb(colour: Sequence[float]) -> tuple[int, int, int]:
+    red, green, blue = (round(255 * float(x)) for x in colour)
+    return red, green, blue
+
+
+def _hex(colour: str) -> tuple[int, int, int]:
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return red, green, blue
