@@ -9,11 +9,11 @@ import pytest
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
+from e2efly.scenes.faces import bodies
 from e2efly.scenes.generate import room
 from e2efly.scenes.scene import Scene, Solids, distances
 from e2efly.tasks.hover import HoverConfig
 from e2efly.view import plots
-from e2efly.scenes.faces import bodies
 from e2efly.view.worlds import draw_plan, plot_flights_in_worlds
 from tests.view.test_plots import check_png, flights
 

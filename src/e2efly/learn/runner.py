@@ -158,7 +158,7 @@ def _loop(
     """Chunks of updates, an evaluation and a checkpoint after each. Ends at the last update, the goal, or Ctrl-C."""
     config = setup.config
     before, stopped = progress.seconds, False  # of earlier processes of this run
-    with _writing(run, progress.update) as write, _interruptible() as stop:
+    with _writing(run, progress.update * setup.steps_per_update) as write, _interruptible() as stop:
         while progress.update < setup.updates and not progress.reached:
             if stopped := hosts.any_of(stop.is_set()):
                 if not progress.update:  # there is none yet to go on from
@@ -287,18 +287,18 @@ def policy_of(state: TrainState) -> Weights:
 
 
 @contextmanager
-def _writing(run: RunDirectory, update: int) -> Iterator[Callable[[list[dict[str, float]]], None]]:
-    """Writes rows to metrics.csv, and the last of them to TensorBoard's events; in process 0."""
+def _writing(run: RunDirectory, steps: int) -> Iterator[Callable[[list[dict[str, float]]], None]]:
+    """Writes rows to metrics.csv, and the last of them to TensorBoard's events, by environment steps; in process 0."""
     from e2efly.learn.events import event_file
 
     if not hosts.first():
         yield lambda rows: None
         return
-    with event_file(run.events, update) as log:
+    with event_file(run.events, steps) as log:
 
         def write(rows: list[dict[str, float]]) -> None:
             run.append(rows)
-            log(rows[-1], int(rows[-1]["update"]))
+            log(rows[-1], int(rows[-1]["steps"]))
 
         yield write
 

@@ -1,0 +1,44 @@
+"""`e2efly compare`: runs side by side."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from e2efly.terminal import Terminal, console_table
+
+
+@dataclass(frozen=True)
+class Compare:
+    """Lay runs side by side: in what they differ, when they were there, how well they did. A table and a plot."""
+
+    runs: tyro.conf.Positional[tuple[Path, ...]]
+    """Folders of runs."""
+    out: Path = Path("runs") / "compare.png"
+    """The plot."""
+    json: Path | None = None
+    """Write the table to this file, too."""
+
+
+def run(options: Compare) -> int:
+    """Print the table, draw the plot.
+
+    Raises:
+        ValueError: when a folder holds no run, or one of another version.
+        OSError: when a file cannot be written.
+    """
+    from e2efly.learn.comparison import Compared, table
+    from e2efly.storage import write_json
+    from e2efly.view.comparison import plot_runs
+
+    if not options.runs:
+        raise ValueError("RUNS is empty; accepted: folders of runs")
+    found = [Compared.of(path) for path in options.runs]
+    rows, console = table(found), Terminal()
+    console.print(console_table(rows))
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    plot_runs(found, options.out)
+    console.print(f"Plot: {options.out}")
+    if options.json:
+        write_json(options.json, {"runs": rows})
+    return 0

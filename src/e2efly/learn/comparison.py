@@ -1,0 +1,96 @@
+"""Runs side by side: what they were asked, what came of them, and how they got there."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from e2efly.learn.judge import worst_success
+from e2efly.learn.rundir import RunDirectory, to_json
+
+GOOD = 0.99
+"""The success of an evaluation at which a run counts as there."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One run."""
+
+    path: Path
+    """Its folder."""
+    options: dict[str, Any]
+    """Its configuration, by dotted name."""
+    steps: Float[np.ndarray, " t"]
+    """Environment steps at each evaluation."""
+    seconds: Float[np.ndarray, " t"]
+    """Since the start of the process, of all processes of the run together."""
+    success: Float[np.ndarray, " t"]
+    """Of the worst criterion."""
+    summary: dict[str, Any] | None
+    """What the run said of itself at its end; None: it has not ended."""
+
+    @staticmethod
+    def of(path: Path) -> "Compared":
+        """Read a run.
+
+        Raises:
+            ValueError: when the folder holds no run, or one of another version.
+        """
+        run = RunDirectory(path)
+        options = dict(_flat(to_json(run.config())))
+        rows = [row for row in run.rows() if "seconds" in row]
+        worst = [min(x for name, x in row.items() if name.endswith("/success")) for row in rows]
+        columns = ([row["steps"] for row in rows], [row["seconds"] for row in rows], worst)
+        ended = run.read_json("summary.json") if (path / "summary.json").is_file() else None
+        return Compared(path, options, *(np.array(column, float) for column in columns), ended)
+
+    @property
+    def there(self) -> tuple[float, float] | None:
+        """Environment steps and seconds at the first evaluation with `GOOD`; None: there was none."""
+        found = np.flatnonzero(self.success >= GOOD)
+        return (float(self.steps[found[0]]), float(self.seconds[found[0]])) if len(found) else None
+
+    @property
+    def shipped(self) -> float | None:
+        """Success of the policy that is shipped, on the vehicles of the training; None: the run has not ended."""
+        return None if self.summary is None else worst_success(self.summary["shipped"])
+
+
+def differing(runs: Sequence[Compared]) -> dict[str, list[Any]]:
+    """The options in which runs differ, by dotted name: the value of each run; None where it has no such option."""
+    names = dict.fromkeys(name for run in runs for name in run.options)
+    columns = {name: [run.options.get(name) for run in runs] for name in names}
+    return {name: column for name, column in columns.items() if any(value != column[0] for value in column)}
+
+
+def table(runs: Sequence[Compared]) -> list[dict[str, str]]:
+    """A row per run, as text."""
+    different = differing(runs)
+    rows = []
+    for i, run in enumerate(runs):
+        there, ended = run.there, run.summary
+        rows.append({
+            "run": str(run.path),
+            **{name: _text(column[i]) for name, column in different.items()},
+            "steps": f"{run.steps[-1] / 1e6:.2f} M" if len(run.steps) else "none",
+            "time": f"{run.seconds[-1]:.0f} s" if len(run.seconds) else "none",
+            f"to {GOOD:.0%}": "never" if there is None else f"{there[0] / 1e6:.2f} M, {there[1]:.0f} s",
+            "success": "has not ended" if run.shipped is None else f"{run.shipped:.1%}",
+            "update": "" if ended is None else str(ended["shipped"]["update"]),
+        })  # fmt: skip
+    return rows
+
+
+def _flat(values: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in values.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+def _text(value: Any) -> str:
+    return "" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
