@@ -2,6 +2,7 @@
 
 import signal
 import threading
+import time
 from types import TracebackType
 from typing import Any
 
@@ -29,22 +30,33 @@ class Terminal(Console):
             raise SystemExit(128 + signal.SIGPIPE)
 
 
+NARROW = 110
+"""Columns of a terminal below which the bar is short and tells less: the time left must be seen."""
+LINES_S = 5.0
+"""Between two lines where the output is no terminal, s."""
+
+
 class TerminalProgress:
-    """A bar with the rate, the time left and the success of the last and the best evaluation."""
+    """A bar with the rate, the time left and the success of the last and the best evaluation; lines where the output is
+    no terminal.
+    """
 
     def __init__(self, console: Console, title: str) -> None:
+        self._console, self._title, self._narrow = console, title, console.width < NARROW
         self._bar = Progress(
             SpinnerColumn("dots" if console.encoding.startswith("utf") else "line"),
             TextColumn("{task.description}", "bold", markup=False),
-            BarColumn(bar_width=24),
+            BarColumn(bar_width=8 if self._narrow else 24),
             TextColumn("{task.fields[figures]}", markup=False),
-            TimeElapsedColumn(),
-            TextColumn("left"),
+            *(() if self._narrow else (TimeElapsedColumn(),)),
             TimeRemainingColumn(),
+            TextColumn("left"),
             console=console,
             transient=False,
+            disable=not console.is_terminal,
         )
         self._task = self._bar.add_task(title, total=None, figures="")
+        self._began, self._told = time.monotonic(), -LINES_S
         self.end: tuple[Any, ...] = ()
         """Of `ended`."""
 
@@ -59,17 +71,33 @@ class TerminalProgress:
 
     def compiling(self) -> None:
         """Show that nothing is flying yet."""
-        self._bar.update(self._task, figures="compiling (seconds; cached for the next run)")
+        self._say("compiling" if self._narrow else "compiling (seconds; cached for the next run)")
 
     def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
-        """Move the bar."""
+        """Move the bar, or print a line."""
         figures = f"{steps / 1e6:.2f}M steps  {rate / 1e3:.0f}k/s  success {success:.1%}  best {best:.1%}"
+        if self._narrow:
+            figures = f"{steps / 1e6:.2f}M  success {success:.0%}"
         figures += f"  {stage}" if stage else ""
         self._bar.update(self._task, completed=steps, total=total, figures=figures)
+        now = time.monotonic()
+        if not self._console.is_terminal and (now - self._told >= LINES_S or steps >= total):
+            left = (now - self._began) * (total - steps) / max(steps, 1)
+            self._console.print(f"{self._title}: {figures}  {left:.0f} s left")
+            self._told = now
+
+    def judging(self, starts: int) -> None:
+        """Show that the training is over, and the policy flown from starts that it never saw."""
+        self._say(f"flying {starts} starts" if self._narrow else f"flying {starts} starts that it never saw")
 
     def ended(self, *end: Any) -> None:
         """Keep what the run has ended with, for the plots."""
         self.end = end
+
+    def _say(self, text: str) -> None:
+        self._bar.update(self._task, figures=text)
+        if not self._console.is_terminal:
+            self._console.print(f"{self._title}: {text}")
 
 
 def console_table(rows: list[dict[str, Any]]) -> Table:

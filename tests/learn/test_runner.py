@@ -48,6 +48,9 @@ class Silent:
     def compiling(self) -> None:
         pass
 
+    def judging(self, starts: int) -> None:
+        pass
+
     def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
         del total, rate, best
         self.seen.append((steps, success))

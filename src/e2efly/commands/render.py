@@ -1,4 +1,4 @@
-"""`e2efly render`: what sensors see of a world, as pictures and as a video of a flight."""
+"""`e2efly render`: what sensors see of a world, as pictures and as a video of a flight; or a policy's flight."""
 
 import math
 from dataclasses import dataclass
@@ -22,10 +22,14 @@ PICTURE, PANEL = 640, 256
 
 @dataclass(frozen=True)
 class Render:
-    """Draw what sensors see of a world: pictures, a contact sheet with every noise, and a video of a flight."""
+    """Draw what sensors see of a world: pictures, a contact sheet with every noise, and a video of a flight.
+
+    Of a run or a policy.onnx: a video of it in flight, as `e2efly watch --video` draws it.
+    """
 
     scene: tyro.conf.Positional[str]
-    """forest, clutter, room, corridor, garage, terrain, warehouse, a race track, or a .toml, .glb, .obj, .ply file."""
+    """forest, clutter, room, corridor, garage, terrain, warehouse, a race track, or a .toml, .glb, .obj, .ply file; a
+    run's folder or a policy.onnx."""
     camera: Literal["d435i", "fpv", "down", "lidar"] = "d435i"
     """The sensor of the pictures and the video: a RealSense, an FPV camera, one that looks down, a LiDAR."""
     width: int | None = None
@@ -57,6 +61,8 @@ def run(options: Render) -> int:
         value = getattr(options, name)
         if value is not None and not np.all(np.isfinite(value)):
             raise ValueError(f"--{name} is {value}; accepted: finite numbers")
+    if options.scene.endswith(".onnx") or (Path(options.scene) / "config.json").is_file():
+        return _policy(options)
     prepare()
     from e2efly.env import random_key
     from e2efly.scenes.camera import PRESETS
@@ -90,6 +96,19 @@ def run(options: Render) -> int:
     console.print(f"Pictures: {out} (sheet.png has all of them)")
     console.print(f"Video: {', '.join(map(str, written))}, {tour.time[-1]:.1f} s of flight")
     return 0
+
+
+def _policy(options: Render) -> int:
+    """A video of a policy in flight."""
+    from importlib.util import find_spec
+
+    from e2efly.commands.watch import Watch, run
+
+    path = Path(options.scene)
+    out = options.out or Path("runs/render") / (path.parent.name if path.suffix else path.name)
+    _make(out)
+    film = out / ("flight.webm" if find_spec("cv2") else "flight.gif")
+    return run(Watch(what=(options.scene,), seed=options.seed, video=film))
 
 
 def viewpoint(options: Render, tour: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -155,6 +155,9 @@ class _Shown:
         self.page.begin()
         self.bar.progress(steps, total, rate, success, best, stage)
 
+    def judging(self, starts: int) -> None:
+        self.bar.judging(starts)
+
     def ended(self, *end: Any) -> None:
         self.bar.ended(*end)
 
@@ -169,7 +172,8 @@ def _tell(o: Train, again: str, console: Console, summary: dict[str, Any], progr
     if o.plots and not console.quiet:
         from e2efly.view.evaluation import plot_run
 
-        plot_run(o.out, *progress.end)
+        with console.status("Drawing plots"):
+            plot_run(o.out, *progress.end)
         console.print(f"Plots: {o.out / 'plots'}")
     console.print(f"Policy: {o.out / 'policy.onnx'} (its contract is inside; `e2efly eval {o.out}` flies it again)")
     console.print(f"All of this took {since_process_start():.1f} s.")

@@ -53,6 +53,10 @@ class Reporter(Protocol):
         """
         ...
 
+    def judging(self, starts: int) -> None:
+        """The training is over; the policy flies so many starts that it never saw."""
+        ...
+
     def ended(self, setup: Setup, flown: dict[str, Episodes], /) -> None:
         """The run, and how its best policy flew unseen starts of each criterion: nominal, where there is that."""
         ...
@@ -240,6 +244,7 @@ def _finish(
     def told(flown: dict[str, Episodes]) -> dict[str, Any]:
         return {name: summary_of(e) for name, e in flown.items()}
 
+    reporter.judging(REPORT_EPISODES)
     by_best = flown(best, setup.judges)
     is_last = progress.best_update == progress.update
     by_last = by_best if is_last else flown(policy_of(state), setup.judges)
