@@ -3,7 +3,8 @@
 What it takes from AirSim's sources: methods with their parameter counts and rpclib's words for a wrong one; a thread
 for a move, answers in any order; NED and FRD; a clock of physics steps that `simContinueForTime` lets go on by the wall
 clock, so that one step more or less is taken; a move that blocks until its duration has passed on that clock or another
-call cuts it short, and whose command stays; SimpleFlight's rate loop as gains times error over the vehicle's authority.
+call cuts it short, and whose command stays; SimpleFlight's rate loop as gains times error over the vehicle's authority;
+pictures (`airsim_eyes.py`) of where the vehicle was in the last frame of the game, of which there are none in a pause.
 """
 
 import argparse
@@ -21,14 +22,17 @@ from typing import Any
 import msgpack
 import numpy as np
 
-from e2efly.validation.airsim.protocol import METHODS
+from e2efly.validation.airsim.protocol import DIALECTS, METHODS
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plants.mujoco import MujocoPlant
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.vehicles.vehicle import allocation_matrix
+from tests.validation.airsim_eyes import AirSimError, Eyes, quaternion_of
 
 PERIOD = 0.003
 """Physics step, s."""
+FRAME = 5
+"""Physics steps in a frame of the game."""
 STOCK_GAIN = 0.25
 """Of SimpleFlight's rate loop, throttle per rad/s."""
 FLIP = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -50,6 +54,8 @@ class World:
         self._authority = authority(vehicle)
         self.plant = MujocoPlant(vehicle)
         self.set_gains(np.full(3, STOCK_GAIN))
+        self.eyes = Eyes(settings, version)
+        self.drawn, self.placed = self.plant.state, 0  # where the game draws the vehicle; steps when it was placed
 
     def set_gains(self, gains: np.ndarray) -> None:
         """Gains of the rate loop; the body goes on as it is."""
@@ -75,14 +81,19 @@ class World:
     def go_on(self, seconds: float) -> None:
         """As the executor does: as many steps as the wall clock has room for from where its loop happens to stand."""
         phase = float(self._random.uniform(0, 1))
-        for _ in range(math.floor(seconds / PERIOD + phase)):
+        count = math.floor(seconds / PERIOD + phase)
+        for _ in range(count):
             self.step()
+            if self.steps % FRAME == 0:
+                self.drawn = self.plant.state
+        if count < FRAME:  # AirSim waits for the end of a frame that a short stretch has begun in
+            self.drawn = self.plant.state
 
     def kinematics(self) -> dict[str, Any]:
         """The truth, NED and FRD."""
         with self.lock:
             s = self.plant.state
-        turned = _quaternion(FLIP @ _matrix(s.quaternion) @ TURN)
+        turned = quaternion_of(FLIP @ _matrix(s.quaternion) @ TURN)
         none = _vector(np.zeros(3))
         return {
             "position": _vector(FLIP @ s.position),
@@ -95,11 +106,22 @@ class World:
         """Pose and velocities; the rotors turn as they did."""
         q = np.array([k["orientation"][name] for name in ("w_val", "x_val", "y_val", "z_val")])
         position, velocity, rate = (_array(k[name]) for name in ("position", "linear_velocity", "angular_velocity"))
-        quaternion = _quaternion(FLIP @ _matrix(q / np.linalg.norm(q)) @ TURN)
+        quaternion = quaternion_of(FLIP @ _matrix(q / np.linalg.norm(q)) @ TURN)
         with self.lock:
             speed = self.plant.data.act.copy()
             self.plant.reset(RigidState(FLIP @ position, FLIP @ velocity, np.array(quaternion), TURN @ rate))
             self.plant.data.act[:] = speed
+            self.placed = self.steps
+
+    def pictures(self, requests: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """The answers to `ImageRequest`s."""
+        position, matrix = FLIP @ self.drawn.position, FLIP @ _matrix(self.drawn.quaternion) @ TURN
+        time = (self.steps - self.placed) * PERIOD
+        return [self.eyes.answer(request, position, matrix, time, self.now()) for request in requests]
+
+    def camera(self, name: str) -> dict[str, Any]:
+        """A `CameraInfo`."""
+        return self.eyes.info(name, FLIP @ self.drawn.position, FLIP @ _matrix(self.drawn.quaternion) @ TURN)
 
     def call(self, method: str, p: list[Any]) -> Any:
         """Do what a method does; runs in a thread of its own."""
@@ -121,6 +143,8 @@ class World:
             "setAngleRateControllerGains": lambda: self.set_gains(np.array(p[0], float)),
             "cancelLastTask": self.cut.set,
             "reset": self._reset,
+            "simGetImages": lambda: self.pictures(p[0]),
+            "simGetCameraInfo": lambda: self.camera(p[0]),
         }
         return actions[method]()
 
@@ -194,16 +218,23 @@ class _Connection(socketserver.BaseRequestHandler):
         _, number, method, parameters = message
         self._served.calls.append((method, parameters))
         error, result = None, None
-        if method not in METHODS:
+        methods = {**METHODS, **DIALECTS[self._served.world.version].image_methods}
+        if method not in methods:
             count = len(parameters)
             error = f"rpclib: server could not find function '{method}' with argument count {count}."
-        elif len(parameters) != (wanted := len(METHODS[method])):
+        elif len(parameters) != (wanted := len(methods[method])):
             error = (
                 f"rpclib: Function '{method}' was called with an invalid number of arguments. "
                 f"Expected: {wanted}, got: {len(parameters)}"
             )
         else:
-            result = self._served.world.call(method, parameters)
+            try:
+                result = self._served.world.call(method, parameters)
+            except AirSimError as thrown:
+                error = (
+                    f"rpclib: function '{method}' (called with {wanted} arg(s)) threw an exception. "
+                    f"The exception contained this information: {thrown}."
+                )
         with writing, contextlib.suppress(OSError):
             self.request.sendall(msgpack.packb([1, number, error, result], use_single_float=True))
 
@@ -238,19 +269,6 @@ def _matrix(q: np.ndarray) -> np.ndarray:
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ])  # fmt: skip
-
-
-def _quaternion(r: np.ndarray) -> list[float]:
-    """Of a rotation matrix, wxyz: the eigenvector of the largest eigenvalue (Bar-Itzhack, 2000)."""
-    (a, b, c), (d, e, f), (g, h, i) = r
-    k = np.array([
-        [a - e - i, d + b, g + c, h - f],
-        [d + b, e - a - i, h + f, c - g],
-        [g + c, h + f, i - a - e, d - b],
-        [h - f, c - g, d - b, a + e + i],
-    ])  # fmt: skip
-    x, y, z, w = np.linalg.eigh(k)[1][:, -1].tolist()
-    return [w, x, y, z]
 
 
 def main() -> None:

@@ -31,7 +31,7 @@ def run(options: AirsimSettings) -> int:
         ValueError: for an unknown vehicle or policy, or a port that is none. Nothing is written then.
     """
     from e2efly.deploy.policy.loader import load_policy
-    from e2efly.validation.airsim.settings import settings, unsaid
+    from e2efly.validation.airsim.settings import named, settings, unsaid
     from e2efly.vehicles import load_vehicle
     from e2efly.zoo import policy_file
 
@@ -44,6 +44,8 @@ def run(options: AirsimSettings) -> int:
     console = Terminal()
     write_json(options.out, settings(vehicle, images, options.port))
     console.print(f"Settings: {options.out}")
+    for option in named(images):
+        console.print(f"Its camera in `e2efly validate --plant airsim`: {option}")
     table = Table(box=None, header_style="bold", pad_edge=False)
     for heading in ("what settings.json cannot say", vehicle.name, "where AirSim has it"):
         table.add_column(heading, overflow="fold")

@@ -51,6 +51,10 @@ class Validate:
     """Write the report, with a row for every start, to this file."""
     log: Path | None = None
     """Folder for a CSV log of each flight, for `e2efly identify flight`; not with --stress."""
+    image: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    """What a policy that sees is shown by airsim's own cameras: IMAGE=plant:CAMERA, for a mask
+    IMAGE=plant:CAMERA:RED,GREEN,BLUE, its colour in AirSim's segmentation; images that are not named are rendered of
+    the task's world. Not with --stress; see docs/airsim.md."""
     seed: int = 1_000_000
     """Seed of the starts."""
     vehicle: str | None = None
@@ -111,6 +115,7 @@ def run(asked: Asked) -> int:
             seed=o.seed,
             max_drop=o.max_drop,
             log=o.log,
+            image=o.image,
             progress=progress,
         )
     for note in found.notes():
@@ -138,6 +143,8 @@ def _stress(o: Validate) -> int:
 
     if o.log:
         raise ValueError(f"--log is {o.log}; accepted without --stress")
+    if o.image:
+        raise ValueError(f"--image is {o.image[0]!r}; accepted without --stress")
     for field in dataclasses.fields(Validate):
         if field.name in ("flights", "max_drop") and getattr(o, field.name) != field.default:
             option = field.name.replace("_", "-")

@@ -2,10 +2,11 @@
 
 import multiprocessing
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ from e2efly.device import compute_at_once, cores, prepare
 from e2efly.goal import Course
 from e2efly.tasks import TASKS
 from e2efly.validation.flight import Trajectory, fly
-from e2efly.validation.plant import RigidState
+from e2efly.validation.plant import Plant, RigidState
 from e2efly.validation.plants import find_plant
 from e2efly.validation.reality import Reality, check_realities
 from e2efly.vehicles import Vehicle
@@ -43,8 +44,19 @@ class Mission:
     """The vehicle that the plant's flight controller believes in."""
     duration: float
     """Longest flight, s."""
+    cameras: Mapping[str, str] = field(default_factory=dict)
+    """By an image of the contract, which of the plant's own cameras gives it; the others are rendered."""
     sample: float | None = None
     """Seconds between two samples of a log, at most; None: none are kept."""
+
+    def kind(self) -> type[Plant]:
+        """The class of the plant.
+
+        Raises:
+            ValueError: for one that cannot be had.
+        """
+        kind = find_plant(self.plant)
+        return kind.seeing(self.cameras) if self.cameras else kind
 
 
 @dataclass(frozen=True)
@@ -110,7 +122,8 @@ def _fly_chunk(mission: Mission, flights: Sequence[Flight]) -> list[Trajectory]:
 
 
 def _fly(mission: Mission, flights: Sequence[Flight]) -> Iterator[Trajectory]:
-    policy, kind = load_policy(mission.policy), find_plant(mission.plant)
+    policy, kind = load_policy(mission.policy), mission.kind()
+    names = [image.name for image in policy.contract.images]
     with closing(kind.of(mission.believed, policy.contract)) as plant:
         met = mission.believed.hash, False
         for flight in flights:
@@ -121,7 +134,12 @@ def _fly(mission: Mission, flights: Sequence[Flight]) -> Iterator[Trajectory]:
             sight = flight.sight
             runtime = Runtime.of(policy, flight.course, mission.trained, imu=True, images=sight is not None)
             latency = max(reality.latency - kind.latency, 0.0)
-            images = None if sight is None else sight.begin().images
+            images = None
+            if sight is not None:
+                own = {i: name for i, name in enumerate(names) if name in mission.cameras}
+                if own:
+                    plant.expose({name: sight.shutter(i) for i, name in own.items()})
+                images = sight.begin({i: partial(plant.shown, name) for i, name in own.items()}).images
             yield fly(runtime, plant, flight.start, mission.duration, latency, reality.air, mission.sample, images)
 
 

@@ -71,6 +71,26 @@ class Known:
 _SHAPES = {"position": (3,), "velocity": (3,), "quaternion": (4,), "body_rate": (3,)}
 
 
+@dataclass(frozen=True)
+class Shutter:
+    """When a camera of a plant exposes. Image n = 0, 1, ... is exposed at n times `every` less `latency`, or at the
+    start, and is shown from n times `every` on.
+    """
+
+    every: float
+    """Time from an image to the next, s."""
+    latency: float
+    """Age of an image when it is first shown, s."""
+
+    def exposed(self, n: int) -> float:
+        """When image `n` is, s since the start."""
+        return max(n * self.every - self.latency, 0.0)
+
+    def newest(self, now: float) -> int:
+        """The image that is shown at `now`, s since the start."""
+        return math.floor(now / self.every + 1e-6)
+
+
 class Plant(ABC):
     """A vehicle with its flight controller, in some physics. Commands act at once: latency is the `Delay`'s.
 
@@ -114,6 +134,22 @@ class Plant(ABC):
             ValueError: for an address that it does not take.
         """
         raise ValueError(f"--plant is {cls.name}:{address}; accepted: {cls.name}, which takes no address")
+
+    @classmethod
+    def seeing(cls, cameras: Mapping[str, str]) -> type[Self]:
+        """The plant whose own cameras a policy sees by. It then has `expose` and `shown`.
+
+        Args:
+            cameras: by an image of the contract, what stands behind `--image IMAGE=plant:`.
+
+        Raises:
+            ValueError: for a plant without cameras.
+        """
+        name, where = next(iter(cameras.items()))
+        raise ValueError(
+            f"--image {name} is 'plant:{where}'; accepted on plant {cls.name!r}, which has no cameras of its own: no "
+            "--image, as the task's world is rendered there"
+        )
 
     @classmethod
     def differences(cls, vehicle: Vehicle, contract: Contract) -> list[str]:
@@ -167,6 +203,25 @@ class Plant(ABC):
             NotImplementedError: where `alters` promises what this plant does not do.
         """
         raise NotImplementedError(f"plant {self.name!r} has no method disturb")
+
+    def expose(self, shutters: Mapping[str, Shutter]) -> None:
+        """Take images in flight from the next `reset` on.
+
+        Args:
+            shutters: of each image for which `seeing` names a camera.
+
+        Raises:
+            NotImplementedError: for a plant without cameras.
+        """
+        raise NotImplementedError(f"plant {self.name!r} has no method expose")
+
+    def shown(self, name: str, now: float) -> np.ndarray:
+        """The newest image that a policy sees at `now`, s since `reset`.
+
+        Raises:
+            NotImplementedError: for a plant without cameras.
+        """
+        raise NotImplementedError(f"plant {self.name!r} has no method shown")
 
     def close(self) -> None:  # noqa: B027
         """Let go of what it holds (processes, sockets); it is not used again."""

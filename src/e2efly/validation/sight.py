@@ -3,7 +3,7 @@
 Rate, age, mounting and noise of the images are those of the training's environment, whose cameras draw them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import jax
@@ -16,7 +16,7 @@ from e2efly.physics import State
 from e2efly.scenes.scene import Scene
 from e2efly.sensors.eyes import Eye, see, steps_between
 from e2efly.sensors.latency import delayed_state, frames
-from e2efly.validation.plant import RigidState
+from e2efly.validation.plant import RigidState, Shutter
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,23 @@ class Sight:
     seed: int
     """Of the noise."""
 
-    def begin(self) -> "Watch":
-        """For a flight that begins."""
-        return Watch(self)
+    def begin(self, taken: Mapping[int, Callable[[float], np.ndarray]] | None = None) -> "Watch":
+        """For a flight that begins.
+
+        Args:
+            taken: by a camera's number, what gives its newest image at a time since the start, s, for cameras of the
+                plant's own; None: all are rendered.
+        """
+        return Watch(self, taken or {})
+
+    def shutter(self, i: int) -> Shutter:
+        """When camera `i` is to expose."""
+        return Shutter(self.period * self.steps_between(i), float(self.eyes[i].latency[0]))
+
+    def steps_between(self, i: int) -> int:
+        """Control steps from an image of camera `i` to the next."""
+        every = self.eyes[i].every
+        return steps_between(self.cameras[i], self.period) if every is None else int(every[0])
 
 
 @dataclass
@@ -47,6 +61,8 @@ class Watch:
 
     sight: Sight
     """What is seen."""
+    taken: Mapping[int, Callable[[float], np.ndarray]] = field(default_factory=dict)
+    """What gives the newest image of cameras of the plant's own."""
     shown: list[np.ndarray] = field(default_factory=list)
     """The last image of each camera."""
 
@@ -59,8 +75,10 @@ class Watch:
         """
         sight = self.sight
         for i, (camera, eye) in enumerate(zip(sight.cameras, sight.eyes, strict=True)):
-            every = steps_between(camera, sight.period) if eye.every is None else int(eye.every[0])
-            if k % every and self.shown:
+            if k % sight.steps_between(i) and self.shown:
+                continue
+            if i in self.taken:
+                self.shown[i : i + 1] = [self.taken[i](k * sight.period)]
                 continue
             newest = [states[max(len(states) - 1 - age, 0)] for age in range(frames(sight.oldest, sight.period) + 1)]
             key = jax.random.fold_in(jax.random.fold_in(jax.random.key(sight.seed), k), i)

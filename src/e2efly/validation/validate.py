@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from e2efly.config import TaskConfig
+from e2efly.deploy.policy.contract import Contract
 from e2efly.deploy.policy.runtime import check
+from e2efly.deploy.sight.sources import by_image
 from e2efly.device import compute_at_once, prepare
 from e2efly.episodes import Episodes, rows, summary
 from e2efly.evaluation import ROW, SEED, UNITS, Candidate, candidate, course_rows, fly_criteria, settling
@@ -141,6 +143,7 @@ def validate(
     seed: int = SEED,
     max_drop: float = 2.0,
     log: str | os.PathLike[str] | None = None,
+    image: Sequence[str] = (),
     progress: Callable[[str, int, int], None] = lambda criterion, done, total: None,
 ) -> Validation:
     """Fly a policy by the bridge's runtime on another plant, from the starts of `evaluate`.
@@ -161,6 +164,9 @@ def validate(
         max_drop: points of success by which the plant may lie under the training simulator.
         log: folder for a CSV log of each flight, CRITERION_NUMBER.csv, which `e2efly identify flight` reads; None:
             none are written.
+        image: IMAGE=plant:CAMERA of each image of the contract that the plant's own camera is to give; of a mask
+            IMAGE=plant:CAMERA:RED,GREEN,BLUE, its colour in the plant's segmentation. The others are rendered of the
+            task's world.
         progress: (criterion, flights that are over, of how many).
 
     Raises:
@@ -177,6 +183,8 @@ def validate(
     compute_at_once()
     prepare("cpu")  # the plants compute there, one vehicle at a time
     found, kind, own = flyable(policy, plant, vehicle, controller, task)
+    cameras = plant_cameras(image, found.policy.contract)
+    kind = kind.seeing(cameras) if cameras else kind
     reality = Reality(found.flown.body, found.latency)
     check_realities(kind, found.flown.believed, [reality])
     differences = tuple(kind.differences(found.flown.believed, found.policy.contract))
@@ -190,7 +198,7 @@ def validate(
         env = found.environment(suite)
         starts = draw_starts(env, episodes, seed)
         sample = None if log is None else SAMPLE
-        mission = Mission(found.file, name, own, found.flown.believed, float(suite.episode_s), sample)
+        mission = Mission(found.file, name, own, found.flown.believed, float(suite.episode_s), cameras, sample)
         begins = zip(starts.states, starts.courses, starts.sights(env, seed), strict=True)
         asked = [Flight(start, course, reality, sight) for start, course, sight in begins]
         flights = fly_all(mission, asked, lambda done: progress(criterion, done, episodes))  # noqa: B023
@@ -206,6 +214,19 @@ def _write_logs(folder: Path, criterion: str, flights: list[Trajectory], mode: s
     for number, flight in enumerate(flights):
         path = folder / f"{criterion}_{number:04d}.csv"
         write_csv(record_of(path, flight, mode), path)
+
+
+def plant_cameras(texts: Sequence[str], contract: Contract) -> dict[str, str]:
+    """IMAGE=plant:CAMERA of each text as CAMERA by image.
+
+    Raises:
+        ValueError: naming the text and what is accepted: no such image, one twice, or another source.
+    """
+    chosen = by_image(texts, contract)
+    for name, uri in chosen.items():
+        if not uri.startswith("plant:"):
+            raise ValueError(f"--image {name} is {uri!r}; accepted: {name}=plant:CAMERA, a camera of the plant's own")
+    return {name: uri.removeprefix("plant:") for name, uri in chosen.items()}
 
 
 def plant_name(plant: str | type[Plant]) -> str:

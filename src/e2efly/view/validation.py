@@ -120,10 +120,12 @@ def plot_validation(found: Validation, folder: Path) -> None:
         v = found.criteria[name]
         shown = [int(i) for i in np.argsort(v.flown.success, kind="stable")[:DRAWN]]  # failures first
         home = Reality(nominal, contract.latency_of(nominal))
-        asked = [Flight(v.starts.states[i], v.starts.courses[i], home) for i in shown]
+        env = flew.at_home.environment(suite)
+        sights = v.starts.sights(env, found.seed)
+        asked = [Flight(v.starts.states[i], v.starts.courses[i], home, sights[i]) for i in shown]
         mission = Mission(flew.file, "simulator", nominal, nominal, float(suite.episode_s))
         again = fly_all(mission, asked, processes=1)
-        verdicts = judge(flew.at_home.environment(suite), v.starts.of(shown), again)
+        verdicts = judge(env, v.starts.of(shown), again)
         there = [v.flights[i] for i in shown]
         flown = {
             "training simulator": _flights(flew.policy, again, verdicts.duration, verdicts.success),

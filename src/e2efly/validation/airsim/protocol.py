@@ -42,6 +42,15 @@ class Dialect:
     """Of `simGetImages`."""
     image_request: tuple[str, ...]
     """Fields of an `ImageRequest`."""
+    camera_parameters: tuple[str, ...]
+    """Of `simGetCameraInfo`."""
+    colours: str
+    """In which order an uncompressed image has them (`RenderRequest::getScreenshot`)."""
+
+    @property
+    def image_methods(self) -> Mapping[str, tuple[str, ...]]:
+        """The methods beside `METHODS`, with their parameters."""
+        return {"simGetImages": self.image_parameters, "simGetCameraInfo": self.camera_parameters}
 
 
 DIALECTS: Mapping[int, Dialect] = {
@@ -49,11 +58,15 @@ DIALECTS: Mapping[int, Dialect] = {
         "AirSim 1.8.1",
         ("requests", "vehicle_name", "external"),
         ("camera_name", "image_type", "pixels_as_float", "compress"),
+        ("camera_name", "vehicle_name", "external"),
+        "BGR",
     ),
     4: Dialect(
         "Cosys-AirSim 3.3 or later",
         ("requests", "vehicle_name"),
         ("camera_name", "image_type", "pixels_as_float", "compress", "annotation_name"),
+        ("camera_name", "vehicle_name"),
+        "RGB",
     ),
 }
 """By what `getServerVersion` answers. For flights by state they are one: what differs are images."""

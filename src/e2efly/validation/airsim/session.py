@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.validation.airsim import frames, protocol
+from e2efly.validation.airsim.images import Picture, field_of_view, image_request, picture
 from e2efly.validation.airsim.rpc import Rpc, RpcError
 from e2efly.validation.plant import RigidState
 
@@ -56,7 +57,8 @@ class Session:
             known = ", ".join(f"{number} ({each.name})" for number, each in protocol.DIALECTS.items())
             raise ValueError(f"{rpc.where}: getServerVersion is {version!r}; accepted: {known}")
         self.dialect = protocol.DIALECTS[version]
-        self._wall = 1 / _clock_speed(self._call("getSettingsString"))
+        self.settings = _settings(self._call("getSettingsString"))
+        self._wall = 1 / _clock_speed(self.settings)
         self.take_over()
         self.step = self._physics_step()
         self._due = self._now()
@@ -133,6 +135,51 @@ class Session:
             now = self._later(now, (steps - _SHY) * self.step)
         return (now - began) / 1e9
 
+    def tick(self) -> None:
+        """Let one physics step pass; later stretches make up for it.
+
+        Raises:
+            RpcError: when the simulator's clock does not go on.
+        """
+        self._later(self._now(), (1 - _SHY) * self.step)
+
+    def begin(self, state: RigidState) -> None:
+        """Put the vehicle there, and count time from now."""
+        self.place(state)
+        self._due = self._now()
+
+    def picture(self, camera: str, image_type: int) -> Picture:
+        """What a camera of the vehicle shows now, uncompressed: depth as numbers, all else as colours.
+
+        Raises:
+            RpcError: when the server refuses, as for an unknown camera.
+            ValueError: for an answer that is no such picture.
+        """
+        request = image_request(self.dialect, camera, image_type)
+        more = (False,) * (len(self.dialect.image_parameters) - 2)  # no camera beside the vehicle
+        try:
+            answer = self._call("simGetImages", [request], self.vehicle, *more)
+        except RpcError as error:
+            accepted = "accepted: a camera of the vehicle, as its settings call it"
+            raise RpcError(f"{error} (asked for camera {camera!r}; {accepted})") from None
+        try:
+            return picture(answer, request, self.dialect)
+        except ValueError as error:
+            raise ValueError(f"{self.rpc.where}: simGetImages of camera {camera!r}: {error}") from None
+
+    def field_of_view(self, camera: str) -> float:
+        """Of the longer side of a camera's pictures, degrees. AirSim follows a null pointer where there is no such
+        camera: ask for a picture before.
+
+        Raises:
+            ValueError: for an answer that is no angle.
+        """
+        more = (False,) * (len(self.dialect.camera_parameters) - 2)
+        try:
+            return field_of_view(self._call("simGetCameraInfo", camera, self.vehicle, *more))
+        except ValueError as error:
+            raise ValueError(f"{self.rpc.where}: simGetCameraInfo of camera {camera!r}: {error}") from None
+
     def settle(self) -> RigidState | None:
         """Let the vehicle come to rest with its rotors off; None: it falls, as there is no ground.
 
@@ -153,7 +200,7 @@ class Session:
         self.rpc.close()
 
     def _call(self, method: str, *parameters: Any, timeout: float | None = None) -> Any:
-        assert len(parameters) == len(protocol.METHODS[method])
+        assert method not in protocol.METHODS or len(parameters) == len(protocol.METHODS[method])
         return self.rpc.call(method, *parameters, timeout=timeout)
 
     def _now(self) -> int:
@@ -207,12 +254,17 @@ class Session:
         raise RpcError(f"{self.rpc.where}: the simulator's clock does not go on when simContinueForTime tells it to")
 
 
-def _clock_speed(text: Any) -> float:
-    """The simulator's seconds in a second of the wall clock, by the text of its settings; 1 where it does not say."""
-    speed = None
+def _settings(text: Any) -> dict[str, Any]:
+    """What the text of the settings says; nothing where it is no JSON object."""
     with contextlib.suppress(ValueError, TypeError):
         read = json.loads(text)
-        speed = read.get("ClockSpeed") if isinstance(read, dict) else None
+        return read if isinstance(read, dict) else {}
+    return {}
+
+
+def _clock_speed(settings: dict[str, Any]) -> float:
+    """The simulator's seconds in a second of the wall clock; 1 where its settings do not say."""
+    speed = settings.get("ClockSpeed")
     if isinstance(speed, int | float) and not isinstance(speed, bool) and 1e-3 <= speed <= 1e3:
         return float(speed)
     return 1.0

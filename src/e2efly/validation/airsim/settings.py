@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.policy.images import Image
+from e2efly.validation.airsim.camera import IMAGE_TYPES
 from e2efly.validation.airsim.rpc import PORT
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import inertia_tensor, terms
 
-IMAGE_TYPES = {"depth": 1, "range": 2, "rgb": 0, "normal": 6, "mask": 5}
-"""AirSim's `ImageType` of what a camera shows: planar depth, distance, scene, surface normals, segmentation."""
+CELL = 4
+"""Pixels that a row and a column of the policy's image have at least, where theirs are not square: AirSim's are."""
 
 
 def settings(vehicle: Vehicle, images: Sequence[Image] = (), port: int = PORT) -> dict[str, Any]:
@@ -33,8 +34,8 @@ def settings(vehicle: Vehicle, images: Sequence[Image] = (), port: int = PORT) -
         "AllowAPIAlways": True,
         "RC": {"RemoteControlID": -1, "AllowAPIWhenDisconnected": True},
     }
-    if images:
-        own["Cameras"] = {image.name: _camera(image) for image in images}
+    if cameras := {image.name: _camera(image) for image in images if not _beyond(image)}:
+        own["Cameras"] = cameras
     return {
         "SettingsVersion": 1.2,
         "SimMode": "Multirotor",
@@ -79,34 +80,50 @@ def unsaid(vehicle: Vehicle, images: Sequence[Image] = ()) -> list[tuple[str, st
         for f in terms()
         if getattr(vehicle, f.name) is not None
     ]
-    for image in images:
-        if image.sees not in IMAGE_TYPES:
-            rows.append((f"image {image.name!r}", f"sees {image.sees}", "nowhere"))
-        if (square := _rows(image)) != image.height:
-            fov = " x ".join(f"{math.degrees(angle):.4g}" for angle in image.fov_rad)
-            told = f"{image.height} rows of {fov} degrees"
-            rows.append((f"image {image.name!r}", told, f"AirSim's pixels are square: {square} rows see as much"))
-    return rows
+    return rows + [(f"image {image.name!r}", told, "no camera") for image in images if (told := _beyond(image))]
+
+
+def named(images: Sequence[Image]) -> list[str]:
+    """What `e2efly validate` is told to see by the cameras of the file, an option each."""
+    colour = {"mask": ":RED,GREEN,BLUE"}
+    return [
+        f"--image {image.name}=plant:{image.name}{colour.get(image.sees, '')}" for image in images if not _beyond(image)
+    ]
+
+
+def _beyond(image: Image) -> str | None:
+    """What of an image AirSim's cameras cannot give; None: they can give it."""
+    if image.sees not in IMAGE_TYPES:
+        return f"sees {image.sees}"
+    return None if image.projection == "pinhole" else f"is {image.projection}"
 
 
 def _camera(image: Image) -> dict[str, Any]:
-    """A camera in the vehicle's frame: forward, right, down, m; pitch upwards, degrees."""
+    """A camera in the vehicle's frame: forward, right, down, m; pitch upwards, degrees.
+
+    `simGetCameraInfo` tells the field of view of ImageType -1, the camera itself, so that both have the same.
+    """
     x, y, z = image.position_m
-    capture = {
-        "ImageType": IMAGE_TYPES.get(image.sees, 0),
-        "Width": image.width,
-        "Height": _rows(image),
-        "FOV_Degrees": round(math.degrees(image.fov_rad[0]), 6),
-    }
+    width, height = _size(image)
+    half = math.tan(image.fov_rad[0] / 2) * max(width, height) / width  # Unreal's angle is that of the longer side
+    fov = {"FOV_Degrees": round(math.degrees(2 * math.atan(half)), 6)}
+    kinds = -1, IMAGE_TYPES[image.sees]
     place = {"X": x, "Y": -y + 0.0, "Z": -z + 0.0}
     angles = {"Pitch": round(-math.degrees(image.pitch_rad), 6) + 0.0, "Roll": 0.0, "Yaw": 0.0}
-    return {**place, **angles, "CaptureSettings": [capture]}
+    captures = [{"ImageType": kind, "Width": width, "Height": height, **fov} for kind in kinds]
+    return {**place, **angles, "CaptureSettings": captures}
 
 
-def _rows(image: Image) -> int:
-    """Rows of square pixels that see as high an angle."""
+def _size(image: Image) -> tuple[int, int]:
+    """Columns and rows of square pixels: those of the policy where its own are square, else `CELL` times as many or
+    more, from which its own are made.
+    """
     wide, high = (math.tan(angle / 2) for angle in image.fov_rad)
-    return max(round(image.width * high / wide), 1)
+    rows = image.width * high / wide
+    if abs(rows / image.height - 1) < 1e-3:
+        return image.width, image.height
+    times = math.ceil(CELL * max(1.0, image.height / rows))
+    return image.width * times, math.ceil(rows * times)
 
 
 def _list(values: Any) -> str:

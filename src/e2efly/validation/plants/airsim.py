@@ -1,5 +1,6 @@
 """AirSim as a plant: its vehicle, its flight controller SimpleFlight and its physics, in lockstep over its RPC."""
 
+from collections.abc import Mapping
 from typing import ClassVar, Self, cast
 
 import numpy as np
@@ -7,10 +8,11 @@ import numpy as np
 from e2efly.control import COMMAND_MODES
 from e2efly.deploy.pilot.hover import controlled, rates_of
 from e2efly.deploy.policy.contract import Contract
+from e2efly.validation.airsim.camera import Camera, camera_of, opened, taken
 from e2efly.validation.airsim.model import LONG_S, SPUN_S, differences, hold, measure
 from e2efly.validation.airsim.rpc import PORT, Rpc
 from e2efly.validation.airsim.session import Session
-from e2efly.validation.plant import Plant, RigidState, check_mode
+from e2efly.validation.plant import MOMENT, Plant, RigidState, Shutter, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
@@ -34,6 +36,8 @@ class AirsimPlant(Plant):
     host: ClassVar[str] = "127.0.0.1"
     port: ClassVar[int] = PORT
     named: ClassVar[str] = ""
+    cameras: ClassVar[Mapping[str, str]] = {}
+    """By an image of the contract, the camera of AirSim that gives it."""
 
     @classmethod
     def at(cls, address: str) -> type[Self]:
@@ -48,9 +52,36 @@ class AirsimPlant(Plant):
         port = more[0] if more else str(PORT)
         if len(more) > 2 or not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):
             raise ValueError(f"--plant is airsim:{address}; {accepted}")
-        where = {"host": host or cls.host, "port": int(port), "named": more[1] if len(more) > 1 else ""}
-        made = type(cls.__name__, (cls,), {**where, "__module__": cls.__module__, "__doc__": cls.__doc__})
+        return cls._with(host=host or cls.host, port=int(port), named=more[1] if len(more) > 1 else "")
+
+    @classmethod
+    def seeing(cls, cameras: Mapping[str, str]) -> type[Self]:
+        """The plant by whose `simGetImages` a policy sees."""
+        return cls._with(cameras=dict(cameras))
+
+    @classmethod
+    def _with(cls, **values: object) -> type[Self]:
+        made = type(cls.__name__, (cls,), {**values, "__module__": cls.__module__, "__doc__": cls.__doc__})
         return cast("type[Self]", made)
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, contract: Contract) -> Self:
+        """The plant, with its cameras looked through once.
+
+        Raises:
+            ValueError: for a command mode that is no body rates and thrust in the end, a camera that is not the
+                contract's, or answers that make no sense.
+            OSError: naming the address, when AirSim does not answer or refuses.
+        """
+        images = {image.name: image for image in contract.images}
+        asked = [camera_of(where, images[name]) for name, where in cls.cameras.items()]
+        plant = cls(vehicle, contract.action.mode)
+        try:
+            plant._cameras = [opened(plant._session, camera) for camera in asked]
+        except BaseException:
+            plant.close()
+            raise
+        return plant
 
     @classmethod
     def differences(cls, vehicle: Vehicle, contract: Contract) -> list[str]:
@@ -65,6 +96,7 @@ class AirsimPlant(Plant):
             told = (
                 [] if plant.grounded else ["AirSim's vehicle has no ground to stand on: it falls with its rotors off."]
             )
+            told += [camera.describe() for camera in plant._cameras]
             return told + differences(plant.model, vehicle)
         finally:
             plant.close()
@@ -80,6 +112,10 @@ class AirsimPlant(Plant):
         if COMMAND_MODES[mode].controller is None:
             raise ValueError(f"plant 'airsim' takes no {mode!r} commands; accepted: policies of other modes")
         self.vehicle, self.mode = vehicle, mode
+        self._cameras: list[Camera] = []
+        self._shutters: Mapping[str, Shutter] = {}
+        self._films: dict[str, list[np.ndarray]] = {}
+        self._time = 0.0  # since the last reset, s
         rpc = Rpc(self.host, self.port)
         try:
             self._session = Session(rpc, self.named)
@@ -108,13 +144,34 @@ class AirsimPlant(Plant):
     def reset(self, state: RigidState) -> None:
         """Bring the rotors to hover in level flight a metre above, and put the vehicle there."""
         above = RigidState(state.position + np.array([0.0, 0.0, 1.0]), np.zeros(3), np.eye(4)[0], np.zeros(3))
-        self._place(above)
+        self._session.place(self._there(above))
         hold(self._session, np.zeros(3), self.model.throttle(GRAVITY), SPUN_S)
-        self._place(state)
+        self._session.begin(self._there(state))
         self._look()
+        self._time, self._films = 0.0, {name: [] for name in self._shutters}
+        if self._shutters:
+            self._develop()
+            self._session.begin(self._there(state))  # the pictures may have taken a few physics steps
+            self._look()
 
     def step(self, command: np.ndarray, dt: float) -> None:
         """Hold a command for `dt` s, to within half of AirSim's physics step, which later steps make up for."""
+        end = self._time + dt
+        while self._time < end - MOMENT:
+            until = min([end, *(due for due in self._due() if due > self._time + MOMENT)])
+            self._hold(command, until - self._time)
+            self._time = until
+            self._develop()
+
+    def expose(self, shutters: Mapping[str, Shutter]) -> None:
+        """Take pictures in flight, at the moments of AirSim's clock that the shutters say."""
+        self._shutters = dict(shutters)
+
+    def shown(self, name: str, now: float) -> np.ndarray:
+        """The newest image of a camera that a policy sees at `now`, s since `reset`."""
+        return self._films[name][self._shutters[name].newest(now)]
+
+    def _hold(self, command: np.ndarray, dt: float) -> None:
         longest = LONG_S if self.mode == "ctbr" else OUTER_S
         count = max(int(np.ceil(dt / longest - 1e-9)), 1)
         limit = np.asarray(self.vehicle.body_rate_max, float)
@@ -125,13 +182,26 @@ class AirsimPlant(Plant):
             self._session.advance(dt / count)
             self._look()
 
+    def _due(self) -> list[float]:
+        """When the next image of each camera is to be exposed, s since the last reset."""
+        return [shutter.exposed(len(self._films[name])) for name, shutter in self._shutters.items()]
+
+    def _develop(self) -> None:
+        """Take the images that are due now."""
+        for camera in self._cameras:
+            shutter, film = self._shutters.get(camera.image.name), self._films.get(camera.image.name, [])
+            image = None
+            while shutter is not None and shutter.exposed(len(film)) <= self._time + MOMENT:
+                image = taken(self._session, camera) if image is None else image
+                film.append(image)
+
     def close(self) -> None:
         """Give AirSim back its vehicle, and let it run on."""
         self._session.close()
 
-    def _place(self, state: RigidState) -> None:
-        position = state.position + self._origin
-        self._session.place(RigidState(position, state.velocity, state.quaternion, state.body_rate))
+    def _there(self, state: RigidState) -> RigidState:
+        """A state of our world in AirSim's."""
+        return RigidState(state.position + self._origin, state.velocity, state.quaternion, state.body_rate)
 
     def _look(self) -> None:
         s = self._session.state()
