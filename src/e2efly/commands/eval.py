@@ -13,6 +13,7 @@ from e2efly.commands.options import parse as parse_options
 from e2efly.commands.policies import named_first, values, with_task
 from e2efly.commands.rows import check_stress, report_stress
 from e2efly.config import EnvConfig, TaskConfig
+from e2efly.config.train import TIMED
 from e2efly.storage import write_json
 from e2efly.terminal import Terminal, seconds
 from e2efly.vehicles import Controller
@@ -113,7 +114,7 @@ def run(asked: Asked) -> int:
     found = evaluate(o.policy, o.episodes, env=asked.env, task=asked.task, **flies, kept=ROW if o.json else 0)
     for note in found.candidate.notes:
         console.print(note, style="dim")
-    console.print(_table(found.flown, o.episodes))
+    console.print(_table(found.flown, o.episodes, found.candidate.task.precision not in TIMED))
     if o.json:
         write_json(o.json, found.as_json())
         console.print(f"Report: {o.json}")
@@ -136,7 +137,8 @@ def _folder(o: Eval, flew: "Candidate") -> Path:
     return o.plots or (flew.run.plots if flew.run else beside(flew.file) / "plots")
 
 
-def _table(flown: dict[str, Any], episodes: int) -> Table:
+def _table(flown: dict[str, Any], episodes: int, errs: bool) -> Table:
+    """Success, then failures by their cause, then how well; `errs`: the distance from the goal says something."""
     from e2efly.episodes import summary
 
     found = {name: summary(e) for name, e in flown.items()}
@@ -147,8 +149,12 @@ def _table(flown: dict[str, Any], episodes: int) -> Table:
 
     row("success", lambda s: f"{s['success']:.2%}")
     row("95 % interval", lambda s: "{:.2%} to {:.2%}".format(*s["success_interval_95"]))
-    row("final error", lambda s: f"{100 * s['final_error_m']:.2f} cm")
-    row("mean error", lambda s: f"{100 * s['mean_error_m']:.2f} cm")
+    if any(s["success"] < 1 for s in found.values()):
+        row("crashed or left", lambda s: str(s["crashed"]))
+        row("out of time", lambda s: str(round(s["episodes"] * (1 - s["success"])) - s["crashed"]))
+    if errs:
+        row("final error", lambda s: f"{100 * s['final_error_m']:.2f} cm")
+        row("mean error", lambda s: f"{100 * s['mean_error_m']:.2f} cm")
     row("time of a success", lambda s: seconds(s["seconds_of_success"]))
     row("mean speed", lambda s: "-" if s["mean_speed_m_s"] is None else f"{s['mean_speed_m_s']:.1f} m/s")
     row("top speed", lambda s: f"{s['top_speed_m_s']:.1f} m/s")

@@ -16,6 +16,7 @@ from e2efly import presets
 from e2efly.commands.options import parse as parse_options
 from e2efly.commands.options import peek
 from e2efly.config import ALGORITHMS, EnvConfig, NetworkConfig, RewardConfig, TrainConfig
+from e2efly.config.train import TIMED
 from e2efly.device import Hosts, prepare
 from e2efly.supervised import is_watched, watched
 from e2efly.tasks import TASKS
@@ -165,7 +166,7 @@ class _Shown:
 def _tell(o: Train, again: str, console: Console, summary: dict[str, Any], progress: TerminalProgress) -> int:
     from e2efly.learn.clock import since_process_start
 
-    _report(console, summary, o.config.stop_at)
+    _report(console, summary, o)
     if summary["stopped_by_user"]:
         console.print(f"Stopped; {again}")
         return 130
@@ -180,7 +181,7 @@ def _tell(o: Train, again: str, console: Console, summary: dict[str, Any], progr
     return 0
 
 
-def _report(console: Console, summary: dict[str, Any], stop_at: float | None) -> None:
+def _report(console: Console, summary: dict[str, Any], o: Train) -> None:
     from e2efly.learn.judge import verdict
 
     rows = [
@@ -188,8 +189,15 @@ def _report(console: Console, summary: dict[str, Any], stop_at: float | None) ->
             "policy": f"{name}, {called}",
             "update": summary["last" if which == "last" else "shipped"]["update"],
             "success": f"{d['success']:.1%}",
-            "final error": f"{100 * d['final_error_m']:.1f} cm",
-            "mean error": f"{100 * d['mean_error_m']:.1f} cm",
+            "crashed": d["crashed"],
+            **(
+                {}
+                if o.config.task.precision in TIMED
+                else {
+                    "final error": f"{100 * d['final_error_m']:.1f} cm",
+                    "mean error": f"{100 * d['mean_error_m']:.1f} cm",
+                }
+            ),
             "time": seconds(d["seconds_of_success"]),
             "top speed": f"{d['top_speed_m_s']:.1f} m/s",
         }
@@ -198,8 +206,9 @@ def _report(console: Console, summary: dict[str, Any], stop_at: float | None) ->
         if name != "update"
     ]
     took, steps = summary["seconds_trained_from_process_start"], summary["env_steps"] / 1e6
+    told = verdict(summary, o.config.stop_at)
     console.print(
-        f"\n{verdict(summary, stop_at)}, trained by {took:.1f} s after the start of the process ({steps:.2f} M "
+        f"\n{told}, trained by {took:.1f} s after the start of the process ({steps:.2f} M "
         f"environment steps). Flown from {summary['episodes']} starts that it never saw:"
     )
     console.print(console_table(rows))

@@ -97,6 +97,10 @@ class Robust:
         )
 
 
+TIMED = ("duration", "pace")
+"""Values of `TaskConfig.precision` of tasks flown against time: a distance from the goal says nothing of them."""
+
+
 @dataclass(frozen=True)
 class TaskConfig:
     """Options of a task, and all that commands ask of a task.

@@ -43,9 +43,9 @@ class Compared:
         options = dict(_flat(to_json(run.config())))
         rows = [row for row in run.rows() if "seconds" in row]
         worst = [min(x for name, x in row.items() if name.endswith("/success")) for row in rows]
-        columns = ([row["steps"] for row in rows], [row["seconds"] for row in rows], worst)
+        steps, seconds = (np.array([row[name] for row in rows], float) for name in ("steps", "seconds"))
         ended = run.read_json("summary.json") if (path / "summary.json").is_file() else None
-        return Compared(path, options, *(np.array(column, float) for column in columns), ended)
+        return Compared(path, options, steps, seconds, np.array(worst, float), ended)
 
     @property
     def there(self) -> tuple[float, float] | None:

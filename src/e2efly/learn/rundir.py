@@ -20,7 +20,6 @@ from typing import Any
 
 from e2efly.config import ALGORITHMS, EnvConfig, TrainConfig
 from e2efly.config.reading import read
-from e2efly.learn import history
 from e2efly.learn.inputs import Kept, by_content, content_of, input_files, replaced, sha256, value_at
 from e2efly.presets import preset
 from e2efly.storage import held, write_atomically, write_json
@@ -256,6 +255,8 @@ class RunDirectory:
         """Drop metrics and policies of updates that a resumed run will do again, and files that a killed one had not
         finished.
         """
+        from e2efly.learn import history  # which needs JAX
+
         for part in (*self.path.glob("*.part"), *self.history.glob("*.part")):
             part.unlink()
         history.forget_after(self.history, update)
