@@ -69,6 +69,12 @@ def raise_at_interrupt() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def be_idle() -> None:
+    """Let this process, and the threads that it starts from now on, compute only while no other wants a core."""
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+
+
 def be_punctual(priority: int) -> None:
     """Let nothing hold up this process, whose work must not wait: neither other processes nor its own memory.
 

@@ -1,15 +1,21 @@
 """Recorded flights in the viewer, and films."""
 
+import json
+import socket
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from e2efly.cli import run
+from e2efly.deploy.pose.sources import open_source
 from e2efly.scenes.faces import box
+from e2efly.validation.room import free_port
 from e2efly.vehicles import load_vehicle
 from e2efly.watch.film import Soup, film, picture
 from e2efly.watch.frames import Frame
+from e2efly.watch.poses import Poses
 from e2efly.watch.recording import PERIOD, Recording, read_flight
 from e2efly.watch.shapes import mesh_of
 
@@ -79,3 +85,24 @@ def test_ghosts_are_flown_with_the_first(tmp_path: Path) -> None:
     assert len(pictures) == 3
     frame: Frame = Recording(flights, vehicle).step(0)
     assert frame.position.shape == (2, 3)
+
+
+def test_a_pose_source_is_watched_until_it_is_lost() -> None:
+    port = free_port()
+    shown, source = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), open_source(f"udp:{port}")
+    with shown:
+        poses = Poses(source, load_vehicle("vis_r"))
+        assert "no good pose" in poses.step(0).note
+        for i in range(40):
+            pose = {"stamp": 0.01 * i, "position": [0.02 * i, 0.0, 1.0 + 1e-6 * i], "quaternion": [1.0, 0.0, 0.0, 0.0]}
+            shown.sendto(json.dumps(pose).encode(), ("127.0.0.1", port))
+            time.sleep(0.01)
+            frame = poses.step(0)
+        assert np.allclose(frame.position[0], [0.78, 0.0, 1.0], atol=0.05)
+        assert frame.rotor_speed.all()
+        time.sleep(0.4)
+        lost = poses.step(0)
+    source.close()
+    assert "no good pose" in lost.note
+    assert not lost.rotor_speed.any()
+    assert np.allclose(lost.position, frame.position)

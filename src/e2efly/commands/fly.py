@@ -8,7 +8,7 @@ import time
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tyro
 
@@ -51,6 +51,10 @@ SLOWEST = 0.5
 """Largest `--latency`, s: behind more no gains hold a hover."""
 
 
+if TYPE_CHECKING:
+    from e2efly.watch.beside import Shown
+
+
 @dataclass(frozen=True)
 class Fly:
     """Fly on a Betaflight quadrotor; the pilot's switches decide. See docs/flying.md before the first flight."""
@@ -80,6 +84,8 @@ class Fly:
     live: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Where to publish the flight while it lasts: foxglove[:[HOST:]PORT], ros1[:/PREFIX], ros2[:/PREFIX],
     mcap:FILE.mcap or bag:FILE.bag; may be repeated. See docs/telemetry.md."""
+    watch: int | None = None
+    """Port of a page of 127.0.0.1 that shows the vehicle in flight, by a process of its own. See docs/watch.md."""
     throttle_map: Path | None = None
     """Throttle map that an earlier flight learned (.throttle.json)."""
     watchdog: bool = True
@@ -193,7 +199,10 @@ def run(options: Fly) -> int:
         stack.callback(stop.restore)
         path = options.log or Path("flights") / time.strftime("%Y-%m-%d_%H-%M-%S.mcap")
         telemetry = stack.enter_context(Telemetry(path))
-        log = Logs((telemetry, live)) if targets else telemetry
+        shown = _shown(options, body.name)
+        if shown is not None:
+            stack.callback(shown.close)
+        log = Logs((telemetry, *([live] if targets else []), *([] if shown is None else [shown])))
         bridge.log = log
         _record_meta(log, bridge, body, contract.to_json() if contract else "", rows)
         rate = loop_rate(contract.control_rate_hz) if contract else LOWEST_RATE
@@ -206,6 +215,8 @@ def run(options: Fly) -> int:
 
         for line in live.describe():
             say(f"live {line}")
+        if shown is not None:
+            say(f"watch it at {shown.page.address}")
         say(f"{rate:g} Hz, log {path}. Ctrl-C lands.")
         timing = fly(
             bridge, rate, log=log, live=live, watchdog=held if isinstance(held, WatchedLink) else None, say=say,
@@ -227,6 +238,15 @@ def run(options: Fly) -> int:
             say(f"Next: e2efly identify flight {path} --vehicle {options.vehicle} --mass KG SIGMA")
         say(f"Next: e2efly fly-report {path}; throttle map: {path.with_suffix('.throttle.json')}")
         return 0
+
+
+def _shown(options: Fly, vehicle: str) -> "Shown | None":
+    """The page of `--watch`."""
+    if options.watch is None:
+        return None
+    from e2efly.watch.beside import Shown
+
+    return Shown(options.watch, "--vehicle", options.vehicle or vehicle)
 
 
 def _worker(

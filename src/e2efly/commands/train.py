@@ -135,11 +135,9 @@ def _page(o: Train) -> "Beside | None":
     """
     if o.watch is None or o.hosts.index > 0:
         return None
-    if not 0 <= o.watch <= 65535:
-        raise ValueError(f"--watch is {o.watch}; accepted: a port, 1 to 65535, or 0 for any")
     from e2efly.watch.beside import Beside
 
-    return Beside(o.out, "127.0.0.1", o.watch)
+    return Beside(o.watch, str(o.out))
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import tyro
 
+from e2efly.process import be_idle
 from e2efly.terminal import Terminal
 
 if TYPE_CHECKING:
@@ -37,8 +38,10 @@ class Watch:
     """
 
     what: tyro.conf.Positional[tuple[str, ...]]
-    """A task (the zoo's policy of it), a policy.onnx, a run's folder; or flight logs, as many as wanted: the first is
-    followed, the others are its ghosts."""
+    """A task (the zoo's policy of it), a policy.onnx, a run's folder; flight logs, as many as wanted: the first is
+    followed, the others are its ghosts; or a pose source, as of `e2efly fly`: udp:PORT, ros1:/topic, ..."""
+    world: str | None = None
+    """Of a pose source: a policy in whose world the vehicle is, which `--seed` draws, as `e2efly hil` does."""
     vehicle: str | None = None
     """A shipped vehicle or a .toml file; left out: the policy's, or the log's."""
     criterion: str | None = None
@@ -53,6 +56,8 @@ class Watch:
     """Of the page; 0: any that is free."""
     seconds: float | None = None
     """End after so long; left out: at Ctrl-C. Of a video, its length; left out: 8 s, or the log's."""
+    idle: bool = False
+    """Compute only while no other process wants a core."""
     video: Path | None = None
     """Draw no page, but this file: .gif, .mp4, .webm, or .png, a picture of the last moment."""
     camera: Literal["follow", "orbit", "first person"] = "follow"
@@ -74,6 +79,8 @@ def run(options: Watch) -> int:
     if o.seconds is not None and not 0 < o.seconds < math.inf:
         raise ValueError(f"--seconds is {o.seconds}; accepted: more than 0")
     logs = _logs(o.what)
+    if o.idle:
+        be_idle()
     if o.video is not None:
         return _draw(o, o.video, logs, console)
     from e2efly.watch.viewer import serve
@@ -116,10 +123,49 @@ def _serve(o: Watch, server: Any, logs: list[Path]) -> None:
         between = times_on(panel, recording)
         loop(recording, panel.viewer, panel, lambda: time.monotonic() > end, between)
         return
+    if _is_source(o.what[0]):
+        with _poses(o) as poses:
+            loop(poses, panel.viewer, panel, lambda: time.monotonic() > end)
+        return
     with _flown(o, Terminal()) as (simulation, progress):
         hands_on(panel, simulation)
         between = (lambda: None) if progress is None else policies_on(panel, progress)
         loop(simulation, panel.viewer, panel, lambda: time.monotonic() > end, between)
+
+
+def _is_source(text: str) -> bool:
+    """Whether it names a pose source, and nothing else."""
+    from e2efly.deploy.pose.sources import SOURCES
+
+    return text.partition(":")[0] in SOURCES and ":" in text
+
+
+@contextmanager
+def _poses(o: Watch) -> "Iterator[Any]":
+    """A vehicle where a pose source sees it."""
+    from e2efly.deploy.pose.sources import open_source
+    from e2efly.scenes.faces import bodies
+    from e2efly.vehicles import load_vehicle
+    from e2efly.watch.poses import Poses
+
+    stands = ()
+    if o.world is not None:
+        from e2efly.device import prepare
+
+        prepare("cpu")
+        from e2efly.evaluation import candidate
+        from e2efly.validation.scenery import Scenery
+
+        found = candidate(o.world, o.vehicle)
+        scenery = Scenery.draw(
+            found.environment(found.task.criteria()[_criterion(o.criterion, found.task.criteria())]), o.seed
+        )
+        stands = () if scenery is None else tuple(bodies(scenery.scene, 0, ceilings=True))
+    source = open_source(o.what[0])
+    try:
+        yield Poses(source, load_vehicle(o.vehicle or USUAL), stands)
+    finally:
+        source.close()
 
 
 def _draw(o: Watch, path: Path, logs: list[Path], console: Terminal) -> int:
@@ -127,6 +173,8 @@ def _draw(o: Watch, path: Path, logs: list[Path], console: Terminal) -> int:
     from e2efly.watch.film import film
 
     check_film(path)
+    if _is_source(o.what[0]):
+        raise ValueError(f"--video is {path}, of {o.what[0]}; accepted: of a policy, a run or flight logs")
     if logs:
         recording = _recording(o, logs)
         source: Source = recording

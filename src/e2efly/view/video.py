@@ -97,7 +97,7 @@ def check_film(path: Path) -> None:
 
 
 def write_film(film: Iterable[Frame], path: Path, period: float) -> None:
-    """Write pictures as one file, by its suffix: GIF, MP4 (H.264 by the program ffmpeg), WebM (VP9 by OpenCV), or PNG
+    """Write pictures as one file, by its suffix: GIF, MP4 (H.264 by the program ffmpeg), WebM (VP8 by OpenCV), or PNG
     of the last one.
 
     Args:
@@ -135,7 +135,7 @@ def _webm(film: Iterable[Frame], path: Path, period: float) -> None:
     writer = None
     for frame in film:
         if writer is None:
-            code = cv2.VideoWriter.fourcc(*"VP90")
+            code = cv2.VideoWriter.fourcc(*"VP80")
             writer = cv2.VideoWriter(str(path), code, 1 / period, (frame.shape[1], frame.shape[0]))
             if not writer.isOpened():
                 raise OSError(f"OpenCV cannot write {path}")

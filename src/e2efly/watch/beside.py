@@ -1,58 +1,55 @@
-"""The viewer of a training, as a process that computes only while the training leaves a core idle."""
+"""The viewer as a process beside a training or a flight, which computes only while those leave a core idle."""
 
-import os
+import json
+import socket
 import subprocess
 import sys
 from contextlib import suppress
-from pathlib import Path
+from typing import Any
 
 from e2efly.watch.viewer import free_port
 
+HOST = "127.0.0.1"
+"""Where the page is served, and where it gets poses."""
+
 
 class Beside:
-    """`e2efly watch RUN` beside the training that makes the run. Whatever becomes of it, the training goes on."""
+    """`e2efly watch WHAT` beside what makes it. Whatever becomes of the viewer, that goes on."""
 
-    def __init__(self, run: Path, host: str, port: int) -> None:
+    def __init__(self, port: int, *what: str) -> None:
         """Find a port; the process begins with `begin`.
 
+        Args:
+            port: of the page; 0: any.
+            what: arguments of `e2efly watch`.
+
         Raises:
-            ValueError: where viser is not installed; where the port is in use.
-            OSError: for an address that this machine does not have.
+            ValueError: for a port that there is not, or that is in use; where viser is not installed.
         """
-        self.run, self.host, self.port = run, host, free_port(host, port)
+        if not 0 <= port <= 65535:
+            raise ValueError(f"--watch is {port}; accepted: a port, 1 to 65535, or 0 for any")
+        self.what, self.port = what, free_port(HOST, port)
         self._process: subprocess.Popen[bytes] | None = None
 
     @property
     def address(self) -> str:
         """Of the page."""
-        return f"http://{self.host}:{self.port}"
+        return f"http://{HOST}:{self.port}"
 
     def begin(self) -> None:
         """Start the process, unless it was started already."""
         if self._process is not None:
             return
-        command = [
-            sys.executable,
-            "-m",
-            "e2efly",
-            "watch",
-            str(self.run),
-            "--host",
-            self.host,
-            "--port",
-            str(self.port),
-        ]
+        where = ["--idle", "--host", HOST, "--port", str(self.port)]
         self._process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            start_new_session=True, preexec_fn=_idle,
+            [sys.executable, "-m", "e2efly", "watch", *self.what, *where], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            start_new_session=True,
         )  # fmt: skip
 
     def wait(self) -> None:
         """Until somebody ends it with Ctrl-C, which ends it here, too."""
         with suppress(KeyboardInterrupt):
             if self._process is not None:
-                with suppress(OSError, AttributeError):
-                    os.sched_setscheduler(self._process.pid, os.SCHED_OTHER, os.sched_param(0))
                 self._process.wait()
 
     def close(self) -> None:
@@ -64,8 +61,39 @@ class Beside:
             self._process.kill()
 
 
-def _idle() -> None:
-    """Compute only while nobody else wants the core."""
-    with suppress(OSError, AttributeError):
-        os.nice(19)
-        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+class Shown:
+    """A log, as of a flight, that shows the vehicle on a page. It sends datagrams, which wait for nobody."""
+
+    def __init__(self, port: int, *what: str) -> None:
+        """Start the viewer.
+
+        Args:
+            port: of the page; 0: any.
+            what: more arguments of `e2efly watch`.
+
+        Raises:
+            ValueError: for a port that there is not, or that is in use; where viser is not installed.
+        """
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind((HOST, 0))
+            self._to = probe.getsockname()
+        self.page = Beside(port, f"udp:{self._to[1]}", *what)
+        self.page.begin()
+
+    def record(self, channel: str, time: float, values: dict[str, Any]) -> None:
+        """Show an odometry; what else there is is left out."""
+        if channel == "odometry" and values.get("position") is not None and values.get("quaternion") is not None:
+            self.show(time, values["position"], values["quaternion"])
+
+    def show(self, time: float, position: Any, quaternion: Any) -> None:
+        """Show the vehicle at a place, (3,) m, in an attitude, (4,) wxyz, at a time, s."""
+        pose = {"stamp": time, "position": [*map(float, position)], "quaternion": [*map(float, quaternion)]}
+        with suppress(OSError):
+            self._socket.sendto(json.dumps(pose).encode(), self._to)
+
+    def close(self) -> None:
+        """End the viewer."""
+        self._socket.close()
+        self.page.close()

@@ -118,7 +118,7 @@ def film(
     stage: Stage | None = None
     still = Soup.of(())
     angle, past, eye = np.zeros((1, 4)), deque[np.ndarray](maxlen=TRAIL), np.zeros(3)
-    flown, shown = 0.0, -np.inf
+    flown, due = 0.0, 0.0
     while flown < seconds - 1e-9:
         frame = source.step(0)
         flown += source.period
@@ -132,9 +132,9 @@ def film(
         past.append(here.copy())
         shape = quadrotor(stage.vehicle)
         angle = (angle + shape.spin * frame.rotor_speed / SLOWEST * source.period) % (2 * np.pi)
-        if flown - shown < 1 / rate - 1e-9:
+        if flown < due - 1e-9:
             continue
-        shown = flown
+        due += 1 / rate
         moved = Soup(still.triangles + source.origin, still.colour)
         soup = moved + _moving(stage, frame.time, source.origin) + _flying(stage, frame, angle) + _trail(past)
         ahead = turned(frame.quaternion[0], np.array([1.0, 0.0, 0.0]))
