@@ -42,8 +42,8 @@ class Beside:
             return
         where = ["--idle", "--host", HOST, "--port", str(self.port)]
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "e2efly", "watch", *self.what, *where], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            start_new_session=True,
+            [sys.executable, "-m", "e2efly", "watch", *self.what, *where], start_new_session=True,
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
 
     def wait(self) -> None:

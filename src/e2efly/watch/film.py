@@ -118,7 +118,7 @@ def film(
     stage: Stage | None = None
     still = Soup.of(())
     angle, past, eye = np.zeros((1, 4)), deque[np.ndarray](maxlen=TRAIL), np.zeros(3)
-    flown, due = 0.0, 0.0
+    flown, due = 0.0, 1 / rate
     while flown < seconds - 1e-9:
         frame = source.step(0)
         flown += source.period
