@@ -182,8 +182,9 @@ def _draw(o: Watch, path: Path, logs: list[Path], console: Terminal) -> int:
     else:
         with _flown(o, console) as (source, _):
             seconds = o.seconds or FILM_S
+    rate = 1 / seconds if path.suffix == ".png" else FILM_HZ  # of a still, the last moment alone
     with console.status(f"Drawing {seconds:g} s of flight"):
-        write_film(film(source, seconds, FILM_HZ, o.camera), path, 1 / FILM_HZ)
+        write_film(film(source, seconds, rate, o.camera), path, 1 / rate)
     console.print(f"Video: {path}")
     return 0
 
