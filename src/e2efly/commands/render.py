@@ -25,7 +25,8 @@ class Render:
     """Draw what sensors see of a world: pictures, a contact sheet with every noise, and a video of a flight."""
 
     scene: tyro.conf.Positional[str]
-    """forest, clutter, room, corridor, garage, terrain, warehouse, a race track, or a .toml, .glb, .obj, .ply file."""
+    """forest, clutter, room, corridor, garage, terrain, warehouse, a race track, or a file: .toml, .glb, .obj, .ply,
+    .stl."""
     camera: Literal["d435i", "fpv", "down", "lidar"] = "d435i"
     """The sensor of the pictures and the video: a RealSense, an FPV camera, one that looks down, a LiDAR."""
     width: int | None = None
