@@ -7,6 +7,7 @@ import time
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import e2efly
 from e2efly.deploy.log.live import Live, targets_of
@@ -24,12 +25,14 @@ TAKE = """
 import json, sys, threading
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import BatteryState, Image, Imu, Joy
+from sensor_msgs.msg import BatteryState, CameraInfo, Image, Imu, Joy
 from std_msgs.msg import Float32MultiArray, String
 def seconds(stamp):
     return stamp.sec + 1e-9 * stamp.nanosec if hasattr(stamp, "sec") else stamp.to_sec()
+camera = "camera/" + sys.argv[2]
 kinds = {"odometry": Odometry, "imu": Imu, "command": TwistStamped, "battery": BatteryState, "rc": Joy, "mode": String,
-         "policy/observation": Float32MultiArray, "policy/action": Float32MultiArray, "image/" + sys.argv[2]: Image}
+         "policy/observation": Float32MultiArray, "policy/action": Float32MultiArray, camera + "/image": Image,
+         camera + "/camera_info": CameraInfo}
 missing, one = set(kinds), threading.Lock()  # topics come by threads of their own
 def take(name, m):
     with one:
@@ -49,7 +52,15 @@ def tell(name, m):
         said = [m.voltage, m.current, len(m.cell_voltage)]
     elif name == "rc":
         said = list(m.axes)
-    elif name.startswith("image"):
+    elif name == "/tf":
+        said = [[t.header.frame_id, t.child_frame_id, seconds(t.header.stamp)]
+                + [getattr(t.transform.translation, c) for c in "xyz"]
+                + [getattr(t.transform.rotation, c) for c in "wxyz"]
+                for t in m.transforms]
+    elif name.endswith("camera_info"):
+        k, p, d = (getattr(m, c, getattr(m, c.lower(), None)) for c in "KPD")
+        said = [m.height, m.width, m.distortion_model, list(k), list(p), list(d), m.header.frame_id]
+    elif name.endswith("image"):
         said = [m.height, m.width, m.encoding, m.step, bytes(m.data).hex()]
     else:
         said = m.data if name == "mode" else list(m.data)
@@ -109,7 +120,7 @@ def heard(target: str, prefix: str, command: list[str]) -> Heard:
             live.record("mode", now, MODE)
             live.show([Seen(CAMERA, Frame(now, IMAGE))])
             time.sleep(0.02)
-        subscriber.wait_for(10, time.monotonic() + 2)
+        subscriber.wait_for(11, time.monotonic() + 2)
         live.close()
         assert live.problems == []
         return subscriber.heard
@@ -121,10 +132,12 @@ def heard(target: str, prefix: str, command: list[str]) -> Heard:
 def check(said: Heard) -> None:
     """What `heard` flew, in ROS's words."""
     values = {name: value for name, (_, value) in said.items()}
-    image = f"image/{CAMERA.name}"
-    assert set(values) == {
+    image, info = f"camera/{CAMERA.name}/image", f"camera/{CAMERA.name}/camera_info"
+    assert set(values) - {"/tf"} == {
         "ready", "odometry", "imu", "command", "battery", "rc", "mode", "policy/observation", "policy/action", image,
+        info,
     }  # fmt: skip
+    check_info(*values[info])
     for name, (stamp, _) in said.items():
         assert stamp is None or abs(stamp - time.time()) < 120, name
     np.testing.assert_allclose(values["odometry"][:6], [1, 2, 3, 0, -4, 0.5], atol=1e-9)
@@ -139,6 +152,38 @@ def check(said: Heard) -> None:
     height, width, encoding, step, data = values[image]
     assert (height, width, encoding, step) == (*CAMERA.shape, "32FC1", 4 * CAMERA.width)
     np.testing.assert_array_equal(np.frombuffer(bytes.fromhex(data), "<f4").reshape(CAMERA.shape), IMAGE)
+
+
+def check_info(height: int, width: int, model: str, k: Any, p: Any, d: Any, frame: str) -> None:
+    """Of the camera: a ray through the edge of the image is half of the field of view aside."""
+    assert (height, width, model, frame) == (*CAMERA.shape, "plumb_bob", f"{CAMERA.name}_optical")
+    np.testing.assert_allclose(np.reshape(p, (3, 4))[:, :3], np.reshape(k, (3, 3)))
+    assert not np.any(d)
+    for size, focal, middle, angle in ((width, k[0], k[2], CAMERA.fov_rad[0]), (height, k[4], k[5], CAMERA.fov_rad[1])):
+        np.testing.assert_allclose(
+            [(-0.5 - middle) / focal, (size - 0.5 - middle) / focal], np.tan([-angle / 2, angle / 2])
+        )
+
+
+def check_transforms(found: list[list[Any]]) -> None:
+    """The body in the room and the camera on the body, as rviz asks for them: the camera looks along the nose."""
+    assert [each[:2] for each in found] == [["map", "base_link"], ["base_link", f"{CAMERA.name}_optical"]]
+    body, camera = (np.array(each[3:], float) for each in found)
+    np.testing.assert_allclose(body, [1, 2, 3, HALF, 0, 0, HALF], atol=1e-9)
+    np.testing.assert_allclose(camera[:3], CAMERA.position_m)
+    turn = Rotation.from_quat(camera[3:], scalar_first=True)
+    down = np.array([np.cos(CAMERA.pitch_rad), 0, -np.sin(CAMERA.pitch_rad)])
+    np.testing.assert_allclose(turn.apply([0, 0, 1]), down, atol=1e-9)
+    np.testing.assert_allclose(turn.apply([1, 0, 0]), [0, -1, 0], atol=1e-9)
+
+
+def opened(target: str) -> list[str]:
+    """What is said of an outlet that was opened."""
+    live = Live(targets_of([target]))
+    try:
+        return live.describe()
+    finally:
+        live.close()
 
 
 def latched(target: str, prefix: str, command: list[str]) -> Heard:

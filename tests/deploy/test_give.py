@@ -1,8 +1,11 @@
 """Images that a node gives to other computers: over TCP, with the reader's clock."""
 
+import signal
 import socket
+import threading
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -11,7 +14,7 @@ from e2efly.deploy.policy.loader import load_policy
 from e2efly.deploy.process.image_stream import IMAGE, MESSAGE, PING, PING_MAGIC, Clocks, image, unpacked
 from e2efly.deploy.sight.give import Output, give, outputs
 from e2efly.deploy.sight.shared import SharedImages, place
-from e2efly.deploy.sight.source import Frame
+from e2efly.deploy.sight.source import Frame, ImageSource
 from e2efly.deploy.sight.sources import open_image
 from e2efly.zoo import policy_file
 
@@ -39,6 +42,33 @@ def depth(seed: int) -> np.ndarray:
     return np.random.default_rng(seed).uniform(0.3, 9.9, CAMERA.shape).astype(np.float32)
 
 
+@contextmanager
+def publishing(images: SharedImages) -> Iterator[None]:
+    """Images all the while."""
+    stop = threading.Event()
+
+    def publish() -> None:
+        while not stop.wait(0.05):
+            images.publish(time.monotonic(), depth(0))
+
+    publisher = threading.Thread(target=publish)
+    publisher.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        publisher.join()
+
+
+def wait_for_problem(source: ImageSource, said: str) -> None:
+    """Until the source tells a problem with these words."""
+    end = time.monotonic() + 20
+    while source.problem is None or said not in source.problem:
+        assert time.monotonic() < end, source.problem
+        source.read(0.0)
+        time.sleep(0.02)
+
+
 def received(source: object, images: SharedImages, seed: int) -> tuple[Frame, float, np.ndarray]:
     """An image that was published and came through."""
     end = time.monotonic() + 10
@@ -59,21 +89,8 @@ def test_images_come_over_tcp_with_the_time_of_their_exposure(images: SharedImag
     port = free_port()
     giver = give(CAMERA, NAME, Output("tcp", str(port), exact), "127.0.0.1")
     try:
-        import threading
-
-        stop = threading.Event()
-
-        def publish() -> None:
-            while not stop.wait(0.05):
-                images.publish(time.monotonic(), depth(0))
-
-        first = threading.Thread(target=publish)
-        first.start()  # a source opens with its first image
-        try:
+        with publishing(images):  # a source opens with its first image
             source = open_image(f"hil:127.0.0.1:{port}", CAMERA)
-        finally:
-            stop.set()
-            first.join()
         frame, at, shown = received(source, images, 1)
         assert abs(frame.time - at) < 0.005  # the same clock on both sides
         if exact:
@@ -82,14 +99,55 @@ def test_images_come_over_tcp_with_the_time_of_their_exposure(images: SharedImag
             np.testing.assert_allclose(frame.image, shown, atol=0.51e-3)
             assert np.any(frame.image != shown)
         assert "clocks agree within" in source.describe()
-        giver.close()
-        end = time.monotonic() + 5
-        while source.problem is None and time.monotonic() < end:
-            source.read(0.0)
-            time.sleep(0.02)
-        assert "has ended the stream" in str(source.problem)
         source.close()
     finally:
+        giver.close()
+
+
+def test_a_node_that_dies_is_looked_for_until_it_is_back(images: SharedImages) -> None:
+    port = free_port()
+    giver = give(CAMERA, NAME, Output("tcp", str(port), True), "127.0.0.1")
+    with publishing(images):
+        source = open_image(f"hil:127.0.0.1:{port}", CAMERA)
+    try:
+        for seed in (1, 100):  # it dies twice
+            before, _, _ = received(source, images, seed)
+            assert source.problem is None
+            giver.process.kill()
+            giver.process.wait()
+            wait_for_problem(source, "")
+            assert source.problem == f"hil:127.0.0.1:{port}: connection lost, trying again"
+            images.publish(time.monotonic(), depth(50))
+            time.sleep(0.5)
+            assert source.read(0.0) == []  # what nobody gives is not there, and nothing is repeated
+            giver.close()
+            giver = give(CAMERA, NAME, Output("tcp", str(port), True), "127.0.0.1")
+            frame, at, shown = received(source, images, seed + 200)
+            np.testing.assert_array_equal(frame.image, shown)
+            assert abs(frame.time - at) < 0.005  # by clocks that were measured anew
+            assert frame.time > before.time
+            assert source.problem is None
+    finally:
+        source.close()
+        giver.close()
+
+
+def test_a_node_that_is_silent_is_lost_and_one_with_other_images_is_named(images: SharedImages) -> None:
+    port = free_port()
+    giver = give(CAMERA, NAME, Output("tcp", str(port), True), "127.0.0.1")
+    try:
+        with publishing(images):
+            source = open_image(f"hil:127.0.0.1:{port}", CAMERA)
+        giver.process.send_signal(signal.SIGSTOP)  # a cable that is pulled: nothing comes, and no end either
+        wait_for_problem(source, "connection lost, trying again")
+        giver.process.kill()
+        giver.close()
+        giver = give(CAMERA, NAME, Output("tcp", str(port)), "127.0.0.1")  # uint16 now
+        with publishing(images):
+            wait_for_problem(source, "its images have become")
+        source.close()
+    finally:
+        giver.process.kill()
         giver.close()
 
 
@@ -160,7 +218,6 @@ def test_a_server_that_is_none_is_named() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         server.settimeout(10)
-        import threading
 
         def answer() -> None:
             connection, _ = server.accept()

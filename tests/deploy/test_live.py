@@ -5,6 +5,7 @@ import os
 import signal
 import socket
 import statistics
+import struct
 import subprocess
 import sys
 import time
@@ -31,6 +32,7 @@ from e2efly.deploy.sight.source import Frame
 from e2efly.deploy.sight.watch import Seen
 from tests.conftest import NetworkTrace
 from tests.deploy.foxglove_client import FoxgloveClient
+from tests.deploy.live_ros import check_info, check_transforms
 
 CONTRACT: Contract = e2efly.load_policy("avoid").contract
 CAMERA = CONTRACT.images[0]
@@ -39,6 +41,7 @@ ODOMETRY: dict[str, Any] = {
     "age": 0.004, "position": [1.0, 2.0, 3.0], "velocity": [4.0, 0.0, 0.5], "quaternion": [HALF, 0.0, 0.0, HALF],
     "body_rate": [0.1, 0.2, 0.3],
 }  # fmt: skip
+INFO = f"/camera/{CAMERA.name}/camera_info"
 MODE = {"mode": "POLICY", "previous": "HOVER", "reasons": ["switch"]}
 
 
@@ -88,9 +91,11 @@ def test_foxglove_hears_the_channels_of_the_log_the_pose_and_the_image(
     assert host == "127.0.0.1"
     live.record("mode", time.monotonic(), MODE)  # before anybody listens
     client = FoxgloveClient(host, int(port))
-    image = f"/image/{CAMERA.name}"
-    offered = client.advertised(*CHANNELS, "/tf", image)
-    assert set(offered) == {*CHANNELS, "/tf", image}
+    image = f"/camera/{CAMERA.name}/image"
+    info = f"/camera/{CAMERA.name}/camera_info"
+    offered = client.advertised(*CHANNELS, "/tf", image, info)
+    assert set(offered) == {*CHANNELS, "/tf", image, info}
+    assert offered[info]["schemaName"] == "foxglove.CameraCalibration"
     assert "[m/s]" in json.loads(offered["odometry"]["schema"])["properties"]["velocity"]["description"]
     assert (offered["/tf"]["schemaName"], offered[image]["schemaName"]) == (
         "foxglove.FrameTransform",
@@ -110,6 +115,17 @@ def test_foxglove_hears_the_channels_of_the_log_the_pose_and_the_image(
     assert json.loads(data) == {"gyro": [1.0, None, 3.0]}
     assert abs(stamp - stamp_of(start)) < 50e6
     assert picture().astype("<f4").tobytes() in client.message(image)[1]
+    client.subscribe(info, "/tf")
+    for _ in range(50):
+        live.record("odometry", time.monotonic(), ODOMETRY)
+        live.show([Seen(CAMERA, Frame(time.monotonic(), picture()))])
+        time.sleep(0.01)
+    calibration = client.message(info)[1]
+    focal = CAMERA.width / 2 / np.tan(CAMERA.fov_rad[0] / 2)
+    assert struct.pack("<d", focal) in calibration and f"{CAMERA.name}_optical".encode() in calibration
+    placed = client.message("/tf")[1], client.message("/tf")[1]
+    assert any(b"map" in each and b"base_link" in each for each in placed)
+    assert any(b"base_link" in each and f"{CAMERA.name}_optical".encode() in each for each in placed)
     live.close()
     client.close()
     assert live.problems == []
@@ -132,8 +148,10 @@ def test_an_mcap_file_says_in_ros_2_s_words_what_was_recorded(tmp_path: Path, li
             found.setdefault(channel.topic, []).append((message.log_time, read))
         summary = reader.get_summary()
     assert summary is not None
-    image_topic = f"/image/{CAMERA.name}"
-    assert {channel.topic for channel in summary.channels.values()} == {topic.name for topic in TOPICS} | {image_topic}
+    image_topic = f"/camera/{CAMERA.name}/image"
+    assert {channel.topic for channel in summary.channels.values()} == {topic.name for topic in TOPICS} | {
+        image_topic, INFO, "/tf",
+    }  # fmt: skip
     check_messages(found, start)
 
 
@@ -152,9 +170,10 @@ def test_a_bag_says_in_ros_1_s_words_what_was_recorded(tmp_path: Path, lives: li
 
 def check_messages(found: dict[str, list[tuple[int, Any]]], start: float) -> None:
     """What `fly` recorded, by topic."""
-    image_topic = f"/image/{CAMERA.name}"
+    image_topic = f"/camera/{CAMERA.name}/image"
     assert {topic: len(messages) for topic, messages in found.items()} == {
         "/odometry": 20, "/imu": 20, "/mode": 1, "/policy/observation": 20, "/policy/action": 20, image_topic: 1,
+        INFO: 1, "/tf": 20,
     }  # fmt: skip
     stamp, odometry = found["/odometry"][3]
     assert abs(stamp - stamp_of(start + 0.03)) < 50e6
@@ -166,7 +185,17 @@ def check_messages(found: dict[str, list[tuple[int, Any]]], start: float) -> Non
     assert np.isnan(imu.linear_acceleration.y) and imu.linear_acceleration.z == 9.81
     np.testing.assert_array_equal(found["/policy/observation"][0][1].data, [0, 1, 2])
     assert found["/mode"][0][1].data == "HOVER -> POLICY: switch"
-    image = found[image_topic][0][1]
+    image, info = found[image_topic][0][1], found[INFO][0][1]
+    assert info.header.stamp == image.header.stamp
+    k, p, d = (getattr(info, name, getattr(info, name.lower(), None)) for name in "KPD")
+    check_info(info.height, info.width, info.distortion_model, k, p, d, info.header.frame_id)
+    placed = found["/tf"][3][1].transforms
+    assert placed[0].header.stamp == header  # when the odometry was true
+    check_transforms([
+        [each.header.frame_id, each.child_frame_id, None, *(getattr(each.transform.translation, c) for c in "xyz"),
+         *(getattr(each.transform.rotation, c) for c in "wxyz")]
+        for each in placed
+    ])  # fmt: skip
     assert (image.height, image.width, image.encoding) == (*CAMERA.shape, "32FC1")
     assert image.step * image.height == len(image.data)
     np.testing.assert_array_equal(image.data.view("<f4").reshape(CAMERA.shape), picture().astype("<f4"))
@@ -213,7 +242,7 @@ def test_a_process_that_stands_still_costs_the_loop_nothing_and_the_log_no_messa
 def test_a_browser_that_stalls_holds_up_neither_the_process_nor_another_browser(lives: list[Live]) -> None:
     live = Live(targets_of(["foxglove:0"]), [CAMERA])
     lives.append(live)
-    port, image = int(live.outlets[0].detail.rpartition(":")[2]), f"/image/{CAMERA.name}"
+    port, image = int(live.outlets[0].detail.rpartition(":")[2]), f"/camera/{CAMERA.name}/image"
     stalled, other = FoxgloveClient("127.0.0.1", port), FoxgloveClient("127.0.0.1", port)
     stalled.subscribe(image)  # and never reads again
     other.subscribe("odometry")
@@ -241,7 +270,7 @@ def test_a_process_that_is_killed_is_told_once_and_another_goes_on(tmp_path: Pat
     assert said == ["live foxglove:0: its process has ended; the flight goes on without it"]
     assert any("foxglove:0: its process has ended" in problem for problem in live.problems)
     with AnyReader([tmp_path / "live.bag"]) as reader:
-        assert sum(1 for _ in reader.messages()) == 81
+        assert sum(1 for _ in reader.messages()) == 101
 
 
 def test_a_bridge_that_is_killed_leaves_a_whole_file_and_no_process(tmp_path: Path) -> None:

@@ -6,14 +6,21 @@ import pytest
 
 from e2efly.deploy.child import SYSTEM_PYTHON
 from e2efly.deploy.log.live import Live, targets_of
-from tests.deploy.live_ros import TAKE, check, heard, latched
+from e2efly.deploy.log.process.ros_topics import TF_DEFINITION
+from tests.deploy.live_ros import TAKE, check, check_transforms, heard, latched
 from tests.deploy.ros_master import ros_master
 
 SUBSCRIBER = f"""{TAKE}
-import rospy
+import rospy, genpy.dynamic
+definition = {TF_DEFINITION!r}
+tf = genpy.dynamic.generate_dynamic("tf2_msgs/TFMessage", definition)["tf2_msgs/TFMessage"]
+assert tf._md5sum == "94810edda583a504dfda3829e70d7eec", tf._md5sum  # that of the package, by which rviz knows it
+kinds["/tf"] = tf
+missing.add("/tf")
 rospy.init_node("subscriber", disable_signals=True)
 for name, kind in kinds.items():
-    rospy.Subscriber(sys.argv[1] + "/" + name, kind, lambda m, name=name: take(name, m), queue_size=10)
+    topic = name if name[0] == "/" else sys.argv[1] + "/" + name
+    rospy.Subscriber(topic, kind, lambda m, name=name: take(name, m), queue_size=10)
 with one:
     print(json.dumps(["ready", None, None]), flush=True)
 while missing:
@@ -29,11 +36,13 @@ def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 def test_a_subscriber_hears_every_topic(ros: None) -> None:
-    check(heard("ros1:/vehicle", "/vehicle", [SYSTEM_PYTHON, "-c", SUBSCRIBER]))
+    said = heard("ros1:/vehicle", "/vehicle", [SYSTEM_PYTHON, "-c", SUBSCRIBER])
+    check(said)
+    check_transforms(said["/tf"][1])
 
 
 def test_who_comes_late_hears_the_mode(ros: None) -> None:
-    command = [SYSTEM_PYTHON, "-c", SUBSCRIBER.replace("set(kinds)", '{"mode"}')]
+    command = [SYSTEM_PYTHON, "-c", SUBSCRIBER.replace("set(kinds)", '{"mode"}').replace('missing.add("/tf")', "")]
     assert latched("ros1", "/e2efly", command)["mode"][1] == "HOVER -> POLICY: switch"
 
 

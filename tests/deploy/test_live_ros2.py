@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.deploy.live_ros import TAKE, check, heard, latched
+from tests.deploy.live_ros import TAKE, check, heard, latched, opened
 
 PACKAGES = 'pip install "ros-rclpy[fastrtps]" ros-nav-msgs ros-geometry-msgs ros-sensor-msgs'
 SUBSCRIBER = f"""{TAKE}
@@ -39,6 +39,12 @@ def ros() -> Iterator[None]:
 
 def test_a_subscriber_hears_every_topic(ros: None) -> None:
     check(heard("ros2:/vehicle", "/vehicle", [sys.executable, "-c", SUBSCRIBER]))
+
+
+def test_a_python_without_tf2_says_that_it_publishes_no_tf(ros: None) -> None:
+    (detail,) = opened("ros2")
+    without = importlib.util.find_spec("tf2_msgs") is None
+    assert detail.endswith(", without /tf (no package tf2_msgs)") == without
 
 
 def test_who_comes_late_hears_the_mode(ros: None) -> None:

@@ -1,6 +1,9 @@
 """Images of hardware in the loop are those of the environment, bit for bit."""
 
 import dataclasses
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -13,6 +16,8 @@ from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pose.source import PlantSource
 from e2efly.env import Env
 from e2efly.evaluation import candidate
+from e2efly.scenes.meshes.load import load_mesh_scene
+from e2efly.tasks.avoid.world import Avoid
 from e2efly.validation.hil import Node, ahead
 from e2efly.validation.scenery import Scenery
 from e2efly.validation.starts import draw_starts
@@ -38,11 +43,27 @@ def env_of(sees: str) -> Env:
     return dataclasses.replace(env, cameras=(CameraConfig(sees, width=32, height=16, latency=(0.0, 0.05), rate=30.0),))
 
 
+SCAN = load_mesh_scene("warehouse")
+
+
+@partial(jax.tree_util.register_dataclass, data_fields=["config", "shape"], meta_fields=["control_period", "checks"])
+@dataclass(frozen=True)
+class Scanned(Avoid):
+    """A task whose world is of triangles."""
+
+    def scene(self, memory: Any) -> Any:
+        return SCAN
+
+
+@pytest.mark.parametrize("triangles", [False, True])
 @pytest.mark.parametrize("sees", ["depth", "rgb"])
-def test_an_image_is_that_of_the_environment_at_the_pose_bit_for_bit(sees: str) -> None:
+def test_an_image_is_that_of_the_environment_at_the_pose_bit_for_bit(sees: str, triangles: bool) -> None:
     env = env_of(sees)
     scenery = Scenery.draw(env, SEED)
     assert scenery is not None
+    if triangles:  # the node shows the scene in place of the task's world, the environment has a task of that world
+        scenery = scenery.within(SCAN)
+        env = dataclasses.replace(env, task=Scanned(**vars(env.task)))
     samples, kept = list[Sample](), Kept()
     node = Node(scenery, PlantSource(lambda now: [samples.pop()]), [kept], ORIGIN, 1000.0, 0.001)
     look = jax.jit(lambda env, state, renewed: env.look(state, renewed))

@@ -1,13 +1,14 @@
 """`e2efly hil`: hardware in the loop."""
 
 import dataclasses
+import math
 import os
 import socket
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import tyro
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from e2efly.deploy.child import Child
     from e2efly.deploy.sight.give import Output
     from e2efly.validation.hil import Node
+    from e2efly.validation.scenery import Scenery
 
 _ROW = "six numbers, room_x,room_y,room_z,x,y,z"
 PRIORITY = 4
@@ -58,6 +60,15 @@ class Hil:
     task: TaskConfig = TaskConfig()
     """The world, in place of what the policy's run or contract says: options of its task, as `train` has them
     (--task.track my.toml, --task.speed 4 5, --task.clutter.obstacles 8)."""
+    scene: str | None = None
+    """Show this in place of the task's world: a scan or model (.glb, .gltf, .obj, .ply, .stl), a scene file (.toml),
+    or warehouse, garage, terrain. The course stays the task's."""
+    scene_unit: float | None = None
+    """Length of the unit of a scan's file, m (0.001: mm); 1 when left out."""
+    scene_up: Literal["y", "z"] | None = None
+    """Axis of a scan's file that points up; as its format has it when left out."""
+    beside: bool = False
+    """Show what stands in the task's world (gates, trees, a pad) beside the scene."""
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the origin of the world lies in the room, m; as --goal.origin of `e2efly fly`."""
     origin_yaw: float = 0.0
@@ -107,6 +118,10 @@ def run(asked: Asked) -> int:
     """
     o, console = asked.options, Terminal()
     check_rehearsal(o)
+    if o.scene is None:
+        for option in ("scene_unit", "scene_up", "beside"):
+            if value := getattr(o, option):
+                raise ValueError(f"--{option.replace('_', '-')} is {value}; accepted: only with --scene")
     if o.rate is not None and not 1 <= o.rate <= FASTEST:
         raise ValueError(f"--rate is {o.rate}; accepted: 1 to {FASTEST:g} Hz")
     if o.seconds is not None and not o.seconds > 0:
@@ -137,6 +152,7 @@ def run(asked: Asked) -> int:
     with console.status("drawing the world"):
         scenery = Scenery.draw(found.environment(suite), o.seed)
     assert scenery is not None
+    scenery = _where(o, scenery, found.policy.contract.task, float(body.radius), console)
     goal = flags("goal", dataclasses.replace(
         route_of(found.policy.contract).drawn(scenery.course, o.track), origin=origin.position, origin_yaw=origin.yaw,
     ))  # fmt: skip
@@ -179,6 +195,25 @@ def run(asked: Asked) -> int:
             measured = {"began": node.began, "pose_to_image_s": node.latencies, "collisions": node.collisions}
             write_json(o.json, measured)
     return 0
+
+
+def _where(o: Hil, scenery: "Scenery", task: str, radius: float, console: Terminal) -> "Scenery":
+    """The scenery in the world that the options name, with ground below its course.
+
+    Raises:
+        ValueError: naming the world, what is wrong with it and what is accepted.
+    """
+    from e2efly.validation.scene_files import SceneFile, ground_of
+
+    if o.scene is None:
+        ground_of(scenery, f"the world of task {task}", radius)
+        return scenery
+    scenery = SceneFile(o.scene, o.scene_unit, o.scene_up, o.beside).put(scenery)
+    ground = ground_of(scenery, f"scene {o.scene}", radius)
+    console.print(f"Scene {o.scene}: the ground is {ground.depth:.2f} m below the start.")
+    if math.isfinite(ground.ends):
+        console.print(f"It has no ground under the way to the first goal from {ground.ends:.1f} m on.")
+    return scenery
 
 
 def _loop(node: "Node", seconds: float | None, console: Terminal, givers: dict[str, "Child"]) -> None:

@@ -3,7 +3,7 @@
 import math
 import signal
 import time
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,6 +72,7 @@ def rehearse(o: "Hil", task: dict[str, Any], origin: Origin) -> int:
     from e2efly.validation.hil_rehearsal import Plan, draw
     from e2efly.validation.hil_rehearsal import rehearse as fly
     from e2efly.validation.room import flags
+    from e2efly.validation.scene_files import SceneFile
     from e2efly.view.hil_rehearsal import plot_lap, plot_times
 
     raise_at_interrupt()
@@ -79,6 +80,8 @@ def rehearse(o: "Hil", task: dict[str, Any], origin: Origin) -> int:
     prepare("cpu")
     found, console = candidate(o.policy, o.vehicle, task=task), Terminal()
     plan = Plan(found, origin, o.rate, o.pose_delay, flags("task", found.task, candidate(o.policy, o.vehicle).task))
+    if o.scene is not None:
+        plan = replace(plan, scene=SceneFile(o.scene, o.scene_unit, o.scene_up, o.beside))
     if not plan.found.policy.contract.images:
         raise ValueError(f"policy {o.policy} sees nothing; accepted: a policy with images")
     folder = o.out or Path("rehearsals") / time.strftime("%Y-%m-%d_%H-%M-%S")

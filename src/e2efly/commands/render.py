@@ -28,8 +28,8 @@ class Render:
     """
 
     scene: tyro.conf.Positional[str]
-    """forest, clutter, room, corridor, garage, terrain, warehouse, a race track, or a .toml, .glb, .obj, .ply file; a
-    run's folder or a policy.onnx."""
+    """forest, clutter, room, corridor, garage, terrain, warehouse, a race track, or a file: .toml, .glb, .obj, .ply,
+    .stl; a run's folder or a policy.onnx."""
     camera: Literal["d435i", "fpv", "down", "lidar"] = "d435i"
     """The sensor of the pictures and the video: a RealSense, an FPV camera, one that looks down, a LiDAR."""
     width: int | None = None

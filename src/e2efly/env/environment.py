@@ -37,6 +37,8 @@ from e2efly.physics import Physics, State, started, step
 from e2efly.physics.body import hover_rotor_speed
 from e2efly.physics.rotation import from_euler, unrotate, yaw
 from e2efly.scenes import scene as scenes
+from e2efly.scenes.meshes.scene import MeshScene
+from e2efly.scenes.scene import Scene
 from e2efly.sensors import imu, latency
 from e2efly.sensors.eyes import Eye, image_shape, see, steady, steps_between
 from e2efly.sensors.noise import add_noise
@@ -238,7 +240,7 @@ class Env:
         reached, out = self._restart(reached, out)
         return self.look(reached, out.done), out
 
-    def look(self, state: EnvState, renewed: Bool[Array, " n"]) -> EnvState:
+    def look(self, state: EnvState, renewed: Bool[Array, " n"], world: Scene | MeshScene | None = None) -> EnvState:
         """The state with the images that are there to act on.
 
         New are those of cameras whose turn it is, and those of vehicles whose episode is new.
@@ -246,11 +248,12 @@ class Env:
         Args:
             state: of the vehicles, with the images so far.
             renewed: whose episode is new.
+            world: what is seen in place of the task's worlds: n worlds, or the one of triangles that all are in.
         """
         if not self.cameras:
             return state
         still = jax.lax.stop_gradient(state)
-        scene = self.task.scene(still.memory)
+        scene = self.task.scene(still.memory) if world is None else world
         images = []
         for index, (camera, eye, old) in enumerate(zip(self.cameras, still.eyes, still.images, strict=True)):
             every = steps_between(camera, self.control_period)

@@ -13,6 +13,7 @@ from e2efly.physics import State
 from e2efly.scenes import camera
 from e2efly.scenes.camera import Mount
 from e2efly.scenes.cast import Light, usual_light
+from e2efly.scenes.meshes.scene import MeshScene
 from e2efly.scenes.scene import Scene
 from e2efly.sensors.image_noise import add_image_noise, chosen
 
@@ -94,13 +95,13 @@ def image_shape(config: CameraConfig) -> tuple[int, ...]:
     return (config.height, config.width, *((3,) if config.sees in ("rgb", "normal") else ()))
 
 
-def see(config: CameraConfig, eye: Eye, scene: Scene, state: State, key: PRNGKeyArray) -> Array:
+def see(config: CameraConfig, eye: Eye, scene: Scene | MeshScene, state: State, key: PRNGKeyArray) -> Array:
     """The images of n vehicles.
 
     Args:
         config: the camera.
         eye: how it sits on each.
-        scene: n worlds, standing still.
+        scene: n worlds, standing still; or the one world of triangles that all are in, whose colours are the file's.
         state: of the vehicles.
         key: of the noise.
 
@@ -108,7 +109,7 @@ def see(config: CameraConfig, eye: Eye, scene: Scene, state: State, key: PRNGKey
         Depth and range in m (0: a hole), a mask, 0 or 1, of shape (n, h, w); colours in [0, 1], normals, (n, h, w, 3).
     """
     position, quaternion = (x.astype(jnp.float32) for x in (state.position, state.quaternion))
-    if eye.tints is not None:
+    if eye.tints is not None and isinstance(scene, Scene):
         scene = _tinted(scene, eye.tints)
     image = camera.look(config, scene, eye.mount, position, quaternion, eye.light)
     if not chosen(config.noise):

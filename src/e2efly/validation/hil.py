@@ -21,6 +21,8 @@ LOST_S = 0.1
 """A pose older than this shows nothing any more, s."""
 RESTART_S = 1.0
 """After so long without a good pose tracking starts anew, s."""
+STEPS = 4
+"""From one image to the next the way of the vehicle is looked at in so many pieces."""
 STRUCK_S = 1.0
 """For so long after a virtual collision there are no images, s: the policy's flight ends."""
 
@@ -59,12 +61,14 @@ class Node:
     _due: float = field(default=-math.inf, init=False)
     _blind_until: float = field(default=-math.inf, init=False)
     _count: int = field(default=0, init=False)
+    _at: np.ndarray | None = field(default=None, init=False)
+    """Where the vehicle was at the last image, in the scene, m; None: it was not seen then."""
 
     def warm(self) -> None:
         """Compile, so that the first image of a flight is not late."""
         state = RigidState(np.zeros(3), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3))
         self._images(state, 0.0)
-        self.scenery.nearest([np.zeros(3)], [0.0], self.origin)
+        self._struck(np.zeros(3), np.zeros(3), 0.0)
 
     def step(self, now: float, clock: Callable[[], float]) -> str | None:
         """Take in poses, and publish where it is time to.
@@ -86,13 +90,15 @@ class Node:
         if now < self._due:
             return None
         self._due = max(self._due + 1 / self.rate, now) if math.isfinite(self._due) else now + 1 / self.rate
+        before, self._at = self._at, None
         if now < self._blind_until:
             return "no images: a virtual collision"
         if self._odometry is None or now - self._odometry.time > LOST_S:
             return f"no images: no good pose{f' ({self.refused})' if self.refused else ''}"
         shown = ahead(self._odometry, now)
         local = shown.seen_from(self.origin)
-        if self.scenery.nearest([local.position], [now - began], Origin()) < self.radius:
+        self._at = local.position
+        if self._struck(local.position if before is None else before, local.position, now - began):
             self.collisions, self._blind_until = self.collisions + 1, now + STRUCK_S
             return f"virtual collision at {local.position.round(2).tolist()} m of the scene"
         for output, image in zip(self.outputs, self._images(RigidState.of(local), now - began), strict=True):
@@ -105,6 +111,11 @@ class Node:
             "scene_time": now - began, "pose_to_image": self.latencies[-1],
         })  # fmt: skip
         return "images"
+
+    def _struck(self, before: np.ndarray, here: np.ndarray, time: float) -> bool:
+        """Whether the vehicle comes too near to something on its way, scene, m."""
+        way = list(np.linspace(before, here, STEPS + 1))
+        return self.scenery.nearest(way, [time] * len(way), Origin(), self.radius) < self.radius
 
     def _images(self, state: RigidState, time: float) -> list[np.ndarray]:
         self._count += 1

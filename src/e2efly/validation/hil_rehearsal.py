@@ -24,6 +24,7 @@ from e2efly.validation.hil_lap import TOUCH, Heard, Lap, lap_of
 from e2efly.validation.mocap_process import DELAY_S
 from e2efly.validation.rehearsal import LINK_S, REACH_IN_SIGHT
 from e2efly.validation.room import FLIGHT_S, START_S, TAKEN, Program, Room, Victim, bridge, flags, free_port, take_off
+from e2efly.validation.scene_files import SceneFile, ground_of
 from e2efly.validation.scenery import Scenery
 from e2efly.validation.session import rehearsal_settings
 from e2efly.vehicles import Vehicle, load_vehicle
@@ -62,6 +63,8 @@ class Plan:
     """Options of `e2efly hil` that say which world: `--task.*`."""
     options: tuple[str, ...] = ()
     """More of `e2efly fly`."""
+    scene: SceneFile | None = None
+    """What is shown in place of the task's world."""
 
     @property
     def vehicle(self) -> Vehicle:
@@ -101,12 +104,16 @@ def draw(plan: Plan, seed: int, track: Path) -> Drawn:
         track: a .toml file that is written where the task's gates are drawn.
 
     Raises:
-        ValueError: for a policy that sees nothing, and for a task whose options cannot ask for the course drawn.
+        ValueError: for a policy that sees nothing, for a scene in which the course cannot begin, and for a task whose
+            options cannot ask for the course drawn.
     """
     found, contract = plan.found, plan.found.policy.contract
     scenery = Scenery.draw(found.environment(next(iter(found.task.criteria().values()))), seed)
     if scenery is None:
         raise ValueError(f"policy {found.file} sees nothing; accepted: a policy with images")
+    if plan.scene is not None:
+        scenery = plan.scene.put(scenery)
+        ground_of(scenery, f"scene {plan.scene.name}", float(plan.vehicle.radius))
     route = replace(
         route_of(contract).drawn(scenery.course, track), origin=plan.origin.position, origin_yaw=plan.origin.yaw
     )
@@ -197,7 +204,8 @@ class _Flight:
         flies = ["--vehicle", plan.found.vehicle]
         # rendering takes one core and no more: the firmware and the bridge need the others
         policy = str(plan.found.file)
-        self.node = Program("the HIL node", ["-m", "e2efly", "hil", policy, *node, *flies, *plan.world], cores[-1])
+        world = [*plan.world, *([] if plan.scene is None else plan.scene.options)]
+        self.node = Program("the HIL node", ["-m", "e2efly", "hil", policy, *node, *flies, *world], cores[-1])
         stack.enter_context(self.node)
         self.node.wait_for("Fly it with", 2 * START_S)
         stands = ["--at", *(f"{x:.6g}" for x in self._stand()), "--exact", "--record", str(folder / "truth.csv")]

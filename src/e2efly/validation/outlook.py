@@ -16,6 +16,8 @@ from jaxtyping import Array
 
 from e2efly.env import UNSEEN, Env, random_key
 from e2efly.env.state import EnvState
+from e2efly.scenes.meshes.scene import MeshScene
+from e2efly.scenes.scene import Scene
 from e2efly.sensors.eyes import Eye
 from e2efly.validation.plant import RigidState
 
@@ -28,6 +30,8 @@ class Outlook:
     """Numbers on the device."""
     state: EnvState
     """Of one vehicle; where it is matters to nobody."""
+    world: Scene | MeshScene | None = None
+    """What is seen in place of the task's world."""
 
     @staticmethod
     def of(env: Env, memory: Any, eyes: tuple[Eye, ...], seed: int) -> "Outlook":
@@ -45,6 +49,10 @@ class Outlook:
         young = tuple(dataclasses.replace(eye, latency=jnp.zeros_like(eye.latency)) for eye in eyes)
         state = dataclasses.replace(zeros, key=random_key(seed, UNSEEN, 0), memory=memory, eyes=young)
         return Outlook(*jax.device_put((env, state)))
+
+    def seeing(self, world: Scene | MeshScene) -> "Outlook":
+        """The same cameras in another world."""
+        return dataclasses.replace(self, world=jax.device_put(world))
 
     def images(self, state: RigidState, time: float, count: int, which: tuple[int, ...]) -> list[np.ndarray]:
         """What cameras show at once.
@@ -65,7 +73,7 @@ class Outlook:
             past = jax.tree.map(lambda old, x: np.broadcast_to(x[:, None], old.shape), past, vehicle)
         world = np.full(1, time, np.float32)
         there = dataclasses.replace(self.state, vehicle=vehicle, past=past, time=world, tick=np.int32(count))
-        seen = _look(self.env, there, _RENEWED, which)
+        seen = _look(self.env, there, _RENEWED, self.world, which)
         return [np.asarray(image)[0] for image in seen]
 
 
@@ -73,6 +81,8 @@ _RENEWED = np.ones(1, bool)
 
 
 @partial(jax.jit, static_argnames="which")
-def _look(env: Env, state: EnvState, renewed: np.ndarray, which: tuple[int, ...]) -> list[Array]:
-    images = env.look(state, jnp.asarray(renewed)).images
+def _look(
+    env: Env, state: EnvState, renewed: np.ndarray, world: Scene | MeshScene | None, which: tuple[int, ...]
+) -> list[Array]:
+    images = env.look(state, jnp.asarray(renewed), world).images
     return [images[i] for i in which]

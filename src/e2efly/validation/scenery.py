@@ -1,6 +1,7 @@
 """The world that a whole flight sees, and cameras in it: what a policy by sight needs beside the rig."""
 
 import dataclasses
+import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,6 +16,8 @@ from e2efly.courses.origin import Origin
 from e2efly.deploy.sight.source import Frame
 from e2efly.env import Env
 from e2efly.goal import Course
+from e2efly.scenes.meshes.near import Near
+from e2efly.scenes.meshes.scene import MeshScene
 from e2efly.scenes.scene import Scene, gaps
 from e2efly.sensors.eyes import Eye
 from e2efly.validation.outlook import Outlook
@@ -33,12 +36,14 @@ class Scenery:
     """In the order of the contract's images."""
     eyes: tuple[Eye, ...]
     """How each sits on the vehicle: leaves (1, ...)."""
-    scene: Scene
+    scene: Scene | MeshScene
     """One world."""
     course: Course
     """What the task drew to be flown in it."""
     outlook: Outlook
     """The same world as the environment's own program shows it."""
+    near: Near | None = None
+    """Its triangles, where it has some."""
 
     @staticmethod
     def draw(env: Env, seed: int) -> "Scenery | None":
@@ -49,6 +54,11 @@ class Scenery:
             return None
         outlook = Outlook.of(env, starts.memory, starts.eyes, seed)
         return Scenery(sight.cameras, sight.eyes, sight.scene, starts.courses[0], outlook)
+
+    def within(self, world: Scene | MeshScene) -> "Scenery":
+        """The same cameras and course in another world."""
+        near = Near.of(world) if isinstance(world, MeshScene) else None
+        return dataclasses.replace(self, scene=world, outlook=self.outlook.seeing(world), near=near)
 
     def on(self, course: Course) -> Course:
         """A course of the same task, as its policy is to fly it in this world."""
@@ -78,14 +88,22 @@ class Scenery:
         """The same of all cameras, at the price of one call."""
         return self.outlook.images(state, time, count, tuple(range(len(self.cameras))))
 
-    def nearest(self, position: Sequence[np.ndarray], time: Sequence[float], origin: Origin) -> float:
+    def nearest(
+        self, position: Sequence[np.ndarray], time: Sequence[float], origin: Origin, within: float = math.inf
+    ) -> float:
         """How near a path comes to what stands in this world and is not to be landed on, m; infinite: to nothing.
+
+        In a world of triangles a path that goes through one comes as near as 0 m.
 
         Args:
             position: of the path, each (3,), in the room, m.
             time: of the same, s.
             origin: of the task's world in the room.
+            within: what is farther away may count as nothing, m.
         """
+        if self.near is not None:
+            return self.near.distance(origin.seen(np.stack(position)), within) if len(position) else math.inf
+        assert isinstance(self.scene, Scene)
         solids = {kind: solid for kind, solid in self.scene.solids.items() if kind not in LANDING}
         if not len(position) or not solids:
             return np.inf

@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 
 from e2efly.courses.origin import Origin
 from e2efly.scenes.faces import Body, bodies
+from e2efly.scenes.meshes.scene import MeshScene
 from e2efly.scenes.scene import Scene
 from e2efly.validation.hil_lap import Lap
 from e2efly.view.style import BLUE, FAILURE, GREY, START, VERMILLION, figure, say
@@ -17,9 +18,11 @@ from e2efly.view.worlds import draw_plan
 
 _MARGIN = 0.8
 """About what is drawn, m."""
+_MOST_TRIANGLES = 5000
+"""Of a scene, in a picture."""
 
 
-def plot_lap(lap: Lap, scene: Scene, origin: Origin, path: str | Path) -> None:
+def plot_lap(lap: Lap, scene: Scene | MeshScene, origin: Origin, path: str | Path) -> None:
     """One flight: in the room from above, and in the scene from above and from the side.
 
     Args:
@@ -35,11 +38,15 @@ def plot_lap(lap: Lap, scene: Scene, origin: Origin, path: str | Path) -> None:
             for ax in (above, side, room):
                 say(ax, "not recorded")
             return
-        things, motion = bodies(scene), lap.truth
+        things, motion = bodies(scene) if isinstance(scene, Scene) else [], lap.truth
         local = origin.seen(motion.position)
         flown = (motion.time >= lap.window[0]) & (motion.time <= lap.window[1])
-        draw_plan(above, things)
-        _draw_side(side, things)
+        if isinstance(scene, Scene):
+            draw_plan(above, things)
+            _draw_side(side, things)
+        else:
+            _draw_triangles(above, scene, (0, 1))
+            _draw_triangles(side, scene, (0, 2))
         for ax, axes in ((above, (0, 1)), (side, (0, 2))):
             _track(ax, local[:, axes], flown)
             _fit(ax, local[:, axes], [body.quads[..., axes].reshape(-1, 2) for body in things])
@@ -109,6 +116,13 @@ def _draw_side(ax: Axes, things: list[Body]) -> None:
         faces = list(body.quads[..., [0, 2]])
         pale = tuple(0.65 * body.colour + 0.35)
         ax.add_collection(PolyCollection(faces, facecolors=[pale], edgecolors="none", alpha=0.35, zorder=1.6))
+
+
+def _draw_triangles(ax: Axes, scene: MeshScene, axes: tuple[int, int]) -> None:
+    """The edges of a scene's triangles, of many the largest, seen along the axis that is left out."""
+    largest = np.argsort(-np.linalg.norm(np.ptp(scene.triangles, axis=1), axis=1))[:_MOST_TRIANGLES]
+    flat = list(scene.triangles[largest][..., list(axes)])
+    ax.add_collection(PolyCollection(flat, facecolors="none", edgecolors=GREY, linewidths=0.3, alpha=0.4, zorder=1.6))
 
 
 def _fit(ax: Axes, points: np.ndarray, others: list[np.ndarray]) -> None:

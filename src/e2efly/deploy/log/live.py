@@ -4,6 +4,7 @@ The control loop puts a record into a socket that keeps a megabyte and is never 
 subscribers or its disk do not take in time is dropped and counted.
 """
 
+import math
 import os
 import time
 from collections.abc import Callable, Sequence
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.control import Quat
 from e2efly.deploy.child import ROS_PYTHON, first_opened, pythons
 from e2efly.deploy.log.channels import CHANNELS, json_schema
 from e2efly.deploy.log.mcap_file import encode
@@ -185,8 +187,20 @@ class _Shown:
         return {
             "path": str(self.memory.path), "sequence": AT_SEQUENCE, "slots": AT_SLOTS, "slot": layout.slot,
             "height": layout.height, "width": layout.width, "step": step, "encoding": _FORMS[self.image.sees],
-            "frame": f"{self.image.name}_optical",
+            "frame": f"{self.image.name}_optical", "position": list(self.image.position_m),
+            "quaternion": optical(self.image.pitch_rad),
+            "fov": list(self.image.fov_rad) if self.image.projection == "pinhole" else None,
         }  # fmt: skip
+
+
+def optical(pitch: float) -> list[float]:
+    """The optical frame of a camera (x right, y down, z ahead) in the body's, wxyz.
+
+    Args:
+        pitch: of the camera, downwards from straight ahead, rad.
+    """
+    down = Quat(math.cos(pitch / 2), 0.0, math.sin(pitch / 2), 0.0)
+    return [float(part) for part in down.compose(Quat(0.5, -0.5, 0.5, -0.5)).stack()]
 
 
 def _drawn(image: Image, values: np.ndarray) -> np.ndarray:

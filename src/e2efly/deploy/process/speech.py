@@ -1,8 +1,8 @@
 """What a script of this folder begins with: lines to the process that started it, and an end when that one ends.
 
 Lines that it writes: `waiting TEXT` for what it waits for, `ready TEXT` once, `failed TEXT` when it cannot go on,
-`problem TEXT` for what it passed over, and what else the script has to tell. It ends when its standard input does,
-however the other process ends.
+`problem TEXT` for what it passed over, `solved` when that is over, and what else the script has to tell. It ends when
+its standard input does, however the other process ends.
 """
 
 from __future__ import annotations

@@ -59,7 +59,8 @@ class Captured:
         if self._closed:
             return []
         for line in self._child.lines():
-            self._problem = f"{self._name}: {text_of(line.partition(b' ')[2])}"
+            word, _, said = line.partition(b" ")
+            self._problem = None if word == b"solved" else f"{self._name}: {text_of(said)}"
         return self._camera.read(now)
 
     def close(self) -> None:

@@ -143,7 +143,7 @@ def _away(
     surface = np.ravel_multi_index(tuple(place[within].T), shape)
     pairs = np.unique(surface * len(scene.triangles) + owner[within])
     surface, face = np.divmod(pairs, len(scene.triangles))
-    order = np.lexsort((_to_triangles(points[surface], scene.triangles[face]), surface))
+    order = np.lexsort((to_triangles(points[surface], scene.triangles[face]), surface))
     surface, face = surface[order], face[order]
     cells, first, counts = np.unique(surface, return_index=True, return_counts=True)
     empty = np.ones(math.prod(shape), bool)
@@ -155,7 +155,7 @@ def _away(
         best = np.full(len(part), np.inf, np.float32)
         for i in range(_TRIED):
             has = np.flatnonzero(counts[number] > i)
-            found = _to_triangles(part[has], scene.triangles[face[first[number[has]] + i]])
+            found = to_triangles(part[has], scene.triangles[face[first[number[has]] + i]])
             best[has] = np.minimum(best[has], found)
         return best
 
@@ -188,7 +188,7 @@ def _samples(
     return points.reshape(-1, 3), np.repeat(np.concatenate([which for _, which in done]), 6)
 
 
-def _to_triangles(p: Float[np.ndarray, "n 3"], triangles: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, " n"]:
+def to_triangles(p: Float[np.ndarray, "n 3"], triangles: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, " n"]:
     """Distance of each point to its triangle: to the plane over it, else to the nearest side."""
     corners = [triangles[:, i] for i in range(3)]
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])

@@ -12,9 +12,11 @@ from e2efly.scenes.meshes.references import textured_materials
 from e2efly.scenes.meshes.scene import MeshScene, Part
 from e2efly.vehicles.names import unknown
 
-FORMATS = (".glb", ".gltf", ".obj", ".ply")
+FORMATS = (".glb", ".gltf", ".obj", ".ply", ".stl")
 """Endings of files that are read."""
-_UP = {".glb": "y", ".gltf": "y", ".obj": "z", ".ply": "z"}
+_UP = {".glb": "y", ".gltf": "y", ".obj": "z", ".ply": "z", ".stl": "z"}
+_NAMELESS = (".ply", ".stl")
+"""Formats whose files are one object without a name."""
 _TURN = {"y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]), "z": np.eye(3)}
 
 
@@ -62,7 +64,7 @@ def _parts(path: Path, turn: np.ndarray, textured: set[str]) -> Iterator[Part]:
     for node in scene.graph.nodes_geometry:
         pose, name = scene.graph[node]
         mesh = scene.geometry[name]
-        named = _object(scene, node, name, mesh, objects) if path.suffix.lower() != ".ply" else path.stem
+        named = _object(scene, node, name, mesh, objects) if path.suffix.lower() not in _NAMELESS else path.stem
         if not hasattr(mesh, "faces"):
             raise ValueError(
                 f"object {named!r} has no triangles; accepted: surfaces (a point cloud needs meshing first)"

@@ -27,6 +27,8 @@ def textured_materials(path: Path) -> set[str]:
             return _obj(path)
         case ".ply":
             return _ply(path)
+        case ".stl":
+            return set()  # it has no materials
         case _:
             return _gltf(path)
 

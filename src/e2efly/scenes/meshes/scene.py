@@ -1,13 +1,15 @@
 """A world of triangles, one for all environments. World frame: x, y level, z up, m."""
 
+import dataclasses
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import jax
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Array, Float, Int, UInt8
 
 from e2efly.scenes.scene import CLASSES, COLOURS, GROUND, OBSTACLE, SKY
 from e2efly.vehicles.tables import LARGEST
@@ -45,6 +47,7 @@ def class_of(name: str) -> int:
     return CLASSES.index(head) if head in CLASSES else OBSTACLE
 
 
+@jax.tree_util.register_static
 @dataclass(frozen=True, eq=False)
 class MeshScene:
     """Triangles with what is known of each; compared by identity, constant in compiled programs."""
@@ -100,6 +103,29 @@ class MeshScene:
         whole |= {name: whole[name].astype(np.float32) for name in ("colour", "uv")}
         dropped = int(sum(piece["dropped"] for piece in pieces))
         return MeshScene(**whole, names=tuple(names), textures=tuple(textures), dropped=dropped)
+
+    def at(self, time: Float[Array, " n"]) -> "MeshScene":
+        """The world as it is at any time: nothing in it moves."""
+        del time
+        return self
+
+    def beside(self, other: "MeshScene") -> "MeshScene":
+        """Both in one world; instance numbers of the other's objects follow those of this one's."""
+        objects, textures = len(self.names) - 2, len(self.textures) - 1
+
+        def later(numbers: np.ndarray, by: int, least: int) -> np.ndarray:
+            return np.where(numbers >= least, numbers + by, numbers).astype(np.int32)
+
+        theirs = dataclasses.replace(
+            other, instance=later(other.instance, objects, 2), texture=later(other.texture, textures, 1)
+        )
+        each = "triangles", "label", "instance", "colour", "uv", "texture"
+        return MeshScene(
+            **{name: np.concatenate([getattr(self, name), getattr(theirs, name)]) for name in each},
+            names=(*self.names, *other.names[2:]),
+            textures=(*self.textures, *other.textures[1:]),
+            dropped=self.dropped + other.dropped,
+        )
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:

@@ -51,6 +51,8 @@ class Mcap(Topics):
 class Bag(Topics):
     """A bag of ROS 1. Its index comes at the end; without it `rosbag reindex` mends the bag."""
 
+    version = 1
+
     def __init__(self, config: dict[str, Any]) -> None:
         self._messages = importlib.import_module("ros_messages")
         self._store = self._messages.type_store(1)

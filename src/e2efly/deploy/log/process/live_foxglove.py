@@ -1,14 +1,14 @@
 """A flight's records for Foxglove, by a WebSocket server of the package `foxglove-sdk`.
 
 The channels are those of the flight log, under the same names, so that a layout made for one shows the other. Beside
-them: `/tf`, where the vehicle is, for the 3D panel, and `/image/NAME`, what the policy sees.
+them: `/tf`, where the vehicle and its cameras are, for the 3D panel; `/camera/NAME/image`, what the policy sees, and
+`/camera/NAME/camera_info`, by what camera.
 """
 
 from __future__ import annotations
 
 import importlib
 import json
-import math
 from typing import Any, Callable  # noqa: UP035  # Python 3.8
 
 RARE = ("mode", "event", "meta")
@@ -38,8 +38,12 @@ class Foxglove:
         }
         self._last: dict[str, tuple[int, dict[str, Any]]] = {}
         self._transform = channels.FrameTransformChannel("/tf")
-        self._images = {
-            name: (layout, channels.RawImageChannel(f"/image/{name}")) for name, layout in config["images"].items()
+        self._layouts = layouts = config["images"]
+        self._images = {name: channels.RawImageChannel(self._words.IMAGE_TOPIC.format(name)) for name in layouts}
+        self._infos = {
+            name: channels.CameraCalibrationChannel(self._words.INFO_TOPIC.format(name))
+            for name, layout in layouts.items()
+            if layout["fov"]
         }
 
         class Listener(importlib.import_module("foxglove.websocket").ServerListener):
@@ -67,11 +71,17 @@ class Foxglove:
             self._place(stamp, values)
 
     def show(self, name: str, stamp: int, data: bytes) -> None:
-        """Publish an image."""
-        layout, channel = self._images[name]
+        """Publish an image, and what is known of its camera."""
+        layout = self._layouts[name]
+        if name in self._infos:
+            info = self._messages.CameraCalibration(
+                timestamp=self._time(stamp), frame_id=layout["frame"], width=layout["width"], height=layout["height"],
+                distortion_model="plumb_bob", **self._words.intrinsics(layout),
+            )  # fmt: skip
+            self._infos[name].log(info, log_time=stamp)
         size = {key: layout[key] for key in ("width", "height", "encoding", "step")}
         image = self._messages.RawImage(timestamp=self._time(stamp), frame_id=layout["frame"], data=data, **size)
-        channel.log(image, log_time=stamp)
+        self._images[name].log(image, log_time=stamp)
 
     def flush(self) -> None:
         """Nothing waits."""
@@ -81,15 +91,14 @@ class Foxglove:
         self._server.stop()
 
     def _place(self, stamp: int, values: dict[str, Any]) -> None:
-        position, q = self._words.numbers(values, "position", 3), self._words.numbers(values, "quaternion", 4)
-        if all(map(math.isfinite, position + q)):
-            w, x, y, z = q
+        for each in self._words.transforms(values, stamp, self._layouts):
+            (x, y, z), q = each.position, each.quaternion
             moved = self._messages.FrameTransform(
-                timestamp=self._time(stamp),
-                parent_frame_id=self._words.WORLD_FRAME,
-                child_frame_id=self._words.BODY_FRAME,
-                translation=self._messages.Vector3(x=position[0], y=position[1], z=position[2]),
-                rotation=self._messages.Quaternion(x=x, y=y, z=z, w=w),
+                timestamp=self._time(each.stamp),
+                parent_frame_id=each.parent,
+                child_frame_id=each.child,
+                translation=self._messages.Vector3(x=x, y=y, z=z),
+                rotation=self._messages.Quaternion(x=q[1], y=q[2], z=q[3], w=q[0]),
             )
             self._transform.log(moved, log_time=stamp)
 

@@ -25,11 +25,22 @@ def fill(message: Any, tree: dict[str, Any]) -> Any:
             )
         elif isinstance(value, dict):
             fill(known, value)
+        elif value and isinstance(value, list) and isinstance(value[0], dict):
+            setattr(message, name, [fill(_entry(message, name), entry) for entry in value])
         elif isinstance(known, array.array):  # ROS 2, which would look at every entry of a list
             setattr(message, name, array.array(known.typecode, value))
         else:
             setattr(message, name, value)
     return message
+
+
+def _entry(message: Any, name: str) -> Any:
+    """An empty message for a list of messages of one type."""
+    if hasattr(message, "get_fields_and_field_types"):  # ROS 2: sequence<package/Name>
+        kind = message.get_fields_and_field_types()[name].partition("<")[2].rstrip(">")
+    else:  # ROS 1: package/Name[]
+        kind = message._slot_types[message.__slots__.index(name)].partition("[")[0]
+    return ros_class(kind)()
 
 
 def ros_class(kind: str) -> Any:
@@ -40,6 +51,9 @@ def ros_class(kind: str) -> Any:
 
 class Ros1(Topics):
     """Publishes by rospy."""
+
+    version = 1
+    _made: Any = None
 
     def __init__(self, config: dict[str, Any]) -> None:
         self._rospy, rosgraph = importlib.import_module("rospy"), importlib.import_module("rosgraph")
@@ -53,11 +67,19 @@ class Ros1(Topics):
 
     def advertise(self, topic: str, kind: str, latched: bool) -> Any:
         """Announce a topic."""
-        return self._rospy.Publisher(topic, ros_class(kind), queue_size=QUEUE, latch=latched)
+        return self._rospy.Publisher(topic, self._class(kind), queue_size=QUEUE, latch=latched)
 
     def send(self, handle: Any, kind: str, stamp: int, tree: dict[str, Any]) -> None:
         """Publish; a thread of rospy waits for the subscribers."""
-        handle.publish(fill(ros_class(kind)(), tree))
+        handle.publish(fill(self._class(kind)(), tree))
+
+    def _class(self, kind: str) -> Any:
+        if kind != self._words.TRANSFORMS_TYPE:
+            return ros_class(kind)
+        if self._made is None:
+            made = importlib.import_module("genpy.dynamic").generate_dynamic(kind, self._words.TF_DEFINITION)
+            self._made = made[kind]
+        return self._made
 
     def close(self) -> None:
         """Leave the master."""
@@ -68,22 +90,32 @@ class Ros1(Topics):
 class Ros2(Topics):
     """Publishes by rclpy."""
 
+    _without = ""
+    """What is not published, for people."""
+
     def __init__(self, config: dict[str, Any]) -> None:
         self._rclpy, self._qos = importlib.import_module("rclpy"), importlib.import_module("rclpy.qos")
         signals = importlib.import_module("rclpy.signals")
         self._rclpy.init(signal_handler_options=signals.SignalHandlerOptions.NO)
         self._node = self._rclpy.create_node(f"e2efly_live_{os.getpid()}")
         super().__init__(config)
-        self.detail = f"topics {config['prefix']}/..., rclpy of {sys.executable}"
+        self.detail = f"topics {config['prefix']}/..., rclpy of {sys.executable}{self._without}"
 
     def advertise(self, topic: str, kind: str, latched: bool) -> Any:
         """Announce a topic; reliable, so that subscribers of either reliability hear it."""
+        try:
+            known = ros_class(kind)
+        except ModuleNotFoundError as error:
+            if kind != self._words.TRANSFORMS_TYPE:  # the others are needed
+                raise
+            self._without = f", without {topic} (no package {error.name})"
+            return None
         durability = self._qos.DurabilityPolicy
         profile = self._qos.QoSProfile(
             depth=1 if latched else QUEUE,
             durability=durability.TRANSIENT_LOCAL if latched else durability.VOLATILE,
         )
-        return self._node.create_publisher(ros_class(kind), topic, profile)
+        return self._node.create_publisher(known, topic, profile)
 
     def send(self, handle: Any, kind: str, stamp: int, tree: dict[str, Any]) -> None:
         """Publish."""

@@ -11,6 +11,8 @@ class Topics:
 
     detail = ""
     """Where to, and by which package."""
+    version = 2
+    """Of ROS."""
 
     def __init__(self, config: dict[str, Any]) -> None:
         self._words = importlib.import_module("ros_topics")
@@ -19,11 +21,17 @@ class Topics:
         for topic in self._words.TOPICS:
             handle = self.advertise(prefix + topic.name, topic.kind, topic.latched)
             self._by_channel.setdefault(topic.channel, []).append((topic, handle))
-        kind = self._words.IMAGE_TYPE
+        words, images = self._words, config["images"]
+        self._layouts = images
         self._images = {
-            name: (layout, self.advertise(f"{prefix}/image/{name}", kind, False))
-            for name, layout in config["images"].items()
+            name: self.advertise(prefix + words.IMAGE_TOPIC.format(name), words.IMAGE_TYPE, False) for name in images
         }
+        self._infos = {
+            name: self.advertise(prefix + words.INFO_TOPIC.format(name), words.INFO_TYPE, False)
+            for name, layout in images.items()
+            if layout["fov"]
+        }
+        self._transforms = self.advertise(words.TRANSFORMS_TOPIC, words.TRANSFORMS_TYPE, False)
 
     def write(self, channel: str, stamp: int, values: dict[str, Any]) -> None:
         """Publish what a record says."""
@@ -31,14 +39,21 @@ class Topics:
             tree = topic.build(values, stamp)
             if tree is not None:
                 self.send(handle, topic.kind, stamp, tree)
+        if channel == "odometry" and self._transforms is not None:
+            found = self._words.transforms(values, stamp, self._layouts)
+            if found:
+                self.send(self._transforms, self._words.TRANSFORMS_TYPE, stamp, self._words.tf_message(found))
 
     def show(self, name: str, stamp: int, data: bytes) -> None:
-        """Publish an image."""
-        layout, handle = self._images[name]
-        self.send(handle, self._words.IMAGE_TYPE, stamp, self._words.image(layout, stamp, data))
+        """Publish an image, and what is known of its camera."""
+        words, layout = self._words, self._layouts[name]
+        if name in self._infos:
+            info = words.camera_info(layout, stamp, self.version)
+            self.send(self._infos[name], words.INFO_TYPE, stamp, info)
+        self.send(self._images[name], words.IMAGE_TYPE, stamp, words.image(layout, stamp, data))
 
     def advertise(self, topic: str, kind: str, latched: bool) -> Any:
-        """Announce a topic; what `send` is to be given."""
+        """Announce a topic; what `send` is to be given, None where its type is not there."""
         raise NotImplementedError
 
     def send(self, handle: Any, kind: str, stamp: int, tree: dict[str, Any]) -> None:

@@ -16,7 +16,13 @@ def type_store(version: int) -> Any:
         ImportError: where rosbags is not there.
     """
     typesys = importlib.import_module("rosbags.typesys")
-    return typesys.get_typestore(typesys.Stores.ROS1_NOETIC if version == 1 else typesys.Stores.ROS2_HUMBLE)
+    store = typesys.get_typestore(typesys.Stores.ROS1_NOETIC if version == 1 else typesys.Stores.ROS2_HUMBLE)
+    words = importlib.import_module("ros_topics" if __package__ in (None, "") else f"{__package__}.ros_topics")
+    kind = full_name(words.TRANSFORMS_TYPE)
+    if kind not in store.fielddefs:  # ROS 1's has it not
+        own = words.TF_DEFINITION.partition("=")[0]
+        store.register(typesys.get_types_from_msg(own, kind))
+    return store
 
 
 def full_name(kind: str) -> str:

@@ -11,12 +11,45 @@ Whatever Python has ROS must be able to run this: it needs Python 3.8 or newer a
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Dict, NamedTuple, Optional  # noqa: UP035  # Python 3.8
+from typing import Any, Callable, Dict, List, NamedTuple, Optional  # noqa: UP035  # Python 3.8
 
 WORLD_FRAME, BODY_FRAME = "map", "base_link"
 """Names of the frames, by REP 105."""
-IMAGE_TYPE = "sensor_msgs/Image"
-"""Type of the images."""
+IMAGE_TYPE, INFO_TYPE, TRANSFORMS_TYPE = "sensor_msgs/Image", "sensor_msgs/CameraInfo", "tf2_msgs/TFMessage"
+"""Types of the images, of what is known of their cameras, and of where the frames are."""
+IMAGE_TOPIC, INFO_TOPIC = "/camera/{}/image", "/camera/{}/camera_info"
+"""Names of their topics, by the camera's; rviz looks for the second beside the first."""
+TRANSFORMS_TOPIC = "/tf"
+"""Of the frames, below no prefix."""
+
+TF_DEFINITION = """geometry_msgs/TransformStamped[] transforms
+================================================================================
+MSG: geometry_msgs/TransformStamped
+Header header
+string child_frame_id
+Transform transform
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+================================================================================
+MSG: geometry_msgs/Transform
+Vector3 translation
+Quaternion rotation
+================================================================================
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+"""
+"""Of tf2_msgs/TFMessage, by which ROS 1 makes the type where the package is not there."""
 
 Tree = Dict[str, Any]  # noqa: UP006
 Build = Callable[[Dict[str, Any], int], Optional[Tree]]  # noqa: UP006, UP045
@@ -149,6 +182,71 @@ def image(layout: dict[str, Any], stamp: int, data: bytes) -> Tree:
     """An image; `layout` has its height, width, encoding and the bytes of a row."""
     size = {key: layout[key] for key in ("height", "width", "encoding", "step")}
     return {"header": header(stamp, layout["frame"]), **size, "is_bigendian": 0, "data": data}
+
+
+def intrinsics(layout: dict[str, Any]) -> Tree:
+    """Of a pinhole camera without distortion, whose optical axis is in the middle: D, K, R and P by ROS 1's names."""
+    across, down = layout["fov"]
+    height, width = layout["height"], layout["width"]
+    fx, fy = width / 2 / math.tan(across / 2), height / 2 / math.tan(down / 2)
+    cx, cy = width / 2 - 0.5, height / 2 - 0.5  # centres of pixels have whole numbers
+    return {
+        "D": [0.0] * 5,
+        "K": [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+        "R": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        "P": [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+    }
+
+
+def camera_info(layout: dict[str, Any], stamp: int, version: int) -> Tree:
+    """What is known of a camera; ROS 2 writes the names of `intrinsics` small."""
+    known = {name if version == 1 else name.lower(): value for name, value in intrinsics(layout).items()}
+    size = {"height": layout["height"], "width": layout["width"], "distortion_model": "plumb_bob"}
+    return {"header": header(stamp, layout["frame"]), **size, **known}
+
+
+class Transform(NamedTuple):
+    """Where a frame is in another."""
+
+    stamp: int
+    parent: str
+    child: str
+    position: List[float]  # noqa: UP006
+    """m."""
+    quaternion: List[float]  # noqa: UP006
+    """wxyz, child to parent."""
+
+
+def transforms(values: dict[str, Any], stamp: int, images: dict[str, dict[str, Any]]) -> list[Transform]:
+    """Where the body is in the world by a record of the odometry, and the cameras are on the body; empty where the
+    record does not say it. The cameras are told each time, so that who comes later hears of them, too.
+    """
+    age, position, q = number(values, "age"), numbers(values, "position", 3), numbers(values, "quaternion", 4)
+    if not all(map(math.isfinite, position + q)):
+        return []
+    true = stamp if math.isnan(age) else max(stamp - round(age * 1e9), 0)
+    mounted = [
+        Transform(true, BODY_FRAME, layout["frame"], layout["position"], layout["quaternion"])
+        for layout in images.values()
+    ]
+    return [Transform(true, WORLD_FRAME, BODY_FRAME, position, q), *mounted]
+
+
+def tf_message(found: list[Transform]) -> Tree:
+    """The same as a message."""
+    return {
+        "transforms": [
+            {
+                "header": header(each.stamp, each.parent),
+                "child_frame_id": each.child,
+                "transform": {
+                    "translation": vector(each.position),
+                    "rotation": dict(zip("wxyz", each.quaternion)),  # noqa: B905  # Python 3.8
+                },
+            }
+            for each in found
+        ]
+    }
 
 
 TOPICS = (

@@ -1,0 +1,179 @@
+"""Scenes from files in place of a task's world: what can be flown in, and what is refused. Imports JAX."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from e2efly.config import CameraConfig
+from e2efly.courses.origin import Origin
+from e2efly.scenes.camera import look, mount
+from e2efly.scenes.file import load_scene
+from e2efly.scenes.mesh import parts
+from e2efly.scenes.meshes.load import FORMATS, load_mesh_scene
+from e2efly.scenes.meshes.scene import MeshScene
+from e2efly.scenes.scene import Scene, join
+from e2efly.scenes.shapes import FAR
+from e2efly.validation.scenery import Scenery
+
+LEAST, MOST = 0.5, 1000.0
+"""How large a scene of triangles may be, m: the longest side of the box about it."""
+DEEP = 50.0
+"""The ground is looked for so far below the start, m."""
+_STEP = 0.5
+"""How close together the ground is looked for along the way, m."""
+_DOWN = CameraConfig(width=1, height=1, fov=(1e-3, 1e-3), pitch=math.pi / 2, reach=(0.0, DEEP))
+"""One ray straight down."""
+
+World = Scene | MeshScene
+"""One world of solids, or of triangles."""
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """What is shown in place of a task's world."""
+
+    name: str
+    """Path of a file, or name of a mesh scene of the package."""
+    unit: float | None = None
+    """See `load_world`."""
+    up: Literal["y", "z"] | None = None
+    """See `load_world`."""
+    beside: bool = False
+    """Whether what stands in the task's world is shown beside it."""
+
+    def put(self, scenery: Scenery) -> Scenery:
+        """A task's scenery in this scene.
+
+        Raises:
+            ValueError: naming the scene, what is wrong and what is accepted.
+        """
+        world = load_world(self.name, self.unit, self.up)
+        if self.beside:
+            assert isinstance(scenery.scene, Scene)
+            world = beside(world, scenery.scene)
+        return scenery.within(world)
+
+    @property
+    def options(self) -> list[str]:
+        """Those of `e2efly hil` that name it."""
+        more = [("--scene-unit", self.unit), ("--scene-up", self.up)]
+        given = [word for option, value in more if value is not None for word in (option, str(value))]
+        return ["--scene", self.name, *given, *(["--beside"] if self.beside else [])]
+
+
+def load_world(name: str, unit: float | None = None, up: Literal["y", "z"] | None = None) -> World:
+    """A scene by the path of its file, or one of the package's mesh scenes by name.
+
+    Args:
+        name: a .toml of docs/vision.md, a mesh of one of `FORMATS`, or a name.
+        unit: length of a mesh file's unit, m; None: 1.
+        up: axis of a mesh file that points up; None: as its format has it.
+
+    Raises:
+        ValueError: naming the scene, what is wrong and what is accepted.
+    """
+    if name.endswith(".toml"):
+        if unit is not None or up is not None:
+            raise ValueError(f"scene {name}: is in m with z up; accepted: a unit and an axis for {', '.join(FORMATS)}")
+        return load_scene(Path(name))
+    try:
+        scene = load_mesh_scene(name, up, 1.0 if unit is None else unit)
+    except ValueError as error:
+        said = f"{error}, or of a .toml of solids" if "unknown mesh scene" in str(error) else str(error)
+        raise ValueError(f"scene {said}") from None
+    low, high = scene.bounds
+    sides = high - low
+    if not LEAST <= sides.max() <= MOST:
+        size = " x ".join(f"{side:.4g}" for side in sides)
+        raise ValueError(
+            f"scene {name}: is {size} m large; accepted: a longest side of {LEAST:g} to {MOST:g} m (another unit of "
+            "the file? 0.001 for mm)"
+        )
+    return scene
+
+
+def beside(world: World, task: Scene) -> World:
+    """What stands in a task's world, but not its ground, put into a scene.
+
+    Raises:
+        ValueError: where something of the task's world moves and the scene is of triangles, which do not.
+    """
+    if isinstance(world, Scene):
+        both = {
+            kind: join(*(s.solids[kind] for s in (world, task) if kind in s.solids)) for kind in _kinds(world, task)
+        }
+        return dataclasses.replace(world, solids=both)
+    for kind, solids in task.solids.items():
+        if np.any(np.asarray(solids.active) & (np.asarray(solids.rate) != 0)):
+            raise ValueError(
+                f"the task's world has a {kind} that moves; accepted: a scene of solids (.toml), or a task without"
+            )
+    things = parts(dataclasses.replace(task, ground=np.full_like(task.ground, -FAR)), 0)
+    return world.beside(MeshScene.of(things)) if things else world
+
+
+def _kinds(*scenes: Scene) -> list[str]:
+    return sorted({kind for scene in scenes for kind in scene.kinds})
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What lies below a course."""
+
+    depth: float
+    """How far it is below the start, m."""
+    ends: float
+    """How far along the straight way to the first goal it is there, m; infinite: all along."""
+
+
+def ground_of(scenery: Scenery, name: str, radius: float) -> Ground:
+    """Look for the ground straight below the start of a course and below the way to its first goal.
+
+    Args:
+        scenery: the world and the course.
+        name: of the world, for the error.
+        radius: of the vehicle, m.
+
+    Raises:
+        ValueError: where there is none below the start, or something is nearer to the start than the radius.
+    """
+    course = scenery.course
+    start = np.asarray(course.start, np.float64)
+    goal = np.asarray(course.goal.goal(course.memory, np.zeros(1)), np.float64)[0]
+    way = float(np.linalg.norm((goal - start)[:2]))
+    along = np.linspace(0.0, 1.0, int(way / _STEP) + 2)
+    points = start + along[:, None] * (goal - start)
+    points[:, 2] = start[2]  # the goal may lie on the ground
+    depth = _depths(scenery.scene, points)
+    at = f"[{', '.join(f'{x:.2f}' for x in start)}] m, where its course begins"
+    if depth[0] >= DEEP:
+        raise ValueError(
+            f"{name} has no ground under {at}; accepted: a scene with a floor there, at most {DEEP:g} m below (another "
+            "axis up? another origin?)"
+        )
+    gap = scenery.nearest([start], [0.0], Origin(), radius)
+    if gap < radius:
+        raise ValueError(
+            f"{name} has something {max(gap, 0.0):.2f} m from {at}; accepted: more than the radius of the vehicle, "
+            f"{radius:g} m"
+        )
+    missing = np.flatnonzero(depth >= DEEP)
+    return Ground(float(depth[0]), float(along[missing[0]] * way) if len(missing) else math.inf)
+
+
+def _depths(world: World, points: np.ndarray) -> np.ndarray:
+    """Of what is met straight below each of n points, m; `DEEP`: nothing."""
+    n = len(points)
+    if isinstance(world, Scene):
+        ground = float(world.ground[0])
+        if ground > -FAR:
+            return np.where(points[:, 2] > ground, np.minimum(points[:, 2] - ground, DEEP), DEEP)
+        world = jax.tree.map(lambda x: jnp.repeat(x, n, axis=0), world.at(jnp.zeros(1)))
+    level = jnp.tile(jnp.asarray([1.0, 0.0, 0.0, 0.0]), (n, 1))
+    return np.asarray(look(_DOWN, world, mount(_DOWN, n), jnp.asarray(points, jnp.float32), level))[:, 0, 0]
