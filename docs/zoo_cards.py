@@ -90,8 +90,6 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
     for kind_of, suffix in (("Flights", "png"), ("One flight", "webp")):
         if (DOCS / "zoo" / f"{vehicle}-{task}.{suffix}").exists():
             lines += ["", f"![{kind_of} of {name}](zoo/{vehicle}-{task}.{suffix})"]
-        elif suffix == "png":
-            lines += ["", f"It has no picture yet: `python docs/zoo_pictures.py {name}` makes it."]
     lines += ["", f"| {name} | |", "| --- | --- |"]
     for criterion, share in about["success"].items():
         lines.append(f"| success{'' if criterion in (task, kind) else f': {criterion}'} | {percent(share)} |")
