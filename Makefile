@@ -4,9 +4,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 TEST_READY := $(VENV)/.test-ready
+DOCS_READY := $(VENV)/.docs-ready
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint bench zoo docs clean
+.PHONY: demo test lint bench zoo docs site clean
 
 demo: $(READY)
 	@rm -rf runs/demo
@@ -41,11 +42,20 @@ bench: $(TEST_READY)
 zoo: $(READY)
 	$(BIN)/python benchmarks/zoo.py
 
-docs: $(READY)
+# The site, with the pages that are made: of the measurements, the zoo and the notebooks.
+docs: $(DOCS_READY)
 	$(BIN)/python docs/figures.py
+	$(BIN)/python docs/zoo_cards.py
+	$(BIN)/python docs/notebook_pages.py
+	@$(MAKE) --no-print-directory site
+
+# The variable leaves out a notice of the end of MkDocs Material (docs/architecture.md).
+site: $(DOCS_READY)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "The site: site/index.html. Its search needs a server: $(BIN)/python -m http.server --directory site"
 
 clean:
-	rm -rf $(VENV) build dist src/*.egg-info
+	rm -rf $(VENV) build dist site src/*.egg-info
 
 $(READY): pyproject.toml constraints.txt
 	@echo "setting up $(VENV) (once)"
@@ -56,4 +66,8 @@ $(READY): pyproject.toml constraints.txt
 
 $(TEST_READY): $(READY)
 	@$(INSTALL) -e '.[test]'
+	@touch $@
+
+$(DOCS_READY): $(READY)
+	@$(INSTALL) -e '.[docs]'
 	@touch $@

@@ -83,7 +83,7 @@ def train(
         changes: other fields of `TrainConfig`, such as steps or seed.
 
     Returns:
-        The run's summary; success is at summary["shipped"][criterion]["success"].
+        The run's summary; success is at `summary["shipped"][criterion]["success"]`.
 
     Raises:
         ValueError: naming the field, the value and what is accepted.

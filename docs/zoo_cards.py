@@ -1,0 +1,123 @@
+"""Write docs/zoo.md, a card for each policy of the zoo, from what the package ships: `make docs`.
+
+The pictures are those of docs/zoo_pictures.py.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from e2efly.deploy.policy.loader import Policy, load_policy
+from e2efly.vehicles import load_family
+from e2efly.zoo import USUAL, contents, policy_file
+
+DOCS = Path(__file__).parent
+TASKS = {
+    "hover": "Fly to a point and stay there.",
+    "land": "Land on a point of the ground, gently.",
+    "track": "Follow a moving reference.",
+    "race": "Fly a lap through gates.",
+    "race_any": "Fly a lap of any track: a different one in every episode ([any track](any-track.md)).",
+    "gap": "Fly through a narrow tilted slit, banked.",
+    "hover_aware": "Fly to a point and keep a moving ball in view.",
+    "land_visual": "Land on a pad that only a camera shows.",
+    "avoid": "Fly fast through a forest that only a depth camera shows.",
+    "race_clutter": "Race among obstacles that only a depth camera shows.",
+}
+VEHICLES = {
+    "any": "Any quadrotor",
+    "crazyflie": "Crazyflie",
+    "vis_h": "VIS-H",
+    "vis_r": "VIS-R",
+}
+WORST = 3
+"""Rows of the stress that a card names."""
+INTRO = """
+# The zoo
+
+Written by `make docs` from `src/e2efly/zoo/zoo.json` and the policies beside it. These policies come with the
+package. Every command that takes a policy takes one by the name of its card:
+
+    e2efly eval vis_r/hover
+    e2efly eval vis_r/hover --stress
+    e2efly validate vis_r/hover --plant mujoco
+
+`e2efly fly vis_r/hover --link ... --pose ...` flies it on a real vehicle: read [Hardware](hardware.md) first.
+
+- **Success** is that of 1000 unseen starts of `e2efly eval`, on the vehicle of the file in still air; of *any
+  quadrotor*, of 1000 unseen vehicles. The [tasks](tasks.md) say what counts.
+- **Under stress** the vehicle, the air or the sensors are not those of the file: one difference in each
+  [row](robustness.md#stress), and a last row with all of them at once. Each row is of 1000 starts, and of 250 where
+  the policy sees. A card names the worst rows; [Benchmarks](benchmarks.md) has all of them.
+- **Pictures** show the first starts of `e2efly eval`: 12, or 6 where the policy sees. **Videos** show one of
+  these flights, from a camera that follows the vehicle. The green ball is where the policy is told to be.
+- **Training curves** are not shown: the runs that made these policies are not kept. The command *trained by*
+  makes such a run, with its curve in `plots/learning.png`; its result differs a little on another machine.
+
+None of these policies has flown a real vehicle yet. All of them were flown in the simulator of the training, and
+many in MuJoCo and through the real firmware ([Validate](validation.md)).
+"""
+
+
+def percent(share: float) -> str:
+    """With one decimal, cut: 100.0 stands for all."""
+    return f"{int(1000 * share + 1e-6) / 10:.1f} %"
+
+
+def limits(about: dict[str, Any]) -> list[str]:
+    """The worst rows of the stress, each a line of the table."""
+    rows = {name: share for name, share in about.get("stress", {}).items() if name not in ("nominal", "all at once")}
+    worst = sorted(rows.items(), key=lambda row: row[1])[:WORST]
+    return [f"| under stress: {name} | {percent(share)} |" for name, share in worst if share < 1.0]
+
+
+def flies_by(policy: Policy) -> str:
+    """What a policy needs, in words."""
+    contract = policy.contract
+    seen = [f"{image.height} x {image.width} pixels of {image.sees}" for image in contract.images]
+    memory = f"a memory of {contract.memory_size} numbers" if contract.memory_size else "no memory"
+    return ", ".join([f"{contract.control_rate_hz:g} commands per second", memory, *seen])
+
+
+def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
+    """The lines of one policy's card."""
+    name = f"{vehicle}/{task}"
+    policy = policy_file(name)
+    kind = task.removesuffix("_any")
+    options = "" if vehicle == USUAL else f" --vehicle {vehicle}"
+    preset = "" if about["preset"] == "robust" else f" --preset {about['preset']}"
+    stress = about.get("stress", {})
+    lines = [f"### {name}", "", TASKS[task]]
+    for kind_of, suffix in (("Flights", "png"), ("One flight", "webp")):
+        if (DOCS / "zoo" / f"{vehicle}-{task}.{suffix}").exists():
+            lines += ["", f"![{kind_of} of {name}](zoo/{vehicle}-{task}.{suffix})"]
+    lines += ["", f"| {name} | |", "| --- | --- |"]
+    for criterion, share in about["success"].items():
+        lines.append(f"| success{'' if criterion in (task, kind) else f': {criterion}'} | {percent(share)} |")
+    if "mean_speed_m_s" in about:
+        speeds = about["mean_speed_m_s"]
+        told = ", ".join(f"{c} {v:.1f}" for c, v in speeds.items()) if isinstance(speeds, dict) else f"{speeds:.1f}"
+        lines.append(f"| mean speed of a success, m/s | {told} |")
+    if stress:
+        lines.append(f"| under stress: all at once | {percent(stress['all at once'])} |")
+        lines += limits(about) or ["| under stress: every other row | 100.0 % |"]
+    else:
+        lines.append("| under stress | not measured row by row |")
+    lines.append(f"| flies by | {flies_by(load_policy(policy))} |")
+    trained = f"e2efly train {kind}{options}{preset} --seed {about['seed']}"
+    lines.append(f"| trained by | `{trained}`, {about['env_steps'] / 1e6:.1f} million steps |")
+    lines.append(f"| file | {policy.stat().st_size / 1000:.0f} kB, SHA-256 `{about['sha256'][:16]}...` |")
+    return [*lines, ""]
+
+
+def page() -> str:
+    """The whole page."""
+    zoo, lines = contents(), [INTRO.strip(), ""]
+    for vehicle in sorted(zoo, key=lambda name: (name != USUAL, load_family(name) is None, name)):
+        lines += [f"## {VEHICLES[vehicle]}", ""]
+        for task in [task for task in TASKS if task in zoo[vehicle]]:
+            lines += card(vehicle, task, zoo[vehicle][task])
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    (DOCS / "zoo.md").write_text(page(), encoding="utf-8")

@@ -1,0 +1,94 @@
+"""Fly each policy of the zoo and draw it: the pictures and videos of docs/zoo.md, in docs/zoo/.
+
+    python docs/zoo_pictures.py [VEHICLE/TASK ...]
+
+Every policy gets a picture of flights from unseen starts of its first criterion. Those of the VIS-R get a video as
+well: one flight, seen by a camera that follows the vehicle.
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from PIL import Image
+
+from e2efly.adapters.picture import Chase
+from e2efly.config import TaskConfig
+from e2efly.device import prepare
+from e2efly.env import UNSEEN, Env, random_key
+from e2efly.episodes import Act
+from e2efly.evaluation import SEED, act_of, candidate, episode_steps
+from e2efly.view.flights import Flights, fly
+from e2efly.view.space import plot_flights
+from e2efly.view.worlds import plot_flights_in_worlds
+from e2efly.zoo import USUAL, contents
+
+FOLDER = Path(__file__).parent / "zoo"
+EPISODES, SEEN = 12, 6
+"""Flights in a picture, and of a policy that sees."""
+WIDE, COLOURS = 800, 48
+"""Of a picture: columns and colours."""
+FILM, QUALITY, LONGEST = (240, 160), 40, 8.0
+"""Of a video: pixels, WebP's quality, s."""
+PERIOD = 0.1
+"""Seconds from frame to frame."""
+
+
+def picture(flights: Flights, suite: TaskConfig, env: Env, key: Any, path: Path, title: str) -> None:
+    """The plot of flights that `e2efly eval` draws, smaller."""
+    with tempfile.TemporaryDirectory() as folder:
+        large = Path(folder) / "flights.png"
+        if env.cameras or suite.own_worlds:
+            worlds = env.task.scene(env.reset(key, len(flights.length))[0].memory)
+            plot_flights_in_worlds(flights, worlds, large, title)
+        else:
+            plot_flights(suite, flights, large, title)
+        with Image.open(large) as drawn:
+            size = WIDE, round(WIDE * drawn.height / drawn.width)
+            small = drawn.convert("RGB").resize(size, Image.Resampling.LANCZOS)
+    small.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+
+
+def video(env: Env, act: Act, key: Any, flights: Flights, path: Path) -> None:
+    """The first flight that succeeds, as an animated WebP."""
+    n, row = len(flights.length), int(np.argmax(flights.success))
+    chase, step = Chase(env), jax.jit(lambda state, action: env.step(state, action, restart=False))
+    state, observation = env.reset(key, n)
+    memory, film = act.begin(n), []
+    for k in range(min(int(flights.length[row]), round(LONGEST / env.control_period))):
+        if k * env.control_period >= len(film) * PERIOD:
+            film.append(Image.fromarray(chase(state, row)).resize(FILM, Image.Resampling.LANCZOS))
+        images = tuple(np.asarray(image) for image in state.images)
+        action, memory = act.act(np.asarray(observation), images, memory)
+        state, out = step(state, action)
+        observation = out.final_observation
+    film[0].save(
+        path, save_all=True, append_images=film[1:], duration=round(1000 * PERIOD), loop=0, quality=QUALITY, method=6
+    )
+
+
+def main() -> None:
+    """Draw those that are named, or all."""
+    prepare()
+    key = random_key(SEED, UNSEEN, 0)  # the starts of `e2efly eval`
+    FOLDER.mkdir(exist_ok=True)
+    named = sys.argv[1:] or [f"{vehicle}/{task}" for vehicle, tasks in contents().items() for task in tasks]
+    for name in named:
+        vehicle, task = name.split("/")
+        found = candidate(name)
+        suite = next(iter(found.task.criteria().values()))
+        env, act = found.environment(suite), act_of(found.policy)
+        n = SEEN if env.cameras else EPISODES
+        flights = fly(env, act, key, n, episode_steps(suite, env))
+        title = f"{found.policy.contract.task} on {found.policy.contract.vehicle}"
+        picture(flights, suite, env, key, FOLDER / f"{vehicle}-{task}.png", title)
+        if vehicle == USUAL:
+            video(env, act, key, flights, FOLDER / f"{vehicle}-{task}.webp")
+        print(name, f"{flights.success.mean():.0%}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,58 @@
+"""The pages that are made from other files are what these files say today."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from e2efly.zoo import USUAL, contents
+from tests.docs.pages import DOCS
+
+NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
+
+
+def script(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"docs_{name}", DOCS / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_page_of_the_zoo_is_what_the_zoo_says() -> None:
+    assert (DOCS / "zoo.md").read_text(encoding="utf-8") == script("zoo_cards").page()
+
+
+def test_every_policy_of_the_zoo_has_a_card_and_pictures() -> None:
+    page = (DOCS / "zoo.md").read_text(encoding="utf-8")
+    for vehicle, tasks in contents().items():
+        for task in tasks:
+            assert f"### {vehicle}/{task}\n" in page
+            assert (DOCS / "zoo" / f"{vehicle}-{task}.png").read_bytes()[1:4] == b"PNG"
+            if vehicle == USUAL:
+                assert (DOCS / "zoo" / f"{vehicle}-{task}.webp").read_bytes()[8:12] == b"WEBP"
+
+
+def test_limits_are_the_worst_rows_first() -> None:
+    limits = script("zoo_cards").limits
+    about = {"stress": {"nominal": 0.5, "all at once": 0.1, "a": 1.0, "b": 0.999, "c": 0.25, "d": 0.75, "e": 0.8}}
+    assert limits(about) == [
+        "| under stress: c | 25.0 % |",
+        "| under stress: d | 75.0 % |",
+        "| under stress: e | 80.0 % |",
+    ]
+    assert limits({}) == []
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_the_page_of_a_notebook_is_what_the_notebook_has(notebook: Path, tmp_path: Path) -> None:
+    copy = tmp_path / notebook.name
+    copy.write_bytes(notebook.read_bytes())
+    assert notebook.with_suffix(".md").read_text(encoding="utf-8") == script("notebook_pages").page(copy)
+    pictures = sorted(tmp_path.glob("*.png"))
+    assert pictures
+    assert all(picture.read_bytes() == (notebook.parent / picture.name).read_bytes() for picture in pictures)
