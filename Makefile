@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 TEST_READY := $(VENV)/.test-ready
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint bench zoo docs clean
+.PHONY: demo test lint bench zoo docs web clean
 
 demo: $(READY)
 	@rm -rf runs/demo
@@ -43,6 +43,10 @@ zoo: $(READY)
 
 docs: $(READY)
 	$(BIN)/python docs/figures.py
+
+# The page of `e2efly export RUN --web DIR`; needs Node.js and the packages of web/package-lock.json, which it fetches.
+web:
+	cd web && npm ci --ignore-scripts && npm run check && npm run build
 
 clean:
 	rm -rf $(VENV) build dist src/*.egg-info
