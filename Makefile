@@ -7,7 +7,7 @@ TEST_READY := $(VENV)/.test-ready
 DOCS_READY := $(VENV)/.docs-ready
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint bench zoo docs site clean
+.PHONY: demo test lint bench zoo docs site web clean
 
 demo: $(READY)
 	@rm -rf runs/demo
@@ -53,6 +53,10 @@ docs: $(DOCS_READY)
 site: $(DOCS_READY)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "The site: site/index.html. Its search needs a server: $(BIN)/python -m http.server --directory site"
+
+# The page of `e2efly export RUN --web DIR`; needs Node.js and the packages of web/package-lock.json, which it fetches.
+web:
+	cd web && npm ci --ignore-scripts && npm run check && npm run build
 
 clean:
 	rm -rf $(VENV) build dist site src/*.egg-info

@@ -37,13 +37,14 @@ from hypothesis import settings  # noqa: E402
 settings.register_profile("suite", deadline=None)  # how busy the machine is says nothing of the code
 settings.load_profile("suite")
 
-PARTS = ("ros1", "ros2", "mocap", "realsense", "sitl")
+PARTS = ("ros1", "ros2", "mocap", "realsense", "sitl", "browser")
 """What may be missing on a laptop: tests in files whose names end so need it, and fail without it."""
 LONGEST = (
     "docs/test_tutorials.py", "docs/test_notebooks.py",
     "identification/test_flight.py", "learn/test_runner.py", "learn/test_hosts.py", "commands/test_sweep.py",
     "test_zoo.py", "learn/test_ablation.py", "learn/test_algorithms.py", "validation/test_faults_sitl.py",
     "validation/test_campaign_sitl.py", "test_examples.py", "adapters/test_torch.py", "scenes/test_cast.py",
+    "web/test_page_browser.py",
 )  # fmt: skip
 """Files that take a minute or so, the longest first: they begin, so that of two workers neither ends long alone."""
 WITHOUT = tuple(filter(None, os.environ.get("E2EFLY_WITHOUT", "").split(",")))

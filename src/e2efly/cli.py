@@ -23,6 +23,7 @@ _EXAMPLES = {
     "ablate hover": "what each reward term is good for: a figure and a table",
     "sweep hover --seeds 5": "over seeds and options, side by side on Ray",
     "export RUN": "write policy.onnx from a checkpoint again",
+    "export race --web DIR": "a page in which a policy flies, in any browser",
     "validate POLICY": "fly it on another physics, or through the real firmware",
     "fly POLICY": "fly it on a Betaflight quadrotor",
     "hil POLICY": "put a real vehicle into a virtual world: poses in, images out",

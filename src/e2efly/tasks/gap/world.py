@@ -3,6 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -28,6 +29,9 @@ jax.tree_util.register_dataclass(Memory)
 @dataclass(frozen=True)
 class Gap(GapGoal):
     """Make it with `Gap.of`."""
+
+    page: ClassVar = "gap"
+    """What the page of `e2efly export --web` calls this world, which it simulates."""
 
     @staticmethod
     def of(config: GapConfig, shape: Shape, control_period: float, checks: int) -> "Gap":

@@ -2,6 +2,7 @@
 
 import dataclasses
 from dataclasses import dataclass
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -20,6 +21,9 @@ from e2efly.tasks.task import at_rest, uniform
 @dataclass(frozen=True)
 class Hover(HoverGoal):
     """Starts about the target, over level ground."""
+
+    page: ClassVar = "hover"
+    """What the page of `e2efly export --web` calls this world, which it simulates."""
 
     @classmethod
     def of(cls, config: HoverConfig, shape: Shape, control_period: float, substeps: int = 1) -> "Hover":

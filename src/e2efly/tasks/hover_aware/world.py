@@ -2,6 +2,7 @@
 
 import dataclasses
 from dataclasses import dataclass
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -23,6 +24,9 @@ jax.tree_util.register_dataclass(Memory)
 @dataclass(frozen=True)
 class HoverAware(HoverAwareGoal):
     """Starts about the target, with a ball on a circle around it."""
+
+    page: ClassVar = "hover_aware"
+    """What the page of `e2efly export --web` calls this world, which it simulates."""
 
     @classmethod
     def of(cls, config: HoverAwareConfig, shape: Shape, control_period: float, substeps: int = 1) -> "HoverAware":

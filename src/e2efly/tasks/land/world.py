@@ -2,6 +2,7 @@
 
 import dataclasses
 from dataclasses import dataclass
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +22,9 @@ from e2efly.tasks.task import at_rest, uniform
 @dataclass(frozen=True)
 class Land(LandGoal):
     """Starts over and beside a flat pad."""
+
+    page: ClassVar = "land"
+    """What the page of `e2efly export --web` calls this world, which it simulates."""
 
     @classmethod
     def of(cls, config: LandConfig, shape: Shape, control_period: float, substeps: int = 1) -> "Land":

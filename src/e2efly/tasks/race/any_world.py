@@ -3,7 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -33,6 +33,8 @@ jax.tree_util.register_dataclass(Memory, data_fields=["tracks", "passed"], meta_
 class AnyRace(AnyRaceGoal):
     """Make it with `AnyRace.of`."""
 
+    page: ClassVar = "any_race"
+    """What the page of `e2efly export --web` calls this world, which it simulates."""
     given: Tracks | None
     """The track of every episode (n = 1); None: another one in each."""
 

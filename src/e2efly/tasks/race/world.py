@@ -3,6 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +25,9 @@ from e2efly.tasks.race.way import NextGates
 @dataclass(frozen=True)
 class Race(RaceGoal):
     """Make it with `Race.of`."""
+
+    page: ClassVar = "race"
+    """What the page of `e2efly export --web` calls this world, which it simulates."""
 
     @staticmethod
     def of(config: RaceConfig, shape: Shape, control_period: float = 0.0, substeps: int = 1) -> "Race | AnyRace":

@@ -3,6 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -28,6 +29,8 @@ jax.tree_util.register_dataclass(Memory)
 class Track(TrackGoal):
     """Follow a reference; make it with `Track.of`."""
 
+    page: ClassVar = "track"
+    """What the page of `e2efly export --web` calls this world, which it simulates."""
     knots: int
     curve: Lissajous | Spline | None
     """What to follow: a curve, the spline of the user's file, or None: random polynomials."""
