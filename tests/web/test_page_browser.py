@@ -225,8 +225,14 @@ def test_a_page_is_flown_by_its_visitor(racing: tuple[Candidate, Path], browser:
     page.locator("#wind").fill("10")
     page.keyboard.press(" ")
     page.wait_for_function("parseFloat(document.getElementById('time').textContent) > 0.2")
-    flown = now()
-    assert math.dist(flown["velocity"], [0.0, 0.0, 0.0]) > 0
+    page.keyboard.press(" ")
+    page.wait_for_function("document.getElementById('status').textContent === 'paused'")
+    watched = now()
+    whole = open_page.fly(start=1, seconds=watched["time"])
+    np.testing.assert_allclose(watched["position"], whole["position"][-1], rtol=0, atol=1e-9)
+    still_air = {"wind": [0, 0, 0], "mass": 1, "delay": open_page.page.evaluate("e2eflyFlight.latency")}
+    light = open_page.fly(start=1, seconds=watched["time"], conditions=still_air)
+    assert math.dist(watched["velocity"], light["velocity"][-1]) > 0.1
     assert open_page.complaints == []
     assert all(url.startswith(("file://", "data:", "blob:")) for url in open_page.requests)
     page.close()
