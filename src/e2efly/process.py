@@ -3,6 +3,7 @@
 Imports next to nothing, so that it holds before anything else is imported.
 """
 
+import ctypes
 import gc
 import io
 import os
@@ -75,6 +76,10 @@ def be_idle() -> None:
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
 
 
+MLOCK_CURRENT, MLOCK_FUTURE, MLOCK_ONFAULT = 1, 2, 4
+"""Flags of Linux's mlockall(2)."""
+
+
 def be_punctual(priority: int) -> None:
     """Let nothing hold up this process, whose work must not wait: neither other processes nor its own memory.
 
@@ -87,6 +92,8 @@ def be_punctual(priority: int) -> None:
     """
     gc.collect()
     gc.freeze()
+    with suppress(OSError, AttributeError):  # pages that were touched stay: none is read from a disk in flight
+        ctypes.CDLL(None).mlockall(MLOCK_CURRENT | MLOCK_FUTURE | MLOCK_ONFAULT)
     with suppress(OSError, AttributeError):
         for thread in Path("/proc/self/task").iterdir():
             os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(priority))

@@ -182,6 +182,7 @@ def run(asked: Asked) -> int:
             givers[f"--record {o.record}"], node.tell = recorder.child, recorder.tell
         node.warm()
         be_punctual(PRIORITY)
+        source.read(time.monotonic())  # what came while it compiled is old
         console.print(f"{rate:g} Hz, poses from {source.describe()}. Fly it with:")
         console.print(f"  {' '.join([*goal, *given])}")
         try:

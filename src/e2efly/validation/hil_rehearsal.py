@@ -22,7 +22,7 @@ from e2efly.goal import Course
 from e2efly.tasks.route import Route, course_for, route_of
 from e2efly.validation.hil_lap import TOUCH, Heard, Lap, lap_of
 from e2efly.validation.mocap_process import DELAY_S
-from e2efly.validation.rehearsal import LINK_S, REACH_IN_SIGHT
+from e2efly.validation.rehearsal import REACH_IN_SIGHT
 from e2efly.validation.room import FLIGHT_S, START_S, TAKEN, Program, Room, Victim, bridge, flags, free_port, take_off
 from e2efly.validation.scene_files import SceneFile, ground_of
 from e2efly.validation.scenery import Scenery
@@ -70,13 +70,6 @@ class Plan:
     def vehicle(self) -> Vehicle:
         """What flies."""
         return load_vehicle(self.found.vehicle)
-
-    @property
-    def link(self) -> float:
-        """What the vehicle's radio link and controller take, s, beside what the rehearsal's own do: all that its
-        latency is beyond the poses'. The bridge's poses are late by it, as nothing else of the link can be.
-        """
-        return max(self.found.policy.contract.latency_of(self.vehicle) - self.pose_delay - LINK_S, 0.0)
 
     @property
     def period(self) -> float:
@@ -185,15 +178,7 @@ class _Flight:
         stack.callback(_forget, names)
         pairs = zip(contract.images, names, strict=True)
         images = [word for image, name in pairs for word in ("--image", f"{image.name}=shm:{name}")]
-        to = [
-            "--to",
-            str(ports[0]),
-            f"{ports[1]}+{plan.link:.6g}",
-            "--seed",
-            str(seed),
-            "--delay",
-            f"{plan.pose_delay:.6g}",
-        ]
+        to = ["--to", *map(str, ports), "--seed", str(seed), "--delay", f"{plan.pose_delay:.6g}"]
         self.mocap = Program("motion capture", ["-m", "e2efly.validation.mocap_process", *to])
         stack.enter_context(self.mocap)
         inlet = json.loads(self.mocap.wait_for('"from"', START_S))["from"]

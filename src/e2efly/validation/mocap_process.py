@@ -1,11 +1,10 @@
 """A motion capture system that is not there, as a process of its own: exact poses in, measured ones out, over UDP.
 
-    python -m e2efly.validation.mocap_process --to PORT[+S] [PORT[+S] ...] [--delay S] [--gaps HZ] [--seed N]
+    python -m e2efly.validation.mocap_process --to PORT [PORT ...] [--delay S] [--gaps HZ] [--seed N]
 
 It prints one line of JSON, `{"from": PORT}`: the port of the loopback interface that takes exact poses, as
 docs/pose-sources.md has them. Each goes on to every port of `--to`, later and with noise, without velocity and body
-rate: cameras see none. Now and then the markers are hidden for a moment. A port with `+S` gets everything S seconds
-later: so long takes the link behind it. The process ends with its standard input.
+rate: cameras see none. Now and then the markers are hidden for a moment. The process ends with its standard input.
 """
 
 import argparse
@@ -88,15 +87,8 @@ class Camera:
         return ready
 
 
-def later(text: str) -> tuple[int, float]:
-    """A port, and how much later it gets the poses, s: of PORT or PORT+S."""
-    port, _, seconds = text.partition("+")
-    return int(port), float(seconds or 0.0)
-
-
-def serve(inlet: socket.socket, ports: list[tuple[int, float]], camera: Camera) -> None:
+def serve(inlet: socket.socket, ports: list[int], camera: Camera) -> None:
     """Pass poses on until standard input ends."""
-    held = [(port, seconds, deque[tuple[float, bytes]]()) for port, seconds in ports]
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         while True:
             readable, _, _ = select.select([inlet, sys.stdin], [], [], 0.001)
@@ -104,18 +96,15 @@ def serve(inlet: socket.socket, ports: list[tuple[int, float]], camera: Camera) 
                 return
             if inlet in readable:
                 camera.see(json.loads(inlet.recv(_LARGEST)), time.monotonic())
-            now = time.monotonic()
-            ready = camera.ready(now)
-            for port, seconds, waiting in held:
-                waiting.extend((now + seconds, message) for message in ready)
-                while waiting and waiting[0][0] <= now:
-                    sender.sendto(waiting.popleft()[1], ("127.0.0.1", port))
+            for message in camera.ready(time.monotonic()):
+                for port in ports:
+                    sender.sendto(message, ("127.0.0.1", port))
 
 
 def main() -> None:
     """Open the port and serve."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--to", type=later, nargs="+", required=True, help="UDP ports on 127.0.0.1 for the poses")
+    parser.add_argument("--to", type=int, nargs="+", required=True, help="UDP ports on 127.0.0.1 that take the poses")
     parser.add_argument("--delay", type=float, default=DELAY_S, help="s")
     parser.add_argument("--gaps", type=float, default=GAPS_HZ, help="how often the markers are hidden, Hz")
     parser.add_argument("--seed", type=int, default=0, help="of noise and gaps")
