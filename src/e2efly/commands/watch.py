@@ -154,13 +154,15 @@ def _poses(o: Watch) -> "Iterator[Any]":
 
         prepare("cpu")
         from e2efly.evaluation import candidate
+        from e2efly.scenes.scene import Scene
         from e2efly.validation.scenery import Scenery
 
         found = candidate(o.world, o.vehicle)
         scenery = Scenery.draw(
             found.environment(found.task.criteria()[_criterion(o.criterion, found.task.criteria())]), o.seed
         )
-        stands = () if scenery is None else tuple(bodies(scenery.scene, 0, ceilings=True))
+        if scenery is not None and isinstance(scenery.scene, Scene):
+            stands = tuple(bodies(scenery.scene, 0, ceilings=True))
     source = open_source(o.what[0])
     try:
         yield Poses(source, load_vehicle(o.vehicle or USUAL), stands)
