@@ -1,10 +1,12 @@
 """The viewer's page in a real browser: Debian's Chromium, headless."""
 
+import contextlib
 import os
 import re
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -136,3 +138,23 @@ def test_a_port_in_use_is_named(capsys: pytest.CaptureFixture[str]) -> None:
         port = str(taken.getsockname()[1])
         assert run(["watch", "hover", "--port", port]) == 2
     assert f"--port {port} is in use on 127.0.0.1" in capsys.readouterr().err
+
+
+def test_a_viewer_beside_a_program_ends_with_it() -> None:
+    code = (
+        "import sys, time; from e2efly.watch.beside import Shown\n"
+        "shown = Shown(0, '--vehicle', 'vis_r'); print(shown.page._process.pid, flush=True); time.sleep(60)\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        viewer = int(program.stdout.readline())
+        program.kill()
+    try:
+        for _ in range(600):
+            if not Path(f"/proc/{viewer}").exists() or "Z" in Path(f"/proc/{viewer}/stat").read_text().split()[2]:
+                return
+            time.sleep(0.1)
+        raise AssertionError("the viewer goes on")
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(viewer, signal.SIGKILL)

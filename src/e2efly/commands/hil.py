@@ -8,7 +8,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import tyro
@@ -81,6 +81,8 @@ class Hil:
     """End after so long; left out: at Ctrl-C."""
     track: Path = Path("flights") / "hil-track.toml"
     """Where to write the gates of a drawn race, for --goal.track of `e2efly fly`; other tasks write nothing."""
+    watch: int | None = None
+    """Port of a page of 127.0.0.1 that shows the vehicle in the scene, by a process of its own. See docs/watch.md."""
     record: Path | None = None
     """A new .mcap file with the images, their poses, latencies and virtual collisions."""
     report: Path | None = None
@@ -180,6 +182,8 @@ def run(asked: Asked) -> int:
             recorder = Recorder(o.record, images, names)
             stack.callback(recorder.close)
             givers[f"--record {o.record}"], node.tell = recorder.child, recorder.tell
+        if o.watch is not None:
+            _watch(node, o, bool(asked.task), stack, console)
         node.warm()
         be_punctual(PRIORITY)
         source.read(time.monotonic())  # what came while it compiled is old
@@ -215,6 +219,24 @@ def _where(o: Hil, scenery: "Scenery", task: str, radius: float, console: Termin
     if math.isfinite(ground.ends):
         console.print(f"It has no ground under the way to the first goal from {ground.ends:.1f} m on.")
     return scenery
+
+
+def _watch(node: "Node", o: Hil, other_world: bool, stack: ExitStack, console: Terminal) -> None:
+    """Show each pose of the scene on a page, beside what is told already; and the world, where that is the policy's."""
+    from e2efly.watch.beside import Shown
+
+    same = not other_world and o.scene is None
+    world = ["--world", str(o.policy), "--seed", str(o.seed)] if same else []
+    shown, tell = Shown(o.watch or 0, *world, *(["--vehicle", o.vehicle] if o.vehicle else [])), node.tell
+    stack.callback(shown.close)
+    console.print(f"watch it at {shown.page.address}")
+
+    def both(topic: str, message: dict[str, Any]) -> None:
+        tell(topic, message)
+        if topic == "shown":
+            shown.show(message["time"], message["scene_position"], message["scene_quaternion"])
+
+    node.tell = both
 
 
 def _loop(node: "Node", seconds: float | None, console: Terminal, givers: dict[str, "Child"]) -> None:

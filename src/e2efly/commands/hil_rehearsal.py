@@ -30,7 +30,7 @@ LATE_S = 0.01
 """Control steps and a room that are later than this in 99 of 100 say that the machine is too slow or busy, s."""
 STALL_S = 0.05
 """... and so do single ones later than this, s."""
-REHEARSALS, OWN = ("laps", "kill", "pose_delay", "out"), ("pose", "image", "seconds", "json", "track")
+REHEARSALS, OWN = ("laps", "kill", "pose_delay", "out"), ("pose", "image", "seconds", "json", "track", "watch")
 """Options that only a rehearsal has, and those that it sets itself."""
 
 

@@ -1,6 +1,9 @@
 """`e2efly watch`: flights in a browser, live."""
 
 import math
+import os
+import select
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -57,7 +60,7 @@ class Watch:
     seconds: float | None = None
     """End after so long; left out: at Ctrl-C. Of a video, its length; left out: 8 s, or the log's."""
     idle: bool = False
-    """Compute only while no other process wants a core."""
+    """For a viewer beside another program: compute only while no other wants a core, and end with standard input."""
     video: Path | None = None
     """Draw no page, but this file: .gif, .mp4, .webm, or .png, a picture of the last moment."""
     camera: Literal["follow", "orbit", "first person"] = "follow"
@@ -117,20 +120,29 @@ def _serve(o: Watch, server: Any, logs: list[Path]) -> None:
     from e2efly.watch.viewer import Viewer
 
     end = time.monotonic() + (np.inf if o.seconds is None else o.seconds)
+
+    def over() -> bool:
+        return time.monotonic() > end or (o.idle and _abandoned())
+
     panel = Panel(Viewer(server, len(logs) or o.count, ghosts=len(logs) > 1))
     if logs:
         recording = _recording(o, logs)
         between = times_on(panel, recording)
-        loop(recording, panel.viewer, panel, lambda: time.monotonic() > end, between)
+        loop(recording, panel.viewer, panel, over, between)
         return
     if _is_source(o.what[0]):
         with _poses(o) as poses:
-            loop(poses, panel.viewer, panel, lambda: time.monotonic() > end)
+            loop(poses, panel.viewer, panel, over)
         return
     with _flown(o, Terminal()) as (simulation, progress):
         hands_on(panel, simulation)
         between = (lambda: None) if progress is None else policies_on(panel, progress)
-        loop(simulation, panel.viewer, panel, lambda: time.monotonic() > end, between)
+        loop(simulation, panel.viewer, panel, over, between)
+
+
+def _abandoned() -> bool:
+    """Whether standard input has ended: with whoever started this, however that ended."""
+    return bool(select.select([sys.stdin], [], [], 0)[0]) and not os.read(sys.stdin.fileno(), 1)
 
 
 def _is_source(text: str) -> bool:

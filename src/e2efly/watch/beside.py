@@ -43,7 +43,7 @@ class Beside:
         where = ["--idle", "--host", HOST, "--port", str(self.port)]
         self._process = subprocess.Popen(
             [sys.executable, "-m", "e2efly", "watch", *self.what, *where], start_new_session=True,
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
 
     def wait(self) -> None:
