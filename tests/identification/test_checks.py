@@ -159,3 +159,15 @@ def test_splines_that_overshoot_are_refused(vehicle: Vehicle) -> None:
     rng = np.random.default_rng(0)
     with pytest.raises(ValueError, match=r"rotor_speed is up to 1e\+06 rad/s, and beyond what a quadrotor can do in"):
         checked([changed(flight(), "rotor_speed", lambda x: np.where(rng.random((len(x), 1)) < 0.01, 1e6, x))], vehicle)
+
+
+def test_a_voltage_that_was_not_measured_scales_no_motor_outputs(vehicle: Vehicle) -> None:
+    t = np.arange(0, 12.0, 0.5)
+    none, some = (Stream(t, np.where(np.arange(len(t))[:, None] < k, 0.0, 16.1)) for k in (len(t), 3))
+    record = flight()
+    (dead,) = checked([replace(record, streams={**record.streams, "voltage": none})], vehicle)
+    (late,) = checked([replace(record, streams={**record.streams, "voltage": some})], vehicle)
+    assert "voltage" not in dead.streams
+    assert dead.notes == ("the battery's voltage was not measured: 0 V",)
+    assert late.streams["voltage"].values.min() == 16.1
+    assert late.notes == ("3 voltages of 0 V are left out",)

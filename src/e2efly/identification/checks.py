@@ -21,6 +21,8 @@ LIMITS = {
 """The largest size of a number that a quadrotor's log can hold, in the stream's unit."""
 LOST = 1e-3
 """Share of a stream that may lie outside, as single wrong samples, and is left out."""
+LEAST_VOLTS = 1.0
+"""Of any battery, V: what says less has no sensor."""
 MOVING = 0.3
 """Speed from which on poses show a vehicle that moves, m/s."""
 DRIFT = 0.02
@@ -53,7 +55,7 @@ def checked(records: Sequence[Record], vehicle: Vehicle) -> list[Record]:
                 f"{record.path}: holds the same numbers as {seen[digest].path}; accepted: each flight once"
             )
         seen[digest] = record
-        record = _within_limits(record)
+        record = _with_battery(_within_limits(record))
         _check_constant(record)
         _check_units(record)
         record = _in_the_air(_levelled(record), vehicle)
@@ -91,6 +93,24 @@ def _within_limits(record: Record) -> Record:
             notes.append(f"{int(bad.sum())} samples of {name} that no quadrotor reaches are left out")
         streams[name] = Stream(stream.time[~bad], stream.values[~bad])
     return replace(record, streams=streams, notes=tuple(notes))
+
+
+def _with_battery(record: Record) -> Record:
+    """Without voltages that are none: a flight controller without a sensor says 0 V."""
+    if "voltage" not in record.streams:
+        return record
+    stream = record.streams["voltage"]
+    there = stream.values[:, 0] > LEAST_VOLTS
+    if there.all():
+        return record
+    streams = dict(record.streams)
+    streams["voltage"] = Stream(stream.time[there], stream.values[there])
+    if there.mean() < 0.5:
+        del streams["voltage"]
+        note = "the battery's voltage was not measured: 0 V"
+    else:
+        note = f"{int((~there).sum())} voltages of 0 V are left out"
+    return replace(record, streams=streams, notes=(*record.notes, note))
 
 
 def _check_constant(record: Record) -> None:
