@@ -25,6 +25,7 @@ def load_scene(path: Path, n: int = 1) -> Scene:
     Raises:
         ValueError: naming the file, the solid, the key, the value and what is accepted.
     """
+    path = Path(path)
     table = read_table(path)
     if extra := set(table) - {"ground", "solids"}:
         raise ValueError(f"{path}: has {sorted(extra)}; accepted: ground (m, or false for none) and solids")
