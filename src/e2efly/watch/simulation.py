@@ -245,4 +245,9 @@ class Simulation:
         if self._ends:
             share = 100 * float(np.mean(self._ends))
             told += f"  \n{share:.0f} % of the last {len(self._ends)} episodes succeeded"
-        return told
+        changed = [
+            f"{name} {100 * value:.0f} %"
+            for name, value in (("mass", self.hands.mass), ("thrust", self.hands.thrust))
+            if np.isfinite(value)
+        ]
+        return f"{told}  \nchanged: {', '.join(changed)}" if changed else told
