@@ -22,11 +22,6 @@ from typing import Any
 
 from common import arguments, table, write
 
-CHROMIUM = "/usr/bin/chromium"
-FLAGS = [
-    "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-sync",
-    "--disable-background-networking", "--disable-component-update", "--no-first-run",
-]  # fmt: skip
 UNBUFFERED = {**os.environ, "PYTHONUNBUFFERED": "1"}
 SHOWN = "document.body.innerText.includes('from its goal')"
 
@@ -34,12 +29,10 @@ SHOWN = "document.body.innerText.includes('from its goal')"
 @contextmanager
 def browser() -> Iterator[Any]:
     """A page of a browser."""
-    from playwright.sync_api import sync_playwright
+    from tests.browser import chromium
 
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+    with chromium() as opened:
         yield opened.new_page(viewport={"width": 1000, "height": 700})
-        opened.close()
 
 
 def first_picture(task: str) -> float:

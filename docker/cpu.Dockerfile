@@ -1,6 +1,6 @@
 # e2efly on the CPU. From the root of the repository:
 #   docker build -f docker/cpu.Dockerfile -t e2efly .
-#   docker run --rm -v "$PWD/runs:/work/runs" e2efly train hover
+#   docker run --rm -v "$PWD/runs:/data/runs" e2efly train hover
 FROM python:3.11-slim
 
 # gcc builds the real firmware, once, at the first `e2efly firmware`
@@ -11,8 +11,8 @@ COPY pyproject.toml constraints.txt README.md LICENSE ./
 COPY src ./src
 RUN pip install --no-cache-dir -c constraints.txt '.[mesh,mujoco]'
 
-RUN useradd --create-home pilot && mkdir /work && chown pilot /work
+RUN useradd --create-home pilot && mkdir /data && chown pilot /data
 USER pilot
-WORKDIR /work
+WORKDIR /data
 ENTRYPOINT ["e2efly"]
 CMD ["--help"]

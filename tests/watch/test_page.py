@@ -14,14 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
 
-CHROMIUM = "/usr/bin/chromium"
-"""Of the package that `.ci/run` installs."""
-FLAGS = (
-    "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-sync",
-    "--disable-background-networking", "--disable-component-update", "--no-first-run",
-)  # fmt: skip
+from tests.browser import chromium
+
 PATIENCE_MS = 120_000
 
 
@@ -53,14 +49,12 @@ def served(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
 @contextmanager
 def page_of(address: str, wrong: list[str]) -> Iterator[Page]:
     """A browser that looks at it; what is wrong on its console is kept."""
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
+    with chromium() as browser:
         page = browser.new_page(viewport={"width": 900, "height": 900})
         page.on("console", lambda m: wrong.append(m.text) if m.type == "error" else None)
         page.on("pageerror", lambda error: wrong.append(str(error)))
         page.goto(address)
         yield page
-        browser.close()
 
 
 def wait_for(page: Page, condition: str) -> None:
@@ -157,3 +151,8 @@ def test_a_viewer_beside_a_program_ends_with_it() -> None:
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.kill(viewer, signal.SIGKILL)
+
+
+def test_a_bridge_that_is_watched_imports_neither_jax_nor_the_viewer() -> None:
+    code = "import sys, e2efly.watch.beside; sys.exit(any(name in sys.modules for name in ('jax', 'viser')))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

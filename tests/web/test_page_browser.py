@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 from e2efly.config import EnvConfig, ImuConfig, RewardConfig
 from e2efly.control import COMMAND_MODES
@@ -23,9 +22,9 @@ from e2efly.tasks.hover import HoverConfig
 from e2efly.vehicles.vehicle import terms
 from e2efly.web.page import STARTS, beginnings, numbers, still, write_page
 from e2efly.zoo import FOLDER
+from tests.browser import chromium
 from tests.terms import VALUES
 
-CHROMIUM = shutil.which("chromium")
 SECONDS = 5.0
 ANY_TRACK = str(FOLDER / "vis_r" / "race_any.onnx")
 POLICIES = ("hover", "land", "track", "race", "gap", "hover_aware", ANY_TRACK, "any/hover")
@@ -34,15 +33,8 @@ POLICIES = ("hover", "land", "track", "race", "gap", "hover_aware", ANY_TRACK, "
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    if CHROMIUM is None:
-        pytest.fail("needs chromium (Debian: apt-get install chromium); or E2EFLY_WITHOUT=browser to go without")
-    with sync_playwright() as started:
-        options = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--enable-unsafe-swiftshader"]
-        browser = started.chromium.launch(executable_path=CHROMIUM, args=options)
-        try:
-            yield browser
-        finally:
-            browser.close()
+    with chromium() as started:
+        yield started
 
 
 @dataclasses.dataclass(frozen=True)

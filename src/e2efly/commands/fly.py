@@ -151,7 +151,8 @@ def run(options: Fly) -> int:
             f"--vehicle is left out; accepted: a name or .toml file, as the policy flies any vehicle within the ranges "
             f"of {loaded.contract.vehicle!r}"
         )
-    body = load_vehicle(options.vehicle or _own_vehicle(policy, loaded))
+    flies = options.vehicle or _own_vehicle(policy, loaded)
+    body = load_vehicle(flies)
     runtime = None
     if loaded is not None:
         if reasons := check(loaded.contract, body, fields_of(loaded.contract), imu=True, images=True):
@@ -199,7 +200,7 @@ def run(options: Fly) -> int:
         stack.callback(stop.restore)
         path = options.log or Path("flights") / time.strftime("%Y-%m-%d_%H-%M-%S.mcap")
         telemetry = stack.enter_context(Telemetry(path))
-        shown = _shown(options, body.name)
+        shown = _shown(options, flies)
         if shown is not None:
             stack.callback(shown.close)
         log = Logs((telemetry, *([live] if targets else []), *([] if shown is None else [shown])))
@@ -246,7 +247,7 @@ def _shown(options: Fly, vehicle: str) -> "Shown | None":
         return None
     from e2efly.watch.beside import Shown
 
-    return Shown(options.watch, "--vehicle", options.vehicle or vehicle)
+    return Shown(options.watch, "--vehicle", vehicle)
 
 
 def _worker(

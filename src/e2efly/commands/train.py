@@ -114,9 +114,9 @@ def _train(o: Train, again: str, console: Console) -> int:
     if page is not None:
         console.print(f"Watch it at {page.address} once it flies: the page has the time that the training leaves.")
     try:
-        with TerminalProgress(console, f"{o.config.task.name} by {o.config.algo.name}") as progress:
-            reporter = progress if page is None else _Shown(progress, page)
-            summary = train(o.config, o.out, reporter, o.resume, o.overwrite, traced=traced_folder(o.config))
+        title = f"{o.config.task.name} by {o.config.algo.name}"
+        with TerminalProgress(console, title) if page is None else _Shown(console, title, page) as progress:
+            summary = train(o.config, o.out, progress, o.resume, o.overwrite, traced=traced_folder(o.config))
         status = _tell(o, again, console, summary, progress)
         if page is not None and status == 0:
             console.print(f"Watch it at {page.address} (Ctrl-C ends it)")
@@ -140,25 +140,16 @@ def _page(o: Train) -> "Beside | None":
     return Beside(o.watch, str(o.out))
 
 
-@dataclass(frozen=True)
-class _Shown:
+class _Shown(TerminalProgress):
     """The terminal's progress, and a page that begins with the first policy."""
 
-    bar: TerminalProgress
-    page: "Beside"
-
-    def compiling(self) -> None:
-        self.bar.compiling()
+    def __init__(self, console: Console, title: str, page: "Beside") -> None:
+        super().__init__(console, title)
+        self._page = page
 
     def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
-        self.page.begin()
-        self.bar.progress(steps, total, rate, success, best, stage)
-
-    def judging(self, starts: int) -> None:
-        self.bar.judging(starts)
-
-    def ended(self, *end: Any) -> None:
-        self.bar.ended(*end)
+        self._page.begin()
+        super().progress(steps, total, rate, success, best, stage)
 
 
 def _tell(o: Train, again: str, console: Console, summary: dict[str, Any], progress: TerminalProgress) -> int:

@@ -19,6 +19,8 @@ from e2efly.terminal import Terminal
 
 if TYPE_CHECKING:
     from e2efly.watch.frames import Source
+    from e2efly.watch.simulation import Simulation
+    from e2efly.watch.training import Progress
 
 MOST = 1024
 """Vehicles at most."""
@@ -134,10 +136,10 @@ def _serve(o: Watch, server: Any, logs: list[Path]) -> None:
         with _poses(o) as poses:
             loop(poses, panel.viewer, panel, over)
         return
-    with _flown(o, Terminal()) as (simulation, progress):
-        hands_on(panel, simulation)
-        between = (lambda: None) if progress is None else policies_on(panel, progress)
-        loop(simulation, panel.viewer, panel, over, between)
+    simulation, progress = _flown(o, Terminal())
+    hands_on(panel, simulation)
+    between = (lambda: None) if progress is None else policies_on(panel, progress)
+    loop(simulation, panel.viewer, panel, over, between)
 
 
 def _abandoned() -> bool:
@@ -170,9 +172,8 @@ def _poses(o: Watch) -> "Iterator[Any]":
         from e2efly.validation.scenery import Scenery
 
         found = candidate(o.world, o.vehicle)
-        scenery = Scenery.draw(
-            found.environment(found.task.criteria()[_criterion(o.criterion, found.task.criteria())]), o.seed
-        )
+        suites = found.task.criteria()
+        scenery = Scenery.draw(found.environment(suites[_criterion(o.criterion, suites)]), o.seed)
         if scenery is not None and isinstance(scenery.scene, Scene):
             stands = tuple(bodies(scenery.scene, 0, ceilings=True))
     source = open_source(o.what[0])
@@ -194,8 +195,8 @@ def _draw(o: Watch, path: Path, logs: list[Path], console: Terminal) -> int:
         source: Source = recording
         seconds = o.seconds or recording.length * recording.period
     else:
-        with _flown(o, console) as (source, _):
-            seconds = o.seconds or FILM_S
+        source, _ = _flown(o, console)
+        seconds = o.seconds or FILM_S
     rate = 1 / seconds if path.suffix == ".png" else FILM_HZ  # of a still, the last moment alone
     with console.status(f"Drawing {seconds:g} s of flight"):
         write_film(film(source, seconds, rate, o.camera), path, 1 / rate)
@@ -211,9 +212,12 @@ def _recording(o: Watch, logs: list[Path]) -> Any:
     return Recording([read_flight(path, vehicle) for path in logs], vehicle)
 
 
-@contextmanager
-def _flown(o: Watch, console: Terminal) -> Iterator[tuple[Any, Any]]:
-    """The simulation of a policy, and the progress of its run where it is one."""
+def _flown(o: Watch, console: Terminal) -> "tuple[Simulation, Progress | None]":
+    """The simulation of a policy, and the progress of its run where it is one.
+
+    Raises:
+        ValueError: for a policy or a criterion that there is not; for a run that has no policy in `WAIT_S`.
+    """
     from e2efly.device import prepare
 
     prepare("cpu")
@@ -226,24 +230,19 @@ def _flown(o: Watch, console: Terminal) -> Iterator[tuple[Any, Any]]:
         from e2efly.watch.training import of_run
 
         progress = of_run(RunDirectory(what))
-        if progress.look() is False and not progress.updates:
+        if not progress.wait(0):
             console.print("There is no policy yet; waiting for the first.")
         if not progress.wait(WAIT_S):
             raise ValueError(f"{what} has no policy after {WAIT_S:g} s; accepted: a run that trains, or has trained")
-        judges, suites = progress.setup.judges, progress.setup.config.task.criteria()
-        name = _criterion(o.criterion, judges)
-        env = judges[name]
-        vehicle = env.physics.flown
-        yield (
-            Simulation(env, vehicle, suites.get(name, progress.setup.config.task), progress.act, o.count, o.seed),
-            progress,
-        )
-        return
-    found = candidate(o.what[0], o.vehicle)
-    suites = found.task.criteria()
-    name = _criterion(o.criterion, suites)
-    env = found.environment(suites[name])
-    yield Simulation(env, env.physics.flown, suites[name], act_of(found.policy), o.count, o.seed), None
+        suites = progress.setup.config.task.criteria()
+        name = _criterion(o.criterion, suites)
+        env, act = progress.setup.judges[name], progress.act
+    else:
+        progress, found = None, candidate(o.what[0], o.vehicle)
+        suites = found.task.criteria()
+        name = _criterion(o.criterion, suites)
+        env, act = found.environment(suites[name]), act_of(found.policy)
+    return Simulation(env, env.physics.flown, suites[name], act, o.count, o.seed), progress
 
 
 def _criterion(asked: str | None, there: Any) -> str:

@@ -7,7 +7,7 @@ import sys
 from contextlib import suppress
 from typing import Any
 
-from e2efly.watch.viewer import free_port
+from e2efly.watch.port import free_port
 
 HOST = "127.0.0.1"
 """Where the page is served, and where it gets poses."""
@@ -57,7 +57,7 @@ class Beside:
         if self._process is not None:
             self._process.terminate()
             with suppress(subprocess.TimeoutExpired):
-                self._process.wait(5)
+                self._process.communicate(timeout=5)
             self._process.kill()
 
 

@@ -16,27 +16,33 @@ from e2efly.drawing import Face, Line
 from e2efly.scenes.faces import box, cylinder
 from e2efly.scenes.meshes.engine import needed
 from e2efly.watch.frames import Frame, Source, Stage
-from e2efly.watch.shapes import Mesh, mesh_of, quadrotor, spun, turned
+from e2efly.watch.shapes import (
+    BEHIND,
+    GOAL,
+    NOSE,
+    SKY,
+    SLOWEST,
+    Mesh,
+    Quadrotor,
+    face,
+    mesh_of,
+    quadrotor,
+    rgb,
+    spun,
+    turned,
+)
 
 SIZE = (360, 640)
 """Rows and columns of a picture."""
 SPREAD = 0.55
 """Half of the vertical field of view over the distance."""
-SKY, GROUND, GRID = np.array([222, 230, 238]) / 255, np.array([236, 238, 240]) / 255, np.array([0.72, 0.74, 0.77])
-"""RGB of the background, of the ground and of its lines."""
+GROUND, GRID = np.array([236, 238, 240]) / 255, np.array([0.72, 0.74, 0.77])
+"""RGB of the ground and of its lines."""
 SUN = np.array([0.35, 0.25, 0.9]) / np.linalg.norm([0.35, 0.25, 0.9])
 CELL, LINE = 1.0, 0.012
 """Distance and half width of the lines on the ground, m."""
 TRAIL = 90
 """Frames of which the trail is shown."""
-SLOWEST = 40.0
-"""Rotors are drawn turning at this part of their speed."""
-
-
-BEHIND = np.array([-1.3, -1.3, 0.7])
-"""Where the eye is that follows, m from the vehicle."""
-NOSE = 0.15
-"""How far before the centre of mass the first person's eye is, m."""
 THICK = 0.012
 """Of a trail and of lines, m."""
 
@@ -86,7 +92,7 @@ def picture(soup: Soup, eye: np.ndarray, look_at: np.ndarray, ground: bool, size
         width = np.maximum(LINE, 0.0012 * far[hit])[:, None]
         on_line = (np.abs((place[:, :2] / CELL + 0.5) % 1 - 0.5) * CELL < width).any(axis=1)
         haze = np.clip(far[hit] / 60, 0, 1)[:, None]
-        seen[hit] = (1 - haze) * np.where(on_line[:, None], GRID, GROUND) + haze * SKY
+        seen[hit] = (1 - haze) * np.where(on_line[:, None], GRID, GROUND) + haze * np.array(SKY)
     if len(soup.triangles):
         with needed("mesh"):
             from e2efly.scenes.meshes.embree import Embree
@@ -115,8 +121,8 @@ def film(
         camera: of `viewer.CAMERAS`; the one that stays looks at the first vehicle from where that began.
         size: rows and columns.
     """
-    stage: Stage | None = None
-    still = Soup.of(())
+    first = source.stage_of(0)
+    stage, still, shape = first, _standing(first), quadrotor(first.vehicle)
     angle, past, eye = np.zeros((1, 4)), deque[np.ndarray](maxlen=TRAIL), np.zeros(3)
     flown, due = 0.0, 1 / rate
     while flown < seconds - 1e-9:
@@ -124,19 +130,23 @@ def film(
         flown += source.period
         stage, before = source.stage_of(0), stage
         if stage is not before:
-            still = _standing(stage)
+            still, shape = _standing(stage), quadrotor(stage.vehicle)
         if frame.fresh:
             past.clear()
         here = frame.position[0]
         eye = here + BEHIND if not past and camera == "orbit" else eye
         past.append(here.copy())
-        shape = quadrotor(stage.vehicle)
         angle = (angle + shape.spin * frame.rotor_speed / SLOWEST * source.period) % (2 * np.pi)
         if flown < due - 1e-9:
             continue
         due += 1 / rate
         moved = Soup(still.triangles + source.origin, still.colour)
-        soup = moved + _moving(stage, frame.time, source.origin) + _flying(stage, frame, angle) + _trail(past)
+        soup = (
+            moved
+            + _moving(stage, frame.time, source.origin)
+            + _flying(shape, frame, angle, 0.25 * float(np.max(stage.vehicle.radius)))
+            + _trail(past)
+        )
         ahead = turned(frame.quaternion[0], np.array([1.0, 0.0, 0.0]))
         match camera:
             case "first person":
@@ -152,14 +162,10 @@ def _standing(stage: Stage) -> Soup:
     meshes = [mesh_of(body.quads, body.colour) for body in stage.bodies if body.path is None]
     for thing in stage.things:
         if isinstance(thing, Face):
-            meshes.append(_fan(np.asarray(thing.points, float) + np.array([0, 0, 0.004]), _hex(thing.color)))
+            meshes.append(face(thing))
         elif isinstance(thing, Line):
-            meshes += _tube(np.asarray(thing.points, float), _hex(thing.color))
-    soup = Soup.of(meshes)
-    if stage.triangles is not None:
-        s = stage.triangles
-        soup += Soup(s.vertices[s.faces], s.colours[s.faces].mean(axis=1))
-    return soup
+            meshes += _tube(np.asarray(thing.points, float), rgb(thing.color))
+    return Soup.of(meshes)
 
 
 def _moving(stage: Stage, time: float, origin: np.ndarray) -> Soup:
@@ -168,23 +174,17 @@ def _moving(stage: Stage, time: float, origin: np.ndarray) -> Soup:
     )
 
 
-def _flying(stage: Stage, frame: Frame, angle: np.ndarray) -> Soup:
-    """The vehicles, and the goal of the first."""
-    shape, meshes = quadrotor(stage.vehicle), []
-    for p, q in zip(frame.position, frame.quaternion, strict=True):
-        for mesh in shape.body:
-            meshes.append(
-                Mesh(p + turned(np.broadcast_to(q, (len(mesh.vertices), 4)), mesh.vertices), mesh.faces, mesh.colour)
-            )
-    places, attitudes = spun(shape, frame.position, frame.quaternion, angle)
-    rotor = shape.rotor
-    for p, q in zip(places, attitudes, strict=True):
-        meshes.append(
-            Mesh(p + turned(np.broadcast_to(q, (len(rotor.vertices), 4)), rotor.vertices), rotor.faces, rotor.colour)
-        )
+def _flying(shape: Quadrotor, frame: Frame, angle: np.ndarray, goal: float) -> Soup:
+    """The vehicles, and the goal of the first, of that half width, m."""
+
+    def placed(mesh: Mesh, place: np.ndarray, attitude: np.ndarray) -> Mesh:
+        return Mesh(place + turned(attitude[None], mesh.vertices), mesh.faces, mesh.colour)
+
+    meshes = [placed(m, p, q) for p, q in zip(frame.position, frame.quaternion, strict=True) for m in shape.body]
+    rotors = zip(*spun(shape, frame.position, frame.quaternion, angle), strict=True)
+    meshes += [placed(shape.rotor, place, attitude) for place, attitude in rotors]
     if frame.goal is not None and np.isfinite(frame.goal[0]).all():
-        size = 0.25 * float(np.max(stage.vehicle.radius))
-        meshes.append(mesh_of(cylinder(size, size) + frame.goal[0], (0.93, 0.45, 0.13)))
+        meshes.append(mesh_of(cylinder(goal, goal) + frame.goal[0], GOAL))
     return Soup.of(meshes)
 
 
@@ -208,13 +208,3 @@ def _tube(points: np.ndarray, colour: tuple[float, float, float]) -> list[Mesh]:
             mesh_of(box([length / 2, THICK / 2, THICK / 2]) @ np.stack([x, y, np.cross(x, y)]) + (a + b) / 2, colour)
         )
     return meshes
-
-
-def _fan(corners: np.ndarray, colour: tuple[float, float, float]) -> Mesh:
-    faces = np.array([[0, i, i + 1] for i in range(1, len(corners) - 1)], np.uint32)
-    return Mesh(corners, faces, colour)
-
-
-def _hex(colour: str) -> tuple[float, float, float]:
-    red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
-    return red, green, blue

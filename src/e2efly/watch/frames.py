@@ -22,22 +22,8 @@ class Stage:
     """Solids, as they are at time 0."""
     things: Sequence[Thing] = ()
     """What the task has in space."""
-    triangles: "Surface | None" = None
-    """A scanned world."""
     ground: bool = True
     """Whether there is level ground at height 0."""
-
-
-@dataclass(frozen=True)
-class Surface:
-    """Triangles with a colour each corner."""
-
-    vertices: Float[np.ndarray, "v 3"]
-    """World, m."""
-    faces: np.ndarray
-    """(f, 3) indices."""
-    colours: Float[np.ndarray, "v 3"]
-    """RGB in [0, 1]."""
 
 
 @dataclass(frozen=True)

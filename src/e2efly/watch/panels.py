@@ -5,12 +5,17 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from queue import SimpleQueue
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from e2efly.watch.frames import Frame
 from e2efly.watch.viewer import CAMERAS, Viewer
+
+if TYPE_CHECKING:
+    from e2efly.watch.recording import Recording
+    from e2efly.watch.simulation import Simulation
+    from e2efly.watch.training import Progress
 
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 """Of the flight, over real time."""
@@ -133,7 +138,7 @@ def _enlarged(image: np.ndarray) -> np.ndarray:
     return np.repeat(np.repeat(np.rint(255 * np.clip(x, 0, 1)).astype(np.uint8), times, 0), times, 1)
 
 
-def hands_on(panel: Panel, simulation: Any) -> None:
+def hands_on(panel: Panel, simulation: "Simulation") -> None:
     """Add the controls of a simulation: new starts, throws, wind, mass, thrust, delay, and a goal to be dragged.
 
     Args:
@@ -163,7 +168,7 @@ def hands_on(panel: Panel, simulation: Any) -> None:
     _drag(panel, simulation)
 
 
-def _drag(panel: Panel, simulation: Any) -> None:
+def _drag(panel: Panel, simulation: "Simulation") -> None:
     """Arrows by which the goal, and the task's world with it, are moved."""
     arrows = panel.viewer.server.scene.add_transform_controls(
         "/world/move", 0.5, active_axes=(True, True, not simulation.levels), disable_rotations=True,
@@ -178,7 +183,7 @@ def _drag(panel: Panel, simulation: Any) -> None:
     arrows.on_update(lambda _: panel.wishes.put(partial(move, np.array(arrows.position, float))))
 
 
-def policies_on(panel: Panel, progress: Any) -> Callable[[], None]:
+def policies_on(panel: Panel, progress: "Progress") -> Callable[[], None]:
     """Add the controls of a run's policies: the newest as it comes, or one of the older ones.
 
     Args:
@@ -223,7 +228,7 @@ def policies_on(panel: Panel, progress: Any) -> Callable[[], None]:
     return between
 
 
-def times_on(panel: Panel, recording: Any) -> Callable[[], None]:
+def times_on(panel: Panel, recording: "Recording") -> Callable[[], None]:
     """Add a slider of the time of a recording.
 
     Args:

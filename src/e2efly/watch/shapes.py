@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from e2efly.drawing import Face
 from e2efly.scenes.faces import Quads, box, cylinder
 from e2efly.vehicles import Vehicle
 
@@ -13,6 +14,18 @@ DARK, FRONT, METAL = (0.16, 0.17, 0.2), (0.93, 0.45, 0.13), (0.55, 0.57, 0.6)
 """RGB of body and rear arms, of the arms in front, and of motors."""
 BLADE = (0.25, 0.28, 0.33)
 """RGB of rotors."""
+GOAL = FRONT
+"""RGB of goals."""
+SKY = (0.87, 0.9, 0.93)
+"""RGB of the background."""
+SLOWEST = 40.0
+"""Rotors are drawn turning at this part of their speed: faster would look like standing still."""
+BEHIND = np.array([-1.1, -1.1, 0.6])
+"""Where the eye is that follows, seen from the vehicle, m."""
+NOSE = 0.12
+"""How far before the centre of mass the first person's eye is, m."""
+LIFTED = 0.004
+"""Faces on the ground are drawn so far above it, m."""
 REACH = 0.46
 """Radius of a rotor over the distance of the nearest two."""
 
@@ -58,6 +71,19 @@ def mesh_of(quads: Quads, colour: Sequence[float] | Float[np.ndarray, "3"]) -> M
     whole = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0
     red, green, blue = (float(x) for x in colour)
     return Mesh(corners, faces[whole].astype(np.uint32), (red, green, blue))
+
+
+def face(thing: Face) -> Mesh:
+    """Of a flat polygon of a task."""
+    corners = np.asarray(thing.points, np.float32) + np.array([0, 0, LIFTED], np.float32)
+    fan = np.array([[0, i, i + 1] for i in range(1, len(corners) - 1)], np.uint32)
+    return Mesh(corners, fan, rgb(thing.color))
+
+
+def rgb(colour: str) -> tuple[float, float, float]:
+    """RGB in [0, 1] of `#RRGGBB`."""
+    red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    return red, green, blue
 
 
 def quadrotor(vehicle: Vehicle) -> Quadrotor:

@@ -149,7 +149,9 @@ class Simulation:
         self._state, observation = self._begin(self.env, random_key(int(self._random.integers(1 << 31))))
         self._observation = np.asarray(observation)
         self._memory = self.act.begin(self.count)
-        self._stage, self._ends, self._began = None, [], True
+        self._ends, self._began = [], True
+        if self.env.cameras or self.task.own_worlds:
+            self._stage = None
 
     def throw(self) -> None:
         """Push and spin all vehicles at random."""
@@ -184,8 +186,8 @@ class Simulation:
             self._ends = [*self._ends, *seen["success"][done].tolist()][-LAST:]
         fresh = bool(done[followed]) or self._began
         self._began = False
-        if done[followed]:
-            self._stage = None
+        if done[followed] and (self.env.cameras or self.task.own_worlds):
+            self._stage = None  # another world; of the others it stays, and need not be drawn again
         return Frame(
             time=float(seen["time"][followed]),
             position=seen["position"] + self._origin,

@@ -77,9 +77,10 @@ class Progress:
     def wait(self, seconds: float) -> bool:
         """Whether there is a policy within so long."""
         end = time.monotonic() + seconds
+        self.look()
         while self.update < 0 and time.monotonic() < end:
-            self.look()
             time.sleep(0.1)
+            self.look()
         return self.update >= 0
 
 

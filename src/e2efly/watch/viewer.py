@@ -1,10 +1,7 @@
 """The page in the browser: a stage and its vehicles in viser's scene. Needs the extra `watch`."""
 
 import contextlib
-import errno
-import importlib.util
 import io
-import socket
 from collections import deque
 from collections.abc import Sequence
 from typing import Any, Literal
@@ -15,55 +12,24 @@ from jaxtyping import Float
 from e2efly.drawing import Face, Line, Mark
 from e2efly.scenes.faces import Body
 from e2efly.watch.frames import Frame, Stage
-from e2efly.watch.shapes import Mesh, mesh_of, quadrotor, spun, turned
+from e2efly.watch.port import free_port
+from e2efly.watch.shapes import BEHIND, GOAL, NOSE, SKY, SLOWEST, Mesh, face, mesh_of, quadrotor, rgb, spun, turned
 
-PORT = 8080
-"""On which the page is served."""
 Camera = Literal["follow", "orbit", "first person"]
 CAMERAS: tuple[Camera, ...] = ("follow", "orbit", "first person")
 """How the page looks at the followed vehicle: moving along, about it as the mouse says; from where the mouse says;
 from its nose."""
-TRAIL_S, TRAIL_POINTS = 4.0, 120
-"""Of the followed vehicle's path, how long it is shown, and in how many pieces."""
+TRAIL_POINTS = 120
+"""Of the followed vehicle's path: in so many pieces, a frame each, it is shown."""
 MANY = 32
 """Of more vehicles, goals are drawn for the followed one alone."""
-SLOWEST = 40.0
-"""Rotors are drawn turning at this part of their speed: faster would look like standing still."""
 FAR_OFF = np.array([[0, 0, 3000], [0, 0, -3000]], np.float32)
 """Places of two more instances of each mesh, m: three.js draws none of a mesh whose first places are out of view."""
 LEVEL = np.array([1, 0, 0, 0], np.float32)
 ANCHOR = np.array([0.0, 0.0, 1.0])
 """Where the followed vehicle is in the page's space."""
-BEHIND = np.array([-1.1, -1.1, 0.6])
-"""Where the page's camera is at first, seen from there, m."""
-BEHIND = np.array([-1.1, -1.1, 0.6])
-"""Where the page's camera is at first, seen from there, m."""
-NOSE = 0.12
-"""How far before the centre of mass the first person's eye is, m."""
-SKY = (222, 230, 238)
-"""RGB of the background."""
 GHOST = (120, 140, 165)
 """RGB of all vehicles but the followed one, where there are several plants."""
-
-
-def free_port(host: str, port: int) -> int:
-    """The port, or a free one for 0.
-
-    Raises:
-        ValueError: where viser is not installed; where the port is in use.
-        OSError: for an address that this machine does not have.
-    """
-    if importlib.util.find_spec("viser") is None:
-        raise ValueError("the viewer needs viser; accepted: pip install 'e2efly[watch]'")
-    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except OSError as error:
-            if error.errno == errno.EADDRINUSE:
-                raise ValueError(f"--port {port} is in use on {host}; accepted: a free one, or 0 for any") from None
-            raise OSError(f"--host {host}, --port {port}: {error.strerror}") from error
-        return probe.getsockname()[1]
 
 
 def serve(host: str, port: int, title: str) -> Any:
@@ -84,7 +50,7 @@ def serve(host: str, port: int, title: str) -> Any:
     scene.configure_default_lights(False)
     scene.add_light_hemisphere("/light/sky", ground_color=(150, 150, 155), intensity=1.6)
     scene.add_light_directional("/light/sun", intensity=1.6, position=(3.0, 2.0, 8.0))
-    scene.set_background_image(np.full((2, 2, 3), SKY, np.uint8), format="png")
+    scene.set_background_image(np.full((2, 2, 3), _rgb(SKY), np.uint8), format="png")
     server.gui.main_panel.dock_right()
     first.position, first.look_at = tuple(ANCHOR + BEHIND), tuple(ANCHOR)
     return server
@@ -162,13 +128,6 @@ class Viewer:
             self._mesh(f"/world/task/stage/solids_{i}", mesh_of(np.concatenate(quads), colour))
         for i, thing in enumerate(stage.things):
             self._thing(f"/world/task/stage/thing_{i}", thing)
-        if stage.triangles is not None:
-            import trimesh
-
-            s = stage.triangles
-            self._scene.add_mesh_trimesh(
-                "/world/task/stage/scan", trimesh.Trimesh(s.vertices, s.faces, vertex_colors=s.colours, process=False)
-            )
         if new:
             self._make_vehicles(stage)
 
@@ -178,7 +137,7 @@ class Viewer:
         self._rotors = self._batch("/vehicles/rotors", shape.rotor, len(shape.rotors))
         size = 0.25 * float(np.max(stage.vehicle.radius))
         self._goals = [
-            self._scene.add_icosphere(f"/world/goals/goal_{i}", size, color=(238, 115, 33), opacity=0.5, subdivisions=2)
+            self._scene.add_icosphere(f"/world/goals/goal_{i}", size, color=_rgb(GOAL), opacity=0.5, subdivisions=2)
             for i in range(self.count if self.count <= MANY else 1)
         ]
 
@@ -202,14 +161,12 @@ class Viewer:
     def _thing(self, name: str, thing: Line | Face | Mark) -> None:
         match thing:
             case Face():
-                corners = np.asarray(thing.points, np.float32) + np.array([0, 0, 0.004], np.float32)
-                faces = np.array([[0, i, i + 1] for i in range(1, len(corners) - 1)], np.uint32)
-                self._scene.add_mesh_simple(name, corners, faces, color=_hex(thing.color), side="double")
+                self._mesh(name, face(thing))
             case Line():
                 points = np.asarray(thing.points, np.float32)
                 pieces = np.stack([points[:-1], points[1:]], axis=1)
                 self._scene.add_line_segments(
-                    name, pieces, _hex(thing.color), thickness=2 * thing.width, thickness_units="screen"
+                    name, pieces, _rgb(rgb(thing.color)), thickness=2 * thing.width, thickness_units="screen"
                 )
             case Mark():
                 if thing.text:
@@ -284,9 +241,9 @@ def _and_far_off(attitude: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, n
     return np.concatenate([attitude, more]), np.concatenate([place, FAR_OFF])
 
 
-def coloured(speed: Float[np.ndarray, " n"], fastest: float | None = None) -> np.ndarray:
-    """(n, 3) uint8: from blue, at rest, over green to yellow, at the fastest speed, m/s; left out: that of them."""
-    share = np.clip(np.asarray(speed, float) / max(fastest or float(np.max(speed, initial=0.0)), 0.5), 0, 1)
+def coloured(speed: Float[np.ndarray, " n"]) -> np.ndarray:
+    """(n, 3) uint8: from blue, at rest, over green to yellow, at the fastest of the speeds, m/s."""
+    share = np.asarray(speed, float) / max(float(np.max(speed, initial=0.0)), 0.5)
     stops = np.array([[68, 60, 140], [33, 145, 140], [94, 201, 98], [253, 200, 37]], float)
     at = share * (len(stops) - 1)
     low = np.minimum(at.astype(int), len(stops) - 2)
@@ -296,9 +253,4 @@ def coloured(speed: Float[np.ndarray, " n"], fastest: float | None = None) -> np
 
 def _rgb(colour: Sequence[float]) -> tuple[int, int, int]:
     red, green, blue = (round(255 * float(x)) for x in colour)
-    return red, green, blue
-
-
-def _hex(colour: str) -> tuple[int, int, int]:
-    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     return red, green, blue
