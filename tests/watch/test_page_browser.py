@@ -1,18 +1,15 @@
 """The viewer's page in a real browser: Debian's Chromium, headless."""
 
-import contextlib
 import os
 import re
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-import pytest
 from PIL import Image
 from playwright.sync_api import Page
 
@@ -102,57 +99,3 @@ def test_a_browser_that_goes_away_does_not_end_the_viewer() -> None:
             wait_for(page, "/from its goal/.test(text)")
         assert process.poll() is None
     assert wrong == []
-
-
-@pytest.mark.parametrize(("arguments", "told"), [
-    (["hover", "--count", "0"], "--count is 0; accepted: 1 to 1024"),
-    (["hover", "--port", "70000"], "--port is 70000; accepted: 0 to 65535"),
-    (["hover", "race"], "accepted: one policy or run, or several flight logs"),
-    (["nowhere.mcap"], "'nowhere.mcap' does not exist"),
-    (["hover", "--criterion", "x"], "--criterion is 'x'; accepted: hover"),
-    (["hover", "--video", "x.avi"], "accepted: a name that ends in .gif, .mp4, .webm, .png"),
-])  # fmt: skip
-def test_bad_input_is_named(arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
-    from e2efly.cli import run
-
-    port = [] if "--port" in arguments else ["--port", "0"]
-    assert run(["watch", *arguments, *port]) == 2
-    assert told in capsys.readouterr().err
-
-
-def test_a_port_in_use_is_named(capsys: pytest.CaptureFixture[str]) -> None:
-    import socket
-
-    from e2efly.cli import run
-
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = str(taken.getsockname()[1])
-        assert run(["watch", "hover", "--port", port]) == 2
-    assert f"--port {port} is in use on 127.0.0.1" in capsys.readouterr().err
-
-
-def test_a_viewer_beside_a_program_ends_with_it() -> None:
-    code = (
-        "import sys, time; from e2efly.watch.beside import Shown\n"
-        "shown = Shown(0, '--vehicle', 'vis_r'); print(shown.page._process.pid, flush=True); time.sleep(60)\n"
-    )
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as program:
-        assert program.stdout is not None
-        viewer = int(program.stdout.readline())
-        program.kill()
-    try:
-        for _ in range(600):
-            if not Path(f"/proc/{viewer}").exists() or "Z" in Path(f"/proc/{viewer}/stat").read_text().split()[2]:
-                return
-            time.sleep(0.1)
-        raise AssertionError("the viewer goes on")
-    finally:
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(viewer, signal.SIGKILL)
-
-
-def test_a_bridge_that_is_watched_imports_neither_jax_nor_the_viewer() -> None:
-    code = "import sys, e2efly.watch.beside; sys.exit(any(name in sys.modules for name in ('jax', 'viser')))"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
