@@ -1,9 +1,10 @@
 // Builds the page of `e2efly export RUN --web DIR` into the Python package.
 import { createHash } from "node:crypto";
-import { copyFileSync, mkdirSync, readdirSync, readFileSync, writeFileSync } from "node:fs";
+import { readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { gzipSync } from "node:zlib";
 import { build } from "esbuild";
 
+// index.html and page.css need no building: they stand there
 const OUT = "../src/e2efly/web/assets";
 const RUNTIME = "node_modules/onnxruntime-web/dist/ort-wasm-simd-threaded.wasm";
 
@@ -13,14 +14,12 @@ function digest() {
     .filter((entry) => entry.isFile())
     .map((entry) => `${entry.parentPath}/${entry.name}`);
   const hash = createHash("sha256");
-  for (const name of ["build.js", "index.html", "package-lock.json", "package.json", "page.css", ...names].sort()) {
+  for (const name of ["build.js", "package-lock.json", "package.json", ...names].sort()) {
     hash.update(`${name}\0${readFileSync(name, "utf8")}\0`);
   }
   return hash.digest("hex");
 }
 
-mkdirSync(OUT, { recursive: true });
-for (const name of ["index.html", "page.css"]) copyFileSync(name, `${OUT}/${name}`);
 await build({
   entryPoints: ["src/main.js"],
   bundle: true,
