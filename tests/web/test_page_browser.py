@@ -213,10 +213,11 @@ def test_a_page_is_flown_by_its_visitor(racing: tuple[Candidate, Path], browser:
     assert math.dist(now()["velocity"], rested["velocity"]) > 0
     page.locator("#reset").click()
     assert now()["time"] == 0
-    page.locator("#mass").fill("1.3")  # it is flown by: an episode that ends meanwhile begins anew
-    page.locator("#wind").fill("6")
+    page.locator("#mass").fill("2")
+    page.locator("#wind").fill("10")
     page.keyboard.press(" ")
-    page.wait_for_function("parseFloat(document.getElementById('time').textContent) > 0.2")
+    page.wait_for_function("async () => (await e2efly).now().time > 0.2")  # the panel may still tell of before
+    page.wait_for_function("document.getElementById('status').textContent === 'flying'")
     page.keyboard.press(" ")
     page.wait_for_function("document.getElementById('status').textContent === 'paused'")
     watched = now()
