@@ -9,7 +9,8 @@ believes in the file, and identified from the log of its sensors (`e2efly.valida
 `--plant betaflight` flies them by the bridge's excitation mode through the real firmware (`e2efly.validation.excited`),
 and identifies each twice: from the flight log alone, and with the firmware's blackbox laid over it. The delay is
 compared with the one on the rig's own clock: the age of the poses, and the time from a command to the setpoint.
-`--first` is the seed of the first vehicle.
+`--first` is the seed of the first vehicle. A flight
+that ends before its excitation does is named in the JSON file, and has no errors to count.
 """
 
 import dataclasses
@@ -59,6 +60,10 @@ def hidden(vehicle: Vehicle, rng: np.random.Generator) -> Vehicle:
     return dataclasses.replace(vehicle, **changed, latency=float(rng.uniform(0.02, 0.08)))
 
 
+class EndedEarlyError(Exception):
+    """The bridge left the excitation before its end: the message says the vehicle and its changes of mode."""
+
+
 Errors = dict[str, tuple[float, float]]
 """By parameter: its error (relative, or s) and by how many standard deviations it is off."""
 ROOM = Fence(low=(-6.0, -6.0, 0.2), high=(6.0, 6.0, 5.0), speed=8.0)
@@ -78,7 +83,7 @@ def through_firmware(vehicle: Vehicle, seed: int) -> dict[str, Errors]:
                 sag=rng.uniform(0, 0.08), seed=seed,
             )  # fmt: skip
         if not flight.complete or flight.blackbox is None:
-            raise RuntimeError(f"vehicle {seed}: {flight.flown.changes}")
+            raise EndedEarlyError(f"vehicle {seed}: {flight.flown.changes}")
         (exact,) = with_blackboxes([flight.truth, *read_flights(flight.blackbox)])
         link, age = setpoint_delay(exact), flight.truth.pose_age
         assert link is not None
@@ -135,8 +140,14 @@ def main() -> None:
     prepare("cpu")
     vehicle, began = load_vehicle(options.vehicle), time.perf_counter()
     every: dict[str, list[Errors]] = {}
+    ended: list[str] = []
     for seed in range(options.first, options.first + options.vehicles):
-        found = through_firmware(vehicle, seed) if options.plant == "betaflight" else {"": one(vehicle, seed)}
+        try:
+            found = through_firmware(vehicle, seed) if options.plant == "betaflight" else {"": one(vehicle, seed)}
+        except EndedEarlyError as early:
+            ended.append(str(early))
+            print(early, flush=True)
+            continue
         for label, errors_of in found.items():
             every.setdefault(label, []).append(errors_of)
         if (seed + 1 - options.first) % 10 == 0 or options.plant == "betaflight":
@@ -144,7 +155,7 @@ def main() -> None:
     tables = {label: rows_of(found) for label, found in every.items()}
     seconds = (time.perf_counter() - began) / options.vehicles
     name = "identify" if options.plant == "mujoco" else f"identify_{options.plant}"
-    told = {"first": options.first, "seconds_each": seconds}
+    told = {"first": options.first, "seconds_each": seconds, "ended_early": ended}
     if options.plant == "mujoco":
         write(name, options.json, {"table": tables[""], **told, "vehicles": every[""]})
     else:
