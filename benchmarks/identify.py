@@ -9,8 +9,8 @@ believes in the file, and identified from the log of its sensors (`e2efly.valida
 `--plant betaflight` flies them by the bridge's excitation mode through the real firmware (`e2efly.validation.excited`),
 and identifies each twice: from the flight log alone, and with the firmware's blackbox laid over it. The delay is
 compared with the one on the rig's own clock: the age of the poses, and the time from a command to the setpoint.
-`--first` is the seed of the first vehicle. A flight
-that ends before its excitation does is named in the JSON file, and has no errors to count.
+`--first` is the seed of the first vehicle. A flight that ends before its excitation does is named in the JSON file,
+and has no errors to count.
 """
 
 import dataclasses
