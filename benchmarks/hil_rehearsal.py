@@ -1,16 +1,18 @@
 """Hardware in the loop without hardware, in real time: laps by sight, and each process killed once in flight.
 
     python benchmarks/hil_rehearsal.py [--policies race_clutter] [--vehicle vis_r] [--laps 20] [--seed 0] [--speed 4 6]
-        [--json FILE]
+        [--link-delay S] [--json FILE]
 
 As `e2efly hil POLICY --rehearse`: motion capture over UDP, the HIL node, `e2efly fly` with its watchdog, and the real
 firmware are processes. Let the machine be quiet. Exit status 1 when fewer than 19 of 20 laps of a policy succeed, when
 99 % of the images come later than 15 ms after their pose, or when a kill ends otherwise than documented. `--speed` is
-the commanded speed of race_clutter, m/s, drawn for each lap; without numbers as the task draws it.
+the commanded speed of race_clutter, m/s, drawn for each lap; without numbers as the task draws it. `--link-delay` is
+the radio's, as the command takes it; left out: what the vehicle's latency leaves.
 """
 
 import sys
 import tempfile
+from argparse import Namespace
 from pathlib import Path
 from typing import get_args
 
@@ -29,18 +31,20 @@ WANTED, WANTED_S = 0.95, 0.015
 
 def main() -> None:
     """Fly, print the tables, write the figures."""
-    args = arguments(__doc__ or "", policies=["race_clutter"], vehicle="vis_r", laps=20, seed=0, speed=[4.0, 6.0])
+    args = arguments(
+        __doc__ or "", policies=["race_clutter"], vehicle="vis_r", laps=20, seed=0, speed=[4.0, 6.0], link_delay=None
+    )
     prepare("cpu")
     firmware.chosen()
     laps, kills, rows, ends = dict[str, list[Lap]](), list[Lap](), list[dict[str, str]](), list[dict[str, str]]()
     with tempfile.TemporaryDirectory() as text:
         for name in args.policies:
-            plan = _plan(name, args.vehicle, tuple(args.speed))
+            plan = _plan(name, args)
             laps[name] = [
                 _fly(plan, args.seed + i, Path(text) / f"{Path(name).stem}-{i}", None) for i in range(args.laps)
             ]
             rows.append(_row(name, laps[name]))
-        plan = _plan(args.policies[0], args.vehicle, tuple(args.speed))
+        plan = _plan(args.policies[0], args)
         for i, kill in enumerate(get_args(Victim)):
             kills.append(_fly(plan, args.seed + i, Path(text) / f"kill-{kill}", kill))
             ends.append(_end(kills[-1]))
@@ -55,11 +59,12 @@ def main() -> None:
     sys.exit(1 if few or late or any(lap.problems for lap in kills) else 0)
 
 
-def _plan(name: str, vehicle: str, speed: tuple[float, ...]) -> Plan:
-    own = candidate(name, vehicle)
-    changed = {"speed": speed} if speed and own.task.name == "race_clutter" else {}
-    found = candidate(name, vehicle, task=changed)
-    return Plan(found, world=flags("task", found.task, own.task))
+def _plan(name: str, args: Namespace) -> Plan:
+    own = candidate(name, args.vehicle)
+    changed = {"speed": tuple(args.speed)} if args.speed and own.task.name == "race_clutter" else {}
+    found = candidate(name, args.vehicle, task=changed)
+    delay = None if args.link_delay is None else float(args.link_delay)
+    return Plan(found, world=flags("task", found.task, own.task), link_delay=delay)
 
 
 def _fly(plan: Plan, seed: int, folder: Path, kill: Victim | None) -> Lap:

@@ -2,6 +2,7 @@
 
 import socket
 import threading
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -200,6 +201,27 @@ def test_sticks_go_first_and_their_replies_are_eaten() -> None:
     assert client.backlog == 0
     assert wire.sent
     assert 200 not in client.latest
+
+
+def test_a_slow_radio_is_no_controller_that_is_behind() -> None:
+    wire = Wire()
+    client = Client(wire, SCHEDULE)
+    delay, under_way, counts = 0.08, deque[tuple[float, bytes]](), Counter[int]()
+    client.poll(0.0)
+    for tick in range(1, 5000):  # 5 s, with stick frames at 100 Hz: eight of them are always under way
+        now = tick * 1e-3
+        if tick % 10 == 0:
+            client.set_raw_rc(STICKS, now)
+        wire.answer()
+        if wire.inbox:
+            under_way.append((now + delay, wire.receive()))
+        while under_way and under_way[0][0] <= now:
+            wire.inbox += under_way.popleft()[1]
+        before = {code: reply.time for code, reply in client.latest.items()}
+        client.poll(now)
+        counts.update(code for code, reply in client.latest.items() if reply.time != before.get(code))
+    for code in (messages.StatusEx.CODE, messages.Rc.CODE, messages.AttitudeReply.CODE, messages.RawImu.CODE):
+        assert counts[code] > 5 * 10  # asked for again when its answer is there: at most 12 a second
 
 
 def acquainted() -> tuple[Wire, Client]:

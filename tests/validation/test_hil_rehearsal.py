@@ -15,7 +15,8 @@ from e2efly.deploy.pose.json_source import parse_pose
 from e2efly.deploy.settings import Fence, FlightSettings
 from e2efly.evaluation import candidate
 from e2efly.validation.hil_lap import Change, Lap, Spread, Truth, verdict
-from e2efly.validation.hil_rehearsal import Drawn, Plan, draw, unlike
+from e2efly.validation.hil_rehearsal import LOOP_S, Drawn, Plan, draw, unlike
+from e2efly.validation.link_process import Line
 from e2efly.validation.mocap_process import ATTITUDE, POSITION, Camera, Marks
 from e2efly.validation.room import Program, flags
 
@@ -52,6 +53,24 @@ def test_hidden_markers_deliver_nothing_for_a_moment() -> None:
         seen += len(camera.ready(0.005 * k))
     hidden = 4000 - seen
     assert 40 < hidden < 300  # 40 gaps of 15 ms on average, each three poses or so
+
+
+def test_a_radio_delivers_late_and_in_order() -> None:
+    line = Line(0.05)
+    line.send(b"first ", now=1.0)
+    line.send(b"second", now=1.01)
+    assert line.arrived(1.0499) == b""
+    assert line.arrived(1.0501) == b"first "
+    assert line.arrived(1.0501) == b""
+    line.send(b" third", now=1.02)
+    assert line.arrived(1.2) == b"second third"
+
+
+def test_the_radio_of_a_rehearsal_has_what_the_loop_leaves_of_the_latency() -> None:
+    by_radio, on_board = (candidate("race_clutter", vehicle) for vehicle in ("vis_h", "vis_r"))
+    assert Plan(by_radio).radio == pytest.approx(0.09 - LOOP_S)
+    assert Plan(on_board).radio == pytest.approx(0.06 - LOOP_S)
+    assert Plan(by_radio, link_delay=0.0).radio == 0.0
 
 
 def test_options_of_a_command_are_those_that_differ() -> None:

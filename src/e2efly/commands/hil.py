@@ -98,6 +98,9 @@ class Hil:
     """Kill one of the processes in each flight while the policy flies, to see what happens then."""
     pose_delay: float = 0.004
     """How late the poses of the rehearsal come, s: what cameras and network of your room take."""
+    link_delay: float | None = None
+    """How late what the bridge sends reaches the vehicle in the rehearsal, s: its radio. Left out: so late that the
+    whole is the vehicle's latency; 0 for a bridge on board."""
     out: Path | None = None
     """Folder of the rehearsal's report; left out: a new one in the folder `rehearsals`."""
 

@@ -23,14 +23,17 @@ if TYPE_CHECKING:
 LAP_S = 30.0
 """What a flight takes with the start of its processes, at least, s."""
 LATEST_S = 0.2
-"""Largest `--pose-delay`, s."""
+"""Largest `--pose-delay` and `--link-delay`, s."""
 WANTED_S = 0.015
 """From a pose to its image in 99 of 100, s: more is told of."""
 LATE_S = 0.01
 """Control steps and a room that are later than this in 99 of 100 say that the machine is too slow or busy, s."""
 STALL_S = 0.05
 """... and so do single ones later than this, s."""
-REHEARSALS, OWN = ("laps", "kill", "pose_delay", "out"), ("pose", "image", "seconds", "json", "track", "watch")
+REHEARSALS, OWN = (
+    ("laps", "kill", "pose_delay", "link_delay", "out"),
+    ("pose", "image", "seconds", "json", "track", "watch"),
+)
 """Options that only a rehearsal has, and those that it sets itself."""
 
 
@@ -47,8 +50,9 @@ def check_rehearsal(o: "Hil") -> None:
             raise ValueError(f"--{name.replace('_', '-')} is {value}; accepted: {said} --rehearse")
     if o.laps < 1:
         raise ValueError(f"--laps is {o.laps}; accepted: 1 or more")
-    if not 0 <= o.pose_delay <= LATEST_S:
-        raise ValueError(f"--pose-delay is {o.pose_delay}; accepted: 0 to {LATEST_S:g} s")
+    for name, value in (("pose-delay", o.pose_delay), ("link-delay", o.link_delay or 0.0)):
+        if not 0 <= value <= LATEST_S:
+            raise ValueError(f"--{name} is {value}; accepted: 0 to {LATEST_S:g} s")
     check_time({f"--laps is {o.laps}": o.laps * LAP_S}, f"at {LAP_S:g} s each")
 
 
@@ -79,7 +83,8 @@ def rehearse(o: "Hil", task: dict[str, Any], origin: Origin) -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the flight's processes end with this one
     prepare("cpu")
     found, console = candidate(o.policy, o.vehicle, task=task), Terminal()
-    plan = Plan(found, origin, o.rate, o.pose_delay, flags("task", found.task, candidate(o.policy, o.vehicle).task))
+    world = flags("task", found.task, candidate(o.policy, o.vehicle).task)
+    plan = Plan(found, origin, o.rate, o.pose_delay, o.link_delay, world)
     if o.scene is not None:
         plan = replace(plan, scene=SceneFile(o.scene, o.scene_unit, o.scene_up, o.beside))
     if not plan.found.policy.contract.images:

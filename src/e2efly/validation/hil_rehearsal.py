@@ -37,6 +37,8 @@ PILOT_S = 0.5
 """What a pilot takes to see that nobody flies, s."""
 WATCHDOG_S = 15.0
 """How long the watchdog of a bridge may take to end after the pilot has disarmed, s."""
+LOOP_S = 0.033
+"""From a pose to the rate loop's setpoint without a radio, s: 25 to 40 ms were measured."""
 ENDED = ("HOVER:", "LAND:", "DONE:", "PILOT:", "INIT:", TAKEN)
 """The bridge's word on another mode than the policy's, and on the watchdog."""
 DOCUMENTED: dict[Victim, tuple[str, str]] = {
@@ -59,6 +61,8 @@ class Plan:
     """Images per second; None: the contract's."""
     pose_delay: float = DELAY_S
     """How late the motion capture's poses come, s."""
+    link_delay: float | None = None
+    """How late what the bridge sends reaches the vehicle, s; None: what the vehicle's latency has beyond `LOOP_S`."""
     world: Sequence[str] = ()
     """Options of `e2efly hil` that say which world: `--task.*`."""
     options: tuple[str, ...] = ()
@@ -70,6 +74,13 @@ class Plan:
     def vehicle(self) -> Vehicle:
         """What flies."""
         return load_vehicle(self.found.vehicle)
+
+    @property
+    def radio(self) -> float:
+        """How late what the bridge sends reaches the vehicle, s."""
+        if self.link_delay is not None:
+            return self.link_delay
+        return max(self.found.policy.contract.latency_of(self.vehicle) - LOOP_S, 0.0)
 
     @property
     def period(self) -> float:
@@ -196,12 +207,20 @@ class _Flight:
         stands = ["--at", *(f"{x:.6g}" for x in self._stand()), "--exact", "--record", str(folder / "truth.csv")]
         self.room = Room(plan.found.vehicle, seed, stands, cores[0], inlet)
         stack.enter_context(self.room)
+        link = None if plan.radio == 0.0 else self._radio(stack)
         settings = rehearsal_settings(self._height(), REACH_IN_SIGHT)
         options = [*flags("flight", settings), *images, "--envelope.speed", "8"]
         options += [*flags("goal", drawn.route), *flies, *plan.options]
         log = folder / "flight.mcap"
-        self.flies = bridge(Path(policy), self.room, log, options, pose=f"udp:{ports[1]}", urgent=True)
+        self.flies = bridge(Path(policy), self.room, log, options, link, f"udp:{ports[1]}", urgent=True)
         stack.enter_context(self.flies)
+
+    def _radio(self, stack: ExitStack) -> str:
+        """Start the radio; the address that the bridge connects to."""
+        to = ["--to", self.room.link.rpartition(":")[2], "--delay", f"{self.plan.radio:.6g}"]
+        self.radio = Program("the radio", ["-m", "e2efly.validation.link_process", *to])
+        stack.enter_context(self.radio)
+        return json.loads(self.radio.wait_for('"link"', START_S))["link"]
 
     def _first(self) -> np.ndarray:
         return self.drawn.course.origin.points(self.drawn.course.start)

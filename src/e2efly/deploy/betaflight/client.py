@@ -42,8 +42,8 @@ FORGOTTEN = 1.0
 MAX_IN_FLIGHT = 256
 """Bytes of scheduled replies that may be awaited at a time."""
 MAX_BACKLOG = 6
-"""With more stick frames without answer the controller is behind, or answers were lost: it is asked for one message
-at a time, whose answer tells which."""
+"""With more stick frames without answer, for longer than the link takes, the controller is behind, or answers were
+lost: it is asked for one message at a time, whose answer tells which."""
 _UNKNOWN_REPLY = 64
 """Bytes that a reply of unknown length is taken to have."""
 _OVERHEAD = 6
@@ -87,6 +87,8 @@ class Client:
     latency: float = 0.0
     """How long the newest answer took, s; those to stick frames not counted. The controller answers in order, so that
     stick frames reach it as late."""
+    quickest: float = math.inf
+    """The least time that an answer took on this connection, s: what the link itself takes, there and back."""
     heard: float = -math.inf
     """When the newest reply came, s on the monotonic clock; those to stick frames not counted."""
     run_together: int = 0
@@ -145,6 +147,7 @@ class Client:
             return
         self.replies += 1
         self.latency = now - asked
+        self.quickest = min(self.quickest, self.latency)
         self._sizes[frame.code] = len(frame.payload) + _OVERHEAD
         if frame.direction == ERROR:
             self.errors[frame.code] = "the controller does not know or refuses it"
@@ -197,7 +200,7 @@ class Client:
                 self._take(frame, now)
 
     def _ask_due(self, now: float) -> None:
-        behind = self.backlog > MAX_BACKLOG
+        behind = self.backlog > MAX_BACKLOG and self._unanswered(now) > MAX_BACKLOG
         in_flight = sum(self._sizes.get(code, _UNKNOWN_REPLY) for code in self._asked)
         free = (code for code in self.schedule if code not in self._asked)
         overdue = {code: (now - self._due.setdefault(code, now)) * self.schedule[code] for code in free}
@@ -210,6 +213,11 @@ class Client:
             period = 1 / self.schedule[code]
             self._due[code] = max(self._due[code] + period, now + 0.5 * period)
 
+    def _unanswered(self, now: float) -> int:
+        """Stick frames that wait for longer than the link takes: on a slow radio some are always under way."""
+        longest = 0.0 if math.isinf(self.quickest) else self.quickest
+        return sum(code == messages.SET_RAW_RC and now - asked >= longest for code, asked in self._awaited)
+
     def _forget(self) -> None:
         """A new connection: nothing of the old one is awaited or believed."""
         self._connection = self.link.connections
@@ -218,7 +226,7 @@ class Client:
         self._due.clear()
         self.latest.clear()
         self.errors.clear()
-        self.backlog, self.latency = 0, 0.0
+        self.backlog, self.latency, self.quickest = 0, 0.0, math.inf
         self.decoder = Decoder(bad_checksums=self.decoder.bad_checksums, skipped=self.decoder.skipped)
 
 
