@@ -145,6 +145,26 @@ def test_slow_motor_outputs_give_thrust_while_the_measured_rates_turn_the_vehicl
     assert np.isclose(thrust.value[0], BODY.thrust_map[0], rtol=0.05)
 
 
+def test_poses_are_not_younger_because_slow_telemetry_is_late(record: Record) -> None:
+    rotors, command = record.streams["rotor_speed"], record.streams["command"]
+    late, link, age = 0.012, 0.02, 0.04  # of what the flight controller tells; of the commands; of the poses
+    seen = {
+        name: dataclasses.replace(s, time=s.time + late) if name in ("body_rate", "specific_force") else s
+        for name, s in record.streams.items()
+        if name != "rotor_speed"
+    }
+    share = np.clip(FILE.thrust_map[0] * rotors.values**2 / FILE.thrust_range[1], 0.0, 1.0)
+    motor = dataclasses.replace(rotors, time=rotors.time[::3] + late, values=(np.sqrt(0.25 + 2 * share) - 0.5)[::3])
+    times = np.arange(command.time[0] + 0.2, command.time[-1] - 0.2, 0.0173)
+    asked = command.values[np.searchsorted(command.time, times - link, side="right") - 1, 1:]
+    streams = seen | {"motor": motor, "setpoint": dataclasses.replace(rotors, time=times, values=asked)}
+    told = dataclasses.replace(record, streams=streams, pose_age=age)
+    found = identify(dataclasses.replace(FILE, mass=BODY.mass), [told])
+    assert found.model.driver == "motor_and_rate"
+    latency = next(e for e in found.estimates if e.name == "latency")
+    assert abs(float(latency.value) - (link + age)) < 0.004 < 1.645 * float(latency.sigma)
+
+
 def test_hover_does_not_give_the_inertia() -> None:
     plant = find_plant("mujoco")(FILE)
     record = sensed(fly_excitation(plant, FILE, 0.05, seconds=6.0, speed=0.0, pulses=False), Sensors(), 1)

@@ -24,6 +24,8 @@ EXACT_ELSE = 0.15
 STRUCTURE = {"thrust_map": 0.002, "inertia": 0.004, "rate_gain": 0.01, "motor_time_constant": 0.01, "latency": 3e-4}
 """Spread of what is found over models that differ in what no log shows: how often the flight controller acts, how the
 accelerometer is filtered; s of the delay, else relative."""
+SLOW_STRUCTURE = STRUCTURE | {"thrust_map": 0.015, "motor_time_constant": 0.05}
+"""The same where motor outputs come so seldom that they are held between."""
 HELD_OUT = 5
 """One window of so many is kept out of the fit, for the judgement."""
 POSE_DELAY = [name for name, _ in NUISANCES].index("pose_delay")
@@ -244,7 +246,8 @@ def _latency(
     the poses of which the command was made.
 
     The first is what the setpoints show, where a flight controller logs them; else what the fit of commands found. A
-    delay of motor outputs is none of the vehicle's.
+    delay of motor outputs is none of the vehicle's. How much later the poses are than what a flight controller tells
+    seldom says nothing of their age: what it tells is late itself, by up to the time between two samples.
     """
     shown = [late for late in map(setpoint_delay, records) if late is not None]
     at = [i for i, u in enumerate(model.unknowns) if u.field == "latency" and not refused[i]]
@@ -254,8 +257,11 @@ def _latency(
         late, off = float(model.base.latency) + float(p[at[0]]), float(sigma[at[0]])
     else:
         return []
+    seldom = model.driver == "motor_and_rate"
+    if seldom:  # anywhere within an interval is as likely
+        off = float(np.hypot(off, np.median([np.median(np.diff(r.streams["motor"].time)) for r in records]) / 12**0.5))
     ages = [
-        record.pose_age + float(q[POSE_DELAY])
+        record.pose_age + (0.0 if seldom else float(q[POSE_DELAY]))
         for record, q in zip(records, found.q, strict=True)
         if record.pose_age is not None
     ]
@@ -298,7 +304,8 @@ def sigmas(model: Model, found: Fit) -> np.ndarray:
     in squares over it what the model itself may be off by (`STRUCTURE`).
     """
     noise = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
-    return np.hypot(noise, [STRUCTURE.get(u.field, 0.0) for u in model.unknowns])
+    structure = SLOW_STRUCTURE if model.driver == "motor_and_rate" else STRUCTURE
+    return np.hypot(noise, [structure.get(u.field, 0.0) for u in model.unknowns])
 
 
 def _estimates(model: Model, p: np.ndarray, sigma: np.ndarray, refused: np.ndarray, source: str) -> list[Estimate]:
