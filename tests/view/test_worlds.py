@@ -1,6 +1,10 @@
 """Solids in plots: where they stand, what they cover, and that flights are drawn among them."""
 
+import dataclasses
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -9,13 +13,16 @@ import pytest
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
+from e2efly.config import CameraConfig
 from e2efly.scenes.faces import bodies
 from e2efly.scenes.generate import room
 from e2efly.scenes.scene import Scene, Solids, distances
 from e2efly.tasks.hover import HoverConfig
 from e2efly.view import plots
+from e2efly.view.seen import plot_seen
+from e2efly.view.style import figure
 from e2efly.view.worlds import draw_plan, plot_flights_in_worlds
-from tests.view.test_plots import check_png, flights
+from tests.view.test_plots import STEPS, check_png, flights
 
 SIZES = {
     "box": [0.5, 0.3, 0.2], "sphere": [0.6], "cylinder": [0.4, 1.0], "capsule": [0.3, 0.5],
@@ -76,6 +83,38 @@ def test_flights_each_in_its_own_world(tmp_path: Path) -> None:
         check_png(tmp_path / f"{name}.png")
     plot_flights_in_worlds(flown, one("box"), tmp_path / "same.png", "one world")
     check_png(tmp_path / "same.png")
+
+
+def test_flights_without_success_come_first_and_goals_are_numbered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flown = flights(4)
+    flown.success[3] = False
+    steps = np.arange(len(flown.time))[:, None, None]
+    goals = np.where(steps < 5, [1.0, 0.0, 2.0], [0.0, 4.0, 2.0]) + np.zeros((1, 4, 1))
+    flown = dataclasses.replace(flown, goal=goals, late=np.array([False, False, False, True]))
+    drawn: list[Figure] = []
+
+    @contextmanager
+    def kept(*args: Any, **kwargs: Any) -> Iterator[Figure]:
+        with figure(*args, **kwargs) as fig:
+            drawn.append(fig)
+            yield fig
+
+    monkeypatch.setattr("e2efly.view.worlds.figure", kept)
+    plot_flights_in_worlds(flown, one("box"), tmp_path / "worlds.png", "race", 2)
+    plans = [ax for ax in drawn[0].axes if ax.get_title(loc="left")]
+    assert [ax.get_title(loc="left").split(",")[0] for ax in plans] == ["out of time", "success"]
+    assert {text.get_text() for text in plans[0].texts} == {"1", "2"}
+
+
+def test_what_the_cameras_saw(tmp_path: Path) -> None:
+    flown = flights(3)
+    rng = np.random.default_rng(0)
+    images = rng.uniform(1, 5, (STEPS, 3, 8, 12)), (rng.uniform(size=(STEPS, 3, 8, 8)) < 0.3).astype(float)
+    cameras = CameraConfig(width=12, height=8), CameraConfig(sees="mask", width=8, height=8)
+    plot_seen(dataclasses.replace(flown, images=images), cameras, tmp_path / "seen.png", "avoid", count=2)
+    check_png(tmp_path / "seen.png")
 
 
 def test_flights_in_space_among_solids(tmp_path: Path) -> None:

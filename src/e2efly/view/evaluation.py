@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import numpy as np
 
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.env import UNSEEN, Env, random_key
@@ -14,6 +15,7 @@ from e2efly.learn.rundir import RunDirectory
 from e2efly.learn.setup import Setup
 from e2efly.view import plots
 from e2efly.view.flights import Flights
+from e2efly.view.seen import plot_seen
 from e2efly.view.worlds import plot_flights_in_worlds
 
 DRAWN = 12
@@ -33,7 +35,7 @@ def plot_evaluation(found: Evaluation, folder: Path) -> None:
     for name, suite in suites.items():
         env, tag = flew.environment(suite), f"{title}: {name}" if len(suites) > 1 else title
         flights = plots.fly(env, act_of(flew.policy), key, DRAWN, episode_steps(suite, env))
-        _flights(flights, suite, env, key, folder, name, tag)
+        _flights(flights, suite, env, key, folder, name, tag, f"seed {found.seed}")
     plots.plot_errors(found.flown, folder / "errors.png", title, plots.limits(suites))
     if flew.run:
         _learned(flew.run, folder, title)
@@ -52,7 +54,9 @@ def plot_run(run: Path, setup: Setup, flown: dict[str, Episodes]) -> None:
     for name, env in (setup.nominal or setup.judges).items():
         tag = f"{title}: {name}" if len(suites) > 1 else title
         key, steps = random_key(0, REPORTED, 0), episode_steps(suites[name], env)
-        _flights(plots.fly(env, act, key, DRAWN, steps), suites[name], env, key, folder, name, tag)
+        flights = plots.fly(env, act, key, DRAWN, steps)
+        note = f"trained by {config.algo.name}, seed {config.seed}"
+        _flights(flights, suites[name], env, key, folder, name, tag, note)
     plots.plot_errors(flown, folder / "errors.png", title, plots.limits(suites))
     _learned(RunDirectory(run), folder, title)
 
@@ -64,13 +68,19 @@ def _make(folder: Path) -> None:
         raise OSError(f"cannot make the folder of the plots {folder}: {error.strerror}") from error
 
 
-def _flights(flights: Flights, suite: Any, env: Env, key: Any, folder: Path, name: str, title: str) -> None:
+def _flights(flights: Flights, suite: Any, env: Env, key: Any, folder: Path, name: str, title: str, note: str) -> None:
     if env.cameras or suite.own_worlds:  # every flight has a world of its own
         begun = jax.jit(Env.reset, static_argnums=2)(env, key, DRAWN)[0]
-        plot_flights_in_worlds(flights, env.task.scene(begun.memory), folder / f"flights_{name}.png", title)
+        scene = env.task.scene(begun.memory)
+        plot_flights_in_worlds(flights, scene, folder / f"flights_{name}.png", title, notes=[note])
+        if env.cameras:
+            plot_seen(flights, env.cameras, folder / f"seen_{name}.png", title)
     else:
-        plots.plot_flights(suite, flights, folder / f"flights_{name}.png", title)
-    plots.plot_time(flights, 0, folder / f"time_{name}.png", title)
+        course = "".join(f", {key} {value}" for key, value in suite.course().items() if isinstance(value, str))
+        shown = f"{note}, {len(flights.length)} episodes{course}"
+        plots.plot_flights(suite, flights, folder / f"flights_{name}.png", title, notes=[shown])
+    worst = int(np.argmin(flights.success))  # the first that failed, or else the first
+    plots.plot_time(flights, worst, folder / f"time_{name}.png", title, env.physics.nominal)
 
 
 def _learned(run: RunDirectory, folder: Path, title: str) -> None:

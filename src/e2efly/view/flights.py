@@ -1,6 +1,7 @@
 """Flights of a policy as NumPy arrays: what the plots draw."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, PRNGKeyArray
@@ -36,6 +37,18 @@ class Flights:
     """Whether it ended well."""
     command_mode: str = "ctbr"
     """A name of `e2efly.control.COMMAND_MODES`: what `command` is."""
+    late: Bool[np.ndarray, " n"] | None = None
+    """Whether it ended because the time was out; None: not known."""
+    images: tuple[np.ndarray, ...] = ()
+    """What the policy was shown at the start of each step by each camera: (t, n, h, w) or (t, n, h, w, 3)."""
+
+    def ending(self, index: int) -> str:
+        """How an episode ended, in a word or two."""
+        if self.success[index]:
+            return "success"
+        if self.late is None:
+            return "no success"
+        return "out of time" if self.late[index] else "crashed or left"
 
     @property
     def speed(self) -> Float[np.ndarray, "t n"]:
@@ -64,7 +77,13 @@ def fly(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int) -> Flights:
         n: episodes, side by side.
         steps: control steps; an episode that is longer is cut.
     """
-    reached, command, goal, out = trace(env, act, key, n, steps)
+    shown = list[tuple[np.ndarray, ...]]()
+
+    def watched(observation: Any, images: tuple[Any, ...], memory: Any) -> tuple[Any, Any]:
+        shown.append(images)
+        return act.act(observation, images, memory)
+
+    reached, command, goal, out = trace(env, replace(act, act=watched), key, n, steps)
     parts = (reached.position, reached.velocity, reached.quaternion, reached.body_rate, reached.rotor_speed)
     arrays = (np.asarray(x) for x in (*parts, command, goal))
     done, success = np.asarray(out.done), np.asarray(out.success)
@@ -75,4 +94,6 @@ def fly(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int) -> Flights:
         length=length,
         success=success[length - 1, np.arange(n)],
         command_mode=env.physics.command_mode,
+        images=tuple(np.stack(of) for of in zip(*shown, strict=True)),
+        late=~np.asarray(out.terminated)[length - 1, np.arange(n)],
     )

@@ -15,12 +15,16 @@ from e2efly.config import TaskConfig
 from e2efly.control import COMMAND_MODES
 from e2efly.drawing import INK
 from e2efly.episodes import Episodes, wilson
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 from e2efly.view.flights import Flights, fly
 from e2efly.view.space import plot_flights
 from e2efly.view.style import BLUE, CYCLE, GREEN, GREY, PURPLE, VERMILLION, figure, say
 
 Rows = list[dict[str, float]]
+NEARLY = 0.8
+"""Share of a bound from which on it is drawn."""
+LEARNED = 0.99
+"""Success whose first time is marked on learning curves."""
 
 _STEPS = "environment steps (million)"
 _DASHED: dict[str, Any] = {"linewidth": 1.2, "linestyle": (0, (4, 2))}
@@ -40,6 +44,10 @@ def plot_learning(rows: Rows, path: str | Path, title: str, best_update: int | N
     evaluated = [row for row in rows if "seconds" in row]
     best = next((row for row in evaluated if row["update"] == best_update), None)
     note = [] if best is None else [f"dashed: update {best['update']:.0f}, whose policy was shipped"]
+    learned = next((row for row in evaluated if _least_success(row) >= LEARNED), None)
+    if learned is not None:
+        steps = f"{learned['steps'] / 1e6:.2f} million steps"
+        note.append(f"dotted: {100 * LEARNED:g} % first reached, after {learned['seconds']:.1f} s and {steps}")
     with figure(path, title, 8.8, note) as fig:
         grid = fig.add_gridspec(3, 2, height_ratios=[1.0, 1.0, 1.2])
         clocks = (("seconds", 1.0, "time since process start, compilation included (s)"), ("steps", 1e-6, _STEPS))
@@ -56,6 +64,8 @@ def plot_learning(rows: Rows, path: str | Path, title: str, best_update: int | N
             below.set_xlabel(label)
             for ax in (above, below):
                 _mark(ax, best, clock, scale)
+            if learned is not None:
+                above.axvline(scale * learned[clock], color=GREEN, linewidth=1.2, linestyle=":", zorder=1.5)
             above.set_xlim(left=0.0)
         terms = fig.add_subplot(grid[2, :])
         _terms(terms, rows)
@@ -84,6 +94,11 @@ def _success(ax: Axes, rows: Rows, x: str, scale: float) -> None:
     ax.set_yticks([0, 25, 50, 75, 100])
 
 
+def _least_success(row: dict[str, float]) -> float:
+    """Of the criteria of an evaluation; 0 without any."""
+    return min((x for key, x in row.items() if key.startswith("eval/") and key.endswith("/success")), default=0.0)
+
+
 def _mark(ax: Axes, best: dict[str, float] | None, x: str, scale: float) -> None:
     if best is not None:
         ax.axvline(scale * best[x], color=GREY, zorder=1.5, **_DASHED)
@@ -110,7 +125,7 @@ def _terms(ax: Axes, rows: Rows) -> None:
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=8, borderpad=0.1)
 
 
-def plot_time(flights: Flights, index: int, path: str | Path, title: str) -> None:
+def plot_time(flights: Flights, index: int, path: str | Path, title: str, vehicle: Vehicle | None = None) -> None:
     """Draw one episode over time: position and velocity, attitude, command, body rates and rotor speeds.
 
     Args:
@@ -118,14 +133,16 @@ def plot_time(flights: Flights, index: int, path: str | Path, title: str) -> Non
         index: which of them.
         path: the PNG file.
         title: of the figure.
+        vehicle: its largest body rates, thrust and rotor speed are drawn where they are nearly reached; None: none.
     """
     steps, mode = int(flights.length[index]), COMMAND_MODES[flights.command_mode]
     time, command = flights.time[:steps], flights.command[:steps, index]
     asked = time - (flights.time[0] if len(flights.time) else 0.0)
     end = f"{time[-1]:.2f} s" if steps else "0 s"
-    ending = f"episode {index}: {'success' if flights.success[index] else 'no success'}, {end}"
+    ending = f"episode {index}: {flights.ending(index)}, {end}"
     note = f"{ending}; commands are drawn when the policy gives them, its latency before they act"
-    with figure(path, title, 9.6, [note]) as fig:
+    bound = f"dotted: the bounds of {vehicle.name}, where a curve comes near them" if vehicle is not None else ""
+    with figure(path, title, 9.6, [note, *([bound] if bound else [])]) as fig:
         axes = fig.subplots(4, 2, sharex=True).ravel()
         place, speed, attitude, thrust, roll, pitch, yaw, rotor = axes
         colors = (BLUE, VERMILLION, GREEN)
@@ -135,7 +152,7 @@ def plot_time(flights: Flights, index: int, path: str | Path, title: str) -> Non
             speed.plot(time, flights.velocity[:steps, index, i], color=color, label=name)
         place.plot([], [], color=GREY, label="goal", **_DASHED)
         attitude.plot(time, np.degrees(flights.tilt[:steps, index]), color=BLUE, label="tilt")
-        attitude.plot(*_unwound(time, np.degrees(flights.yaw[:steps, index])), color=VERMILLION, label="yaw")
+        attitude.plot(time, np.degrees(np.unwrap(flights.yaw[:steps, index])), color=VERMILLION, label="yaw")
         for i, (ax, color) in enumerate(zip((roll, pitch, yaw), colors, strict=True)):
             name = ("roll", "pitch", "yaw")[i]
             if f"{name}_rate" in mode.fields:
@@ -147,6 +164,12 @@ def plot_time(flights: Flights, index: int, path: str | Path, title: str) -> Non
         for i, name in enumerate(("rear right", "front right", "rear left", "front left")):
             color = (BLUE, VERMILLION, GREEN, PURPLE)[i]
             rotor.plot(time, flights.rotor_speed[:steps, index, i], color=color, linewidth=1.2, label=name)
+        if vehicle is not None:
+            for ax, top in zip((roll, pitch, yaw), np.broadcast_to(vehicle.body_rate_max, 3), strict=True):
+                _bound(ax, float(top), both=True)
+            _bound(rotor, float(vehicle.full_rotor_speed))
+            if mode.fields[0] == "collective_thrust":
+                _bound(thrust, vehicle.thrust_to_weight)
         for ax, label in ((place, "position (m)"), (speed, "velocity (m/s)"), (attitude, "angle (deg)")):
             ax.set_ylabel(label)
         rotor.set_ylabel("rotor speed (rad/s)")
@@ -157,6 +180,14 @@ def plot_time(flights: Flights, index: int, path: str | Path, title: str) -> Non
         attitude.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 1.5, 3, 4.5, 9, 10]))
         for ax in axes[-2:]:
             ax.set_xlabel("time (s)")
+
+
+def _bound(ax: Axes, top: float, both: bool = False) -> None:
+    """A dotted line at what the vehicle can do at most, and at its negative, where a curve comes near it."""
+    values = np.concatenate([np.asarray(line.get_ydata(), float) for line in ax.get_lines()])
+    for sign in (1.0, -1.0) if both else (1.0,):
+        if np.nanmax(sign * values, initial=0.0) > NEARLY * top:
+            ax.axhline(sign * top, color=INK, linewidth=1.2, linestyle=":")
 
 
 def _command(ax: Axes, time: Float[np.ndarray, " t"], command: Float[np.ndarray, "t 4"], name: str) -> None:
@@ -170,12 +201,6 @@ def _command(ax: Axes, time: Float[np.ndarray, " t"], command: Float[np.ndarray,
     for i, (field, color) in enumerate(zip(mode.fields, CYCLE, strict=False)):
         ax.plot(time, command[:, i], color=color, drawstyle="steps-post", label=field.replace("_", " "))
     ax.set_ylabel(f"command ({', '.join(dict.fromkeys(mode.units))})")
-
-
-def _unwound(time: np.ndarray, degrees: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """An angle over time with gaps where it jumps from one end of its range to the other."""
-    jumps = np.flatnonzero(np.abs(np.diff(degrees)) > 180) + 1
-    return np.insert(time, jumps, np.nan), np.insert(degrees, jumps, np.nan)
 
 
 def limits(suites: Mapping[str, TaskConfig]) -> dict[str, dict[str, float]]:
@@ -209,8 +234,13 @@ def plot_errors(
     """
     notes = [_rate(name, np.asarray(e.success)) for name, e in episodes.items()]
     colors = dict(zip(episodes, CYCLE * len(episodes), strict=False))
-    with figure(path, title, 6.6, notes) as fig:
-        for ax, (field, label) in zip(fig.subplots(2, 3, sharey=True).ravel(), _PANELS, strict=True):
+    panels = [panel for panel in _PANELS if _varies(episodes, panel[0])] or list(_PANELS)
+    below = len(panels) > 3
+    with figure(path, title, 6.6 if below else 4.2, notes) as fig:
+        grid = fig.subplots(1 + below, min(len(panels), 3), sharey=True, squeeze=False).ravel()
+        for ax in grid[len(panels) :]:
+            ax.set_axis_off()
+        for ax, (field, label) in zip(grid, panels, strict=False):
             values = {name: _finite(getattr(e, field), field) for name, e in episodes.items()}
             lines = {name: limit[field] for name, limit in (limits or {}).items() if field in limit and name in colors}
             _distributions(ax, values, lines, colors, field.endswith("error"))
@@ -222,6 +252,12 @@ def plot_errors(
         if limits:
             handles.append(Line2D([], [], color=INK, label="limit of success", **_DASHED))
         fig.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+
+
+def _varies(episodes: Mapping[str, Episodes], field: str) -> bool:
+    """Whether a field has more than one value over all episodes: a constant has no distribution."""
+    whole = np.concatenate([np.zeros(0), *(_finite(getattr(e, field), field) for e in episodes.values())])
+    return bool(np.ptp(whole) > 1e-6 * np.abs(whole).max()) if len(whole) else False
 
 
 def _rate(name: str, success: np.ndarray) -> str:

@@ -37,7 +37,10 @@ _TEXT: dict[str, Any] = {
 }  # fmt: skip
 
 
-def plot_flights(task: TaskConfig, flights: Flights, path: str | Path, title: str, solids: Sequence[Body] = ()) -> None:
+def plot_flights(
+    task: TaskConfig, flights: Flights, path: str | Path, title: str, solids: Sequence[Body] = (),
+    notes: Sequence[str] = (),
+) -> None:  # fmt: skip
     """Draw episodes in space, in 3D and from above, coloured by speed, with what the task has there.
 
     Args:
@@ -46,6 +49,7 @@ def plot_flights(task: TaskConfig, flights: Flights, path: str | Path, title: st
         path: the PNG file.
         title: of the figure.
         solids: of the world that all of them fly in.
+        notes: lines under the title.
     """
     things = scene(task, flights)
     tracks = [flights.position[:k, i] for i, k in enumerate(flights.length)]
@@ -53,7 +57,7 @@ def plot_flights(task: TaskConfig, flights: Flights, path: str | Path, title: st
     speeds = _paths(flights)[1]
     fastest = speeds[np.isfinite(speeds)].max(initial=0.0)
     norm = Normalize(0.0, max(fastest, 0.1))
-    with figure(path, title, 4.8 if _is_flat(high - low) else 5.8, free=True) as fig:
+    with figure(path, title, 4.8 if _is_flat(high - low) else 5.8, notes, free=True) as fig:
         solid: Solid = fig.add_axes((0.01, 0.10, 0.55, 0.83), projection="3d", computed_zorder=False)
         _solid(solid, flights, things, low, high, norm)
         _fit(fig, solid, low, high, Bbox.from_extents(0.012, 0.09, 0.55, 0.91))

@@ -11,13 +11,26 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
+from e2efly.control import Quat
+from e2efly.drawing import INK
 from e2efly.scenes.faces import Body, bodies
 from e2efly.scenes.scene import Scene
 from e2efly.view.flights import Flights
 from e2efly.view.style import FAILURE, GREY, MARK, SPEED, START, WIDTH, figure
+
+HEADINGS = 12
+"""Of a flight, at how many times its heading is drawn."""
+APART, MANY = 0.3, 40
+"""A goal that jumps by more, m, is another one; with more jumps than this it is one that moves."""
+NUMBER: dict[str, Any] = {
+    "color": INK, "size": 8, "weight": "bold", "zorder": 6,
+    "path_effects": [withStroke(linewidth=2, foreground="white")],
+}  # fmt: skip
+"""Of the number of a goal."""
 
 
 def draw_plan(ax: Axes, things: Sequence[Body]) -> None:
@@ -40,8 +53,11 @@ def draw_space(ax: Any, things: Sequence[Body]) -> None:
             ax.add_collection3d(way, autolim=False)
 
 
-def plot_flights_in_worlds(flights: Flights, scene: Scene, path: str | Path, title: str, count: int = 6) -> None:
-    """Draw flights from above, each in its own world as that was when the flight ended, coloured by speed.
+def plot_flights_in_worlds(
+    flights: Flights, scene: Scene, path: str | Path, title: str, count: int = 6, notes: Sequence[str] = ()
+) -> None:
+    """Draw flights, each in its own world as that was when the flight ended, coloured by speed: from above, with the
+    heading now and then, and their height over the distance flown.
 
     Args:
         flights: n episodes.
@@ -49,65 +65,105 @@ def plot_flights_in_worlds(flights: Flights, scene: Scene, path: str | Path, tit
         path: the PNG file.
         title: of the figure.
         count: how many flights, those without success first.
+        notes: lines under the title.
     """
     order = np.argsort(flights.success, kind="stable")
-    shown = sorted([int(i) for i in order if flights.length[i] > 0][:count])
+    shown = [int(i) for i in order if flights.length[i] > 0][:count]
     worlds = [bodies(scene, i if scene.worlds > 1 else 0, float(flights.time[flights.length[i] - 1])) for i in shown]
     tracks = [flights.position[: flights.length[i], i] for i in shown]
     low, high = _bounds(tracks, worlds)
     size = high - low
     columns = max(1, min(len(shown), 3, round(math.sqrt(1.5 * len(shown) * size[1] / size[0]))))
     rows = max(1, math.ceil(len(shown) / columns))
-    panel = (WIDTH - 1.6) / columns
-    height = min(max(rows * (panel * size[1] / size[0] + 0.45) + 1.3, 4.5), 14.0)
+    panel = max((WIDTH - 1.6) / columns * size[1] / size[0], 0.5)
+    height = min(max(rows * (panel + 1.35) + 1.3, 4.5), 10.8)
     fastest = max((flights.speed[: flights.length[i], i].max() for i in shown), default=0.0)
     norm = Normalize(0.0, max(float(fastest), 0.1))
-    failed = int(np.sum(~flights.success[shown].astype(bool)))
-    note = [f"From above, {len(shown)} of {len(flights.length)} flights, each in its own world"]
-    with figure(path, title, height, note) as fig:
-        axes = fig.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
-        for ax, i, world, track in zip(axes.flat, shown, worlds, tracks, strict=False):
-            draw_plan(ax, world)
-            speed = flights.speed[: len(track), i]
-            lines = LineCollection(
-                list(np.stack([track[:-1, :2], track[1:, :2]], axis=1)), array=(speed[:-1] + speed[1:]) / 2,
-                cmap=SPEED, norm=norm, linewidths=2.0, zorder=3, capstyle="round",
-            )  # fmt: skip
-            ax.add_collection(lines)
-            ax.plot(*flights.goal[len(track) - 1, i, :2, None], marker="*", **MARK, zorder=2.5)
-            ax.plot(*track[0, :2, None], **START, zorder=4)
-            good = bool(flights.success[i])
-            if not good:
-                ax.plot(*track[-1, :2, None], **FAILURE, zorder=5)
-            word = "success" if good else "no success"
-            ax.set_title(f"{word}, {flights.time[len(track) - 1]:.1f} s, top {speed.max():.1f} m/s", size=9)
-            ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-            ax.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
-            ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-            ax.grid(False)
-        for ax in axes.flat[len(shown) :]:
-            ax.set_axis_off()
-        for ax in axes[-1]:
-            ax.set_xlabel("x (m)")
-        for ax in axes[:, 0]:
-            ax.set_ylabel("y (m)")
+    top = max((float(np.nanmax(track[:, 2])) for track in tracks), default=1.0)
+    number = f"{len(shown)} of {len(flights.length)} flights, each in its own world"
+    with figure(path, title, height, [*notes, f"{number}, from above and by their height"]) as fig:
+        axes = fig.subplots(2 * rows, columns, squeeze=False, height_ratios=[panel, 0.55] * rows)
+        for k, (i, world, track) in enumerate(zip(shown, worlds, tracks, strict=True)):
+            plan, side = axes[2 * (k // columns) : 2 * (k // columns) + 2, k % columns]
+            draw_plan(plan, world)
+            _path(plan, track[:, :2], flights.speed[: len(track), i], norm)
+            _headings(plan, track, flights.quaternion[: len(track), i], 0.025 * float(size.max()))
+            way = np.insert(np.cumsum(np.linalg.norm(np.diff(track, axis=0), axis=1)), 0, 0.0)
+            _path(side, np.stack([way, track[:, 2]], axis=1), flights.speed[: len(track), i], norm)
+            _goals(plan, side, flights.goal[: len(track), i], way)
+            plan.plot(*track[0, :2, None], **START, zorder=4)
+            if not flights.success[i]:
+                plan.plot(*track[-1, :2, None], **FAILURE, zorder=5)
+            ended = f"{flights.ending(i)}, {flights.time[len(track) - 1]:.1f} s"
+            plan.set_title(f"{ended}, top {flights.speed[: len(track), i].max():.1f} m/s", size=9)
+            plan.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+            side.set(xlim=(0, max(way[-1], 0.1)), ylim=(0, 1.15 * max(top, 0.5)), xlabel="flown (m)")
+            for ax in (plan, side):
+                ax.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+                ax.yaxis.set_major_locator(MaxNLocator(5 if ax is plan else 2, steps=[1, 2, 5, 10]))
+                ax.grid(False)
+            if k % columns == 0:
+                plan.set_ylabel("y (m)")
+                side.set_ylabel("z (m)")
+        for k in range(len(shown), rows * columns):
+            for ax in axes[2 * (k // columns) : 2 * (k // columns) + 2, k % columns]:
+                ax.set_axis_off()
         bar = fig.colorbar(ScalarMappable(norm, SPEED), ax=axes, fraction=0.025, pad=0.01, aspect=40)
         bar.set_label("speed (m/s)")
         bar.outline.set_visible(False)
-        handles = [Line2D([], [], label="start", **START), Line2D([], [], label="goal at the end", marker="*", **MARK)]
-        if failed:
+        handles = [
+            Line2D([], [], label="start", **START),
+            Line2D([], [], label="goal (several: by number)", marker="*", **MARK),
+            Line2D([], [], color=INK, linewidth=1.0, label="heading"),
+        ]
+        if failed := int(np.sum(~flights.success[shown].astype(bool))):
             handles.append(Line2D([], [], label=f"no success ({failed} of {len(shown)})", **FAILURE))
-        fig.legend(handles=handles, loc="outside lower center", ncols=3)
+        fig.legend(handles=handles, loc="outside lower center", ncols=4)
+
+
+def _path(ax: Axes, points: np.ndarray, speed: np.ndarray, norm: Normalize) -> None:
+    """A path, (m, 2), coloured by speed."""
+    lines = LineCollection(
+        list(np.stack([points[:-1], points[1:]], axis=1)), array=(speed[:-1] + speed[1:]) / 2,
+        cmap=SPEED, norm=norm, linewidths=2.0, zorder=3, capstyle="round",
+    )  # fmt: skip
+    ax.add_collection(lines)
+
+
+def _headings(ax: Axes, track: np.ndarray, quaternion: np.ndarray, length: float) -> None:
+    """Where the vehicle's nose points, at even times, by lines of a length, m."""
+    at = np.unique(np.linspace(0, len(track) - 1, HEADINGS).round().astype(int))
+    yaw = Quat.of(quaternion[at]).yaw()
+    ends = track[at, :2] + length * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
+    ax.add_collection(
+        LineCollection(list(np.stack([track[at, :2], ends], axis=1)), colors=INK, linewidths=1.0, zorder=3.5)
+    )
+
+
+def _goals(plan: Axes, side: Axes, goal: np.ndarray, way: np.ndarray) -> None:
+    """One goal by a star; several, one after the other, by their numbers, and where each was reached."""
+    changes = np.flatnonzero(np.linalg.norm(np.diff(goal, axis=0), axis=1) > APART)
+    if not 0 < len(changes) <= MANY:
+        plan.plot(*goal[-1, :2, None], marker="*", **MARK, zorder=2.5)
+        return
+    reached = [*changes, *([len(goal) - 1] if len(goal) - 1 - changes[-1] > 1 else [])]
+    for number, k in enumerate(reached, 1):
+        plan.annotate(str(number), (goal[k, 0], goal[k, 1]), (5, 5), textcoords="offset points", **NUMBER)
+    for number, k in enumerate(changes, 1):
+        side.axvline(way[k], color=GREY, linewidth=0.8, zorder=1)
+        side.annotate(str(number), (way[k], goal[k, 2]), (3, 3), textcoords="offset points", **NUMBER)
 
 
 def _bounds(tracks: list[np.ndarray], worlds: list[list[Body]]) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of a level rectangle about all that is drawn, with a margin."""
+    """Corners of a level rectangle about the flights and the middles of the solids, with a margin: of a long wall there
+    is no more to be seen than where it is flown through.
+    """
     points = [track[:, :2] for track in tracks]
-    points += [body.quads[..., :2].reshape(-1, 2) for world in worlds for body in world]
+    points += [body.outline.mean(axis=0, keepdims=True) for world in worlds for body in world]
     whole = np.concatenate([*points, np.zeros((0, 2))])
     whole = whole if len(whole) else np.zeros((1, 2))
     low, high = whole.min(axis=0), whole.max(axis=0)
-    margin = np.maximum(0.03 * (high - low).max(), 0.3)
+    margin = np.maximum(0.03 * (high - low).max(), 0.5)
     return low - margin, high + margin
 
 

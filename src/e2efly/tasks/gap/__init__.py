@@ -46,6 +46,11 @@ class GapConfig(TaskConfig):
     collisions_end: bool = True
     """Whether a collision ends the episode; training goes on, so that it learns from what comes after."""
 
+    @property
+    def own_worlds(self) -> bool:
+        """Its wall."""
+        return True
+
     @classmethod
     def training(cls) -> "GapConfig":
         """Collisions end no episode."""

@@ -59,6 +59,11 @@ class HoverAwareConfig(TaskConfig):
     fence: float = number(defaults.HOVER_FENCE, above=0, endless=True)
     """Farther than this from the target the episode fails, m."""
 
+    @property
+    def own_worlds(self) -> bool:
+        """What it looks at."""
+        return True
+
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
         """As hover's, with rewards for looking at the target."""
