@@ -40,6 +40,7 @@ TITLES = {
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
     "plants_by_sight": "Policies that see, on plants that render",
     "image_faults": "Cameras that break in flight",
+    "pad_masks": "Masks by the package's network, of rendered pads that it never saw",
     "firmware_faults": "Faults injected into flights of the real firmware",
     "fault_campaign": "Pairs and triples of faults by chance, injected into flights of the real firmware",
     "process_faults": "The bridge's process killed, stopped, its disk full, in flight",
@@ -101,9 +102,8 @@ newest image is older than training's oldest, one image and 50 ms.""",
     "identify_betaflight": """
 30 s of `e2efly fly excitation` each, in a fence of 12 x 12 x 4.8 m, by the bridge, through Betaflight 4.6
 in virtual time. The delay's truth is on the rig's own clock: the age of the poses, and the time from a
-command to the setpoint. Three vehicles are few. Measured when rotor speeds were taken to rise
-evenly with motor outputs, and outputs of 50 Hz to tell torques. Since then thrust is a quadratic of
-outputs, and a log with less than 200 Hz of them gives thrust, lag and drag, but no inertia.
+command to the setpoint. Thrust is a quadratic of motor outputs, and a log with less than 200 Hz of them
+gives thrust, lag and drag, but no inertia.
 [What to fly](identification.md#what-to-fly).""",
     "robust": """
 Five seeds, 1000 starts a row. While track's last two and race's first three trained, other programs

@@ -159,6 +159,16 @@ def test_a_file_that_is_no_such_network_is_named(tmp_path: Path, content: bytes 
     assert "accepted: an ONNX file" in str(error.value)
 
 
+@pytest.mark.parametrize(("ground", "pad"), [((70, 110, 60), (235, 235, 230)), ((200, 190, 170), (190, 30, 30))])
+def test_the_network_of_the_package_finds_a_pad_and_no_other(ground: tuple[int, ...], pad: tuple[int, ...]) -> None:
+    inside, random = polygon(CORNERS), np.random.default_rng(0)
+    picture = np.where(inside[..., None] > 0, np.array(pad), np.array(ground)) + random.normal(0, 6, (HIGH, WIDE, 1))
+    bare = np.array(ground) + random.normal(0, 6, (HIGH, WIDE, 1))
+    network = chosen("onnx")
+    assert overlap(network(picture.clip(0, 255).astype(np.uint8)), inside) > 0.9
+    assert network(bare.clip(0, 255).astype(np.uint8)).mean() < 0.001
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -9,7 +9,7 @@ import onnxruntime
 from e2efly.deploy.sight.segment import SEGMENTERS, opencv
 
 OWN = Path(__file__).parent / "pad.onnx"
-"""What is loaded where no file is named; `benchmarks/pad_masks.py --train` writes it. The package has none yet."""
+"""What is loaded where no file is named; `benchmarks/pad_masks.py --train` writes it."""
 LONGER_SIDE, STEP = 64, 16
 """Of what a network is shown that takes any size: pixels of the longer side; sides are multiples of the step."""
 ACCEPTED = (
