@@ -15,7 +15,7 @@ TUTORIALS = sorted((DOCS / "tutorials").glob("*.md"))
 BRIEF = """
 e2efly() {
   case "$1" in
-    train) python -m e2efly "$@" --steps 20000 ;;
+    train) python -m e2efly "$@" --steps 20000 --no-plots ;;
     eval | validate) case "$*" in
       *betaflight*) python -m e2efly "$@" ;;
       *) python -m e2efly "$@" --episodes 2 ;;
