@@ -5,7 +5,7 @@
     python benchmarks/paper.py                # judges anew what is there already
 
 Each training is a process of `e2efly train`. What a run came to is written at once. A finished run is not repeated but
-with `--again`, and one that was killed goes on from its checkpoint in --runs. `--longest` stops a training in order
+with `--again`, and a training that was killed goes on from its checkpoint in --runs. `--longest` stops a training in order
 after so many seconds: it counts with the steps that it took, and a later command with more of them goes on. `--short`
 makes the first two runs of each experiment in seconds, with sizes that teach nothing. Experiments, runs and rules of
 the verdicts: `benchmarks/claims`.
@@ -85,7 +85,11 @@ def parsed() -> argparse.Namespace:
     add("--algos", nargs="*", default=[], help="these alone: bptt, ppo, zoo")
     add("--variants", nargs="*", default=[], help="those alone whose names hold one of these texts")
     add("--longest", type=float, default=math.inf, help="stop a training after so many seconds")
-    add("--runs", type=Path, help="folder of the runs that are not finished; left out: a temporary one")
+    add(
+        "--runs",
+        type=Path,
+        help="folder of the trainings, which a later command takes or goes on with; left out: a temporary one",
+    )
     add("--again", action="store_true", help="repeat what is there already")
     add("--short", action="store_true", help="two tiny runs of each experiment")
     add("--json", type=Path, default=FILE, help=f"the figures; left out: {FILE.name} beside the others")

@@ -1,6 +1,7 @@
 """Runs of the paper's experiments, each training in a process of its own; what it came to, as JSON."""
 
 import dataclasses
+import hashlib
 import json
 import math
 import os
@@ -39,7 +40,7 @@ SHORT = (
     "8",
     "8",
     "--task.episode-s",
-    "0.5",
+    "1",
 )
 
 
@@ -78,13 +79,16 @@ def make(run: Run, seed: int, seeds: int, how: How) -> dict[str, Any]:
         return about | ablated(run, seeds, how)
     if run.kind == "zoo":
         return about | {"finished": True, "seconds": 0.0, "flights": flights(run.task, run.flights, how)}
-    out = how.folder / "-".join([run.task, run.algo, run.variant.replace(" ", "_"), str(seed)])
+    out = place(run, seed, how)
     told = trained(run, seed, out, how)
     told["flights"] = flights(out, run.flights, how)
-    if told["finished"]:
-        shutil.rmtree(out)
-        out.with_suffix(".time").unlink(missing_ok=True)
     return about | told
+
+
+def place(run: Run, seed: int, how: How) -> Path:
+    """The folder of a training: that of all runs with the same options, so that none is trained twice."""
+    told = hashlib.sha256(repr((run.options, how.short)).encode()).hexdigest()[:8]
+    return how.folder / f"{run.task}-{run.algo}-{seed}-{told}"
 
 
 def trained(run: Run, seed: int, out: Path, how: How) -> dict[str, Any]:
@@ -190,7 +194,7 @@ def flights(policy: Path | str, asked: Mapping[str, Flight], how: How) -> dict[s
 
 def ablated(run: Run, seeds: int, how: How) -> dict[str, Any]:
     """The curves of an ablation: of each variant the last evaluation of each seed, and the mean over seeds."""
-    out = how.folder / f"ablation-{run.task}-{run.algo}-{run.variant.replace(' ', '_')}-{seeds}"
+    out = how.folder / f"{run.task}-{run.algo}-{run.variant}-{seeds}"
     short = ("--steps", "40960") if how.short else ()
     command = ["ablate", run.task, "--algos", run.algo, "--seeds", str(seeds), "--by", "group", "--out", str(out)]
     process([*command, *run.options, *short, "--device", "cpu"], out.with_suffix(".time"))
