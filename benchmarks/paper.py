@@ -1,12 +1,12 @@
 """The paper's experiments: every table and figure that needs no vehicle, ours beside theirs, with a verdict a claim.
 
     python benchmarks/paper.py EXPERIMENT... [--seeds N] [--tasks hover ...] [--algos bptt ...] [--variants TEXT ...]
-                               [--longest SECONDS] [--runs FOLDER] [--again] [--short] [--json FILE]
+                               [--most STEPS] [--runs FOLDER] [--again] [--short] [--json FILE]
     python benchmarks/paper.py                # judges anew what is there already
 
 Each training is a process of `e2efly train`. What a run came to is written at once. A finished run is not repeated but
-with `--again`, and a training that was killed goes on from its checkpoint in --runs. `--longest` stops a training in order
-after so many seconds: it counts with the steps that it took, and a later command with more of them goes on. `--short`
+with `--again`, and a training that was killed goes on from its checkpoint in --runs. `--most` stops a training in order
+once it has taken so many steps: it counts with those, and a later command with more of them goes on. `--short`
 makes the first two runs of each experiment in seconds, with sizes that teach nothing. Experiments, runs and rules of
 the verdicts: `benchmarks/claims`.
 """
@@ -84,7 +84,7 @@ def parsed() -> argparse.Namespace:
     add("--tasks", nargs="*", default=[], help="these alone")
     add("--algos", nargs="*", default=[], help="these alone: bptt, ppo, zoo")
     add("--variants", nargs="*", default=[], help="those alone whose names hold one of these texts")
-    add("--longest", type=float, default=math.inf, help="stop a training after so many seconds")
+    add("--most", type=float, default=math.inf, help="stop a training after so many environment steps")
     add(
         "--runs",
         type=Path,
@@ -104,7 +104,7 @@ def main() -> None:
     """Make what is asked for, judge, print the tables, write JSON."""
     options = parsed()
     with tempfile.TemporaryDirectory() as folder:
-        how = How(options.runs or Path(folder), short=options.short, longest=options.longest)
+        how = How(options.runs or Path(folder), short=options.short, most=options.most)
         with held(how.folder):
             for name in options.experiments:
                 measure(EXPERIMENTS[name], options, how)

@@ -10,7 +10,8 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -54,15 +55,15 @@ class How:
     """Starts of each flight."""
     short: bool = False
     """Whether in seconds, with figures that say nothing."""
-    longest: float = math.inf
-    """Seconds after which a training is stopped in order; what it got to counts, and a later command goes on."""
+    most: float = math.inf
+    """Environment steps after which a training is stopped in order; a later command goes on with it."""
 
 
 def wanted(run: Run, seed: int, seeds: int, known: Sequence[Mapping[str, Any]], how: How) -> bool:
     """Whether a run is to be made: it is not known, or was stopped earlier than it would be now."""
     for one in known:
         if key(one) == (run.task, run.algo, run.variant, seed):
-            enough = one["finished"] or one["seconds"] >= how.longest
+            enough = one["finished"] or one["steps"] >= how.most
             return not enough or (run.kind == "ablate" and one["seeds"] != seeds)
     return True
 
@@ -100,12 +101,14 @@ def trained(run: Run, seed: int, out: Path, how: How) -> dict[str, Any]:
         else:
             short = (*SHORT, *SMALL[run.algo]) if how.short else ()
             options = [run.task, "--algo", run.algo, "--seed", str(seed), "--out", str(out), *run.options, *short]
-        process(["train", *options, "--no-plots", "--device", "cpu"], out.with_suffix(".time"), how.longest)
+        limited = not math.isinf(how.most)
+        command = ["train", *options, "--no-plots", "--device", "cpu"]
+        process(command, out.with_suffix(".time"), lambda: limited and taken(out) >= how.most)
     return figures(out)
 
 
-def process(arguments: list[str], times: Path, longest: float = math.inf) -> None:
-    """Run a command of e2efly; stop it in order after so many seconds. Its CPU and wall seconds join a file.
+def process(arguments: list[str], times: Path, over: Callable[[], bool] = lambda: False) -> None:
+    """Run a command of e2efly; stop it in order once it is over. Its user and system seconds join a file.
 
     Raises:
         SystemExit: with what it says, when it fails.
@@ -115,10 +118,11 @@ def process(arguments: list[str], times: Path, longest: float = math.inf) -> Non
     with log.open("w") as told:
         child = subprocess.Popen([sys.executable, "-m", "e2efly", *arguments], stdout=told, stderr=subprocess.STDOUT)
         try:
-            child.wait(None if math.isinf(longest) else longest)
-        except subprocess.TimeoutExpired:
-            child.send_signal(signal.SIGINT)
-            child.wait()
+            while child.poll() is None:
+                time.sleep(0.5)
+                if over():
+                    child.send_signal(signal.SIGINT)
+                    child.wait()
         except BaseException:
             child.kill()
             raise
@@ -128,6 +132,14 @@ def process(arguments: list[str], times: Path, longest: float = math.inf) -> Non
     with times.open("a") as file:
         file.write(f"{after.ru_utime - before.ru_utime:.2f} {after.ru_stime - before.ru_stime:.2f}\n")
     log.unlink()
+
+
+def taken(out: Path) -> float:
+    """Environment steps that a training has taken so far."""
+    from e2efly.learn.rundir import RunDirectory
+
+    rows = RunDirectory(out).rows()
+    return rows[-1]["steps"] if rows else 0.0
 
 
 def figures(out: Path) -> dict[str, Any]:
