@@ -42,10 +42,13 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def judged(experiment: Experiment, runs: list[Any]) -> dict[str, Any]:
-    """What the runs of an experiment come to: its claims with verdicts, and its table."""
+    """What an experiment is, and what its runs come to: its claims with verdicts, and its table."""
     found = Found(runs, results)
     verdicts = [(claim, claim.judge(found)) for claim in experiment.claims]
     return {
+        "title": experiment.title,
+        "where": experiment.where,
+        "about": experiment.about.strip(),
         "claims": [
             {"the paper": c.says, "theirs": c.theirs, "ours": v.ours, "verdict": v.word, "why": v.why}
             for c, v in verdicts

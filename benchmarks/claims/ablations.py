@@ -14,7 +14,7 @@ PRESETS = {
 STABLE = ("hover", "land", "track")
 BY_ERROR = ("hover", "track")
 SUCCESS, ERROR = 0.02, 1.1
-"""A part is missed where without it success is lower by more than this, or the error higher by more than this factor."""
+"""A part is missed where success is lower by more than this without it, or the error higher by more than the factor."""
 FULL = "full"
 
 
@@ -88,7 +88,8 @@ ABLATION = Experiment(
     (
         Claim("Hovering, landing and tracking degrade without any of progress, action, velocity, body rate",
               "by both algorithms", all_needed),
-        Claim("Progress plays the dominant role in racing", "by both algorithms", without("prog", ("race",), ("ppo", "bptt"))),
+        Claim("Progress plays the dominant role in racing", "by both algorithms",
+              without("prog", ("race",), ("ppo", "bptt"))),
         Claim("Sparse rewards are critical for PPO", "in all four tasks", without("sparse", TASKS, ("ppo",))),
     ),
     tuple(
@@ -101,7 +102,7 @@ ABLATION = Experiment(
     f"""
 `e2efly ablate --by group`: error (hover, track) or success (land, race) at the end, mean of the seeds. A part counts as
 missed where success is lower by more than {100 * SUCCESS:.0f} points, or the error higher by more than
-{100 * ERROR - 100:.0f} %. Rewards of the preset `paper` are the paper's, for 4 M steps; those of `nominal` are ours. Our
-terms stand with what they reward: `near` is progress, `descent` velocity, `upright` orientation.""",
+{100 * ERROR - 100:.0f} %. Rewards of the preset `paper` are the paper's, for 4 M steps; those of `nominal` are ours.
+Our terms stand with what they reward: `near` is progress, `descent` velocity, `upright` orientation.""",
     seeds=3,
 )  # fmt: skip

@@ -88,7 +88,8 @@ LATENCY = Experiment(
     "Latency compensated against not",
     "section Latency Compensation",
     (
-        Claim("Latency that is not compensated causes oscillation, even loss of control", "90 ms VIS-H, 60 ms VIS-R", uncompensated),
+        Claim("Latency that is not compensated causes oscillation, even loss of control", "90 ms VIS-H, 60 ms VIS-R",
+              uncompensated),
         Claim("Compensated, the closed loop behaves nearly as without", "nearly identical", compensated),
     ),
     tuple(
@@ -127,6 +128,11 @@ def one_start(task: str) -> tuple[str, ...]:
     return tuple(words)
 
 
+def from_both(task: str) -> dict[str, Flight]:
+    """Flights from random starts, and from one."""
+    return {RANDOM: Flight(task=usual(task)), ONE: Flight(task=STARTS[task])}
+
+
 def starts_needed(found: Found) -> Verdict:
     """Whether what was trained from one start fails from random ones."""
     told, right = [], []
@@ -147,7 +153,7 @@ RANDOMISATION = Experiment(
     "table of domain randomisation; section Domain Randomization",
     (Claim("Insufficient randomisation transfers poorly", "p, of hovering v too", starts_needed),),
     tuple(
-        Run(task, "bptt", variant, (*NOMINAL, *options), {RANDOM: Flight(task=usual(task)), ONE: Flight(task=STARTS[task])})
+        Run(task, "bptt", variant, (*NOMINAL, *options), from_both(task))
         for task in STARTS
         for variant, options in ((RANDOM, ()), (ONE, one_start(task)))
     ),
@@ -162,8 +168,8 @@ FILE, IDENTIFIED, UNKNOWN = "the file's vehicle", "as identified", "not identifi
 VEHICLES = {
     FILE: Flight(),
     IDENTIFIED: Flight({
-        "randomize": {"mass": 0.01, "inertia": 0.03, "motor_time_constant": 0.02, "torque_ratio": 0.03, "rate_gain": 0.02,
-                      "drag_linear": 0.2, "drag_quadratic": 0.2},
+        "randomize": {"mass": 0.01, "inertia": 0.03, "motor_time_constant": 0.02, "torque_ratio": 0.03,
+                      "rate_gain": 0.02, "drag_linear": 0.2, "drag_quadratic": 0.2},
     }),
     UNKNOWN: Flight({
         "randomize": {"mass": 0.25, "inertia": 0.5, "motor_time_constant": 0.8, "torque_ratio": 0.3, "rate_gain": 0.5,
@@ -221,8 +227,8 @@ IDENTIFICATION = Experiment(
     """
 Preset `nominal` by BPTT with the paper's observations, and the zoo's policies, which were trained for many vehicles and
 have a memory. *As identified*: mass, inertia, motor lag, torque, rate loop and drag off by at most what 90 % of [our
-identifications](benchmarks.md#identification-of-hidden-vehicles-from-the-logs-of-a-flight) stay below. *Not identified*:
-the ranges of the preset `robust`, in still air.""",
+identifications](benchmarks.md#identification-of-hidden-vehicles-from-the-logs-of-a-flight) stay below. *Not
+identified*: the ranges of the preset `robust`, in still air.""",
     seeds=3,
 )  # fmt: skip
 
@@ -236,7 +242,8 @@ STATES = {
     ),
 }
 VIO = (
-    "--env.noise.position", "0.02", "--env.noise.velocity", "0.1", "--env.noise.attitude", "0.01", "--env.noise.body-rate", "0.02",
+    "--env.noise.position", "0.02", "--env.noise.velocity", "0.1", "--env.noise.attitude", "0.01",
+    "--env.noise.body-rate", "0.02",
 )  # fmt: skip
 MASKS = {
     "without noise": Flight(),
@@ -294,9 +301,8 @@ def sight_without(found: Found) -> Verdict:
         clean, noisy = worst_noise(found, task, CLEAN), worst_noise(found, task, NOISY)
         if clean and noisy:
             right.append(clean[1] < noisy[1] - LOST)
-            told.append(
-                f"{task}: {100 * clean[1]:.1f} % {clean[0]}, trained without; {100 * noisy[1]:.1f} % {noisy[0]}, trained with"
-            )
+            without, given = (f"{100 * left:.1f} % {name}" for name, left in (clean, noisy))
+            told.append(f"{task}: {without}, trained without; {given}, trained with")
     return Verdict(majority(right), "; ".join(told), "success in the worst noise") if right else NOTHING
 
 

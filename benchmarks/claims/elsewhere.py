@@ -12,7 +12,11 @@ def aligned(found: Found) -> Verdict:
         return NOTHING
     rms = known["steps"]["held_out_rms"]
     rates = {name: of for name, of in rms.items() if name.endswith("_rate")}
-    told = "; ".join(f"{name.replace('_', ' ')}: {of['before']:.3f} to {of['aligned']:.3f} {of['unit']}" for name, of in rms.items() if name in rates or name == "thrust")  # fmt: skip
+    told = "; ".join(
+        f"{name.replace('_', ' ')}: {of['before']:.3f} to {of['aligned']:.3f} {of['unit']}"
+        for name, of in rms.items()
+        if name in rates or name == "thrust"
+    )
     right = all(of["aligned"] < 0.5 * of["before"] for of in rates.values())
     why = "error of steps that the fit did not see, before and after; confirmed: of all rates at most half"
     return Verdict(CONFIRMED if right else REFUTED, told, why)
@@ -97,7 +101,8 @@ def frames(found: Found) -> Verdict:
     if row is None:
         return NOTHING
     rate = float(row["frames/s, median"])
-    return Verdict(CONFIRMED if rate >= FRAMES else REFUTED, f"{rate:,.0f} per second", "two CPU cores, worlds of solids; theirs on a GPU, scenes of meshes")  # fmt: skip
+    why = "two CPU cores, worlds of solids; theirs on a GPU, scenes of meshes"
+    return Verdict(CONFIRMED if rate >= FRAMES else REFUTED, f"{rate:,.0f} per second", why)
 
 
 def not_here(why: str) -> Any:
@@ -114,17 +119,19 @@ RENDERING = Experiment(
     table_of("rendering"),
 )
 
+NEEDS = "needs the vehicle"
+FLIGHTS = "benchmarks.md#whole-flights-through-real-betaflight-firmware-nobody-helping"
 REAL = Experiment(
     "real",
     "What needs a vehicle",
     "figures of the policy response, of zero-shot transfer, of hardware in the loop; table of vehicle parameters",
     (
         Claim("Zero-shot transfer of all tasks to VIS-R", "shown by flights, no success rate",
-              not_here("needs the vehicle; [flights through the real firmware](benchmarks.md#whole-flights-through-real-betaflight-firmware-nobody-helping) stand in")),
-        Claim("The policy's response in flight matches the simulator's", "curves lie on one another", not_here("needs the vehicle")),
+              not_here(f"{NEEDS}; [flights through the real firmware]({FLIGHTS}) stand in")),
+        Claim("The policy's response in flight matches the simulator's", "curves lie on one another", not_here(NEEDS)),
         Claim("Hardware in the loop on VIS-H, racing with random obstacles", "shown by a flight",
               not_here("needs the vehicle and motion capture; [rehearsed](hil.md) without them")),
-        Claim("A latency of 90 ms by telemetry and below 30 ms on board", "90 ms, 30 ms", not_here("needs the vehicle")),
+        Claim("A latency of 90 ms by telemetry and below 30 ms on board", "90 ms, 30 ms", not_here(NEEDS)),
         Claim("Parameters of VIS-R and VIS-H", "table of parameters",
               not_here("needs the vehicles; inertia [by a list of parts](identification.md) lies beside the paper's")),
         Claim("Costs of 630 and 280 USD", "630, 280 USD", not_here("prices of one day and place")),

@@ -143,7 +143,7 @@ def taken(out: Path) -> float:
 
 
 def figures(out: Path) -> dict[str, Any]:
-    """What a run directory says: steps, seconds, curves, when levels were reached, how the best and last policy flew."""
+    """What a run directory says: steps, seconds, curves, when levels were reached, how the best policy flew."""
     from e2efly.learn.rundir import RunDirectory
 
     run = RunDirectory(out)
