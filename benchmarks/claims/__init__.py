@@ -1,10 +1,11 @@
 """The paper's experiments, one after the other."""
 
 from claims.ablations import ABLATION
-from claims.alignment import CURRICULUM, IDENTIFICATION, LATENCY, NOISE, RANDOMISATION
+from claims.alignment import IDENTIFICATION, LATENCY, RANDOMISATION
 from claims.elsewhere import REAL, RENDERING, SIM_TO_SIM, STEPS
 from claims.experiment import Experiment
 from claims.learning import HOURS, LEARNING, SPEED
+from claims.noise import CURRICULUM, NOISE
 from claims.vision import LANDING, RACING
 
 EXPERIMENTS: dict[str, Experiment] = {
