@@ -7,7 +7,7 @@
 Each training is a process of `e2efly train`. What a run came to is written at once. A finished run is not repeated but
 with `--again`, and a training that was killed goes on from its checkpoint in --runs. `--most` stops a training in order
 once it has taken so many steps: it counts with those, and a later command with more of them goes on. `--short`
-makes the first two runs of each experiment in seconds, with sizes that teach nothing. Experiments, runs and rules of
+makes the first run or two of each experiment in seconds, with sizes that teach nothing. Experiments, runs and rules of
 the verdicts: `benchmarks/claims`.
 """
 
@@ -73,7 +73,7 @@ def asked(experiment: Experiment, options: argparse.Namespace) -> list[tuple[Run
         and (not options.algos or run.algo in options.algos)
         and (not options.variants or any(text in run.variant for text in options.variants))
     ]
-    runs = runs[:2] if options.short else runs
+    runs = runs[: experiment.short] if options.short else runs
     seeds = range(1 if options.short else options.seeds or experiment.seeds)
     return [(run, seed) for seed in seeds for run in runs if seed == 0 or run.kind == "train"]
 
@@ -94,7 +94,7 @@ def parsed() -> argparse.Namespace:
         help="folder of the trainings, which a later command takes or goes on with; left out: a temporary one",
     )
     add("--again", action="store_true", help="repeat what is there already")
-    add("--short", action="store_true", help="two tiny runs of each experiment")
+    add("--short", action="store_true", help="a tiny run or two of each experiment")
     add("--json", type=Path, default=FILE, help=f"the figures; left out: {FILE.name} beside the others")
     options = parser.parse_args()
     for name in options.experiments:

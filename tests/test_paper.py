@@ -57,7 +57,7 @@ def test_the_short_version_of_an_experiment_gives_rows_and_verdicts(name: str, f
     found = json.loads(file.read_text())
     assert list(found) == list(EXPERIMENTS)
     part = found[name]
-    assert len(part["runs"]) == (1 if name == "ablation" else 2)
+    assert len(part["runs"]) == EXPERIMENTS[name].short
     assert part["machine"]["cores"] and part["date"]
     assert all(one["finished"] for one in part["runs"])
     assert all(claim["verdict"] in (CONFIRMED, REFUTED, UNTESTABLE, UNMEASURED) for claim in part["claims"])
@@ -65,11 +65,10 @@ def test_the_short_version_of_an_experiment_gives_rows_and_verdicts(name: str, f
     assert any(UNMEASURED in row.values() or "-" in row.values() for row in part["table"])  # the runs left out
     for one in part["runs"]:
         (asked,) = [r for r in EXPERIMENTS[name].runs if (r.task, r.algo, r.variant) == paper.key(one)[:3]]
-        assert set(one["flights"]) == set(asked.flights)
+        assert list(one["flights"]) == list(asked.flights)[:2]
         if asked.kind == "train":
             assert one["steps"] >= 256
             assert len(one["curve"]["reward"].split()) == len(one["curve"]["steps"].split()) > 1
-    assert file.read_text() == (run(name, file=file, runs=folder) and file.read_text())  # nothing was repeated
 
 
 def test_what_was_killed_goes_on_where_it_was(folder: Path, tmp_path: Path) -> None:
@@ -88,6 +87,9 @@ def test_what_was_killed_goes_on_where_it_was(folder: Path, tmp_path: Path) -> N
     assert after[: len(before)] == before
     assert [one["algo"] for one in after] == ["bptt", "ppo"]
     assert first == after[0]
+    whole = file.read_bytes()
+    run("learning", file=file, runs=folder)  # nothing is repeated
+    assert file.read_bytes() == whole
 
 
 def test_a_training_that_was_stopped_goes_on_from_its_checkpoint(

@@ -78,6 +78,8 @@ class Experiment:
     """How it was done, in words."""
     seeds: int = 5
     """Of the whole experiment."""
+    short: int = 1
+    """How many of its runs the short version makes."""
 
 
 @dataclass(frozen=True)

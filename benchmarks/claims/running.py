@@ -191,7 +191,7 @@ def flights(policy: Path | str, asked: Mapping[str, Flight], how: How) -> dict[s
     from e2efly.episodes import summary
 
     flown = {}
-    for name, flight in asked.items():
+    for name, flight in list(asked.items())[: 2 if how.short else None]:
         found = evaluate(policy, 4 if how.short else how.episodes, env=flight.env, task=flight.task, device="cpu")
         if not flight.by:
             flown[name] = {criterion: summary(e) for criterion, e in found.flown.items()}
