@@ -58,7 +58,7 @@ def uncompensated(late: int) -> Any:
                 told.append(f"{task}: {percents(flown)} %, actions change {rough:.1f} times as much")
         if not right:
             return NOTHING
-        why = f"trained without latency, flown with it; confirmed: success lost, or actions change {ROUGHER:g} times as much"
+        why = f"trained without, flown with it; confirmed: success lost, or actions change {ROUGHER:g} times as much"
         return Verdict(majority(right), "; ".join(told), why)
 
     return judge
@@ -106,7 +106,7 @@ LATENCY = Experiment(
     tuple(
         Run(task, "bptt", f"{late} ms", late_options(late), FLOWN_LATE)
         for task in ("hover", "race")
-        for late in (0, 60, 90, 30)
+        for late in LATENCIES
     ),
     lambda found: flights_table(LATENCY, found),
     """
