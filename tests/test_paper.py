@@ -65,7 +65,7 @@ def test_the_short_version_of_an_experiment_gives_rows_and_verdicts(name: str, f
     assert any(UNMEASURED in row.values() or "-" in row.values() for row in part["table"])  # the runs left out
     for one in part["runs"]:
         (asked,) = [r for r in EXPERIMENTS[name].runs if (r.task, r.algo, r.variant) == paper.key(one)[:3]]
-        assert list(one["flights"]) == list(asked.flights)[:2]
+        assert list(one["flights"]) == list(asked.flights)[:1]
         if asked.kind == "train":
             assert one["steps"] >= 256
             assert len(one["curve"]["reward"].split()) == len(one["curve"]["steps"].split()) > 1
@@ -96,7 +96,7 @@ def test_a_training_that_was_stopped_goes_on_from_its_checkpoint(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XLA_FLAGS", environment()["XLA_FLAGS"])
-    steps = 40_000
+    steps = 8_000
     longer = (*SHORT, *SMALL["ppo"], "--steps", str(steps))
     one, out = Run("hover", "ppo", "long", (*NOMINAL, *longer)), tmp_path / "run"
     first = trained(one, 0, out, How(tmp_path, most=1))

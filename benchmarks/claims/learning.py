@@ -43,8 +43,12 @@ def cost(one: Mapping[str, Any], figure: str) -> float:
 
 
 def share(one: Mapping[str, Any]) -> float:
-    """CPU seconds in a second of the clock, on the one core that a training has: others may have had the rest."""
-    return min(1.0, one["cpu_seconds"] / one["seconds"]) if one["cores"] == 1 and one["cpu_seconds"] else 1.0
+    """CPU seconds in a second of the clock, on the one core that a training has: others may have had the rest. NaN: it
+    is not known.
+    """
+    if one["cores"] > 1:
+        return 1.0
+    return min(1.0, one["cpu_seconds"] / one["seconds"]) if one["cpu_seconds"] else math.nan
 
 
 def spent(one: Mapping[str, Any], figure: str) -> float:
@@ -69,6 +73,8 @@ def cheaper(figure: str, most: float) -> Any:
         for variant in (IDENTICAL, OWN):
             for task, (bptt, ppo) in pairs(found, variant).items():
                 ours, other = mean([cost(one, figure) for one in bptt]), mean([spent(one, figure) for one in ppo])
+                if math.isnan(ours) or math.isnan(other):
+                    continue
                 if math.isinf(ours):
                     right.append(False)
                     told.append(f"{task} ({variant}): BPTT does not get there")
@@ -159,7 +165,7 @@ def each(runs: list[Any], show: Any) -> str:
 
 def number(value: float, digits: int) -> str:
     """A number, or that it was never reached."""
-    return "never" if math.isinf(value) else f"{value:.{digits}f}"
+    return "never" if math.isinf(value) else "unknown" if math.isnan(value) else f"{value:.{digits}f}"
 
 
 LEARNING = Experiment(
