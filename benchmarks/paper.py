@@ -49,6 +49,7 @@ def judged(experiment: Experiment, runs: list[Any]) -> dict[str, Any]:
         "title": experiment.title,
         "where": experiment.where,
         "about": experiment.about.strip(),
+        "made_of": {name: known["date"] for name in experiment.made_of if (known := results(name))},
         "claims": [
             {"the paper": c.says, "theirs": c.theirs, "ours": v.ours, "verdict": v.word, "why": v.why}
             for c, v in verdicts

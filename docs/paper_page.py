@@ -94,7 +94,7 @@ def page() -> str:
 
 def section(name: str, part: dict[str, Any]) -> list[str]:
     """An experiment: what it is, its claims, its curves and its table."""
-    lines = [f"## {part['title']}", "", f"The paper: {part['where']}. {measured(name, part)}", ""]
+    lines = [f"## {part['title']}", "", f"The paper: {part['where']}. {measured(name, part)}".strip(), ""]
     lines += [part["about"], ""] if part["about"] else []
     lines += [*markdown(part["claims"]), ""]
     if part["runs"] and name in PICTURES:
@@ -105,6 +105,10 @@ def section(name: str, part: dict[str, Any]) -> list[str]:
 
 def measured(name: str, part: dict[str, Any]) -> str:
     """Where the figures come from."""
+    if part["made_of"]:
+        return f"From {', '.join(f'`{file}.json` of {day}' for file, day in part['made_of'].items())}."
+    if all(claim["verdict"] == WORDS[2] for claim in part["claims"]):
+        return ""
     if not part["runs"]:
         return f"`benchmarks/paper.py {name}`."
     m = part["machine"]

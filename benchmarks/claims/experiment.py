@@ -76,6 +76,8 @@ class Experiment:
     """The table under the claims."""
     about: str = ""
     """How it was done, in words."""
+    made_of: tuple[str, ...] = ()
+    """The results of other benchmarks that it is made of, by the names of their files."""
     seeds: int = 5
     """Of the whole experiment."""
     short: int = 1

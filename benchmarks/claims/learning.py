@@ -308,7 +308,8 @@ HOURS = Experiment(
     ),
     (),
     hour_rows,
-    """
+    made_of=("time_to_criterion",),
+    about="""
 The paper counts seconds on an RTX 4090 until the reward has converged; the policy then lands within 5 cm of height and
 10 cm of the pad, or flies a lap through all gates in order. Ours are seconds from the start of the process, with an
 empty cache, on two CPU cores, until 99 % of 1000 unseen starts (race: 95 %) meet the same conditions, of landing also
