@@ -7,8 +7,8 @@ from claims.experiment import NOTHING, Claim, Experiment, Found, Run, Verdict, m
 from claims.learning import TASKS
 
 PRESETS = {
-    "paper": ("--preset", "paper", "--past-actions", "0", "--steps", "4000000"),
     "nominal": ("--past-actions", "0"),
+    "paper": ("--preset", "paper", "--past-actions", "0", "--steps", "4000000"),
 }
 """Whose rewards; of the paper's, fewer steps."""
 STABLE = ("hover", "land", "track")
@@ -95,7 +95,7 @@ ABLATION = Experiment(
     tuple(
         Run(task, algo, preset, options, kind="ablate")
         for preset, options in PRESETS.items()
-        for algo in ("bptt", "ppo")
+        for algo in ("ppo", "bptt")
         for task in TASKS
     ),
     rows,

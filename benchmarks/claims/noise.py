@@ -48,6 +48,8 @@ def worst_noise(found: Found, task: str, variant: str) -> tuple[str, float] | No
         return None
     names = [name for name in runs[0]["flights"] if name != CLEAN]
     left = {name: mean(found.flown(name, task=task, variant=variant)) for name in names}
+    if not left:
+        return None
     worst = min(left, key=lambda name: left[name])
     return worst, left[worst]
 

@@ -28,7 +28,7 @@ LEAST = 0.95
 def every_pad(found: Found) -> Verdict:
     """Whether the shipped policy lands on each shape, of the paper's width."""
     runs = found.of(variant=ZOO)
-    if not runs:
+    if not (runs and "0.5 m" in runs[0]["flights"]):
         return NOTHING
     at = runs[0]["flights"]["0.5 m"]
     told = "; ".join(f"{OUTLINES[name]}: {100 * of['success']:.1f} %" for name, of in at.items())
@@ -63,7 +63,7 @@ def landing_rows(found: Found) -> list[dict[str, str]]:
     for number, outline in OUTLINES.items():
         row = {"policy": ZOO, "pad": outline, "seeds": "1" if runs else "0"}
         for width in PADS:
-            at = runs[0]["flights"][width].get(number) if runs else None
+            at = runs[0]["flights"].get(width, {}).get(number) if runs else None
             row[width] = f"{100 * at['success']:.1f}" if at else NOTHING.word
         out.append(row)
     for variant in (PAPER, LARGE, OURS):
