@@ -62,7 +62,7 @@ def test_the_short_version_of_an_experiment_gives_rows_and_verdicts(name: str, f
     assert all(one["finished"] for one in part["runs"])
     assert all(claim["verdict"] in (CONFIRMED, REFUTED, UNTESTABLE, UNMEASURED) for claim in part["claims"])
     assert len(part["table"]) > 1
-    assert any(UNMEASURED in row.values() or "-" in row.values() for row in part["table"])  # the runs left out
+    assert any(UNMEASURED in str(row) or "-" in row.values() for row in part["table"])  # the runs left out
     for one in part["runs"]:
         (asked,) = [r for r in EXPERIMENTS[name].runs if (r.task, r.algo, r.variant) == paper.key(one)[:3]]
         assert list(one["flights"]) == list(asked.flights)[:1]

@@ -35,6 +35,7 @@ SMALL = {
 SHORT = (
     "--steps",
     "256",
+    "--fast-compile",
     "--chunk",
     "2",
     "--eval-episodes",

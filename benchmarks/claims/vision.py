@@ -1,5 +1,7 @@
 """The paper's two tasks by sight: landing on pads of any shape, racing in clutter."""
 
+import math
+
 from claims.experiment import (
     CONFIRMED,
     NOTHING,
@@ -136,7 +138,8 @@ def fast(found: Found) -> Verdict:
         return NOTHING
     flown = runs[0]["flights"]["its tracks"]
     told = "; ".join(
-        f"{TRACKS[name]}: {of['top_speed_m_s']:.1f} m/s, mean {of['mean_speed_m_s']:.1f}" for name, of in flown.items()
+        f"{TRACKS[name]}: {of['top_speed_m_s']:.1f} m/s, mean {of['mean_speed_m_s'] or math.nan:.1f}"
+        for name, of in flown.items()
     )
     right = all(of["top_speed_m_s"] > 10 for of in flown.values())
     return Verdict(CONFIRMED if right else REFUTED, told, "largest of 1000 flights; mean of those that succeed")
@@ -156,7 +159,7 @@ def racing_rows(found: Found) -> list[dict[str, str]]:
             row["seeds"] = str(len(own))
             row["success, %"] = percents([x["success"] for x in of]) if own else NOTHING.word
             row["top speed, m/s"] = " ".join(f"{x['top_speed_m_s']:.1f}" for x in of) or "-"
-            row["time of a lap, s"] = " ".join(f"{x['seconds_of_success'] or float('nan'):.1f}" for x in of) or "-"
+            row["time of a lap, s"] = " ".join(f"{x['seconds_of_success'] or math.nan:.1f}" for x in of) or "-"
             row["M steps"] = " ".join(f"{one['steps'] / 1e6:.1f}" for one in own if "steps" in one) or "-"
             out.append(row)
     return out
