@@ -177,6 +177,8 @@ def ablation(runs: list[dict[str, Any]]) -> None:
             ax.set_ylabel("error (m)" if by_error else "success (%)")
             if by_error:
                 ax.set_yscale("log")
+            else:
+                ax.set_ylim(-4, 104)
         for ax in axes.ravel()[len(runs) :]:
             ax.set_axis_off()
         known = {
