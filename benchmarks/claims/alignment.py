@@ -10,9 +10,9 @@ from claims.experiment import (
     Found,
     Run,
     Verdict,
-    majority,
     mean,
     percents,
+    verdict,
 )
 from e2efly.tasks import TASKS
 
@@ -56,10 +56,8 @@ def uncompensated(late: int) -> Any:
                 )
                 right.append(mean(flown) < 1 - LOST or rough > ROUGHER)
                 told.append(f"{task}: {percents(flown)} %, actions change {rough:.1f} times as much")
-        if not right:
-            return NOTHING
         why = f"trained without, flown with it; confirmed: success lost, or actions change {ROUGHER:g} times as much"
-        return Verdict(majority(right), "; ".join(told), why)
+        return verdict(right, told, why, 2)
 
     return judge
 
@@ -73,9 +71,7 @@ def compensated(found: Found) -> Verdict:
             if none and (own := found.flown(f"{late} ms", task=task, variant=f"{late} ms")):
                 right.append(mean(own) > max(mean(none), FLIES) - LOST)
                 told.append(f"{task}, {late} ms: {percents(own)} %")
-    if not right:
-        return NOTHING
-    return Verdict(majority(right), "; ".join(told), "success where flown with the latency of the training")
+    return verdict(right, told, "success where flown with the latency of the training", 6)
 
 
 def flights_table(experiment: Experiment, found: Found, figure: str = "success") -> list[dict[str, str]]:
@@ -151,11 +147,7 @@ def starts_needed(found: Found) -> Verdict:
         if few := found.flown(RANDOM, task=task, variant=ONE):
             right.append(mean(few) < 1 - LOST)
             told.append(f"{task}: {percents(few)} %")
-    return (
-        Verdict(majority(right), "; ".join(told), "trained from one start, flown from random ones")
-        if right
-        else NOTHING
-    )
+    return verdict(right, told, "trained from one start, flown from random ones", 3)
 
 
 RANDOMISATION = Experiment(
@@ -201,9 +193,7 @@ def no_need(found: Found) -> Verdict:
         if flown := found.flown(IDENTIFIED, **own):
             right.append(mean(flown) > max(mean(found.flown(FILE, **own)), FLIES) - LOST)
             told.append(f"{task}: {percents(flown)} %")
-    if not right:
-        return NOTHING
-    return Verdict(majority(right), "; ".join(told), "success on vehicles as far off as identification leaves them")
+    return verdict(right, told, "success on vehicles as far off as identification leaves them", 3)
 
 
 def needed_without(found: Found) -> Verdict:
@@ -214,9 +204,7 @@ def needed_without(found: Found) -> Verdict:
         if plain and many:
             right.append(mean(plain) < mean(many) - LOST)
             told.append(f"{task}: {percents(plain)} % and {percents(many)} %")
-    if not right:
-        return NOTHING
-    return Verdict(majority(right), "; ".join(told), "on vehicles that nobody measured: trained for one, and for many")
+    return verdict(right, told, "on vehicles that nobody measured: trained for one, and for many", 3)
 
 
 IDENTIFICATION = Experiment(

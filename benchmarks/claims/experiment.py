@@ -119,6 +119,20 @@ def percents(values: Sequence[float]) -> str:
     return " ".join(f"{100 * x:.1f}" for x in values) or "-"
 
 
-def majority(right: Sequence[bool]) -> str:
-    """The word of a claim that was tested in several cases: confirmed where all say so."""
-    return UNMEASURED if not right else CONFIRMED if all(right) else REFUTED
+def verdict(right: Sequence[bool], told: Sequence[str], why: str, cases: float) -> Verdict:
+    """The verdict on a claim about several cases: confirmed where all agree, refuted where one does not.
+
+    Args:
+        right: of each case that was measured, whether it says what the paper says.
+        told: our figures, in words.
+        why: what they are.
+        cases: that the claim is about.
+    """
+    if not right:
+        return NOTHING
+    ours = "; ".join(told) or "-"
+    if not all(right):
+        return Verdict(REFUTED, ours, f"{right.count(False)} of {len(right)} cases say otherwise; {why}".rstrip("; "))
+    if len(right) < cases:
+        return Verdict(UNMEASURED, ours, f"so far {len(right)} of {cases:g} cases, which confirm; {why}".rstrip("; "))
+    return Verdict(CONFIRMED, ours, why)

@@ -14,9 +14,9 @@ from claims.experiment import (
     Found,
     Run,
     Verdict,
-    majority,
     mean,
     percents,
+    verdict,
 )
 
 TASKS = ("hover", "land", "track", "race")
@@ -85,9 +85,7 @@ def cheaper(figure: str, most: float) -> Any:
                     continue
                 right.append(ours < most * other)
                 told.append(f"{task} ({variant}): {'below ' if short else ''}{100 * ours / other:.0f} %")
-        if not right:
-            return NOTHING
-        return Verdict(majority(right), "; ".join(told), f"{sum(right)} of {len(right)} cases; {TO_LEVEL}")
+        return verdict(right, told, TO_LEVEL, 2 * len(TASKS))
 
     return judge
 
@@ -102,9 +100,7 @@ def higher(found: Found) -> Verdict:
         ours, other = (mean([one["converged"]["reward"] for one in runs]) for runs in (bptt, ppo))
         right.append(ours > other)
         told.append(f"{task}: {ours:.4f} and {other:.4f}")
-    if not right:
-        return NOTHING
-    return Verdict(majority(right), "; ".join(told), "mean reward of a step at the end of the run, BPTT and PPO")
+    return verdict(right, told, "mean reward of a step at the end of the run, BPTT and PPO", len(TASKS))
 
 
 def accomplished(algo: str, variant: str) -> Any:
@@ -124,6 +120,8 @@ def accomplished(algo: str, variant: str) -> Any:
         if cut:
             names = ", ".join(dict.fromkeys(one["task"] for one in cut))
             return Verdict(NOTHING.word, told, f"stopped before its last step: {names}")
+        if missing := [task for task, x in each.items() if not x]:
+            return Verdict(NOTHING.word, told, f"not yet: {', '.join(missing)}")
         return Verdict(CONFIRMED, told, "of 1000 unseen starts, every seed at least 95 %")
 
     return judge
@@ -208,9 +206,7 @@ def faster(found: Found) -> Verdict:
             ppo, bptt = mean(rates["ppo"]), mean(rates["bptt"])
             right.append(0.5 <= bptt / ppo <= 2.0)
             told.append(f"{task}: {ppo / 1e3:.0f} k and {bptt / 1e3:.0f} k")
-    if not right:
-        return NOTHING
-    return Verdict(majority(right), "; ".join(told), "steps/s of training by PPO and BPTT; alike: within a factor of 2")
+    return verdict(right, told, "steps/s of training by PPO and BPTT; alike: within a factor of 2", len(TASKS))
 
 
 def above(found: Found) -> Verdict:
