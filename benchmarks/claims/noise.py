@@ -41,6 +41,7 @@ DEPTHS = {
     ),
 }
 CLEAN, NOISY = "without noise", "with noise"
+STATE_BASED = ("hover", "race")
 
 
 def worst_noise(found: Found, task: str, variant: str) -> tuple[str, float] | None:
@@ -86,14 +87,14 @@ NOISE = Experiment(
     "Trained without noise and with, flown under each",
     "table of noise; section Noise Modeling",
     (
-        Claim("State-based tasks transfer without noise in training", "zero-shot", noiseless(("hover", "race"), flies=True)),
+        Claim("State-based tasks transfer without noise in training", "zero-shot", noiseless(STATE_BASED, flies=True)),
         Claim("For tasks by sight that is insufficient", "no figure", noiseless(("land_visual", "avoid"), flies=False)),
         Claim("Noise of inverse depth in training narrows the gap", "no figure", depth_helps),
     ),
     (
         *(
             Run(task, "bptt", variant, (*NOMINAL, *options), STATES)
-            for task in ("hover", "race")
+            for task in STATE_BASED
             for variant, options in ((CLEAN, ()), (NOISY, VIO))
         ),
         Run("land_visual", "bptt", CLEAN, ("--preset", "nominal"), MASKS),
