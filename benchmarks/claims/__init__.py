@@ -4,8 +4,9 @@ from claims.ablations import ABLATION
 from claims.alignment import IDENTIFICATION, LATENCY, RANDOMISATION
 from claims.elsewhere import REAL, RENDERING, SIM_TO_SIM, STEPS
 from claims.experiment import Experiment
-from claims.learning import HOURS, LEARNING, SPEED
+from claims.learning import LEARNING
 from claims.noise import CURRICULUM, NOISE
+from claims.times import HOURS, SPEED
 from claims.vision import LANDING, RACING
 
 EXPERIMENTS: dict[str, Experiment] = {
