@@ -56,8 +56,8 @@ def plant_rows(found: Found) -> list[dict[str, str]]:
     """A row a file, criterion and plant: success in training and on the plant."""
     out = []
     for name, policies in PLANTS.items():
-        known = found.results(name)
-        for row in known["table"] if known else ():
+        known = found.results(name) or {"table": ()}
+        for row in known["table"]:
             plant = row.get("plant", "AirSim's RPC")
             if plant != "simulator":
                 here = row.get("success in training's simulator", row.get("in training"))
