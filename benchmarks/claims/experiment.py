@@ -134,5 +134,6 @@ def verdict(right: Sequence[bool], told: Sequence[str], why: str, cases: float) 
     if not all(right):
         return Verdict(REFUTED, ours, f"{right.count(False)} of {len(right)} cases say otherwise; {why}".rstrip("; "))
     if len(right) < cases:
-        return Verdict(UNMEASURED, ours, f"so far {len(right)} of {cases:g} cases, which confirm; {why}".rstrip("; "))
+        of = "" if math.isinf(cases) else f" of {cases:g}"
+        return Verdict(UNMEASURED, ours, f"so far {len(right)}{of} cases, which confirm; {why}".rstrip("; "))
     return Verdict(CONFIRMED, ours, why)
