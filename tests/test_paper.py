@@ -21,7 +21,7 @@ import paper  # noqa: E402
 from claims import EXPERIMENTS  # noqa: E402
 from claims.alignment import NOMINAL  # noqa: E402
 from claims.experiment import CONFIRMED, NOTHING, REFUTED, UNMEASURED, UNTESTABLE, Found, Run  # noqa: E402
-from claims.learning import LEARNING  # noqa: E402
+from claims.learning import LEARNING, OWN, TASKS  # noqa: E402
 from claims.running import SHORT, SMALL, How, converged, figures, trained, wanted  # noqa: E402
 
 WITH_RUNS = [name for name, experiment in EXPERIMENTS.items() if experiment.runs]
@@ -152,20 +152,29 @@ def learned(algo: str, reached: float | None, **other: Any) -> dict[str, Any]:
     return told | other
 
 
-def verdicts(*runs: dict[str, Any]) -> list[str]:
+def verdicts(bptt: dict[str, Any], *ppo: dict[str, Any]) -> list[str]:
+    """The verdicts where all tasks have the same runs, PPO with either reward."""
+    runs = [one | {"task": task} for task in TASKS for one in (bptt, *ppo)]
+    runs += [one | {"task": task, "variant": OWN} for task in TASKS for one in ppo]
+    return words(runs)
+
+
+def words(runs: list[dict[str, Any]]) -> list[str]:
     return [claim.judge(Found(runs, lambda name: None)).word for claim in LEARNING.claims]
 
 
 def test_verdicts_of_learning_follow_the_figures() -> None:
-    assert verdicts() == [NOTHING.word] * 6
-    bptt = learned("bptt", 1e6)
-    assert verdicts(bptt, learned("ppo", 5e6, converged={"reward": -2.0}))[:3] == [CONFIRMED] * 3
+    assert words([]) == [NOTHING.word] * 6
+    bptt, ppo = learned("bptt", 1e6), learned("ppo", 5e6, converged={"reward": -2.0})
+    assert verdicts(bptt, ppo) == [CONFIRMED] * 6
+    assert words([bptt, ppo]) == [UNMEASURED] * 6  # hover alone
     slower = learned("ppo", 2e6, converged={"reward": -0.5})
     assert verdicts(bptt, slower)[:3] == [CONFIRMED, REFUTED, REFUTED]
+    assert words([bptt, slower])[:3] == [UNMEASURED, REFUTED, REFUTED]  # one case is enough to refute
     # PPO that never got there took at least what its run took
     assert verdicts(bptt, learned("ppo", None))[:2] == [CONFIRMED, CONFIRMED]
     stopped = learned("ppo", None, finished=False, steps=5e5, seconds=50.0, cpu_seconds=50.0)
-    assert verdicts(bptt, stopped)[:2] == [UNMEASURED, UNMEASURED]
+    assert verdicts(bptt, stopped)[:3] == [UNMEASURED, UNMEASURED, UNMEASURED]
     assert verdicts(learned("bptt", None), stopped)[:2] == [REFUTED, REFUTED]
     failed = {"hover": {"success": 0.2}}
     assert verdicts(bptt, learned("ppo", None, shipped=failed))[4] == REFUTED

@@ -96,6 +96,8 @@ def higher(found: Found) -> Verdict:
     """Whether BPTT ends with the higher reward where both have the same."""
     told, right = [], []
     for task, (bptt, ppo) in pairs(found, IDENTICAL).items():
+        if not all(one["finished"] for one in (*bptt, *ppo)):
+            continue
         ours, other = (mean([one["converged"]["reward"] for one in runs]) for runs in (bptt, ppo))
         right.append(ours > other)
         told.append(f"{task}: {ours:.4f} and {other:.4f}")
