@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -79,7 +80,7 @@ def test_what_was_killed_goes_on_where_it_was(folder: Path, tmp_path: Path) -> N
         while not (file.exists() and json.loads(file.read_text())["learning"]["runs"]):
             assert process.poll() is None
             time.sleep(0.01)
-        process.kill()
+        os.killpg(process.pid, signal.SIGKILL)  # with the training that it waits for
     before = json.loads(file.read_text())["learning"]["runs"]
     (first,) = before[:1]
     run("learning", file=file, runs=folder)
