@@ -45,6 +45,7 @@ zoo: $(READY)
 # The site, with the pages that are made: of the measurements, the zoo and the notebooks.
 docs: $(DOCS_READY)
 	$(BIN)/python docs/figures.py
+	$(BIN)/python docs/paper_page.py
 	$(BIN)/python docs/zoo_cards.py
 	$(BIN)/python docs/notebook_pages.py
 	@$(MAKE) --no-print-directory site

@@ -44,12 +44,16 @@ def arguments(about: str, **extra: Any) -> argparse.Namespace:
     return parser.parse_args()
 
 
+def today() -> str:
+    """The day of a measurement."""
+    return datetime.now(UTC).strftime("%Y-%m-%d")
+
+
 def write(name: str, path: Path | None, content: dict[str, Any]) -> None:
     """Write figures with the machine and the day."""
     path = path or RESULTS / f"{name}.json"
     path.parent.mkdir(parents=True, exist_ok=True)
-    day = datetime.now(UTC).strftime("%Y-%m-%d")
-    write_json(path, {"machine": machine(), "date": day, **content})
+    write_json(path, {"machine": machine(), "date": today(), **content})
 
 
 def with_earlier(name: str, path: Path | None, part: str, keys: tuple[str, ...], rows: list[Any]) -> list[Any]:

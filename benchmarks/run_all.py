@@ -1,4 +1,7 @@
-"""Every benchmark, one after the other (about an hour on two cores); figures go to benchmarks/results."""
+"""Every benchmark, one after the other (about an hour on two cores); figures go to benchmarks/results.
+
+The paper's experiments take hours: they are only judged anew here (`paper.py EXPERIMENT` makes their runs).
+"""
 
 import subprocess
 import sys
@@ -8,7 +11,7 @@ for name in (
     "rates", "time_to_criterion", "success", "runtime_speed", "msp_fuzz", "sim_to_sim", "firmware_flights",
     "firmware_faults", "command_flights", "fault_campaign", "process_faults", "bridge_loop", "rendering",
     "mesh_rendering", "expert", "visual_tasks", "ablation", "stable_baselines3_ppo", "thrown_starts", "thrown",
-    "any_vehicle", "raptor", "identify", "step_response",
+    "any_vehicle", "raptor", "identify", "step_response", "paper",
 ):  # fmt: skip
     print(f"== {name}", flush=True)
     subprocess.run([sys.executable, str(Path(__file__).parent / f"{name}.py")], check=True)

@@ -40,7 +40,7 @@ settings.load_profile("suite")
 PARTS = ("ros1", "ros2", "mocap", "realsense", "sitl", "browser")
 """What may be missing on a laptop: tests in files whose names end so need it, and fail without it."""
 LONGEST = (
-    "docs/test_tutorials.py", "docs/test_notebooks.py",
+    "docs/test_tutorials.py", "docs/test_notebooks.py", "test_paper.py",
     "identification/test_flight.py", "learn/test_runner.py", "learn/test_hosts.py", "commands/test_sweep.py",
     "test_zoo.py", "learn/test_ablation.py", "learn/test_algorithms.py", "validation/test_faults_sitl.py",
     "validation/test_campaign_sitl.py", "test_examples.py", "adapters/test_torch.py", "scenes/test_cast.py",

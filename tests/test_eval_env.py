@@ -130,6 +130,17 @@ def test_the_reference_of_a_row_can_be_made_again(flown: Callable[..., Any]) -> 
         assert len({row["course"]["phase_rad"] for row in said[criterion]["starts"]}) == 3
 
 
+def test_a_row_of_visual_landing_says_what_pad_it_had() -> None:
+    found = e2efly.evaluate("land_visual", episodes=30, task={"pad_size": (0.3, 0.8)})
+    (criterion,) = found.as_json()["criteria"].values()
+    pads = [row["course"] for row in criterion["starts"]]
+    assert {pad["pad_outline"] for pad in pads} == {0, 1, 2}
+    widths = [pad["pad_width_m"] for pad in pads]
+    assert 0.3 <= min(widths) < 0.4 < 0.7 < max(widths) <= 0.8
+    start = draw_starts(found.candidate.environment(found.candidate.task), 30, SEED)
+    np.testing.assert_allclose(widths, 2 * np.asarray(start.memory.size[:, 0, 0]), atol=1e-6)
+
+
 def test_a_reference_without_a_phase_says_its_knots_and_one_from_a_file_its_name() -> None:
     suite = dataclasses.replace(candidate("track").task, reference="polynomial")
     env = Env.of(suite, RewardConfig({"prog2": 1.0}))

@@ -191,3 +191,12 @@ def test_unknown_names_are_named() -> None:
 def test_a_term_without_its_signal_is_refused() -> None:
     with pytest.raises(ValueError, match="'avoid1' needs clearance"):
         reward({"avoid1": 1.0}, {}, {})
+
+
+def test_the_papers_groups_hold_each_term_once_and_a_term_of_no_group_stands_alone() -> None:
+    members = [term for group in rewards.GROUPS.values() for term in group]
+    assert len(members) == len(set(members))
+    assert set(members) <= set(TERMS)
+    found = rewards.grouped(["goal", "prog1", "fit", "anglev_sq", "crash", "near"])
+    assert found == {"sparse": ("goal", "crash"), "prog": ("prog1", "near"), "fit": ("fit",), "anglev": ("anglev_sq",)}
+    assert list(found) == ["sparse", "prog", "fit", "anglev"]

@@ -10,7 +10,7 @@ docstring says what we do; docs/rewards.md has the table.
 """
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeVar
 
@@ -330,6 +330,28 @@ def register(kind: Kind) -> Callable[[F], F]:
 for _kind, _functions in _KINDS.items():
     for _function in _functions:
         register(_kind)(_function)
+
+
+GROUPS: dict[str, tuple[str, ...]] = {
+    "prog": ("prog1", "prog2", "progxy", "progx", "progy", "progz", "progway", "near"),
+    "act": ("act1", "act2", "act3", "act2_sq"),
+    "ori": ("ori1", "ori2", "ori3", "ori4", "upright"),
+    "v": ("v1", "v2", "v3", "vz", "descent", "vel", "overspeed"),
+    "anglev": ("anglev", "anglev_sq"),
+    "avoid": ("avoid1", "avoid2", "avoid"),
+    "sparse": ("goal", "crash"),
+}
+"""The parts of a reward that the paper's ablations take away, and their terms; ours stand with what they reward."""
+
+
+def grouped(terms: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """The paper's parts that a reward has, with its terms of each. A term of no part is one of its own."""
+    of = {term: group for group, members in GROUPS.items() for term in members}
+    found: dict[str, tuple[str, ...]] = {}
+    for term in terms:
+        group = of.get(term, term)
+        found[group] = (*found.get(group, ()), term)
+    return found
 
 
 def constants() -> set[str]:

@@ -27,6 +27,10 @@ def test_the_page_of_the_zoo_is_what_the_zoo_says() -> None:
     assert (DOCS / "zoo.md").read_text(encoding="utf-8") == script("zoo_cards").page()
 
 
+def test_the_page_of_the_papers_claims_is_what_was_measured() -> None:
+    assert (DOCS / "paper.md").read_text(encoding="utf-8") == script("paper_page").page()
+
+
 def test_every_policy_of_the_zoo_has_a_card_and_pictures() -> None:
     page = (DOCS / "zoo.md").read_text(encoding="utf-8")
     for vehicle, tasks in contents().items():

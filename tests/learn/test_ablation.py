@@ -67,6 +67,19 @@ def test_members_differ_and_an_ablation_that_was_stopped_ends_bit_for_bit_like_o
         np.testing.assert_array_equal(resumed.success[name], whole.success[name])
 
 
+def test_the_papers_groups_are_left_out_whole() -> None:
+    config = small("bptt", 1024)
+    reward = dataclasses.replace(config.reward, weights={"prog2": 1.0, "near": 1.0, "v1": 0.1, "anglev_sq": 0.1})
+    config = dataclasses.replace(config, reward=reward)
+    curves = ablate(config, 1, by="group")
+    assert curves.variants == (FULL, "prog", "v", "anglev")
+    without = dataclasses.replace(config, reward=dataclasses.replace(reward, weights={"v1": 0.1, "anglev_sq": 0.1}))
+    with_one = dataclasses.replace(config, reward=dataclasses.replace(reward, weights={"prog2": 1.0, "anglev_sq": 0.1}))
+    alone = ablate(without, 1).error["hover"][0, 0]  # what the group leaves
+    np.testing.assert_allclose(curves.error["hover"][1, 0], alone, rtol=0.02)
+    assert not np.allclose(curves.error["hover"][1, 0], ablate(with_one, 1).error["hover"][0, 0], rtol=0.02)
+
+
 def test_what_cannot_be_compared_is_refused() -> None:
     one = dataclasses.replace(small("bptt"), reward=dataclasses.replace(small("bptt").reward, weights={"prog2": 1.0}))
     with pytest.raises(ValueError, match="1 reward terms"):

@@ -20,7 +20,10 @@ from e2efly.terminal import Terminal, TerminalProgress, console_table, markdown
 
 @dataclass(frozen=True)
 class Ablate:
-    """Learn tasks without each term of their reward in turn, over several seeds in one compiled program; draw it."""
+    """Learn tasks without each term of their reward in turn, over several seeds in one compiled program; draw it.
+
+    With `--by group` all terms of a group go together, as in the paper's figures: prog, act, ori, v, anglev, sparse.
+    """
 
     tasks: tyro.conf.Positional[tuple[str, ...]] = ("hover", "land", "track", "race")
     """Tasks to ablate (default: hover land track race)."""
@@ -30,8 +33,12 @@ class Ablate:
     """Where rewards and sizes come from: nominal, robust, paper or thrown; their curricula are left out."""
     seeds: int = 3
     """Runs of each variant."""
+    by: Literal["term", "group"] = "term"
+    """What is left out at a time: a term, or all terms of one of the paper's groups."""
     steps: int | None = None
     """Environment steps of each run; the preset's when left out."""
+    past_actions: int | None = None
+    """How many past actions the policies see, 0 as in the paper; as many as the latency holds when left out."""
     out: Path = Path("runs/ablation")
     """Folder of the figures, the table and the curves. What is there already is not trained again."""
     device: Literal["cpu", "gpu"] | None = None
@@ -85,6 +92,8 @@ def _config(options: Ablate, task: str, algo: str) -> TrainConfig:
     config = dataclasses.replace(presets.preset(task, algo, options.preset), curriculum=(), start_from=None)
     if options.steps is not None:
         config = dataclasses.replace(config, steps=options.steps)
+    if options.past_actions is not None:
+        config = dataclasses.replace(config, env=dataclasses.replace(config.env, past_actions=options.past_actions))
     presets.check(config)
     return config
 
@@ -98,7 +107,8 @@ def _about(options: Ablate, config: TrainConfig) -> dict[str, Any]:
     from e2efly.learn.checkpoint import FORMAT
     from e2efly.learn.rundir import to_json
 
-    return {"format": FORMAT, "seeds": options.seeds, "config": to_json(config)}
+    groups = {"by": options.by} if options.by != "term" else {}  # curves by terms that are there already stay
+    return {"format": FORMAT, "seeds": options.seeds, "config": to_json(config), **groups}
 
 
 def _known(options: Ablate, config: TrainConfig) -> Any:
@@ -119,9 +129,11 @@ def _known(options: Ablate, config: TrainConfig) -> Any:
 def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
     """Train all variants of a configuration; keep their curves."""
     from e2efly.learn.ablation import Kept, ablate
+    from e2efly.rewards import grouped
 
     task, algo = config.task.name, config.algo.name
-    steps = config.steps * options.seeds * (len(config.reward.weights) + 1)
+    parts = grouped(config.reward.weights) if options.by == "group" else config.reward.weights
+    steps = config.steps * options.seeds * (len(parts) + 1)
     with TerminalProgress(console, f"{task} by {algo}") as progress:
         progress.compiling()
         began, best = time.perf_counter(), 0.0
@@ -133,7 +145,7 @@ def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
             progress.progress(int(done), steps, done / (time.perf_counter() - began), success, best, "")
 
         kept = Kept(_path(options, config).with_suffix(".safetensors"), _about(options, config))
-        curves = ablate(config, options.seeds, told, kept)
+        curves = ablate(config, options.seeds, told, kept, options.by)
     content = {
         "about": _about(options, config),
         "variants": list(curves.variants),

@@ -167,7 +167,8 @@ class EnvConfig:
     """Commands that actions of -1 and of 1 stand for, in the units of the command mode; the vehicle's own limits when
     left out. What is beyond those the flight controller clips."""
     past_actions: int | None = None
-    """How many past actions the policy sees; as many as the latency holds when left out (sets shapes)."""
+    """How many past actions the policy sees: 0 as in the paper, as many as the latency holds when left out (sets
+    shapes)."""
     randomize: dict[str, float] = field(default_factory=dict)
     """Relative half-width of the uniform factor on a vehicle parameter, per episode: {"mass": 0.1} is 0.9 to 1.1.
     {"identified": 1.0} draws from the standard deviations and correlations of the vehicle's file, times so much."""

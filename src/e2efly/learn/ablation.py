@@ -1,4 +1,6 @@
-"""What each term of a reward is good for: the full reward and each without one term, over several seeds, at once.
+"""What each part of a reward is good for: the full reward and each without one part, over several seeds, at once.
+
+A part is a term, or all terms of one of the paper's groups (`e2efly.rewards.GROUPS`).
 
 All of them are members of one compiled program: weights of the reward and seeds are its leaves. The devices share the
 members, where a single run shares its environments; each member is a run on one device.
@@ -10,7 +12,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -28,9 +30,12 @@ from e2efly.learn.networks import Weights
 from e2efly.learn.programs import acting
 from e2efly.learn.rundir import different_values
 from e2efly.learn.setup import Setup
+from e2efly.rewards import grouped
 
 FULL = "full"
 """Name of the reward with all terms."""
+By = Literal["term", "group"]
+"""What of a reward is left out at a time."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,7 @@ class Curves:
     """How each variant learned."""
 
     variants: tuple[str, ...]
-    """`FULL` and the names of the terms that were left out."""
+    """`FULL` and the names of the terms or groups that were left out."""
     steps: Float[np.ndarray, " t"]
     """Environment steps at each evaluation."""
     success: dict[str, Float[np.ndarray, "v s t"]]
@@ -78,6 +83,7 @@ def ablate(
     seeds: int,
     told: Callable[[float, float], None] = lambda share, best: None,
     kept: Kept | None = None,
+    by: By = "term",
 ) -> Curves:
     """Train all variants.
 
@@ -86,19 +92,22 @@ def ablate(
         seeds: runs of each variant.
         told: (share of the work done, mean success of the full reward) after each evaluation.
         kept: where to keep how far it got, and to go on from.
+        by: what is left out at a time: a term, or a group of the paper's.
 
     Raises:
-        ValueError: for a configuration that cannot be used: with a curriculum, a reward of one term; for a checkpoint
+        ValueError: for a configuration that cannot be used: with a curriculum, a reward of one part; for a checkpoint
             that is damaged, or of another ablation.
     """
     terms = tuple(config.reward.weights)
-    if len(terms) < 2 or seeds < 1 or config.curriculum:
+    parts = grouped(terms) if by == "group" else {term: (term,) for term in terms}
+    if len(parts) < 2 or seeds < 1 or config.curriculum:
         raise ValueError(
-            f"an ablation of {len(terms)} reward terms over {seeds} seeds, with {len(config.curriculum)} stages of a "
-            "curriculum; accepted: two terms or more, a seed or more, no curriculum"
+            f"an ablation of {len(parts)} reward {by}s over {seeds} seeds, with {len(config.curriculum)} stages of a "
+            f"curriculum; accepted: two {by}s or more, a seed or more, no curriculum"
         )
     setup = Setup.of(dataclasses.replace(config, devices=1))
-    variants = (FULL, *terms)
+    variants = (FULL, *parts)
+    without: dict[str, tuple[str, ...]] = {FULL: (), **parts}
     members = len(variants) * seeds
     setup.check(members)
     devices = min(len(jax.devices()), members)
@@ -106,7 +115,7 @@ def ablate(
     places = np.minimum(np.arange(room), members - 1)
     of_seed = places % seeds
     weights = {
-        term: np.array([0.0 if variants[i // seeds] == term else weight for i in places], np.float32)
+        term: np.array([0.0 if term in without[variants[i // seeds]] else weight for i in places], np.float32)
         for term, weight in config.reward.weights.items()
     }
     each = [setup.algorithm.init(setup.env, config.algo, config.seed + i) for i in range(seeds)]

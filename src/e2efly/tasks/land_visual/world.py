@@ -49,6 +49,10 @@ class LandVisual(LandVisualGoal):
         """The pad on level ground."""
         return Scene.of({"pad": memory}, memory.active.shape[0])
 
+    def drawn(self, memory: Solids) -> dict[str, Array]:
+        """The pad: its outline (0 a disc, 1 a square, 2 a triangle) and its width, m."""
+        return {"pad_outline": memory.size[:, 0, 2].astype(int), "pad_width_m": 2 * memory.size[:, 0, 0]}
+
     def desired_yaw(self, memory: Solids, state: State) -> Float[Array, " n"]:
         """Along world x."""
         del memory

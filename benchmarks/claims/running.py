@@ -1,0 +1,241 @@
+"""Runs of the paper's experiments, each training in a process of its own; what it came to, as JSON."""
+
+import dataclasses
+import hashlib
+import json
+import math
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from claims.experiment import Flight, Run
+
+LEVELS = (0.5, 0.9, 0.95, 0.99)
+"""Success, over the starts that training watches, at which steps and seconds are noted."""
+STOPPED = 130
+"""Exit status of a training that Ctrl-C has stopped in order."""
+POINTS = 40
+"""Most points of a curve that are kept."""
+SETTLED = 0.05
+"""A reward has converged where it stays within this share of its whole rise."""
+SMALL = {
+    "ppo": ("--algo.envs", "8", "--algo.horizon", "8", "--algo.minibatch", "64", "--algo.epochs", "1"),
+    "bptt": ("--algo.envs", "8", "--algo.horizon", "4"),
+}
+"""Sizes of the short version, by algorithm."""
+SHORT = (
+    "--steps",
+    "256",
+    "--fast-compile",
+    "--chunk",
+    "2",
+    "--eval-episodes",
+    "40",
+    "--network.hidden",
+    "8",
+    "8",
+    "--task.episode-s",
+    "1",
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class How:
+    """How runs are made."""
+
+    folder: Path
+    """Of the runs."""
+    episodes: int = 1000
+    """Starts of each flight."""
+    short: bool = False
+    """Whether in seconds, with figures that say nothing."""
+    most: float = math.inf
+    """Environment steps after which a training is stopped in order; a later command goes on with it."""
+
+
+def wanted(run: Run, seed: int, seeds: int, known: Sequence[Mapping[str, Any]], how: How) -> bool:
+    """Whether a run is to be made: it is not known, or was stopped earlier than it would be now."""
+    for one in known:
+        if key(one) == (run.task, run.algo, run.variant, seed):
+            enough = one["finished"] or one["steps"] >= how.most
+            return not enough or (run.kind == "ablate" and one["seeds"] != seeds)
+    return True
+
+
+def key(one: Mapping[str, Any]) -> tuple[str, str, str, int]:
+    """What names a run."""
+    return one["task"], one["algo"], one["variant"], one["seed"]
+
+
+def make(run: Run, seed: int, seeds: int, how: How) -> dict[str, Any]:
+    """Make a run: its figures, and those of the flights of its policy."""
+    about = {"task": run.task, "algo": run.algo, "variant": run.variant, "seed": seed}
+    if run.kind == "ablate":
+        return about | ablated(run, seeds, how)
+    if run.kind == "zoo":
+        return about | {"finished": True, "seconds": 0.0, "flights": flights(run.task, run.flights, how)}
+    out = place(run, seed, how)
+    told = trained(run, seed, out, how)
+    told["flights"] = flights(out, run.flights, how)
+    return about | told
+
+
+def place(run: Run, seed: int, how: How) -> Path:
+    """The folder of a training: that of all runs with the same options, so that none is trained twice."""
+    told = hashlib.sha256(repr((run.options, how.short)).encode()).hexdigest()[:8]
+    return how.folder / f"{run.task}-{run.algo}-{seed}-{told}"
+
+
+def trained(run: Run, seed: int, out: Path, how: How) -> dict[str, Any]:
+    """The figures of a training, which goes on where its folder has one that was stopped or killed."""
+    summary = out / "summary.json"
+    told = json.loads(summary.read_text()) if summary.exists() else {"finished": False, "env_steps": 0}
+    if not told["finished"] and told["env_steps"] < how.most:
+        if (out / "checkpoint.safetensors").exists():
+            options = ["--resume", str(out)]
+        else:
+            short = (*SHORT, *SMALL[run.algo]) if how.short else ()
+            options = [run.task, "--algo", run.algo, "--seed", str(seed), "--out", str(out), *run.options, *short]
+        limited = not math.isinf(how.most)
+        command = ["train", *options, "--no-plots", "--device", "cpu"]
+        process(command, out.with_suffix(".time"), lambda: limited and taken(out) >= how.most)
+    return figures(out)
+
+
+def process(arguments: list[str], times: Path, over: Callable[[], bool] = lambda: False) -> None:
+    """Run a command of e2efly; stop it in order once it is over. Its user and system seconds join a file.
+
+    Raises:
+        SystemExit: with what it says, when it fails.
+    """
+    times.parent.mkdir(parents=True, exist_ok=True)
+    before, log = resource.getrusage(resource.RUSAGE_CHILDREN), times.with_suffix(".log")
+    with log.open("w") as told:
+        child = subprocess.Popen([sys.executable, "-m", "e2efly", *arguments], stdout=told, stderr=subprocess.STDOUT)
+        accepted = (0,)
+        try:
+            while child.poll() is None:
+                time.sleep(0.5)
+                if over():
+                    child.send_signal(signal.SIGINT)
+                    child.wait()
+                    accepted = (0, STOPPED)
+        except BaseException:
+            child.kill()
+            raise
+    if child.returncode not in accepted:
+        raise SystemExit(f"e2efly {' '.join(arguments)} failed:\n{log.read_text()}")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    with times.open("a") as file:
+        file.write(f"{after.ru_utime - before.ru_utime:.2f} {after.ru_stime - before.ru_stime:.2f}\n")
+    log.unlink()
+
+
+def taken(out: Path) -> float:
+    """Environment steps that a training has taken so far."""
+    from e2efly.learn.rundir import RunDirectory
+
+    rows = RunDirectory(out).rows()
+    return rows[-1]["steps"] if rows else 0.0
+
+
+def figures(out: Path) -> dict[str, Any]:
+    """What a run directory says: steps, seconds, curves, when levels were reached, how the best policy flew."""
+    from e2efly.learn.rundir import RunDirectory
+
+    run = RunDirectory(out)
+    summary, rows = run.read_json("summary.json"), run.rows()
+    times = out.with_suffix(".time")
+    cpu = sum(sum(map(float, line.split()[:2])) for line in times.read_text().splitlines()) if times.exists() else None
+    last = [i for i, row in enumerate(rows) if "seconds" in row]
+    points = []
+    for before, i in zip([-1, *last], last, strict=False):
+        row, success = rows[i], [x for name, x in rows[i].items() if name.endswith("/success")]
+        error = max(x for name, x in row.items() if name.endswith("/final_error"))
+        reward = float(np.mean([r["reward"] for r in rows[before + 1 : i + 1]]))
+        points.append({
+            "steps": row["steps"], "seconds": row["seconds"], "reward": reward, "success": min(success), "error": error,
+        })  # fmt: skip
+    every = math.ceil(len(points) / POINTS)
+    shown = points[::-1][::every][::-1]
+    reached = {str(x): next((p for p in points if p["success"] >= x), None) for x in LEVELS}
+    return {
+        "finished": bool(summary["finished"]),
+        "steps": summary["env_steps"],
+        "seconds": summary["seconds_trained_from_process_start"],
+        "cpu_seconds": cpu,
+        "rate": float(np.median([rows[i]["rate"] for i in last])),
+        "cores": len(os.sched_getaffinity(0)),
+        "reached": {x: p and {name: p[name] for name in ("steps", "seconds")} for x, p in reached.items()},
+        "converged": converged(points),
+        "shipped": {name: told for name, told in summary["shipped"].items() if name != "update"},
+        "curve": {name: numbers(p[name] for p in shown) for name in shown[0]},
+    }
+
+
+def converged(points: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """When the mean reward had come to its last value and stayed there, and that value: the mean of the last tenth."""
+    reward = np.array([p["reward"] for p in points])
+    final = float(reward[-max(1, len(reward) // 10) :].mean())
+    away = np.flatnonzero(np.abs(reward - final) > SETTLED * abs(final - reward[0]))
+    i = min(int(away[-1]) + 1, len(points) - 1) if len(away) else 0
+    return {"steps": points[i]["steps"], "seconds": points[i]["seconds"], "reward": final}
+
+
+def flights(policy: Path | str, asked: Mapping[str, Flight], how: How) -> dict[str, Any]:
+    """How a policy flew in each of the flights, by criterion, or by what its episodes drew."""
+    from e2efly import evaluate
+    from e2efly.episodes import summary
+
+    flown = {}
+    for name, flight in list(asked.items())[: 1 if how.short else None]:
+        task, episodes = ({"episode_s": 1.0}, 4) if how.short else ({}, how.episodes)
+        found = evaluate(policy, episodes, env=flight.env, task={**flight.task, **task}, device="cpu")
+        if not flight.by:
+            flown[name] = {criterion: summary(e) for criterion, e in found.flown.items()}
+            continue
+        for criterion, e in found.flown.items():
+            drawn = np.asarray(found.drawn[criterion][flight.by])
+            for value in np.unique(drawn):
+                own = {f.name: np.asarray(getattr(e, f.name))[drawn == value] for f in dataclasses.fields(e)}
+                flown.setdefault(name, {})[f"{value:g}"] = summary(dataclasses.replace(e, **own))
+    return flown
+
+
+def ablated(run: Run, seeds: int, how: How) -> dict[str, Any]:
+    """The curves of an ablation: of each variant the last evaluation of each seed, and the mean over seeds."""
+    out = how.folder / f"{run.task}-{run.algo}-{run.variant}-{seeds}"
+    short = ("--steps", "40960") if how.short else ()
+    command = ["ablate", run.task, "--algos", run.algo, "--seeds", str(seeds), "--by", "group", "--out", str(out)]
+    process([*command, *run.options, *short, "--device", "cpu"], out.with_suffix(".time"))
+    found = json.loads((out / f"{run.task}_{run.algo}.json").read_text())
+    success = np.min(list(found["success"].values()), axis=0)
+    error = np.max(list(found["error"].values()), axis=0)
+    every = math.ceil(success.shape[-1] / POINTS)
+    shown = np.arange(success.shape[-1])[::-1][::every][::-1]
+    shutil.rmtree(out)
+    out.with_suffix(".time").unlink()
+    return {
+        "finished": True, "seconds": 0.0, "seeds": seeds, "variants": found["variants"],
+        "success": success[..., -1].tolist(), "error": error[..., -1].tolist(),
+        "curve": {
+            "steps": numbers(np.asarray(found["steps"])[shown]),
+            "success": [numbers(x[shown]) for x in success.mean(axis=1)],
+            "error": [numbers(x[shown]) for x in error.mean(axis=1)],
+        },
+        "flights": {},
+    }  # fmt: skip
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Numbers of a curve, in one line of the file."""
+    return " ".join(f"{x:.5g}" for x in values)
