@@ -24,6 +24,7 @@ _EXAMPLES = {
     "sweep hover --seeds 5": "over seeds and options, side by side on Ray",
     "export RUN": "write policy.onnx from a checkpoint again",
     "export race --web DIR": "a page in which a policy flies, in any browser",
+    "export race --c DIR": "a policy as C, for machines without Python",
     "validate POLICY": "fly it on another physics, or through the real firmware",
     "fly POLICY": "fly it on a Betaflight quadrotor",
     "hil POLICY": "put a real vehicle into a virtual world: poses in, images out",

@@ -2,14 +2,28 @@
 
 import re
 from dataclasses import dataclass
+from typing import Literal
 
 from e2efly.c_policy.text import comment, number, string
 from e2efly.deploy.policy.contract import ACTION_SIZE, Contract
 from e2efly.deploy.policy.images import Image
 from e2efly.observation import PAST_ACTIONS
 
-FLOAT = 4
-"""Bytes of a number."""
+
+
+Precision = Literal["double", "float"]
+"""The type that the network computes in."""
+BYTES: dict[Precision, int] = {"double": 8, "float": 4}
+"""Of a number in each precision."""
+
+
+KEYWORDS = frozenset(
+    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
+    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while class delete "
+    "explicit export false friend mutable namespace new operator private protected public template this throw true "
+    "try typename using virtual and or not xor bool catch".split()
+)
+"""Words that neither C nor C++ takes as a name."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +45,13 @@ class Sizes:
         return self.state + self.images
 
 
-def sizes(contract: Contract, scratch: int, constants: int) -> Sizes:
+def sizes(contract: Contract, scratch: int, constants: int, precision: Precision) -> Sizes:
     """What a policy needs, of its contract and of so many numbers of scratch and bytes of constants."""
     kept = contract.observation_size + contract.memory_size + past_actions(contract)
     images = sum(image_size(image) for image in contract.images)
-    return Sizes(scratch, FLOAT * (max(scratch, 1) + kept), FLOAT * images, constants)
+    width = BYTES[precision]
+    state = -(-(width * max(scratch, 1) + BYTES["float"] * kept) // width) * width  # C aligns it
+    return Sizes(scratch, state, BYTES["float"] * images, constants)
 
 
 def past_actions(contract: Contract) -> int:
@@ -52,18 +68,10 @@ def image_size(image: Image) -> int:
 def member(name: str) -> str:
     """The name of an observation field or an image as C takes it."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
-    return plain if re.match(r"[A-Za-z]", plain) and plain not in _KEYWORDS else f"field_{plain}"
+    return plain if re.match(r"[A-Za-z]", plain) and plain not in KEYWORDS else f"field_{plain}"
 
 
-_KEYWORDS = frozenset(
-    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
-    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while class delete "
-    "explicit export false friend mutable namespace new operator private protected public template this throw true "
-    "try typename using virtual and or not xor bool catch".split()
-)
-
-
-def header(contract: Contract, name: str, digest: str, needs: Sizes) -> str:
+def header(contract: Contract, name: str, digest: str, needs: Sizes, precision: Precision) -> str:
     """The file NAME.h.
 
     Args:
@@ -71,6 +79,7 @@ def header(contract: Contract, name: str, digest: str, needs: Sizes) -> str:
         name: of the file and the symbols.
         digest: the SHA-256 of the policy.onnx.
         needs: what it takes of the machine.
+        precision: that the network computes in.
     """
     big = name.upper()
     parts = [
@@ -78,14 +87,15 @@ def header(contract: Contract, name: str, digest: str, needs: Sizes) -> str:
         comment(
             f"Made by e2efly export --c from the policy.onnx whose SHA-256 stands below; not to be edited. {name}.c "
             "needs <math.h> alone. Nothing is allocated and nothing is static but constants: what changes lies in "
-            f"{name}_state, so that several may fly at once. All numbers are float; SI units; the world is east, north, "
+            f"{name}_state, so that several may fly at once. All numbers that go in and out are float; SI units; the world is east, north, "
             "up, the body forward, left, up; quaternions are w, x, y, z, unit, from body to world."
+            f" The network computes in {precision}."
         ),
         f"#ifndef E2EFLY_{big}_H\n#define E2EFLY_{big}_H\n",
         '#ifdef __cplusplus\nextern "C" {\n#endif\n',
         _about(contract, big, digest, needs),
         _fields(contract, name),
-        _state(contract, name, needs),
+        _state(contract, name, needs, precision),
         _calls(contract, name),
         "#ifdef __cplusplus\n}\n#endif\n\n#endif",
     ]
@@ -165,13 +175,13 @@ def _fields(c: Contract, name: str) -> str:
     return "\n".join(lines)
 
 
-def _state(c: Contract, name: str, needs: Sizes) -> str:
-    lines = [comment("All that changes from step to step; begin it before the first."), "typedef struct {"]
+def _state(c: Contract, name: str, needs: Sizes, precision: Precision) -> str:
+    lines = [f"typedef {precision} {name}_real;\n", comment("All that changes from step to step; begin it before the first."), "typedef struct {"]
     if c.memory_size:
         lines.append(f"    float memory[{c.memory_size}];")
     if past := past_actions(c):
         lines.append(f"    float past_actions[{past}]; {comment('newest first')}")
-    lines += [f"    float observation[{c.observation_size}];", f"    float scratch[{max(needs.scratch, 1)}];"]
+    lines += [f"    float observation[{c.observation_size}];", f"    {name}_real scratch[{max(needs.scratch, 1)}];"]
     return "\n".join([*lines, f"}} {name}_state;\n"])
 
 

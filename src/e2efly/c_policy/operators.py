@@ -1,7 +1,9 @@
 """ONNX's operators as statements of C, for one observation at a time.
 
+`real` is the type of what is computed and REAL(f) its function f of <math.h>; weights are float.
+
 Each function takes the node, its operands and the program, to which it adds constants, buffers and a step, and returns
-its outputs. All arrays are of floats and lie row by row; the batch axis, 1, is left out of their shapes.
+its outputs. Arrays lie row by row; the batch axis, 1, is left out of their shapes.
 """
 
 import math
@@ -19,13 +21,13 @@ from e2efly.c_policy.text import number
 Given = Sequence[Operand]
 UNARY = {
     "Relu": "x > 0.0f ? x : 0.0f",
-    "Tanh": "tanhf(x)",
-    "Sigmoid": "1.0f / (1.0f + expf(-x))",
-    "Log": "logf(x)",
-    "Softplus": "(x > 0.0f ? x : 0.0f) + log1pf(expf(-fabsf(x)))",
+    "Tanh": "REAL(tanh)(x)",
+    "Sigmoid": "1.0f / (1.0f + REAL(exp)(-x))",
+    "Log": "REAL(log)(x)",
+    "Softplus": "(x > 0.0f ? x : 0.0f) + REAL(log1p)(REAL(exp)(-REAL(fabs)(x)))",
 }
 """Expressions of the number x."""
-SLOPED = {"Elu": ("x > 0.0f ? x : {} * (expf(x) - 1.0f)", 1.0), "LeakyRelu": ("x > 0.0f ? x : {} * x", 0.01)}
+SLOPED = {"Elu": ("x > 0.0f ? x : {} * (REAL(exp)(x) - 1.0f)", 1.0), "LeakyRelu": ("x > 0.0f ? x : {} * x", 0.01)}
 """The same, of `alpha` and its default."""
 BINARY = {
     "Add": "{} + {}",
@@ -71,7 +73,7 @@ def _unary(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     else:
         attributes(node)
         expression = UNARY[node.op_type]
-    lines = f"{{ const float x = {x.at('i')}; {{out}}[i] = {expression}; }}"
+    lines = f"{{ const real x = {x.at('i')}; {{out}}[i] = {expression}; }}"
     out = program.buffer(x.shape)
     text = f"for (int i = 0; i < {out.size}; i++) {lines.replace('{out}', out.text)}"
     program.step(node.op_type, [text], given, out, in_place=x.text == f"b{x.buffer}")
@@ -142,7 +144,7 @@ def _linear(node: NodeProto, x: Operand, matrix: np.ndarray, bias: np.ndarray, p
     blocks = rows // BLOCK * BLOCK
     if blocks:
         lines += [f"for (int i = 0; i < {blocks}; i += {BLOCK}) {{", f"    const float *w = {weight.text} + i * {columns};"]
-        lines += [f"    const float {', '.join(f'x{k} = {x.text}[i + {k}]' for k in range(BLOCK))};"]
+        lines += [f"    const real {', '.join(f'x{k} = {x.text}[i + {k}]' for k in range(BLOCK))};"]
         terms = " + ".join(f"x{k} * w[j{f' + {k * columns}' if k else ''}]" for k in range(BLOCK))
         lines += [f"    for (int j = 0; j < {columns}; j++) {out.text}[j] += {terms};", "}"]
     for row in range(blocks, rows):
@@ -250,9 +252,9 @@ def _norm(node: NodeProto, given: Given, program: Program) -> list[Operand]:
         raise ValueError(f"is over the axes {list(about['axes'])}; accepted: all but the batch axis, which stay as 1")
     out = program.buffer((1,) * len(x.shape))
     lines = [
-        "float sum = 0.0f;",
+        "real sum = 0.0f;",
         f"for (int i = 0; i < {x.size}; i++) sum += {x.text}[i] * {x.text}[i];",
-        f"{out.text}[0] = sqrtf(sum);",
+        f"{out.text}[0] = REAL(sqrt)(sum);",
     ]
     program.step(node.op_type, lines, given, out)
     return [out]
@@ -276,15 +278,15 @@ def _pool(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     (h, w), (down, right), (rows, columns) = _window(node, x)
     channels, height, width = x.shape
     out, largest = program.buffer((channels, rows, columns)), node.op_type == "MaxPool"
-    first = f"{x.text}[{height * width} * c + {width} * {down} * i + {right} * j]"
-    taken = "if (at[k] > value) value = at[k];" if largest else "value += at[k];"
+    read = f"{x.text}[at + {width} * row + k]"
+    taken = f"if ({read} > value) value = {read};" if largest else f"value += {read};"
     lines = [
         f"for (int c = 0; c < {channels}; c++)",
         f"    for (int i = 0; i < {rows}; i++)",
         f"        for (int j = 0; j < {columns}; j++) {{",
-        f"            const float *at = &{first};",
-        f"            float value = {'at[0]' if largest else '0.0f'};",
-        f"            for (int row = 0; row < {h}; row++, at += {width})",
+        f"            const int at = {height * width} * c + {width * down} * i + {right} * j;",
+        f"            real value = {f'{x.text}[at]' if largest else '0.0f'};",
+        f"            for (int row = 0; row < {h}; row++)",
         f"                for (int k = 0; k < {w}; k++) {taken}",
         f"            {out.text}[{rows * columns} * c + {columns} * i + j] = "
         f"{'value' if largest else f'value / {number(h * w)}'};",
@@ -317,7 +319,7 @@ def _convolution(node: NodeProto, given: Given, program: Program) -> list[Operan
         f"        for (int c = 0; c < {channels}; c++)",
         f"            for (int row = 0; row < {h}; row++)",
         f"                for (int k = 0; k < {w}; k++, w += {filters}) {{",
-        f"                    const float x = {x.text}[{height * width} * c + {width} * ({down} * i + row)"
+        f"                    const real x = {x.text}[{height * width} * c + {width} * ({down} * i + row)"
         f" + {right} * j + k];",
         f"                    for (int f = 0; f < {filters}; f++) {sums}[f] += x * w[f];",
         "                }",

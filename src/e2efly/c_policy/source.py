@@ -6,7 +6,7 @@ from hashlib import sha256
 import numpy as np
 
 from e2efly.c_policy.graph import network
-from e2efly.c_policy.header import FLOAT, Sizes, header, image_size, member, past_actions, sizes
+from e2efly.c_policy.header import BYTES, Precision, Sizes, header, image_size, member, past_actions, sizes
 from e2efly.c_policy.program import Operand, Program, layout
 from e2efly.c_policy.text import array, comment, number
 from e2efly.deploy.policy.contract import ACTION_SIZE, Contract
@@ -24,13 +24,14 @@ class Sources:
     needs: Sizes
 
 
-def sources(contract: Contract, content: bytes, name: str) -> Sources:
+def sources(contract: Contract, content: bytes, name: str, precision: Precision) -> Sources:
     """Header and source of a policy.
 
     Args:
         contract: of the policy.
         content: of its policy.onnx.
         name: of the files and the symbols.
+        precision: that the network computes in.
 
     Raises:
         ValueError: for a graph that is not known as C.
@@ -42,20 +43,22 @@ def sources(contract: Contract, content: bytes, name: str) -> Sources:
     graph = network(content, inputs)
     program, outputs = graph.program, graph.outputs
     places, scratch = layout(program, {x.buffer for x in outputs.values() if x.buffer is not None})
-    constants = FLOAT * sum(x.size for x in program.floats.values()) + 2 * sum(x.size for x in program.indices.values())
-    needs = sizes(contract, scratch, constants)
+    constants = BYTES["float"] * sum(x.size for x in program.floats.values())
+    constants += 2 * sum(x.size for x in program.indices.values())
+    needs = sizes(contract, scratch, constants, precision)
     parts = [
         comment(f"See {name}.h, the contract. Made by e2efly export --c; not to be edited."),
         f'#include "{name}.h"\n\n#include <math.h>\n',
         '#ifdef __FAST_MATH__\n#error "without -ffast-math: it takes the checks for numbers that are not finite away"\n'
         "#endif\n",
+        f"typedef {name}_real real;\n#define REAL(name) name{'' if precision == 'double' else '##f'}\n",
         *(array("static const unsigned short", key, map(str, x)) for key, x in program.indices.items()),
         *(array("static const float", key, map(number, x.reshape(-1))) for key, x in program.floats.items()),
         "",
         _network(contract, name, program, places, outputs),
         _around(contract, name),
     ]
-    return Sources(header(contract, name, sha256(content).hexdigest(), needs), "\n".join(parts), needs)
+    return Sources(header(contract, name, sha256(content).hexdigest(), needs, precision), "\n".join(parts), needs)
 
 
 def _images(contract: Contract) -> str:
@@ -68,8 +71,8 @@ def _network(c: Contract, name: str, program: Program, places: list[int], output
         f"{name}_status {name}_network({name}_state *state, const float observation[{c.observation_size}],"
         f"{_images(c)} float action[4])",
         "{",
-        "    float *const s = state->scratch;",
-        *(f"    float *const b{i} = s + {place};" for i, place in enumerate(places) if _is_used(program, i)),
+        "    real *const s = state->scratch;",
+        *(f"    real *const b{i} = s + {place};" for i, place in enumerate(places) if _is_used(program, i)),
         "",
         f"    for (int i = 0; i < {c.observation_size}; i++)",
         f"        if (!isfinite(observation[i])) return {big}_NOT_FINITE;",
@@ -82,15 +85,15 @@ def _network(c: Contract, name: str, program: Program, places: list[int], output
     lines += [
         "",
         f"    for (int i = 0; i < {ACTION_SIZE}; i++)",
-        f"        if (!(fabsf({action.text}[i]) <= {most})) return {big}_BAD_ACTION;",
+        f"        if (!(REAL(fabs)({action.text}[i]) <= {most})) return {big}_BAD_ACTION;",
         f"    for (int i = 0; i < {ACTION_SIZE}; i++) {{",
-        f"        const float a = {action.text}[i];",
+        f"        const float a = (float){action.text}[i];",
         "        action[i] = a < -1.0f ? -1.0f : a > 1.0f ? 1.0f : a;",
         "    }",
     ]
     if c.memory_size:
         kept = outputs[NEXT_MEMORY]
-        lines.append(f"    for (int i = 0; i < {c.memory_size}; i++) state->memory[i] = {kept.text}[i];")
+        lines.append(f"    for (int i = 0; i < {c.memory_size}; i++) state->memory[i] = (float){kept.text}[i];")
     return "\n".join([*lines, f"    return {big}_OK;", "}\n"])
 
 
