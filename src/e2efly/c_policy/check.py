@@ -31,9 +31,7 @@ def check_source(contract: Contract, content: bytes, name: str, precision: Preci
     memory, actions = np.zeros((1, contract.memory_size)), np.empty((STEPS, ACTION_SIZE))
     for k in range(STEPS):
         actions[k], memory = exact.act(observation[k : k + 1], [x[k : k + 1] for x in images], memory)
-    given = "".join(
-        f" {member(image.name)} + {image_size(image)} * (k % {STEPS})," for image in contract.images
-    )
+    given = "".join(f" {member(image.name)} + {image_size(image)} * (k % {STEPS})," for image in contract.images)
     return "\n".join(
         [
             comment(
@@ -41,8 +39,10 @@ def check_source(contract: Contract, content: bytes, name: str, precision: Preci
             ),
             f'#include "{name}.h"\n\n#include <math.h>\n#include <stdio.h>\n#include <time.h>\n',
             array("static const float", "observation", map(number, observation.reshape(-1))),
-            *(array("static const float", member(i.name), map(number, x.reshape(-1)))
-              for i, x in zip(contract.images, images, strict=True)),
+            *(
+                array("static const float", member(i.name), map(number, x.reshape(-1)))
+                for i, x in zip(contract.images, images, strict=True)
+            ),
             array("static const double", "wanted", map(repr, actions.reshape(-1).tolist())),
             f"static {name}_state state;\n",
             f"static {name}_status step(int k, float action[4])\n{{",
@@ -67,5 +67,5 @@ def check_source(contract: Contract, content: bytes, name: str, precision: Preci
             f"           1e6 * (double)(clock() - began) / CLOCKS_PER_SEC / {ROUNDS});",
             f"    return worst <= {CLOSE[precision]!r} ? 0 : 1;",
             "}\n",
-        ]  # fmt: skip
+        ]
     )

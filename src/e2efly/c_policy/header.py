@@ -9,8 +9,6 @@ from e2efly.deploy.policy.contract import ACTION_SIZE, Contract
 from e2efly.deploy.policy.images import Image
 from e2efly.observation import PAST_ACTIONS
 
-
-
 Precision = Literal["double", "float"]
 """The type that the network computes in."""
 BYTES: dict[Precision, int] = {"double": 8, "float": 4}
@@ -18,11 +16,15 @@ BYTES: dict[Precision, int] = {"double": 8, "float": 4}
 
 
 KEYWORDS = frozenset(
-    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
-    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while class delete "
-    "explicit export false friend mutable namespace new operator private protected public template this throw true "
-    "try typename using virtual and or not xor bool catch".split()
-)
+    {
+        "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum",
+        "extern", "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return",
+        "short", "signed", "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void",
+        "volatile", "while", "class", "delete", "explicit", "export", "false", "friend", "mutable", "namespace",
+        "new", "operator", "private", "protected", "public", "template", "this", "throw", "true", "try",
+        "typename", "using", "virtual", "and", "or", "not", "xor", "bool", "catch",
+    }
+)  # fmt: skip
 """Words that neither C nor C++ takes as a name."""
 
 
@@ -87,9 +89,9 @@ def header(contract: Contract, name: str, digest: str, needs: Sizes, precision: 
         comment(
             f"Made by e2efly export --c from the policy.onnx whose SHA-256 stands below; not to be edited. {name}.c "
             "needs <math.h> alone. Nothing is allocated and nothing is static but constants: what changes lies in "
-            f"{name}_state, so that several may fly at once. All numbers that go in and out are float; SI units; the world is east, north, "
-            "up, the body forward, left, up; quaternions are w, x, y, z, unit, from body to world."
-            f" The network computes in {precision}."
+            f"{name}_state, so that several may fly at once. All numbers that go in and out are float; SI units; "
+            "the world is east, north, up, the body forward, left, up; quaternions are w, x, y, z, unit, from body to "
+            f"world. The network computes in {precision}."
         ),
         f"#ifndef E2EFLY_{big}_H\n#define E2EFLY_{big}_H\n",
         '#ifdef __cplusplus\nextern "C" {\n#endif\n',
@@ -135,10 +137,10 @@ def _about(c: Contract, big: str, digest: str, needs: Sizes) -> str:
     lines += [f"#define {big}_{key} {number(value)} {comment(about)}" for key, (value, about) in numbers.items()]
     lines += [f"#define {big}_{key} {value} {comment(about)}" for key, (value, about) in counts.items()]
     if c.vehicle_ranges is not None:
-        lines.append(comment(f"It flies any vehicle of the family {c.vehicle} within these ranges:"))
-        lines += [f"#define {big}_{key}_MIN {number(a)}\n#define {big}_{key}_MAX {number(b)}" for key, (a, b) in (
-            (key.upper(), value) for key, value in vars(c.vehicle_ranges).items()
-        )]  # fmt: skip
+        lines.append(comment(f"It flies any vehicle of the family {c.vehicle} within these ranges, in SI units:"))
+        for key, (least, most) in vars(c.vehicle_ranges).items():
+            lines.append(f"#define {big}_VEHICLE_{key.upper()}_MIN {number(least)}")
+            lines.append(f"#define {big}_VEHICLE_{key.upper()}_MAX {number(most)}")
     return "\n".join(lines) + "\n"
 
 
@@ -166,7 +168,8 @@ def _fields(c: Contract, name: str) -> str:
             f"{', '.join(f'{x:g}' for x in image.position_m)} m of the body, {image.pitch_rad:.6g} rad downwards; "
             f"its age in training {image.latency_range_s[0]:g} to {image.latency_range_s[1]:g} s. Row by row from the "
             f"top, columns from the left{', three numbers for each' if len(image.shape) > 2 else ''}. A value is "
-            f"{image.description}. Between two images it is shown the last one. {image.preprocessing}."
+            f"{image.description}. Between two images it is shown the last one. Done by the network itself: "
+            f"{image.preprocessing.removeprefix('inside the graph: ')}."
         )
         low, high = image.limits
         lines += [comment(about), f"#define {big}_HEIGHT {image.height}", f"#define {big}_WIDTH {image.width}"]
@@ -176,7 +179,11 @@ def _fields(c: Contract, name: str) -> str:
 
 
 def _state(c: Contract, name: str, needs: Sizes, precision: Precision) -> str:
-    lines = [f"typedef {precision} {name}_real;\n", comment("All that changes from step to step; begin it before the first."), "typedef struct {"]
+    lines = [
+        f"typedef {precision} {name}_real;\n",
+        comment("All that changes from step to step; begin it before the first."),
+        "typedef struct {",
+    ]
     if c.memory_size:
         lines.append(f"    float memory[{c.memory_size}];")
     if past := past_actions(c):
@@ -204,16 +211,20 @@ def _calls(c: Contract, name: str) -> str:
     return "\n".join(
         [
             comment("Why there is no action. The state and the action are then as they were."),
-            "typedef enum {", *entries, f"}} {name}_status;\n",
+            "typedef enum {",
+            *entries,
+            f"}} {name}_status;\n",
             comment("The policy takes over: it has no memory yet, and is shown hovering actions as its last ones."),
             f"void {name}_begin({name}_state *state);\n",
-            comment(f"One step, {big}_CONTROL_RATE_HZ times a second: the action, of four numbers in "
-                    f"[{low:g}, {high:g}], for what is seen now. Memory and past actions go on in the state."),
+            comment(
+                f"One step, {big}_CONTROL_RATE_HZ times a second: the action, of four numbers in "
+                f"[{low:g}, {high:g}], for what is seen now. Memory and past actions go on in the state."
+            ),
             f"{name}_status {name}_act({name}_state *state, const {name}_seen *seen,{images} float action[4]);\n",
             comment("The same from a whole observation, past actions included; those of the state stay as they are."),
             f"{name}_status {name}_network({name}_state *state, const float observation[{c.observation_size}],"
             f"{images} float action[4]);\n",
             comment(f"From action to command: {c.action.mapping}. {commands}."),
             f"void {name}_command(const float action[4], float command[4]);\n",
-        ]  # fmt: skip
+        ]
     )

@@ -143,7 +143,10 @@ def _linear(node: NodeProto, x: Operand, matrix: np.ndarray, bias: np.ndarray, p
     lines = [f"for (int j = 0; j < {columns}; j++) {out.text}[j] = {start.text}[j];"]
     blocks = rows // BLOCK * BLOCK
     if blocks:
-        lines += [f"for (int i = 0; i < {blocks}; i += {BLOCK}) {{", f"    const float *w = {weight.text} + i * {columns};"]
+        lines += [
+            f"for (int i = 0; i < {blocks}; i += {BLOCK}) {{",
+            f"    const float *w = {weight.text} + i * {columns};",
+        ]
         lines += [f"    const real {', '.join(f'x{k} = {x.text}[i + {k}]' for k in range(BLOCK))};"]
         terms = " + ".join(f"x{k} * w[j{f' + {k * columns}' if k else ''}]" for k in range(BLOCK))
         lines += [f"    for (int j = 0; j < {columns}; j++) {out.text}[j] += {terms};", "}"]

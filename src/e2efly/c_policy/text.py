@@ -17,8 +17,8 @@ def number(value: float) -> str:
 
 
 def string(text: str) -> str:
-    """A string literal of printable ASCII."""
-    plain = "".join(c if " " <= c <= "~" and c not in '"\\?' else f"\\{b:03o}" for c in text for b in c.encode()[:1])
+    """A string literal, its UTF-8 in printable ASCII."""
+    plain = "".join(chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode())
     return f'"{plain}"'
 
 

@@ -37,7 +37,7 @@ def write_c(
     if not re.fullmatch(r"[a-z][a-z0-9_]{0,30}", name) or name in KEYWORDS:
         raise ValueError(f"--name is {name!r}; accepted: a name of C: a to z, then a to z, 0 to 9 and _, 31 at most")
     for option, limit in (("memory", memory), ("flash", flash)):
-        if limit is not None and not 0 < limit:
+        if limit is not None and not limit > 0:
             raise ValueError(f"--{option} is {limit}; accepted: more than 0 KiB")
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"--c is {str(folder)!r}, a file; accepted: a folder, which is made where it is not there")
@@ -65,12 +65,12 @@ def _check_sizes(
         smaller += ["--precision float, which halves most of the state"] if precision == "double" else []
         raise ValueError(
             f"--memory is {memory:g} KiB; the policy needs {_kib(needs.memory)}: {_kib(needs.state)} for its "
-            f"state{images}; accepted: {'; '.join([f'{_kib(needs.memory)} or more', *smaller])}"
+            f"state{images}; accepted: {', or '.join([f'{_kib(needs.memory)} or more', *smaller])}"
         )
     if flash is not None and needs.constants > flash * KIB:
         raise ValueError(
-            f"--flash is {flash:g} KiB; the policy needs {_kib(needs.constants)} for its weights, and its code comes on "
-            f"top; accepted: {_kib(needs.constants)} or more, or a policy with fewer weights"
+            f"--flash is {flash:g} KiB; the policy needs {_kib(needs.constants)} for its weights, and its code "
+            f"comes on top; accepted: {_kib(needs.constants)} or more, or a policy with fewer weights"
         )
 
 
