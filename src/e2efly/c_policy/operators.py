@@ -7,28 +7,30 @@ its outputs. Arrays lie row by row; the batch axis, 1, is left out of their shap
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import accumulate
-from typing import Any
 
 import numpy as np
-from onnx import NodeProto, helper
+from onnx import NodeProto
 
 from e2efly.c_policy.program import Operand, Program, Shape
 from e2efly.c_policy.text import number
+from e2efly.c_policy.windows import Given, attributes, convolution, norm, pool
 
-Given = Sequence[Operand]
 UNARY = {
-    "Relu": "x > 0.0f ? x : 0.0f",
-    "Tanh": "REAL(tanh)(x)",
-    "Sigmoid": "1.0f / (1.0f + REAL(exp)(-x))",
-    "Log": "REAL(log)(x)",
-    "Softplus": "(x > 0.0f ? x : 0.0f) + REAL(log1p)(REAL(exp)(-REAL(fabs)(x)))",
+    "Relu": "{0} > 0.0f ? {0} : 0.0f",
+    "Tanh": "REAL(tanh)({0})",
+    "Sigmoid": "1.0f / (1.0f + REAL(exp)(-{0}))",
+    "Log": "REAL(log)({0})",
+    "Softplus": "({0} > 0.0f ? {0} : 0.0f) + REAL(log1p)(REAL(exp)(-REAL(fabs)({0})))",
 }
-"""Expressions of the number x."""
-SLOPED = {"Elu": ("x > 0.0f ? x : {} * (REAL(exp)(x) - 1.0f)", 1.0), "LeakyRelu": ("x > 0.0f ? x : {} * x", 0.01)}
-"""The same, of `alpha` and its default."""
+"""Expressions of a number."""
+SLOPED = {
+    "Elu": ("{0} > 0.0f ? {0} : {alpha} * (REAL(exp)({0}) - 1.0f)", 1.0),
+    "LeakyRelu": ("{0} > 0.0f ? {0} : {alpha} * {0}", 0.01),
+}
+"""The same, of `alpha` too, and its default."""
 BINARY = {
     "Add": "{} + {}",
     "Sub": "{} - {}",
@@ -40,18 +42,6 @@ BINARY = {
 """Expressions of two numbers."""
 BLOCK = 4
 """Rows of a matrix that are added at once: an output is then read and written once in so many rows."""
-
-
-def attributes(node: NodeProto, **known: Any) -> dict[str, Any]:
-    """The attributes of a node, with defaults.
-
-    Raises:
-        ValueError: for one that is not among `known`.
-    """
-    found = {entry.name: helper.get_attribute_value(entry) for entry in node.attribute}
-    if unknown := sorted(set(found) - set(known)):
-        raise ValueError(f"has the attribute {unknown[0]}; accepted: {', '.join(known) or 'none'}")
-    return known | found
 
 
 def _each(node: NodeProto, program: Program, shape: Shape, reads: Given, expression: str) -> list[Operand]:
@@ -67,17 +57,11 @@ def _each(node: NodeProto, program: Program, shape: Shape, reads: Given, express
 
 def _unary(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     (x,) = given
-    if node.op_type in SLOPED:
-        form, default = SLOPED[node.op_type]
-        expression = form.format(number(attributes(node, alpha=default)["alpha"]))
-    else:
+    form, default = SLOPED.get(node.op_type) or (UNARY[node.op_type], None)
+    alpha = default and number(attributes(node, alpha=default)["alpha"])
+    if default is None:
         attributes(node)
-        expression = UNARY[node.op_type]
-    lines = f"{{ const real x = {x.at('i')}; {{out}}[i] = {expression}; }}"
-    out = program.buffer(x.shape)
-    text = f"for (int i = 0; i < {out.size}; i++) {lines.replace('{out}', out.text)}"
-    program.step(node.op_type, [text], given, out, in_place=x.text == f"b{x.buffer}")
-    return [out]
+    return _each(node, program, x.shape, given, form.format(x.at("i"), alpha=alpha))
 
 
 def _binary(node: NodeProto, given: Given, program: Program) -> list[Operand]:
@@ -248,100 +232,14 @@ def _split(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     return [replace(x, text=f"({x.text} + {part * math.prod(shape)})", shape=shape) for part in range(count)]
 
 
-def _norm(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    (x,) = given
-    about = attributes(node, axes=(), keepdims=1)
-    if sorted(about["axes"]) != list(range(1, len(x.shape) + 1)) or not about["keepdims"]:
-        raise ValueError(f"is over the axes {list(about['axes'])}; accepted: all but the batch axis, which stay as 1")
-    out = program.buffer((1,) * len(x.shape))
-    lines = [
-        "real sum = 0.0f;",
-        f"for (int i = 0; i < {x.size}; i++) sum += {x.text}[i] * {x.text}[i];",
-        f"{out.text}[0] = REAL(sqrt)(sum);",
-    ]
-    program.step(node.op_type, lines, given, out)
-    return [out]
-
-
-def _window(node: NodeProto, x: Operand, **more: Any) -> tuple[list[int], list[int], Shape]:
-    """The sides and strides of a window over rows and columns that never reaches beyond them, and its places."""
-    plain = {"auto_pad": b"NOTSET", "ceil_mode": 0, "storage_order": 0, "count_include_pad": 0, "group": 1}
-    about = attributes(node, kernel_shape=None, strides=[1, 1], pads=[0] * 4, dilations=[1, 1], **plain, **more)
-    sides, strides = about["kernel_shape"], list(about["strides"])
-    odd = [key for key, value in plain.items() if about[key] != value]
-    odd += [key for key, value in (("pads", [0] * 4), ("dilations", [1, 1])) if list(about[key]) != value]
-    if odd or len(x.shape) != 3 or sides is None or len(sides) != 2:
-        raise ValueError(f"has {', '.join(odd) or 'no kernel_shape'}; accepted: a window of an image, without padding")
-    places = tuple((n - side) // stride + 1 for n, side, stride in zip(x.shape[1:], sides, strides, strict=True))
-    return list(sides), strides, places
-
-
-def _pool(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    (x,) = given
-    (h, w), (down, right), (rows, columns) = _window(node, x)
-    channels, height, width = x.shape
-    out, largest = program.buffer((channels, rows, columns)), node.op_type == "MaxPool"
-    read = f"{x.text}[at + {width} * row + k]"
-    taken = f"if ({read} > value) value = {read};" if largest else f"value += {read};"
-    lines = [
-        f"for (int c = 0; c < {channels}; c++)",
-        f"    for (int i = 0; i < {rows}; i++)",
-        f"        for (int j = 0; j < {columns}; j++) {{",
-        f"            const int at = {height * width} * c + {width * down} * i + {right} * j;",
-        f"            real value = {f'{x.text}[at]' if largest else '0.0f'};",
-        f"            for (int row = 0; row < {h}; row++)",
-        f"                for (int k = 0; k < {w}; k++) {taken}",
-        f"            {out.text}[{rows * columns} * c + {columns} * i + j] = "
-        f"{'value' if largest else f'value / {number(h * w)}'};",
-        "        }",
-    ]
-    program.step(f"{node.op_type}, {h} x {w}", lines, given, out)
-    return [out]
-
-
-def _convolution(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    x, kernel = given[:2]
-    if kernel.value is None or kernel.value.ndim != 4 or (len(given) > 2 and given[2].value is None):
-        raise ValueError("is other than with a constant kernel and bias")
-    (h, w), (down, right), (rows, columns) = _window(node, x)
-    filters = kernel.value.shape[0]
-    if kernel.value.shape[1:] != (x.shape[0], h, w):
-        raise ValueError(f"has a kernel of the shape {kernel.shape}; accepted: (n, {x.shape[0]}, {h}, {w})")
-    bias = given[2].value if len(given) > 2 else np.zeros(filters)
-    weight = program.constant("kernel", np.moveaxis(kernel.value, 0, -1).reshape(-1, filters))
-    start = program.constant("bias", np.asarray(bias))
-    channels, height, width = x.shape
-    # the sums of all filters lie side by side behind the output, for the compiler's vectors
-    both = program.buffer((filters * (rows * columns + 1),))
-    sums = f"({both.text} + {filters * rows * columns})"
-    lines = [
-        f"for (int i = 0; i < {rows}; i++)",
-        f"    for (int j = 0; j < {columns}; j++) {{",
-        f"        const float *w = {weight.text};",
-        f"        for (int f = 0; f < {filters}; f++) {sums}[f] = {start.text}[f];",
-        f"        for (int c = 0; c < {channels}; c++)",
-        f"            for (int row = 0; row < {h}; row++)",
-        f"                for (int k = 0; k < {w}; k++, w += {filters}) {{",
-        f"                    const real x = {x.text}[{height * width} * c + {width} * ({down} * i + row)"
-        f" + {right} * j + k];",
-        f"                    for (int f = 0; f < {filters}; f++) {sums}[f] += x * w[f];",
-        "                }",
-        f"        for (int f = 0; f < {filters}; f++)",
-        f"            {both.text}[{rows * columns} * f + {columns} * i + j] = {sums}[f];",
-        "    }",
-    ]
-    program.step(f"{node.op_type}, {h} x {w}, {channels} to {filters}", lines, [x], both)
-    return [replace(both, shape=(filters, rows, columns))]
-
-
 OPERATORS: dict[str, Callable[[NodeProto, Given, Program], list[Operand]]] = (
     dict.fromkeys([*UNARY, *SLOPED], _unary)
     | dict.fromkeys(BINARY, _binary)
-    | dict.fromkeys(["MaxPool", "AveragePool"], _pool)
+    | dict.fromkeys(["MaxPool", "AveragePool"], pool)
     | {
         "Where": _where, "Clip": _clip, "Identity": _identity, "Gemm": _gemm, "MatMul": _matmul, "Gather": _gather,
-        "Reshape": _reshape, "Transpose": _transpose, "Concat": _concat, "Split": _split, "ReduceL2": _norm,
-        "Conv": _convolution,
+        "Reshape": _reshape, "Transpose": _transpose, "Concat": _concat, "Split": _split, "ReduceL2": norm,
+        "Conv": convolution,
     }
 )  # fmt: skip
 """By ONNX's name: all that the policies of this package have."""
