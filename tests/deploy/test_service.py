@@ -44,38 +44,49 @@ def told(manager: socket.socket) -> list[str]:
             return found
 
 
+class Heard(Grounded):
+    """A bridge whose manager reads at each step, as a socket holds ten datagrams or so."""
+
+    def __init__(self, manager: socket.socket) -> None:
+        super().__init__()
+        self.manager, self.lines = manager, list[str]()
+
+    def tick(self, now: float, lateness: float, slack: float) -> None:
+        super().tick(now, lateness, slack)
+        self.lines += told(self.manager)
+
+
 def looped(bridge: Grounded, seconds: float, address: str | None = None) -> None:
-    clock = Clock()
+    clock, service = Clock(), Service(address)
     end = clock.now() + seconds
-    fly(bridge, 100.0, stop=lambda: clock.now() > end, service=Service(address), clock=clock)  # type: ignore[arg-type]
+    fly(bridge, 100.0, stop=lambda: clock.now() > end, service=service, clock=clock)  # type: ignore[arg-type]
+    service.close()
 
 
 def test_the_loop_makes_it_ready_once_and_feeds_its_watchdog(manager: socket.socket) -> None:
-    looped(Grounded(), 3.0, manager.getsockname())
-    first, *rest, last = told(manager)
+    bridge = Heard(manager)
+    looped(bridge, 3.0, manager.getsockname())
+    first, *rest = bridge.lines
     assert first == "READY=1\nWATCHDOG=1"
     assert set(rest) == {"WATCHDOG=1"}
     assert 25 <= len(rest) <= 31  # every 0.1 s
-    assert last.startswith("STOPPING=1\n")
+    assert told(manager)[-1].startswith("STOPPING=1\n")
 
 
 def test_a_loop_that_stands_still_feeds_nothing(manager: socket.socket) -> None:
-    bridge, found = Grounded(), list[list[str]]()
+    bridge, within = Heard(manager), list[str]()
     step = bridge.tick
 
     def tick(now: float, lateness: float, slack: float) -> None:
         step(now, lateness, slack)
         if bridge.steps == 100:
-            found.append(told(manager))
             time.sleep(0.4)
-            found.append(told(manager))
+            within.extend(told(manager))
 
     bridge.tick = tick  # type: ignore[method-assign]
     looped(bridge, 1.5, manager.getsockname())
-    before, within = found
-    assert len(before) >= 9
+    assert len(bridge.lines) >= 12
     assert within == []
-    assert told(manager)  # and then it goes on
 
 
 def test_without_a_manager_nothing_is_told_and_one_that_is_gone_or_full_holds_up_nothing(
@@ -132,48 +143,55 @@ def _until(manager: socket.socket, found: Callable[[list[str]], bool]) -> list[s
     return lines
 
 
-def flying(*boxes: int) -> Callable[[int], bytes]:
-    """The recorded controller, with modes on; the codes that it is asked for are in `asked`."""
-    ids = BoxIds.parse(payload(REPLIES[1][BoxIds.CODE])).ids
-    status = bytearray(payload(REPLIES[1][StatusEx.CODE]))
-    on = sum(1 << ids.index(box) for box in boxes)
-    status[6:10] = (on & 0xFFFFFFFF).to_bytes(4, "little")
-    extra = status[15] & 15
-    status[16 : 16 + extra] = (on >> 32).to_bytes(extra, "little")
+class Flying:
+    """The recorded controller, with modes on."""
 
-    def reply(code: int) -> bytes:
-        asked.add(code)
-        return encode(Frame(code, bytes(status), REPLY)) if code == StatusEx.CODE else recorded(code)
+    def __init__(self, *boxes: int) -> None:
+        self.boxes = boxes
+        self.asked: set[int] = set()
+        """Codes of what it was sent."""
+        self._ids = (*BoxIds.parse(payload(REPLIES[1][BoxIds.CODE])).ids, OVERRIDE)
 
-    asked = reply.asked = set[int]()  # type: ignore[attr-defined]
-    return reply
+    def __call__(self, code: int) -> bytes:
+        self.asked.add(code)
+        if code == BoxIds.CODE:
+            return encode(Frame(code, bytes(self._ids), REPLY))
+        if code != StatusEx.CODE:
+            return recorded(code)
+        status = bytearray(payload(REPLIES[1][StatusEx.CODE]))
+        status[6:10] = sum(1 << self._ids.index(box) for box in self.boxes).to_bytes(4, "little")
+        return encode(Frame(code, bytes(status), REPLY))
 
 
 def test_started_in_flight_it_takes_nothing_over(tmp_path: Path) -> None:
     """Its first frame would close the throttle."""
-    reply = flying(ARM, OVERRIDE)
+    reply = Flying(ARM, OVERRIDE)
     with controller(reply) as client:
         options = Fly(vehicle="vis_r", link=client.link.name, pose=f"udp:{free_port()}", log=tmp_path / "f.mcap")  # type: ignore[attr-defined]
         with pytest.raises(ValueError, match=r"armed and its override is on, .*; accepted: disarmed, or override low"):
             fly_command(options)
-    assert StatusEx.CODE in reply.asked  # type: ignore[attr-defined]
-    assert SET_RAW_RC not in reply.asked  # type: ignore[attr-defined]
+    assert StatusEx.CODE in reply.asked
+    assert SET_RAW_RC not in reply.asked
     assert not (tmp_path / "f.mcap").exists()
 
 
 @pytest.mark.parametrize("boxes", [(), (ARM,), (OVERRIDE,)], ids=["neither", "armed", "override"])
 def test_on_the_ground_or_beside_a_pilot_who_flies_it_begins(boxes: tuple[int, ...], tmp_path: Path) -> None:
-    reply, began = flying(*boxes), time.monotonic()
+    reply, began = Flying(*boxes), time.monotonic()
     with controller(reply) as client:
         command = [sys.executable, "-m", "e2efly", "fly", "hover", "--link", client.link.name]  # type: ignore[attr-defined]
         command += ["--pose", f"udp:{free_port()}", "--log", str(tmp_path / "flight.mcap")]
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
         try:
-            while SET_RAW_RC not in reply.asked:  # type: ignore[attr-defined]
+            while SET_RAW_RC not in reply.asked:
                 assert process.poll() is None
                 assert time.monotonic() < began + 60
                 time.sleep(0.02)
+            reply.boxes = ()  # disarmed, it ends
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(30) == 0
         finally:
+            reply.boxes = ()  # else its watchdog would stay
             process.kill()
             process.wait()
 
