@@ -17,7 +17,9 @@ from typing import Any
 import pytest
 
 from e2efly.cli import WHOLE
+from e2efly.commands.fly import parse
 from e2efly.deploy.log.flight_log import read_log
+from e2efly.deploy.service import PERIOD_S
 from tests.commands.test_fly import free_port
 from tests.deploy.test_msp_client import controller, recorded
 
@@ -151,3 +153,26 @@ def test_what_it_cannot_do_is_named(arguments: list[str], lacks: str, slim: Path
     assert f"`e2efly {arguments[0]}` needs {lacks}" in said
     assert "the part of e2efly that flies, e2efly-fly; accepted: `fly`, or an environment with the whole" in said
     assert not [*tmp_path.iterdir()]
+
+
+def unit() -> dict[str, str]:
+    """The lines of the service's unit."""
+    text = (ROOT / "onboard" / "e2efly-fly.service").read_text(encoding="utf-8")
+    return dict(line.split("=", 1) for line in text.splitlines() if "=" in line and not line.startswith("#"))
+
+
+def test_the_unit_leaves_the_landing_to_the_watchdog_process() -> None:
+    """Whatever ends the bridge, systemd kills nothing else, and waits for a landing."""
+    lines = unit()
+    assert (lines["Type"], lines["NotifyAccess"]) == ("notify", "main")
+    assert (lines["KillMode"], lines["SendSIGKILL"], lines["OOMPolicy"]) == ("process", "no", "continue")
+    assert lines["TimeoutStopSec"] == "infinity"
+    assert float(lines["WatchdogSec"]) > 10 * PERIOD_S
+    assert int(lines["LimitRTPRIO"]) >= 20  # that of the watchdog process
+
+
+def test_the_unit_starts_a_command_that_there_is() -> None:
+    name, value = (ROOT / "onboard" / "fly.env").read_text(encoding="utf-8").strip().split("=", 1)
+    program, command, given = unit()["ExecStart"].split()
+    assert (Path(program).name, command, given) == ("e2efly", "fly", f"${name}")
+    assert parse(value.split()).policy == Path("hover")
