@@ -60,7 +60,7 @@ web:
 	cd web && npm ci --ignore-scripts && npm run check && npm run build
 
 clean:
-	rm -rf $(VENV) build dist site src/*.egg-info
+	rm -rf $(VENV) build onboard/build dist site src/*.egg-info
 
 $(READY): pyproject.toml constraints.txt
 	@echo "setting up $(VENV) (once)"

@@ -46,6 +46,8 @@ TITLES = {
     "process_faults": "The bridge's process killed, stopped, its disk full, in flight",
     "bridge_loop": "The bridge's control loop, flying the firmware in real time",
     "runtime_speed": "The runtime on a companion computer",
+    "onboard": "The part that flies, beside the whole",
+    "c_export": "The zoo's policies as C",
     "msp_fuzz": "MSP codec under fuzzing",
 }
 
@@ -57,6 +59,13 @@ was the default until then. The default of today takes three times as long per p
 ([physics](physics.md))."""
 """What stands over all tables."""
 NOTES = {
+    "c_export": """
+Plain: `cc -O2`. Native: `cc -O3 -march=native`. Difference: the largest of the actions on 200 inputs by
+chance, from the value of the policy.onnx in double precision; of ONNX Runtime likewise.
+[What is exported](onboard.md#as-c).""",
+    "onboard": """
+Each flies hover beside a controller that answers as recorded firmware did. [How to install
+it](onboard.md).""",
     "rates": """
 Third-order sub-steps, today's default. First-order ones (`semi_implicit`) run at 168 M/s on the same
 machine and day. On the 22nd, on a faster machine of the same name, first order gave 453 M/s, 38 times

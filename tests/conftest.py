@@ -37,7 +37,7 @@ from hypothesis import settings  # noqa: E402
 settings.register_profile("suite", deadline=None)  # how busy the machine is says nothing of the code
 settings.load_profile("suite")
 
-PARTS = ("ros1", "ros2", "mocap", "realsense", "sitl", "browser")
+PARTS = ("ros1", "ros2", "mocap", "realsense", "sitl", "browser", "cc")
 """What may be missing on a laptop: tests in files whose names end so need it, and fail without it."""
 LONGEST = (
     "docs/test_tutorials.py", "docs/test_notebooks.py", "test_paper.py",

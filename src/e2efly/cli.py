@@ -24,6 +24,7 @@ _EXAMPLES = {
     "sweep hover --seeds 5": "over seeds and options, side by side on Ray",
     "export RUN": "write policy.onnx from a checkpoint again",
     "export race --web DIR": "a page in which a policy flies, in any browser",
+    "export race --c DIR": "a policy as C, for machines without Python",
     "validate POLICY": "fly it on another physics, or through the real firmware",
     "fly POLICY": "fly it on a Betaflight quadrotor",
     "hil POLICY": "put a real vehicle into a virtual world: poses in, images out",
@@ -37,6 +38,8 @@ _EXAMPLES = {
     "bench": "how fast this machine simulates and learns",
     "list": "tasks, algorithms, vehicles, tracks, plants, reward terms",
 }
+WHOLE = ("jax", "jaxlib", "jaxtyping", "matplotlib", "onnx", "optax", "safetensors", "scipy", "tensorboardX")
+"""Packages that the distribution `e2efly` needs and `e2efly-fly`, the part that flies, does not: onboard/."""
 _COMMANDS = dict.fromkeys(example.split()[0] for example in _EXAMPLES)
 
 
@@ -69,6 +72,15 @@ def run(arguments: list[str]) -> int:
         return _command(arguments[0], arguments[1:])
     except BrokenPipeError:
         raise
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] not in WHOLE:
+            raise
+        console.print("error:", style="bold red", end=" ")
+        console.print(
+            f"`e2efly {arguments[0]}` needs {error.name}, which is not installed: this is the part of e2efly that "
+            "flies, e2efly-fly; accepted: `fly`, or an environment with the whole, `pip install e2efly`"
+        )
+        return 2
     except (ValueError, OSError, FloatingPointError, MemoryError, RuntimeError) as error:
         full = isinstance(error, MemoryError) or "RESOURCE_EXHAUSTED" in str(error)  # NumPy's word, and XLA's
         if isinstance(error, RuntimeError) and not full:

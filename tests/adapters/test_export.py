@@ -17,7 +17,7 @@ from e2efly.adapters.gym import QuadrotorVectorEnv
 from e2efly.adapters.stable_baselines3 import SB3VecEnv
 from e2efly.adapters.torch import TorchEnv
 from e2efly.config import NetworkConfig
-from e2efly.learn.export import random_observations
+from e2efly.deploy.policy.draws import random_observations
 
 NETWORK = {"net_arch": [16, 16]}
 

@@ -19,10 +19,11 @@ import e2efly.deploy
 from e2efly import presets
 from e2efly.config import NetworkConfig
 from e2efly.deploy.policy.contract import METADATA_KEY
+from e2efly.deploy.policy.draws import random_observations
 from e2efly.deploy.policy.loader import Policy, load_policy, sealed_policy
 from e2efly.deploy.policy.onnx_file import sealed
 from e2efly.env import Env
-from e2efly.learn.export import contract_of, export_policy, random_observations
+from e2efly.learn.export import contract_of, export_policy
 from e2efly.learn.networks import Actor, Weights, init_mlp
 from e2efly.vehicles import load_vehicle
 from e2efly.zoo import policy_file

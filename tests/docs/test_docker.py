@@ -1,5 +1,7 @@
 """The Dockerfiles copy what is there and run what the documentation says. No image is built."""
 
+import importlib.util
+import json
 import re
 import shlex
 import tomllib
@@ -31,12 +33,19 @@ def test_dockerfile(path) -> None:  # noqa: ANN001
     for source in sources:
         assert (ROOT / source).exists(), source
         assert source in allowed, f"{source} is left out by .dockerignore"
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    (extras,) = re.findall(r"pip install [^']*'\.\[([a-z0-9,-]+)\]'", " ".join(text for _, text in found))
-    assert set(extras.split(",")) <= set(project["optional-dependencies"])
-    assert {project["readme"], *project["license-files"]} <= set(sources)
-    assert ("ENTRYPOINT", '["e2efly"]') in found
+    part = "onboard" if path.stem.startswith("fly") else "."
+    project = tomllib.loads((ROOT / part / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    installed = re.findall(
+        r"pip install [^']*?(?:'\.\[([a-z0-9,-]+)\]'|\./onboard)$", "\n".join(t for _, t in found), re.M
+    )
+    assert len(installed) == 1
+    assert set(filter(None, installed[0].split(","))) <= set(project["optional-dependencies"])
+    assert {*project["license-files"]} | ({project["readme"]} if "readme" in project else set()) <= set(sources)
+    (entry,) = (json.loads(text) for name, text in found if name == "ENTRYPOINT")
+    assert entry[-1] == "e2efly"
     assert "e2efly" in project["scripts"]
+    for module in entry[2:-1]:  # python -m MODULE e2efly
+        assert importlib.util.find_spec(module)
 
 
 def test_the_python_of_the_images_is_one_that_the_project_takes() -> None:
@@ -46,9 +55,10 @@ def test_the_python_of_the_images_is_one_that_the_project_takes() -> None:
 
 
 def test_the_documentation_builds_and_runs_them_as_they_say_themselves() -> None:
-    page = (DOCS / "tutorials" / "install.md").read_text(encoding="utf-8")
-    assert [path.stem for path in FILES] == ["cpu", "cuda"]
+    assert [path.stem for path in FILES] == ["cpu", "cuda", "fly"]
     for path in FILES:
+        name = "onboard.md" if path.stem == "fly" else "tutorials/install.md"
+        page = (DOCS / name).read_text(encoding="utf-8")
         commands = re.findall(r"^#   (docker .*)$", path.read_text(encoding="utf-8"), re.MULTILINE)
         assert len(commands) == 2
         assert not [command for command in commands if f"$ {command}\n" not in page]

@@ -13,9 +13,10 @@ from e2efly import presets
 from e2efly.config import EnvConfig, ImuConfig, NetworkConfig, TrainConfig
 from e2efly.control import COMMAND_MODES
 from e2efly.deploy.policy.contract import METADATA_KEY, Contract
+from e2efly.deploy.policy.draws import random_observations
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.env import Env
-from e2efly.learn.export import contract_of, export_policy, parity, random_observations
+from e2efly.learn.export import contract_of, export_policy, parity
 from e2efly.learn.networks import ACTIVATIONS, Actor, Layers, Weights, init_mlp
 from e2efly.observation import ATTITUDE, BODY_RATE, VELOCITY, Field, past_actions
 from e2efly.tasks import TASKS

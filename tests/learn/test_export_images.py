@@ -13,11 +13,12 @@ import pytest
 
 from e2efly import presets
 from e2efly.config import CameraConfig, EnvConfig, ImuConfig, NetworkConfig, RewardConfig, TrainConfig
+from e2efly.deploy.policy.draws import random_images, random_observations
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.env import Env
 from e2efly.episodes import Act
 from e2efly.evaluation import act_of, check_observation, config_from_contract
-from e2efly.learn.export import contract_of, export_policy, parity, random_images, random_observations
+from e2efly.learn.export import contract_of, export_policy, parity
 from e2efly.learn.networks import Actor, View, Weights
 from e2efly.learn.programs import acting
 from e2efly.learn.rundir import RunDirectory, run_of

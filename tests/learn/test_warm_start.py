@@ -12,8 +12,8 @@ import pytest
 
 import e2efly
 from e2efly.cli import run
+from e2efly.deploy.policy.draws import random_images, random_observations
 from e2efly.learn.checkpoint import read_arrays
-from e2efly.learn.export import random_images, random_observations
 from e2efly.learn.setup import Setup
 from e2efly.learn.warm_start import started_from
 from e2efly.presets import begun

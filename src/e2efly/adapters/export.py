@@ -16,8 +16,9 @@ import torch
 
 from e2efly.adapters.stepper import Stepper
 from e2efly.config import NetworkConfig
+from e2efly.deploy.policy.draws import random_observations
 from e2efly.deploy.policy.loader import load_policy
-from e2efly.learn.export import contract_of, random_observations, write_policy
+from e2efly.learn.export import contract_of, write_policy
 from e2efly.learn.graph import perceptron_graph
 from e2efly.learn.networks import Layers
 from e2efly.storage import write_atomically

@@ -1,23 +1,26 @@
 """`e2efly export`."""
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import tyro
 
+from e2efly.c_policy.header import Precision
 from e2efly.device import prepare
 from e2efly.storage import write_atomically
 from e2efly.terminal import Terminal
+from e2efly.zoo import policy_file
 
 
 @dataclass(frozen=True)
 class Export:
-    """Write policy.onnx from the checkpoint of a run, or a page in which a policy flies."""
+    """Write policy.onnx from the checkpoint of a run, a page in which a policy flies, or a policy as C."""
 
     run: tyro.conf.Positional[Path]
     """A run directory; or a policy.onnx of an older e2efly, to give it the digest that is checked when it is loaded;
-    with --web also the name of a task: the zoo's policy of it."""
+    with --web and --c also the name of a task: the zoo's policy of it."""
     out: Path | None = None
     """The file to write; RUN/policy.onnx, or the older file itself, when left out."""
     which: Literal["best", "last"] = "best"
@@ -27,10 +30,26 @@ class Export:
     browser, and wind, mass and delay can be changed. Open its index.html, or put the folder on any host of files."""
     vehicle: str | None = None
     """What flies in the page, a name or a .toml file; the policy's own vehicle when left out."""
+    c: Path | None = None
+    """Write the policy.onnx of the run as C99 into this folder: no dependency but <math.h>, nothing allocated, its
+    contract as a header, and a program that checks and times it. See docs/onboard.md."""
+    name: str = "policy"
+    """With --c: of the files and of all symbols."""
+    precision: Precision = "double"
+    """With --c: what the network computes in. double: within 1e-6 of the exact value of the file; float: as near as
+    ONNX Runtime, a few 1e-6, for processors that compute in single precision alone."""
+    memory: float | None = None
+    """With --c: KiB of memory that the target has for the policy's state and images; a policy that needs more is
+    refused."""
+    flash: float | None = None
+    """With --c: KiB of read-only memory that the target has for the policy's weights, likewise."""
 
 
 def run(options: Export) -> int:
-    """Write policy.onnx from a checkpoint, or anew from a file of an older e2efly; or a page, see `Export.web`."""
+    """Write policy.onnx from a checkpoint, or anew from a file of an older e2efly; or a page or C: `Export`."""
+    if options.c is not None:
+        return _write_c(options, options.c)
+    _without_effect(options, ("name", "precision", "memory", "flash"), "it has no effect without --c")
     if options.web is not None:
         return _write_page(options, options.web)
     if options.vehicle is not None:
@@ -58,12 +77,8 @@ def run(options: Export) -> int:
 
 
 def _write_page(options: Export, folder: Path) -> int:
-    for name, value, default in (("out", options.out, None), ("which", options.which, "best")):
-        if value != default:
-            raise ValueError(
-                f"--{name} is {str(value)!r}, which has no effect with --web; accepted: one of the two: a page flies "
-                "the policy.onnx that there is"
-            )
+    why = "it has no effect with --web: a page flies the policy.onnx that there is"
+    _without_effect(options, ("out", "which"), why)
     prepare("cpu")
     from e2efly.evaluation import candidate
     from e2efly.web.page import write_page
@@ -72,3 +87,25 @@ def _write_page(options: Export, folder: Path) -> int:
     write_page(folder, found)
     Terminal().print(f"Wrote a page that flies {found.file}: open {folder / 'index.html'}")
     return 0
+
+
+def _write_c(options: Export, folder: Path) -> int:
+    why = "it has no effect with --c: the policy.onnx that there is becomes C"
+    _without_effect(options, ("out", "which", "web", "vehicle"), why)
+    from e2efly.c_policy.write import write_c
+
+    file, name = policy_file(options.run), options.name
+    needs = write_c(folder, file, name, options.precision, options.memory, options.flash)
+    console = Terminal()
+    console.print(f"Wrote {file} as C to {folder}: {name}.h, {name}.c and {name}_check.c")
+    console.print(
+        f"It needs {needs.state} bytes of state, {needs.images} of images and {needs.constants} of weights and tables. "
+        f"Check it: cd {folder} && cc -O2 -std=c99 {name}.c {name}_check.c -lm -o check && ./check"
+    )
+    return 0
+
+
+def _without_effect(options: Export, names: tuple[str, ...], why: str) -> None:
+    for field in dataclasses.fields(options):
+        if field.name in names and (value := getattr(options, field.name)) != field.default:
+            raise ValueError(f"--{field.name} is {str(value)!r}; {why}; accepted: without it")

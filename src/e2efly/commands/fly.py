@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import tyro
 
 from e2efly import __version__
-from e2efly.commands.fly_check import look, settings_table
+from e2efly.commands.fly_check import look, refuse_in_flight, settings_table
 from e2efly.commands.options import parse as parse_options
 from e2efly.deploy.betaflight.check import Row, examine, problems
 from e2efly.deploy.betaflight.client import SCHEDULE, Client
@@ -34,6 +34,7 @@ from e2efly.deploy.policy.loader import Policy, load_policy
 from e2efly.deploy.policy.runtime import Envelope, Runtime, check
 from e2efly.deploy.policy.worker import PolicyWorker
 from e2efly.deploy.pose.sources import open_source
+from e2efly.deploy.service import Service
 from e2efly.deploy.settings import FlightSettings
 from e2efly.deploy.settings import check as check_settings
 from e2efly.deploy.sight.sources import open_cameras
@@ -196,6 +197,9 @@ def run(options: Fly) -> int:
         source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:
             return look(bridge, source, console, rows, policy)
+        refuse_in_flight(bridge)
+        service = Service()
+        stack.callback(service.close)
         stop = Stop()
         stack.callback(stop.restore)
         path = options.log or Path("flights") / time.strftime("%Y-%m-%d_%H-%M-%S.mcap")
@@ -221,7 +225,7 @@ def run(options: Fly) -> int:
         say(f"{rate:g} Hz, log {path}. Ctrl-C lands.")
         timing = fly(
             bridge, rate, log=log, live=live, watchdog=held if isinstance(held, WatchedLink) else None, say=say,
-            stop=stop, identify_again=again,
+            stop=stop, identify_again=again, service=service,
         )  # fmt: skip
         telemetry.close()
         live.close()

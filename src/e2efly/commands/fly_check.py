@@ -8,6 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from e2efly.deploy.betaflight.check import Row, problems
+from e2efly.deploy.betaflight.messages import StatusEx
 from e2efly.deploy.bridge import Bridge
 from e2efly.deploy.commander.commander import Commander
 from e2efly.deploy.odometry import Sample
@@ -22,6 +23,8 @@ from e2efly.deploy.terminal import printable
 
 LOOK_S = 1.5
 """How long `--check` watches poses and receiver, s."""
+STATUS_S, STATUSES = 1.0, 3
+"""So long, s, and in so many messages, the controller may say whether it is armed, before a bridge begins."""
 PICTURES = Path("flights")
 """Where `--check` puts pictures of what the network is shown."""
 
@@ -81,6 +84,30 @@ def look(
     for refusal in refusals:
         console.print(f"  - {printable(refusal)}")
     return 1 if problems(rows) or bridge.odometry is None else 0
+
+
+def refuse_in_flight(bridge: Bridge) -> None:
+    """Refuse to begin where the controller would obey at once: the first frame of a bridge closes the throttle.
+
+    A bridge that a service manager starts anew while the vehicle flies must not take it over. Sends no sticks.
+
+    Args:
+        bridge: that is about to begin.
+
+    Raises:
+        ValueError: when the controller is armed and its override is on.
+    """
+    end, known = time.monotonic() + STATUS_S, set[float]()
+    while (now := time.monotonic()) < end and len(known) < STATUSES:
+        bridge.look(now)
+        if (reply := bridge.client.latest.get(StatusEx.CODE)) is not None:
+            known.add(reply.time)
+        time.sleep(0.005)
+    if bridge.inputs.armed and bridge.inputs.override:
+        raise ValueError(
+            "the controller is armed and its override is on, so that the first frame, which closes the throttle, would "
+            "stop the motors; accepted: disarmed, or override low. If a watchdog is landing the vehicle, let it"
+        )
 
 
 def _add_poses(table: Table, bridge: Bridge, source: PoseSource, poses: list[Sample]) -> None:

@@ -19,6 +19,7 @@ from e2efly.deploy.log.live import Live
 from e2efly.deploy.log.record import Log
 from e2efly.deploy.pilot.flight_state import Mode
 from e2efly.deploy.pilot.hover import blind, blind_time, sink_time
+from e2efly.deploy.service import Service
 from e2efly.deploy.terminal import printable
 
 LOWEST_RATE = 100.0
@@ -63,6 +64,7 @@ def fly(
     say: Callable[[str], None] = print,
     stop: Callable[[], bool] = lambda: False,
     identify_again: Callable[[], ControllerInfo | None] | None = None,
+    service: Service | None = None,
     clock: Clock = MONOTONIC,
 ) -> Timing:
     """Run the bridge until `stop` says so and the vehicle is on the ground and disarmed, or the watchdog's for good.
@@ -76,6 +78,7 @@ def fly(
         say: takes lines for people; it must not block. What it raises is lost with its line.
         stop: whether to end; a vehicle in the air is landed first.
         identify_again: reads the controller's settings anew after it was connected again, on the ground.
+        service: tells the service manager that the loop goes on.
         clock: the time.
     """
     timing, period = Timing(), 1 / rate
@@ -89,6 +92,8 @@ def fly(
             now = clock.now()
             late = max(now - due, 0.0)
             if stop():
+                if service is not None and not bridge.land_now:
+                    service.stopping()
                 bridge.land_now = True
                 ended = bridge.flight.mode in (Mode.INIT, Mode.DONE)  # not while the pilot flies: the sticks would stay
                 if ended and not bridge.inputs.armed:  # or the throttle stick, in its middle, would have the motors
@@ -101,6 +106,8 @@ def fly(
                 due = now = clock.now()
                 late = 0.0
             bridge.tick(now, late, slack=period / 2)
+            if service is not None:
+                service.stepped(now)
             if live is not None:
                 live.show(bridge.seen)
             if watchdog is not None and now - last_plan >= PLAN_PERIOD:

@@ -12,6 +12,7 @@ from e2efly import __version__
 from e2efly.config import TrainConfig
 from e2efly.control import COMMAND_MODES
 from e2efly.deploy.policy.contract import CONTRACT_VERSION, METADATA_KEY, Action, Contract
+from e2efly.deploy.policy.draws import random_images, random_observations
 from e2efly.deploy.policy.images import NONE, Image
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.deploy.policy.onnx_file import sealed
@@ -19,7 +20,6 @@ from e2efly.env import Env
 from e2efly.env.limits import limits_of
 from e2efly.learn.graph import OPERATORS, policy_graph
 from e2efly.learn.networks import FAINTEST, NEAREST, Actor, View, Weights
-from e2efly.observation import Field
 from e2efly.storage import write_atomically
 from e2efly.tasks import TASKS
 from e2efly.vehicles import load_family, nominal_vehicle
@@ -203,28 +203,6 @@ def parity(path: Path, weights: Weights, actor: Actor, count: int = 10_000, seed
 
     both = zip(exported.act(observation, images, memory), wanted(weights, observation, images, memory), strict=True)
     return float(max(np.max(np.abs(a - np.asarray(b)), initial=0.0) for a, b in both))
-
-
-def random_observations(rng: np.random.Generator, fields: tuple[Field, ...], count: int) -> np.ndarray:
-    """Float32 (count, o): any attitude, past actions all over their range, the rest normal, of twice its scale."""
-
-    def draw(field: Field) -> np.ndarray:
-        if field.frame == "none":
-            return rng.uniform(-field.scale, field.scale, (count, field.size))
-        normal = rng.standard_normal((count, field.size))
-        if field.frame == "world_body":
-            return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-        return 2 * field.scale * normal
-
-    return np.concatenate([draw(field) for field in fields], axis=-1).astype(np.float32)
-
-
-def random_images(rng: np.random.Generator, image: Image, count: int) -> np.ndarray:
-    """Float32 (count, h, w) or (count, h, w, 3): values all over their range, a part of them 0; a mask: 0 and 1."""
-    low, high = image.limits
-    x = rng.uniform(low, high, (count, *image.shape))
-    shown = rng.random((count, *image.shape)) < rng.random((count, *(1,) * len(image.shape)))
-    return (shown * (1.0 if image.sees == "mask" else x)).astype(np.float32)
 
 
 def _check(weights: Weights, actor: Actor) -> None:

@@ -19,7 +19,7 @@ SLOWEST = 0.01
 NONE = "none"
 """In place of what an image does not have: a class but of a mask, an encoding but of depth and range."""
 _COLOURS = ("rgb", "normal")
-_ROUNDING = 1e-5
+ROUNDING = 1e-5
 """Relative, of what lies at the end of a range."""
 
 
@@ -89,7 +89,7 @@ class Image:
                 f"{self.description}"
             )
         low, high = self.limits
-        room = _ROUNDING * (high - low)
+        room = ROUNDING * (high - low)
         if x.size and not (x.min() >= low - room and x.max() <= high + room):  # false for NaN
             bad = x[~((x >= low - room) & (x <= high + room))]
             raise ValueError(

@@ -1,0 +1,64 @@
+"""From the graph of a policy.onnx to a program of C."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import onnx
+from onnx import numpy_helper
+
+from e2efly.c_policy.operators import OF_CONSTANTS, OPERATORS
+from e2efly.c_policy.program import Operand, Program
+
+
+@dataclass(frozen=True)
+class Network:
+    """A policy's graph as a program."""
+
+    program: Program
+    outputs: dict[str, Operand]
+    """By name."""
+
+
+def network(content: bytes, inputs: Mapping[str, Operand]) -> Network:
+    """The program of a policy's graph, for one observation.
+
+    Args:
+        content: of a policy.onnx that `load_policy` accepts.
+        inputs: where each input of the graph lies, by its name.
+
+    Raises:
+        ValueError: naming the node and its operator, where it is not among `OPERATORS` or does what is not known, and
+            the type of a constant that is none of floats or whole numbers.
+    """
+    graph = onnx.load_model_from_string(content).graph
+    program, known = Program(), dict(inputs)
+    for tensor in graph.initializer:
+        known[tensor.name] = _constant(tensor)
+    for node in graph.node:
+        where = f"node {node.output[0]!r} of the graph"
+        if node.domain not in ("", "ai.onnx") or node.op_type not in OPERATORS:
+            accepted = ", ".join(sorted(OPERATORS))
+            raise ValueError(f"{where} is {node.op_type!r}, which the export as C does not know; accepted: {accepted}")
+        for output, operand in zip(node.output, _outputs(where, node, known, program), strict=True):
+            known[output] = operand
+    return Network(program, {output.name: known[output.name] for output in graph.output})
+
+
+def _outputs(where: str, node: onnx.NodeProto, known: Mapping[str, Operand], program: Program) -> list[Operand]:
+    try:
+        given = [known[name] for name in node.input if name]
+        raw = 1 if node.op_type in OF_CONSTANTS else len(given)
+        given[:raw] = [program.held(operand) for operand in given[:raw]]
+        return OPERATORS[node.op_type](node, given, program)
+    except ValueError as error:
+        raise ValueError(f"{where}, {node.op_type}, {error}") from None
+
+
+def _constant(tensor: onnx.TensorProto) -> Operand:
+    value = numpy_helper.to_array(tensor)
+    if value.dtype != np.int64 and (value.dtype != np.float32 or not np.isfinite(value).all()):
+        raise ValueError(
+            f"constant {tensor.name!r} of the graph is of {value.dtype}; accepted: finite float32, and int64 of places"
+        )
+    return Operand("", value.shape, value=value)

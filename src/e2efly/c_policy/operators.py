@@ -1,0 +1,247 @@
+"""ONNX's operators as statements of C, for one observation at a time.
+
+`real` is the type of what is computed and REAL(f) its function f of <math.h>; weights are float.
+
+Each function takes the node, its operands and the program, to which it adds constants, buffers and a step, and returns
+its outputs. Arrays lie row by row; the batch axis, 1, is left out of their shapes.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import accumulate
+
+import numpy as np
+from onnx import NodeProto
+
+from e2efly.c_policy.program import Operand, Program, Shape
+from e2efly.c_policy.text import number
+from e2efly.c_policy.windows import Given, attributes, convolution, norm, pool
+
+UNARY = {
+    "Relu": "{0} > 0.0f ? {0} : 0.0f",
+    "Tanh": "REAL(tanh)({0})",
+    "Sigmoid": "1.0f / (1.0f + REAL(exp)(-{0}))",
+    "Log": "REAL(log)({0})",
+    "Softplus": "({0} > 0.0f ? {0} : 0.0f) + REAL(log1p)(REAL(exp)(-REAL(fabs)({0})))",
+}
+"""Expressions of a number."""
+SLOPED = {
+    "Elu": ("{0} > 0.0f ? {0} : {alpha} * (REAL(exp)({0}) - 1.0f)", 1.0),
+    "LeakyRelu": ("{0} > 0.0f ? {0} : {alpha} * {0}", 0.01),
+}
+"""The same, of `alpha` too, and its default."""
+BINARY = {
+    "Add": "{} + {}",
+    "Sub": "{} - {}",
+    "Mul": "{} * {}",
+    "Div": "{} / {}",
+    "Max": "{0} > {1} ? {0} : {1}",
+    "Greater": "{} > {} ? 1.0f : 0.0f",
+}
+"""Expressions of two numbers."""
+BLOCK = 4
+"""Rows of a matrix that are added at once: an output is then read and written once in so many rows."""
+
+
+def _each(node: NodeProto, program: Program, shape: Shape, reads: Given, expression: str) -> list[Operand]:
+    """A step that computes number by number."""
+    out = program.buffer(shape)
+    whole = {operand.buffer for operand in reads if operand.size == out.size}
+    in_place = all(operand.buffer is None or operand.buffer in whole for operand in reads)
+    in_place = in_place and all(operand.text == f"b{operand.buffer}" for operand in reads if operand.buffer is not None)
+    lines = [f"for (int i = 0; i < {out.size}; i++) {out.text}[i] = {expression};"]
+    program.step(node.op_type, lines, reads, out, in_place=in_place)
+    return [out]
+
+
+def _unary(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    (x,) = given
+    form, default = SLOPED.get(node.op_type) or (UNARY[node.op_type], None)
+    alpha = default and number(attributes(node, alpha=default)["alpha"])
+    if default is None:
+        attributes(node)
+    return _each(node, program, x.shape, given, form.format(x.at("i"), alpha=alpha))
+
+
+def _binary(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    attributes(node)
+    if len(given) != 2:
+        raise ValueError(f"has {len(given)} inputs; accepted: 2")
+    shape = _common(given)
+    return _each(node, program, shape, given, BINARY[node.op_type].format(*(x.at("i") for x in given)))
+
+
+def _where(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    attributes(node)
+    condition, a, b = given
+    expression = f"{condition.at('i')} > 0.0f ? {a.at('i')} : {b.at('i')}"
+    return _each(node, program, _common(given), given, expression)
+
+
+def _clip(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    attributes(node)
+    if len(given) != 3 or given[1].size != 1 or given[2].size != 1:
+        raise ValueError("has other inputs than an array and two numbers")
+    x = given[0]
+    v, a, b = (operand.at("i") for operand in given)
+    return _each(node, program, x.shape, given, f"{v} < {a} ? {a} : {v} > {b} ? {b} : {v}")
+
+
+def _common(given: Given) -> Shape:
+    """The shape of all, where each has it or is one number."""
+    largest = max(given, key=lambda x: (x.size, len(x.shape))).shape
+    for x in given:
+        if x.size not in (1, math.prod(largest)) or (x.size > 1 and _tight(x.shape) != _tight(largest)):
+            raise ValueError(f"has inputs of the shapes {[x.shape for x in given]}; accepted: equal ones, or 1 number")
+    return largest
+
+
+def _tight(shape: Shape) -> Shape:
+    return tuple(n for n in shape if n != 1)
+
+
+def _identity(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    del program
+    attributes(node)
+    return list(given)
+
+
+def _gemm(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    about = attributes(node, alpha=1.0, beta=1.0, transA=0, transB=0)
+    x, weight = given[:2]
+    if about["alpha"] != 1.0 or about["beta"] != 1.0 or about["transA"] or weight.value is None or len(x.shape) != 1:
+        raise ValueError("is other than x W + b with constant W")
+    matrix = weight.value.T if about["transB"] else weight.value
+    bias = given[2].value if len(given) > 2 else np.zeros(1, np.float32)
+    if bias is None or matrix.ndim != 2 or matrix.shape[0] != x.size or bias.size not in (1, matrix.shape[1]):
+        raise ValueError(f"has inputs of the shapes {[x.shape for x in given]}; accepted: (k,), (k, n) and (n,)")
+    return [_linear(node, x, matrix, np.broadcast_to(bias.reshape(-1), matrix.shape[1]), program)]
+
+
+def _linear(node: NodeProto, x: Operand, matrix: np.ndarray, bias: np.ndarray, program: Program) -> Operand:
+    """Row by row of the matrix, so that a compiler's vectors go along the outputs."""
+    rows, columns = matrix.shape
+    weight, start = program.constant("weight", matrix), program.constant("bias", bias)
+    out = program.buffer((columns,))
+    lines = [f"for (int j = 0; j < {columns}; j++) {out.text}[j] = {start.text}[j];"]
+    blocks = rows // BLOCK * BLOCK
+    if blocks:
+        lines += [
+            f"for (int i = 0; i < {blocks}; i += {BLOCK}) {{",
+            f"    const float *w = {weight.text} + i * {columns};",
+        ]
+        lines += [f"    const real {', '.join(f'x{k} = {x.text}[i + {k}]' for k in range(BLOCK))};"]
+        terms = " + ".join(f"x{k} * w[j{f' + {k * columns}' if k else ''}]" for k in range(BLOCK))
+        lines += [f"    for (int j = 0; j < {columns}; j++) {out.text}[j] += {terms};", "}"]
+    for row in range(blocks, rows):
+        term = f"{x.text}[{row}] * {weight.text}[j + {row * columns}]"
+        lines.append(f"for (int j = 0; j < {columns}; j++) {out.text}[j] += {term};")
+    program.step(f"{node.op_type}, {rows} to {columns}", lines, [x], out)
+    return out
+
+
+def _matmul(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    attributes(node)
+    a, b = given
+    if len(a.shape) != 2 or len(b.shape) != 2 or a.shape[1] != b.shape[0]:
+        raise ValueError(f"has inputs of the shapes {a.shape} and {b.shape}; accepted: (m, k) and (k, n)")
+    (m, k), n = a.shape, b.shape[1]
+    out = program.buffer((m, n))
+    terms = " + ".join(f"{a.text}[{k} * i + {q}] * {b.text}[j + {n * q}]" for q in range(k))
+    if k > 16:
+        raise ValueError(f"has {k} terms; accepted: up to 16, as to turn vectors")
+    lines = [f"for (int i = 0; i < {m}; i++)", f"    for (int j = 0; j < {n}; j++) {out.text}[{n} * i + j] = {terms};"]
+    program.step(f"{node.op_type}, {m} x {k} x {n}", lines, given, out)
+    return [out]
+
+
+def _gather(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    about = attributes(node, axis=0)
+    x, index = given
+    if about["axis"] != 1 or len(x.shape) != 1 or index.value is None or index.value.ndim != 1:
+        raise ValueError("is other than of constant columns")
+    places = [int(i) + (x.size if i < 0 else 0) for i in index.value]
+    if not all(0 <= place < x.size for place in places):
+        raise ValueError(f"has the places {places}; accepted: 0 to {x.size - 1}")
+    out = program.buffer((len(places),))
+    if places:
+        table = program.table(places)
+        lines = [f"for (int i = 0; i < {out.size}; i++) {out.text}[i] = {x.text}[{table}[i]];"]
+        program.step(node.op_type, lines, [x], out)
+    return [out]
+
+
+def _reshape(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    del program
+    about = attributes(node, allowzero=0)
+    x, wanted = given
+    if wanted.value is None or about["allowzero"] or not len(wanted.value) or int(wanted.value[0]) not in (0, 1):
+        raise ValueError("is other than to a constant shape behind the batch axis")
+    shape = [x.shape[i] if n == 0 else int(n) for i, n in enumerate(wanted.value[1:])]
+    if shape.count(-1) == 1:
+        shape[shape.index(-1)] = x.size // -math.prod(shape) if math.prod(shape) else 0
+    if math.prod(shape) != x.size or min(shape, default=1) < 0:
+        raise ValueError(f"is from {x.shape} to {tuple(wanted.value[1:])}; accepted: of as many numbers")
+    return [replace(x, shape=tuple(shape))]
+
+
+def _transpose(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    (x,) = given
+    order = list(attributes(node, perm=())["perm"])
+    if sorted(order) != list(range(len(x.shape) + 1)) or order[0] != 0:
+        raise ValueError(f"has perm {order}; accepted: the batch axis first, then each of the other axes")
+    axes = [axis - 1 for axis in order[1:]]
+    shape = tuple(x.shape[axis] for axis in axes)
+    kept = [axis for axis in axes if x.shape[axis] != 1]
+    if kept == sorted(kept):  # the numbers stay where they are
+        return [replace(x, shape=shape)]
+    strides = _strides(x.shape)
+    out, names = program.buffer(shape), [f"t{axis}" for axis in axes]
+    target = " + ".join(f"{stride} * {name}" for name, stride in zip(names, _strides(shape), strict=True))
+    source = " + ".join(f"{strides[axis]} * {name}" for name, axis in zip(names, axes, strict=True))
+    lines = [f"for (int {name} = 0; {name} < {n}; {name}++)" for name, n in zip(names, shape, strict=True)]
+    program.step(node.op_type, [*lines, f"    {out.text}[{target}] = {x.text}[{source}];"], given, out)
+    return [out]
+
+
+def _strides(shape: Shape) -> list[int]:
+    return [math.prod(shape[i + 1 :]) for i in range(len(shape))]
+
+
+def _concat(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    if attributes(node, axis=1)["axis"] != 1 or len({x.shape[1:] for x in given}) != 1:
+        raise ValueError(f"is of the shapes {[x.shape for x in given]}; accepted: along the first axis")
+    out = program.buffer((sum(x.shape[0] for x in given), *given[0].shape[1:]))
+    starts = accumulate((x.size for x in given), initial=0)
+    lines = [
+        f"for (int i = 0; i < {x.size}; i++) {out.text}[i + {start}] = {x.text}[i];"
+        for x, start in zip(given, starts, strict=False)
+        if x.size
+    ]
+    program.step(node.op_type, lines, given, out)
+    return [out]
+
+
+def _split(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    del program
+    x, count = given[0], len(node.output)
+    if attributes(node, axis=0)["axis"] != 1 or len(given) != 1 or x.shape[0] % count:
+        raise ValueError("is other than into equal parts of the first axis")
+    shape = (x.shape[0] // count, *x.shape[1:])
+    return [replace(x, text=f"({x.text} + {part * math.prod(shape)})", shape=shape) for part in range(count)]
+
+
+OPERATORS: dict[str, Callable[[NodeProto, Given, Program], list[Operand]]] = (
+    dict.fromkeys([*UNARY, *SLOPED], _unary)
+    | dict.fromkeys(BINARY, _binary)
+    | dict.fromkeys(["MaxPool", "AveragePool"], pool)
+    | {
+        "Where": _where, "Clip": _clip, "Identity": _identity, "Gemm": _gemm, "MatMul": _matmul, "Gather": _gather,
+        "Reshape": _reshape, "Transpose": _transpose, "Concat": _concat, "Split": _split, "ReduceL2": norm,
+        "Conv": convolution,
+    }
+)  # fmt: skip
+"""By ONNX's name: all that the policies of this package have."""
+OF_CONSTANTS = ("Gemm", "Gather", "Reshape", "Conv")
+"""Operators that take their constants in another form than the graph has them."""

@@ -1,0 +1,115 @@
+"""ONNX's operators on images as statements of C; as in `e2efly.c_policy.operators`."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from onnx import NodeProto, helper
+
+from e2efly.c_policy.program import Operand, Program, Shape
+from e2efly.c_policy.text import number
+
+Given = Sequence[Operand]
+"""What a node reads."""
+
+
+def attributes(node: NodeProto, **known: Any) -> dict[str, Any]:
+    """The attributes of a node, with defaults.
+
+    Raises:
+        ValueError: for one that is not among `known`.
+    """
+    found = {entry.name: helper.get_attribute_value(entry) for entry in node.attribute}
+    if unknown := sorted(set(found) - set(known)):
+        raise ValueError(f"has the attribute {unknown[0]}; accepted: {', '.join(known) or 'none'}")
+    return known | found
+
+
+def norm(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    """The square root of the sum of the squares of an image."""
+    (x,) = given
+    about = attributes(node, axes=(), keepdims=1)
+    if sorted(about["axes"]) != list(range(1, len(x.shape) + 1)) or not about["keepdims"]:
+        raise ValueError(f"is over the axes {list(about['axes'])}; accepted: all but the batch axis, which stay as 1")
+    out = program.buffer((1,) * len(x.shape))
+    lines = [
+        "real sum = 0.0f;",
+        f"for (int i = 0; i < {x.size}; i++) sum += {x.text}[i] * {x.text}[i];",
+        f"{out.text}[0] = REAL(sqrt)(sum);",
+    ]
+    program.step(node.op_type, lines, given, out)
+    return [out]
+
+
+def _window(node: NodeProto, x: Operand, **more: Any) -> tuple[list[int], list[int], Shape]:
+    """The sides and strides of a window over rows and columns that never reaches beyond them, and its places."""
+    plain = {"auto_pad": b"NOTSET", "ceil_mode": 0, "storage_order": 0, "count_include_pad": 0, "group": 1}
+    about = attributes(node, kernel_shape=None, strides=[1, 1], pads=[0] * 4, dilations=[1, 1], **plain, **more)
+    sides, strides = about["kernel_shape"], list(about["strides"])
+    odd = [key for key, value in plain.items() if about[key] != value]
+    odd += [key for key, value in (("pads", [0] * 4), ("dilations", [1, 1])) if list(about[key]) != value]
+    if odd or len(x.shape) != 3 or sides is None or len(sides) != 2:
+        raise ValueError(f"has {', '.join(odd) or 'no kernel_shape'}; accepted: a window of an image, without padding")
+    places = tuple((n - side) // stride + 1 for n, side, stride in zip(x.shape[1:], sides, strides, strict=True))
+    return list(sides), strides, places
+
+
+def pool(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    """The largest or the mean of each window of an image."""
+    (x,) = given
+    (h, w), (down, right), (rows, columns) = _window(node, x)
+    channels, height, width = x.shape
+    out, largest = program.buffer((channels, rows, columns)), node.op_type == "MaxPool"
+    read = f"{x.text}[at + {width} * row + k]"
+    taken = f"if ({read} > value) value = {read};" if largest else f"value += {read};"
+    lines = [
+        f"for (int c = 0; c < {channels}; c++)",
+        f"    for (int i = 0; i < {rows}; i++)",
+        f"        for (int j = 0; j < {columns}; j++) {{",
+        f"            const int at = {height * width} * c + {width * down} * i + {right} * j;",
+        f"            real value = {f'{x.text}[at]' if largest else '0.0f'};",
+        f"            for (int row = 0; row < {h}; row++)",
+        f"                for (int k = 0; k < {w}; k++) {taken}",
+        f"            {out.text}[{rows * columns} * c + {columns} * i + j] = "
+        f"{'value' if largest else f'value / {number(h * w)}'};",
+        "        }",
+    ]
+    program.step(f"{node.op_type}, {h} x {w}", lines, given, out)
+    return [out]
+
+
+def convolution(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+    """Sums of windows of an image, weighed by filters."""
+    x, kernel = given[:2]
+    if kernel.value is None or kernel.value.ndim != 4 or (len(given) > 2 and given[2].value is None):
+        raise ValueError("is other than with a constant kernel and bias")
+    (h, w), (down, right), (rows, columns) = _window(node, x)
+    filters = kernel.value.shape[0]
+    if kernel.value.shape[1:] != (x.shape[0], h, w):
+        raise ValueError(f"has a kernel of the shape {kernel.shape}; accepted: (n, {x.shape[0]}, {h}, {w})")
+    bias = given[2].value if len(given) > 2 else np.zeros(filters)
+    weight = program.constant("kernel", np.moveaxis(kernel.value, 0, -1).reshape(-1, filters))
+    start = program.constant("bias", np.asarray(bias))
+    channels, height, width = x.shape
+    # the sums of all filters lie side by side behind the output, for the compiler's vectors
+    both = program.buffer((filters * (rows * columns + 1),))
+    sums = f"({both.text} + {filters * rows * columns})"
+    lines = [
+        f"for (int i = 0; i < {rows}; i++)",
+        f"    for (int j = 0; j < {columns}; j++) {{",
+        f"        const float *w = {weight.text};",
+        f"        for (int f = 0; f < {filters}; f++) {sums}[f] = {start.text}[f];",
+        f"        for (int c = 0; c < {channels}; c++)",
+        f"            for (int row = 0; row < {h}; row++)",
+        f"                for (int k = 0; k < {w}; k++, w += {filters}) {{",
+        f"                    const real x = {x.text}[{height * width} * c + {width} * ({down} * i + row)"
+        f" + {right} * j + k];",
+        f"                    for (int f = 0; f < {filters}; f++) {sums}[f] += x * w[f];",
+        "                }",
+        f"        for (int f = 0; f < {filters}; f++)",
+        f"            {both.text}[{rows * columns} * f + {columns} * i + j] = {sums}[f];",
+        "    }",
+    ]
+    program.step(f"{node.op_type}, {h} x {w}, {channels} to {filters}", lines, [x], both)
+    return [replace(both, shape=(filters, rows, columns))]
