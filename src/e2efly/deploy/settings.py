@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from e2efly.numbers import check_numbers, number
 
 Point = tuple[float, float, float]
+Box = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,8 @@ class Fence:
     """Deceleration that hovering can count on, m/s^2: the guard takes over while that still stops inside."""
     reaction: float = number(0.15, above=0)
     """Time before the braking acts, s."""
+    solids: tuple[Box, ...] = ()
+    """Boxes that the filter of --guard filter keeps the vehicle out of: smallest x, y, z, largest x, y, z of each."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,332 @@
+"""The backup manoeuvre: turn the thrust against the velocity, brake to rest, hover. Its command, and where it leads.
+
+The manoeuvre's way is found in the plane in which the thrust turns: there the rate loop, the mixer and the rotors' lag
+make one angle and one thrust over time, both with the vehicle's own numbers. What the thrust does to the velocity
+follows by adding up. After `TURN` s the thrust points where it brakes, and the rest of the way is in closed form.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from e2efly.deploy.filter.arithmetic import SCALARS, Number, clip
+from e2efly.deploy.filter.body import NOTHING, Command, Motion, Residual, Response, lag, turning
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+STEPS = (0.02, 0.03, 0.04, 0.05, 0.07, 0.09, 0.1)
+"""Steps of the turn, s: it is quickest at its begin."""
+SEEN = (1, 3, 4, 5, 6)
+"""After these of them the position is compared with the limits."""
+TURN = sum(STEPS)
+"""Length of the turn, s."""
+TILT_GAIN = 9.0
+"""Body rate over the angle that is left to turn, 1/s: of a state forecast to when the command acts, without delay."""
+TURN_RATE = 0.8
+"""Share of the vehicle's `body_rate_max` that the backup turns with."""
+THRUST_SHARE = 0.8
+"""Share of the largest thrust that is counted on: a flat battery takes a fifth."""
+STEEPEST = math.radians(65)
+"""Largest tilt of the manoeuvre, rad, where the fence allows it."""
+COUNTED = (0.75, 0.6)
+"""Shares of what is commanded that are counted on, sideways and of a fall: until a loss of thrust is noticed."""
+DIAGONAL = 1.4 / THRUST_SHARE
+"""By which turning about a diagonal with a flat battery takes more of the rotors than about x or y with a full one."""
+YAW_KEPT = 0.8
+"""Share of the turning about the thrust that the manoeuvre keeps: stopping it at once takes what else would tilt."""
+CLIMB_SHARE = 0.85
+"""Share of that thrust which may point up to brake a fall; braking sideways gets what is left."""
+SINK = 4.5
+"""Deceleration of a climb, m/s^2: the thrust that is left can still brake sideways."""
+GUST = 0.4
+"""What air may push against the braking, m/s^2: a gust of 3 m/s at 10 m/s, on the vehicles that are shipped."""
+SPEED_GAIN = 12.0
+"""Deceleration over speed where the manoeuvre comes to rest, 1/s."""
+LEAD = 0.1
+"""The velocity that is braked is that so much later, s: while it turns, the thrust still pushes where it pointed."""
+REST_S = LEAD + 1 / SPEED_GAIN
+"""Time constant with which the manoeuvre comes to rest, s."""
+
+
+class Step(NamedTuple):
+    """A step of the turn: its length and what the lags make of it."""
+
+    h: float
+    """s."""
+    end: float
+    """Since the begin of the turn, s."""
+    loop: tuple[float, float, float, float]
+    """Of the rate loop: `turning`."""
+    kept: float
+    """Of the error of the rotors' speed, after the step, ..."""
+    mean: float
+    """... on average ..."""
+    square: float
+    """... and of its square, on average."""
+    free: float
+    """In its middle, the share of the turn that goes on by itself which is still to come."""
+    seen: bool
+    """Whether the position after it is compared with the limits."""
+
+
+@dataclass(frozen=True)
+class Backup:
+    """The manoeuvre of a vehicle. Make it with `Backup.of`."""
+
+    response: Response
+    """The vehicle."""
+    most: float
+    """Thrust over mass that is counted on, m/s^2."""
+    level: float
+    """Deceleration sideways that is commanded, m/s^2."""
+    climb: float
+    """Deceleration of a fall that is commanded, m/s^2."""
+    braking: tuple[float, float, float]
+    """Decelerations sideways, of a fall and of a climb that are counted on, m/s^2."""
+    steepest: float
+    """Largest tilt, rad."""
+    rate: float
+    """Largest body rate, rad/s."""
+    steps: tuple["Step", ...]
+    """Of the turn."""
+
+    @staticmethod
+    def of(vehicle: Vehicle, tilt: float) -> "Backup":
+        """Of a loaded vehicle, within a tilt, rad.
+
+        Raises:
+            ValueError: for a vehicle with too little thrust to brake with, naming it.
+        """
+        response = Response.of(vehicle)
+        most = response.thrust[1] * THRUST_SHARE
+        spare = most - GRAVITY
+        if spare < 0.3 * GRAVITY:
+            least = 1.3 / THRUST_SHARE
+            raise ValueError(
+                f"guard 'filter': the vehicle's thrust is {vehicle.thrust_to_weight:.2f} of its weight; accepted: "
+                f"{least:.2f} or more, so that it brakes with a flat battery"
+            )
+        climb = CLIMB_SHARE * most - GRAVITY
+        steepest = min(STEEPEST, 0.9 * tilt)
+        level = min(0.8 * most, GRAVITY * math.tan(min(steepest, 0.96)))
+        braking = (COUNTED[0] * level - GUST, COUNTED[1] * climb - GUST, SINK - GUST)
+        rate = TURN_RATE * min(response.rate_max[:2])
+        return Backup(response, most, level, climb, braking, steepest, rate, _steps(response))
+
+
+class Brake(NamedTuple):
+    """Where the manoeuvre points the thrust, and what it will have made of the attitude by itself."""
+
+    bx: Number
+    """Direction of the thrust as it is, world."""
+    by: Number
+    bz: Number
+    cx: Number
+    """Direction in which the turning that goes on comes to rest, world."""
+    cy: Number
+    cz: Number
+    tx: Number
+    """Direction that is wanted, world."""
+    ty: Number
+    tz: Number
+    thrust: Number
+    """Collective thrust over mass that is wanted along it, m/s^2."""
+    share: Number
+    """Thrust over that of the command."""
+    vx: Number
+    """The velocity that is braked, m/s."""
+    vy: Number
+    vz: Number
+    wx: Number
+    """Rate at which the thrust turns, world, rad/s."""
+    wy: Number
+    wz: Number
+    ax: Number
+    """Its change by the rotors, world, rad/s^2."""
+    ay: Number
+    az: Number
+
+
+class Way(NamedTuple):
+    """Where the manoeuvre leads."""
+
+    px: tuple[Number, ...]
+    """Positions during the turn, at the moments of `SEEN`, world, m."""
+    py: tuple[Number, ...]
+    pz: tuple[Number, ...]
+    speed2: Number
+    """Square of the largest speed on the way, (m/s)^2."""
+    vx: Number
+    """Velocity after the turn, m/s; zero where braking would have turned it round."""
+    vy: Number
+    vz: Number
+
+
+def axes(m: Motion) -> tuple[Number, ...]:
+    """The body's axes x, y and z in the world, nine numbers."""
+    w, x, y, z = m.qw, m.qx, m.qy, m.qz
+    return (
+        1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),
+        2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x),
+        2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y),
+    )  # fmt: skip
+
+
+def axes_z(w: Number, x: Number, y: Number, z: Number) -> tuple[Number, Number, Number]:
+    """The body's z axis in the world, of a quaternion."""
+    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
+
+
+def brake(xp: Any, b: Backup, m: Motion, air: Residual, back: tuple[Number, ...] = (0.0, 0.0, 0.0)) -> Brake:
+    """The manoeuvre from a state, to rest or to a velocity back, world, m/s.
+
+    The turning that goes on comes to rest by itself at the attitude c of `Brake`.
+    """
+    r = b.response
+    xx, xy, xz, yx, yy, yz, bx, by, bz = axes(m)
+    ox, oy = _coast(xp, r, m)
+    s2 = ox * ox + oy * oy
+    cos, sinc = 1.0 - s2 / 2 + s2 * s2 / 24, 1.0 - s2 / 6 + s2 * s2 / 120
+    # about body x the z axis goes to -y, about body y to x
+    cx = cos * bx + sinc * (oy * xx - ox * yx)
+    cy = cos * by + sinc * (oy * xy - ox * yy)
+    cz = cos * bz + sinc * (oy * xz - ox * yz)
+    f = LEAD * air.share * m.f
+    vx, vy, vz = m.vx + f * cx + LEAD * air.x, m.vy + f * cy + LEAD * air.y, m.vz + f * cz + LEAD * (air.z - GRAVITY)
+    vx, vy, vz = vx - back[0], vy - back[1], vz - back[2]
+    level = xp.sqrt(vx * vx + vy * vy + 1e-9)
+    gz = GRAVITY - air.z + clip(xp, -SPEED_GAIN * vz, -SINK, b.climb)
+    gz = clip(xp, gz, 0.3 * GRAVITY, b.most)
+    push = -xp.minimum(xp.minimum(b.level, SPEED_GAIN * level), xp.sqrt(b.most * b.most - gz * gz + 1.0)) / level
+    gx, gy = push * vx - air.x, push * vy - air.y
+    reach = gz * math.tan(b.steepest)
+    side = xp.sqrt(gx * gx + gy * gy + 1e-9)
+    shrink = reach / xp.maximum(side, reach)
+    gx, gy = gx * shrink, gy * shrink
+    thrust = xp.sqrt(gx * gx + gy * gy + gz * gz)
+    return Brake(
+        bx, by, bz, cx, cy, cz, gx / thrust, gy / thrust, gz / thrust, thrust, air.share, vx, vy, vz,
+        m.wx * xx + m.wy * yx, m.wx * xy + m.wy * yy, m.wx * xz + m.wy * yz,
+        m.ax * xx + m.ay * yx, m.ax * xy + m.ay * yy, m.ax * xz + m.ay * yz,
+    )  # fmt: skip
+
+
+def _coast(xp: Any, r: Response, m: Motion) -> tuple[Number, Number]:
+    """The turn about body x and y that is left in the rate loop when it is told to stop, rad.
+
+    That is the integral of its free response, (rate + lag * acceleration) / gain; of a rate that takes more than the
+    rotors have, the way under their largest acceleration down to the rate that does not, with their lag besides.
+    """
+    gain, (low, high) = min(r.gain[:2]), r.thrust
+    x, y = m.wx + r.motor_time * m.ax, m.wy + r.motor_time * m.ay
+    rate = xp.sqrt(x * x + y * y + 1e-9)
+    fair = THRUST_SHARE * 0.5 * (high - low) * rate / (gain * (r.spread[0] * abs(x) + r.spread[1] * abs(y)) + 1e-9)
+    over = xp.maximum(rate - fair, 0.0)
+    turn = xp.minimum(rate, fair) / gain + over * ((rate + fair) / (2.0 * gain * fair) + r.motor_time)
+    return x * turn / rate, y * turn / rate
+
+
+def command(xp: Any, b: Backup, m: Motion, k: Brake) -> Command:
+    """What the manoeuvre sends now: turn by the shortest way, with no more thrust than points where it is wanted.
+
+    Args:
+        xp: computes.
+        b: the vehicle's manoeuvre.
+        m: the state when the command acts.
+        k: the manoeuvre from there.
+    """
+    xx, xy, xz, yx, yy, yz, bx, by, bz = axes(m)
+    nx, ny, nz = by * k.tz - bz * k.ty, bz * k.tx - bx * k.tz, bx * k.ty - by * k.tx
+    sine = xp.sqrt(nx * nx + ny * ny + nz * nz + 1e-18)
+    cosine = bx * k.tx + by * k.ty + bz * k.tz
+    turn = xp.minimum(TILT_GAIN * xp.arctan2(sine, cosine), b.rate) / sine
+    # upside down to where it should point there is no shortest way: about body x is as good as any
+    over = (sine < 1e-3) & (cosine < 0.0)
+    wx = xp.where(over, b.rate, turn * (nx * xx + ny * xy + nz * xz))
+    wy = xp.where(over, 0.0, turn * (nx * yx + ny * yy + nz * yz))
+    return Command(k.thrust / k.share * xp.maximum(cosine, 0.0), wx, wy, YAW_KEPT * m.wz)
+
+
+def way(xp: Any, b: Backup, m: Motion, k: Brake, air: Residual) -> Way:
+    """Where the manoeuvre leads from a state.
+
+    The manoeuvre turns in the plane of c and t of `Brake`, about an axis u. There the angle to t obeys the rate loop,
+    from the rate about u that there is; d(angle) is the direction. What turns across that plane comes to rest by
+    itself: of the distance `off` of the thrust from the plane, a share e is still left. So the thrust points along
+    d(angle) + e * off, with d(angle) = sin(angle) / sin(whole) c + sin(whole - angle) / sin(whole) t.
+    """
+    low, high = b.response.thrust
+    gain, motor_time, top, most = min(b.response.gain[:2]), b.response.motor_time, b.rate, k.thrust / k.share
+    spread, half = DIAGONAL * max(b.response.spread[:2]) * gain, (high - low) / 2
+    cx, cy, cz, tx, ty, tz = k.cx, k.cy, k.cz, k.tx, k.ty, k.tz
+    ux, uy, uz = cy * tz - cz * ty, cz * tx - cx * tz, cx * ty - cy * tx
+    sine = xp.sqrt(ux * ux + uy * uy + uz * uz + 1e-12)
+    whole = xp.arctan2(sine, cx * tx + cy * ty + cz * tz)
+    whole = xp.minimum(xp.maximum(whole, 1e-3), math.pi - 0.02)
+    rate = (k.wx * ux + k.wy * uy + k.wz * uz) / sine
+    angular = (k.ax * ux + k.ay * uy + k.az * uz) / sine
+    bx, by, bz = k.bx, k.by, k.bz
+    up = (ux * (by * tz - bz * ty) + uy * (bz * tx - bx * tz) + uz * (bx * ty - by * tx)) / sine
+    left = xp.arctan2(up, bx * tx + by * ty + bz * tz)
+    scale = 1.0 / xp.sin(whole)
+    a, d = xp.sin(left) * scale, xp.sin(whole - left) * scale
+    offx, offy, offz = bx - a * cx - d * tx, by - a * cy - d * ty, bz - a * cz - d * tz
+    root = xp.sqrt(m.f)
+    vb = vc = vt = pb = pc = pt = 0.0 * left
+    ox, oy, oz = air.x, air.y, air.z - GRAVITY
+    px, py, pz, fastest = [], [], [], m.vx * m.vx + m.vy * m.vy + m.vz * m.vz
+    vx, vy, vz = m.vx, m.vy, m.vz
+    for h, t, (a11, a12, a21, a22), kept, mean, square, free, seen in b.steps:
+        error = rate - xp.minimum(xp.maximum(TILT_GAIN * left, -top), top)
+        taken = spread * abs(error) + 1e-9
+        error = error * xp.minimum(half / taken, 1.0)
+        wanted = rate - error
+        after, then = a11 * error + a12 * angular, a21 * error + a22 * angular
+        turned = wanted * h - (motor_time * (then - angular) + (after - error)) / gain
+        taken = xp.minimum(taken, half)
+        goal = xp.sqrt(xp.minimum(xp.maximum(most * xp.cos(left), low + taken), high - taken))
+        rate, angular = wanted + after, then
+        middle, left = left - 0.5 * turned, left - turned
+        off = root - goal
+        push = k.share * (goal * goal + off * (2.0 * goal * mean + off * square))
+        root = goal + kept * off
+        a, d, e = push * scale * xp.sin(middle), push * scale * xp.sin(whole - middle), push * free
+        k2 = 0.5 * h * h
+        pb, pc, pt = pb + h * vb + k2 * e, pc + h * vc + k2 * a, pt + h * vt + k2 * d
+        vb, vc, vt = vb + h * e, vc + h * a, vt + h * d
+        if seen:
+            fall = 0.5 * t * t
+            px.append(m.px + t * m.vx + fall * ox + pb * offx + pc * cx + pt * tx)
+            py.append(m.py + t * m.vy + fall * oy + pb * offy + pc * cy + pt * ty)
+            pz.append(m.pz + t * m.vz + fall * oz + pb * offz + pc * cz + pt * tz)
+            vx = m.vx + t * ox + vb * offx + vc * cx + vt * tx
+            vy = m.vy + t * oy + vb * offy + vc * cy + vt * ty
+            vz = m.vz + t * oz + vb * offz + vc * cz + vt * tz
+            fastest = xp.maximum(fastest, vx * vx + vy * vy + vz * vz)
+    vx = xp.where(vx * k.vx > 0.0, vx, 0.0)
+    vy = xp.where(vy * k.vy > 0.0, vy, 0.0)
+    vz = xp.where(vz * k.vz > 0.0, vz, 0.0)
+    return Way(tuple(px), tuple(py), tuple(pz), fastest, vx, vy, vz)
+
+
+def _steps(r: Response) -> tuple[Step, ...]:
+    gain, steps, at = min(r.gain[:2]), [], 0.0
+    for i, h in enumerate(STEPS):
+        a, _, c, _ = turning(gain, r.motor_time, at + h / 2)
+        at += h
+        free = min(max(a + r.motor_time * c, 0.0), 1.0)  # of a rate of one, with rotors at rest
+        steps.append(Step(h, at, turning(gain, r.motor_time, h), *lag(r.motor_time, h), lag(r.motor_time / 2, h)[1],
+                          free, i in SEEN))
+    return tuple(steps)
+
+
+def stopping(b: Backup, speed: float) -> float:
+    """Distance in which level flight at a speed, m/s, comes to rest by the manoeuvre, from its first command on, m."""
+    m = Motion(0.0, 0.0, 0.0, speed, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
+    w = way(SCALARS, b, m, brake(SCALARS, b, m, NOTHING), NOTHING)
+    return max(*w.px, w.px[-1] + run_out(SCALARS, w.vx, b.braking[0]))
+
+
+def run_out(xp: Any, speed: Number, braking: Number) -> Number:
+    """The distance in which a speed, m/s, comes to rest: braked by so much, m/s^2, then with `REST_S`, m."""
+    slow = braking * REST_S
+    return xp.where(speed < slow, speed * REST_S, 0.5 * speed * speed / braking + 0.5 * slow * REST_S)
