@@ -96,9 +96,9 @@ class Fences:
     tilt: float
     """rad."""
 
-    def limits(self, radius: float) -> Limits:
+    def limits(self, radius: float, margin: float) -> Limits:
         """As the filter takes them."""
-        one = Limits.of(Fence(low=(0.0,) * 3, high=(0.0,) * 3, speed=0.0, tilt=self.tilt), radius)
+        one = Limits.of(Fence(low=(0.0,) * 3, high=(0.0,) * 3, speed=0.0, tilt=self.tilt), radius, margin)
         low = tuple(self.low[:, i] + one.low[i] for i in range(3))
         high = tuple(self.high[:, i] + one.high[i] for i in range(3))
         return Limits(low, high, self.speed + one.speed, one.tilt)  # type: ignore[arg-type]
@@ -181,7 +181,8 @@ def fly(
         watched: flights whose steps are kept.
     """
     n, random = len(kind), np.random.default_rng(seed)
-    filter = Filter(Backup.of(vehicle, fences.tilt), fences.limits(float(vehicle.radius)), believed or latency)
+    backup = Backup.of(vehicle, fences.tilt)
+    filter = Filter(backup, fences.limits(float(vehicle.radius), backup.margin), believed or latency)
     physics = Physics.of(vehicle, "ctbr", control_rate=RATE)
     room = np.minimum(1.0, (fences.high - fences.low) * 0.3)
     position = random.uniform(fences.low + room, fences.high - room)

@@ -122,6 +122,12 @@ def _check_fence(fence: Fence) -> None:
         if high - low < SMALLEST:
             said = f"flight.fence.low and flight.fence.high are {low} and {high} in {axis}"
             raise ValueError(f"{said}; accepted: low at least {SMALLEST} m below high")
+    for i, box in enumerate(fence.solids):
+        finite = len(box) == 6 and all(map(math.isfinite, box))
+        if not finite or not all(low < high for low, high in zip(box[:3], box[3:], strict=True)):
+            raise ValueError(
+                f"flight.fence.solids[{i}] is {box!r}; accepted: six numbers, the smallest x, y, z, then the largest"
+            )
 
 
 def _check_channels(channels: PilotChannels) -> None:

@@ -25,9 +25,11 @@ TURN_RATE = 0.8
 """Share of the vehicle's `body_rate_max` that the backup turns with."""
 THRUST_SHARE = 0.8
 """Share of the largest thrust that is counted on: a flat battery takes a fifth."""
+UNSEEN = 0.85
+"""Share of the thrust that is left before a loss of it is noticed."""
 STEEPEST = math.radians(65)
 """Largest tilt of the manoeuvre, rad, where the fence allows it."""
-COUNTED = (0.75, 0.6)
+COUNTED = (0.62, 0.55)
 """Shares of what is commanded that are counted on, sideways and of a fall: until a loss of thrust is noticed."""
 DIAGONAL = 1.4 / THRUST_SHARE
 """By which turning about a diagonal with a flat battery takes more of the rotors than about x or y with a full one."""
@@ -39,10 +41,19 @@ SINK = 4.5
 """Deceleration of a climb, m/s^2: the thrust that is left can still brake sideways."""
 GUST = 0.4
 """What air may push against the braking, m/s^2: a gust of 3 m/s at 10 m/s, on the vehicles that are shipped."""
+MARGIN_S2 = 0.006
+"""The manoeuvre stays inside by so much of the vehicle's largest thrust over mass, s^2: what the forecast leaves out
+grows with the thrust. That is 0.16 m for VIS-R. It is more ..."""
+TIMING = 0.03
+"""... by the way of so long, s: in the forecast's time, too, there are errors."""
 SPEED_GAIN = 12.0
 """Deceleration over speed where the manoeuvre comes to rest, 1/s."""
-LEAD = 0.1
-"""The velocity that is braked is that so much later, s: while it turns, the thrust still pushes where it pointed."""
+WAY_GAINS = (4.0, 3.0)
+"""The same, sideways and up, for what is foreseen of the turn: there it is held from the begin, 1/s, and must not have
+turned the velocity round at the end."""
+LEAD, LEAD_UP = 0.1, 0.04
+"""The velocity that is braked is that so much later, s: while it turns, the thrust still pushes where it pointed. Up
+and down it only has to follow the rotors."""
 REST_S = LEAD + 1 / SPEED_GAIN
 """Time constant with which the manoeuvre comes to rest, s."""
 
@@ -89,6 +100,11 @@ class Backup:
     steps: tuple["Step", ...]
     """Of the turn."""
 
+    @property
+    def margin(self) -> float:
+        """By which the manoeuvre stays inside at rest, m."""
+        return MARGIN_S2 * self.response.thrust[1]
+
     @staticmethod
     def of(vehicle: Vehicle, tilt: float) -> "Backup":
         """Of a loaded vehicle, within a tilt, rad.
@@ -99,15 +115,15 @@ class Backup:
         response = Response.of(vehicle)
         most = response.thrust[1] * THRUST_SHARE
         spare = most - GRAVITY
-        if spare < 0.3 * GRAVITY:
-            least = 1.3 / THRUST_SHARE
+        if spare < GRAVITY:
+            least = 2.0 / THRUST_SHARE
             raise ValueError(
                 f"guard 'filter': the vehicle's thrust is {vehicle.thrust_to_weight:.2f} of its weight; accepted: "
                 f"{least:.2f} or more, so that it brakes with a flat battery"
             )
         climb = CLIMB_SHARE * most - GRAVITY
         steepest = min(STEEPEST, 0.9 * tilt)
-        level = min(0.8 * most, GRAVITY * math.tan(min(steepest, 0.96)))
+        level = min(0.8 * most, GRAVITY * math.tan(min(steepest, 1.05)))
         braking = (COUNTED[0] * level - GUST, COUNTED[1] * climb - GUST, SINK - GUST)
         rate = TURN_RATE * min(response.rate_max[:2])
         return Backup(response, most, level, climb, braking, steepest, rate, _steps(response))
@@ -153,6 +169,10 @@ class Way(NamedTuple):
     """Positions during the turn, at the moments of `SEEN`, world, m."""
     py: tuple[Number, ...]
     pz: tuple[Number, ...]
+    lz: tuple[Number, ...]
+    """Heights, m, if the battery goes flat now ..."""
+    wz: Number
+    """... and the speed of falling after the turn, m/s, at most 0."""
     speed2: Number
     """Square of the largest speed on the way, (m/s)^2."""
     vx: Number
@@ -176,8 +196,15 @@ def axes_z(w: Number, x: Number, y: Number, z: Number) -> tuple[Number, Number, 
     return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
 
 
-def brake(xp: Any, b: Backup, m: Motion, air: Residual, back: tuple[Number, ...] = (0.0, 0.0, 0.0)) -> Brake:
-    """The manoeuvre from a state, to rest or to a velocity back, world, m/s.
+def brake(
+    xp: Any,
+    b: Backup,
+    m: Motion,
+    air: Residual,
+    back: tuple[Number, ...] = (0.0, 0.0, 0.0),
+    gains: tuple[float, float] = (SPEED_GAIN, SPEED_GAIN),
+) -> Brake:
+    """The manoeuvre from a state, to rest or to a velocity back, world, m/s, by decelerations over speed, 1/s.
 
     The turning that goes on comes to rest by itself at the attitude c of `Brake`.
     """
@@ -190,13 +217,14 @@ def brake(xp: Any, b: Backup, m: Motion, air: Residual, back: tuple[Number, ...]
     cx = cos * bx + sinc * (oy * xx - ox * yx)
     cy = cos * by + sinc * (oy * xy - ox * yy)
     cz = cos * bz + sinc * (oy * xz - ox * yz)
-    f = LEAD * air.share * m.f
-    vx, vy, vz = m.vx + f * cx + LEAD * air.x, m.vy + f * cy + LEAD * air.y, m.vz + f * cz + LEAD * (air.z - GRAVITY)
+    f = air.share * m.f
+    vx, vy = m.vx + LEAD * (f * cx + air.x), m.vy + LEAD * (f * cy + air.y)
+    vz = m.vz + LEAD_UP * (f * cz + air.z - GRAVITY)
     vx, vy, vz = vx - back[0], vy - back[1], vz - back[2]
     level = xp.sqrt(vx * vx + vy * vy + 1e-9)
-    gz = GRAVITY - air.z + clip(xp, -SPEED_GAIN * vz, -SINK, b.climb)
+    gz = GRAVITY - air.z + clip(xp, -gains[1] * vz, -SINK, b.climb)
     gz = clip(xp, gz, 0.3 * GRAVITY, b.most)
-    push = -xp.minimum(xp.minimum(b.level, SPEED_GAIN * level), xp.sqrt(b.most * b.most - gz * gz + 1.0)) / level
+    push = -xp.minimum(xp.minimum(b.level, gains[0] * level), xp.sqrt(b.most * b.most - gz * gz + 1.0)) / level
     gx, gy = push * vx - air.x, push * vy - air.y
     reach = gz * math.tan(b.steepest)
     side = xp.sqrt(gx * gx + gy * gy + 1e-9)
@@ -216,7 +244,7 @@ def _coast(xp: Any, r: Response, m: Motion) -> tuple[Number, Number]:
     That is the integral of its free response, (rate + lag * acceleration) / gain; of a rate that takes more than the
     rotors have, the way under their largest acceleration down to the rate that does not, with their lag besides.
     """
-    gain, (low, high) = min(r.gain[:2]), r.thrust
+    gain, (low, high) = UNSEEN * min(r.gain[:2]), r.thrust
     x, y = m.wx + r.motor_time * m.ax, m.wy + r.motor_time * m.ay
     rate = xp.sqrt(x * x + y * y + 1e-9)
     fair = THRUST_SHARE * 0.5 * (high - low) * rate / (gain * (r.spread[0] * abs(x) + r.spread[1] * abs(y)) + 1e-9)
@@ -273,9 +301,10 @@ def way(xp: Any, b: Backup, m: Motion, k: Brake, air: Residual) -> Way:
     root = xp.sqrt(m.f)
     vb = vc = vt = pb = pc = pt = 0.0 * left
     ox, oy, oz = air.x, air.y, air.z - GRAVITY
-    px, py, pz, fastest = [], [], [], m.vx * m.vx + m.vy * m.vy + m.vz * m.vz
+    px, py, pz, lz, fastest = [], [], [], [], m.vx * m.vx + m.vy * m.vy + m.vz * m.vz
     vx, vy, vz = m.vx, m.vy, m.vz
-    for h, t, (a11, a12, a21, a22), kept, mean, square, free, seen in b.steps:
+    flat, lift = xp.minimum(xp.maximum(THRUST_SHARE / k.share, UNSEEN), 1.0), 0.0
+    for h, t, (a11, a12, a21, a22), kept, mean, square, still, seen in b.steps:
         error = rate - xp.minimum(xp.maximum(TILT_GAIN * left, -top), top)
         taken = spread * abs(error) + 1e-9
         error = error * xp.minimum(half / taken, 1.0)
@@ -289,7 +318,7 @@ def way(xp: Any, b: Backup, m: Motion, k: Brake, air: Residual) -> Way:
         off = root - goal
         push = k.share * (goal * goal + off * (2.0 * goal * mean + off * square))
         root = goal + kept * off
-        a, d, e = push * scale * xp.sin(middle), push * scale * xp.sin(whole - middle), push * free
+        a, d, e = push * scale * xp.sin(middle), push * scale * xp.sin(whole - middle), push * still
         k2 = 0.5 * h * h
         pb, pc, pt = pb + h * vb + k2 * e, pc + h * vc + k2 * a, pt + h * vt + k2 * d
         vb, vc, vt = vb + h * e, vc + h * a, vt + h * d
@@ -297,15 +326,19 @@ def way(xp: Any, b: Backup, m: Motion, k: Brake, air: Residual) -> Way:
             fall = 0.5 * t * t
             px.append(m.px + t * m.vx + fall * ox + pb * offx + pc * cx + pt * tx)
             py.append(m.py + t * m.vy + fall * oy + pb * offy + pc * cy + pt * ty)
-            pz.append(m.pz + t * m.vz + fall * oz + pb * offz + pc * cz + pt * tz)
+            free, lift = m.pz + t * m.vz + fall * oz, pb * offz + pc * cz + pt * tz
+            pz.append(free + lift)
+            lz.append(free + flat * lift)
             vx = m.vx + t * ox + vb * offx + vc * cx + vt * tx
             vy = m.vy + t * oy + vb * offy + vc * cy + vt * ty
-            vz = m.vz + t * oz + vb * offz + vc * cz + vt * tz
+            lift = vb * offz + vc * cz + vt * tz
+            vz = m.vz + t * oz + lift
             fastest = xp.maximum(fastest, vx * vx + vy * vy + vz * vz)
+    wz = xp.minimum(vz - (1.0 - flat) * lift, 0.0)
     vx = xp.where(vx * k.vx > 0.0, vx, 0.0)
     vy = xp.where(vy * k.vy > 0.0, vy, 0.0)
     vz = xp.where(vz * k.vz > 0.0, vz, 0.0)
-    return Way(tuple(px), tuple(py), tuple(pz), fastest, vx, vy, vz)
+    return Way(tuple(px), tuple(py), tuple(pz), tuple(lz), wz, fastest, vx, vy, vz)
 
 
 def _steps(r: Response) -> tuple[Step, ...]:
@@ -322,7 +355,7 @@ def _steps(r: Response) -> tuple[Step, ...]:
 def stopping(b: Backup, speed: float) -> float:
     """Distance in which level flight at a speed, m/s, comes to rest by the manoeuvre, from its first command on, m."""
     m = Motion(0.0, 0.0, 0.0, speed, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
-    w = way(SCALARS, b, m, brake(SCALARS, b, m, NOTHING), NOTHING)
+    w = way(SCALARS, b, m, brake(SCALARS, b, m, NOTHING, gains=WAY_GAINS), NOTHING)
     return max(*w.px, w.px[-1] + run_out(SCALARS, w.vx, b.braking[0]))
 
 

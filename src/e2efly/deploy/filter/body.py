@@ -1,8 +1,8 @@
 """How the vehicle answers to collective thrust and body rates, as the filter forecasts it.
 
 A rigid body without drag. The rate loop asks for an angular acceleration in proportion to the rate's error; rotors
-follow with their lag, which is one of their speed, the root of the thrust. As in the flight controller's mixer attitude goes before thrust: turning hard needs a spread
-between the rotors, which raises a small thrust and lowers a large one.
+follow with their lag, which is one of their speed, the root of the thrust. As in the flight controller's mixer attitude
+goes before thrust: turning hard needs a spread between the rotors, which raises a small thrust and lowers a large one.
 """
 
 from dataclasses import dataclass

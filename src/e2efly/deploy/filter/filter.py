@@ -11,15 +11,21 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from e2efly.deploy.filter.arithmetic import SCALARS, Number, clip
-from e2efly.deploy.filter.backup import Backup, axes_z, brake, command, stopping
+from e2efly.deploy.filter.backup import TIMING, Backup, axes_z, brake, command, stopping
 from e2efly.deploy.filter.body import NOTHING, Actuators, Command, Motion, Residual, actuated, moved
-from e2efly.deploy.filter.room import MARGIN, NAMES, Limits, against, near, retreat, rooms
+from e2efly.deploy.filter.room import NAMES, Limits, against, near, retreat, rooms
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.settings import Fence
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
-HOLD = 0.02
+HOLD = 0.01
 """A command is judged as if it were held for so long, s."""
+SLOW = 0.5
+"""A vehicle slower than this, m/s, may be led back inside by the policy itself."""
+LEADS = (0.03,) * 4
+"""Whether a command leads back inside is seen after it was held for so long, in steps, s: the rotors lag."""
+GAINS = 0.002
+"""It must leave so much more room than the manoeuvre, m."""
 HALVINGS = 3
 """How often the share of the change is halved: to an eighth."""
 AIR_S, AIR_MOST = 0.4, 4.0
@@ -50,21 +56,19 @@ class Filter:
         Raises:
             ValueError: naming the field, for a vehicle that cannot brake, or a fence in which it could not stop.
         """
-        filter = Filter(
-            Backup.of(vehicle, fence.tilt), Limits.of(fence, float(vehicle.radius)),
-            float(vehicle.latency if latency is None else latency),
-        )  # fmt: skip
-        _check(filter, vehicle, fence)
+        backup = Backup.of(vehicle, fence.tilt)
+        limits = Limits.of(fence, float(vehicle.radius), backup.margin)
+        filter = Filter(backup, limits, float(vehicle.latency if latency is None else latency))
+        _check(filter, fence)
         return filter
 
 
 def stopping_distance(filter: Filter, speed: float) -> float:
     """Room that level flight at a speed, m/s, needs before a wall, m: the delay, the manoeuvre, and the margin."""
-    return speed * filter.latency + stopping(filter.backup, speed) + MARGIN
+    return speed * (filter.latency + TIMING) + stopping(filter.backup, speed) + filter.backup.margin
 
 
-def _check(filter: Filter, vehicle: Vehicle, fence: Fence) -> None:
-    del vehicle
+def _check(filter: Filter, fence: Fence) -> None:
     distance = stopping_distance(filter, fence.speed)
     for axis, low, high in zip("xy", fence.low[:2], fence.high[:2], strict=True):
         if high - low < distance:
@@ -206,36 +210,55 @@ def filtered(
     m = forecast(filter, memory, odometry, now)
     solids = near(filter.limits, m, _reach(m)) if filter.limits.solids else ()
 
-    def left(c: Command) -> tuple[Number, ...]:
-        after = moved(xp, r, m, c, air, HOLD)
+    def left(c: Command, holds: tuple[float, ...] = (HOLD,)) -> tuple[Number, ...]:
+        after = m
+        for h in holds:
+            after = moved(xp, r, after, c, air, h)
         return rooms(xp, b, filter.limits, after, air, solids, floor, m)
 
     found = left(wanted)
-    if xp is SCALARS:
-        room = min(found)
-        limit = found.index(room)
-        if room >= 0.0:
-            return Filtered(wanted, 0.0, room, limit)
-    else:
-        stacked = xp.stack(found)
-        room, limit = stacked.min(axis=0), stacked.argmin(axis=0)
+    if xp is SCALARS and min(found) >= 0.0:
+        return Filtered(wanted, 0.0, *_worst(xp, found))
     back = retreat(xp, filter.limits, m)
     own = command(xp, b, m, brake(xp, b, m, against(xp, m, air), back))
-    share = _least(xp, lambda s: left(_between_two(wanted, own, s)), 0.0 * room)
-    passes = room >= 0.0
+    short, limit = _worst(xp, found)
+    share = _least(xp, lambda s: _worst(xp, left(_between_two(wanted, own, s)))[0], 0.0 * short)
+    passes = short >= 0.0
+    slow = m.vx * m.vx + m.vy * m.vy + m.vz * m.vz < SLOW * SLOW
+    if xp is not SCALARS or (share == 1.0 and slow):
+        # where a vehicle at rest is beyond a limit, a command is as good that leads back inside faster
+        beyond = tuple((room < 0.0) & (low < 0.0) for room, low in zip(found, left(own), strict=True))
+        kept = tuple((room >= 0.0) | out for room, out in zip(found, beyond, strict=True))
+        ahead, behind = left(wanted, LEADS), left(own, LEADS)
+        gains = tuple((a >= b + GAINS) | ~out if xp is not SCALARS else (a >= b + GAINS or not out)
+                      for a, b, out in zip(ahead, behind, beyond, strict=True))  # fmt: skip
+        passes = passes | slow & _all(xp, kept) & _all(xp, gains)
+    share = xp.where(passes, 0.0, share)
     given = Command(*(
         xp.where(passes, a, xp.where(share >= 1.0, c, a + share * (c - a))) for a, c in zip(wanted, own, strict=True)
     ))  # fmt: skip
-    return Filtered(given, xp.where(passes, 0.0, share), room, limit)
+    return Filtered(given, share, short, limit)
 
 
-def _least(xp: Any, left: Any, zero: Number) -> Number:
-    """The least share, of eighths, by which a command must be changed so that room is left; 1 where none does."""
+def _all(xp: Any, conditions: tuple[Any, ...]) -> Any:
+    return all(conditions) if xp is SCALARS else xp.stack(conditions).all(axis=0)
+
+
+def _worst(xp: Any, rooms: tuple[Number, ...]) -> tuple[Number, Any]:
+    """The least room, and the index of its limit."""
+    if xp is SCALARS:
+        least = min(rooms)
+        return least, rooms.index(least)
+    stacked = xp.stack(rooms)
+    return stacked.min(axis=0), stacked.argmin(axis=0)
+
+
+def _least(xp: Any, spare: Any, zero: Number) -> Number:
+    """The least share, of eighths, by which a command must be changed so that enough is left; 1 where none does."""
     low, high = zero, zero + 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        found = left(middle)
-        good = (min(found) if xp is SCALARS else xp.stack(found).min(axis=0)) >= 0.0
+        good = spare(middle) >= 0.0
         low, high = xp.where(good, low, middle), xp.where(good, middle, high)
     return high
 

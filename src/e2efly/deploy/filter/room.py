@@ -5,15 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from e2efly.deploy.filter.arithmetic import Number, clip
-from e2efly.deploy.filter.backup import Backup, Brake, Way, brake, run_out, way
+from e2efly.deploy.filter.backup import TIMING, WAY_GAINS, Backup, Brake, Way, brake, run_out, way
 from e2efly.deploy.filter.body import Motion, Residual
 from e2efly.deploy.settings import Fence
 
-MARGIN = 0.25
-"""The manoeuvre stays so far inside, m: for noise of the poses and for what the forecast leaves out."""
-SPEED_MARGIN, SPEED_S = 0.3, 0.25
+SPEED_MARGIN, SPEED_S = 0.6, 0.25
 """The largest speed is kept to with this margin, m/s; so much of it counts as a metre of room, s."""
-TILT_MARGIN, TILT_M = 0.25, 0.3
+TILT_MARGIN, TILT_M = 0.3, 0.3
 """The largest tilt is kept to with this margin, rad; a radian counts as so much room, m."""
 FADES = 2.0
 """At this speed against it, m/s, the air's push is not counted on at all."""
@@ -41,10 +39,10 @@ class Limits:
     """What is kept between the centre of mass and a solid."""
 
     @staticmethod
-    def of(fence: Fence, radius: float) -> "Limits":
-        """Of a fence, for a vehicle of this radius, m."""
+    def of(fence: Fence, radius: float, margin: float) -> "Limits":
+        """Of a fence, for a vehicle of this radius, m, that stays inside by a margin, m."""
         (a, b, c), (d, e, f) = fence.low, fence.high
-        m = MARGIN
+        m = margin
         return Limits(
             (a + m, b + m, c + m), (d - m, e - m, f - m), fence.speed - SPEED_MARGIN,
             fence.tilt - TILT_MARGIN if fence.tilt < math.pi else math.inf, fence.solids, radius + m,
@@ -95,24 +93,30 @@ def rooms(
         at: the state for which `near` was asked.
     """
     air = against(xp, m, air)
-    k = brake(xp, b, m, air)
+    k = brake(xp, b, m, air, gains=WAY_GAINS)
     w = way(xp, b, m, k, air)
     level, fall, rise = b.braking
     side = xp.sqrt(w.vx * w.vx + w.vy * w.vy + 1e-9)
     run = run_out(xp, side, level) / side
     dx, dy = w.vx * run, w.vy * run
-    dz = xp.where(w.vz > 0.0, run_out(xp, w.vz, rise), -run_out(xp, -w.vz, fall))
+    down = -run_out(xp, -w.wz, fall)
+    dz = xp.where(w.vz > 0.0, run_out(xp, xp.maximum(w.vz, 0.0), rise), down)
     (x0, y0, z0), (x1, y1, z1) = limits.low, limits.high
     low_x, high_x = _ends(xp, w.px, dx)
     low_y, high_y = _ends(xp, w.py, dy)
-    low_z, high_z = _ends(xp, w.pz, dz)
+    low_z, _ = _ends(xp, w.lz, down)
+    _, high_z = _ends(xp, w.pz, dz)
+    off_x, off_y, off_z = TIMING * abs(m.vx), TIMING * abs(m.vy), TIMING * abs(m.vz)
+    low_z = low_z - z0 if floor else z1 - low_z
     found = [
-        low_x - x0, x1 - high_x, low_y - y0, y1 - high_y, low_z - z0 if floor else z1 - low_z, z1 - high_z,
+        low_x - x0 - off_x, x1 - high_x - off_x, low_y - y0 - off_y, y1 - high_y - off_y,
+        low_z - off_z, z1 - high_z - off_z,
         SPEED_S * (limits.speed - xp.sqrt(w.speed2)), _tilt_room(xp, limits, k),
     ]  # fmt: skip
     for nx, ny, nz, gap in solids:
         assert at is not None
-        found.append(gap - _towards(xp, w, at, (nx, ny, nz), (dx, dy, dz)))
+        off = TIMING * xp.maximum(nx * m.vx + ny * m.vy + nz * m.vz, 0.0)
+        found.append(gap - off - _towards(xp, w, at, (nx, ny, nz), (dx, dy, dz)))
     return tuple(found)
 
 
