@@ -29,7 +29,7 @@ UNSEEN = 0.85
 """Share of the thrust that is left before a loss of it is noticed."""
 STEEPEST = math.radians(65)
 """Largest tilt of the manoeuvre, rad, where the fence allows it."""
-COUNTED = (0.62, 0.55)
+COUNTED = (0.55, 0.55)
 """Shares of what is commanded that are counted on, sideways and of a fall: until a loss of thrust is noticed."""
 DIAGONAL = 1.4 / THRUST_SHARE
 """By which turning about a diagonal with a flat battery takes more of the rotors than about x or y with a full one."""
@@ -41,11 +41,12 @@ SINK = 4.5
 """Deceleration of a climb, m/s^2: the thrust that is left can still brake sideways."""
 GUST = 0.4
 """What air may push against the braking, m/s^2: a gust of 3 m/s at 10 m/s, on the vehicles that are shipped."""
-MARGIN_S2 = 0.006
+MARGIN_S2 = 0.005
 """The manoeuvre stays inside by so much of the vehicle's largest thrust over mass, s^2: what the forecast leaves out
-grows with the thrust. That is 0.16 m for VIS-R. It is more ..."""
-TIMING = 0.03
-"""... by the way of so long, s: in the forecast's time, too, there are errors."""
+grows with the thrust. That is 0.14 m for VIS-R. It is more ..."""
+TIMING, TURNING = 0.03, 0.012
+"""... by the way of so long, s: in the forecast's time, too, there are errors; and by so much of the body rate, m s:
+fast turns are foreseen less well."""
 SPEED_GAIN = 12.0
 """Deceleration over speed where the manoeuvre comes to rest, 1/s."""
 WAY_GAINS = (4.0, 3.0)
@@ -303,7 +304,7 @@ def way(xp: Any, b: Backup, m: Motion, k: Brake, air: Residual) -> Way:
     ox, oy, oz = air.x, air.y, air.z - GRAVITY
     px, py, pz, lz, fastest = [], [], [], [], m.vx * m.vx + m.vy * m.vy + m.vz * m.vz
     vx, vy, vz = m.vx, m.vy, m.vz
-    flat, lift = xp.minimum(xp.maximum(THRUST_SHARE / k.share, UNSEEN), 1.0), 0.0
+    flat, z = xp.minimum(xp.maximum(THRUST_SHARE / k.share, UNSEEN), 1.0), 0.0
     for h, t, (a11, a12, a21, a22), kept, mean, square, still, seen in b.steps:
         error = rate - xp.minimum(xp.maximum(TILT_GAIN * left, -top), top)
         taken = spread * abs(error) + 1e-9
@@ -324,17 +325,18 @@ def way(xp: Any, b: Backup, m: Motion, k: Brake, air: Residual) -> Way:
         vb, vc, vt = vb + h * e, vc + h * a, vt + h * d
         if seen:
             fall = 0.5 * t * t
-            px.append(m.px + t * m.vx + fall * ox + pb * offx + pc * cx + pt * tx)
-            py.append(m.py + t * m.vy + fall * oy + pb * offy + pc * cy + pt * ty)
-            free, lift = m.pz + t * m.vz + fall * oz, pb * offz + pc * cz + pt * tz
-            pz.append(free + lift)
-            lz.append(free + flat * lift)
-            vx = m.vx + t * ox + vb * offx + vc * cx + vt * tx
-            vy = m.vy + t * oy + vb * offy + vc * cy + vt * ty
-            lift = vb * offz + vc * cz + vt * tz
-            vz = m.vz + t * oz + lift
+            x, y, z = pb * offx + pc * cx + pt * tx, pb * offy + pc * cy + pt * ty, pb * offz + pc * cz + pt * tz
+            free = m.pz + t * m.vz + fall * oz
+            px.append(m.px + t * m.vx + fall * ox + x)
+            py.append(m.py + t * m.vy + fall * oy + y)
+            pz.append(free + z)
+            lz.append(free + flat * z)
+            x, y, z = vb * offx + vc * cx + vt * tx, vb * offy + vc * cy + vt * ty, vb * offz + vc * cz + vt * tz
+            vx = m.vx + t * ox + x
+            vy = m.vy + t * oy + y
+            vz = m.vz + t * oz + z
             fastest = xp.maximum(fastest, vx * vx + vy * vy + vz * vz)
-    wz = xp.minimum(vz - (1.0 - flat) * lift, 0.0)
+    wz = xp.minimum(vz - (1.0 - flat) * z, 0.0)
     vx = xp.where(vx * k.vx > 0.0, vx, 0.0)
     vy = xp.where(vy * k.vy > 0.0, vy, 0.0)
     vz = xp.where(vz * k.vz > 0.0, vz, 0.0)

@@ -20,12 +20,6 @@ from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 HOLD = 0.01
 """A command is judged as if it were held for so long, s."""
-SLOW = 0.5
-"""A vehicle slower than this, m/s, may be led back inside by the policy itself."""
-LEADS = (0.03,) * 4
-"""Whether a command leads back inside is seen after it was held for so long, in steps, s: the rotors lag."""
-GAINS = 0.002
-"""It must leave so much more room than the manoeuvre, m."""
 HALVINGS = 3
 """How often the share of the change is halved: to an eighth."""
 AIR_S, AIR_MOST = 0.4, 4.0
@@ -210,10 +204,8 @@ def filtered(
     m = forecast(filter, memory, odometry, now)
     solids = near(filter.limits, m, _reach(m)) if filter.limits.solids else ()
 
-    def left(c: Command, holds: tuple[float, ...] = (HOLD,)) -> tuple[Number, ...]:
-        after = m
-        for h in holds:
-            after = moved(xp, r, after, c, air, h)
+    def left(c: Command) -> tuple[Number, ...]:
+        after = moved(xp, r, m, c, air, HOLD)
         return rooms(xp, b, filter.limits, after, air, solids, floor, m)
 
     found = left(wanted)
@@ -224,24 +216,11 @@ def filtered(
     short, limit = _worst(xp, found)
     share = _least(xp, lambda s: _worst(xp, left(_between_two(wanted, own, s)))[0], 0.0 * short)
     passes = short >= 0.0
-    slow = m.vx * m.vx + m.vy * m.vy + m.vz * m.vz < SLOW * SLOW
-    if xp is not SCALARS or (share == 1.0 and slow):
-        # where a vehicle at rest is beyond a limit, a command is as good that leads back inside faster
-        beyond = tuple((room < 0.0) & (low < 0.0) for room, low in zip(found, left(own), strict=True))
-        kept = tuple((room >= 0.0) | out for room, out in zip(found, beyond, strict=True))
-        ahead, behind = left(wanted, LEADS), left(own, LEADS)
-        gains = tuple((a >= b + GAINS) | ~out if xp is not SCALARS else (a >= b + GAINS or not out)
-                      for a, b, out in zip(ahead, behind, beyond, strict=True))  # fmt: skip
-        passes = passes | slow & _all(xp, kept) & _all(xp, gains)
     share = xp.where(passes, 0.0, share)
     given = Command(*(
         xp.where(passes, a, xp.where(share >= 1.0, c, a + share * (c - a))) for a, c in zip(wanted, own, strict=True)
     ))  # fmt: skip
     return Filtered(given, share, short, limit)
-
-
-def _all(xp: Any, conditions: tuple[Any, ...]) -> Any:
-    return all(conditions) if xp is SCALARS else xp.stack(conditions).all(axis=0)
 
 
 def _worst(xp: Any, rooms: tuple[Number, ...]) -> tuple[Number, Any]:

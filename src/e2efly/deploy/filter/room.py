@@ -5,18 +5,19 @@ from dataclasses import dataclass
 from typing import Any
 
 from e2efly.deploy.filter.arithmetic import Number, clip
-from e2efly.deploy.filter.backup import TIMING, WAY_GAINS, Backup, Brake, Way, brake, run_out, way
+from e2efly.deploy.filter.backup import TIMING, TURNING, WAY_GAINS, Backup, Brake, Way, brake, run_out, way
 from e2efly.deploy.filter.body import Motion, Residual
 from e2efly.deploy.settings import Fence
 
-SPEED_MARGIN, SPEED_S = 0.6, 0.25
+SPEED_MARGIN, SPEED_S = 0.5, 0.25
 """The largest speed is kept to with this margin, m/s; so much of it counts as a metre of room, s."""
-TILT_MARGIN, TILT_M = 0.3, 0.3
+TILT_MARGIN, TILT_M = 0.25, 0.3
 """The largest tilt is kept to with this margin, rad; a radian counts as so much room, m."""
 FADES = 2.0
 """At this speed against it, m/s, the air's push is not counted on at all."""
-RETREAT = 2.0
-"""Speed back inside over the distance beyond the margin, 1/s."""
+RETREAT, BACK = 2.0, 0.05
+"""Speed back inside over the distance beyond the margin, 1/s; it comes to rest so far within, m: there the policy has
+room again, and may leave the wall."""
 WALLS = ("x low", "x high", "y low", "y high", "floor", "ceiling")
 """Names of the limits, in the order of their rooms; those of solids follow."""
 NAMES = (*WALLS, "speed", "tilt")
@@ -106,16 +107,17 @@ def rooms(
     low_y, high_y = _ends(xp, w.py, dy)
     low_z, _ = _ends(xp, w.lz, down)
     _, high_z = _ends(xp, w.pz, dz)
-    off_x, off_y, off_z = TIMING * abs(m.vx), TIMING * abs(m.vy), TIMING * abs(m.vz)
+    rough = TURNING * xp.sqrt(m.wx * m.wx + m.wy * m.wy + 1e-9)
+    off_x, off_y, off_z = TIMING * abs(m.vx) + rough, TIMING * abs(m.vy) + rough, TIMING * abs(m.vz) + rough
     low_z = low_z - z0 if floor else z1 - low_z
     found = [
         low_x - x0 - off_x, x1 - high_x - off_x, low_y - y0 - off_y, y1 - high_y - off_y,
         low_z - off_z, z1 - high_z - off_z,
-        SPEED_S * (limits.speed - xp.sqrt(w.speed2)), _tilt_room(xp, limits, k),
+        SPEED_S * (limits.speed - xp.sqrt(w.speed2)) - rough, _tilt_room(xp, limits, k) - TILT_M * rough,
     ]  # fmt: skip
     for nx, ny, nz, gap in solids:
         assert at is not None
-        off = TIMING * xp.maximum(nx * m.vx + ny * m.vy + nz * m.vz, 0.0)
+        off = rough + TIMING * xp.maximum(nx * m.vx + ny * m.vy + nz * m.vz, 0.0)
         found.append(gap - off - _towards(xp, w, at, (nx, ny, nz), (dx, dy, dz)))
     return tuple(found)
 
@@ -130,10 +132,10 @@ def against(xp: Any, m: Motion, air: Residual) -> Residual:
 
 
 def retreat(xp: Any, limits: Limits, m: Motion) -> tuple[Number, ...]:
-    """The velocity back inside, world, m/s: in proportion to how far a state is beyond the margins; 0 inside."""
+    """The velocity back inside, world, m/s: in proportion to how far a state is beyond the margins, or near them."""
     (x0, y0, z0), (x1, y1, z1) = limits.low, limits.high
     return tuple(
-        RETREAT * (xp.maximum(low - at, 0.0) - xp.maximum(at - high, 0.0))
+        RETREAT * (xp.maximum(low + BACK - at, 0.0) - xp.maximum(at - high + BACK, 0.0))
         for at, low, high in ((m.px, x0, x1), (m.py, y0, y1), (m.pz, z0, z1))
     )
 
