@@ -1,7 +1,7 @@
 """Flights of many vehicles at once against the filter of `fly --guard filter`: the physics, the air, the adversaries.
 
-The body is the simulator's own: drag, mixer, rotors, rate loop. The filter knows the vehicle's file and the delay; it is
-not told of the wind, nor of the thrust that is lost in flight, nor of the noise of the poses.
+The body is the simulator's own: drag, mixer, rotors, rate loop. The filter knows the vehicle's file and the delay; it
+is not told of the wind, nor of the thrust that is lost in flight, nor of the noise of the poses.
 """
 
 from collections import deque
@@ -15,12 +15,16 @@ import numpy as np
 
 from e2efly.deploy.filter.backup import Backup
 from e2efly.deploy.filter.body import Command
-from e2efly.deploy.filter.filter import Filter, Filtered, Memory, filtered, remember, watch
+from e2efly.deploy.filter.filter import Filter, Filtered, Memory, filtered, remember, stopping_distance, watch
 from e2efly.deploy.filter.room import NAMES, Limits
 from e2efly.deploy.odometry import Odometry
+from e2efly.deploy.pilot.hover import controlled, rates_of
+from e2efly.deploy.policy.loader import load_policy
+from e2efly.deploy.policy.runtime import Imu, Runtime, act, begin
 from e2efly.deploy.settings import Fence
 from e2efly.physics import State
 from e2efly.physics.step import Physics, step
+from e2efly.tasks.route import course_for
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
@@ -65,6 +69,8 @@ class Seen:
         return (self.gap < 0) | (self.over_speed > 0) | (self.over_tilt > 0)
 
 
+SWAPPED = ("hover", "land", "track", "gap", "race")
+"""Policies of the zoo that fly their own course, wherever the fence is."""
 Policy = Callable[[int, Odometry, np.ndarray], np.ndarray]
 """(step, what is seen, whether the filter acted in the last step) -> (n, 4) thrust over mass and body rates."""
 
@@ -153,6 +159,30 @@ def adversaries(kind: np.ndarray, vehicle: Vehicle, top: np.ndarray, seed: int) 
     return policy
 
 
+def swapped(n: int, vehicle: Vehicle) -> Policy:
+    """The zoo's policies of `SWAPPED`, in turn: each flies its own course, which knows nothing of the fence."""
+    runtimes = []
+    for i in range(n):
+        acts = load_policy(SWAPPED[i % len(SWAPPED)])
+        runtimes.append(Runtime.of(acts, course_for(acts.contract, vehicle), vehicle, imu=True))
+    states: list[Any] = [None] * n
+    held = np.tile([GRAVITY, 0.0, 0.0, 0.0], (n, 1))
+    imu = Imu(np.zeros(3), np.array([0.0, 0.0, GRAVITY]))
+
+    def policy(k: int, o: Odometry, acted: np.ndarray) -> np.ndarray:
+        del acted
+        for i, runtime in enumerate(runtimes):
+            one = Odometry(o.time, o.position[i], o.velocity[i], o.quaternion[i], o.body_rate[i])
+            states[i] = begin(runtime, one, o.time) if states[i] is None else states[i]
+            if k % round(RATE * runtime.period) == 0:
+                states[i], decision = act(runtime, states[i], one, o.time, imu)
+                wanted = controlled(vehicle, decision.mode, one, decision.command)
+                held[i] = [wanted.thrust, *rates_of(wanted)]
+        return held.copy()
+
+    return policy
+
+
 def fly(
     vehicle: Vehicle,
     fences: Fences,
@@ -205,7 +235,9 @@ def fly(
     steps = round(seconds * RATE)
     for k in range(steps):
         now = k / RATE
-        p, v, q, w = (np.asarray(x, np.float64) for x in (state.position, state.velocity, state.quaternion, state.body_rate))
+        p, v, q, w = (
+            np.asarray(x, np.float64) for x in (state.position, state.velocity, state.quaternion, state.body_rate)
+        )
         gap, speed = np.minimum(gap, fences.gap(p)), np.linalg.norm(v, axis=1)
         tilt = np.arccos(np.clip(1 - 2 * (q[:, 1] ** 2 + q[:, 2] ** 2), -1, 1))
         over_speed, top_speed = np.maximum(over_speed, speed - fences.speed), np.maximum(top_speed, speed)
@@ -243,13 +275,20 @@ def _line(i: int, k: int, memory: Memory, wanted: np.ndarray, given: np.ndarray,
           v: np.ndarray, tilt: np.ndarray) -> dict[str, Any]:  # fmt: skip
     told = {} if f is None else {"room": f.room[i], "limit": NAMES[f.limit[i]], "share": f.share[i]}
     told["air"] = [np.broadcast_to(x, len(p))[i] for x in memory.air]
-    return {"flight": i, "step": k, "p": p[i], "v": v[i], "tilt": tilt[i], "wanted": wanted[i], "given": given[i], **told}
+    return {
+        "flight": i,
+        "step": k,
+        "p": p[i],
+        "v": v[i],
+        "tilt": tilt[i],
+        "wanted": wanted[i],
+        "given": given[i],
+        **told,
+    }
 
 
 def drawn_fences(n: int, filter: Filter, random: np.random.Generator, fastest: float) -> Fences:
     """Fences in which a vehicle can stop from their largest speed, 3 to `fastest` m/s."""
-    from e2efly.deploy.filter.filter import stopping_distance
-
     speed = random.uniform(3.0, fastest, n)
     least = np.array([stopping_distance(filter, s) for s in speed])
     size = np.stack([random.uniform(least, 30.0), random.uniform(least, 30.0), random.uniform(2.5, 12.0, n)], 1)

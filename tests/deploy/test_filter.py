@@ -96,8 +96,9 @@ def test_one_command_for_ever_breaches_nothing_and_names_what_it_was_changed_for
     for k in range(400):
         now, seen = k * DT, odometry(flown[-1], k * DT)
         # a policy that turns until it leans, and then pushes on
-        leans = 2 * (flown[-1].qx * flown[-1].qz + flown[-1].qw * flown[-1].qy), -2 * (
-            flown[-1].qy * flown[-1].qz - flown[-1].qw * flown[-1].qx
+        leans = (
+            2 * (flown[-1].qx * flown[-1].qz + flown[-1].qw * flown[-1].qy),
+            -2 * (flown[-1].qy * flown[-1].qz - flown[-1].qw * flown[-1].qx),
         )
         still = limit != "tilt" and math.hypot(*leans) > 0.5
         asked = wanted._replace(x=0.0, y=0.0) if still else wanted
@@ -200,7 +201,7 @@ def test_a_vehicle_that_cannot_brake_is_refused_by_name() -> None:
 def test_many_vehicles_at_once_are_filtered_as_each_alone() -> None:
     random = np.random.default_rng(0)
     n = 40
-    p, v = random.uniform(-5, 5, (n, 3)) + [0, 0, 3], random.uniform(-3, 3, (n, 3))
+    p, v = random.uniform([-5, -5, -2], [5, 5, 8], (n, 3)), random.uniform(-3, 3, (n, 3))
     q = np.column_stack([np.full(n, 3.0), random.normal(size=(n, 3))])
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     wanted = np.column_stack([random.uniform(2, 25, n), random.uniform(-8, 8, (n, 3)) * [1, 1, 0.4]])
@@ -213,9 +214,7 @@ def test_many_vehicles_at_once_are_filtered_as_each_alone() -> None:
     assert 5 < (found.share > 0).sum() < n
     for i in range(n):
         one = Odometry(0.0, p[i], v[i], q[i], w[i])
-        alone = filtered(
-            FILTER, watch(FILTER, memory, one, 0.0, flying=True), one, 0.0, Command(*wanted[i].tolist())
-        )
+        alone = filtered(FILTER, watch(FILTER, memory, one, 0.0, flying=True), one, 0.0, Command(*wanted[i].tolist()))
         np.testing.assert_allclose([x[i] for x in found.command], alone.command, rtol=1e-9, atol=1e-9)
         assert found.share[i] == pytest.approx(alone.share)
         if alone.share == 0.0:

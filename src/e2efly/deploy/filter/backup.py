@@ -349,8 +349,17 @@ def _steps(r: Response) -> tuple[Step, ...]:
         a, _, c, _ = turning(gain, r.motor_time, at + h / 2)
         at += h
         free = min(max(a + r.motor_time * c, 0.0), 1.0)  # of a rate of one, with rotors at rest
-        steps.append(Step(h, at, turning(gain, r.motor_time, h), *lag(r.motor_time, h), lag(r.motor_time / 2, h)[1],
-                          free, i in SEEN))
+        steps.append(
+            Step(
+                h,
+                at,
+                turning(gain, r.motor_time, h),
+                *lag(r.motor_time, h),
+                lag(r.motor_time / 2, h)[1],
+                free,
+                i in SEEN,
+            )
+        )
     return tuple(steps)
 
 

@@ -114,8 +114,10 @@ class Filtered:
 
 
 def remember(memory: Memory, sent: Command, now: float) -> Memory:
-    """The memory after a command was sent."""
+    """The memory after a command was sent; the same one once more changes nothing."""
     kept = memory.sent
+    if kept and isinstance(sent.thrust, float) and kept[-1][1] == sent:
+        return memory
     while len(kept) > 1 and kept[1][0] < now - OLDEST:
         kept = kept[1:]
     return replace(memory, sent=(*kept, (now, sent)))
@@ -153,7 +155,13 @@ def watch(filter: Filter, memory: Memory, odometry: Odometry, now: float, *, fly
 
 
 def _felt(
-    xp: Any, air: Residual, v0: tuple[Number, ...], v1: tuple[Number, ...], axis: tuple[Number, ...], f: Number, dt: float
+    xp: Any,
+    air: Residual,
+    v0: tuple[Number, ...],
+    v1: tuple[Number, ...],
+    axis: tuple[Number, ...],
+    f: Number,
+    dt: float,
 ) -> Residual:
     """What is not explained after a change of velocity in dt s: along the thrust by its share, across it by the air."""
     bx, by, bz = axis
@@ -211,7 +219,7 @@ def filtered(
     found = left(wanted)
     if xp is SCALARS and min(found) >= 0.0:
         return Filtered(wanted, 0.0, *_worst(xp, found))
-    back = retreat(xp, filter.limits, m)
+    back = retreat(xp, filter.limits, m, floor)
     own = command(xp, b, m, brake(xp, b, m, against(xp, m, air), back))
     short, limit = _worst(xp, found)
     share = _least(xp, lambda s: _worst(xp, left(_between_two(wanted, own, s)))[0], 0.0 * short)

@@ -15,9 +15,9 @@ TILT_MARGIN, TILT_M = 0.25, 0.3
 """The largest tilt is kept to with this margin, rad; a radian counts as so much room, m."""
 FADES = 2.0
 """At this speed against it, m/s, the air's push is not counted on at all."""
-RETREAT, BACK = 2.0, 0.05
-"""Speed back inside over the distance beyond the margin, 1/s; it comes to rest so far within, m: there the policy has
-room again, and may leave the wall."""
+RETREAT, BACK, BACK_UP = 2.0, 0.05, 0.35
+"""Speed back inside over the distance beyond the margin, 1/s; it comes to rest so far within, m, and over the floor:
+there the policy has room again, and may leave the wall."""
 WALLS = ("x low", "x high", "y low", "y high", "floor", "ceiling")
 """Names of the limits, in the order of their rooms; those of solids follow."""
 NAMES = (*WALLS, "speed", "tilt")
@@ -131,12 +131,13 @@ def against(xp: Any, m: Motion, air: Residual) -> Residual:
     return Residual(x, y, z, air.share)
 
 
-def retreat(xp: Any, limits: Limits, m: Motion) -> tuple[Number, ...]:
+def retreat(xp: Any, limits: Limits, m: Motion, floor: bool = True) -> tuple[Number, ...]:
     """The velocity back inside, world, m/s: in proportion to how far a state is beyond the margins, or near them."""
     (x0, y0, z0), (x1, y1, z1) = limits.low, limits.high
+    z0 = z0 if floor else -math.inf
     return tuple(
-        RETREAT * (xp.maximum(low + BACK - at, 0.0) - xp.maximum(at - high + BACK, 0.0))
-        for at, low, high in ((m.px, x0, x1), (m.py, y0, y1), (m.pz, z0, z1))
+        RETREAT * (xp.maximum(low + back - at, 0.0) - xp.maximum(at - high + BACK, 0.0))
+        for at, low, high, back in ((m.px, x0, x1, BACK), (m.py, y0, y1, BACK), (m.pz, z0, z1, BACK_UP))
     )
 
 
