@@ -56,6 +56,9 @@ def campaign(flights: int) -> list[dict[str, Any]]:
         policy = adversaries(kind, vehicle, fences.speed, seed)
         seen = fly(vehicle, fences, policy, kind, seconds=SECONDS, latency=LATENCY, seed=seed)
         print(f"{n} flights, {seen.breach.sum()} breaches", flush=True)
+        for i in np.flatnonzero(seen.breach):
+            told = (seen.gap[i], seen.over_speed[i], seen.over_tilt[i], seen.top_speed[i])
+            print(f"  seed {seed}, flight {i}, {KINDS[kind[i]]}: " + ", ".join(f"{x:.2f}" for x in told), flush=True)
         for i, name in enumerate(KINDS):
             found[name].append(picked(seen, kind == i))
         left, seed = left - n, seed + 1

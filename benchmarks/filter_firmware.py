@@ -63,7 +63,8 @@ def through_firmware(count: int) -> dict[str, Any]:
             for _ in range(min(PER_RIG, count - len(gaps))):
                 rig.set(mission="hover")
                 flight.session.fly(2.0)
-                flight.hand_over(at(*(float(p) for p in flight.position)))
+                inside = np.clip(flight.position, np.add(FENCE.low, 0.3), np.subtract(FENCE.high, 0.3))
+                flight.hand_over(at(*inside.tolist()))
                 flight.command(3.0, at(0.0, 0.0, 1.5))
                 flown = flight.session.flown
                 begun = len(flown.time)

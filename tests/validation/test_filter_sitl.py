@@ -60,7 +60,8 @@ def test_a_commander_that_flies_at_a_wall_is_kept_inside(field: tuple[Field, Pat
     session = flight.session
     flight.rig.set(mission="hover")
     session.fly(3.0)
-    flight.hand_over(at(*(float(p) for p in flight.position)))
+    x, y, z = (float(p) for p in np.clip(flight.position, np.add(FENCE.low, 0.3), np.subtract(FENCE.high, 0.3)))
+    flight.hand_over(at(x, y, z))
     flight.command(4.0, CENTRE)
     keeper = session.bridge.keeper
     if keeper is not None:

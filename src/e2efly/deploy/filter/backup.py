@@ -29,7 +29,7 @@ UNSEEN = 0.85
 """Share of the thrust that is left before a loss of it is noticed."""
 STEEPEST = math.radians(65)
 """Largest tilt of the manoeuvre, rad, where the fence allows it."""
-COUNTED = (0.55, 0.55)
+COUNTED = (0.5, 0.55)
 """Shares of what is commanded that are counted on, sideways and of a fall: until a loss of thrust is noticed."""
 DIAGONAL = 1.4 / THRUST_SHARE
 """By which turning about a diagonal with a flat battery takes more of the rotors than about x or y with a full one."""
@@ -41,9 +41,9 @@ SINK = 4.5
 """Deceleration of a climb, m/s^2: the thrust that is left can still brake sideways."""
 GUST = 0.4
 """What air may push against the braking, m/s^2: a gust of 3 m/s at 10 m/s, on the vehicles that are shipped."""
-MARGIN_S2 = 0.005
+MARGIN_S2 = 0.0065
 """The manoeuvre stays inside by so much of the vehicle's largest thrust over mass, s^2: what the forecast leaves out
-grows with the thrust. That is 0.14 m for VIS-R. It is more ..."""
+grows with the thrust. That is 0.18 m for VIS-R. It is more ..."""
 TIMING, TURNING = 0.03, 0.012
 """... by the way of so long, s: in the forecast's time, too, there are errors; and by so much of the body rate, m s:
 fast turns are foreseen less well."""

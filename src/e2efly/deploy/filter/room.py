@@ -9,9 +9,9 @@ from e2efly.deploy.filter.backup import TIMING, TURNING, WAY_GAINS, Backup, Brak
 from e2efly.deploy.filter.body import Motion, Residual
 from e2efly.deploy.settings import Fence
 
-SPEED_MARGIN, SPEED_S = 0.5, 0.25
+SPEED_MARGIN, SPEED_S = 0.6, 0.25
 """The largest speed is kept to with this margin, m/s; so much of it counts as a metre of room, s."""
-TILT_MARGIN, TILT_M = 0.25, 0.3
+TILT_MARGIN, TILT_M = 0.28, 0.3
 """The largest tilt is kept to with this margin, rad; a radian counts as so much room, m."""
 FADES = 2.0
 """At this speed against it, m/s, the air's push is not counted on at all."""
