@@ -22,6 +22,7 @@ from common import RESULTS, arguments, table, write
 from filter_firmware import through_firmware
 from filter_flights import KINDS, Seen, adversaries, drawn_fences, fly, swapped
 
+from e2efly.control import Quat
 from e2efly.deploy.filter.body import Command
 from e2efly.deploy.filter.filter import Filter, Memory, filtered, remember, stopping_distance, watch
 from e2efly.deploy.odometry import Odometry
@@ -38,8 +39,10 @@ SECONDS, BATCH = 8.0, 1000
 SHARE_SWAPPED = 0.05
 """Of the flights: those of the zoo's policies, which are slower to fly."""
 ZOO = ("hover", "hover_aware", "land", "track", "gap", "race")
-BESIDE = 1.0
-"""The zoo's flights have a fence so far around all of them, m."""
+BESIDE = (1.0, 3.0)
+"""The zoo's flights have fences so far around all of them, m ..."""
+SPARE = (1.0, 0.4)
+"""... and so much more speed and tilt than they reach, m/s and rad."""
 
 
 def campaign(flights: int) -> list[dict[str, Any]]:
@@ -103,21 +106,24 @@ def zoo(episodes: int) -> list[dict[str, Any]]:
         mode, latency = found.candidate.policy.contract.action.mode, found.candidate.latency
         places = np.concatenate([flight.position for flight in flights])
         speed = max(float(np.linalg.norm(flight.velocity, axis=1).max()) for flight in flights)
-        low, high = places.min(0) - BESIDE, places.max(0) + BESIDE
-        fence = Fence(low=tuple(low.tolist()), high=tuple(high.tolist()), speed=max(speed + 1.0, 6.0), tilt=1.4)
-        filter = Filter.of(vehicle, fence, latency)
-        counts = [judged(filter, flight, mode, task == "land") for flight in flights]
-        steps, changed = (sum(count[i] for count in counts) for i in range(2))
-        rows.append({
-            "task": task, "flights": len(flights), "steps": steps, "top speed": f"{speed:.1f} m/s",
-            "steps changed": f"{changed / steps:.2%}",
-        })  # fmt: skip
+        tilt = max(float(Quat.of(flight.quaternion).tilt().max()) for flight in flights)
+        row = {
+            "task": task, "flights": len(flights), "steps": sum(len(flight.command) for flight in flights),
+            "top speed": f"{speed:.1f} m/s", "largest tilt": f"{tilt:.2f} rad",
+        }  # fmt: skip
+        for beside in BESIDE:
+            low, high = (places.min(0) - beside).tolist(), (places.max(0) + beside).tolist()
+            fence = Fence(low, high, max(speed + SPARE[0], 6.0), max(tilt + SPARE[1], 1.4))
+            filter = Filter.of(vehicle, fence, latency)
+            changed = sum(judged(filter, flight, mode, task == "land") for flight in flights)
+            row[f"changed, fence {beside:g} m around"] = f"{changed / row['steps']:.2%}"
+        rows.append(row)
         print(rows[-1], flush=True)
     return rows
 
 
-def judged(filter: Filter, flight: Any, mode: str, lands: bool) -> tuple[int, int]:
-    """Steps of a flight, and those in which the filter would change the command."""
+def judged(filter: Filter, flight: Any, mode: str, lands: bool) -> int:
+    """The steps of a flight in which the filter would change the command."""
     vehicle, memory, changed = load_vehicle(VEHICLE), Memory(), 0
     for k in range(-20, 0):
         memory = remember(memory, Command(GRAVITY, 0.0, 0.0, 0.0), k * 0.01)
@@ -129,7 +135,7 @@ def judged(filter: Filter, flight: Any, mode: str, lands: bool) -> tuple[int, in
         wanted = Command(float(asked.thrust), *rates_of(asked))
         changed += filtered(filter, memory, o, now, wanted, floor=not lands).share > 0
         memory = remember(memory, wanted, now)
-    return len(flight.command), changed
+    return changed
 
 
 def timed(calls: int = 20000) -> list[dict[str, Any]]:

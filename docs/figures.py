@@ -130,7 +130,7 @@ VIS-R on the simulator's body, each flight in a fence of its own with a largest 
 m/s; 90 ms of delay, noise of motion capture, gusts of up to 3 m/s, and a fifth of the thrust lost from a
 moment of the flight on, of which the filter is not told. A breach is any moment outside the fence, or
 above its speed or tilt. The tables after that: shares of the steps of the zoo's own flights in which the
-filter would change the command, in a fence 1 m around all of them; the share of the default fence in
+filter would change the command, in fences around all of them with 1 m/s and 0.4 rad to spare; the share of the default fence in
 which the vehicle may fly level at a speed in every direction; milliseconds of the processor for a call;
 flights at walls through the real firmware.""",
     "firmware_faults": """
