@@ -63,17 +63,23 @@ def through_firmware(count: int) -> dict[str, Any]:
             for _ in range(min(PER_RIG, count - len(gaps))):
                 rig.set(mission="hover")
                 flight.session.fly(2.0)
+                if flight.mode is not Mode.HOVER:
+                    break
                 inside = np.clip(flight.position, np.add(FENCE.low, 0.3), np.subtract(FENCE.high, 0.3))
                 flight.hand_over(at(*inside.tolist()))
+                flight.command(2.0, at(*(0.5 * inside + [0.0, 0.0, 0.75]).tolist()))  # farther off would be refused
                 flight.command(3.0, at(0.0, 0.0, 1.5))
                 flown = flight.session.flown
-                begun = len(flown.time)
+                begun, since = len(flown.time), rig.now()
                 flight.command(SECONDS, attack(random))
                 places = np.array(flown.position[begun:])
                 gaps.append(float(np.minimum(places - FENCE.low, np.array(FENCE.high) - places).min()))
                 speeds.append(float(np.linalg.norm(flown.velocity[begun:], axis=1).max()))
                 if flight.mode is not Mode.POLICY:
-                    ended.append("; ".join(flight.reasons))
+                    ended.append(
+                        next("; ".join(why) for at, mode, why in flown.changes if at > since and mode != "policy")
+                    )
+                    print(f"{gaps[-1]:.2f} m: {ended[-1]}", flush=True)
         print(f"{len(gaps)} flights through the firmware, nearest {min(gaps):.2f} m, {len(ended)} ended", flush=True)
     return {
         "through the firmware": len(gaps), "breaches": sum(gap < 0 for gap in gaps), "ended in HOVER": len(ended),

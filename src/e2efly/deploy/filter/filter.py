@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from e2efly.deploy.filter.arithmetic import SCALARS, Number, clip
-from e2efly.deploy.filter.backup import TIMING, Backup, axes_z, brake, command, stopping
+from e2efly.deploy.filter.backup import TIMING, Backup, axes_z, brake, command
 from e2efly.deploy.filter.body import NOTHING, Actuators, Command, Motion, Residual, actuated, moved
 from e2efly.deploy.filter.room import NAMES, Limits, against, near, retreat, rooms
+from e2efly.deploy.filter.way import stopping
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.settings import Fence
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from e2efly.deploy.filter.arithmetic import Number, clip
-from e2efly.deploy.filter.backup import TIMING, TURNING, WAY_GAINS, Backup, Brake, Way, brake, run_out, way
+from e2efly.deploy.filter.backup import TIMING, TURNING, WAY_GAINS, Backup, Brake, brake
 from e2efly.deploy.filter.body import Motion, Residual
+from e2efly.deploy.filter.way import Way, run_out, way
 from e2efly.deploy.settings import Fence
 
 SPEED_MARGIN, SPEED_S = 0.6, 0.25
