@@ -33,7 +33,7 @@ class Rule:
     def problem(self, value: Any) -> str | None:
         """What is accepted in place of a value; None: it is accepted."""
         numbers = value if isinstance(value, tuple) else (value,)
-        if any(isinstance(x, bool) or not isinstance(x, int | float) for x in numbers):
+        if not numbers or any(isinstance(x, bool) or not isinstance(x, int | float) for x in numbers):
             return None
         if math.isfinite(self.high):
             least = self.low if self.above is None else self.above

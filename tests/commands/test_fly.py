@@ -21,6 +21,7 @@ from e2efly.commands.fly import run as fly_command
 from e2efly.deploy.betaflight.codec import REPLY, Frame, encode
 from e2efly.deploy.betaflight.messages import Name
 from e2efly.deploy.log.flight_log import read_log
+from e2efly.deploy.settings import Fence, FlightSettings
 from e2efly.tasks.hover.goal import HoverRoute
 from tests.deploy.test_msp_client import controller, recorded
 
@@ -116,3 +117,10 @@ def test_the_policy_of_the_goal_s_options_is_looked_for_in_no_device(tmp_path: P
 
 def test_each_image_has_an_option_of_its_own() -> None:
     assert parse(["avoid", "--image", "a=shm:x", "--image", "b=shm:y"]).image == ("a=shm:x", "b=shm:y")
+
+
+def test_a_filter_is_refused_before_anything_is_opened_in_a_fence_too_small_to_stop_in() -> None:
+    fence = Fence(low=(-1.0, -3.0, 0.2), high=(1.0, 3.0, 4.5))
+    options = Fly(vehicle="vis_r", guard="filter", link="/dev/none", flight=FlightSettings(fence=fence))
+    with pytest.raises(ValueError, match=r"guard 'filter': flight.fence.speed is 6 m/s.* 2 m long in x; accepted"):
+        fly_command(options)

@@ -57,6 +57,8 @@ def test_numbers_that_make_no_sense(name: str, value: object) -> None:
         (Fence(low=(3, 0, 0)), "fence.low and flight.fence.high are 3 and 3.0 in x"),
         (Fence(low=(0, 5, 0)), "fence.low and flight.fence.high are 5 and 3.0 in y"),
         (Fence(low=(0, 0, 4.2)), "fence.low and flight.fence.high are 4.2 and 4.5 in z"),
+        (Fence(solids=((0, 0, 0, 1, 1, 1), (0, 0, 0, 1, -1, 1))), "fence.solids[1] is (0, 0, 0, 1, -1, 1)"),
+        (Fence(solids=((0, 0, 0, 1, 1, math.inf),)), "fence.solids[0] is"),
     ],
 )  # fmt: skip
 def test_a_fence_that_is_none(fence: Fence, named: str) -> None:

@@ -644,6 +644,16 @@ def test_sticks_never_lead_out_of_the_fence_nor_make_the_target_jump(
     assert -math.pi <= to.yaw <= math.pi
 
 
+def test_behind_a_filter_the_guard_ends_a_policy_outside_alone() -> None:
+    near = having(AWAY, odometry=at(z=1.5, x=2.5, velocity=(3.0, 0.0, 0.0)))
+    outside = having(AWAY, odometry=at(z=1.5, x=3.05))
+    (ended,) = flown(policy_flying(), near).reasons
+    assert ended.startswith(Reason.GUARD)
+    assert flown(policy_flying(), having(near, filtered=True)).mode is Mode.POLICY
+    (ended,) = flown(policy_flying(), having(outside, filtered=True)).reasons
+    assert ended.startswith(Reason.OUTSIDE_FENCE)
+
+
 @hypothesis_settings(deadline=None)
 @given(
     st.tuples(*[st.floats(-2.9, 2.9)] * 2, st.floats(0.3, 4.4)), st.tuples(*[st.floats(-3.4, 3.4)] * 3)

@@ -8,7 +8,7 @@ import time
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
@@ -25,6 +25,7 @@ from e2efly.deploy.commander.commander import Commander, CommandSource
 from e2efly.deploy.commander.sources import open_commands
 from e2efly.deploy.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
 from e2efly.deploy.excitation import NAME as EXCITATION
+from e2efly.deploy.filter.filter import Filter
 from e2efly.deploy.flight_loop import LOWEST_RATE, fly, loop_rate
 from e2efly.deploy.log.live import Live, targets_of
 from e2efly.deploy.log.record import Log, Logs
@@ -91,6 +92,9 @@ class Fly:
     """Throttle map that an earlier flight learned (.throttle.json)."""
     watchdog: bool = True
     """Let a process of its own hold the link and land the vehicle should this one die. Do not fly without."""
+    guard: Literal["switch", "filter"] = "switch"
+    """What keeps a policy in the fence: a switch, which ends its flight where it could hardly stop inside any more, or
+    a filter, which changes its commands no more than stopping inside needs, and lets it fly on. See docs/flying.md."""
     latency: float | None = None
     """From the vehicle's motion to its rate loop, s: sets the hover gains; left out: the vehicle file's."""
     goal: tyro.conf.Suppress[Route | None] = None
@@ -154,6 +158,7 @@ def run(options: Fly) -> int:
         )
     flies = options.vehicle or _own_vehicle(policy, loaded)
     body = load_vehicle(flies)
+    filter = Filter.of(body, settings.fence, options.latency) if options.guard == "filter" else None
     runtime = None
     if loaded is not None:
         if reasons := check(loaded.contract, body, fields_of(loaded.contract), imu=True, images=True):
@@ -192,7 +197,7 @@ def run(options: Fly) -> int:
             stack.callback(worker.close)
         bridge = Bridge(
             client, info, source, body, settings, worker=worker, latency=options.latency,
-            settings_problems=problems(rows), throttle_map=known, cameras=cameras,
+            settings_problems=problems(rows), throttle_map=known, cameras=cameras, filter=filter,
         )  # fmt: skip
         source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:

@@ -11,6 +11,9 @@ from rich.table import Table
 
 from e2efly.terminal import Terminal
 
+LONGEST = 20
+"""So many of the times at which the filter stepped in are printed."""
+
 
 @dataclass(frozen=True)
 class FlyReport:
@@ -74,9 +77,24 @@ def _print(console: Console, table: dict[str, Any]) -> None:
     for name, text in _lines(table):
         figures.add_row(name, text)
     console.print(figures)
+    if table["filter"]:
+        console.print(_filter(table["filter"]))
     for event in table["events"]:
         if event["level"] in ("warning", "error"):
             console.print(f"{event['time_s']:8.2f} s  {event['level']}: {event['text']}")
+
+
+def _filter(found: dict[str, Any]) -> Table:
+    """Where the filter stepped in."""
+    title = f"the filter changed {found['commands']} of {found['of']} commands of the policy"
+    table = Table("for", "from", "to", "commands", "largest share", box=None, header_style="bold", pad_edge=False)
+    table.title, table.title_justify = title, "left"
+    for row in found["stepped_in"][:LONGEST]:
+        times = f"{row['start_s']:.2f} s", f"{row['end_s']:.2f} s"
+        table.add_row(row["limit"], *times, str(row["commands"]), f"{row['largest_share']:.0%}")
+    if (more := len(found["stepped_in"]) - LONGEST) > 0:
+        table.caption = f"and {more} more (summary.json has them all)"
+    return table
 
 
 def _lines(table: dict[str, Any]) -> list[tuple[str, str]]:

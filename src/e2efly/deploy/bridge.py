@@ -11,9 +11,12 @@ from e2efly.deploy.betaflight.controller import ControllerInfo
 from e2efly.deploy.betaflight.instruments import CLOSED, PROBE, ChannelProbe, Instruments, Reading
 from e2efly.deploy.betaflight.messages import AttitudeReply, RawImu, set_raw_rc
 from e2efly.deploy.betaflight.sticks import sticks_of
+from e2efly.deploy.filter.filter import Filter
+from e2efly.deploy.filter.guard import Keeper
 from e2efly.deploy.log.record import (
     Log,
     Sent,
+    record_filter,
     record_link,
     record_map,
     record_message,
@@ -22,7 +25,7 @@ from e2efly.deploy.log.record import (
     record_policy,
     record_sent,
 )  # fmt: skip
-from e2efly.deploy.odometry import Odometry, Sample
+from e2efly.deploy.odometry import Odometry, Sample, yaw_of
 from e2efly.deploy.pilot import estimate, guidance, inertial, state_machine
 from e2efly.deploy.pilot.estimate import LATE_S, Estimate, height_of
 from e2efly.deploy.pilot.flight_state import AIRBORNE, GROUNDED, Flight, Inputs, Mode
@@ -71,6 +74,7 @@ class Bridge:
         settings_problems: tuple[str, ...] = (),
         throttle_map: ThrottleMap | None = None,
         cameras: Sequence[ImageSource] = (),
+        filter: Filter | None = None,
     ) -> None:
         """Make a bridge on the ground.
 
@@ -86,6 +90,7 @@ class Bridge:
             settings_problems: why the controller's settings forbid a take-off.
             throttle_map: learned in earlier flights; None: the vehicle file's.
             cameras: what the policy sees, in the order of its contract's images.
+            filter: keeps the policy inside of the fence; None: the guard ends its flight there.
         """
         delay: float = vehicle.latency if latency is None else latency
         self.client, self.source, self.vehicle, self.settings = client, source, vehicle, settings
@@ -107,6 +112,7 @@ class Bridge:
         self.imu: Imu | None = None
         """The newest measurement of the inertial sensors that can be believed."""
         self.sent = Sent("closed", None, 0.0, self._closed())
+        self.keeper = None if filter is None else Keeper(filter)
         self._history = ThrottleHistory(HISTORY_S)
         self._late: tuple[float, ...] = ()
         self._ticks, self._last = 0, 0.0
@@ -124,7 +130,7 @@ class Bridge:
         self._late = tuple(moment for moment in late if moment >= now - 1.0)
         _, reading = self._perceive(now)
         self._decide(now, slack)
-        self.sent = self._send(now, *self._command(now, dt))
+        self.sent = self._send(now, *self._kept(now, *self._command(now, dt)))
         if self.log is not None:
             self._record(self.log, now, reading)
         return self.sent
@@ -194,7 +200,8 @@ class Bridge:
             pilot=reading.pilot,
             voltage=reading.voltage,
             settings_problems=self.settings_problems + probed + reading.meddling + ((slow,) if slow else ()),
-            policy_problem=reading.meddling[0] if reading.meddling else self._blindness(now),
+            policy_problem=reading.meddling[0] if reading.meddling else self._blindness(now) or self._unfiltered,
+            filtered=self.keeper is not None,
             attitude_error=told.attitude_error(reading.attitude),
             heading_error=told.heading_error,
             missed_deadlines=len(self._late),
@@ -208,6 +215,11 @@ class Bridge:
     def _blindness(self, now: float) -> str | None:
         """Why a policy that sees must not act on the newest images."""
         return next((problem for seen in self.seen if (problem := seen.problem(now))), None)
+
+    @property
+    def _unfiltered(self) -> str | None:
+        """Why the filter cannot keep a policy inside."""
+        return None if self.keeper is None else self.keeper.problem
 
     def _feel(self, now: float, reading: Reading) -> None:
         """Take in the inertial sensors: in the air they teach the throttle map, and carry the velocity on."""
@@ -302,6 +314,21 @@ class Bridge:
         command, self.trim = guidance.hover(self.gentle, flight, flight.target, odometry, self.trim, dt)
         return "hover", command
 
+    def _kept(self, now: float, source: str, command: Ctbr | None) -> tuple[str, Ctbr | None]:
+        """The command as the filter lets it pass; where that fails, a stop, and the next step ends the flight."""
+        keeper, flight, odometry = self.keeper, self.flight, self.odometry
+        if keeper is None:
+            return source, command
+        keeper.problem = None if flight.mode in GROUNDED else keeper.problem
+        keeper.see(odometry, now, flying=self.flying and self.height > LIFTED and not flight.misled)
+        if self.decision is not None and command is not None and odometry is not None:
+            command = keeper.keep(odometry, now, command, floor=not self.inputs.policy_lands)
+            if command is None:
+                stop = (0.0, 0.0, 0.0, yaw_of(odometry.quaternion))
+                source, command = "hover", controlled(self.gentle, "velocity", odometry, stop)
+        keeper.sent(command, now)
+        return source, command
+
     def _send(self, now: float, source: str, command: Ctbr | None) -> Sent:
         if command is None:
             sent = Sent(source, None, 0.0, self._closed())
@@ -321,6 +348,8 @@ class Bridge:
     def _record(self, log: Log, now: float, reading: Reading) -> None:
         if self.odometry is not None and self.inputs.odometry_problem is None:
             record_odometry(log, now, self.odometry)
+        if self.keeper is not None and self.keeper.change is not None:
+            record_filter(log, now, self.keeper.change)
         record_sent(log, now, self.sent, str(self.flight.mode), *self.setpoint)
         for code, reply in reading.fresh.items():
             record_message(log, self.info, code, reply, self.imu)

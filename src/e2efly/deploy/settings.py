@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from e2efly.numbers import check_numbers, number
 
 Point = tuple[float, float, float]
+Box = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,8 @@ class Fence:
     """Deceleration that hovering can count on, m/s^2: the guard takes over while that still stops inside."""
     reaction: float = number(0.15, above=0)
     """Time before the braking acts, s."""
+    solids: tuple[Box, ...] = ()
+    """Boxes that the filter of --guard filter keeps the vehicle out of: smallest x, y, z, largest x, y, z of each."""
 
 
 @dataclass(frozen=True)
@@ -119,6 +122,12 @@ def _check_fence(fence: Fence) -> None:
         if high - low < SMALLEST:
             said = f"flight.fence.low and flight.fence.high are {low} and {high} in {axis}"
             raise ValueError(f"{said}; accepted: low at least {SMALLEST} m below high")
+    for i, box in enumerate(fence.solids):
+        finite = len(box) == 6 and all(map(math.isfinite, box))
+        if not finite or not all(low < high for low, high in zip(box[:3], box[3:], strict=True)):
+            raise ValueError(
+                f"flight.fence.solids[{i}] is {box!r}; accepted: six numbers, the smallest x, y, z, then the largest"
+            )
 
 
 def _check_channels(channels: PilotChannels) -> None:

@@ -13,6 +13,7 @@ from e2efly.deploy.betaflight.controller import identify
 from e2efly.deploy.betaflight.link import Link, open_link
 from e2efly.deploy.bridge import Bridge
 from e2efly.deploy.commander.commander import Commander, CommandSource
+from e2efly.deploy.filter.filter import Filter
 from e2efly.deploy.log.record import Log
 from e2efly.deploy.pilot.flight_state import Mode
 from e2efly.deploy.policy.runtime import Acting, Envelope, Runtime
@@ -82,6 +83,7 @@ class Session:
         cameras: Sequence[ImageSource] = (),
         commands: CommandSource | None = None,
         schedule: Mapping[int, float] = SCHEDULE,
+        filtered: bool = False,
     ) -> None:
         vehicle = rig.world.vehicle
         self.rig, self.settings = rig, settings
@@ -101,6 +103,7 @@ class Session:
         self.bridge = Bridge(
             self.client, self.info, self.source, vehicle, settings,
             worker=self.commander or self.worker, log=log, latency=late, cameras=cameras,
+            filter=Filter.of(vehicle, settings.fence, late) if filtered else None,
         )  # fmt: skip
         self.flown = Flown()
         self.lateness = 0.0

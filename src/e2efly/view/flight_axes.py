@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from e2efly.deploy.log.flight_log import FlightLog
-from e2efly.drawing import ORANGE
+from e2efly.drawing import INK, ORANGE
 from e2efly.view.flight_log import Interval
 from e2efly.view.style import BLUE, GREEN, GREY, PALE, PURPLE, SKY, VERMILLION, say
 
@@ -50,6 +50,16 @@ def mode_handles(color: dict[str, str], filled: bool) -> list[Any]:
     if filled:
         return [Patch(facecolor=c, alpha=0.3, label=mode) for mode, c in color.items() if mode]
     return [Line2D([], [], color=c, label=mode) for mode, c in color.items() if mode]
+
+
+def stepped_in_marks(ax: Axes, log: FlightLog) -> list[Any]:
+    """Marks along the lower edge of a plot over time where the filter changed a command; their entry of a legend."""
+    time = log["filter"].time
+    if not len(time):
+        return []
+    edge = ax.get_xaxis_transform()
+    line = ax.plot(time, np.full(len(time), 0.02), "|", color=INK, markersize=7, transform=edge, label="filter")
+    return list(line)
 
 
 def empty(ax: Axes) -> None:

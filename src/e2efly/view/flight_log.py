@@ -4,14 +4,14 @@ import datetime
 import math
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from e2efly.control import Quat
 from e2efly.deploy.log.blackbox import Alignment, Blackbox
-from e2efly.deploy.log.flight_log import FlightLog
+from e2efly.deploy.log.flight_log import FlightLog, Series
 from e2efly.vehicles import load_vehicle, vehicle_names
 from e2efly.view.rate_response import EXCITATION, StepResponse, step_response
 
@@ -20,6 +20,9 @@ GROUNDED = ("INIT", "DONE", "DISARMED", "")
 """Modes in which the vehicle does not follow commands."""
 ALIGNED_S = 5.0
 """Time in all others that an alignment needs, s."""
+
+TOGETHER_S = 0.3
+"""Changes by the filter, for the same limit, that are nearer to each other than this are told as one, s."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,39 @@ def errors(log: FlightLog) -> tuple[np.ndarray, np.ndarray]:
     return motion.time, np.linalg.norm(position - held, axis=1)
 
 
+def stepped_in(log: FlightLog) -> list[Interval]:
+    """When the filter changed commands: intervals of changes less than `TOGETHER_S` apart, of limits as modes."""
+    changes = log["filter"]
+    limits, found = changes.texts("limit"), list[Interval]()
+    for i in range(len(changes)):
+        at = float(changes.time[i])
+        if found and found[-1].mode == limits[i] and at - found[-1].end < TOGETHER_S:
+            found[-1] = replace(found[-1], end=at)
+        else:
+            found.append(Interval(limits[i], at, at, ()))
+    return found
+
+
+def _filter(log: FlightLog, modes: list[Interval]) -> dict[str, Any] | None:
+    """Where the filter stepped in; None where it never did."""
+    changes = log["filter"]
+    if not len(changes):
+        return None
+    time, share = changes.time, changes.numbers("share")
+    commands = log["command"].time
+    flown = sum(int(((commands >= i.start) & (commands < i.end)).sum()) for i in modes if i.mode.upper() == "POLICY")
+    rows = []
+    for i in stepped_in(log):
+        mine = (time >= i.start) & (time <= i.end) & (np.array(changes.texts("limit")) == i.mode)
+        row = {"limit": i.mode, "start_s": i.start, "end_s": i.end, "commands": int(mine.sum())}
+        rows.append({**row, "largest_share": float(share[mine].max()), "least_room_m": _least(changes, mine)})
+    return {"commands": len(changes), "of": flown, "stepped_in": rows}
+
+
+def _least(changes: Series, mine: np.ndarray) -> float:
+    return float(changes.numbers("room")[mine].min())
+
+
 def tilt(quaternion: np.ndarray) -> np.ndarray:
     """Angle, rad, between body z and up of quaternions (n, 4)."""
     return Quat.of(quaternion).tilt()
@@ -145,6 +181,7 @@ def summary(log: FlightLog, blackbox: Blackbox | None = None, alignment: Alignme
             "round_trip_s": _spread(link.numbers("round_trip")),
         },
         "throttle_map": {name: _ends(log["throttle_map"].numbers(name)) for name in ("scale", "voltage_gain")},
+        "filter": _filter(log, changes),
         "events": [
             {"time_s": float(t), "level": level, "text": text}
             for t, level, text in zip(

@@ -12,7 +12,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from e2efly.deploy.log.flight_log import FlightLog
 from e2efly.drawing import INK
-from e2efly.view.flight_axes import XYZ, bands, colors, empty, liveliest, mode_handles, note
+from e2efly.view.flight_axes import XYZ, bands, colors, empty, liveliest, mode_handles, note, stepped_in_marks
 from e2efly.view.flight_log import AXES, Interval, errors, gyro, intervals, tilt
 from e2efly.view.rate_response import StepResponse
 from e2efly.view.style import GREY, PALE, figure, say
@@ -99,8 +99,9 @@ def plot_motion(log: FlightLog, path: str | Path) -> None:
             ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderpad=0.1)
         error.set_xlabel("time (s)")
         _numbers(place, modes, log.duration)
+        marks = stepped_in_marks(place, log)
         fig.align_ylabels(axes)
-        handles = mode_handles(colors(modes), filled=True)
+        handles = [*mode_handles(colors(modes), filled=True), *marks]
         if handles:
             fig.legend(handles=handles, loc="outside lower center", ncols=len(handles))
 

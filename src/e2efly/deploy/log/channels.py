@@ -150,6 +150,15 @@ _ALL = (
         ("problem", "text", "", "why the last message was refused that was"),
     ),
     _channel(
+        "filter",
+        "With --guard filter: each command that it changed; what was sent is in `command`.",
+        ("limit", "text", "", "what would not have been kept: a wall, floor, ceiling, speed, tilt or a solid"),
+        ("room", "number", "m", "what stopping after the wanted command would have left to it; negative: beyond it"),
+        ("share", "number", "1", "how far the command was changed towards stopping, 0 to 1"),
+        ("wanted_thrust", "number", "m/s^2", "collective thrust over mass of the command as it came"),
+        ("wanted_rate", "numbers", "rad/s", "its body rates, 3"),
+    ),
+    _channel(
         "timing",
         "One round of the control loop.",
         ("period_s", "number", "s", "since the round before"),

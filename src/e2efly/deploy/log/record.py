@@ -10,6 +10,7 @@ from e2efly.deploy.betaflight.controller import ControllerInfo
 from e2efly.deploy.betaflight.instruments import ARM
 from e2efly.deploy.betaflight.messages import AttitudeReply, BatteryState, Motor, RawImu, Rc, StatusEx
 from e2efly.deploy.commander.commander import Commander
+from e2efly.deploy.filter.guard import Change
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.pilot.flight_state import Flight
 from e2efly.deploy.pilot.hover import rates_of
@@ -104,6 +105,14 @@ def record_sent(log: Log, now: float, sent: Sent, mode: str, setpoint: list[floa
     })  # fmt: skip
     log.record("sticks", now, {
         "channels": list(sent.channels), "throttle": sent.throttle, "saturated": bool(sent.saturated),
+    })  # fmt: skip
+
+
+def record_filter(log: Log, now: float, change: Change) -> None:
+    """Keep how the filter changed a command; the command that was sent is the channel `command`'s."""
+    log.record("filter", now, {
+        "limit": change.limit, "room": change.room, "share": change.share,
+        "wanted_thrust": float(change.wanted.thrust), "wanted_rate": rates_of(change.wanted),
     })  # fmt: skip
 
 

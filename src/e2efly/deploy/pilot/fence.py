@@ -12,13 +12,14 @@ MARGIN = 0.1
 """How far inside the fence a policy's flight comes to rest, m."""
 
 
-def fence_problem(fence: Fence, odometry: Odometry, floor: bool = True) -> str | None:
+def fence_problem(fence: Fence, odometry: Odometry, floor: bool = True, *, guard: bool = True) -> str | None:
     """Why the vehicle is outside the fence, or cannot stop inside it any more; None: neither.
 
     Args:
         fence: the fence.
         odometry: where the vehicle is and how it moves.
         floor: whether the lowest height counts.
+        guard: whether it counts that it cannot stop inside.
     """
     v = odometry.velocity
     speed, tilt = float(np.linalg.norm(v)), tilt_of(odometry.quaternion)
@@ -31,7 +32,7 @@ def fence_problem(fence: Fence, odometry: Odometry, floor: bool = True) -> str |
         low = low if floor or axis != "z" else -math.inf
         if not low <= at <= high:
             return f"{Reason.OUTSIDE_FENCE}: {axis} is {at:.2f} m; accepted: {low:g} to {high:g}"
-        if not low <= stop <= high:
+        if guard and not low <= stop <= high:
             return f"{Reason.GUARD}: {axis} would reach {stop:.2f} m; accepted: {low:g} to {high:g}"
     return None
 

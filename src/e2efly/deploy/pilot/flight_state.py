@@ -142,6 +142,8 @@ class Inputs:
     """Its task is over."""
     policy_lands: bool = False
     """Its task is to land: the floor of the fence is open to it."""
+    filtered: bool = False
+    """A filter keeps the policy inside the fence: the guard ends its flight outside alone, not before."""
     missed_deadlines: int = 0
     """Late control steps within the last second."""
 

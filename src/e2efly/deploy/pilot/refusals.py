@@ -82,7 +82,7 @@ def policy_refusals(settings: FlightSettings, flight: Flight, inputs: Inputs, od
     if inputs.policy_problem:
         reasons.append(f"{Reason.POLICY}: {inputs.policy_problem}")
     reasons += _sticks(settings, inputs.pilot, Reason.STICK_INPUT)
-    if problem := fence_problem(settings.fence, odometry, floor=not inputs.policy_lands):
+    if problem := fence_problem(settings.fence, odometry, not inputs.policy_lands, guard=not inputs.filtered):
         reasons.append(problem)
     if inputs.missed_deadlines >= settings.missed_deadlines:
         reasons.append(f"{Reason.DEADLINES}: {inputs.missed_deadlines} in a second")

@@ -1,0 +1,225 @@
+"""The backup manoeuvre: turn the thrust against the velocity, brake to rest, hover. Where it leads is in `way`."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from e2efly.deploy.filter.arithmetic import Number, clip
+from e2efly.deploy.filter.body import Command, Motion, Residual, Response
+from e2efly.deploy.filter.turn import Step, steps_of
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+TILT_GAIN = 9.0
+"""Body rate over the angle that is left to turn, 1/s: of a state forecast to when the command acts, without delay."""
+TURN_RATE = 0.8
+"""Share of the vehicle's `body_rate_max` that the backup turns with."""
+THRUST_SHARE = 0.8
+"""Share of the largest thrust that is counted on: a flat battery takes a fifth."""
+UNSEEN = 0.85
+"""Share of the thrust that is left before a loss of it is noticed."""
+STEEPEST = math.radians(65)
+"""Largest tilt of the manoeuvre, rad, where the fence allows it."""
+COUNTED = (0.5, 0.55)
+"""Shares of what is commanded that are counted on, sideways and of a fall: until a loss of thrust is noticed."""
+DIAGONAL = 1.4 / THRUST_SHARE
+"""By which turning about a diagonal with a flat battery takes more of the rotors than about x or y with a full one."""
+YAW_KEPT = 0.8
+"""Share of the turning about the thrust that the manoeuvre keeps: stopping it at once takes what else would tilt."""
+CLIMB_SHARE = 0.85
+"""Share of that thrust which may point up to brake a fall; braking sideways gets what is left."""
+SINK = 4.5
+"""Deceleration of a climb, m/s^2: the thrust that is left can still brake sideways."""
+GUST = 0.4
+"""What air may push against the braking, m/s^2: a gust of 3 m/s at 10 m/s, on the vehicles that are shipped."""
+MARGIN_S2 = 0.0065
+"""The manoeuvre stays inside by so much of the vehicle's largest thrust over mass, s^2: what the forecast leaves out
+grows with the thrust. That is 0.18 m for VIS-R. It is more ..."""
+TIMING, TURNING = 0.03, 0.012
+"""... by the way of so long, s: in the forecast's time, too, there are errors; and by so much of the body rate, m s:
+fast turns are foreseen less well."""
+SPEED_GAIN = 12.0
+"""Deceleration over speed where the manoeuvre comes to rest, 1/s."""
+WAY_GAINS = (4.0, 3.0)
+"""The same, sideways and up, for what is foreseen of the turn: there it is held from the begin, 1/s, and must not have
+turned the velocity round at the end."""
+LEAD, LEAD_UP = 0.1, 0.04
+"""The velocity that is braked is that so much later, s: while it turns, the thrust still pushes where it pointed. Up
+and down it only has to follow the rotors."""
+REST_S = LEAD + 1 / SPEED_GAIN
+"""Time constant with which the manoeuvre comes to rest, s."""
+
+
+@dataclass(frozen=True)
+class Backup:
+    """The manoeuvre of a vehicle. Make it with `Backup.of`."""
+
+    response: Response
+    """The vehicle."""
+    most: float
+    """Thrust over mass that is counted on, m/s^2."""
+    level: float
+    """Deceleration sideways that is commanded, m/s^2."""
+    climb: float
+    """Deceleration of a fall that is commanded, m/s^2."""
+    braking: tuple[float, float, float]
+    """Decelerations sideways, of a fall and of a climb that are counted on, m/s^2."""
+    steepest: float
+    """Largest tilt, rad."""
+    rate: float
+    """Largest body rate, rad/s."""
+    steps: tuple[Step, ...]
+    """Of the turn."""
+
+    @property
+    def margin(self) -> float:
+        """By which the manoeuvre stays inside at rest, m."""
+        return MARGIN_S2 * self.response.thrust[1]
+
+    @staticmethod
+    def of(vehicle: Vehicle, tilt: float) -> "Backup":
+        """Of a loaded vehicle, within a tilt, rad.
+
+        Raises:
+            ValueError: for a vehicle with too little thrust to brake with, naming it.
+        """
+        response = Response.of(vehicle)
+        most = response.thrust[1] * THRUST_SHARE
+        spare = most - GRAVITY
+        if spare < GRAVITY:
+            least = 2.0 / THRUST_SHARE
+            raise ValueError(
+                f"guard 'filter': the vehicle's thrust is {vehicle.thrust_to_weight:.2f} of its weight; accepted: "
+                f"{least:.2f} or more, so that it brakes with a flat battery"
+            )
+        climb = CLIMB_SHARE * most - GRAVITY
+        steepest = min(STEEPEST, 0.9 * tilt)
+        level = min(0.8 * most, GRAVITY * math.tan(min(steepest, 1.05)))
+        braking = (COUNTED[0] * level - GUST, COUNTED[1] * climb - GUST, SINK - GUST)
+        rate = TURN_RATE * min(response.rate_max[:2])
+        return Backup(response, most, level, climb, braking, steepest, rate, steps_of(response))
+
+
+class Brake(NamedTuple):
+    """Where the manoeuvre points the thrust, and what it will have made of the attitude by itself."""
+
+    bx: Number
+    """Direction of the thrust as it is, world."""
+    by: Number
+    bz: Number
+    cx: Number
+    """Direction in which the turning that goes on comes to rest, world."""
+    cy: Number
+    cz: Number
+    tx: Number
+    """Direction that is wanted, world."""
+    ty: Number
+    tz: Number
+    thrust: Number
+    """Collective thrust over mass that is wanted along it, m/s^2."""
+    share: Number
+    """Thrust over that of the command."""
+    vx: Number
+    """The velocity that is braked, m/s."""
+    vy: Number
+    vz: Number
+    wx: Number
+    """Rate at which the thrust turns, world, rad/s."""
+    wy: Number
+    wz: Number
+    ax: Number
+    """Its change by the rotors, world, rad/s^2."""
+    ay: Number
+    az: Number
+
+
+def axes(m: Motion) -> tuple[Number, ...]:
+    """The body's axes x, y and z in the world, nine numbers."""
+    w, x, y, z = m.qw, m.qx, m.qy, m.qz
+    return (
+        1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),
+        2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x),
+        2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y),
+    )  # fmt: skip
+
+
+def axes_z(w: Number, x: Number, y: Number, z: Number) -> tuple[Number, Number, Number]:
+    """The body's z axis in the world, of a quaternion."""
+    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
+
+
+def brake(
+    xp: Any,
+    b: Backup,
+    m: Motion,
+    air: Residual,
+    back: tuple[Number, ...] = (0.0, 0.0, 0.0),
+    gains: tuple[float, float] = (SPEED_GAIN, SPEED_GAIN),
+) -> Brake:
+    """The manoeuvre from a state, to rest or to a velocity back, world, m/s, by decelerations over speed, 1/s.
+
+    The turning that goes on comes to rest by itself at the attitude c of `Brake`.
+    """
+    r = b.response
+    xx, xy, xz, yx, yy, yz, bx, by, bz = axes(m)
+    ox, oy = _coast(xp, r, m)
+    s2 = ox * ox + oy * oy
+    cos, sinc = 1.0 - s2 / 2 + s2 * s2 / 24, 1.0 - s2 / 6 + s2 * s2 / 120
+    # about body x the z axis goes to -y, about body y to x
+    cx = cos * bx + sinc * (oy * xx - ox * yx)
+    cy = cos * by + sinc * (oy * xy - ox * yy)
+    cz = cos * bz + sinc * (oy * xz - ox * yz)
+    f = air.share * m.f
+    vx, vy = m.vx + LEAD * (f * cx + air.x), m.vy + LEAD * (f * cy + air.y)
+    vz = m.vz + LEAD_UP * (f * cz + air.z - GRAVITY)
+    vx, vy, vz = vx - back[0], vy - back[1], vz - back[2]
+    level = xp.sqrt(vx * vx + vy * vy + 1e-9)
+    gz = GRAVITY - air.z + clip(xp, -gains[1] * vz, -SINK, b.climb)
+    gz = clip(xp, gz, 0.3 * GRAVITY, b.most)
+    push = -xp.minimum(xp.minimum(b.level, gains[0] * level), xp.sqrt(b.most * b.most - gz * gz + 1.0)) / level
+    gx, gy = push * vx - air.x, push * vy - air.y
+    reach = gz * math.tan(b.steepest)
+    side = xp.sqrt(gx * gx + gy * gy + 1e-9)
+    shrink = reach / xp.maximum(side, reach)
+    gx, gy = gx * shrink, gy * shrink
+    thrust = xp.sqrt(gx * gx + gy * gy + gz * gz)
+    return Brake(
+        bx, by, bz, cx, cy, cz, gx / thrust, gy / thrust, gz / thrust, thrust, air.share, vx, vy, vz,
+        m.wx * xx + m.wy * yx, m.wx * xy + m.wy * yy, m.wx * xz + m.wy * yz,
+        m.ax * xx + m.ay * yx, m.ax * xy + m.ay * yy, m.ax * xz + m.ay * yz,
+    )  # fmt: skip
+
+
+def _coast(xp: Any, r: Response, m: Motion) -> tuple[Number, Number]:
+    """The turn about body x and y that is left in the rate loop when it is told to stop, rad.
+
+    That is the integral of its free response, (rate + lag * acceleration) / gain; of a rate that takes more than the
+    rotors have, the way under their largest acceleration down to the rate that does not, with their lag besides.
+    """
+    gain, (low, high) = UNSEEN * min(r.gain[:2]), r.thrust
+    x, y = m.wx + r.motor_time * m.ax, m.wy + r.motor_time * m.ay
+    rate = xp.sqrt(x * x + y * y + 1e-9)
+    fair = THRUST_SHARE * 0.5 * (high - low) * rate / (gain * (r.spread[0] * abs(x) + r.spread[1] * abs(y)) + 1e-9)
+    over = xp.maximum(rate - fair, 0.0)
+    turn = xp.minimum(rate, fair) / gain + over * ((rate + fair) / (2.0 * gain * fair) + r.motor_time)
+    return x * turn / rate, y * turn / rate
+
+
+def command(xp: Any, b: Backup, m: Motion, k: Brake) -> Command:
+    """What the manoeuvre sends now: turn by the shortest way, with no more thrust than points where it is wanted.
+
+    Args:
+        xp: computes.
+        b: the vehicle's manoeuvre.
+        m: the state when the command acts.
+        k: the manoeuvre from there.
+    """
+    xx, xy, xz, yx, yy, yz, bx, by, bz = axes(m)
+    nx, ny, nz = by * k.tz - bz * k.ty, bz * k.tx - bx * k.tz, bx * k.ty - by * k.tx
+    sine = xp.sqrt(nx * nx + ny * ny + nz * nz + 1e-18)
+    cosine = bx * k.tx + by * k.ty + bz * k.tz
+    turn = xp.minimum(TILT_GAIN * xp.arctan2(sine, cosine), b.rate) / sine
+    # upside down to where it should point there is no shortest way: about body x is as good as any
+    over = (sine < 1e-3) & (cosine < 0.0)
+    wx = xp.where(over, b.rate, turn * (nx * xx + ny * xy + nz * xz))
+    wy = xp.where(over, 0.0, turn * (nx * yx + ny * yy + nz * yz))
+    return Command(k.thrust / k.share * xp.maximum(cosine, 0.0), wx, wy, YAW_KEPT * m.wz)

@@ -1,0 +1,97 @@
+"""The filter as the bridge uses it: on commands and odometry as they are elsewhere in `deploy`."""
+
+import math
+from dataclasses import dataclass
+
+from e2efly.control import Ctbr, Vec3
+from e2efly.deploy.filter.body import Command
+from e2efly.deploy.filter.filter import Filter, Memory, filtered, remember, watch
+from e2efly.deploy.filter.room import NAMES
+from e2efly.deploy.odometry import Odometry
+
+
+@dataclass(frozen=True)
+class Change:
+    """How the filter changed a command."""
+
+    limit: str
+    """What would not have been kept: a name of `NAMES`, or the number of a solid."""
+    room: float
+    """What the backup manoeuvre would have left to it after the wanted command, m; negative: beyond it."""
+    share: float
+    """How far towards the manoeuvre's command it was changed, 0 to 1."""
+    wanted: Ctbr
+    """The command as it came."""
+
+
+class FilterError(Exception):
+    """The filter has no command, for numbers that are not finite."""
+
+
+def keep(
+    filter: Filter, memory: Memory, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool = True
+) -> tuple[Ctbr, Change | None]:
+    """The command to send, which is the wanted one itself where that keeps all limits, and how it was changed.
+
+    Args:
+        filter: for this vehicle and fence.
+        memory: after `watch`.
+        odometry: the newest.
+        now: s.
+        wanted: of the policy.
+        floor: whether the lowest height of the fence counts.
+
+    Raises:
+        FilterError: where a number is not finite.
+    """
+    told = Command(*(float(x) for x in (wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z)))
+    try:
+        found = filtered(filter, memory, odometry, now, told, floor=floor)
+    except (ValueError, ArithmeticError) as error:
+        raise FilterError(f"filter: {error}") from error
+    if not all(map(math.isfinite, (*found.command, found.room))):
+        raise FilterError(f"filter: its command is {tuple(found.command)}; accepted: finite numbers")
+    if found.share == 0.0:
+        return wanted, None
+    thrust, x, y, z = found.command
+    limit = NAMES[found.limit] if found.limit < len(NAMES) else f"solid {found.limit - len(NAMES) + 1}"
+    return Ctbr(thrust, Vec3(x, y, z)), Change(limit, found.room, found.share, wanted)
+
+
+def sent(memory: Memory, command: Ctbr | None, now: float) -> Memory:
+    """The memory after a command was sent; None: the throttle was closed."""
+    if command is None:
+        return remember(memory, Command(0.0, 0.0, 0.0, 0.0), now)
+    rate = command.rate
+    return remember(memory, Command(*(float(n) for n in (command.thrust, rate.x, rate.y, rate.z))), now)
+
+
+class Keeper:
+    """The filter in flight: what it remembers, what it has changed, why it has failed."""
+
+    def __init__(self, filter: Filter) -> None:
+        """Filter for a vehicle in a fence."""
+        self.filter, self.memory = filter, Memory()
+        self.change: Change | None = None
+        """How the newest command was changed; None: not at all."""
+        self.problem: str | None = None
+        """Why it cannot filter: no policy flies until the vehicle stands; None: it can."""
+
+    def see(self, odometry: Odometry | None, now: float, *, flying: bool) -> None:
+        """Take in the newest odometry; `flying`: nothing but the air carries the vehicle."""
+        self.change = None
+        if odometry is not None:
+            self.memory = watch(self.filter, self.memory, odometry, now, flying=flying)
+
+    def keep(self, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool) -> Ctbr | None:
+        """The command in place of a policy's, arguments as of the function `keep`; None, with `problem`: it failed."""
+        try:
+            command, self.change = keep(self.filter, self.memory, odometry, now, wanted, floor=floor)
+        except FilterError as error:
+            self.problem = str(error)
+            return None
+        return command
+
+    def sent(self, command: Ctbr | None, now: float) -> None:
+        """Remember what was sent; None: the throttle was closed."""
+        self.memory = sent(self.memory, command, now)

@@ -1,0 +1,169 @@
+"""How much room the backup manoeuvre leaves: to the fence's walls, to solids, to the largest speed and tilt."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from e2efly.deploy.filter.arithmetic import Number, clip
+from e2efly.deploy.filter.backup import TIMING, TURNING, WAY_GAINS, Backup, Brake, brake
+from e2efly.deploy.filter.body import Motion, Residual
+from e2efly.deploy.filter.way import Way, run_out, way
+from e2efly.deploy.settings import Fence
+
+SPEED_MARGIN, SPEED_S = 0.6, 0.25
+"""The largest speed is kept to with this margin, m/s; so much of it counts as a metre of room, s."""
+TILT_MARGIN, TILT_M = 0.28, 0.3
+"""The largest tilt is kept to with this margin, rad; a radian counts as so much room, m."""
+FADES = 2.0
+"""At this speed against it, m/s, the air's push is not counted on at all."""
+RETREAT, BACK, BACK_UP = 2.0, 0.05, 0.35
+"""Speed back inside over the distance beyond the margin, 1/s; it comes to rest so far within, m, and over the floor:
+there the policy has room again, and may leave the wall."""
+WALLS = ("x low", "x high", "y low", "y high", "floor", "ceiling")
+"""Names of the limits, in the order of their rooms; those of solids follow."""
+NAMES = (*WALLS, "speed", "tilt")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Where the vehicle may be and how it may move. Lengths in m, the margins taken off."""
+
+    low: tuple[float, float, float]
+    """World."""
+    high: tuple[float, float, float]
+    speed: float
+    """m/s."""
+    tilt: float
+    """rad; infinite where no tilt is too much."""
+    solids: tuple[tuple[float, ...], ...] = ()
+    """Boxes: smallest x, y, z, largest x, y, z, world."""
+    radius: float = 0.0
+    """What is kept between the centre of mass and a solid."""
+
+    @staticmethod
+    def of(fence: Fence, radius: float, margin: float) -> "Limits":
+        """Of a fence, for a vehicle of this radius, m, that stays inside by a margin, m."""
+        (a, b, c), (d, e, f) = fence.low, fence.high
+        m = margin
+        return Limits(
+            (a + m, b + m, c + m), (d - m, e - m, f - m), fence.speed - SPEED_MARGIN,
+            fence.tilt - TILT_MARGIN if fence.tilt < math.pi else math.inf, fence.solids, radius + m,
+        )  # fmt: skip
+
+
+def near(limits: Limits, m: Motion, reach: float) -> tuple[tuple[float, float, float, float], ...]:
+    """Of each solid within `reach` m: the direction to its nearest point, and the gap to it, m. Of one vehicle alone.
+
+    The plane through the nearest point, square to that direction, has all of a convex solid behind it.
+    """
+    found = []
+    for x0, y0, z0, x1, y1, z1 in limits.solids:
+        dx = min(max(m.px, x0), x1) - m.px
+        dy = min(max(m.py, y0), y1) - m.py
+        dz = min(max(m.pz, z0), z1) - m.pz
+        away = math.sqrt(dx * dx + dy * dy + dz * dz)
+        if away == 0.0:  # inside of it: out by the shortest way
+            sides = ((m.px - x0, 1, 0, 0), (x1 - m.px, -1, 0, 0), (m.py - y0, 0, 1, 0), (y1 - m.py, 0, -1, 0),
+                     (m.pz - z0, 0, 0, 1), (z1 - m.pz, 0, 0, -1))  # fmt: skip
+            depth, nx, ny, nz = min(sides)
+            found.append((float(nx), float(ny), float(nz), -depth - limits.radius))
+        elif away - limits.radius < reach:
+            found.append((dx / away, dy / away, dz / away, away - limits.radius))
+    return tuple(found)
+
+
+def rooms(
+    xp: Any,
+    b: Backup,
+    limits: Limits,
+    m: Motion,
+    air: Residual,
+    solids: tuple[tuple[float, float, float, float], ...] = (),
+    floor: bool = True,
+    at: Motion | None = None,
+) -> tuple[Number, ...]:
+    """What the manoeuvre from a state leaves to each limit of `NAMES`, then to each solid; m, negative beyond it.
+
+    Args:
+        xp: computes.
+        b: the vehicle's manoeuvre.
+        limits: to keep.
+        m: the state.
+        air: what the forecast does not explain.
+        solids: as `near` tells.
+        floor: whether the lowest height counts.
+        at: the state for which `near` was asked.
+    """
+    air = against(xp, m, air)
+    k = brake(xp, b, m, air, gains=WAY_GAINS)
+    w = way(xp, b, m, k, air)
+    level, fall, rise = b.braking
+    side = xp.sqrt(w.vx * w.vx + w.vy * w.vy + 1e-9)
+    run = run_out(xp, side, level) / side
+    dx, dy = w.vx * run, w.vy * run
+    down = -run_out(xp, -w.wz, fall)
+    dz = xp.where(w.vz > 0.0, run_out(xp, xp.maximum(w.vz, 0.0), rise), down)
+    (x0, y0, z0), (x1, y1, z1) = limits.low, limits.high
+    low_x, high_x = _ends(xp, w.px, dx)
+    low_y, high_y = _ends(xp, w.py, dy)
+    low_z, _ = _ends(xp, w.lz, down)
+    _, high_z = _ends(xp, w.pz, dz)
+    rough = TURNING * xp.sqrt(m.wx * m.wx + m.wy * m.wy + 1e-9)
+    off_x, off_y, off_z = TIMING * abs(m.vx) + rough, TIMING * abs(m.vy) + rough, TIMING * abs(m.vz) + rough
+    low_z = low_z - z0 if floor else z1 - low_z
+    found = [
+        low_x - x0 - off_x, x1 - high_x - off_x, low_y - y0 - off_y, y1 - high_y - off_y,
+        low_z - off_z, z1 - high_z - off_z,
+        SPEED_S * (limits.speed - xp.sqrt(w.speed2)) - rough, _tilt_room(xp, limits, k) - TILT_M * rough,
+    ]  # fmt: skip
+    for nx, ny, nz, gap in solids:
+        assert at is not None
+        off = rough + TIMING * xp.maximum(nx * m.vx + ny * m.vy + nz * m.vz, 0.0)
+        found.append(gap - off - _towards(xp, w, at, (nx, ny, nz), (dx, dy, dz)))
+    return tuple(found)
+
+
+def against(xp: Any, m: Motion, air: Residual) -> Residual:
+    """The part of the air's push that is counted on while braking: what brakes by itself may end with the speed."""
+    x, y, z = (
+        push * clip(xp, 1.0 + speed * push / (FADES * (abs(push) + 1e-9)), 0.0, 1.0)
+        for push, speed in zip(air[:3], (m.vx, m.vy, m.vz), strict=True)
+    )
+    return Residual(x, y, z, air.share)
+
+
+def retreat(xp: Any, limits: Limits, m: Motion, floor: bool = True) -> tuple[Number, ...]:
+    """The velocity back inside, world, m/s: in proportion to how far a state is beyond the margins, or near them."""
+    (x0, y0, z0), (x1, y1, z1) = limits.low, limits.high
+    z0 = z0 if floor else -math.inf
+    return tuple(
+        RETREAT * (xp.maximum(low + back - at, 0.0) - xp.maximum(at - high + BACK, 0.0))
+        for at, low, high, back in ((m.px, x0, x1, BACK), (m.py, y0, y1, BACK), (m.pz, z0, z1, BACK_UP))
+    )
+
+
+def _ends(xp: Any, places: tuple[Number, ...], tail: Number) -> tuple[Number, Number]:
+    """The smallest and the largest coordinate on the way."""
+    low = high = places[0]
+    for place in places[1:]:
+        low, high = xp.minimum(low, place), xp.maximum(high, place)
+    end = places[-1] + tail
+    return xp.minimum(low, end), xp.maximum(high, end)
+
+
+def _towards(xp: Any, w: Way, at: Motion, normal: tuple[float, ...], tail: tuple[Number, ...]) -> Number:
+    """How far the way goes in a direction."""
+    nx, ny, nz = normal
+    most = 0.0
+    for x, y, z in zip(w.px, w.py, w.pz, strict=True):
+        most = xp.maximum(most, nx * (x - at.px) + ny * (y - at.py) + nz * (z - at.pz))
+    x, y, z = w.px[-1] + tail[0], w.py[-1] + tail[1], w.pz[-1] + tail[2]
+    return xp.maximum(most, nx * (x - at.px) + ny * (y - at.py) + nz * (z - at.pz))
+
+
+def _tilt_room(xp: Any, limits: Limits, k: Brake) -> Number:
+    """The thrust turns from c to t on a great circle: between two directions within a cone it stays within it."""
+    if limits.tilt == math.inf:
+        return 0.0 * k.cz + 1e3
+    tilt = xp.arctan2(xp.sqrt(k.cx * k.cx + k.cy * k.cy), k.cz)
+    return TILT_M * (limits.tilt - tilt)
