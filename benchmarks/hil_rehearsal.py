@@ -50,10 +50,9 @@ def main() -> None:
             ends.append(_end(kills[-1]))
     print(table(rows))
     print(table(ends))
-    write("hil_rehearsal", args.json, {
-        "table": rows, "kills": ends, "laps": {name: [lap.as_json() for lap in flown] for name, flown in laps.items()},
-        "killed": [lap.as_json() for lap in kills],
-    })  # fmt: skip
+    every = {name: [lap.as_json() for lap in flown] for name, flown in laps.items()}
+    killed = [lap.as_json() for lap in kills]
+    write("hil_rehearsal", args.json, {"table": rows, "tables": [ends], "laps": every, "killed": killed})
     few = any(sum(lap.success for lap in flown) < WANTED * len(flown) for flown in laps.values())
     late = any(lap.pose_to_image.p99 > WANTED_S for flown in laps.values() for lap in flown)
     sys.exit(1 if few or late or any(lap.problems for lap in kills) else 0)

@@ -41,10 +41,12 @@ TITLES = {
     "filter": "The filter of `fly --guard filter`: flights against it, and what it costs",
     "plants_by_sight": "Policies that see, on plants that render",
     "image_faults": "Cameras that break in flight",
+    "hil_rehearsal": "Hardware in the loop, rehearsed in real time",
     "pad_masks": "Masks by the package's network, of rendered pads that it never saw",
     "firmware_faults": "Faults injected into flights of the real firmware",
     "fault_campaign": "Pairs and triples of faults by chance, injected into flights of the real firmware",
     "process_faults": "The bridge's process killed, stopped, its disk full, in flight",
+    "watch": "The viewer",
     "bridge_loop": "The bridge's control loop, flying the firmware in real time",
     "runtime_speed": "The runtime on a companion computer",
     "onboard": "The part that flies, beside the whole",
@@ -52,7 +54,10 @@ TITLES = {
     "msp_fuzz": "MSP codec under fuzzing",
 }
 
-SCRIPTS = {"identify_betaflight": "identify.py --plant betaflight", "zoo_stress_by_sight": "zoo_stress.py --by-sight"}
+SCRIPTS = {
+    "identify_betaflight": "identify.py --plant betaflight", "hil_rehearsal": "hil_rehearsal.py --vehicle vis_h",
+    "zoo_stress_by_sight": "zoo_stress.py --by-sight",
+}  # fmt: skip
 """What measured a file of results that has not the name of its script."""
 FIRST = """
 Rates and times below that are older than 2026-11-24 were measured with the first-order integrator, which
@@ -109,6 +114,11 @@ The starts and worlds are those of `e2efly eval`. Images are rendered at the pla
 The policy of avoid flies by rendered images for a second before its camera breaks. *From its notice*: from
 the first control step in which the images are no longer good. A late or silent camera is noticed when its
 newest image is older than training's oldest, one image and 50 ms.""",
+    "hil_rehearsal": """
+The zoo's race_clutter of VIS-H, commanded to fly at 4 to 6 m/s, with a radio of 57 ms between the bridge and
+the vehicle. Motion capture, HIL node, bridge with watchdog, radio and firmware are processes in real time on
+two cores. Times are the worst lap's median / 99 %. The second table: each process killed once in flight.
+[What stands where](hil.md#rehearse-it-first).""",
     "identify_betaflight": """
 30 s of `e2efly fly excitation` each, in a fence of 12 x 12 x 4.8 m, by the bridge, through Betaflight 4.6
 in virtual time. The delay's truth is on the rig's own clock: the age of the poses, and the time from a
