@@ -131,9 +131,11 @@ def test_arrays_that_are_needed_at_the_same_time_do_not_overlap() -> None:
         places, whole = layout(program, [b for b in kept if b is not None])
         holds: dict[int, int] = {}
         for step in program.steps:
+            written = range(places[step.writes], places[step.writes] + program.sizes[step.writes])
             for buffer in step.reads:
                 at = range(places[buffer], places[buffer] + program.sizes[buffer])
                 assert {holds.get(i) for i in at} == {buffer}
+                assert not set(at) & set(written) or (step.in_place and at == written)
             holds |= dict.fromkeys(
                 range(places[step.writes], places[step.writes] + program.sizes[step.writes]), step.writes
             )

@@ -11,8 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.commands.fly import Fly
-from e2efly.commands.fly import run as fly_command
 from e2efly.deploy.betaflight.codec import REPLY, Frame, encode
 from e2efly.deploy.betaflight.instruments import ARM, OVERRIDE
 from e2efly.deploy.betaflight.messages import SET_RAW_RC, StatusEx
@@ -165,14 +163,23 @@ class Flying:
 
 def test_started_in_flight_it_takes_nothing_over(tmp_path: Path) -> None:
     """Its first frame would close the throttle."""
-    reply = Flying(ARM, OVERRIDE)
+    reply, log = Flying(ARM, OVERRIDE), tmp_path / "flight.mcap"
     with controller(reply) as client:
-        options = Fly(vehicle="vis_r", link=client.link.name, pose=f"udp:{free_port()}", log=tmp_path / "f.mcap")  # type: ignore[attr-defined]
-        with pytest.raises(ValueError, match=r"armed and its override is on, .*; accepted: disarmed, or override low"):
-            fly_command(options)
+        command = [sys.executable, "-m", "e2efly", "fly", "hover", "--link", client.link.name]  # type: ignore[attr-defined]
+        command += ["--pose", f"udp:{free_port()}", "--log", str(log)]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        try:
+            said = " ".join(process.communicate(timeout=60)[1].split())
+        finally:
+            reply.boxes = ()  # else the watchdog of one that began would stay
+            process.kill()
+            process.wait()
+    assert process.returncode == 2
+    assert "armed and its override is on, so that the first frame, which closes the throttle, would stop" in said
+    assert "accepted: disarmed, or override low" in said
     assert StatusEx.CODE in reply.asked
     assert SET_RAW_RC not in reply.asked
-    assert not (tmp_path / "f.mcap").exists()
+    assert not log.exists()
 
 
 @pytest.mark.parametrize("boxes", [(), (ARM,), (OVERRIDE,)], ids=["neither", "armed", "override"])
