@@ -64,9 +64,9 @@ def test_a_policy_of_a_family_says_its_ranges(tmp_path: Path) -> None:
         (["race", "--memory", "-1"], "--memory is -1.0; accepted: more than 0 KiB"),
         (["race", "--name", "Race"], "--name is 'Race'; accepted: a name of C"),
         (["race", "--name", "int"], "--name is 'int'; accepted: a name of C"),
-        (["race", "--out", "x.onnx"], "--out is 'x.onnx'; it has no effect with --c"),
-        (["race", "--web", "x"], "--web is 'x'; it has no effect with --c"),
-        (["race", "--vehicle", "vis_h"], "--vehicle is 'vis_h'; it has no effect with --c"),
+        (["race", "--out", "x.onnx"], "--out is 'x.onnx', which has no effect with --c"),
+        (["race", "--web", "x"], "--web is 'x', which has no effect with --c"),
+        (["race", "--vehicle", "vis_h"], "--vehicle is 'vis_h', which has no effect with --c"),
         (["hoover"], "unknown policy 'hoover'"),
     ],
 )  # fmt: skip
@@ -80,7 +80,7 @@ def test_what_does_not_go_is_refused_by_name(
 
 def test_options_of_c_need_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["export", "race", "--web", str(tmp_path / "web"), "--memory", "4"]) == 2
-    assert "--memory is '4.0'; it has no effect without --c" in " ".join(capsys.readouterr().err.split())
+    assert "--memory is '4.0', which has no effect without --c" in " ".join(capsys.readouterr().err.split())
     assert run(["export", "race", "--c", str(policy_file("race"))]) == 2
     assert "a file; accepted: a folder, which is made" in " ".join(capsys.readouterr().err.split())
 

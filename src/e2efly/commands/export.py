@@ -49,7 +49,7 @@ def run(options: Export) -> int:
     """Write policy.onnx from a checkpoint, or anew from a file of an older e2efly; or a page or C: `Export`."""
     if options.c is not None:
         return _write_c(options, options.c)
-    _without_effect(options, ("name", "precision", "memory", "flash"), "it has no effect without --c")
+    _without_effect(options, ("name", "precision", "memory", "flash"), "has no effect without --c")
     if options.web is not None:
         return _write_page(options, options.web)
     if options.vehicle is not None:
@@ -77,7 +77,7 @@ def run(options: Export) -> int:
 
 
 def _write_page(options: Export, folder: Path) -> int:
-    why = "it has no effect with --web: a page flies the policy.onnx that there is"
+    why = "has no effect with --web: a page flies the policy.onnx that there is"
     _without_effect(options, ("out", "which"), why)
     prepare("cpu")
     from e2efly.evaluation import candidate
@@ -90,7 +90,7 @@ def _write_page(options: Export, folder: Path) -> int:
 
 
 def _write_c(options: Export, folder: Path) -> int:
-    why = "it has no effect with --c: the policy.onnx that there is becomes C"
+    why = "has no effect with --c: the policy.onnx that there is becomes C"
     _without_effect(options, ("out", "which", "web", "vehicle"), why)
     from e2efly.c_policy.write import write_c
 
@@ -108,4 +108,4 @@ def _write_c(options: Export, folder: Path) -> int:
 def _without_effect(options: Export, names: tuple[str, ...], why: str) -> None:
     for field in dataclasses.fields(options):
         if field.name in names and (value := getattr(options, field.name)) != field.default:
-            raise ValueError(f"--{field.name} is {str(value)!r}; {why}; accepted: without it")
+            raise ValueError(f"--{field.name} is {str(value)!r}, which {why}; accepted: without it")
