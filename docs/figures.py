@@ -147,8 +147,8 @@ rendered at the body's true pose, in another world each time; touching a solid i
     "filter": """
 VIS-R on the simulator's body, each flight in a fence of its own with a largest speed of its own, 3 to 10
 m/s; 90 ms of delay, noise of motion capture, gusts of up to 3 m/s, and a fifth of the thrust lost from a
-moment of the flight on, of which the filter is not told. A breach is any moment outside the fence, or
-above its speed or tilt. The tables after that: the steps of the zoo's own flights in which the filter
+moment of the flight on, of which the filter is not told. Its margins were set on other flights of these
+kinds. A breach is any moment outside the fence, or above its speed or tilt. The tables after that: the steps of the zoo's own flights in which the filter
 would change the command, in fences around all of them with 1 m/s and 0.4 rad to spare; the share of the
 default fence in which the vehicle may fly level at a speed in every direction; milliseconds of the
 processor for a call, beside other programs; flights at walls through the
