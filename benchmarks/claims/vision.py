@@ -120,17 +120,6 @@ def whole_ppo(found: Found) -> Verdict:
     return Verdict(CONFIRMED if right else REFUTED, told, "of 1000 unseen worlds each, 100 M steps")
 
 
-def by_bptt(found: Found) -> Verdict:
-    """The zoo's policy."""
-    runs = found.of(variant=ZOO)
-    if not runs:
-        return NOTHING
-    flown = runs[0]["flights"]["its tracks"]
-    told = "; ".join(f"{TRACKS[name]}: {100 * of['success']:.1f} %" for name, of in flown.items())
-    right = all(of["success"] >= 0.995 for of in flown.values())
-    return Verdict(CONFIRMED if right else REFUTED, told, "by BPTT, the zoo's policy, 1000 unseen worlds each")
-
-
 def fast(found: Found) -> Verdict:
     """Whether it flies faster than 10 m/s."""
     runs = found.of(variant=ZOO)
@@ -171,7 +160,6 @@ RACING = Experiment(
     "figures of racing with obstacles and of the rewards of visual tasks",
     (
         Claim("PPO with a curriculum reaches 100 % on all three tracks", "100 %, 1e8 steps", whole_ppo),
-        Claim("The same by BPTT", "not in the paper", by_bptt),
         Claim("at more than 10 m/s", "> 10 m/s", fast),
     ),
     (

@@ -20,7 +20,6 @@ GROUNDED = ("INIT", "DONE", "DISARMED", "")
 """Modes in which the vehicle does not follow commands."""
 ALIGNED_S = 5.0
 """Time in all others that an alignment needs, s."""
-
 TOGETHER_S = 0.3
 """Changes by the filter, for the same limit, that are nearer to each other than this are told as one, s."""
 

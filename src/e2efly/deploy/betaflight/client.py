@@ -200,7 +200,7 @@ class Client:
                 self._take(frame, now)
 
     def _ask_due(self, now: float) -> None:
-        behind = self.backlog > MAX_BACKLOG and self._unanswered(now) > MAX_BACKLOG
+        behind = self._unanswered(now) > MAX_BACKLOG
         in_flight = sum(self._sizes.get(code, _UNKNOWN_REPLY) for code in self._asked)
         free = (code for code in self.schedule if code not in self._asked)
         overdue = {code: (now - self._due.setdefault(code, now)) * self.schedule[code] for code in free}

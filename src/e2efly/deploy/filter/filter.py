@@ -13,7 +13,7 @@ from typing import Any
 from e2efly.deploy.filter.arithmetic import SCALARS, Number, clip
 from e2efly.deploy.filter.backup import TIMING, Backup, axes_z, brake, command
 from e2efly.deploy.filter.body import NOTHING, Actuators, Command, Motion, Residual, actuated, moved
-from e2efly.deploy.filter.room import NAMES, Limits, against, near, retreat, rooms
+from e2efly.deploy.filter.room import Limits, against, near, retreat, rooms
 from e2efly.deploy.filter.way import stopping
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.settings import Fence
@@ -111,7 +111,7 @@ class Filtered:
     room: Number
     """The least that the manoeuvre would have left after the command as it came, m; NaN after what is not finite."""
     limit: Any
-    """The index of that limit in `NAMES`; beyond them: a solid."""
+    """The index of that limit in `room.NAMES`; beyond them: a solid."""
 
 
 def remember(memory: Memory, sent: Command, now: float) -> Memory:
@@ -280,6 +280,3 @@ def _apart(rows: Any) -> tuple[Any, tuple[Number, ...]]:
     import numpy as np
 
     return np, tuple(rows[:, i] for i in range(rows.shape[1]))
-
-
-__all__ = ["NAMES", "Filter", "Filtered", "Memory", "filtered", "forecast", "remember", "stopping_distance", "watch"]
