@@ -1,0 +1,66 @@
+"""`indi`: incremental nonlinear dynamic inversion of the specific force.
+
+Smeur, de Croon and Chu, Cascaded incremental nonlinear dynamic inversion for MAV disturbance rejection, 2018; Tal and
+Karaman, Accurate tracking of aggressive quadrotor trajectories using incremental nonlinear dynamic inversion and
+differential flatness, 2020. What the rotors are to give is what they gave, plus wanted minus felt acceleration, both
+through one filter. That is wanted acceleration less the filtered push of all but the rotors, and needs no mass, drag
+or integral. Their inner increment, of the moment, is left to the flight controller's rate loop.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from e2efly.control import Ctbr, Vec3
+from e2efly.control.cascade import accelerate
+from e2efly.control.place import ZERO, Place
+from e2efly.deploy.pilot.hover import flight_gains
+from e2efly.deploy.pilot.hovering.loops import LIMIT, approach
+from e2efly.deploy.pilot.hovering.registry import ROTOR_SPEED, register
+from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue
+from e2efly.vehicles.vehicle import Vehicle
+
+FILTER_S = 0.2
+"""Time constant of the filter of both, s."""
+
+
+@register("indi")
+@dataclass(frozen=True)
+class Indi:
+    """Its memory is the push of all but the rotors and gravity, world, m/s^2.
+
+    Where the rotors' speeds are not known, the thrust is that of the commands through the motors' lag.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = (ROTOR_SPEED,)
+
+    vehicle: Vehicle
+    """With gains for what the prediction leaves of the latency."""
+    latency: float
+    """From the vehicle's motion to its rate loop, s."""
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, latency: float) -> "Indi":
+        """See `HoverController.of`."""
+        return cls(flight_gains(vehicle, residue(latency)), latency)
+
+    def begin(self) -> Vec3:
+        """Nothing pushes."""
+        return ZERO
+
+    def step(
+        self, memory: Vec3, seen: Seen, under_way: UnderWay, place: Place, dt: float, *, held: bool = False
+    ) -> tuple[Vec3, Ctbr]:
+        """See `HoverController.step`."""
+        vehicle, pushed, motion, goal = self.vehicle, memory, seen, place.after(-seen.age)
+        if not held:
+            if seen.force is not None:
+                gave = under_way.thrust if seen.thrust is None else seen.thrust
+                felt = seen.attitude.rotate(seen.force - Vec3(0.0, 0.0, gave))
+                pushed = (pushed + (felt - pushed) * (1 - math.exp(-dt / FILTER_S))).clip(LIMIT)
+            motion, _ = ahead(vehicle, seen, under_way, pushed)
+            goal = place.after(self.latency - seen.age)
+        behind = approach(vehicle, motion, goal) - motion.velocity
+        wanted = behind.times(Vec3.of(vehicle.velocity_gain)) + goal.acceleration - pushed
+        yaw = motion.attitude.yaw() if goal.yaw is None else goal.yaw
+        return pushed, accelerate(vehicle, motion, wanted, yaw)
