@@ -1,14 +1,15 @@
 """Racing: the goal, and where it is flown. What passing a gate is: `courses/gates.py`. Imports no JAX."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from e2efly.config import number
-from e2efly.control.vectors import Array, namespace
+from e2efly.control.place import Place
+from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
 from e2efly.courses.gates import Gates, Tracks
 from e2efly.courses.tracks import RaceTrack, load_track
@@ -19,6 +20,9 @@ from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.route import Route
 from e2efly.tasks.verdicts import distance, offsets, touches_ground
 from e2efly.vehicles.tables import LARGEST
+
+CRUISE = 2.0
+"""Speed at which a controller that is no policy passes a gate, m/s."""
 
 
 class Racing(Goal):
@@ -108,6 +112,14 @@ class RaceGoal(Racing):
         """The same, minus position."""
         return offsets(self.targets(memory, time), body)
 
+    @classmethod
+    def aim(cls, shown: Mapping[str, Array]) -> Place:
+        """The next gate's centre, passed at `CRUISE` along the mean of the way to it and of the way on from it."""
+        gates = shown["gates"]
+        here, there = gates[..., :3], gates[..., 3:6]
+        along = Vec3.of(_unit(_unit(here) + _unit(there - here)))
+        return Place(Vec3.of(here), along * CRUISE)
+
     observation = (
         (Field("gates", 6, "world", "m", 4.0, "centres of the next two gates minus vehicle position"), target_offsets),
     )
@@ -170,3 +182,8 @@ class RaceRoute(Route):
         lowest = float((track.position[:, 2] - track.opening[:, 1] / 2).min())
         start = track.start.astype(np.float32).astype(np.float64)
         return Course(goal, memory, start, heading=float(track.start_yaw), lowest=lowest, clearance=0.0)
+
+
+def _unit(v: Array) -> Array:
+    """(..., 3) of length 1; no more than that near zero."""
+    return v / (namespace(v).linalg.norm(v, axis=-1, keepdims=True) + 1e-6)

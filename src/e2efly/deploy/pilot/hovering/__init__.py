@@ -15,15 +15,16 @@ __all__ = [
 _SHIPPED = geometric, indi, mpc, pid  # which register themselves
 
 
-def hover_controller(name: str, vehicle: Vehicle, latency: float) -> HoverController:
+def hover_controller(name: str, vehicle: Vehicle, latency: float, hold: float = 0.0) -> HoverController:
     """A hover controller for a vehicle.
 
     Args:
         name: of `HOVERS`, or the reference `path/to/file.py:Name` or `module:Name` of one of the user's own.
         vehicle: as loaded.
         latency: from the vehicle's motion to its rate loop, s.
+        hold: for how long a command is held, s, where that counts beside the latency.
 
     Raises:
         ValueError: for an unknown name, with all there are; naming the package that the machine lacks for it.
     """
-    return HOVERS.find(name).of(vehicle, latency)
+    return HOVERS.find(name).of(vehicle, latency, hold)

@@ -32,9 +32,9 @@ class Geometric:
     """From the vehicle's motion to its rate loop, s."""
 
     @classmethod
-    def of(cls, vehicle: Vehicle, latency: float) -> "Geometric":
+    def of(cls, vehicle: Vehicle, latency: float, hold: float = 0.0) -> "Geometric":
         """See `HoverController.of`."""
-        return cls(flight_gains(vehicle, residue(latency)), latency)
+        return cls(flight_gains(vehicle, residue(latency) + hold / 2), latency)
 
     def begin(self) -> Vec3:
         """No integral."""

@@ -40,9 +40,9 @@ class Indi:
     """From the vehicle's motion to its rate loop, s."""
 
     @classmethod
-    def of(cls, vehicle: Vehicle, latency: float) -> "Indi":
+    def of(cls, vehicle: Vehicle, latency: float, hold: float = 0.0) -> "Indi":
         """See `HoverController.of`."""
-        return cls(flight_gains(vehicle, residue(latency)), latency)
+        return cls(flight_gains(vehicle, residue(latency) + hold / 2), latency)
 
     def begin(self) -> Vec3:
         """Nothing pushes."""

@@ -58,14 +58,14 @@ class Mpc:
     """The solver."""
 
     @classmethod
-    def of(cls, vehicle: Vehicle, latency: float) -> "Mpc":
+    def of(cls, vehicle: Vehicle, latency: float, hold: float = 0.0) -> "Mpc":
         """See `HoverController.of`."""
         try:
             solver: Any = importlib.import_module("daqp")
         except ImportError as error:
             missing = f"hover controller 'mpc': the package daqp is missing ({error})"
             raise ValueError(f"{missing}; accepted: pip install 'e2efly[mpc]', or another hover controller") from None
-        gentle = flight_gains(vehicle, residue(latency))
+        gentle = flight_gains(vehicle, residue(latency) + hold / 2)
         loops = QUICKER * np.sqrt(gentle.position_gain * gentle.velocity_gain)
         tilts = 1 / float(gentle.attitude_gain[0]) + 1 / float(np.min(vehicle.rate_gain[:2]))
         return cls(

@@ -27,9 +27,9 @@ class Pid:
     """With these gains."""
 
     @classmethod
-    def of(cls, vehicle: Vehicle, latency: float) -> "Pid":
+    def of(cls, vehicle: Vehicle, latency: float, hold: float = 0.0) -> "Pid":
         """See `HoverController.of`."""
-        return cls(flight_gains(vehicle, latency))
+        return cls(flight_gains(vehicle, latency + hold / 2))
 
     def begin(self) -> Vec3:
         """No integral."""

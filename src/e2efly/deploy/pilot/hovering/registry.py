@@ -22,8 +22,13 @@ class HoverController(Protocol):
     """Telemetry that it cannot fly without: `ROTOR_SPEED`, or nothing."""
 
     @classmethod
-    def of(cls, vehicle: Vehicle, latency: float) -> Self:
-        """Made for a vehicle as loaded, and for the time from its motion to its rate loop, s.
+    def of(cls, vehicle: Vehicle, latency: float, hold: float = 0.0) -> Self:
+        """Make it.
+
+        Args:
+            vehicle: as loaded.
+            latency: from the vehicle's motion to its rate loop, s.
+            hold: for how long a command is held, s, where that counts beside the latency.
 
         Raises:
             ValueError: naming what the machine lacks for it.
