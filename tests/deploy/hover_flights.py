@@ -11,7 +11,7 @@ from e2efly.deploy.pilot.hovering import HoverController, Seen, UnderWay, sent
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
-STEP = 0.0025
+STEP = 0.005
 """Of the bodies, s."""
 
 
