@@ -21,8 +21,8 @@ from e2efly.tasks.route import Route
 from e2efly.tasks.verdicts import distance, offsets, touches_ground
 from e2efly.vehicles.tables import LARGEST
 
-CRUISE = 2.0
-"""Speed at which a controller that is no policy passes a gate, m/s."""
+CRUISE = 3.0
+"""Speed of a controller that is no policy, m/s."""
 
 
 class Racing(Goal):
@@ -114,11 +114,10 @@ class RaceGoal(Racing):
 
     @classmethod
     def aim(cls, shown: Mapping[str, Array]) -> Place:
-        """The next gate's centre, passed at `CRUISE` along the mean of the way to it and of the way on from it."""
-        gates = shown["gates"]
-        here, there = gates[..., :3], gates[..., 3:6]
-        along = Vec3.of(_unit(_unit(here) + _unit(there - here)))
-        return Place(Vec3.of(here), along * CRUISE)
+        """Straight on to the next gate's centre at `CRUISE`: wherever it is, it moves there."""
+        way = shown["gates"][..., :3]
+        far = namespace(way).linalg.norm(way, axis=-1, keepdims=True)
+        return Place(Vec3.of(0.0 * way), Vec3.of(way / (far + 1e-6)) * CRUISE)
 
     observation = (
         (Field("gates", 6, "world", "m", 4.0, "centres of the next two gates minus vehicle position"), target_offsets),
@@ -182,8 +181,3 @@ class RaceRoute(Route):
         lowest = float((track.position[:, 2] - track.opening[:, 1] / 2).min())
         start = track.start.astype(np.float32).astype(np.float64)
         return Course(goal, memory, start, heading=float(track.start_yaw), lowest=lowest, clearance=0.0)
-
-
-def _unit(v: Array) -> Array:
-    """(..., 3) of length 1; no more than that near zero."""
-    return v / (namespace(v).linalg.norm(v, axis=-1, keepdims=True) + 1e-6)
