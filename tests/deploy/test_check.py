@@ -13,6 +13,7 @@ from e2efly.deploy.betaflight.check import NOT_TOLD, Row, examine, problems
 from e2efly.deploy.betaflight.client import MESSAGES, Client
 from e2efly.deploy.betaflight.codec import ERROR, Decoder, Frame, encode
 from e2efly.deploy.betaflight.controller import ControllerInfo, identify
+from e2efly.deploy.betaflight.messages import MotorTelemetry
 from e2efly.deploy.betaflight.settings import ModeRange, RxFailConfig
 from e2efly.deploy.betaflight.sticks import RATES_PULSE, sticks_of
 from e2efly.deploy.settings import FlightSettings

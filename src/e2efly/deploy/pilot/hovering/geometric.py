@@ -11,9 +11,9 @@ from typing import ClassVar
 from e2efly.control import Ctbr, Quat, Vec3
 from e2efly.control.cascade import attitude_along, limited, pull
 from e2efly.control.place import ZERO, Place
-from e2efly.control.vectors import namespace
+from e2efly.control.vectors import Array, namespace
 from e2efly.deploy.pilot.hover import flight_gains
-from e2efly.deploy.pilot.hovering.loops import approach, attainable, grown
+from e2efly.deploy.pilot.hovering.loops import approach, attainable, grown, lead
 from e2efly.deploy.pilot.hovering.registry import register
 from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue
 from e2efly.vehicles.vehicle import Vehicle
@@ -59,23 +59,19 @@ class Geometric:
         yaw = motion.attitude.yaw() if goal.yaw is None else goal.yaw
         force = pull(vehicle, wanted)
         along = motion.attitude.z_axis().dot(force)
-        rate = turning(vehicle, motion.attitude, force, goal.jerk, yaw)
+        rate = turning(vehicle, motion.attitude, force, yaw) + lead(motion.attitude, force, goal.jerk)
         return memory, limited(vehicle, namespace(along).maximum(along, 0.0), rate)
 
 
-def turning(vehicle: Vehicle, attitude: Quat, force: Vec3, jerk: Vec3, yaw: float) -> Vec3:
+def turning(vehicle: Vehicle, attitude: Quat, force: Vec3, yaw: Array) -> Vec3:
     """The body rates that turn the thrust along a force, rad/s.
 
     Args:
         vehicle: with the gains.
         attitude: body to world.
         force: that the rotors are to give, over mass, world, m/s^2.
-        jerk: at which it changes, world, m/s^3.
         yaw: rad.
     """
-    size = force.norm()
-    axis = force * (1 / size)
-    error = attitude_along(axis, yaw).conjugate().compose(attitude)
+    error = attitude_along(force * (1 / force.norm()), yaw).conjugate().compose(attitude)
     tilt, turn = -2 * vehicle.attitude_gain[..., 0] * error.w, -2 * vehicle.attitude_gain[..., 1] * error.w
-    goes = attitude.unrotate(axis.cross(jerk * (1 / size)))
-    return Vec3(tilt * error.x, tilt * error.y, turn * error.z) + goes
+    return Vec3(tilt * error.x, tilt * error.y, turn * error.z)

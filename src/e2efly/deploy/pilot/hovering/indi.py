@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from e2efly.control import Ctbr, Vec3
-from e2efly.control.cascade import accelerate
 from e2efly.control.place import ZERO, Place
 from e2efly.deploy.pilot.hover import flight_gains
-from e2efly.deploy.pilot.hovering.loops import LIMIT, approach
+from e2efly.deploy.pilot.hovering.loops import LIMIT, approach, steer
 from e2efly.deploy.pilot.hovering.registry import ROTOR_SPEED, register
 from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue
 from e2efly.vehicles.vehicle import Vehicle
@@ -62,5 +61,4 @@ class Indi:
             goal = place.after(self.latency - seen.age)
         behind = approach(vehicle, motion, goal) - motion.velocity
         wanted = behind.times(Vec3.of(vehicle.velocity_gain)) + goal.acceleration - pushed
-        yaw = motion.attitude.yaw() if goal.yaw is None else goal.yaw
-        return pushed, accelerate(vehicle, motion, wanted, yaw)
+        return pushed, steer(vehicle, motion, wanted, goal)

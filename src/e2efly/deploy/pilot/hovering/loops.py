@@ -1,7 +1,7 @@
 """What the hover controllers share: the way to a place, the vehicle's limits, and the integral. Pure."""
 
-from e2efly.control import Motion, Vec3
-from e2efly.control.cascade import pull
+from e2efly.control import Ctbr, Motion, Quat, Vec3
+from e2efly.control.cascade import accelerate, limited, pull
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, namespace
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
@@ -23,6 +23,25 @@ def attainable(vehicle: Vehicle, wanted: Vec3) -> Vec3:
     """What the limits of the vehicle leave of an acceleration, world, m/s^2."""
     force, most = pull(vehicle, wanted), 4 * vehicle.thrust_range[1] / vehicle.mass
     return Vec3(force.x, force.y, namespace(force.z).minimum(force.z, most) - GRAVITY)
+
+
+def lead(attitude: Quat, force: Vec3, jerk: Vec3) -> Vec3:
+    """The body rates of a thrust that goes with a jerk, rad/s.
+
+    Args:
+        attitude: body to world.
+        force: that the rotors are to give, over mass, world, m/s^2.
+        jerk: at which it changes, world, m/s^3.
+    """
+    scale = 1 / force.norm()
+    return attitude.unrotate((force * scale).cross(jerk * scale))
+
+
+def steer(vehicle: Vehicle, motion: Motion, wanted: Vec3, goal: Place) -> Ctbr:
+    """Towards an acceleration, world, m/s^2, in the heading of a place and with its jerk."""
+    yaw = motion.attitude.yaw() if goal.yaw is None else goal.yaw
+    command = accelerate(vehicle, motion, wanted, yaw)
+    return limited(vehicle, command.thrust, command.rate + lead(motion.attitude, pull(vehicle, wanted), goal.jerk))
 
 
 def grown(before: Vec3, vehicle: Vehicle, error: Vec3, wanted: Vec3, flown: Vec3, dt: float) -> Vec3:

@@ -13,11 +13,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from e2efly.control import Ctbr, Vec3
-from e2efly.control.cascade import accelerate
 from e2efly.control.place import ZERO, Place
 from e2efly.control.vectors import Array
 from e2efly.deploy.pilot.hover import flight_gains
-from e2efly.deploy.pilot.hovering.loops import LIMIT
+from e2efly.deploy.pilot.hovering.loops import LIMIT, steer
 from e2efly.deploy.pilot.hovering.plan import Plan, Solve, planned
 from e2efly.deploy.pilot.hovering.registry import register
 from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue
@@ -94,8 +93,7 @@ class Mpc:
         limits = zip(_most(vehicle), vehicle.speed_max.tolist(), strict=True)
         axes = zip((self.level, self.level, self.up), states, limits, strict=True)
         wanted = Vec3(*(self._axis(plan, *state, *limit) for plan, state, limit in axes))
-        yaw = motion.attitude.yaw() if goal.yaw is None else goal.yaw
-        return memory, accelerate(vehicle, motion, wanted + feed, yaw)
+        return memory, steer(vehicle, motion, wanted + feed, goal)
 
     def _axis(
         self, plan: Plan, off: Array, behind: Array, over: Array, feed: Array, moves: Array, most: float, fast: float
