@@ -18,6 +18,7 @@ from e2efly.config import CameraConfig, EnvConfig, ImuConfig, RewardConfig, Task
 from e2efly.config.changes import changed, differing
 from e2efly.deploy.policy.images import NONE, Image
 from e2efly.deploy.policy.loader import Policy, level_and_still, load_policy
+from e2efly.deploy.policy.runtime import Acting
 from e2efly.device import prepare
 from e2efly.env import UNSEEN, Env, random_key
 from e2efly.episodes import Act, Episodes, rows, run_stepwise, summary
@@ -243,7 +244,7 @@ def with_changes(own: EnvConfig, changes: Mapping[str, Any]) -> EnvConfig:
     return flies
 
 
-def pinned(env: EnvConfig, policy: Policy) -> EnvConfig:
+def pinned(env: EnvConfig, policy: Acting) -> EnvConfig:
     """The same environment, which keeps rate, commands and past actions whatever else of it changes."""
     c = policy.contract
     seen = {f.name: f.size for f in c.observation}
@@ -423,7 +424,7 @@ def episode_steps(task: TaskConfig, env: Any) -> int:
     return int(np.ceil(float(task.episode_s) / env.control_period - 1e-6))
 
 
-def check_observation(policy: Policy, env: Any) -> None:
+def check_observation(policy: Acting, env: Any) -> None:
     """Refuse a policy whose observation or images are not the environment's.
 
     Raises:

@@ -16,7 +16,7 @@ from e2efly.vehicles import family_names, load_family, load_vehicle, vehicle_nam
 
 @dataclass(frozen=True)
 class List:
-    """What there is: tasks, algorithms, vehicles, tracks, command modes, hover controllers, plants, reward terms, ..."""
+    """What there is: tasks, algorithms, vehicles, tracks, command modes, hover controllers, plants, reward terms."""
 
 
 def run(options: List) -> int:

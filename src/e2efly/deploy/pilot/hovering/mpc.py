@@ -89,21 +89,29 @@ class Mpc:
         feed = goal.acceleration - pushed
         gives = motion.attitude.z_axis() * thrust - Vec3(0.0, 0.0, GRAVITY)
         off, behind, over = motion.position - goal.position, motion.velocity - goal.velocity, gives - feed
-        states = zip(*map(_parts, (off, behind, over, feed, goal.velocity)), strict=True)
-        limits = zip(_most(vehicle), vehicle.speed_max.tolist(), strict=True)
-        axes = zip((self.level, self.level, self.up), states, limits, strict=True)
-        wanted = Vec3(*(self._axis(plan, *state, *limit) for plan, state, limit in axes))
+        x, y, z = zip(*map(_parts, (off, behind, over, feed, goal.velocity)), strict=True)
+        limits = list(zip(_most(vehicle), vehicle.speed_max.tolist(), strict=True))
+        wanted = Vec3(
+            self._axis(self.level, x, limits[0]),
+            self._axis(self.level, y, limits[1]),
+            self._axis(self.up, z, limits[2]),
+        )
         return memory, steer(vehicle, motion, wanted + feed, goal)
 
-    def _axis(
-        self, plan: Plan, off: Array, behind: Array, over: Array, feed: Array, moves: Array, most: float, fast: float
-    ) -> Array:
-        """What to ask for along an axis, over the acceleration of where to be, m/s^2."""
-        state = np.stack(np.broadcast_arrays(*map(np.atleast_1d, (off, behind, over, feed, moves))), axis=-1)
-        feed, moves = state[:, 3], state[:, 4]
+    def _axis(self, plan: Plan, parts: tuple[Array, ...], limits: tuple[float, float]) -> Array:
+        """What to ask for along an axis, over the acceleration of where to be, m/s^2.
+
+        Args:
+            plan: of the axis.
+            parts: off where to be, m; its change, m/s; the acceleration over that of where to be, and that, m/s^2; the
+                velocity of where to be, m/s.
+            limits: largest acceleration, m/s^2, and speed, m/s.
+        """
+        rows = np.stack(np.broadcast_arrays(*map(np.atleast_1d, parts)), axis=-1)
+        (most, fast), feed, moves = limits, rows[:, 3], rows[:, 4]
         speed = np.stack([-fast - moves, fast - moves], axis=-1)
-        first = plan.best(self.solve, state[:, :3], (-most - feed, most - feed), speed)
-        return first if np.ndim(off) else first[0]
+        first = plan.best(self.solve, rows[:, :3], (-most - feed, most - feed), speed)
+        return first if np.ndim(parts[0]) else first[0]
 
 
 def observed(before: Observed, seen: Seen, under_way: UnderWay, dt: float) -> Observed:

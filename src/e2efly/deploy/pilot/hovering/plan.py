@@ -74,8 +74,8 @@ def planned(frequency: float, lag: float) -> Plan:
         for j in range(k + 1):
             turned[k, :, j] = powers[k - j] @ B
     weights = [*[Q] * (STEPS - 1), P]
-    cost = np.eye(STEPS) + sum(t.T @ w @ t for t, w in zip(turned, weights, strict=True))
-    slope = sum(t.T @ w @ d for t, w, d in zip(turned, weights, drift, strict=True))
+    cost = np.eye(STEPS) + np.sum([t.T @ w @ t for t, w in zip(turned, weights, strict=True)], axis=0)
+    slope = np.sum([t.T @ w @ d for t, w, d in zip(turned, weights, drift, strict=True)], axis=0)
     return Plan(-np.linalg.solve(cost, slope), (drift[:, 1], turned[:, 1]), cost, slope)
 
 

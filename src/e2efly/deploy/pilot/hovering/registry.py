@@ -74,6 +74,7 @@ def register(name: str) -> Callable[[T], T]:
     def registered(kind: T) -> T:
         if lacking := [method for method in METHODS if not hasattr(kind, method)]:
             raise ValueError(f"{origin(kind)} has no {', '.join(lacking)}; accepted: all of {', '.join(METHODS)}")
-        return HOVERS.add(name, kind)
+        HOVERS.add(name, kind)
+        return kind
 
     return registered
