@@ -157,7 +157,7 @@ def test_nothing_is_learned_on_the_ground(name: str) -> None:
     assert memory != controller.begin()
 
 
-def test_the_bridge_holds_the_controller_below_the_height_of_a_flight() -> None:
+def test_the_controller_is_held_below_the_height_of_a_flight_and_while_nothing_is_heard() -> None:
     told = []
 
     class Told:
@@ -167,10 +167,10 @@ def test_the_bridge_holds_the_controller_below_the_height_of_a_flight() -> None:
 
     low, high = (Seen(Vec3(0.0, 0.0, LIFTED + x), ZERO, Quat(1.0, 0.0, 0.0, 0.0), ZERO) for x in (-0.01, 0.01))
     for mode in (Mode.TAKEOFF, Mode.HOVER, Mode.LAND):
-        for motion in (low, high):
-            target = Target((0.0, 0.0, 1.0), 0.0)
-            guidance.hover(Told(), None, Flight(mode), target, motion, UnderWay(), 0.0, 0.01)  # type: ignore[arg-type]
-    assert told == [True, False] * 3
+        for motion, silent in ((low, False), (high, False), (high, True)):
+            known = Told(), None, Flight(mode), Target((0.0, 0.0, 1.0), 0.0), motion, UnderWay(), 0.0, 0.01
+            guidance.hover(*known, silent=silent)  # type: ignore[arg-type]
+    assert told == [True, False, True] * 3
 
 
 def test_indi_believes_rotors_and_accelerometer() -> None:

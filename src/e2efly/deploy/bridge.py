@@ -325,8 +325,9 @@ class Bridge:
             return "closed", None
         seen = self._motion(now, odometry)
         command, self._hovering, self.trim = guidance.hover(
-            self.hover, self._hovering, flight, flight.target, seen, self._under_way, self.trim, dt
-        )
+            self.hover, self._hovering, flight, flight.target, seen, self._under_way, self.trim, dt,
+            silent=self.inputs.silent,
+        )  # fmt: skip
         return "hover", command
 
     def _motion(self, now: float, odometry: Odometry) -> Seen:

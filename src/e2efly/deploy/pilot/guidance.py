@@ -39,6 +39,8 @@ def hover(
     under_way: UnderWay,
     trim: float,
     dt: float,
+    *,
+    silent: bool = False,
 ) -> tuple[Ctbr, Any, float]:
     """Fly to a target by odometry.
 
@@ -51,6 +53,7 @@ def hover(
         under_way: what was sent and does not act yet.
         trim: so far, m/s^2.
         dt: since the last control step, s.
+        silent: the flight controller is not heard, and may not get what is sent.
 
     Returns:
         The command, what the controller is handed next, and the trim, m/s^2.
@@ -67,7 +70,7 @@ def hover(
     if on_ground:  # no tilt before the feet are free
         x, y = float(seen.position.x), float(seen.position.y)
     place = Place(Vec3(x, y, z), Vec3(0.0, 0.0, target.climb), yaw=target.yaw)
-    memory, wanted = controller.step(memory, seen, under_way, place, dt, held=low)
+    memory, wanted = controller.step(memory, seen, under_way, place, dt, held=low or silent)
     rates = (0.0 if on_ground or abs(rate) < STEADY else rate for rate in rates_of(wanted))
     return Ctbr(wanted.thrust + trim, Vec3(*rates)), memory, trim
 

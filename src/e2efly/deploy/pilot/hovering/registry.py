@@ -50,7 +50,7 @@ class HoverController(Protocol):
             under_way: what was sent and does not act yet.
             place: where to be.
             dt: since the last step, s.
-            held: it stands on the ground: nothing is learned and nothing predicted.
+            held: it stands on the ground, or may not get what is sent: nothing is learned and nothing predicted.
 
         Returns:
             What the next step is handed, and the command, within the vehicle's limits.
