@@ -181,8 +181,19 @@ def test_indi_believes_rotors_and_accelerometer() -> None:
         memory, command = controller.step(
             memory, seen(force=Vec3(0.0, 0.0, GRAVITY), thrust=8.0), UnderWay(thrust=8.0), Place(ZERO, yaw=0.0), 0.01
         )
-    assert memory.z == pytest.approx(1.81, abs=1e-6)
+    assert memory.pushed.z == pytest.approx(1.81, abs=1e-6)
     assert command.thrust == pytest.approx(8.0, abs=1e-6)
+
+
+def test_indi_makes_up_for_no_mass_that_the_throttle_map_has_learned() -> None:
+    """The rotors of a vehicle 20 % heavier give 1.2 times what is commanded, over the mass of its file."""
+    controller = hover_controller("indi", VEHICLE, LATENCY)
+    memory = controller.begin()
+    for _ in range(300):
+        hovers = seen(force=Vec3(0.0, 0.0, GRAVITY), thrust=1.2 * GRAVITY)
+        memory, command = controller.step(memory, hovers, UnderWay(), Place(ZERO, yaw=0.0), 0.01)
+    assert memory.pushed.z == pytest.approx(0.0, abs=1e-6)
+    assert command.thrust == pytest.approx(GRAVITY, abs=1e-6)
 
 
 def test_what_is_under_way_is_held_for_the_latency_and_then_acts() -> None:

@@ -13,6 +13,7 @@ from typing import ClassVar
 
 from e2efly.control import Ctbr, Vec3
 from e2efly.control.place import ZERO, Place
+from e2efly.control.vectors import Array
 from e2efly.deploy.pilot.hover import flight_gains
 from e2efly.deploy.pilot.hovering.loops import LIMIT, approach, steer
 from e2efly.deploy.pilot.hovering.registry import ROTOR_SPEED, register
@@ -21,12 +22,25 @@ from e2efly.vehicles.vehicle import Vehicle
 
 FILTER_S = 0.2
 """Time constant of the filter of both, s."""
+UNITS_S = 0.5
+"""Time constant with which thrust by the rotors' speeds is brought to that of the commands, s: whoever turns commands
+into throttle may have learned mass and battery already, and the increments must not make up for them once more."""
+
+
+@dataclass(frozen=True)
+class Felt:
+    """What is known in one flight."""
+
+    pushed: Vec3 = ZERO
+    """Of all but the rotors and gravity, world, m/s^2."""
+    share: Array | None = None
+    """Commanded thrust over that by the rotors' speeds; None: not known yet."""
 
 
 @register("indi")
 @dataclass(frozen=True)
 class Indi:
-    """Its memory is the push of all but the rotors and gravity, world, m/s^2.
+    """Its memory is `Felt`.
 
     Where the rotors' speeds are not known, the thrust is that of the commands through the motors' lag.
     """
@@ -43,22 +57,32 @@ class Indi:
         """See `HoverController.of`."""
         return cls(flight_gains(vehicle, residue(latency) + hold / 2), latency)
 
-    def begin(self) -> Vec3:
+    def begin(self) -> Felt:
         """Nothing pushes."""
-        return ZERO
+        return Felt()
 
     def step(
-        self, memory: Vec3, seen: Seen, under_way: UnderWay, place: Place, dt: float, *, held: bool = False
-    ) -> tuple[Vec3, Ctbr]:
+        self, memory: Felt, seen: Seen, under_way: UnderWay, place: Place, dt: float, *, held: bool = False
+    ) -> tuple[Felt, Ctbr]:
         """See `HoverController.step`."""
-        vehicle, pushed, motion, goal = self.vehicle, memory, seen, place.after(-seen.age)
+        vehicle, motion, goal = self.vehicle, seen, place.after(-seen.age)
         if not held:
-            if seen.force is not None:
-                gave = under_way.thrust if seen.thrust is None else seen.thrust
-                felt = seen.attitude.rotate(seen.force - Vec3(0.0, 0.0, gave))
-                pushed = (pushed + (felt - pushed) * (1 - math.exp(-dt / FILTER_S))).clip(LIMIT)
-            motion, _ = ahead(vehicle, seen, under_way, pushed)
+            memory = felt(memory, seen, under_way, dt)
+            motion, _ = ahead(vehicle, seen, under_way, memory.pushed)
             goal = place.after(self.latency - seen.age)
         behind = approach(vehicle, motion, goal) - motion.velocity
-        wanted = behind.times(Vec3.of(vehicle.velocity_gain)) + goal.acceleration - pushed
-        return pushed, steer(vehicle, motion, wanted, goal)
+        wanted = behind.times(Vec3.of(vehicle.velocity_gain)) + goal.acceleration - memory.pushed
+        return memory, steer(vehicle, motion, wanted, goal)
+
+
+def felt(before: Felt, seen: Seen, under_way: UnderWay, dt: float) -> Felt:
+    """What is known after a step of dt s."""
+    if seen.force is None:
+        return before
+    gave, share = under_way.thrust, before.share
+    if seen.thrust is not None:
+        now = under_way.thrust / seen.thrust
+        share = now if share is None else share + (now - share) * (1 - math.exp(-dt / UNITS_S))
+        gave = share * seen.thrust
+    push = seen.attitude.rotate(seen.force - Vec3(0.0, 0.0, gave))
+    return Felt((before.pushed + (push - before.pushed) * (1 - math.exp(-dt / FILTER_S))).clip(LIMIT), share)
