@@ -5,7 +5,7 @@ from e2efly.deploy.pilot.hovering.registry import HOVERS, ROTOR_SPEED, HoverCont
 from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, sent, thrust_of
 from e2efly.vehicles.vehicle import Vehicle
 
-DEFAULT = "geometric"
+DEFAULT = "pid"
 """What flies unless told."""
 
 __all__ = [

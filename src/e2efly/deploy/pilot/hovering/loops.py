@@ -9,6 +9,9 @@ from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 SHARE = 0.2
 """Growth of the integral over the error of the velocity, in squares of the velocity gain: a fifth, so that it follows
 the loops that act at once at a distance."""
+FASTEST = 0.3
+"""Of a larger error of the velocity the integral learns no more than of this, m/s: it is for what lasts, and a step or a
+stop is over soon."""
 LIMIT = Vec3(0.3 * GRAVITY, 0.3 * GRAVITY, 0.6 * GRAVITY)
 """Largest acceleration that the integral asks for, m/s^2: up for a quadrotor of 2.5 times its mass."""
 
@@ -61,7 +64,7 @@ def grown(before: Vec3, vehicle: Vehicle, error: Vec3, wanted: Vec3, flown: Vec3
 
     def axis(i: Array, gain: Array, e: Array, asked: Array, given: Array, limit: float) -> Array:
         xp = namespace(i, e, asked)
-        winds = (abs(asked - given) > 1e-3) & ((asked - given) * e > 0)
+        winds, e = (abs(asked - given) > 1e-3) & ((asked - given) * e > 0), xp.clip(e, -FASTEST, FASTEST)
         return xp.clip(i + xp.where(winds, 0.0, SHARE * gain**2 * e * dt), -limit, limit)
 
     return Vec3(

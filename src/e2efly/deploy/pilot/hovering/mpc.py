@@ -85,6 +85,8 @@ class Mpc:
             memory = observed(memory, seen, under_way, dt)
             motion, thrust = ahead(vehicle, seen, under_way, memory.pushed)
             goal = place.after(self.latency - seen.age)
+        else:
+            memory = Observed(pushed=memory.pushed)
         pushed = memory.pushed
         feed = goal.acceleration - pushed
         gives = motion.attitude.z_axis() * thrust - Vec3(0.0, 0.0, GRAVITY)
