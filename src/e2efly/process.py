@@ -74,6 +74,8 @@ def be_idle() -> None:
     """Let this process, and the threads that it starts from now on, compute only while no other wants a core."""
     with suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+        if os.getsid(0) == os.getpid():  # Linux shares cores among sessions first: the session has to be idle, too
+            Path("/proc/self/autogroup").write_text("19")
 
 
 MLOCK_CURRENT, MLOCK_FUTURE, MLOCK_ONFAULT = 1, 2, 4
