@@ -28,6 +28,8 @@ LOGS = (".mcap", ".csv", ".bbl", ".bfl", ".bf", ".ulg", ".bag")
 """Endings of the names of flight logs."""
 WAIT_S = 600.0
 """How long a run's first policy is waited for, s."""
+WATCHED_S = 0.2
+"""Between two looks whether a browser has come, s."""
 USUAL = "vis_r"
 """How the vehicle of a log that does not say is drawn."""
 FILM_S, FILM_HZ = 8.0, 25.0
@@ -136,10 +138,17 @@ def _serve(o: Watch, server: Any, logs: list[Path]) -> None:
         with _poses(o) as poses:
             loop(poses, panel.viewer, panel, over)
         return
+    def watched() -> bool:
+        return not o.idle or bool(server.get_clients())
+
+    while not watched() and not over():  # beside a training, nothing is imported or compiled for nobody
+        time.sleep(WATCHED_S)
+    if over():
+        return
     simulation, progress = _flown(o, Terminal())
     hands_on(panel, simulation)
     between = (lambda: None) if progress is None else policies_on(panel, progress)
-    loop(simulation, panel.viewer, panel, over, between)
+    loop(simulation, panel.viewer, panel, over, between, watched)
 
 
 def _abandoned() -> bool:
