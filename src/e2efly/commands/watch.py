@@ -138,6 +138,7 @@ def _serve(o: Watch, server: Any, logs: list[Path]) -> None:
         with _poses(o) as poses:
             loop(poses, panel.viewer, panel, over)
         return
+
     def watched() -> bool:
         return not o.idle or bool(server.get_clients())
 
