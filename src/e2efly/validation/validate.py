@@ -122,6 +122,7 @@ class Validation:
             "task": contract.task,
             "vehicle": self.candidate.vehicle,
             "controller": self.candidate.controller,
+            "changed": {name: value for name, (_, value) in self.candidate.changes.items()},
             "plant": plant,
             "latency_s": self.candidate.latency,
             "seed": self.seed,
