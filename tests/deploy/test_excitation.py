@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 from e2efly.control.excitation import (
-    CHIRPED, KICK, PULSE, SWEEP, THRUST, Room, chirps, fastest, kick_for, kicks, length_for,
+    CHIRPED,
+    KICK,
+    PULSE,
+    SWEEP,
+    THRUST,
+    Room,
+    chirps,
+    fastest,
+    kick_for,
+    kicks,
+    length_for,
 )  # fmt: skip
 from e2efly.deploy.excitation import ExcitationOptions, excitation, room_of
 from e2efly.deploy.odometry import Odometry

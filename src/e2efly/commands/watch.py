@@ -232,14 +232,15 @@ def _recording(o: Watch, logs: list[Path]) -> Any:
 
 def _report(what: tuple[str, ...]) -> Path | None:
     """The validation report that is to be watched; None: something else is."""
-    if Path(what[0]).suffix != ".json" and not Path(what[0]).is_dir():
+    path = Path(what[0])
+    if (path.suffix != ".json" and not path.is_dir()) or (path / "config.json").is_file():  # a run imports nothing yet
         return None
     from e2efly.device import prepare
 
     prepare("cpu")
     from e2efly.watch.report import report_of
 
-    return report_of(Path(what[0]))
+    return report_of(path)
 
 
 def _reported(o: Watch, report: Path) -> "tuple[Recording, list[Shown]]":
