@@ -30,8 +30,6 @@ LOGS = (".mcap", ".csv", ".bbl", ".bfl", ".bf", ".ulg", ".bag")
 """Endings of the names of flight logs."""
 WAIT_S = 600.0
 """How long a run's first policy is waited for, s."""
-WATCHED_S = 0.2
-"""Between two looks whether a browser has come, s."""
 USUAL = "vis_r"
 """How the vehicle of a log that does not say is drawn."""
 FILM_S, FILM_HZ = 8.0, 25.0
@@ -91,6 +89,10 @@ def run(options: Watch) -> int:
     logs = _logs(o.what)
     if o.idle:
         be_idle()
+        from e2efly.watch.waiting import asked_for
+
+        if not asked_for(o.host, o.port, _abandoned):
+            return 0
     if o.video is not None:
         return _draw(o, o.video, logs, console)
     from e2efly.watch.viewer import serve
@@ -149,10 +151,6 @@ def _serve(o: Watch, server: Any, logs: list[Path]) -> None:
     def watched() -> bool:
         return not o.idle or bool(server.get_clients())
 
-    while not watched() and not over():  # beside a training, nothing is imported or compiled for nobody
-        time.sleep(WATCHED_S)
-    if over():
-        return
     simulation, progress = _flown(o, Terminal())
     hands_on(panel, simulation)
     between = (lambda: None) if progress is None else policies_on(panel, progress)
@@ -233,7 +231,7 @@ def _recording(o: Watch, logs: list[Path]) -> Any:
 def _report(what: tuple[str, ...]) -> Path | None:
     """The validation report that is to be watched; None: something else is."""
     path = Path(what[0])
-    if (path.suffix != ".json" and not path.is_dir()) or (path / "config.json").is_file():  # a run imports nothing yet
+    if path.suffix != ".json" and not path.is_dir():
         return None
     from e2efly.device import prepare
 
