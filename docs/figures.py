@@ -38,6 +38,7 @@ TITLES = {
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "airsim": "The same policies over AirSim's RPC, 20 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
+    "controllers": "Hover controllers, and where learning pays",
     "filter": "The filter of `fly --guard filter`: flights against it, and what it costs",
     "plants_by_sight": "Policies that see, on plants that render",
     "image_faults": "Cameras that break in flight",

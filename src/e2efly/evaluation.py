@@ -12,18 +12,20 @@ import jax
 import numpy as np
 
 from e2efly import presets
+from e2efly.baseline import Baseline
 from e2efly.budget import FASTEST, check_memory, check_time
 from e2efly.config import CameraConfig, EnvConfig, ImuConfig, RewardConfig, TaskConfig
 from e2efly.config.changes import changed, differing
 from e2efly.deploy.policy.images import NONE, Image
 from e2efly.deploy.policy.loader import Policy, level_and_still, load_policy
+from e2efly.deploy.policy.runtime import Acting
 from e2efly.device import prepare
 from e2efly.env import UNSEEN, Env, random_key
 from e2efly.episodes import Act, Episodes, rows, run_stepwise, summary
 from e2efly.learn.rundir import RunDirectory, run_of
 from e2efly.observation import PAST_ACTIONS
 from e2efly.physics import State
-from e2efly.vehicles import Controller, Flown, family_names, load_family, load_vehicle, vehicle_names
+from e2efly.vehicles import Controller, Flown, Vehicle, family_names, load_family, load_vehicle, vehicle_names
 from e2efly.zoo import policy_file
 
 SEED = 1_000_000
@@ -61,8 +63,8 @@ class Candidate:
 
     file: Path
     """The policy.onnx."""
-    policy: Policy
-    """As loaded."""
+    policy: Policy | Baseline
+    """As loaded, or the hover controller that flies in its place."""
     task: TaskConfig
     """Of its run, or of its contract."""
     env: EnvConfig
@@ -76,6 +78,8 @@ class Candidate:
     changes: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
     """Where task and environment are not what the run or the contract says: that and what flies, by dotted name
     (`env.wind`, `task.track`)."""
+    baseline: str | None = None
+    """Name of the hover controller that flies in place of the policy; None: the policy flies."""
 
     @property
     def draws(self) -> bool:
@@ -99,6 +103,11 @@ class Candidate:
         return Flown(tuned, tuned)
 
     @property
+    def known(self) -> Vehicle:
+        """The vehicle that the policy was trained on; of a family's policy, the one that it flies."""
+        return load_vehicle(self.env.vehicle) if self.policy.contract.vehicle_ranges is None else self.flown.body
+
+    @property
     def latency(self) -> float:
         """Seconds from observation to command with which one vehicle flies."""
         return self.policy.contract.latency_of(self.flown.body)
@@ -114,6 +123,8 @@ class Candidate:
     def notes(self) -> list[str]:
         """In which ways it does not fly what its run or its contract says, in words."""
         contract, notes = self.policy.contract, []
+        if self.baseline is not None:
+            notes.append(f"What flies is the hover controller {self.baseline}, in place of the policy.")
         if contract.vehicle_ranges is not None:
             every = f"Every episode flies another vehicle of {contract.vehicle}"
             one = f"What flies is {self.vehicle}, by a policy of {contract.vehicle}"
@@ -145,6 +156,7 @@ def candidate(
     controller: Controller = "policy",
     env: Mapping[str, Any] | None = None,
     task: Mapping[str, Any] | None = None,
+    baseline: str | None = None,
 ) -> Candidate:
     """Find a policy, and what it is judged in.
 
@@ -155,6 +167,7 @@ def candidate(
             the one that flies (plant).
         env: values that are to be changed in what the run or the contract says of the environment, by dotted name.
         task: the same of its task, where another was meant to be flown: {"track": "four_gates"}.
+        baseline: the hover controller that flies in place of the policy, under its contract; None: the policy flies.
 
     Raises:
         ValueError: when there is none; for changes that the contract does not allow; when the vehicle that it was
@@ -185,7 +198,18 @@ def candidate(
             f"--vehicle is {found.vehicle}, ranges that are not the policy's; accepted: {own.vehicle}, or one vehicle "
             "within its ranges"
         )
-    return found
+    return found if baseline is None else _flown_by(found, baseline)
+
+
+def _flown_by(found: Candidate, baseline: str) -> Candidate:
+    """The same, flown by a hover controller."""
+    if found.draws:
+        raise ValueError(
+            f"--baseline is {baseline!r}, and every episode flies another vehicle of {found.vehicle}; accepted: one "
+            "vehicle, by --vehicle"
+        )
+    policy = Baseline.of(found.policy.contract, baseline, found.known)
+    return dataclasses.replace(found, policy=policy, baseline=baseline)
 
 
 def _hash(vehicle: str) -> str:
@@ -220,7 +244,7 @@ def with_changes(own: EnvConfig, changes: Mapping[str, Any]) -> EnvConfig:
     return flies
 
 
-def pinned(env: EnvConfig, policy: Policy) -> EnvConfig:
+def pinned(env: EnvConfig, policy: Acting) -> EnvConfig:
     """The same environment, which keeps rate, commands and past actions whatever else of it changes."""
     c = policy.contract
     seen = {f.name: f.size for f in c.observation}
@@ -262,6 +286,7 @@ class Evaluation:
         return {
             "policy": str(self.candidate.file),
             "task": self.candidate.policy.contract.task,
+            "baseline": self.candidate.baseline,
             "vehicle": self.candidate.vehicle,
             "controller": self.candidate.controller,
             "changed": {name: value for name, (_, value) in self.candidate.changes.items()},
@@ -311,6 +336,7 @@ def evaluate(
     seed: int = SEED,
     device: str | None = None,
     kept: int = 0,
+    baseline: str | None = None,
 ) -> Evaluation:
     """Fly a policy's file from unseen starts of its task, in the training simulator.
 
@@ -326,6 +352,8 @@ def evaluate(
         seed: of the starts.
         device: cpu or gpu.
         kept: bytes that the caller keeps of every start (`ROW` for a report), for the check of the memory.
+        baseline: the hover controller that flies in place of the policy, under its contract: pid, geometric, indi, mpc,
+            or the reference of one of your own.
 
     Raises:
         ValueError: naming the field or the option, its value and what is accepted.
@@ -333,7 +361,7 @@ def evaluate(
     if episodes <= 0:
         raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
     prepare(device)
-    found = candidate(policy, vehicle, controller, env, task)
+    found = candidate(policy, vehicle, controller, env, task, baseline)
     return Evaluation(found, seed, *fly_criteria(found, episodes, seed, kept))
 
 
@@ -377,17 +405,18 @@ def settling(suite: TaskConfig) -> float:
     return float(getattr(suite, "settle_s", 0.0))
 
 
-def act_of(policy: Policy) -> Act:
-    """A policy's ONNX graph, asked outside of JAX."""
+def act_of(policy: Policy | Baseline) -> Act:
+    """A policy's ONNX graph, or a baseline, asked outside of JAX."""
     contract = policy.contract
 
-    def act(observation: np.ndarray, images: Sequence[np.ndarray], memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def act(observation: np.ndarray, images: Sequence[np.ndarray], memory: Any) -> tuple[np.ndarray, Any]:
         finite = np.isfinite(observation).all(axis=-1, keepdims=True)
         if not finite.all():  # an episode that is over goes on: what tumbles without a rate loop leaves all numbers
             observation = np.where(finite, observation, level_and_still(contract))
         return policy.act(observation, images, memory)
 
-    return Act(act, lambda n: np.zeros((n, contract.memory_size), np.float32))
+    remembers = isinstance(policy, Policy)
+    return Act(act, lambda n: np.zeros((n, contract.memory_size), np.float32) if remembers else None)
 
 
 def episode_steps(task: TaskConfig, env: Any) -> int:
@@ -395,7 +424,7 @@ def episode_steps(task: TaskConfig, env: Any) -> int:
     return int(np.ceil(float(task.episode_s) / env.control_period - 1e-6))
 
 
-def check_observation(policy: Policy, env: Any) -> None:
+def check_observation(policy: Acting, env: Any) -> None:
     """Refuse a policy whose observation or images are not the environment's.
 
     Raises:

@@ -1,11 +1,12 @@
 """What a task shows a policy and how it judges it: the same code in training (JAX) and in flight (NumPy)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from e2efly.control.place import Place
 from e2efly.control.vectors import Array, namespace
 from e2efly.courses.origin import Origin
 from e2efly.observation import Field
@@ -112,6 +113,21 @@ class Goal:
     def goal(self, memory: Any, time: Array) -> Array:
         """(n, 3) where to be now, world, m."""
         raise NotImplementedError
+
+    @classmethod
+    def aim(cls, shown: Mapping[str, Array]) -> Place:
+        """Where a controller that is no policy is to be, by what a policy is shown.
+
+        Args:
+            shown: the task's own fields of the observation by name, each (..., size).
+
+        Returns:
+            The place, its position relative to the vehicle's.
+
+        Raises:
+            NotImplementedError: for a task that no such place does.
+        """
+        raise NotImplementedError(f"{cls.__name__} names no place to fly to")
 
     def advance(self, memory: Any, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Any, Outcome]:
         """Judge the control step that ended at `time`; the task's state after it, and its outcome."""

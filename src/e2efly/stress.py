@@ -46,6 +46,7 @@ class Report:
         return {
             "policy": str(self.candidate.file),
             "task": self.candidate.policy.contract.task,
+            "baseline": self.candidate.baseline,
             "vehicle": self.candidate.vehicle,
             "controller": self.candidate.controller,
             "plant": self.plant,
@@ -64,6 +65,7 @@ def stress(
     controller: Controller = "policy",
     seed: int = SEED,
     device: str | None = None,
+    baseline: str | None = None,
 ) -> Report:
     """Fly a policy's file in every row of `ROWS`, from the unseen starts of `evaluate`.
 
@@ -75,6 +77,7 @@ def stress(
         controller: the vehicle that the flight controller believes in, in every row: policy or plant.
         seed: of the starts.
         device: cpu or gpu.
+        baseline: the hover controller that flies in place of the policy; see `evaluate`.
 
     Raises:
         ValueError: naming the option, its value and what is accepted.
@@ -83,7 +86,7 @@ def stress(
         raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
     check_rows(rows)
     prepare(device)
-    found = candidate(policy, vehicle, controller)
+    found = candidate(policy, vehicle, controller, baseline=baseline)
     if found.draws:
         raise ValueError(
             f"--vehicle is {vehicle or 'left out'}; accepted with --stress: one vehicle within the ranges of "

@@ -5,19 +5,28 @@ import math
 import numpy as np
 import pytest
 
+from e2efly.control import Ctbr, Quat, Vec3
 from e2efly.deploy.attitude import Attitude
 from e2efly.deploy.odometry import Odometry, Sample
 from e2efly.deploy.pilot import guidance
 from e2efly.deploy.pilot.estimate import OUTLIERS_S, RESTART_S, Estimate, see
 from e2efly.deploy.pilot.flight_state import Flight, Mode, Target
-from e2efly.deploy.pilot.hover import LIFTED, flight_gains, rates_of
+from e2efly.deploy.pilot.hover import LIFTED, rates_of
+from e2efly.deploy.pilot.hovering import Seen, UnderWay, hover_controller
 from e2efly.deploy.pose.checks import Checks
 from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 from tests.deploy.test_pose_tracking import LEVEL, T, sample
 
 HOVER, GROUND = Flight(Mode.HOVER), Flight()
-GENTLE = flight_gains(load_vehicle("vis_r"), 0.06)
+PID = hover_controller("pid", load_vehicle("vis_r"), 0.06)
+
+
+def hovered(flight: Flight, target: Target, odometry: Odometry, trim: float) -> tuple[Ctbr, float]:
+    """The first command of a controller, and the trim."""
+    parts = Vec3(*odometry.position), Vec3(*odometry.velocity), Quat(*odometry.quaternion), Vec3(*odometry.body_rate)
+    command, _, trim = guidance.hover(PID, PID.begin(), flight, target, Seen(*parts), UnderWay(), trim, T)
+    return command, trim
 
 
 def told(before: Estimate, *samples: Sample, flight: Flight = HOVER, now: float | None = None) -> Estimate:
@@ -65,28 +74,28 @@ def odometry(height: float, climb: float = 0.0, x: float = 0.0) -> Odometry:
 
 def test_a_take_off_does_not_tilt_before_it_has_left_the_ground() -> None:
     target, flight = Target((1.0, 1.0, 0.5), 0.7), Flight(Mode.TAKEOFF)
-    standing, _ = guidance.hover(GENTLE, flight, target, odometry(LIFTED - 0.01), 0.0, T)
+    standing, _ = hovered(flight, target, odometry(LIFTED - 0.01), 0.0)
     assert rates_of(standing) == [0.0, 0.0, 0.0]
-    lifted, _ = guidance.hover(GENTLE, flight, target, odometry(LIFTED + 0.01), 0.0, T)
+    lifted, _ = hovered(flight, target, odometry(LIFTED + 0.01), 0.0)
     assert all(abs(rate) > 0.1 for rate in rates_of(lifted))
 
 
 def test_the_trim_grows_while_a_take_off_does_not_climb_and_fades_in_the_air() -> None:
     target, trim = Target((0.0, 0.0, 0.5), 0.0, climb=0.4), 0.0
     for _ in range(100):
-        command, trim = guidance.hover(GENTLE, Flight(Mode.TAKEOFF), target, odometry(0.0), trim, T)
+        command, trim = hovered(Flight(Mode.TAKEOFF), target, odometry(0.0), trim)
     assert trim == pytest.approx(guidance.TRIM_GAIN * 0.4)
     for _ in range(1000):
-        command, trim = guidance.hover(GENTLE, Flight(Mode.TAKEOFF), target, odometry(0.0), trim, T)
+        command, trim = hovered(Flight(Mode.TAKEOFF), target, odometry(0.0), trim)
     assert trim == guidance.TRIM[1]  # it stands tethered: no more thrust than this is added
     hovering = Target((0.0, 0.0, 1.0), 0.0)
     for _ in range(round(guidance.TRIM_FADE / T)):
-        command, trim = guidance.hover(GENTLE, HOVER, hovering, odometry(1.0), trim, T)
+        command, trim = hovered(HOVER, hovering, odometry(1.0), trim)
     assert trim == pytest.approx(guidance.TRIM[1] / math.e)
     assert float(command.thrust) == pytest.approx(GRAVITY + trim)
 
 
 def test_a_steady_hover_sends_body_rates_of_zero() -> None:
     target = Target((0.001, 0.0, 1.0), 0.0)  # they are held for long should the link fall silent
-    command, _ = guidance.hover(GENTLE, HOVER, target, odometry(1.0), 0.0, T)
+    command, _ = hovered(HOVER, target, odometry(1.0), 0.0)
     assert rates_of(command) == [0.0, 0.0, 0.0]

@@ -70,6 +70,21 @@ def test_attitude_and_acceleration_are_flu_as_the_firmware_senses_them() -> None
     assert [count / 256 for count in force] == pytest.approx(up, abs=0.01)
 
 
+def test_the_speeds_of_the_motors_are_radians_a_second() -> None:
+    each = struct.pack("<IHBHHH", 12000, 35, 41, 1480, 320, 17)
+    told = messages.MotorTelemetry.parse(bytes([4]) + 3 * each + struct.pack("<IHBHHH", 0, 10000, 0, 0, 0, 0))
+    assert told.speed == pytest.approx((400 * math.pi, 400 * math.pi, 400 * math.pi, 0.0))
+    with pytest.raises(ValueError, match="MSP MOTOR_TELEMETRY: the payload has 14 bytes; accepted: 27 or more"):
+        messages.MotorTelemetry.parse(bytes([2]) + each)
+
+
+@pytest.mark.parametrize(("dshot", "sensor", "tells"), [(0, 0, False), (1, 0, True), (0, 1, True)])
+def test_a_controller_says_whether_it_measures_speeds(dshot: int, sensor: int, tells: bool) -> None:
+    said = struct.pack("<3H4B", 0, 2000, 1000, 4, 14, dshot, sensor)
+    assert settings.MotorConfig.parse(said).tells_speed is tells
+    assert not settings.MotorConfig.parse(said[:7]).tells_speed  # MSP before 1.42
+
+
 @pytest.mark.parametrize(("heading", "yaw"), [(0, 0.0), (90, -math.pi / 2), (180, math.pi), (350, math.radians(10))])
 def test_yaw_is_positive_to_the_left(heading: int, yaw: float) -> None:
     assert messages.AttitudeReply.parse(struct.pack("<3h", 0, 0, heading)).yaw == pytest.approx(yaw)

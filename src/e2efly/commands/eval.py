@@ -41,6 +41,9 @@ class Eval:
     vehicle: str | None = None
     """What flies, a name or a .toml file; left out: the policy's own vehicle, or of a family another one in every
     episode. The policy is not changed."""
+    baseline: str | None = None
+    """What flies in place of the policy, under its contract: a hover controller, pid, geometric, indi, mpc, or one of
+    your own, path/to/file.py:Name. For hover, hover_aware, land, track and race."""
     controller: Controller = "policy"
     """The vehicle that the flight controller believes in: the policy's own, whatever flies (policy), or the one that
     flies (plant)."""
@@ -110,7 +113,13 @@ def run(asked: Asked) -> int:
     from e2efly.view.evaluation import plot_evaluation
 
     o, console = options, Terminal()
-    flies = {"vehicle": o.vehicle, "controller": o.controller, "seed": o.seed, "device": o.device}
+    flies = {
+        "vehicle": o.vehicle,
+        "controller": o.controller,
+        "seed": o.seed,
+        "baseline": o.baseline,
+        "device": o.device,
+    }
     found = evaluate(o.policy, o.episodes, env=asked.env, task=asked.task, **flies, kept=ROW if o.json else 0)
     for note in found.candidate.notes:
         console.print(note, style="dim")
@@ -127,9 +136,21 @@ def run(asked: Asked) -> int:
 def _stress(o: Eval) -> int:
     from e2efly.stress import stress
 
-    flies = {"vehicle": o.vehicle, "controller": o.controller, "seed": o.seed, "device": o.device}
+    flies = {
+        "vehicle": o.vehicle,
+        "controller": o.controller,
+        "seed": o.seed,
+        "baseline": o.baseline,
+        "device": o.device,
+    }
     found = stress(o.policy, o.episodes, rows=o.rows, **flies)
     return report_stress(found, Terminal(), o.json, _folder(o, found.candidate) / "stress.png", o.least)
+
+
+def _flies(o: Eval) -> dict[str, Any]:
+    """What flies, and where that is computed."""
+    flies = {"vehicle": o.vehicle, "controller": o.controller, "baseline": o.baseline}
+    return flies | {"seed": o.seed, "device": o.device}
 
 
 def _folder(o: Eval, flew: "Candidate") -> Path:

@@ -15,7 +15,7 @@ import tyro
 from e2efly import __version__
 from e2efly.commands.fly_check import look, refuse_in_flight, settings_table
 from e2efly.commands.options import parse as parse_options
-from e2efly.deploy.betaflight.check import Row, examine, problems
+from e2efly.deploy.betaflight.check import Row, check_hover, examine, hover_schedule, problems
 from e2efly.deploy.betaflight.client import SCHEDULE, Client
 from e2efly.deploy.betaflight.controller import ControllerInfo, identify
 from e2efly.deploy.betaflight.link import Link, open_link
@@ -31,6 +31,7 @@ from e2efly.deploy.log.live import Live, targets_of
 from e2efly.deploy.log.record import Log, Logs
 from e2efly.deploy.log.telemetry import Telemetry
 from e2efly.deploy.pilot import throttle_map
+from e2efly.deploy.pilot.hovering import DEFAULT, hover_controller
 from e2efly.deploy.policy.loader import Policy, load_policy
 from e2efly.deploy.policy.runtime import Envelope, Runtime, check
 from e2efly.deploy.policy.worker import PolicyWorker
@@ -95,6 +96,9 @@ class Fly:
     guard: Literal["switch", "filter"] = "switch"
     """What keeps a policy in the fence: a switch, which ends its flight where it could hardly stop inside any more, or
     a filter, which changes its commands no more than stopping inside needs, and lets it fly on. See docs/flying.md."""
+    hover: str = DEFAULT
+    """What flies take-off, hover and landing: pid, geometric, indi (needs the speeds of the rotors), mpc (needs
+    e2efly[mpc]), or a controller of your own, path/to/file.py:Name. See docs/flying.md."""
     latency: float | None = None
     """From the vehicle's motion to its rate loop, s: sets the hover gains; left out: the vehicle file's."""
     goal: tyro.conf.Suppress[Route | None] = None
@@ -158,6 +162,7 @@ def run(options: Fly) -> int:
         )
     flies = options.vehicle or _own_vehicle(policy, loaded)
     body = load_vehicle(flies)
+    hover = hover_controller(options.hover, body, body.latency if options.latency is None else options.latency)
     filter = Filter.of(body, settings.fence, options.latency) if options.guard == "filter" else None
     runtime = None
     if loaded is not None:
@@ -188,8 +193,9 @@ def run(options: Fly) -> int:
             stack.callback(commands.close)
         held: Link = WatchedLink(options.link) if options.watchdog and not options.check else open_link(options.link)
         stack.callback(held.close)
-        client = Client(held, dict(EXCITATION_SCHEDULE if excited else SCHEDULE))
+        client = Client(held, dict(EXCITATION_SCHEDULE if excited else SCHEDULE) | hover_schedule(hover))
         info = _connect(client, options.link)
+        check_hover(options.hover, hover, info)
         rows = examine(info, body, settings, contract)
         console.print(settings_table(rows))
         worker = _worker(runtime, commands, body, options)
@@ -198,6 +204,7 @@ def run(options: Fly) -> int:
         bridge = Bridge(
             client, info, source, body, settings, worker=worker, latency=options.latency,
             settings_problems=problems(rows), throttle_map=known, cameras=cameras, filter=filter,
+            hover=hover,
         )  # fmt: skip
         source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:
@@ -214,7 +221,7 @@ def run(options: Fly) -> int:
             stack.callback(shown.close)
         log = Logs((telemetry, *([live] if targets else []), *([] if shown is None else [shown])))
         bridge.log = log
-        _record_meta(log, bridge, body, contract.to_json() if contract else "", rows)
+        _record_meta(log, bridge, body, contract.to_json() if contract else "", rows, options.hover)
         rate = loop_rate(contract.control_rate_hz) if contract else LOWEST_RATE
         say = Speaker(sys.stdout)
         stack.callback(say.close)
@@ -308,8 +315,9 @@ def _identify_again(
     return info
 
 
-def _record_meta(log: Log, bridge: Bridge, body: Vehicle, contract: str, rows: tuple[Row, ...]) -> None:
+def _record_meta(log: Log, bridge: Bridge, body: Vehicle, contract: str, rows: tuple[Row, ...], hover: str) -> None:
     settings = {
+        "hover": hover,
         "flight": dataclasses.asdict(bridge.settings),
         "controller": {row.setting: row.value for row in rows},
         "throttle_map": json.loads(throttle_map.as_json(bridge.map)),

@@ -16,7 +16,7 @@ from e2efly.vehicles import family_names, load_family, load_vehicle, vehicle_nam
 
 @dataclass(frozen=True)
 class List:
-    """What there is: tasks, algorithms, presets, vehicles, tracks, references, command modes, plants, reward terms."""
+    """What there is: tasks, algorithms, vehicles, tracks, command modes, hover controllers, plants, reward terms."""
 
 
 def run(options: List) -> int:
@@ -25,6 +25,7 @@ def run(options: List) -> int:
     load_installed()
     prepare("cpu")
     from e2efly.control import COMMAND_MODES
+    from e2efly.deploy.pilot.hovering import HOVERS
     from e2efly.physics import INTEGRATORS
     from e2efly.rewards import TERMS
     from e2efly.tasks.race import ANY
@@ -39,6 +40,7 @@ def run(options: List) -> int:
         ("references", ["polynomial", "circle", "lemniscate", "FILE.csv"]),
         ("command modes", COMMAND_MODES),
         ("integrators", INTEGRATORS),
+        ("hover controllers", HOVERS),
         ("plants", PLANTS),
     ):
         console.print(kind, style="bold", end=": ")

@@ -59,6 +59,9 @@ class Validate:
     """Seed of the starts."""
     vehicle: str | None = None
     """What flies, a name or a .toml file; left out: the policy's own vehicle. The policy is not changed."""
+    baseline: str | None = None
+    """What flies in place of the policy, under its contract: a hover controller, pid, geometric, indi, mpc, or one of
+    your own, path/to/file.py:Name. For hover, hover_aware, land, track and race."""
     controller: Controller = "policy"
     """The vehicle that the flight controller believes in: the policy's own, whatever flies (policy), or the one that
     flies (plant)."""
@@ -118,6 +121,7 @@ def run(asked: Asked) -> int:
             log=o.log,
             image=o.image,
             progress=progress,
+            baseline=o.baseline,
         )
     for note in found.notes():
         console.print(note, style="dim")
@@ -153,7 +157,7 @@ def _stress(o: Validate) -> int:
             option = field.name.replace("_", "-")
             raise ValueError(f"--{option} is {getattr(o, field.name)}; accepted without --stress, which has --least")
     console = Terminal()
-    flies = {"rows": o.rows, "vehicle": o.vehicle, "controller": o.controller, "seed": o.seed}
+    flies = {"rows": o.rows, "vehicle": o.vehicle, "controller": o.controller, "seed": o.seed, "baseline": o.baseline}
     with _progress(o.plant, console) as progress:
         found = stress(o.policy, o.plant, FLIGHTS if o.episodes is None else o.episodes, **flies, progress=progress)
     plot = _folder(o, found.candidate) / f"{found.plant}_stress.png"

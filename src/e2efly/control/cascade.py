@@ -53,24 +53,36 @@ def reach(vehicle: Vehicle, motion: Motion, wanted: Vec3, yaw: Array) -> Ctbr:
     return accelerate(vehicle, motion, error.times(Vec3.of(vehicle.velocity_gain)), yaw)
 
 
-def accelerate(vehicle: Vehicle, motion: Motion, wanted: Vec3, yaw: Array) -> Ctbr:
-    """Point the thrust along the wanted acceleration, world, m/s^2, less gravity, within the tilt limit; yaw, rad."""
+def pull(vehicle: Vehicle, wanted: Vec3) -> Vec3:
+    """What the rotors are to give for a wanted acceleration, both world, m/s^2: it less gravity, within the limits."""
     wanted = wanted.clip(Vec3.of(vehicle.acceleration_max))
-    xp = namespace(wanted.z, yaw)
+    xp = namespace(wanted.x, wanted.z)
     up = xp.maximum(wanted.z + GRAVITY, 0.1 * GRAVITY)  # the rotors push up: a steeper fall is not commanded
     level = safe_sqrt(wanted.x**2 + wanted.y**2)
     reach = up * xp.tan(vehicle.tilt_max)
     shrink = reach / xp.maximum(level, reach)
-    force = Vec3(wanted.x * shrink, wanted.y * shrink, up)
-    thrust = force.norm()
-    axis = force * (1 / thrust)
-    # shortest turn from up to the axis, after a turn by yaw about up: singular only upside down, out of reach here
+    return Vec3(wanted.x * shrink, wanted.y * shrink, up)
+
+
+def attitude_along(axis: Vec3, yaw: Array) -> Quat:
+    """The attitude whose z axis is a unit vector, world, at a yaw, rad.
+
+    The shortest turn from up to the axis, after a turn by the yaw about up: singular only upside down.
+    """
+    xp = namespace(axis.z, yaw)
     half = xp.sqrt((1 + axis.z) / 2)
     zero = xp.zeros_like(half)
     tilt = Quat(half, -axis.y / (2 * half), axis.x / (2 * half), zero)
-    wanted_attitude = tilt.compose(Quat(xp.cos(yaw / 2), zero, zero, xp.sin(yaw / 2)))
+    return tilt.compose(Quat(xp.cos(yaw / 2), zero, zero, xp.sin(yaw / 2)))
+
+
+def accelerate(vehicle: Vehicle, motion: Motion, wanted: Vec3, yaw: Array) -> Ctbr:
+    """Point the thrust along the wanted acceleration, world, m/s^2, less gravity, within the tilt limit; yaw, rad."""
+    force = pull(vehicle, wanted)
+    axis = force * (1 / force.norm())
     along = motion.attitude.z_axis().dot(force)  # thrust for the acceleration along the axis as it is now
-    return turn(vehicle, motion, xp.maximum(along, 0.0), wanted_attitude)
+    xp = namespace(along)
+    return turn(vehicle, motion, xp.maximum(along, 0.0), attitude_along(axis, yaw))
 
 
 def turn(vehicle: Vehicle, motion: Motion, thrust: Array, wanted: Quat) -> Ctbr:

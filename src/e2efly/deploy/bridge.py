@@ -5,11 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from e2efly.control import Ctbr
+from e2efly.control import Ctbr, Quat, Vec3
 from e2efly.deploy.betaflight.client import Client
 from e2efly.deploy.betaflight.controller import ControllerInfo
 from e2efly.deploy.betaflight.instruments import CLOSED, PROBE, ChannelProbe, Instruments, Reading
-from e2efly.deploy.betaflight.messages import AttitudeReply, RawImu, set_raw_rc
+from e2efly.deploy.betaflight.messages import AttitudeReply, MotorTelemetry, RawImu, set_raw_rc
 from e2efly.deploy.betaflight.sticks import sticks_of
 from e2efly.deploy.filter.filter import Filter
 from e2efly.deploy.filter.guard import Keeper
@@ -30,6 +30,7 @@ from e2efly.deploy.pilot import estimate, guidance, inertial, state_machine
 from e2efly.deploy.pilot.estimate import LATE_S, Estimate, height_of
 from e2efly.deploy.pilot.flight_state import AIRBORNE, GROUNDED, Flight, Inputs, Mode
 from e2efly.deploy.pilot.hover import LIFTED, controlled, flight_gains, rates_of
+from e2efly.deploy.pilot.hovering import DEFAULT, HoverController, Seen, UnderWay, hover_controller, sent, thrust_of
 from e2efly.deploy.pilot.inertial import FRESH_S, Measurement
 from e2efly.deploy.pilot.landing import has_stood
 from e2efly.deploy.pilot.throttle_map import ThrottleHistory, ThrottleMap, learn
@@ -41,7 +42,7 @@ from e2efly.deploy.pose.source import PoseSource
 from e2efly.deploy.settings import FlightSettings
 from e2efly.deploy.sight import watch
 from e2efly.deploy.sight.source import ImageSource
-from e2efly.deploy.sight.watch import Seen
+from e2efly.deploy.sight.watch import Seen as Watched
 from e2efly.vehicles.vehicle import Vehicle
 
 ATTITUDE_S, BLIND_ATTITUDE_S = 0.1, 0.5
@@ -50,6 +51,8 @@ DELAY_STEPS = 50
 """How often, on the ground, the delay of the poses is measured, control steps."""
 SILENT_S = 0.1
 """A controller that has said nothing for so long may hold the next command for as long as it is silent, s."""
+CUT = Ctbr(0.0, Vec3(0.0, 0.0, 0.0))
+"""What a closed throttle is, as a command."""
 HISTORY_S = 30.0
 """The throttles that were sent are remembered for so long, s: a silence of the link may last long."""
 
@@ -75,6 +78,7 @@ class Bridge:
         throttle_map: ThrottleMap | None = None,
         cameras: Sequence[ImageSource] = (),
         filter: Filter | None = None,
+        hover: HoverController | None = None,
     ) -> None:
         """Make a bridge on the ground.
 
@@ -91,16 +95,21 @@ class Bridge:
             throttle_map: learned in earlier flights; None: the vehicle file's.
             cameras: what the policy sees, in the order of its contract's images.
             filter: keeps the policy inside of the fence; None: the guard ends its flight there.
+            hover: flies take-off, hover and landing; None: the usual one, for this latency.
         """
         delay: float = vehicle.latency if latency is None else latency
         self.client, self.source, self.vehicle, self.settings = client, source, vehicle, settings
         self.gentle = flight_gains(vehicle, delay)
-        """The vehicle with the gains of take-off, hover and landing."""
+        """The vehicle with the gains that the latency allows."""
+        self.hover = hover or hover_controller(DEFAULT, vehicle, delay)
+        """Flies take-off, hover and landing."""
+        self.latency = delay
+        """From the vehicle's motion to its rate loop, s."""
         self.worker, self.log, self.land_now = worker, log, False
         """`land_now`: the operator asks for a landing, as the pilot does by the mission switch."""
         self.cameras = tuple(cameras)
         images = () if worker is None else worker.images
-        self.seen = tuple(Seen(image) for image, _ in zip(images, self.cameras, strict=True))
+        self.seen = tuple(Watched(image) for image, _ in zip(images, self.cameras, strict=True))
         """What is known of each camera."""
         self.instruments = Instruments(client, settings)
         self.adopt(info, settings_problems)
@@ -113,6 +122,7 @@ class Bridge:
         """The newest measurement of the inertial sensors that can be believed."""
         self.sent = Sent("closed", None, 0.0, self._closed())
         self.keeper = None if filter is None else Keeper(filter)
+        self._hovering, self._under_way = self.hover.begin(), UnderWay()
         self._history = ThrottleHistory(HISTORY_S)
         self._late: tuple[float, ...] = ()
         self._ticks, self._last = 0, 0.0
@@ -126,6 +136,7 @@ class Bridge:
         """One control step at `now` s, which began `lateness` s after its time; a policy due within `slack` s acts."""
         dt = min(max(now - self._last, 0.0), 0.1) if self._last else 0.0
         self._last, self._ticks = now, self._ticks + 1
+        self._under_way = sent(self._under_way, self.sent.command or CUT, dt, self.vehicle, self.latency)
         late = (*self._late, now) if lateness > self.settings.lateness else self._late
         self._late = tuple(moment for moment in late if moment >= now - 1.0)
         _, reading = self._perceive(now)
@@ -294,6 +305,7 @@ class Bridge:
         self.estimate = estimate.enter(self.estimate, before, self.flight)
         if self.flight.mode is not before.mode:
             self.trim = 0.0 if self.flight.mode in (Mode.TAKEOFF, Mode.LAND) else self.trim
+            self._hovering = self.hover.begin()
             if self.log is not None:
                 record_mode(self.log, now, before, self.flight)
 
@@ -312,8 +324,24 @@ class Bridge:
             return "blind", command
         if self.inputs.link_problem and self.inputs.silent and has_stood(self.settings, flight, odometry):
             return "closed", None
-        command, self.trim = guidance.hover(self.gentle, flight, flight.target, odometry, self.trim, dt)
+        seen = self._motion(now, odometry)
+        command, self._hovering, self.trim = guidance.hover(
+            self.hover, self._hovering, flight, flight.target, seen, self._under_way, self.trim, dt,
+            silent=self.inputs.silent,
+        )  # fmt: skip
         return "hover", command
+
+    def _motion(self, now: float, odometry: Odometry) -> Seen:
+        """What the hover controller is told."""
+        inertial, told = self.estimate.inertial, self.client.message(MotorTelemetry.CODE, now, FRESH_S)
+        force = inertial.force if now - inertial.time < FRESH_S else None
+        return Seen(
+            Vec3(*odometry.position.tolist()), Vec3(*odometry.velocity.tolist()), Quat(*odometry.quaternion.tolist()),
+            Vec3(*odometry.body_rate.tolist()),
+            force=None if force is None else Vec3(*force.tolist()),
+            age=max(now - odometry.time, 0.0),
+            thrust=None if told is None else thrust_of(self.vehicle, told.speed),
+        )  # fmt: skip
 
     def _kept(self, now: float, source: str, command: Ctbr | None) -> tuple[str, Ctbr | None]:
         """The command as the filter lets it pass; where that fails, a stop, and the next step ends the flight."""

@@ -10,7 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from e2efly.deploy.policy.loader import load_policy
+from e2efly.baseline import Baseline, acting
+from e2efly.deploy.policy.loader import Policy, load_policy
 from e2efly.deploy.policy.runtime import Runtime
 from e2efly.device import compute_at_once, cores, prepare
 from e2efly.goal import Course
@@ -48,6 +49,16 @@ class Mission:
     """By an image of the contract, which of the plant's own cameras gives it; the others are rendered."""
     sample: float | None = None
     """Seconds between two samples of a log, at most; None: none are kept."""
+    baseline: str | None = None
+    """The hover controller that flies in place of the policy; None: the policy flies."""
+
+    def acting(self) -> Policy | Baseline:
+        """What flies.
+
+        Raises:
+            ValueError: for a policy or a baseline that cannot be had.
+        """
+        return acting(load_policy(self.policy), self.baseline, self.trained)
 
     def kind(self) -> type[Plant]:
         """The class of the plant.
@@ -122,7 +133,7 @@ def _fly_chunk(mission: Mission, flights: Sequence[Flight]) -> list[Trajectory]:
 
 
 def _fly(mission: Mission, flights: Sequence[Flight]) -> Iterator[Trajectory]:
-    policy, kind = load_policy(mission.policy), mission.kind()
+    policy, kind = mission.acting(), mission.kind()
     names = [image.name for image in policy.contract.images]
     with closing(kind.of(mission.believed, policy.contract)) as plant:
         met = mission.believed.hash, False

@@ -11,8 +11,7 @@ import numpy as np
 
 from e2efly.deploy.log.record import Log
 from e2efly.deploy.pilot.flight_state import Mode, Reason
-from e2efly.deploy.policy.loader import Policy
-from e2efly.deploy.policy.runtime import RuntimeState
+from e2efly.deploy.policy.runtime import Acting, RuntimeState
 from e2efly.deploy.sight.source import ImageSource
 from e2efly.goal import Course, Outcome
 from e2efly.tasks.route import course_for, route_of
@@ -67,7 +66,7 @@ class Rehearsal:
     """The flight."""
 
 
-def whole_course(policy: Policy, vehicle: Vehicle) -> Course:
+def whole_course(policy: Acting, vehicle: Vehicle) -> Course:
     """What a policy flies in a rehearsal."""
     kind = route_of(policy.contract)
     return course_for(policy.contract, vehicle, kind(**kind.whole))
@@ -75,7 +74,7 @@ def whole_course(policy: Policy, vehicle: Vehicle) -> Course:
 
 def rehearse(
     firmware: Firmware,
-    policy: Policy,
+    policy: Acting,
     vehicle: Vehicle,
     *,
     course: Course | None = None,
@@ -120,7 +119,7 @@ def _unhurt(flight: Rehearsal, scenery: Scenery, course: Course, radius: float) 
 
 
 def _fly(
-    rig: Rig, policy: Policy, course: Course, seed: int, log: Log | None, cameras: Sequence[ImageSource]
+    rig: Rig, policy: Acting, course: Course, seed: int, log: Log | None, cameras: Sequence[ImageSource]
 ) -> Rehearsal:
     random = np.random.default_rng(seed)
     first = course.origin.points(course.start)

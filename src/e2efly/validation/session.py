@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.deploy.betaflight.check import hover_schedule
 from e2efly.deploy.betaflight.client import SCHEDULE, Client
 from e2efly.deploy.betaflight.controller import identify
 from e2efly.deploy.betaflight.link import Link, open_link
@@ -16,6 +17,7 @@ from e2efly.deploy.commander.commander import Commander, CommandSource
 from e2efly.deploy.filter.filter import Filter
 from e2efly.deploy.log.record import Log
 from e2efly.deploy.pilot.flight_state import Mode
+from e2efly.deploy.pilot.hovering import HoverController
 from e2efly.deploy.policy.runtime import Acting, Envelope, Runtime
 from e2efly.deploy.policy.worker import PolicyWorker
 from e2efly.deploy.pose.source import PlantSource
@@ -84,10 +86,12 @@ class Session:
         commands: CommandSource | None = None,
         schedule: Mapping[int, float] = SCHEDULE,
         filtered: bool = False,
+        hover: HoverController | None = None,
     ) -> None:
         vehicle = rig.world.vehicle
         self.rig, self.settings = rig, settings
-        self.client = Client(link or open_link(rig.sitl.msp), dict(schedule))
+        asked = dict(schedule) | ({} if hover is None else hover_schedule(hover))
+        self.client = Client(link or open_link(rig.sitl.msp), asked)
         self.info = identify(self.client, 3.0, clock=rig)
         self.worker: PolicyWorker | None = None
         rate = CONTROL_HZ
@@ -103,7 +107,7 @@ class Session:
         self.bridge = Bridge(
             self.client, self.info, self.source, vehicle, settings,
             worker=self.commander or self.worker, log=log, latency=late, cameras=cameras,
-            filter=Filter.of(vehicle, settings.fence, late) if filtered else None,
+            filter=Filter.of(vehicle, settings.fence, late) if filtered else None, hover=hover,
         )  # fmt: skip
         self.flown = Flown()
         self.lateness = 0.0

@@ -39,6 +39,7 @@ def stress(
     controller: Controller = "policy",
     seed: int = SEED,
     progress: Callable[[str, int, int], None] = lambda criterion, done, total: None,
+    baseline: str | None = None,
 ) -> Report:
     """Fly a policy by the bridge's runtime on a plant, in every row that the plant can be given.
 
@@ -53,6 +54,7 @@ def stress(
         controller: the vehicle that the flight controller believes in, in every row: policy or plant.
         seed: of the starts and of the rows' draws.
         progress: (criterion, flights that are over, of how many).
+        baseline: the hover controller that flies in place of the policy; see `e2efly.evaluate`.
 
     Raises:
         ValueError: naming the option, its value and what is accepted; for a row that the plant cannot be given.
@@ -63,7 +65,7 @@ def stress(
     check_rows(rows)
     compute_at_once()
     prepare("cpu")  # the plants compute there, one vehicle at a time
-    found, kind, own = flyable(policy, plant, vehicle, controller)
+    found, kind, own = flyable(policy, plant, vehicle, controller, baseline=baseline)
     check_seen(rows, found.env.cameras)
     known = rows_for(found.env.cameras)
     left_out = {row: lack for row in known if (lack := lacking(kind, ROWS[row]))}
@@ -90,7 +92,10 @@ def stress(
             meets = realities(drawn, flown, seed, steps, env.control_period)
             seen = starts.sights(env, seed, drawn.camera)
             asked += [Flight(*begin, met, sees) for begin, met, sees in zip(begins, meets, seen, strict=True)]
-        mission, total = Mission(found.file, plant_name(plant), own, believed, float(suite.episode_s)), len(asked)
+        mission, total = (
+            Mission(found.file, plant_name(plant), own, believed, float(suite.episode_s), baseline=baseline),
+            len(asked),
+        )
         flights = fly_all(mission, asked, lambda done: progress(name, done, total))  # noqa: B023
         for i, row in enumerate(chosen):
             report[row][name] = judge(env, starts, flights[i * episodes : (i + 1) * episodes], settling(suite))

@@ -27,7 +27,7 @@ from e2efly.validation.plant import Plant
 from e2efly.validation.plants import PLANTS, find_plant
 from e2efly.validation.reality import Reality, check_realities
 from e2efly.validation.starts import Starts, draw_starts
-from e2efly.vehicles import Controller, Vehicle, load_vehicle
+from e2efly.vehicles import Controller, Vehicle
 
 KEPT = 136
 """Bytes of a control step of a flight on a plant, of which all are kept."""
@@ -120,6 +120,7 @@ class Validation:
         return {
             "policy": str(self.candidate.file),
             "task": contract.task,
+            "baseline": self.candidate.baseline,
             "vehicle": self.candidate.vehicle,
             "controller": self.candidate.controller,
             "changed": {name: value for name, (_, value) in self.candidate.changes.items()},
@@ -146,6 +147,7 @@ def validate(
     log: str | os.PathLike[str] | None = None,
     image: Sequence[str] = (),
     progress: Callable[[str, int, int], None] = lambda criterion, done, total: None,
+    baseline: str | None = None,
 ) -> Validation:
     """Fly a policy by the bridge's runtime on another plant, from the starts of `evaluate`.
 
@@ -169,6 +171,7 @@ def validate(
             IMAGE=plant:CAMERA:RED,GREEN,BLUE, its colour in the plant's segmentation. The others are rendered of the
             task's world.
         progress: (criterion, flights that are over, of how many).
+        baseline: the hover controller that flies in place of the policy; see `e2efly.evaluate`.
 
     Raises:
         ValueError: naming the option or the field, what it is and what is accepted.
@@ -183,7 +186,7 @@ def validate(
         raise ValueError(f"--max-drop is {max_drop}; accepted: 0 or more points of success")
     compute_at_once()
     prepare("cpu")  # the plants compute there, one vehicle at a time
-    found, kind, own = flyable(policy, plant, vehicle, controller, task)
+    found, kind, own = flyable(policy, plant, vehicle, controller, task, baseline)
     cameras = plant_cameras(image, found.policy.contract)
     kind = kind.seeing(cameras) if cameras else kind
     reality = Reality(found.flown.body, found.latency)
@@ -199,7 +202,9 @@ def validate(
         env = found.environment(suite)
         starts = draw_starts(env, episodes, seed)
         sample = None if log is None else SAMPLE
-        mission = Mission(found.file, name, own, found.flown.believed, float(suite.episode_s), cameras, sample)
+        mission = Mission(
+            found.file, name, own, found.flown.believed, float(suite.episode_s), cameras, sample, baseline
+        )
         begins = zip(starts.states, starts.courses, starts.sights(env, seed), strict=True)
         asked = [Flight(start, course, reality, sight) for start, course, sight in begins]
         flights = fly_all(mission, asked, lambda done: progress(criterion, done, episodes))  # noqa: B023
@@ -245,6 +250,7 @@ def flyable(
     vehicle: str | None,
     controller: Controller,
     task: Mapping[str, Any] | None = None,
+    baseline: str | None = None,
 ) -> tuple[Candidate, type[Plant], Vehicle]:
     """A policy that the runtime can fly, the plant, and the vehicle that the policy was trained on; of a family's
     policy, the one that it flies.
@@ -252,14 +258,14 @@ def flyable(
     Raises:
         ValueError: naming what does not fit.
     """
-    kind, found = find_plant(plant_name(plant)), candidate(policy, vehicle, controller, task=task)
+    kind, found = find_plant(plant_name(plant)), candidate(policy, vehicle, controller, task=task, baseline=baseline)
     contract = found.policy.contract
     if found.draws:
         raise ValueError(
             f"--vehicle is {vehicle or 'left out'}; accepted: one vehicle within the ranges of {contract.vehicle!r}, "
             "as a plant has one flight controller"
         )
-    own = load_vehicle(found.env.vehicle) if contract.vehicle_ranges is None else found.flown.body
+    own = found.known
     if reasons := check(contract, own, fields_of(contract), imu=True, images=True):
         raise ValueError("\n".join(reasons))
     return found, kind, own

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
 from e2efly.control import COMMAND_MODES
-from e2efly.deploy.policy.loader import Policy
+from e2efly.deploy.policy.runtime import Acting
 from e2efly.drawing import INK, Face, Line, Thing
 from e2efly.validation.fleet import Flight, Mission, fly_all
 from e2efly.validation.judge import judge
@@ -117,7 +117,7 @@ def flown_again(found: Validation) -> dict[str, Pair]:
         env = flew.at_home.environment(suite)
         sights = v.starts.sights(env, found.seed)
         asked = [Flight(v.starts.states[i], v.starts.courses[i], home, sights[i]) for i in shown]
-        mission = Mission(flew.file, "simulator", nominal, nominal, float(suite.episode_s))
+        mission = Mission(flew.file, "simulator", nominal, nominal, float(suite.episode_s), baseline=flew.baseline)
         again = fly_all(mission, asked, processes=1)
         verdicts = judge(env, v.starts.of(shown), again)
         there = [v.flights[i] for i in shown]
@@ -150,7 +150,7 @@ def plot_validation(found: Validation, pairs: Mapping[str, Pair], folder: Path) 
         plot_overlay(suite, flown, folder / f"{plant}_{name}.png", f"{name} on {vehicle}: {plant}")
 
 
-def _flights(policy: Policy, flights: list[Any], duration: np.ndarray, success: np.ndarray) -> Any:
+def _flights(policy: Acting, flights: list[Any], duration: np.ndarray, success: np.ndarray) -> Any:
     """What the plots draw, until the episodes ended."""
     period = 1 / policy.contract.control_rate_hz
     length = np.rint(duration / period).astype(int)

@@ -4,10 +4,12 @@ from dataclasses import dataclass
 from math import degrees
 
 from e2efly.deploy.betaflight.controller import ControllerInfo
+from e2efly.deploy.betaflight.messages import MotorTelemetry
 from e2efly.deploy.betaflight.names import BOXES
 from e2efly.deploy.betaflight.settings import ModeRange
 from e2efly.deploy.betaflight.sticks import RATES_PULSE, angle_range
 from e2efly.deploy.betaflight.versions import RELEASES
+from e2efly.deploy.pilot.hovering import HOVERS, ROTOR_SPEED, HoverController
 from e2efly.deploy.pilot.throttle_map import ThrottleMap
 from e2efly.deploy.policy.contract import Contract
 from e2efly.deploy.settings import FlightSettings
@@ -23,6 +25,8 @@ LARGEST_BOOST = 5
 """Throttle boost that was flown in rehearsals through the firmware: its default."""
 ATTITUDE_FIRST = ("LEGACY", "LINEAR", "DYNAMIC")
 """Mixer types that give up collective thrust before torque. EZLANDING gives up torque while the throttle is low."""
+SPEED_HZ = 50.0
+"""How often the speeds of the rotors are asked for, Hz."""
 ALWAYS = (1000, 2000)
 """A mode whose range holds all pulses between these is on wherever its switch is, us."""
 NOT_TOLD = "not told by this firmware"
@@ -99,6 +103,30 @@ def examine(
     turned = [round(degrees(angle)) for angle in info.alignment.angles]
     rows.append(Row("align_board", f"{turned} deg", "any: attitudes are compared before take-off", True))
     return tuple(rows)
+
+
+def hover_schedule(hover: HoverController) -> dict[int, float]:
+    """How often each message is asked for that a hover controller needs besides, Hz."""
+    return {MotorTelemetry.CODE: SPEED_HZ} if ROTOR_SPEED in hover.needs else {}
+
+
+def check_hover(name: str, hover: HoverController, info: ControllerInfo) -> None:
+    """Refuse a hover controller that needs what the flight controller does not tell.
+
+    Args:
+        name: of the hover controller.
+        hover: that is to fly.
+        info: of the flight controller.
+
+    Raises:
+        ValueError: naming what is missing, and what is accepted.
+    """
+    if ROTOR_SPEED in hover.needs and not info.motor.tells_speed:
+        able = ", ".join(known for known, kind in HOVERS.items() if ROTOR_SPEED not in kind.needs)
+        raise ValueError(
+            f"--hover is {name!r}, which needs the speeds of the rotors, and this flight controller measures none; "
+            f"accepted: `set dshot_bidir = ON` where its ESCs can, or {able}"
+        )
 
 
 def problems(rows: tuple[Row, ...]) -> tuple[str, ...]:

@@ -190,6 +190,22 @@ class Motor:
 
 
 @dataclass(frozen=True)
+class MotorTelemetry:
+    """How fast the motors turn."""
+
+    CODE: ClassVar[int] = 139
+    speed: tuple[float, ...]
+    """Of each motor, in the controller's order, rad/s; 0 also of one that is not measured."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "MotorTelemetry":
+        """Read a reply."""
+        (count,) = unpack("MOTOR_TELEMETRY", "B", payload)
+        each = unpack("MOTOR_TELEMETRY", "B" + "I9x" * count, payload)[1:]  # behind the speed: errors, heat, current
+        return MotorTelemetry(tuple(turns * 2 * pi / 60 for turns in each))
+
+
+@dataclass(frozen=True)
 class Rc:
     """The channels as the controller takes them."""
 

@@ -298,9 +298,12 @@ class MotorConfig:
     """Output of a stopped motor, µs."""
     count: int
     """Motors."""
+    tells_speed: bool = False
+    """Whether their speeds are measured, by bidirectional DShot or an ESC sensor: then `MotorTelemetry` tells them."""
 
     @staticmethod
     def parse(payload: bytes) -> "MotorConfig":
         """Read a reply."""
         least, most, stopped, count = unpack("MOTOR_CONFIG", "HHHB", payload)
-        return MotorConfig(least or None, most, stopped, count)
+        _, dshot, sensor = (*payload[7:10], 0, 0, 0)[:3]  # the poles, and what there is since MSP 1.42
+        return MotorConfig(least or None, most, stopped, count, bool(dshot or sensor))

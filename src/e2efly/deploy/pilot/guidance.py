@@ -4,17 +4,17 @@ Each adds a trim to the thrust, which makes up for an error of the throttle map.
 """
 
 import math
-
-import numpy as np
+from typing import Any
 
 from e2efly.control import Ctbr, Vec3
+from e2efly.control.place import Place
 from e2efly.deploy.attitude import Attitude
-from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.pilot import inertial, reckoning
 from e2efly.deploy.pilot.flight_state import Flight, Mode, Target
-from e2efly.deploy.pilot.hover import LIFTED, blind, controlled, rates_of
+from e2efly.deploy.pilot.hover import LIFTED, blind, rates_of
+from e2efly.deploy.pilot.hovering import HoverController, Seen, UnderWay
 from e2efly.deploy.pilot.inertial import Inertial
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.vehicle import GRAVITY
 
 TRIM = (-3.0, 5.0)
 """Bounds of the thrust that a take-off adds while the throttle map is still wrong, m/s^2."""
@@ -31,43 +31,48 @@ WEIGHT, LIGHTER, LIGHTEST = 0.97, 0.04, 0.6
 
 
 def hover(
-    gentle: Vehicle, flight: Flight, target: Target, odometry: Odometry, trim: float, dt: float
-) -> tuple[Ctbr, float]:
+    controller: HoverController,
+    memory: Any,
+    flight: Flight,
+    target: Target,
+    seen: Seen,
+    under_way: UnderWay,
+    trim: float,
+    dt: float,
+    *,
+    silent: bool = False,
+) -> tuple[Ctbr, Any, float]:
     """Fly to a target by odometry.
 
     Args:
-        gentle: the vehicle with the gains of `flight_gains`.
+        controller: that flies.
+        memory: of the controller, from its `begin` or the last step.
         flight: its mode and its home count.
         target: where to be.
-        odometry: the motion now.
+        seen: the motion now.
+        under_way: what was sent and does not act yet.
         trim: so far, m/s^2.
         dt: since the last control step, s.
+        silent: the flight controller is not heard, and may not get what is sent.
 
     Returns:
-        The command, and the trim, m/s^2.
+        The command, what the controller is handed next, and the trim, m/s^2.
     """
     x, y, z = target.position
-    taking_off, lifted = flight.mode is Mode.TAKEOFF, float(odometry.position[2]) - flight.home >= LIFTED
+    height, climb = float(seen.position.z), float(seen.velocity.z)
+    taking_off, low = flight.mode is Mode.TAKEOFF, height - flight.home < LIFTED
     if taking_off:
-        behind = target.climb - float(odometry.velocity[2])
-        change = -trim * dt / TRIM_FADE if lifted else TRIM_GAIN * behind * dt
+        change = TRIM_GAIN * (target.climb - climb) * dt if low else -trim * dt / TRIM_FADE
         trim = min(max(trim + change, TRIM[0]), TRIM[1])
     else:
         trim *= math.exp(-dt / TRIM_FADE)
-    on_ground = taking_off and not lifted
+    on_ground = taking_off and low
     if on_ground:  # no tilt before the feet are free
-        x, y = float(odometry.position[0]), float(odometry.position[1])
-    wanted = controlled(gentle, "velocity", odometry, _approach(gentle, (x, y, z), target, odometry))
+        x, y = float(seen.position.x), float(seen.position.y)
+    place = Place(Vec3(x, y, z), Vec3(0.0, 0.0, target.climb), yaw=target.yaw)
+    memory, wanted = controller.step(memory, seen, under_way, place, dt, held=low or silent)
     rates = (0.0 if on_ground or abs(rate) < STEADY else rate for rate in rates_of(wanted))
-    return Ctbr(wanted.thrust + trim, Vec3(*rates)), trim
-
-
-def _approach(
-    gentle: Vehicle, point: tuple[float, float, float], target: Target, odometry: Odometry
-) -> tuple[float, ...]:
-    """The velocity towards a point, and with it where it moves, world, m/s; and the yaw, rad."""
-    wanted = gentle.position_gain * (np.array(point) - odometry.position) + np.array([0.0, 0.0, target.climb])
-    return (*np.clip(wanted, -gentle.speed_max, gentle.speed_max).tolist(), target.yaw)
+    return Ctbr(wanted.thrust + trim, Vec3(*rates)), memory, trim
 
 
 def descend(

@@ -10,6 +10,8 @@ from functools import cached_property
 from itertools import accumulate
 from typing import Any
 
+import numpy as np
+
 from e2efly.control import COMMAND_MODES
 from e2efly.control.modes import THRUST
 from e2efly.deploy.policy import contract_json as read
@@ -59,6 +61,11 @@ class Action:
         """Smallest and largest command, in `units`."""
         (a, b, c, d), (e, f, g, h) = self.low, self.high
         return (a, b, c, d), (e, f, g, h)
+
+    def asking(self, command: np.ndarray) -> np.ndarray:
+        """The action that asks for a command, (..., 4), float32: the inverse of `mapping`, clipped to `limits`."""
+        low, high = np.array(self.low), np.array(self.high)
+        return np.clip(2 * (command - low) / (high - low) - 1, *ACTION_LIMITS).astype(np.float32)
 
 
 @dataclass(frozen=True)

@@ -63,8 +63,8 @@ class Acting(Protocol):
         ...
 
     def act(
-        self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
+        self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: Any = None
+    ) -> tuple[np.ndarray, Any]:
         """The action of an observation, (4,) in [-1, 1], and the memory for the next call; None: there was none."""
         ...
 
@@ -133,8 +133,8 @@ class RuntimeState:
     """The motion that was last judged, in the task's world."""
     past_actions: np.ndarray
     """(k, 4) float32, the policy's last actions, newest first; of k as many as it sees."""
-    recurrent: np.ndarray | None
-    """(m,) float32, the policy's recurrent state; None: it was not yet asked."""
+    recurrent: Any
+    """Of a policy (m,) float32, its recurrent state; what another that acts remembers; None: it was not yet asked."""
     began: float
     """When the policy took over, s on the monotonic clock."""
     slots: int

@@ -2,12 +2,14 @@
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from e2efly.control.vectors import Array, namespace
+from e2efly.control.place import Place
+from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
 from e2efly.goal import Course, Goal, Outcome, Shape
 from e2efly.observation import Field
@@ -36,6 +38,11 @@ class HoverGoal(Goal):
     observation = (
         (Field("position_error", 3, "world", "m", 1.0, "target position minus vehicle position"), position_error),
     )
+
+    @classmethod
+    def aim(cls, shown: Mapping[str, Array]) -> Place:
+        """The target."""
+        return Place(Vec3.of(shown["position_error"]))
 
     def advance(self, memory: Array, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Array, Outcome]:
         """Success: within the radius for the last `hold_s` of the episode, never outside the fence or on the ground."""

@@ -2,13 +2,15 @@
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from e2efly.config import number
-from e2efly.control.vectors import Array, Quat, namespace
+from e2efly.control.place import Place
+from e2efly.control.vectors import Array, Quat, Vec3, namespace
 from e2efly.courses import defaults
 from e2efly.goal import Course, Goal, Outcome, Shape
 from e2efly.observation import Field
@@ -72,6 +74,13 @@ class HoverAwareGoal(Goal):
         (Field("position_error", 3, "world", "m", 1.0, "target position minus vehicle position"), position_error),
         (Field("look_at", 3, "world", "m", 4.0, "position of what to look at minus vehicle position"), look_at_offset),
     )
+
+    @classmethod
+    def aim(cls, shown: Mapping[str, Array]) -> Place:
+        """The target, in the heading of what to look at."""
+        there = shown["look_at"]
+        yaw = namespace(there).arctan2(there[..., 1], there[..., 0])
+        return Place(Vec3.of(shown["position_error"]), yaw=yaw)
 
     def pixel(self, position: Array, quaternion: Array, point: Array) -> Array:
         """(n, 2) where the camera of a vehicle sees a point: right and down from the middle, in halves of the image.

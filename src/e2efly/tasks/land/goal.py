@@ -1,19 +1,25 @@
 """Landing: the goal, and where it is flown. Imports no JAX."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from e2efly.control.vectors import Array, namespace
+from e2efly.control.place import Place
+from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses.origin import Origin
 from e2efly.goal import Course, Goal, Outcome, Shape
 from e2efly.observation import Field
 from e2efly.tasks.land import LandConfig
 from e2efly.tasks.route import Route, place
 from e2efly.tasks.verdicts import touches_ground, upright
+
+OVER = 0.3
+"""A controller that is no policy sinks from within this of the pad's centre, m ..."""
+SINK_RATE, SLOWEST, FASTEST = 0.7, 0.35, 1.2
+"""... at this speed over its height, 1/s, within these bounds, m/s."""
 
 
 class Landing(Goal):
@@ -56,6 +62,14 @@ class LandGoal(Landing):
             position_error,
         ),
     )
+
+    @classmethod
+    def aim(cls, shown: Mapping[str, Array]) -> Place:
+        """Over the pad, and down once it is there, slower near the ground."""
+        x, y, z = (shown["position_error"][..., axis] for axis in range(3))
+        xp = namespace(z)
+        down = xp.where(x**2 + y**2 < OVER**2, xp.clip(SINK_RATE * z, -FASTEST, -SLOWEST), 0.0)
+        return Place(Vec3(x, y, 0.0 * z), Vec3(0.0 * z, 0.0 * z, down))
 
     def advance(self, memory: Array, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Array, Outcome]:
         """The episode ends at the first touch; success: near the centre, slow, upright. Judged at the step's end."""

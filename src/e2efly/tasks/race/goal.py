@@ -1,14 +1,15 @@
 """Racing: the goal, and where it is flown. What passing a gate is: `courses/gates.py`. Imports no JAX."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from e2efly.config import number
-from e2efly.control.vectors import Array, namespace
+from e2efly.control.place import Place
+from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
 from e2efly.courses.gates import Gates, Tracks
 from e2efly.courses.tracks import RaceTrack, load_track
@@ -19,6 +20,9 @@ from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.route import Route
 from e2efly.tasks.verdicts import distance, offsets, touches_ground
 from e2efly.vehicles.tables import LARGEST
+
+CRUISE = 3.0
+"""Speed of a controller that is no policy, m/s."""
 
 
 class Racing(Goal):
@@ -107,6 +111,13 @@ class RaceGoal(Racing):
     def target_offsets(self, memory: Array, time: Array, body: Any) -> Array:
         """The same, minus position."""
         return offsets(self.targets(memory, time), body)
+
+    @classmethod
+    def aim(cls, shown: Mapping[str, Array]) -> Place:
+        """Straight on to the next gate's centre at `CRUISE`: wherever it is, it moves there."""
+        way = shown["gates"][..., :3]
+        far = namespace(way).linalg.norm(way, axis=-1, keepdims=True)
+        return Place(Vec3.of(0.0 * way), Vec3.of(way / (far + 1e-6)) * CRUISE)
 
     observation = (
         (Field("gates", 6, "world", "m", 4.0, "centres of the next two gates minus vehicle position"), target_offsets),

@@ -2,13 +2,15 @@
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from e2efly.config import number
-from e2efly.control.vectors import Array
+from e2efly.control.place import Place
+from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
 from e2efly.courses.references import (
     LONGEST,
@@ -29,6 +31,12 @@ from e2efly.vehicles.names import unknown
 
 SMALLEST = 1e-3
 """Smallest radius, speed and duration of circle and lemniscate, in their units."""
+
+_MOTION = [
+    np.linalg.inv(np.vander(SPACING * np.arange(5), increasing=True))[order] * math.factorial(order)
+    for order in range(4)
+]
+"""What five points are multiplied by to give position, velocity, acceleration and jerk at the first of them."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +78,15 @@ class TrackGoal(Goal):
             target_offsets,
         ),
     )  # fmt: skip
+
+    @classmethod
+    def aim(cls, shown: Mapping[str, Array]) -> Place:
+        """The reference, its motion by the polynomial through its next five points."""
+        points = shown["reference"]
+        near = namespace(points).reshape(points, (*points.shape[:-1], POINTS, 3))[..., :5, :]
+        moves = (namespace(points).tensordot(_MOTION[order], near, axes=([0], [-2])) for order in range(4))
+        position, velocity, acceleration, jerk = map(Vec3.of, moves)
+        return Place(position, velocity, acceleration, jerk)
 
     def advance(self, memory: Memory, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Memory, Outcome]:
         """Success: at the end of the episode the mean error since `settle_s` is small; never outside the fence."""

@@ -1,0 +1,77 @@
+"""`geometric`: tracking control on the rotations themselves, about the motion that the latency leads to.
+
+Lee, Leok and McClamroch, Geometric tracking control of a quadrotor UAV on SE(3), 2010, with the integral of Goodarzi,
+Lee and Leok, Geometric nonlinear PID control of a quadrotor UAV on SE(3), 2013. Their moment is here a body rate, which
+the flight controller's own loop follows. The error of the attitude is the sine of its angle, and vanishes upside down.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from e2efly.control import Ctbr, Quat, Vec3
+from e2efly.control.cascade import attitude_along, limited, pull
+from e2efly.control.place import ZERO, Place
+from e2efly.control.vectors import Array, namespace
+from e2efly.deploy.pilot.hover import flight_gains
+from e2efly.deploy.pilot.hovering.loops import approach, attainable, grown, lead
+from e2efly.deploy.pilot.hovering.registry import register
+from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue
+from e2efly.vehicles.vehicle import Vehicle
+
+
+@register("geometric")
+@dataclass(frozen=True)
+class Geometric:
+    """Its memory is the integral, world, m/s^2."""
+
+    needs: ClassVar[tuple[str, ...]] = ()
+
+    vehicle: Vehicle
+    """With gains for what the prediction leaves of the latency."""
+    latency: float
+    """From the vehicle's motion to its rate loop, s."""
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, latency: float, hold: float = 0.0) -> "Geometric":
+        """See `HoverController.of`."""
+        return cls(flight_gains(vehicle, residue(latency) + hold / 2), latency)
+
+    def begin(self) -> Vec3:
+        """No integral."""
+        return ZERO
+
+    def step(
+        self, memory: Vec3, seen: Seen, under_way: UnderWay, place: Place, dt: float, *, held: bool = False
+    ) -> tuple[Vec3, Ctbr]:
+        """See `HoverController.step`."""
+        vehicle, gains = self.vehicle, Vec3.of(self.vehicle.velocity_gain)
+        # the integral learns from what is seen: a prediction is off by what it makes up for
+        then = place.after(-seen.age)
+        error = approach(vehicle, seen, then) - seen.velocity
+        motion, goal = seen, then
+        if not held:
+            motion, _ = ahead(vehicle, seen, under_way, memory * -1.0)
+            goal = place.after(self.latency - seen.age)
+        behind = approach(vehicle, motion, goal) - motion.velocity
+        wanted = behind.times(gains) + goal.acceleration + memory
+        if not held:
+            memory = grown(memory, vehicle, error, wanted, attainable(vehicle, wanted), dt)
+        yaw = motion.attitude.yaw() if goal.yaw is None else goal.yaw
+        force = pull(vehicle, wanted)
+        along = motion.attitude.z_axis().dot(force)
+        rate = turning(vehicle, motion.attitude, force, yaw) + lead(motion.attitude, force, goal.jerk)
+        return memory, limited(vehicle, namespace(along).maximum(along, 0.0), rate)
+
+
+def turning(vehicle: Vehicle, attitude: Quat, force: Vec3, yaw: Array) -> Vec3:
+    """The body rates that turn the thrust along a force, rad/s.
+
+    Args:
+        vehicle: with the gains.
+        attitude: body to world.
+        force: that the rotors are to give, over mass, world, m/s^2.
+        yaw: rad.
+    """
+    error = attitude_along(force * (1 / force.norm()), yaw).conjugate().compose(attitude)
+    tilt, turn = -2 * vehicle.attitude_gain[..., 0] * error.w, -2 * vehicle.attitude_gain[..., 1] * error.w
+    return Vec3(tilt * error.x, tilt * error.y, turn * error.z)

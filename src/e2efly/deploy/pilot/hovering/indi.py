@@ -1,0 +1,88 @@
+"""`indi`: incremental nonlinear dynamic inversion of the specific force.
+
+Smeur, de Croon and Chu, Cascaded incremental nonlinear dynamic inversion for MAV disturbance rejection, 2018; Tal and
+Karaman, Accurate tracking of aggressive quadrotor trajectories using incremental nonlinear dynamic inversion and
+differential flatness, 2020. What the rotors are to give is what they gave, plus wanted minus felt acceleration, both
+through one filter. That is wanted acceleration less the filtered push of all but the rotors, and needs no mass, drag
+or integral. Their inner increment, of the moment, is left to the flight controller's rate loop.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from e2efly.control import Ctbr, Vec3
+from e2efly.control.place import ZERO, Place
+from e2efly.control.vectors import Array
+from e2efly.deploy.pilot.hover import flight_gains
+from e2efly.deploy.pilot.hovering.loops import LIMIT, approach, steer
+from e2efly.deploy.pilot.hovering.registry import ROTOR_SPEED, register
+from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue
+from e2efly.vehicles.vehicle import Vehicle
+
+FILTER_S = 0.2
+"""Time constant of the filter of both, s."""
+UNITS_S = 0.5
+"""Time constant with which thrust by the rotors' speeds is brought to that of the commands, s: whoever turns commands
+into throttle may have learned mass and battery already, and the increments must not make up for them once more."""
+
+
+@dataclass(frozen=True)
+class Felt:
+    """What is known in one flight."""
+
+    pushed: Vec3 = ZERO
+    """Of all but the rotors and gravity, world, m/s^2."""
+    share: Array | None = None
+    """Commanded thrust over that by the rotors' speeds; None: not known yet."""
+
+
+@register("indi")
+@dataclass(frozen=True)
+class Indi:
+    """Its memory is `Felt`.
+
+    Where the rotors' speeds are not known, the thrust is that of the commands through the motors' lag.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = (ROTOR_SPEED,)
+
+    vehicle: Vehicle
+    """With gains for what the prediction leaves of the latency."""
+    latency: float
+    """From the vehicle's motion to its rate loop, s."""
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, latency: float, hold: float = 0.0) -> "Indi":
+        """See `HoverController.of`."""
+        return cls(flight_gains(vehicle, residue(latency) + hold / 2), latency)
+
+    def begin(self) -> Felt:
+        """Nothing pushes."""
+        return Felt()
+
+    def step(
+        self, memory: Felt, seen: Seen, under_way: UnderWay, place: Place, dt: float, *, held: bool = False
+    ) -> tuple[Felt, Ctbr]:
+        """See `HoverController.step`."""
+        vehicle, motion, goal = self.vehicle, seen, place.after(-seen.age)
+        if not held:
+            memory = felt(memory, seen, under_way, dt)
+            motion, _ = ahead(vehicle, seen, under_way, memory.pushed)
+            goal = place.after(self.latency - seen.age)
+        behind = approach(vehicle, motion, goal) - motion.velocity
+        wanted = behind.times(Vec3.of(vehicle.velocity_gain)) + goal.acceleration - memory.pushed
+        return memory, steer(vehicle, motion, wanted, goal)
+
+
+def felt(before: Felt, seen: Seen, under_way: UnderWay, dt: float) -> Felt:
+    """What is known after a step of dt s."""
+    if seen.force is None:
+        return before
+    gave, share = under_way.thrust, before.share
+    if seen.thrust is not None:
+        now = under_way.thrust / seen.thrust
+        share = now if share is None else share + (now - share) * (1 - math.exp(-dt / UNITS_S))
+        gave = share * seen.thrust
+    push = seen.attitude.rotate(seen.force - Vec3(0.0, 0.0, gave))
+    return Felt((before.pushed + (push - before.pushed) * (1 - math.exp(-dt / FILTER_S))).clip(LIMIT), share)

@@ -1,0 +1,74 @@
+"""What the hover controllers share: the way to a place, the vehicle's limits, and the integral. Pure."""
+
+from e2efly.control import Ctbr, Motion, Quat, Vec3
+from e2efly.control.cascade import accelerate, limited, pull
+from e2efly.control.place import Place
+from e2efly.control.vectors import Array, namespace
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+SHARE = 0.2
+"""Growth of the integral over the error of the velocity, in squares of the velocity gain: a fifth, so that it follows
+the loops that act at once at a distance."""
+FASTEST = 0.3
+"""Of a larger error of the velocity the integral learns no more than of this, m/s: it is for what lasts, and a step or a
+stop is over soon."""
+LIMIT = Vec3(0.3 * GRAVITY, 0.3 * GRAVITY, 0.6 * GRAVITY)
+"""Largest acceleration that the integral asks for, m/s^2: up for a quadrotor of 2.5 times its mass."""
+
+
+def approach(vehicle: Vehicle, motion: Motion, place: Place) -> Vec3:
+    """The velocity to a place, and with it where it moves, world, m/s, within the vehicle's `speed_max`."""
+    off = (place.position - motion.position).times(Vec3.of(vehicle.position_gain))
+    return (off + place.velocity).clip(Vec3.of(vehicle.speed_max))
+
+
+def attainable(vehicle: Vehicle, wanted: Vec3) -> Vec3:
+    """What the limits of the vehicle leave of an acceleration, world, m/s^2."""
+    force, most = pull(vehicle, wanted), 4 * vehicle.thrust_range[1] / vehicle.mass
+    return Vec3(force.x, force.y, namespace(force.z).minimum(force.z, most) - GRAVITY)
+
+
+def lead(attitude: Quat, force: Vec3, jerk: Vec3) -> Vec3:
+    """The body rates of a thrust that goes with a jerk, rad/s.
+
+    Args:
+        attitude: body to world.
+        force: that the rotors are to give, over mass, world, m/s^2.
+        jerk: at which it changes, world, m/s^3.
+    """
+    scale = 1 / force.norm()
+    return attitude.unrotate((force * scale).cross(jerk * scale))
+
+
+def steer(vehicle: Vehicle, motion: Motion, wanted: Vec3, goal: Place) -> Ctbr:
+    """Towards an acceleration, world, m/s^2, in the heading of a place and with its jerk."""
+    yaw = motion.attitude.yaw() if goal.yaw is None else goal.yaw
+    command = accelerate(vehicle, motion, wanted, yaw)
+    return limited(vehicle, command.thrust, command.rate + lead(motion.attitude, pull(vehicle, wanted), goal.jerk))
+
+
+def grown(before: Vec3, vehicle: Vehicle, error: Vec3, wanted: Vec3, flown: Vec3, dt: float) -> Vec3:
+    """The integral after some time, m/s^2.
+
+    It stands still along each axis on which less is flown than is wanted, unless the error leads back (anti-windup).
+
+    Args:
+        before: so far.
+        vehicle: with the gains of the flight.
+        error: wanted velocity minus velocity, world, m/s.
+        wanted: acceleration, world, m/s^2.
+        flown: what the limits of the vehicle leave of it, world, m/s^2.
+        dt: s.
+    """
+    gains = Vec3.of(vehicle.velocity_gain)
+
+    def axis(i: Array, gain: Array, e: Array, asked: Array, given: Array, limit: float) -> Array:
+        xp = namespace(i, e, asked)
+        winds, e = (abs(asked - given) > 1e-3) & ((asked - given) * e > 0), xp.clip(e, -FASTEST, FASTEST)
+        return xp.clip(i + xp.where(winds, 0.0, SHARE * gain**2 * e * dt), -limit, limit)
+
+    return Vec3(
+        axis(before.x, gains.x, error.x, wanted.x, flown.x, LIMIT.x),
+        axis(before.y, gains.y, error.y, wanted.y, flown.y, LIMIT.y),
+        axis(before.z, gains.z, error.z, wanted.z, flown.z, LIMIT.z),
+    )

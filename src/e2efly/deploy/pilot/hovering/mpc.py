@@ -1,0 +1,140 @@
+"""`mpc`: linear model predictive control about hover, free of offset by an observer of what else pushes.
+
+Each axis of the world is a mass whose acceleration follows as a lag, and the latency is part of the model: a plan
+begins with the motion in which its first command will find the vehicle. DAQP solves the programs (Arnström, Bemporad
+and Axehill, A dual active-set solver for embedded quadratic programming using recursive LDL' updates, 2022).
+"""
+
+import importlib
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from e2efly.control import Ctbr, Vec3
+from e2efly.control.place import ZERO, Place
+from e2efly.control.vectors import Array
+from e2efly.deploy.pilot.hover import flight_gains
+from e2efly.deploy.pilot.hovering.loops import LIMIT, steer
+from e2efly.deploy.pilot.hovering.plan import Plan, Solve, planned
+from e2efly.deploy.pilot.hovering.registry import register
+from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+OBSERVER = 2.0
+"""Both poles of the observer, 1/s."""
+QUICKER = 1.25
+"""Frequency of the plan over that of the loops of position and velocity, whose model knows no lag."""
+
+
+@dataclass(frozen=True)
+class Observed:
+    """The observer of one flight."""
+
+    velocity: Vec3 | None = None
+    """By the model, world, m/s; None: at the first step."""
+    pushed: Vec3 = ZERO
+    """What else than rotors and gravity accelerates the vehicle, world, m/s^2."""
+
+
+@register("mpc")
+@dataclass(frozen=True)
+class Mpc:
+    """Its memory is `Observed`."""
+
+    needs: ClassVar[tuple[str, ...]] = ()
+
+    vehicle: Vehicle
+    """With gains for what the prediction leaves of the latency: the attitude is turned by them."""
+    latency: float
+    """From the vehicle's motion to its rate loop, s."""
+    level: Plan
+    """Of x and of y."""
+    up: Plan
+    """Of z."""
+    solve: Solve
+    """The solver."""
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, latency: float, hold: float = 0.0) -> "Mpc":
+        """See `HoverController.of`."""
+        try:
+            solver: Any = importlib.import_module("daqp")
+        except ImportError as error:
+            missing = f"hover controller 'mpc': the package daqp is missing ({error})"
+            raise ValueError(f"{missing}; accepted: pip install 'e2efly[mpc]', or another hover controller") from None
+        gentle = flight_gains(vehicle, residue(latency) + hold / 2)
+        loops = QUICKER * np.sqrt(gentle.position_gain * gentle.velocity_gain)
+        tilts = 1 / float(gentle.attitude_gain[0]) + 1 / float(np.min(vehicle.rate_gain[:2]))
+        return cls(
+            gentle, latency, planned(float(loops[0]), tilts),
+            planned(float(loops[2]), float(vehicle.motor_time_constant)), solver.solve,
+        )  # fmt: skip
+
+    def begin(self) -> Observed:
+        """Nothing pushes."""
+        return Observed()
+
+    def step(
+        self, memory: Observed, seen: Seen, under_way: UnderWay, place: Place, dt: float, *, held: bool = False
+    ) -> tuple[Observed, Ctbr]:
+        """See `HoverController.step`."""
+        vehicle, motion, thrust, goal = self.vehicle, seen, under_way.thrust, place.after(-seen.age)
+        if not held:
+            memory = observed(memory, seen, under_way, dt)
+            motion, thrust = ahead(vehicle, seen, under_way, memory.pushed)
+            goal = place.after(self.latency - seen.age)
+        else:
+            memory = Observed(pushed=memory.pushed)
+        pushed = memory.pushed
+        feed = goal.acceleration - pushed
+        gives = motion.attitude.z_axis() * thrust - Vec3(0.0, 0.0, GRAVITY)
+        off, behind, over = motion.position - goal.position, motion.velocity - goal.velocity, gives - feed
+        x, y, z = zip(*map(_parts, (off, behind, over, feed, goal.velocity)), strict=True)
+        limits = list(zip(_most(vehicle), vehicle.speed_max.tolist(), strict=True))
+        wanted = Vec3(
+            self._axis(self.level, x, limits[0]),
+            self._axis(self.level, y, limits[1]),
+            self._axis(self.up, z, limits[2]),
+        )
+        return memory, steer(vehicle, motion, wanted + feed, goal)
+
+    def _axis(self, plan: Plan, parts: tuple[Array, ...], limits: tuple[float, float]) -> Array:
+        """What to ask for along an axis, over the acceleration of where to be, m/s^2.
+
+        Args:
+            plan: of the axis.
+            parts: off where to be, m; its change, m/s; the acceleration over that of where to be, and that, m/s^2; the
+                velocity of where to be, m/s.
+            limits: largest acceleration, m/s^2, and speed, m/s.
+        """
+        rows = np.stack(np.broadcast_arrays(*map(np.atleast_1d, parts)), axis=-1)
+        (most, fast), feed, moves = limits, rows[:, 3], rows[:, 4]
+        speed = np.stack([-fast - moves, fast - moves], axis=-1)
+        first = plan.best(self.solve, rows[:, :3], (-most - feed, most - feed), speed)
+        return first if np.ndim(parts[0]) else first[0]
+
+
+def observed(before: Observed, seen: Seen, under_way: UnderWay, dt: float) -> Observed:
+    """The observer after a step of dt s: a model of the velocity, drawn to the one that is seen."""
+    if before.velocity is None:
+        return Observed(seen.velocity, before.pushed)
+    gives = seen.attitude.z_axis() * under_way.thrust - Vec3(0.0, 0.0, GRAVITY)
+    expected = before.velocity + (gives + before.pushed) * dt
+    off = seen.velocity - expected
+    kept = math.exp(-OBSERVER * dt)  # of the discrete observer with both poles there
+    pushed = (before.pushed + off * ((1 - kept) ** 2 / max(dt, 1e-3))).clip(LIMIT)
+    return Observed(expected + off * (1 - kept**2), pushed)
+
+
+def _parts(v: Vec3) -> tuple[Array, Array, Array]:
+    return v.x, v.y, v.z
+
+
+def _most(vehicle: Vehicle) -> tuple[float, float, float]:
+    """The largest acceleration along each axis, within tilt and thrust, m/s^2."""
+    level = GRAVITY * math.tan(float(vehicle.tilt_max)) / math.sqrt(2)
+    up = 4 * float(vehicle.thrust_range[1]) / float(vehicle.mass) - GRAVITY
+    x, y, z = (float(limit) for limit in vehicle.acceleration_max)
+    return min(x, level), min(y, level), min(z, max(up, 0.1 * GRAVITY))

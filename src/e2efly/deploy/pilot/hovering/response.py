@@ -1,0 +1,120 @@
+"""What is under way to the vehicle, and the motion in which the next command finds it. Pure; for one or many."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from e2efly.control import Ctbr, Quat, Vec3
+from e2efly.control.place import ZERO
+from e2efly.control.vectors import Array, namespace
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+LONGEST_STEP = 0.02
+"""Of the prediction, s."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a hover controller is told of the vehicle. Components are numbers, or arrays of the batch's shape."""
+
+    position: Vec3
+    """World, m."""
+    velocity: Vec3
+    """World, m/s."""
+    attitude: Quat
+    """Body to world."""
+    body_rate: Vec3
+    """Body, rad/s."""
+    force: Vec3 | None = None
+    """Specific force by the accelerometer, body, m/s^2; None: not known."""
+    age: float = 0.0
+    """How long ago that motion was, s."""
+    thrust: Array | None = None
+    """Collective thrust over mass by the measured speeds of the rotors, m/s^2; None: they are not measured."""
+
+
+@dataclass(frozen=True)
+class UnderWay:
+    """The commands that have been sent and do not act yet."""
+
+    thrust: Array = GRAVITY
+    """Collective thrust over mass that the rotors give, by the motors' lag, as the oldest of them begins to act, m/s^2;
+    at first that of hovering."""
+    commands: tuple[tuple[float, Ctbr], ...] = ()
+    """For how long each is held, s, and the command; oldest first. Together no longer than the latency."""
+
+
+def thrust_of(vehicle: Vehicle, speeds: Sequence[float]) -> float | None:
+    """The collective thrust over mass of rotors that turn so fast, rad/s, m/s^2; None: not all of them are measured."""
+    if len(speeds) != 4 or min(speeds) <= 0:
+        return None
+    k2, k1, k0 = (float(k) for k in vehicle.thrust_map)
+    return sum(max((k2 * w + k1) * w + k0, 0.0) for w in speeds) / float(vehicle.mass)
+
+
+def residue(latency: float) -> float:
+    """The latency that gains must allow for where the motion is predicted, s: a third, as a prediction errs."""
+    return latency / 3
+
+
+def sent(before: UnderWay, command: Ctbr, seconds: float, vehicle: Vehicle, latency: float) -> UnderWay:
+    """What is under way after a command was held for some seconds.
+
+    Args:
+        before: until then.
+        command: that was sent.
+        seconds: for how long it was the newest.
+        vehicle: with the motors' lag.
+        latency: from the vehicle's motion to its rate loop, s.
+    """
+    low, high = (4 * float(limit) / float(vehicle.mass) for limit in vehicle.thrust_range)
+    given = namespace(command.thrust).clip(command.thrust, low, high)
+    commands, thrust = [*before.commands, (seconds, Ctbr(given, command.rate))], before.thrust
+    over = sum(held for held, _ in commands) - latency
+    while commands and over > 1e-9:
+        held, oldest = commands.pop(0)
+        part = min(held, over)
+        thrust = oldest.thrust + (thrust - oldest.thrust) * math.exp(-part / vehicle.motor_time_constant)
+        if held > part:
+            commands.insert(0, (held - part, oldest))
+        over -= part
+    return UnderWay(thrust, tuple(commands))
+
+
+def ahead(vehicle: Vehicle, seen: Seen, under_way: UnderWay, pushed: Vec3 = ZERO) -> tuple[Seen, Array]:
+    """The motion in which the next command will find the vehicle, when all that is under way has acted.
+
+    The rate loop follows its setpoint as a lag of its gain, the rotors theirs as a lag of the motors.
+
+    Args:
+        vehicle: as loaded.
+        seen: the motion that is known.
+        under_way: what was sent since.
+        pushed: what else accelerates it, world, m/s^2.
+
+    Returns:
+        That motion, and the collective thrust over mass then, m/s^2.
+    """
+    position, velocity, attitude, rate, thrust = (
+        seen.position, seen.velocity, seen.attitude, seen.body_rate, under_way.thrust,
+    )  # fmt: skip
+    push, gains = pushed - Vec3(0.0, 0.0, GRAVITY), Vec3.of(vehicle.rate_gain)
+    for seconds, command in under_way.commands:
+        count = max(math.ceil(seconds / LONGEST_STEP - 1e-9), 1)
+        h = seconds / count
+        left = Vec3(*(math.exp(-float(gain) * h) for gain in (gains.x, gains.y, gains.z)))
+        kept = math.exp(-h / vehicle.motor_time_constant)
+        for _ in range(count):
+            turned = command.rate + (rate - command.rate).times(left)
+            gives = command.thrust + (thrust - command.thrust) * kept
+            after = _turned(attitude, (rate + turned) * (h / 2))
+            pull = (attitude.z_axis() * thrust + after.z_axis() * gives) * 0.5 + push
+            position = position + velocity * h + pull * (h * h / 2)
+            velocity, attitude, rate, thrust = velocity + pull * h, after, turned, gives
+    return replace(seen, position=position, velocity=velocity, attitude=attitude, body_rate=rate), thrust
+
+
+def _turned(attitude: Quat, angle: Vec3) -> Quat:
+    """An attitude after a small turn about the body's axes, rad."""
+    one = namespace(attitude.w).ones_like(attitude.w)
+    return attitude.compose(Quat(one, angle.x / 2, angle.y / 2, angle.z / 2)).normalized()

@@ -1,0 +1,65 @@
+"""The hover controllers fly the real firmware: take-off, hover in wind, landing, by the bridge."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from e2efly.deploy.betaflight.check import check_hover
+from e2efly.deploy.betaflight.client import SCHEDULE, Client
+from e2efly.deploy.betaflight.controller import identify
+from e2efly.deploy.betaflight.link import open_link
+from e2efly.deploy.betaflight.messages import MotorTelemetry
+from e2efly.deploy.pilot.flight_state import Mode
+from e2efly.deploy.pilot.hovering import hover_controller
+from e2efly.validation import firmware
+from e2efly.validation.rig import Rig
+from e2efly.validation.session import Session, rehearsal_settings
+from e2efly.validation.speeds import SpeedLink
+from e2efly.vehicles import load_vehicle
+
+VEHICLE, LATENCY = load_vehicle("vis_r"), 0.03
+WIND = np.array([3.0, 0.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    with Rig(firmware.chosen(), tmp_path_factory.mktemp("hovering"), VEHICLE, latency=LATENCY, seed=4) as rig:
+        rig.sleep(0.5)
+        yield rig
+
+
+@pytest.mark.parametrize("name", ["pid", "geometric", "indi", "mpc"])
+def test_it_takes_off_holds_its_place_in_wind_and_lands(rig: Rig, name: str) -> None:
+    rig.state, rig.wind = rig.world.at_rest(), np.zeros(3)
+    link = open_link(rig.sitl.msp)
+    session = Session(
+        rig, rehearsal_settings(1.5), hover=hover_controller(name, VEHICLE, LATENCY + 0.01),
+        link=SpeedLink(link, rig) if name == "indi" else link,
+    )  # fmt: skip
+    try:
+        assert session.take_off(3.0), session.bridge.flight.reasons
+        assert session.flown.errors(Mode.HOVER, last=1.0).mean() < 0.06
+        rig.wind = WIND
+        session.fly(8.0)
+        assert session.bridge.flight.mode is Mode.HOVER, session.bridge.flight.reasons
+        assert session.flown.errors(Mode.HOVER, last=2.0).mean() < 0.05
+        assert session.bridge._hovering != session.bridge.hover.begin()
+        if name == "indi":
+            told = session.client.message(MotorTelemetry.CODE, rig.now(), 0.1)
+            assert told.speed == pytest.approx(np.asarray(rig.state.rotor_speed), rel=0.1)
+        rig.wind = np.zeros(3)
+        assert session.land(), session.bridge.flight.reasons
+        assert session.bridge._hovering == session.bridge.hover.begin()  # of an earlier mode nothing is left
+    finally:
+        session.close()
+
+
+def test_firmware_that_measures_no_speeds_is_refused_by_name(rig: Rig) -> None:
+    client = Client(open_link(rig.sitl.msp), dict(SCHEDULE))
+    try:
+        info = identify(client, 3.0, clock=rig)
+    finally:
+        client.link.close()
+    with pytest.raises(ValueError, match=r"--hover is 'indi', which needs the speeds of the rotors"):
+        check_hover("indi", hover_controller("indi", VEHICLE, LATENCY), info)
