@@ -10,8 +10,8 @@ SHARE = 0.2
 """Growth of the integral over the error of the velocity, in squares of the velocity gain: a fifth, so that it follows
 the loops that act at once at a distance."""
 FASTEST = 0.3
-"""Of a larger error of the velocity the integral learns no more than of this, m/s: it is for what lasts, and a step or a
-stop is over soon."""
+"""Of a larger error of the velocity the integral learns no more than of this, m/s: it is for what lasts, and a step or
+a stop is over soon."""
 LIMIT = Vec3(0.3 * GRAVITY, 0.3 * GRAVITY, 0.6 * GRAVITY)
 """Largest acceleration that the integral asks for, m/s^2: up for a quadrotor of 2.5 times its mass."""
 
