@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, HTTPServer
+from typing import Any
 
 LOOK_S = 0.2
 """Between two looks whether it is still to wait, s."""
@@ -25,9 +26,12 @@ class _Server(HTTPServer):
     timeout = LOOK_S
     asked = False
 
+    def finish_request(self, request: Any, client_address: Any) -> None:
+        super().finish_request(request, client_address)
+        self.asked = True
+
 
 class _Handler(BaseHTTPRequestHandler):
-    server: _Server
     timeout = 1.0
 
     def do_GET(self) -> None:
@@ -37,7 +41,6 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Connection", "close")
         self.end_headers()
         self.wfile.write(PAGE)
-        self.server.asked = True
 
     def log_message(self, format: str, *args: object) -> None:
         del format, args
