@@ -47,7 +47,7 @@ SAG = 0.15
 TASKS = ("hover", "land", "track", "race")
 ROWS = (
     "nominal", "mass x1.25", "thrust falls by 15 %", "motor lag x2", "delay +40 ms", "wind 3 m/s", "gusts 1.5 m/s",
-    "noise and drift of a VIO", "all at once",
+    "one rotor 10 % weaker", "centre of mass 5 mm off", "noise and drift of a VIO", "all at once",
 )  # fmt: skip
 """Of the stress: those that separate them."""
 

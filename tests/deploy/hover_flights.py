@@ -27,6 +27,8 @@ class Case:
     """Over the vehicle file's."""
     push: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Of the air, m/s^2."""
+    twist: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """By how much its rate loop turns it faster than it is told, rad/s: a weak rotor."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,7 @@ def fly(
     """
     n = len(cases)
     mass, yaw = np.array([c.mass for c in cases]), np.array([c.yaw for c in cases])
+    twist = Vec3.of(np.array([c.twist for c in cases]))
     air, to = np.array([c.push for c in cases]), Vec3.of(np.array([c.to for c in cases]))
     zero = np.zeros(n)
     position, velocity, rate = (Vec3(zero, zero, zero) for _ in range(3))
@@ -91,7 +94,7 @@ def fly(
         queue.append(last)
         now = queue.pop(0)
         thrust = thrust + (now.thrust - thrust) * (STEP / lag)
-        rate = rate + (now.rate - rate).times(gains) * STEP
+        rate = rate + (now.rate + twist - rate).times(gains) * STEP
         attitude = attitude.compose(Quat(1.0 + zero, *(x * STEP / 2 for x in (rate.x, rate.y, rate.z)))).normalized()
         force = attitude.z_axis() * (thrust / mass) + Vec3.of(air)
         velocity = velocity + (force + Vec3(0.0, 0.0, -GRAVITY)) * STEP

@@ -15,14 +15,24 @@ from e2efly.control.vectors import Array, namespace
 from e2efly.deploy.pilot.hover import flight_gains
 from e2efly.deploy.pilot.hovering.loops import approach, attainable, grown, lead
 from e2efly.deploy.pilot.hovering.registry import register
-from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue
+from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue, slipped
 from e2efly.vehicles.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What one flight has shown."""
+
+    integral: Vec3 = ZERO
+    """Of position and velocity, world, m/s^2."""
+    slip: Vec3 = ZERO
+    """By how much the body turns faster than it is told, rad/s: in place of the integral of the attitude."""
 
 
 @register("geometric")
 @dataclass(frozen=True)
 class Geometric:
-    """Its memory is the integral, world, m/s^2."""
+    """Its memory is `Learned`."""
 
     needs: ClassVar[tuple[str, ...]] = ()
 
@@ -36,13 +46,13 @@ class Geometric:
         """See `HoverController.of`."""
         return cls(flight_gains(vehicle, residue(latency) + hold / 2), latency)
 
-    def begin(self) -> Vec3:
+    def begin(self) -> Learned:
         """No integral."""
-        return ZERO
+        return Learned()
 
     def step(
-        self, memory: Vec3, seen: Seen, under_way: UnderWay, place: Place, dt: float, *, held: bool = False
-    ) -> tuple[Vec3, Ctbr]:
+        self, memory: Learned, seen: Seen, under_way: UnderWay, place: Place, dt: float, *, held: bool = False
+    ) -> tuple[Learned, Ctbr]:
         """See `HoverController.step`."""
         vehicle, gains = self.vehicle, Vec3.of(self.vehicle.velocity_gain)
         # the integral learns from what is seen: a prediction is off by what it makes up for
@@ -50,16 +60,17 @@ class Geometric:
         error = approach(vehicle, seen, then) - seen.velocity
         motion, goal = seen, then
         if not held:
-            motion, _ = ahead(vehicle, seen, under_way, memory * -1.0)
+            motion, _ = ahead(vehicle, seen, under_way, memory.integral * -1.0, memory.slip)
             goal = place.after(self.latency - seen.age)
         behind = approach(vehicle, motion, goal) - motion.velocity
-        wanted = behind.times(gains) + goal.acceleration + memory
+        wanted = behind.times(gains) + goal.acceleration + memory.integral
         if not held:
-            memory = grown(memory, vehicle, error, wanted, attainable(vehicle, wanted), dt)
+            integral = grown(memory.integral, vehicle, error, wanted, attainable(vehicle, wanted), dt)
+            memory = Learned(integral, slipped(memory.slip, seen, under_way, dt))
         yaw = motion.attitude.yaw() if goal.yaw is None else goal.yaw
         force = pull(vehicle, wanted)
         along = motion.attitude.z_axis().dot(force)
-        rate = turning(vehicle, motion.attitude, force, yaw) + lead(motion.attitude, force, goal.jerk)
+        rate = turning(vehicle, motion.attitude, force, yaw) + lead(motion.attitude, force, goal.jerk) - memory.slip
         return memory, limited(vehicle, namespace(along).maximum(along, 0.0), rate)
 
 

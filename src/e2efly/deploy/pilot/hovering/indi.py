@@ -4,7 +4,8 @@ Smeur, de Croon and Chu, Cascaded incremental nonlinear dynamic inversion for MA
 Karaman, Accurate tracking of aggressive quadrotor trajectories using incremental nonlinear dynamic inversion and
 differential flatness, 2020. What the rotors are to give is what they gave, plus wanted minus felt acceleration, both
 through one filter. That is wanted acceleration less the filtered push of all but the rotors, and needs no mass, drag
-or integral. Their inner increment, of the moment, is left to the flight controller's rate loop.
+or integral. Their inner increment is one of the moment; the flight controller's rate loop takes body rates, and so it
+is here one of them: what is told, plus wanted minus measured.
 """
 
 import math
@@ -17,7 +18,7 @@ from e2efly.control.vectors import Array
 from e2efly.deploy.pilot.hover import flight_gains
 from e2efly.deploy.pilot.hovering.loops import LIMIT, approach, steer
 from e2efly.deploy.pilot.hovering.registry import ROTOR_SPEED, register
-from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue
+from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue, slipped
 from e2efly.vehicles.vehicle import Vehicle
 
 FILTER_S = 0.2
@@ -33,6 +34,8 @@ class Felt:
 
     pushed: Vec3 = ZERO
     """Of all but the rotors and gravity, world, m/s^2."""
+    slip: Vec3 = ZERO
+    """By how much the body turns faster than it is told, rad/s."""
     share: Array | None = None
     """Commanded thrust over that by the rotors' speeds; None: not known yet."""
 
@@ -68,21 +71,22 @@ class Indi:
         vehicle, motion, goal = self.vehicle, seen, place.after(-seen.age)
         if not held:
             memory = felt(memory, seen, under_way, dt)
-            motion, _ = ahead(vehicle, seen, under_way, memory.pushed)
+            motion, _ = ahead(vehicle, seen, under_way, memory.pushed, memory.slip)
             goal = place.after(self.latency - seen.age)
         behind = approach(vehicle, motion, goal) - motion.velocity
         wanted = behind.times(Vec3.of(vehicle.velocity_gain)) + goal.acceleration - memory.pushed
-        return memory, steer(vehicle, motion, wanted, goal)
+        return memory, steer(vehicle, motion, wanted, goal, memory.slip)
 
 
 def felt(before: Felt, seen: Seen, under_way: UnderWay, dt: float) -> Felt:
     """What is known after a step of dt s."""
+    slip = slipped(before.slip, seen, under_way, dt)
     if seen.force is None:
-        return before
+        return Felt(before.pushed, slip, before.share)
     gave, share = under_way.thrust, before.share
     if seen.thrust is not None:
         now = under_way.thrust / seen.thrust
         share = now if share is None else share + (now - share) * (1 - math.exp(-dt / UNITS_S))
         gave = share * seen.thrust
     push = seen.attitude.rotate(seen.force - Vec3(0.0, 0.0, gave))
-    return Felt((before.pushed + (push - before.pushed) * (1 - math.exp(-dt / FILTER_S))).clip(LIMIT), share)
+    return Felt((before.pushed + (push - before.pushed) * (1 - math.exp(-dt / FILTER_S))).clip(LIMIT), slip, share)

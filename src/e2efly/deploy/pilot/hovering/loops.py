@@ -10,8 +10,8 @@ SHARE = 0.2
 """Growth of the integral over the error of the velocity, in squares of the velocity gain: a fifth, so that it follows
 the loops that act at once at a distance."""
 FASTEST = 0.3
-"""Of a larger error of the velocity the integral learns no more than of this, m/s: it is for what lasts, and a step or
-a stop is over soon."""
+"""Of a larger error of the velocity the integral learns no more than of this, m/s: it is for what lasts, not for steps
+and stops."""
 LIMIT = Vec3(0.3 * GRAVITY, 0.3 * GRAVITY, 0.6 * GRAVITY)
 """Largest acceleration that the integral asks for, m/s^2: up for a quadrotor of 2.5 times its mass."""
 
@@ -40,11 +40,12 @@ def lead(attitude: Quat, force: Vec3, jerk: Vec3) -> Vec3:
     return attitude.unrotate((force * scale).cross(jerk * scale))
 
 
-def steer(vehicle: Vehicle, motion: Motion, wanted: Vec3, goal: Place) -> Ctbr:
-    """Towards an acceleration, world, m/s^2, in the heading of a place and with its jerk."""
+def steer(vehicle: Vehicle, motion: Motion, wanted: Vec3, goal: Place, slip: Vec3) -> Ctbr:
+    """Towards an acceleration, world, m/s^2, in the heading of a place and with its jerk, less a slip, rad/s."""
     yaw = motion.attitude.yaw() if goal.yaw is None else goal.yaw
     command = accelerate(vehicle, motion, wanted, yaw)
-    return limited(vehicle, command.thrust, command.rate + lead(motion.attitude, pull(vehicle, wanted), goal.jerk))
+    goes = lead(motion.attitude, pull(vehicle, wanted), goal.jerk)
+    return limited(vehicle, command.thrust, command.rate + goes - slip)
 
 
 def grown(before: Vec3, vehicle: Vehicle, error: Vec3, wanted: Vec3, flown: Vec3, dt: float) -> Vec3:
@@ -60,11 +61,13 @@ def grown(before: Vec3, vehicle: Vehicle, error: Vec3, wanted: Vec3, flown: Vec3
         flown: what the limits of the vehicle leave of it, world, m/s^2.
         dt: s.
     """
-    gains = Vec3.of(vehicle.velocity_gain)
+    gains, xp = Vec3.of(vehicle.velocity_gain), namespace(error.x, error.z)
+    level = FASTEST / xp.maximum(xp.sqrt(error.x**2 + error.y**2), FASTEST)
+    error = Vec3(error.x * level, error.y * level, xp.clip(error.z, -FASTEST, FASTEST))
 
     def axis(i: Array, gain: Array, e: Array, asked: Array, given: Array, limit: float) -> Array:
         xp = namespace(i, e, asked)
-        winds, e = (abs(asked - given) > 1e-3) & ((asked - given) * e > 0), xp.clip(e, -FASTEST, FASTEST)
+        winds = (abs(asked - given) > 1e-3) & ((asked - given) * e > 0)
         return xp.clip(i + xp.where(winds, 0.0, SHARE * gain**2 * e * dt), -limit, limit)
 
     return Vec3(

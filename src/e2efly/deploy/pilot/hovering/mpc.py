@@ -19,7 +19,7 @@ from e2efly.deploy.pilot.hover import flight_gains
 from e2efly.deploy.pilot.hovering.loops import LIMIT, steer
 from e2efly.deploy.pilot.hovering.plan import Plan, Solve, planned
 from e2efly.deploy.pilot.hovering.registry import register
-from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue
+from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue, slipped
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 OBSERVER = 2.0
@@ -36,6 +36,8 @@ class Observed:
     """By the model, world, m/s; None: at the first step."""
     pushed: Vec3 = ZERO
     """What else than rotors and gravity accelerates the vehicle, world, m/s^2."""
+    slip: Vec3 = ZERO
+    """By how much the body turns faster than it is told, rad/s."""
 
 
 @register("mpc")
@@ -83,10 +85,10 @@ class Mpc:
         vehicle, motion, thrust, goal = self.vehicle, seen, under_way.thrust, place.after(-seen.age)
         if not held:
             memory = observed(memory, seen, under_way, dt)
-            motion, thrust = ahead(vehicle, seen, under_way, memory.pushed)
+            motion, thrust = ahead(vehicle, seen, under_way, memory.pushed, memory.slip)
             goal = place.after(self.latency - seen.age)
         else:
-            memory = Observed(pushed=memory.pushed)
+            memory = Observed(pushed=memory.pushed, slip=memory.slip)
         pushed = memory.pushed
         feed = goal.acceleration - pushed
         gives = motion.attitude.z_axis() * thrust - Vec3(0.0, 0.0, GRAVITY)
@@ -98,7 +100,7 @@ class Mpc:
             self._axis(self.level, y, limits[1]),
             self._axis(self.up, z, limits[2]),
         )
-        return memory, steer(vehicle, motion, wanted + feed, goal)
+        return memory, steer(vehicle, motion, wanted + feed, goal, memory.slip)
 
     def _axis(self, plan: Plan, parts: tuple[Array, ...], limits: tuple[float, float]) -> Array:
         """What to ask for along an axis, over the acceleration of where to be, m/s^2.
@@ -119,13 +121,13 @@ class Mpc:
 def observed(before: Observed, seen: Seen, under_way: UnderWay, dt: float) -> Observed:
     """The observer after a step of dt s: a model of the velocity, drawn to the one that is seen."""
     if before.velocity is None:
-        return Observed(seen.velocity, before.pushed)
+        return Observed(seen.velocity, before.pushed, before.slip)
     gives = seen.attitude.z_axis() * under_way.thrust - Vec3(0.0, 0.0, GRAVITY)
     expected = before.velocity + (gives + before.pushed) * dt
     off = seen.velocity - expected
     kept = math.exp(-OBSERVER * dt)  # of the discrete observer with both poles there
     pushed = (before.pushed + off * ((1 - kept) ** 2 / max(dt, 1e-3))).clip(LIMIT)
-    return Observed(expected + off * (1 - kept**2), pushed)
+    return Observed(expected + off * (1 - kept**2), pushed, slipped(before.slip, seen, under_way, dt))
 
 
 def _parts(v: Vec3) -> tuple[Array, Array, Array]:

@@ -11,6 +11,8 @@ from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 LONGEST_STEP = 0.02
 """Of the prediction, s."""
+SLIP_S, SLIP = 0.3, Vec3(2.0, 2.0, 2.0)
+"""Time constant with which the slip of the body rates is followed, s, and its bound, rad/s."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,8 @@ class UnderWay:
     thrust: Array = GRAVITY
     """Collective thrust over mass that the rotors give, by the motors' lag, as the oldest of them begins to act, m/s^2;
     at first that of hovering."""
+    rate: Vec3 = ZERO
+    """Body rates then, as the rate loop of the vehicle file follows, rad/s."""
     commands: tuple[tuple[float, Ctbr], ...] = ()
     """For how long each is held, s, and the command; oldest first. Together no longer than the latency."""
 
@@ -69,19 +73,40 @@ def sent(before: UnderWay, command: Ctbr, seconds: float, vehicle: Vehicle, late
     """
     low, high = (4 * float(limit) / float(vehicle.mass) for limit in vehicle.thrust_range)
     given = namespace(command.thrust).clip(command.thrust, low, high)
-    commands, thrust = [*before.commands, (seconds, Ctbr(given, command.rate))], before.thrust
+    commands, thrust, rate = [*before.commands, (seconds, Ctbr(given, command.rate))], before.thrust, before.rate
     over = sum(held for held, _ in commands) - latency
     while commands and over > 1e-9:
         held, oldest = commands.pop(0)
         part = min(held, over)
         thrust = oldest.thrust + (thrust - oldest.thrust) * math.exp(-part / vehicle.motor_time_constant)
+        rate = oldest.rate + (rate - oldest.rate).times(_left(vehicle, part))
         if held > part:
             commands.insert(0, (held - part, oldest))
         over -= part
-    return UnderWay(thrust, tuple(commands))
+    return UnderWay(thrust, rate, tuple(commands))
 
 
-def ahead(vehicle: Vehicle, seen: Seen, under_way: UnderWay, pushed: Vec3 = ZERO) -> tuple[Seen, Array]:
+def slipped(before: Vec3, seen: Seen, under_way: UnderWay, dt: float) -> Vec3:
+    """By how much the body turns faster than it is told, rad/s: what a steady torque does to a rate loop.
+
+    Args:
+        before: so far.
+        seen: the motion.
+        under_way: with what it was told.
+        dt: since the last control step, s.
+    """
+    off = seen.body_rate - under_way.rate
+    return (before + (off - before) * (1 - math.exp(-dt / SLIP_S))).clip(SLIP)
+
+
+def _left(vehicle: Vehicle, seconds: float) -> Vec3:
+    """What is left of an error of the body rates after some seconds."""
+    return Vec3(*(math.exp(-float(gain) * seconds) for gain in vehicle.rate_gain))
+
+
+def ahead(
+    vehicle: Vehicle, seen: Seen, under_way: UnderWay, pushed: Vec3 = ZERO, slip: Vec3 = ZERO
+) -> tuple[Seen, Array]:
     """The motion in which the next command will find the vehicle, when all that is under way has acted.
 
     The rate loop follows its setpoint as a lag of its gain, the rotors theirs as a lag of the motors.
@@ -91,6 +116,7 @@ def ahead(vehicle: Vehicle, seen: Seen, under_way: UnderWay, pushed: Vec3 = ZERO
         seen: the motion that is known.
         under_way: what was sent since.
         pushed: what else accelerates it, world, m/s^2.
+        slip: by how much it turns faster than it is told, rad/s.
 
     Returns:
         That motion, and the collective thrust over mass then, m/s^2.
@@ -98,14 +124,14 @@ def ahead(vehicle: Vehicle, seen: Seen, under_way: UnderWay, pushed: Vec3 = ZERO
     position, velocity, attitude, rate, thrust = (
         seen.position, seen.velocity, seen.attitude, seen.body_rate, under_way.thrust,
     )  # fmt: skip
-    push, gains = pushed - Vec3(0.0, 0.0, GRAVITY), Vec3.of(vehicle.rate_gain)
+    push = pushed - Vec3(0.0, 0.0, GRAVITY)
     for seconds, command in under_way.commands:
         count = max(math.ceil(seconds / LONGEST_STEP - 1e-9), 1)
         h = seconds / count
-        left = Vec3(*(math.exp(-float(gain) * h) for gain in (gains.x, gains.y, gains.z)))
+        left, told = _left(vehicle, h), command.rate + slip
         kept = math.exp(-h / vehicle.motor_time_constant)
         for _ in range(count):
-            turned = command.rate + (rate - command.rate).times(left)
+            turned = told + (rate - told).times(left)
             gives = command.thrust + (thrust - command.thrust) * kept
             after = _turned(attitude, (rate + turned) * (h / 2))
             pull = (attitude.z_axis() * thrust + after.z_axis() * gives) * 0.5 + push
