@@ -24,8 +24,6 @@ from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 OBSERVER = 2.0
 """Both poles of the observer, 1/s."""
-QUICKER = 1.25
-"""Frequency of the plan over that of the loops of position and velocity, whose model knows no lag."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ class Mpc:
             missing = f"hover controller 'mpc': the package daqp is missing ({error})"
             raise ValueError(f"{missing}; accepted: pip install 'e2efly[mpc]', or another hover controller") from None
         gentle = flight_gains(vehicle, residue(latency) + hold / 2)
-        loops = QUICKER * np.sqrt(gentle.position_gain * gentle.velocity_gain)
+        loops = np.sqrt(gentle.position_gain * gentle.velocity_gain)
         tilts = 1 / float(gentle.attitude_gain[0]) + 1 / float(np.min(vehicle.rate_gain[:2]))
         return cls(
             gentle, latency, planned(float(loops[0]), tilts),

@@ -11,7 +11,7 @@ from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 LONGEST_STEP = 0.02
 """Of the prediction, s."""
-SLIP_S, SLIP = 0.3, Vec3(2.0, 2.0, 2.0)
+SLIP_S, SLIP = 1.0, Vec3(2.0, 2.0, 2.0)
 """Time constant with which the slip of the body rates is followed, s, and its bound, rad/s."""
 
 
