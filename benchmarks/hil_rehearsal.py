@@ -75,8 +75,8 @@ def _fly(plan: Plan, seed: int, folder: Path, kill: Victim | None) -> Lap:
 def _row(name: str, laps: list[Lap]) -> dict[str, str]:
     """Of all laps of a policy: the worst lap's 99 %, and the maximum."""
     parts = {
-        "pose to image": "pose_to_image", "age of images": "image_age", "age of poses": "pose_age",
-        "steps late": "lateness", "room behind": "behind",
+        "pose to image": "pose_to_image", "age of images": "image_age", "then to the sticks": "to_stick",
+        "age of poses": "pose_age", "steps late": "lateness", "room behind": "behind",
     }  # fmt: skip
     return {
         "policy": name, "success": f"{sum(lap.success for lap in laps)} of {len(laps)}",

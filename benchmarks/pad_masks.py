@@ -1,15 +1,17 @@
 """The package's network of pads: its training on rendered pictures, and its masks of pads that it never saw.
 
-    python benchmarks/pad_masks.py [--train 4000] [--pictures 8192] [--unseen 512] [--json FILE]
+    python benchmarks/pad_masks.py [--train 4000] [--pictures 8192] [--more 0] [--unseen 512] [--json FILE]
 
 `--train` learns so many steps and writes `deploy/sight/segment/pad.onnx`; without it the file that ships is measured.
+`--more` begins from the file that ships, with other pictures for each number: the file that ships is of 0, then of 1.
 Outlines, markings, grounds and seeds of the unseen pictures are none of the training's: `pad_renders`.
 """
 
 import jax
 import numpy as np
+import onnx
 from common import arguments, table, write
-from pad_network import graph, learned
+from pad_network import graph, learned, weights_of
 from pad_renders import SEEN, SIDE, UNSEEN, Variety, pictures
 
 from e2efly.deploy.sight.segment.network import OWN, Network
@@ -54,9 +56,10 @@ def measured(name: str, colours: np.ndarray, truth: np.ndarray) -> list[dict[str
 
 def main() -> None:
     """Train where it is asked for, measure, print the table, write the figures."""
-    args = arguments(__doc__ or "", train=0, pictures=8192, unseen=512)
+    args = arguments(__doc__ or "", train=0, pictures=8192, more=0, unseen=512)
     if args.train:
-        weights = learned(*drawn(1, args.pictures, SEEN), args.train)
+        before = weights_of(onnx.load(OWN)) if args.more else None
+        weights = learned(*drawn(1 + 10 * args.more, args.pictures, SEEN), args.train, weights=before)
         OWN.write_bytes(graph(weights).SerializeToString())
         print(f"{OWN}: {OWN.stat().st_size} bytes")
     rows = measured("of the training's kinds, other seeds", *drawn(2, args.unseen, SEEN))

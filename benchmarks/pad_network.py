@@ -144,6 +144,18 @@ def learned(
     return weights
 
 
+def weights_of(model: onnx.ModelProto) -> Weights:
+    """The inverse of `graph`."""
+    found = {tensor.name: numpy_helper.to_array(tensor) for tensor in model.graph.initializer}
+    return {
+        name: (
+            jnp.asarray(found[f"{name}_half"].astype(np.float32).transpose(2, 3, 1, 0)),
+            jnp.asarray(found[f"{name}_bias"]),
+        )
+        for name, *_ in _layers()
+    }
+
+
 def graph(weights: Weights) -> onnx.ModelProto:
     """`logits` in ONNX's operators, and their probability; kernels in half precision."""
     nodes: list[onnx.NodeProto] = []

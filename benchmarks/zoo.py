@@ -1,4 +1,5 @@
-"""Train the policy zoo: the best preset of each task for each vehicle, kept as package data with its success.
+"""Train the policy zoo: the best preset of each task for each vehicle, kept as package data with its success and the
+curve of its training.
 
     python benchmarks/zoo.py [--vehicles vis_r ...] [--tasks hover ...] [--seeds 3]
     python benchmarks/zoo.py --digests
@@ -42,7 +43,7 @@ from e2efly.learn.rundir import RunDirectory
 from e2efly.storage import write_json
 from e2efly.tasks import TASKS
 from e2efly.vehicles import family_names, vehicle_names
-from e2efly.zoo import FOLDER, USUAL, contents
+from e2efly.zoo import FOLDER, USUAL, contents, curve_file
 
 VARIANTS = {"race_any": ("race", "any_track")}
 """Policies of a task by a preset of its own: task and preset."""
@@ -53,6 +54,8 @@ SEEING = (USUAL, "vis_h")
 SEEN = 250
 """Starts per row of the stress of a policy that sees, which takes minutes; of the others 1000."""
 ENOUGH, ENOUGH_STRESSED, WORTH = 0.995, 0.97, 0.5
+POINTS = 200
+"""Evaluations that are kept of a training, for its curve."""
 CHOSEN_BY = 2_000_000
 """Seed of the starts that a robust policy is chosen by."""
 
@@ -127,6 +130,7 @@ def keep(vehicle: str, task: str, policy: Path, about: dict[str, Any]) -> dict[s
     shutil.copy(policy, kept)
     if (seen := samples_file(policy)).is_file():
         shutil.copy(seen, samples_file(kept))
+    curve_file(kept).write_text(curve(RunDirectory(policy.parent)), encoding="utf-8")
     zoo = contents() if (FOLDER / "zoo.json").exists() else {}
     zoo.setdefault(vehicle, {})[task] = about
     write(zoo)
@@ -134,6 +138,20 @@ def keep(vehicle: str, task: str, policy: Path, about: dict[str, Any]) -> dict[s
     line = {"vehicle": vehicle, "task": task, "success, %": success, "kB": kept.stat().st_size // 1000}
     print(line, flush=True)
     return line
+
+
+def curve(run: RunDirectory) -> str:
+    """The evaluations of a training as CSV, at most `POINTS` of them, the last among them: environment steps, seconds
+    from the process's start, success of each criterion.
+    """
+    rows = [row for row in run.rows() if "seconds" in row]
+    rows = rows[:: -max(1, -(-len(rows) // POINTS))][::-1]
+    suites = [name for name in rows[0] if name.startswith("eval/") and name.endswith("/success")]
+    lines = [",".join(["steps", "seconds", *(name.split("/")[1] for name in suites)])]
+    lines += [
+        ",".join([f"{row['steps']:.0f}", f"{row['seconds']:.1f}", *(f"{row[s]:g}" for s in suites)]) for row in rows
+    ]
+    return "\n".join([*lines, ""])
 
 
 def starts_of(policy: Path) -> dict[str, np.ndarray]:

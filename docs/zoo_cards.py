@@ -50,8 +50,9 @@ package. Every command that takes a policy takes one by the name of its card:
   the policy sees. A card names the worst rows; [Benchmarks](benchmarks.md) has all of them.
 - **Pictures** show the first starts of `e2efly eval`: 12, or 6 where the policy sees. **Videos** show one of
   these flights, from a camera that follows the vehicle. The green ball is where the policy is told to be.
-- **Training curves** are not shown: the runs that made these policies are not kept. The command *trained by*
-  makes such a run, with its curve in `plots/learning.png`; its result differs a little on another machine.
+- **Training curves** show the success of the evaluations on the way, as `TASK.curve.csv` beside the policy has it.
+  Policies that were made before these files were kept have none. The command *trained by* makes such a run, with its
+  curve in `plots/learning.png`; its result differs a little on another machine.
 
 None of these policies has flown a real vehicle yet. All of them were flown in the simulator of the training, and
 many in MuJoCo and through the real firmware ([Validate](validation.md)).
@@ -87,9 +88,9 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
     preset = "" if about["preset"] == "robust" else f" --preset {about['preset']}"
     stress = about.get("stress", {})
     lines = [f"### {name}", "", TASKS[task]]
-    for kind_of, suffix in (("Flights", "png"), ("One flight", "webp")):
-        if (DOCS / "zoo" / f"{vehicle}-{task}.{suffix}").exists():
-            lines += ["", f"![{kind_of} of {name}](zoo/{vehicle}-{task}.{suffix})"]
+    for kind_of, ending in (("Flights", ".png"), ("One flight", ".webp"), ("Training", "-training.png")):
+        if (DOCS / "zoo" / f"{vehicle}-{task}{ending}").exists():
+            lines += ["", f"![{kind_of} of {name}](zoo/{vehicle}-{task}{ending})"]
     lines += ["", f"| {name} | |", "| --- | --- |"]
     for criterion, share in about["success"].items():
         lines.append(f"| success{'' if criterion in (task, kind) else f': {criterion}'} | {percent(share)} |")

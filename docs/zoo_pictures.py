@@ -1,11 +1,13 @@
 """Fly each policy of the zoo and draw it: the pictures and videos of docs/zoo.md, in docs/zoo/.
 
-    python docs/zoo_pictures.py [VEHICLE/TASK ...]
+    python docs/zoo_pictures.py [VEHICLE/TASK ...] [--curves]
 
-Every policy gets a picture of flights from unseen starts of its first criterion. Those of the VIS-R get a video as
-well: one flight, seen by a camera that follows the vehicle.
+Every policy gets a picture of flights from unseen starts of its first criterion, and one of the curve of its training,
+where that was kept. Those of the VIS-R get a video as well: one flight, seen by a camera that follows the vehicle.
+With `--curves` the curves alone are drawn.
 """
 
+import csv
 import sys
 import tempfile
 from pathlib import Path
@@ -23,8 +25,9 @@ from e2efly.episodes import Act
 from e2efly.evaluation import SEED, act_of, candidate, episode_steps
 from e2efly.view.flights import Flights, fly
 from e2efly.view.space import plot_flights
+from e2efly.view.style import CYCLE, figure
 from e2efly.view.worlds import plot_flights_in_worlds
-from e2efly.zoo import USUAL, contents
+from e2efly.zoo import USUAL, contents, curve_file, policy_file
 
 FOLDER = Path(__file__).parent / "zoo"
 EPISODES, SEEN = 12, 6
@@ -46,9 +49,34 @@ def picture(flights: Flights, suite: TaskConfig, env: Env, key: Any, path: Path,
             plot_flights_in_worlds(flights, worlds, large, title)
         else:
             plot_flights(suite, flights, large, title)
-        with Image.open(large) as drawn:
-            size = WIDE, round(WIDE * drawn.height / drawn.width)
-            small = drawn.convert("RGB").resize(size, Image.Resampling.LANCZOS)
+        smaller(large, path)
+
+
+def curve(file: Path, path: Path, title: str) -> None:
+    """The success of a training's evaluations over its environment steps."""
+    with file.open(newline="", encoding="utf-8") as text:
+        rows = list(csv.DictReader(text))
+    with tempfile.TemporaryDirectory() as folder:
+        large = Path(folder) / "curve.png"
+        seconds = f"{float(rows[-1]['seconds']):.0f} s from the start of the process to the last evaluation"
+        with figure(large, title, 3.2, [seconds]) as fig:
+            ax = fig.add_subplot()
+            for name, colour in zip(
+                [name for name in rows[0] if name not in ("steps", "seconds")], CYCLE, strict=False
+            ):
+                steps, success = ([float(row[of]) for row in rows] for of in ("steps", name))
+                ax.plot([1e-6 * x for x in steps], [100 * x for x in success], color=colour, label=name)
+            ax.set(xlabel="environment steps (million)", ylabel="success of evaluation (%)", ylim=(-4, 104))
+            ax.set_xlim(left=0.0)
+            ax.legend(loc="lower right")
+        smaller(large, path)
+
+
+def smaller(large: Path, path: Path) -> None:
+    """A plot as the cards have it."""
+    with Image.open(large) as drawn:
+        size = WIDE, round(WIDE * drawn.height / drawn.width)
+        small = drawn.convert("RGB").resize(size, Image.Resampling.LANCZOS)
     small.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
@@ -75,9 +103,13 @@ def main() -> None:
     prepare()
     key = random_key(SEED, UNSEEN, 0)  # the starts of `e2efly eval`
     FOLDER.mkdir(exist_ok=True)
-    named = sys.argv[1:] or [f"{vehicle}/{task}" for vehicle, tasks in contents().items() for task in tasks]
-    for name in named:
+    asked = [word for word in sys.argv[1:] if word != "--curves"]
+    for name in asked or [f"{vehicle}/{task}" for vehicle, tasks in contents().items() for task in tasks]:
         vehicle, task = name.split("/")
+        if (kept := curve_file(policy_file(name))).is_file():
+            curve(kept, FOLDER / f"{vehicle}-{task}-training.png", f"Training of {name}")
+        if "--curves" in sys.argv:
+            continue
         found = candidate(name)
         suite = next(iter(found.task.criteria().values()))
         env, act = found.environment(suite), act_of(found.policy)

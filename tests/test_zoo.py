@@ -73,7 +73,7 @@ def test_a_task_is_the_name_of_its_policy(tmp_path: Path) -> None:
     assert policy_file("hover", "any") == FOLDER / "any" / "hover.onnx"
     with pytest.raises(ValueError, match=r"unknown policy 'hovr'.*hover"):
         policy_file("hovr")
-    with pytest.raises(ValueError, match=r"no policy 'avoid' of vehicle 'crazyflie'; accepted: vis_r"):
+    with pytest.raises(ValueError, match=r"no policy 'avoid' of vehicle 'crazyflie'; accepted: vis_h, vis_r"):
         policy_file("avoid", "crazyflie")
     for own, values, whose in (
         ("mine.toml", "crazyflie", "crazyflie"),  # its values under another name

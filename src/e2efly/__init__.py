@@ -46,8 +46,9 @@ __all__ = [
 
 __version__ = "0.1.0"
 
-_SILENT = {"ORT_DISABLE_TELEMETRY": "1", "RAY_USAGE_STATS_ENABLED": "0"}
-"""Environment variables with which ONNX Runtime and Ray report to nobody. Processes started from here inherit them."""
+_SILENT = {"ORT_DISABLE_TELEMETRY": "1", "RAY_USAGE_STATS_ENABLED": "0", "WANDB_ERROR_REPORTING": "false"}
+"""Environment variables with which ONNX Runtime, Ray and W&B report to nobody of themselves. Processes started from
+here inherit them."""
 
 _too_late = "onnxruntime" in sys.modules and not os.environ.get("ORT_DISABLE_TELEMETRY")
 for _name, _value in _SILENT.items():

@@ -4,6 +4,7 @@ import fcntl
 import json
 import math
 import os
+import reprlib
 import socket
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -40,6 +41,23 @@ def write_json(path: Path, content: Any, indent: int | None = 1) -> None:
         OSError: naming the path, when the folder cannot be written or is full.
     """
     write_atomically(path, (json.dumps(finite(content), indent=indent, allow_nan=False) + "\n").encode())
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """The object in a JSON file.
+
+    Raises:
+        ValueError: when the file is missing, no JSON, or JSON of something else than an object.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path} cannot be read: {error}") from None
+    except RecursionError:
+        raise ValueError(f"{path} cannot be read: it is nested too deeply") from None
+    if not isinstance(found, dict):
+        raise ValueError(f"{path} is {reprlib.repr(found)}; accepted: an object")
+    return found
 
 
 def finite(value: Any) -> Any:
@@ -95,6 +113,25 @@ def held(folder: Path, option: str = "--out") -> Iterator[None]:
         if anew:
             with suppress(OSError):  # it holds something
                 folder.rmdir()
+
+
+def is_held(folder: Path) -> bool:
+    """Whether another process, or this one, keeps a folder by `held`; a file that a killed one left counts for nothing.
+
+    Raises:
+        OSError: when the file of the lock cannot be read.
+    """
+    try:
+        file = os.open(folder / LOCK, os.O_RDONLY | os.O_CLOEXEC)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(file)
+    return False
 
 
 def _locked(path: Path) -> int:

@@ -5,7 +5,19 @@ import dataclasses
 import numpy as np
 import pytest
 
-from e2efly.control.excitation import CHIRPED, SWEEP, THRUST, Room, chirps, fastest, length_for
+from e2efly.control.excitation import (
+    CHIRPED,
+    KICK,
+    PULSE,
+    SWEEP,
+    THRUST,
+    Room,
+    chirps,
+    fastest,
+    kick_for,
+    kicks,
+    length_for,
+)  # fmt: skip
 from e2efly.deploy.excitation import ExcitationOptions, excitation, room_of
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.pilot.fence import fence_problem
@@ -121,3 +133,21 @@ def test_a_chirp_sweeps_each_axis_alone() -> None:
         rises = time[own][1:][(found[own, axis][:-1] < 0) & (found[own, axis][1:] >= 0)]
         periods = np.diff(rises)
         assert 1 / periods[0] < 3 * SWEEP[0] and 1 / periods[-1] == pytest.approx(SWEEP[1], rel=0.15)
+
+
+def test_a_kick_undoes_its_climb() -> None:
+    time = np.arange(0.0, 4.4, 0.001)
+    pushed = np.array([kicks(t, 12.0) for t in time])
+    begun = time[1:][(pushed[:-1] <= 0) & (pushed[1:] > 0)]
+    assert np.diff(begun) == pytest.approx(1.1, abs=2e-3)
+    assert len(begun) == 4
+    climb = np.cumsum(pushed) * 0.001
+    assert climb.max() == pytest.approx(12.0 * PULSE, rel=0.02)
+    assert abs(climb[-1]) < 0.02
+
+
+def test_a_kick_shows_the_top_of_the_thrust_and_stops_within_the_room() -> None:
+    wide = Room(np.zeros(3), np.array([10.0, 10.0, 10.0]), 3.5, 0.45)
+    assert GRAVITY + kick_for(FILE, wide) == pytest.approx(KICK * 4 * FILE.thrust_range[1] / FILE.mass)
+    low = Room(np.zeros(3), np.array([10.0, 10.0, 1.0]), 3.5, 0.45)
+    assert kick_for(FILE, low) * PULSE == pytest.approx(low.fastest[2])

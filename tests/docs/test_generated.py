@@ -5,16 +5,19 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
+from PIL import Image
 
-from e2efly.zoo import USUAL, contents
-from tests.docs.pages import DOCS
+from e2efly.learn.rundir import RunDirectory
+from e2efly.zoo import FOLDER, USUAL, contents, curve_file
+from tests.docs.pages import DOCS, ROOT
 
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 
 
-def script(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(f"docs_{name}", DOCS / f"{name}.py")
+def script(name: str, folder: Path = DOCS) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"{folder.name}_{name}", folder / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -39,6 +42,35 @@ def test_every_policy_of_the_zoo_has_a_card_and_pictures() -> None:
             assert (DOCS / "zoo" / f"{vehicle}-{task}.png").read_bytes()[1:4] == b"PNG"
             if vehicle == USUAL:
                 assert (DOCS / "zoo" / f"{vehicle}-{task}.webp").read_bytes()[8:12] == b"WEBP"
+
+
+def test_every_curve_that_ships_stands_on_its_card() -> None:
+    page = (DOCS / "zoo.md").read_text(encoding="utf-8")
+    drawn = {path.name for path in (DOCS / "zoo").glob("*-training.png")}
+    kept = [file for file in FOLDER.glob("*/*.onnx") if curve_file(file).is_file()]
+    assert drawn == {f"{file.parent.name}-{file.stem}-training.png" for file in kept}
+    for name in drawn:
+        assert f"](zoo/{name})" in page
+
+
+def test_the_curve_of_a_training_is_kept_in_few_points_and_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    run = RunDirectory(tmp_path)
+    for update in range(1, 1001):
+        evaluated = {"seconds": 0.1 * update, "eval/hover/success": update / 1000} if update % 2 == 0 else {}
+        blank = {"update": update, "steps": 100 * update, "seconds": "", "eval/hover/success": "", "reward": 1.0}
+        run.append([{**blank, **evaluated}])  # type: ignore[list-item]
+    lines = script("zoo", ROOT / "benchmarks").curve(run).splitlines()
+    assert lines[0] == "steps,seconds,hover"
+    assert lines[-1] == "100000,100.0,1"
+    assert 100 <= len(lines) <= 201
+    (tmp_path / "hover.curve.csv").write_text("\n".join([*lines, ""]))
+    script("zoo_pictures").curve(tmp_path / "hover.curve.csv", tmp_path / "curve.png", "Training")
+    with Image.open(tmp_path / "curve.png") as picture:
+        assert picture.width == 800
+        assert np.asarray(picture.convert("RGB")).std() > 5
 
 
 def test_limits_are_the_worst_rows_first() -> None:

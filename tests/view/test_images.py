@@ -10,7 +10,7 @@ from e2efly.config import CameraConfig, ImuConfig
 from e2efly.env import random_key
 from e2efly.scenes.scene import COLOURS, GROUND, Scene
 from e2efly.view.cloud import cloud
-from e2efly.view.images import DISTANCE, Sight, in_colours, look_around
+from e2efly.view.images import DISTANCE, Sight, exposure, in_colours, look_around
 from e2efly.view.noise import plot_depth_noise, plot_image_noise, plot_imu
 from tests.view.test_plots import check_png
 
@@ -50,3 +50,16 @@ def test_pictures_of_noise(tmp_path: Path, sight: Sight) -> None:
     for name in ("depth", "image", "imu"):
         assert (tmp_path / f"{name}.png").stat().st_size > 10_000
     check_png(tmp_path / "imu.png", (400, 600))
+
+
+def test_a_dark_world_is_exposed_for_longer_and_a_bright_one_is_not() -> None:
+    dark, bright = np.full((4, 4, 3), 0.2), np.full((4, 4, 3), 0.8)
+    assert exposure([dark]) == pytest.approx(2.0)
+    assert exposure([dark, bright]) == 1.0
+    assert exposure([0 * dark]) == 3.0
+    place, level = np.array([1.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.0, 0.0])
+    usual, longer = (
+        look_around(CAMERA, Scene.of({}, 1), 0.0, place, level, ("rgb",), exposed).images["rgb"]
+        for exposed in (1.0, 2.0)
+    )
+    np.testing.assert_allclose(longer, np.minimum(2 * usual, 1.0), atol=1e-6)

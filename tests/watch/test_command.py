@@ -3,12 +3,17 @@
 import contextlib
 import os
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
+import urllib.request
 from pathlib import Path
 
 import pytest
+
+from e2efly.watch.waiting import MARK, asked_for
 
 
 @pytest.mark.parametrize(("arguments", "told"), [
@@ -28,7 +33,6 @@ def test_bad_input_is_named(arguments: list[str], told: str, capsys: pytest.Capt
 
 
 def test_a_port_in_use_is_named(capsys: pytest.CaptureFixture[str]) -> None:
-    import socket
 
     from e2efly.cli import run
 
@@ -38,6 +42,24 @@ def test_a_port_in_use_is_named(capsys: pytest.CaptureFixture[str]) -> None:
         port = str(taken.getsockname()[1])
         assert run(["watch", "hover", "--port", port]) == 2
     assert f"--port {port} is in use on 127.0.0.1" in capsys.readouterr().err
+
+
+def test_nothing_is_computed_until_a_browser_asks_for_the_page() -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    asked: list[bool] = []
+    over = threading.Event()
+    waiting = threading.Thread(target=lambda: asked.append(asked_for("127.0.0.1", port, over.is_set)))
+    waiting.start()
+    waiting.join(1.0)
+    assert waiting.is_alive()
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/") as answer:
+        assert MARK in answer.read().decode()
+    waiting.join(10.0)
+    assert asked == [True]
+    over.set()
+    assert not asked_for("127.0.0.1", port, over.is_set)  # the port is free again at once
 
 
 def test_a_viewer_beside_a_program_ends_with_it() -> None:

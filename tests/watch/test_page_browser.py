@@ -99,3 +99,19 @@ def test_a_browser_that_goes_away_does_not_end_the_viewer() -> None:
             wait_for(page, "/from its goal/.test(text)")
         assert process.poll() is None
     assert wrong == []
+
+
+def test_a_validation_is_watched(tmp_path: Path) -> None:
+    report = str(tmp_path / "report.json")
+    asked = ["--plant", "mujoco", "--episodes", "2", "--max-drop", "100", "--out", str(tmp_path), "--json", report]
+    subprocess.run([sys.executable, "-m", "e2efly", "validate", "race", *asked], check=True, capture_output=True)
+    wrong: list[str] = []
+    with served(report) as (process, address), page_of(address, wrong) as page:
+        wait_for(page, "/race \\d on mujoco/.test(text)")
+        page.wait_for_timeout(1500)
+        page.screenshot(path=tmp_path / "page.png")
+        assert "Start" in page.inner_text("body")
+        assert process.poll() is None
+    assert wrong == []
+    picture = np.asarray(Image.open(tmp_path / "page.png").convert("RGB"), float)
+    assert picture[:, :500].std() > 5

@@ -13,11 +13,11 @@ from e2efly.deploy.pose.sources import open_source
 from e2efly.scenes.faces import box
 from e2efly.validation.room import free_port
 from e2efly.vehicles import load_vehicle
-from e2efly.watch.film import Soup, film, picture
+from e2efly.watch.film import Soup, beside, film, picture
 from e2efly.watch.frames import Frame
 from e2efly.watch.poses import Poses
 from e2efly.watch.recording import PERIOD, Recording, read_flight
-from e2efly.watch.shapes import mesh_of
+from e2efly.watch.shapes import SKY, mesh_of
 
 
 def log(path: Path, seconds: float = 2.0, speed: float = 1.0) -> Path:
@@ -106,3 +106,16 @@ def test_a_pose_source_is_watched_until_it_is_lost() -> None:
     assert "no good pose" in lost.note
     assert not lost.rotor_speed.any()
     assert np.allclose(lost.position, frame.position)
+
+
+def test_what_cameras_see_stands_beside_a_picture() -> None:
+    seen = np.zeros((90, 160, 3), np.uint8)
+    assert beside(seen, {}) is seen
+    near, red = np.ones((4, 8), np.float32), np.zeros((8, 8, 3), np.float32)
+    red[..., 0] = 1.0
+    film = beside(seen, {"depth 0": near, "rgb 1": red})
+    assert film.shape == (90, 240, 3)
+    assert not film[:, :160].any()
+    assert (film[22, 200] == 255).all()  # in the middle of the upper half
+    assert (film[67, 200] == [255, 0, 0]).all()
+    assert (film[1, 200] == np.rint(255 * np.array(SKY))).all()  # what is left over

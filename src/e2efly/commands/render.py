@@ -24,7 +24,8 @@ PICTURE, PANEL = 640, 256
 class Render:
     """Draw what sensors see of a world: pictures, a contact sheet with every noise, and a video of a flight.
 
-    Of a run or a policy.onnx: a video of it in flight, as `e2efly watch --video` draws it.
+    Of a run or a policy.onnx: a GIF of it in flight, and beside it what its cameras see, as `e2efly watch --video`
+    draws it.
     """
 
     scene: tyro.conf.Positional[str]
@@ -70,7 +71,7 @@ def run(options: Render) -> int:
     from e2efly.view.images import look_around, sized, write_pictures
     from e2efly.view.places import find_place
     from e2efly.view.sheet import write_sheet
-    from e2efly.view.video import frames, write_video
+    from e2efly.view.video import exposure_of, frames, write_video
 
     console = Terminal()
     place = find_place(options.scene, random_key(options.seed))
@@ -81,15 +82,17 @@ def run(options: Render) -> int:
     camera = sized(PRESETS[options.camera], PICTURE, options.width, options.height)
     position, quaternion = viewpoint(options, tour)
     where = f"{options.scene}, seed {options.seed}, {options.camera} at ({', '.join(f'{x:.1f}' for x in position)}) m"
+    small = sized(PRESETS[options.camera], PANEL, options.width, options.height)
     with console.status("Drawing pictures"):
-        sight = look_around(camera, place.scene, options.time, position, quaternion)
+        exposed = exposure_of(small, place.scene, tour)
+        where += f", exposed x {exposed:.1f}" if exposed > 1 else ""
+        sight = look_around(camera, place.scene, options.time, position, quaternion, exposed=exposed)
         lidar = look_around(PRESETS["lidar"], place.scene, options.time, position, quaternion)
         write_pictures(sight, out, where)
         write_cloud(lidar, out / "lidar.png", f"{options.scene}, seed {options.seed}")
         title = f"What sensors see: {Path(options.scene).stem}"
         write_sheet(sight, lidar, place, tour, random_key(options.seed), out / "sheet.png", title, where)
-    small = sized(PRESETS[options.camera], PANEL, options.width, options.height)
-    film = frames(small, place.scene, tour, PANEL if camera.projection == "pinhole" else 3 * PANEL)
+    film = frames(small, place.scene, tour, PANEL if camera.projection == "pinhole" else 3 * PANEL, exposed)
     written = write_video(
         track(film, "Filming", total=len(tour.time), console=console, transient=True), out / "flight", PERIOD
     )
@@ -99,16 +102,13 @@ def run(options: Render) -> int:
 
 
 def _policy(options: Render) -> int:
-    """A video of a policy in flight."""
-    from importlib.util import find_spec
-
+    """A video of a policy in flight, with what its cameras see."""
     from e2efly.commands.watch import Watch, run
 
     path = Path(options.scene)
     out = options.out or Path("runs/render") / (path.parent.name if path.suffix else path.name)
     _make(out)
-    film = out / ("flight.webm" if find_spec("cv2") else "flight.gif")
-    return run(Watch(what=(options.scene,), seed=options.seed, video=film))
+    return run(Watch(what=(options.scene,), seed=options.seed, video=out / "flight.gif"))
 
 
 def viewpoint(options: Render, tour: Any) -> tuple[np.ndarray, np.ndarray]:

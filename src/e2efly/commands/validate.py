@@ -16,7 +16,7 @@ from e2efly.budget import check_time
 from e2efly.commands.policies import Asked, asked_of
 from e2efly.commands.rows import check_stress, report_stress
 from e2efly.config import TaskConfig
-from e2efly.storage import write_json
+from e2efly.storage import write_atomically, write_json
 from e2efly.terminal import Terminal, seconds
 from e2efly.vehicles import Controller
 from e2efly.zoo import beside
@@ -48,7 +48,7 @@ class Validate:
     max_drop: float = 2.0
     """Points of success by which the plant may lie under the training simulator; --stress has --least."""
     json: Path | None = None
-    """Write the report, with a row for every start, to this file."""
+    """Write the report, with a row for every start, to this file, and some flights beside it, for `e2efly watch`."""
     log: Path | None = None
     """Folder for a CSV log of each flight, for `e2efly identify flight`; not with --stress."""
     image: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
@@ -101,7 +101,8 @@ def run(asked: Asked) -> int:
     if options.stress:
         return _stress(options)
     from e2efly.validation.validate import validate
-    from e2efly.view.validation import plot_validation
+    from e2efly.view.kept import flights_file, packed
+    from e2efly.view.validation import flown_again, plot_validation
 
     o, console = options, Terminal()
     if o.flights < 0:
@@ -126,11 +127,13 @@ def run(asked: Asked) -> int:
         console.print(note, style="dim")
     console.print(_table(found))
     folder = _folder(o, found.candidate)
-    plot_validation(found, folder)
+    pairs = flown_again(found)
+    plot_validation(found, pairs, folder)
     console.print(f"Plots: {folder}")
     if o.json:
+        write_atomically(flights_file(o.json), packed(pairs))
         write_json(o.json, found.as_json())
-        console.print(f"Report: {o.json}")
+        console.print(f"Report: {o.json} (in a browser: e2efly watch {o.json})")
     if o.log:
         console.print(f"Logs: {o.log}")
     whole = _whole_flights(found, o.flights, console)

@@ -19,6 +19,8 @@ from e2efly.terminal import Terminal
 
 if TYPE_CHECKING:
     from e2efly.watch.frames import Source
+    from e2efly.watch.recording import Recording
+    from e2efly.watch.report import Shown
     from e2efly.watch.simulation import Simulation
     from e2efly.watch.training import Progress
 
@@ -36,7 +38,7 @@ FILM_S, FILM_HZ = 8.0, 25.0
 
 @dataclass(frozen=True)
 class Watch:
-    """Watch flights in a browser: a policy, live; a training as it goes; flight logs.
+    """Watch flights in a browser: a policy, live; a training as it goes; flight logs; a validation.
 
     A policy flies in the simulator: drag its goal, throw it, change wind, mass, thrust and delay while it flies. See
     docs/watch.md.
@@ -44,7 +46,8 @@ class Watch:
 
     what: tyro.conf.Positional[tuple[str, ...]]
     """A task (the zoo's policy of it), a policy.onnx, a run's folder; flight logs, as many as wanted: the first is
-    followed, the others are its ghosts; or a pose source, as of `e2efly fly`: udp:PORT, ros1:/topic, ..."""
+    followed, the others are its ghosts; a report of `e2efly validate --json`, or its folder: the policy on the plant,
+    and in the training simulator as its ghost; or a pose source, as of `e2efly fly`: udp:PORT, ros1:/topic, ..."""
     world: str | None = None
     """Of a pose source: a policy in whose world the vehicle is, which `--seed` draws, as `e2efly hil` does."""
     vehicle: str | None = None
@@ -86,6 +89,10 @@ def run(options: Watch) -> int:
     logs = _logs(o.what)
     if o.idle:
         be_idle()
+        from e2efly.watch.waiting import asked_for
+
+        if not asked_for(o.host, o.port, _abandoned):
+            return 0
     if o.video is not None:
         return _draw(o, o.video, logs, console)
     from e2efly.watch.viewer import serve
@@ -118,7 +125,7 @@ def _logs(what: tuple[str, ...]) -> list[Path]:
 
 def _serve(o: Watch, server: Any, logs: list[Path]) -> None:
     from e2efly.watch.loop import run as loop
-    from e2efly.watch.panels import Panel, hands_on, policies_on, times_on
+    from e2efly.watch.panels import Panel, hands_on, policies_on, starts_on, times_on
     from e2efly.watch.viewer import Viewer
 
     end = time.monotonic() + (np.inf if o.seconds is None else o.seconds)
@@ -126,9 +133,13 @@ def _serve(o: Watch, server: Any, logs: list[Path]) -> None:
     def over() -> bool:
         return time.monotonic() > end or (o.idle and _abandoned())
 
-    panel = Panel(Viewer(server, len(logs) or o.count, ghosts=len(logs) > 1))
-    if logs:
-        recording = _recording(o, logs)
+    report = _report(o.what)
+    count = len(logs) or (2 if report else o.count)
+    panel = Panel(Viewer(server, count, ghosts=count > 1 and bool(logs or report)))
+    if logs or report:
+        recording, starts = _reported(o, report) if report else (_recording(o, logs), ())
+        if starts:
+            starts_on(panel, recording, starts)
         between = times_on(panel, recording)
         loop(recording, panel.viewer, panel, over, between)
         return
@@ -136,10 +147,14 @@ def _serve(o: Watch, server: Any, logs: list[Path]) -> None:
         with _poses(o) as poses:
             loop(poses, panel.viewer, panel, over)
         return
+
+    def watched() -> bool:
+        return not o.idle or bool(server.get_clients())
+
     simulation, progress = _flown(o, Terminal())
     hands_on(panel, simulation)
     between = (lambda: None) if progress is None else policies_on(panel, progress)
-    loop(simulation, panel.viewer, panel, over, between)
+    loop(simulation, panel.viewer, panel, over, between, watched)
 
 
 def _abandoned() -> bool:
@@ -189,9 +204,10 @@ def _draw(o: Watch, path: Path, logs: list[Path], console: Terminal) -> int:
 
     check_film(path)
     if _is_source(o.what[0]):
-        raise ValueError(f"--video is {path}, of {o.what[0]}; accepted: of a policy, a run or flight logs")
-    if logs:
-        recording = _recording(o, logs)
+        raise ValueError(f"--video is {path}, of {o.what[0]}; accepted: of a policy, a run, a report or logs")
+    report = _report(o.what)
+    if logs or report:
+        recording = _reported(o, report)[0] if report else _recording(o, logs)
         source: Source = recording
         seconds = o.seconds or recording.length * recording.period
     else:
@@ -210,6 +226,37 @@ def _recording(o: Watch, logs: list[Path]) -> Any:
 
     vehicle = load_vehicle(o.vehicle) if o.vehicle else vehicle_of(logs[0]) or load_vehicle(USUAL)
     return Recording([read_flight(path, vehicle) for path in logs], vehicle)
+
+
+def _report(what: tuple[str, ...]) -> Path | None:
+    """The validation report that is to be watched; None: something else is."""
+    path = Path(what[0])
+    if path.suffix != ".json" and not path.is_dir():
+        return None
+    from e2efly.device import prepare
+
+    prepare("cpu")
+    from e2efly.watch.report import report_of
+
+    return report_of(path)
+
+
+def _reported(o: Watch, report: Path) -> "tuple[Recording, list[Shown]]":
+    """The first start of a report, of the criterion that is asked for, and all of them.
+
+    Raises:
+        ValueError: for a vehicle, which the report says; for a criterion that it does not have.
+    """
+    if o.vehicle is not None:
+        raise ValueError(f"--vehicle is {o.vehicle!r}; accepted: left out, as {report} says what flew")
+    from e2efly.watch.recording import Recording
+    from e2efly.watch.report import read_report
+
+    starts, vehicle = read_report(report)
+    criterion = _criterion(o.criterion, dict.fromkeys(start.criterion for start in starts))
+    first = next(start for start in starts if start.criterion == criterion)
+    starts.sort(key=lambda start: start.criterion != criterion)
+    return Recording(first.flights, vehicle, first.stage), starts
 
 
 def _flown(o: Watch, console: Terminal) -> "tuple[Simulation, Progress | None]":

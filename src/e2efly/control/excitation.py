@@ -11,7 +11,7 @@ import numpy as np
 
 from e2efly.control.cascade import Ctbr, Motion, limited, reach
 from e2efly.control.vectors import Vec3
-from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 DURATION = 30.0
 """Of all of it, s."""
@@ -31,6 +31,9 @@ CHIRPED = (2.0, 2.0, 1.5)
 """Amplitudes of the chirps of body rate, rad/s; that of thrust is `THRUST`."""
 YAWS = (0.8, -0.8, 0.0)
 """Headings that are stepped to, rad from the first."""
+KICK, KICK_EVERY, FALL = 0.85, 1.1, 8.0
+"""Meanwhile the thrust is kicked to this share of the largest, so often, s, and the climb is then undone by so much
+less thrust over mass, m/s^2: what the motors give at the top shows nowhere else."""
 STOPPING, CENTRAL = 0.42, 0.25
 """Share of the room's length that stopping may take, and that the centre stays away from its edges."""
 PULL, PULLED = 0.8, 1.0
@@ -152,7 +155,7 @@ class Progress:
 def excite(
     vehicle: Vehicle, room: Room, speed: float, duration: float, before: Progress, time: float, motion: Motion
 ) -> tuple[Progress, Ctbr]:
-    """One control step: lines with doublets, then chirps, then steps of the heading. Pure.
+    """One control step: lines with doublets, then chirps, then steps of the heading with kicks of the thrust. Pure.
 
     Args:
         vehicle: whose gains steer.
@@ -183,6 +186,7 @@ def excite(
     elif share < LINES + CHIRPS:
         rates, push = chirps((share - LINES) * duration, CHIRPS * duration)
     else:
+        push = kicks((share - LINES - CHIRPS) * duration, kick_for(vehicle, room))
         yaw += YAWS[min(int((share - LINES - CHIRPS) / (1 - LINES - CHIRPS) * len(YAWS)), len(YAWS) - 1)]
     # whatever is flown: what would come to rest outside flies inwards
     wanted = np.where(stop > room.high, np.minimum(wanted, -INWARDS), wanted)
@@ -191,6 +195,25 @@ def excite(
     found = reach(vehicle, motion, Vec3(*wanted), np.float64(yaw))
     command = limited(vehicle, max(float(found.thrust) + trim + push, 0.0), found.rate + Vec3(*rates))
     return Progress(before.centre, before.yaw, leg, since, trim, time), command
+
+
+def kick_for(vehicle: Vehicle, room: Room) -> float:
+    """How much thrust over mass a kick adds to hover's, m/s^2: as much as the room's height lets be stopped from."""
+    largest = 4 * float(vehicle.thrust_range[1]) / float(vehicle.mass)
+    return float(np.clip(KICK * largest - GRAVITY, 0.0, room.fastest[2] / PULSE))
+
+
+def kicks(time: float, height: float) -> float:
+    """What is added to the thrust over mass, m/s^2: up for `PULSE` seconds, then down until the climb is undone.
+
+    Args:
+        time: since the first was due, s; it begins when `KICK_EVERY` has passed for a third.
+        height: of a kick, m/s^2.
+    """
+    phase = (time + 2 * KICK_EVERY / 3) % KICK_EVERY
+    if time < KICK_EVERY / 3:
+        return 0.0
+    return height if phase < PULSE else -FALL if phase < PULSE * (1 + height / FALL) else 0.0
 
 
 def chirps(time: float, duration: float) -> tuple[np.ndarray, float]:

@@ -253,7 +253,8 @@ class Bridge:
             if (force := self.estimate.inertial.force) is not None:
                 self.imu = Imu(measured.gyro, force)
                 if sent is not None and flying and not flight.blind:
-                    self.map = learn(self.map, sent, force, inputs.voltage, 0.02)
+                    swing = self._history.swing(asked)
+                    self.map = learn(self.map, sent, force, inputs.voltage, 0.02, swing)
 
         def lift(moment: float) -> tuple[float, float] | None:
             sent = self._history.felt(moment)

@@ -4,10 +4,12 @@ import gc
 import math
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from e2efly.control import Ctbr
 from e2efly.deploy.betaflight.controller import ControllerInfo
@@ -30,8 +32,9 @@ PLAN_RATES = tuple(0.5 * i for i in range(-6, 7))
 """Body rates, rad/s, of the watchdog's tables."""
 SWITCH_S = 1e-4
 """How long another thread of the process may hold up the loop, s; 5 ms is the interpreter's own."""
-LOOP_PRIORITY, POLICY_PRIORITY = 10, 9
-"""Real-time priorities; the watchdog stands above them."""
+LOOP_PRIORITY, POLICY_PRIORITY, OTHER_PRIORITY = 10, 9, 8
+"""Real-time priorities; the watchdog stands above them. Every other thread of the process has one, too: each holds the
+interpreter's lock at times, and the loop would wait for it while another process has its core."""
 STATUS_PERIOD = 1.0
 """How often a line of status is told, s."""
 TAKEN = "; it keeps the link until you disarm: then end this by Ctrl-C and start it anew"
@@ -186,7 +189,8 @@ def _status(bridge: Bridge) -> str:
 @contextmanager
 def _no_pauses(bridge: Bridge) -> Iterator[None]:
     """No garbage collection in flight, threads that give way at once, real-time scheduling where it is allowed."""
-    threads = {0: LOOP_PRIORITY}
+    threads: dict[int, int | None] = dict.fromkeys(_threads(), OTHER_PRIORITY)
+    threads[threading.get_native_id()] = LOOP_PRIORITY
     if bridge.worker is not None and bridge.worker.native_id is not None:
         threads[bridge.worker.native_id] = POLICY_PRIORITY
     before = sys.getswitchinterval()
@@ -198,10 +202,18 @@ def _no_pauses(bridge: Bridge) -> Iterator[None]:
     try:
         yield
     finally:
-        _schedule(dict.fromkeys(threads))
+        _schedule(dict.fromkeys(_threads()))
         gc.enable()
         gc.unfreeze()
         sys.setswitchinterval(before)
+
+
+def _threads() -> list[int]:
+    """Of this process, as the operating system knows them."""
+    try:
+        return [int(thread.name) for thread in Path("/proc/self/task").iterdir()]
+    except OSError:
+        return [threading.get_native_id()]
 
 
 def _schedule(threads: Mapping[int, int | None]) -> None:

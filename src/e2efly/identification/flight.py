@@ -24,6 +24,8 @@ EXACT_ELSE = 0.15
 STRUCTURE = {"thrust_map": 0.002, "inertia": 0.004, "rate_gain": 0.01, "motor_time_constant": 0.01, "latency": 3e-4}
 """Spread of what is found over models that differ in what no log shows: how often the flight controller acts, how the
 accelerometer is filtered; s of the delay, else relative."""
+MOTOR_STRUCTURE = STRUCTURE | {"thrust_map": 0.01, "inertia": 0.015}
+"""The same where motor outputs drive: how thrust rises with them is a guess, and so is the accelerometer's filter."""
 SLOW_STRUCTURE = STRUCTURE | {"thrust_map": 0.015, "motor_time_constant": 0.05}
 """The same where motor outputs come so seldom that they are held between."""
 HELD_OUT = 5
@@ -304,7 +306,7 @@ def sigmas(model: Model, found: Fit) -> np.ndarray:
     in squares over it what the model itself may be off by (`STRUCTURE`).
     """
     noise = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
-    structure = SLOW_STRUCTURE if model.driver == "motor_and_rate" else STRUCTURE
+    structure = {"motor": MOTOR_STRUCTURE, "motor_and_rate": SLOW_STRUCTURE}.get(model.driver, STRUCTURE)
     return np.hypot(noise, [structure.get(u.field, 0.0) for u in model.unknowns])
 
 

@@ -74,14 +74,18 @@ rad/s, over ten."""
 NUISANCES: tuple[tuple[str, float], ...] = (
     ("gyro_x", 0.05), ("gyro_y", 0.05), ("gyro_z", 0.05), ("force_x", 0.5), ("force_y", 0.5), ("force_z", 0.3),
     ("pose_delay", 0.05), ("tilt_x", 0.03), ("tilt_y", 0.03), ("sag", 0.1), ("flight_thrust", 0.03),
-    ("uneven_roll", 0.1), ("uneven_pitch", 0.1), ("uneven_yaw", 0.1),
+    ("uneven_roll", 0.1), ("uneven_pitch", 0.1), ("uneven_yaw", 0.1), ("force_filter", 0.7),
 )  # fmt: skip
 """Of each flight, with the standard deviation of their priors: biases of gyroscope (rad/s) and accelerometer (m/s^2),
 delay of the pose source (s), tilt of its body's axes (rad), share of the thrust lost by the end, of several flights the
 logarithm of the factor on the thrust of this one, and the share by which rotors pull more than the others on the left,
-at the rear, and among those of positive spin: worn propellers, or a centre of mass beside the middle."""
-GYRO, FORCE, LOST, FACTOR, UNEVEN = slice(0, 3), slice(3, 6), 9, 10, slice(11, 14)
-"""Places in `NUISANCES`: of the biases, and of what acts on the thrust."""
+at the rear, and among those of positive spin: worn propellers, or a centre of mass beside the middle. The last is the
+logarithm of the accelerometer's filter over `FORCE_FILTER`."""
+GYRO, FORCE, LOST, FACTOR, UNEVEN, FILTERED = slice(0, 3), slice(3, 6), 9, 10, slice(11, 14), 14
+"""Places in `NUISANCES`: of the biases, of what acts on the thrust, and of the accelerometer's filter."""
+FORCE_FILTER = 0.011
+"""Time constant of each of the two stages by which a flight controller filters its accelerometer, s: together as late
+as Betaflight's own filter of 10 Hz. Not told of it, a fit takes the thrust to rise less with the motor outputs."""
 START = 16
 """Numbers of a window's start: position, velocity, attitude, body rate, rotor speeds (as a share of hover's)."""
 
@@ -179,9 +183,10 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
     added = {
         name: p[places[name]] if name in places else 0.0 for name in ("motor_curve", "motor_idle", "rotor_inertia")
     }
-    spun = window["rotor_speed"]
+    spun, asked = window["rotor_speed"], None
     if model.driver in _MOTORS:  # nobody measured the speeds at the start: what the outputs before it have led to
-        spun = _spun_up(plant, jnp.stack(_driven_speed(model, split4(before[:, :4]), added), -1))
+        asked = jnp.stack(_driven_speed(model, split4(before[:, :4]), added), -1)
+        spun = _spun_up(plant, asked)
     first = State(
         window["position"] + start[:3],
         window["velocity"] + start[3:6],
@@ -221,7 +226,40 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
         begin = dataclasses.replace(begin, rotor_speed=split4(acting[0]))
     _, later = jax.lax.scan(advance, begin, acting)
     whole = jax.tree.map(lambda a, b: jnp.concatenate([jnp.asarray(a)[None], b]), begin, later)
-    return _sensed(plant, whole, q)
+    seen = _sensed(plant, whole, q)
+    if asked is not None and model.driver == "motor":
+        spun_up, turning = _spinning(plant, asked), jnp.stack(whole.rotor_speed, -1)
+        thrust = _collective(plant, jnp.concatenate([spun_up, turning]))
+        less = (thrust - _filtered(thrust, q))[len(spun_up) :] * plant.specific
+        seen["specific_force"] -= less[:, None] * jnp.array([0.0, 0.0, 1.0])
+    return seen
+
+
+def _collective(plant: Plant, rotor_speed: Array) -> Array:
+    """Thrust of all rotors, N, (t,), of their speeds, (t, 4)."""
+    return rotor_wrench(plant, rotor_thrust(plant, split4(rotor_speed)))[0]
+
+
+def _spinning(plant: Plant, asked: Array) -> Array:
+    """Rotor speeds under first-order lag towards what was asked for in each step, from rest at the first, (t, 4)."""
+
+    def follow(speed: Array, wanted: Array) -> tuple[Array, Array]:
+        speed = wanted + (speed - wanted) * plant.decay
+        return speed, speed
+
+    return jax.lax.scan(follow, asked[0], asked)[1]
+
+
+def _filtered(force: Array, q: Array) -> Array:
+    """A force, (t,), as the accelerometer's filter lets it through."""
+    kept = jnp.exp(-STEP / (FORCE_FILTER * jnp.exp(q[FILTERED])))
+
+    def follow(stages: tuple[Array, Array], value: Array) -> tuple[tuple[Array, Array], Array]:
+        first = value + (stages[0] - value) * kept
+        second = first + (stages[1] - first) * kept
+        return (first, second), second
+
+    return jax.lax.scan(follow, (force[0], force[0]), force)[1]
 
 
 def _driven_speed(model: Model, output: tuple[Array, ...], added: dict[str, Any]) -> Any:

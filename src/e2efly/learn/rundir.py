@@ -1,13 +1,12 @@
 """The run directory: everything needed to reproduce a run and to fly its policy.
 
 config.json  versions.json  inputs.json  inputs/  metrics.csv  events/  checkpoint.safetensors  history/  plots/
-policy.onnx  summary.json
+policy.onnx  summary.json  published/
 """
 
 import csv
 import dataclasses
 import io
-import json
 import platform
 import reprlib
 import shutil
@@ -22,15 +21,15 @@ from e2efly.config import ALGORITHMS, EnvConfig, TrainConfig
 from e2efly.config.reading import read
 from e2efly.learn.inputs import Kept, by_content, content_of, input_files, replaced, sha256, value_at
 from e2efly.presets import preset
-from e2efly.storage import held, write_atomically, write_json
+from e2efly.storage import held, read_json, write_atomically, write_json
 from e2efly.tasks import TASKS
 
 _FILES = (
     "config.json", "versions.json", "inputs.json", "metrics.csv", "checkpoint.safetensors", "policy.onnx",
     "policy.images.npz", "summary.json",
 )  # fmt: skip
-_FOLDERS = ("inputs", "events", "history", "plots")
-"""All that a run writes into its folder."""
+_FOLDERS = ("inputs", "events", "history", "plots", "published")
+"""All that a run, or `e2efly publish` of it, writes into its folder."""
 _PACKAGES = ("e2efly", "jax", "jaxlib", "numpy", "optax", "onnx", "onnxruntime")
 
 
@@ -170,15 +169,7 @@ class RunDirectory:
         Raises:
             ValueError: when it is missing, no JSON, or JSON of something else than an object.
         """
-        try:
-            found = json.loads((self.path / name).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise ValueError(f"{self.path / name} cannot be read: {error}") from None
-        except RecursionError:
-            raise ValueError(f"{self.path / name} cannot be read: it is nested too deeply") from None
-        if not isinstance(found, dict):
-            raise ValueError(f"{self.path / name} is {reprlib.repr(found)}; accepted: an object")
-        return found
+        return read_json(self.path / name)
 
     def config(self, names_vehicle: bool = False) -> TrainConfig:
         """The configuration of the run, with its own copies of the files that it is made from.

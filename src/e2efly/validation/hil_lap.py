@@ -114,6 +114,9 @@ class Lap:
     """From the arrival of the newest pose at the HIL node to the image, s."""
     image_age: Spread = Spread()
     """At the policy, s."""
+    to_stick: Spread = Spread()
+    """From the moment at which a control step that sees was due to its sticks: what they come later than the image's
+    age, s."""
     pose_age: Spread = Spread()
     """At the bridge's control steps of the policy's flight, s."""
     lateness: Spread = Spread()
@@ -140,7 +143,7 @@ class Lap:
 
     def as_json(self) -> dict[str, Any]:
         """All but the track."""
-        spreads = ("pose_to_image", "image_age", "pose_age", "lateness", "behind")
+        spreads = ("pose_to_image", "image_age", "to_stick", "pose_age", "lateness", "behind")
         return {
             **{name: getattr(self, name) for name in (
                 "seed", "kill", "success", "told", "nearest", "policy_s", "top_speed", "reaction",
@@ -290,6 +293,7 @@ def lap_of(
         max(end - begin, 0.0) if math.isfinite(begin) else 0.0, judged.top_speed, changes,
         pose_to_image=Spread.of(told.get("pose_to_image_s", [])),
         image_age=Spread.of(steps.numbers("image_age", width)) if width else Spread(),
+        to_stick=Spread.of(_to_stick(log)) if width else Spread(),
         pose_age=Spread.of(ages),
         lateness=Spread.of(timing.numbers("lateness_s")[1e-9 * timing.stamp - shift >= up] if len(timing) else []),
         behind=Spread.of(on),
@@ -297,6 +301,15 @@ def lap_of(
         touch_speed=touch[0], touch_sink=touch[2],
         problems=tuple(heard.problems), truth=motion, window=(begin, end),
     )  # fmt: skip
+
+
+def _to_stick(log: FlightLog) -> np.ndarray:
+    """Lateness and work of the rounds in which the policy was asked, s."""
+    steps, timing = log["policy"], log["timing"]
+    if not len(timing):
+        return np.zeros(0)
+    asked = np.isin(timing.stamp, steps.stamp)
+    return (timing.numbers("lateness_s") + timing.numbers("work_s"))[asked]
 
 
 def _window(changes: tuple[Change, ...], heard: Heard) -> tuple[float, float]:

@@ -30,8 +30,9 @@ TAKEN = "the watchdog has taken over"
 """The bridge's word on that."""
 SINK = 0.5
 """Speed at which a pilot without a bridge comes down, m/s."""
-_LIFT, _CLIMB_GAIN, _BRAKE = 0.1, 0.25, 0.12
-"""Of his throttle stick: where the vehicle about hovers; per m/s; of the others per m/s."""
+_LIFT, _CLIMB_GAIN, _LIFT_GAIN, _BRAKE = 0.1, 0.25, 0.2, 0.12
+"""Of his throttle stick: where it is at first; per m/s; per metre, by which he finds where the vehicle hovers; of the
+others per m/s."""
 
 
 Victim = Literal["mocap", "hil", "bridge", "watchdog"]
@@ -255,17 +256,19 @@ class Room:
 
     def land_by_hand(self, seconds: float) -> bool:
         """Take the vehicle over and land it, as a pilot who looks at it; whether it stands within so long."""
-        end = time.monotonic() + seconds
+        last, lift = time.monotonic(), _LIFT
+        end = last + seconds
         self.set(override=False, mission="land")
-        while time.monotonic() < end:
+        while (now := time.monotonic()) < end:
             state = self.set()
             if state["standing"]:
                 self.set(throttle=-1.0, roll=0.0, pitch=0.0)
                 return True
             (u, v, w), yaw = state["velocity"], state["yaw"]
             ahead, left = math.cos(yaw) * u + math.sin(yaw) * v, math.cos(yaw) * v - math.sin(yaw) * u
+            lift, last = _stick(lift - _LIFT_GAIN * (w + SINK) * (now - last)), now
             self.set(
-                throttle=_stick(_LIFT - _CLIMB_GAIN * (w + SINK)),
+                throttle=_stick(lift - _CLIMB_GAIN * (w + SINK)),
                 pitch=_stick(-_BRAKE * ahead),
                 roll=_stick(_BRAKE * left),
             )

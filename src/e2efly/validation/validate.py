@@ -123,6 +123,7 @@ class Validation:
             "baseline": self.candidate.baseline,
             "vehicle": self.candidate.vehicle,
             "controller": self.candidate.controller,
+            "changed": {name: value for name, (_, value) in self.candidate.changes.items()},
             "plant": plant,
             "latency_s": self.candidate.latency,
             "seed": self.seed,

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -38,6 +38,9 @@ SENSORS = {
     "normal": "Surface normal",
 }
 """What a camera sees, and its title."""
+DARK, BRIGHT, LONGEST = 0.25, 0.4, 3.0
+"""Median of the colours below which a world is dark, that to which its pictures are exposed then, and the largest
+factor for that."""
 TILE = 16
 """Rows and columns of images are multiples of it: the ray caster's tiles."""
 
@@ -96,6 +99,7 @@ def look_around(
     position: np.ndarray,
     quaternion: np.ndarray,
     channels: tuple[str, ...] = CHANNELS,
+    exposed: float = 1.0,
 ) -> Sight:
     """Everything that a camera on a vehicle in a world sees.
 
@@ -106,6 +110,7 @@ def look_around(
         position: of the vehicle, world, m.
         quaternion: of the vehicle, body to world.
         channels: of `CHANNELS`; where depth is among them, range comes with it.
+        exposed: factor on the colours; what gets brighter than white is white.
     """
     when, *place = (jnp.asarray(x, jnp.float32) for x in (time, position, quaternion))
     if isinstance(scene, MeshScene):
@@ -115,11 +120,25 @@ def look_around(
     images, rays, origin = jax.tree.map(np.asarray, found)
     images = {name: image[0] for name, image in images.items()}
     length = np.linalg.norm(rays, axis=-1)
+    if "rgb" in images:
+        images["rgb"] = np.minimum(exposed * images["rgb"], 1.0)
     if "depth" in images:
         near, far = camera.reach
         for name, metres in (("range", images["depth"] * length), ("depth", images["depth"])):
             images[name] = np.where(metres < near, 0.0, np.minimum(metres, far))
     return Sight(camera, images, rays / length[..., None], origin)
+
+
+def exposure(pictures: Iterable[np.ndarray]) -> float:
+    """How much longer than usual a camera exposes in a world, for all pictures of it alike; 1 where it is not dark.
+
+    Under a roof there is no sun, and what light remains leaves most of a picture nearly black.
+
+    Args:
+        pictures: RGB in [0, 1], (h, w, 3), of some places in it.
+    """
+    usual = float(np.median([picture.mean(axis=-1) for picture in pictures]))  # the sky in a window does not count much
+    return 1.0 if usual >= DARK else min(BRIGHT / max(usual, 1e-6), LONGEST)
 
 
 def in_colours(name: str, image: np.ndarray, far: float) -> np.ndarray:

@@ -18,6 +18,7 @@ from e2efly.validation.reality import Reality
 from e2efly.validation.validate import Validation
 from e2efly.vehicles import load_vehicle
 from e2efly.view.flights import Flights
+from e2efly.view.kept import PLACES, Pair
 from e2efly.view.scene import scene
 from e2efly.view.style import BLUE, GREY, VERMILLION, figure
 
@@ -103,22 +104,15 @@ def _space(ax: Axes, places: list, things: list[Thing], axes: tuple[int, int]) -
     ax.set_aspect("equal", adjustable="datalim")
 
 
-def plot_validation(found: Validation, folder: Path) -> None:
-    """Fly some starts by the same runtime in the training simulator, and lay both places over each other.
-
-    Raises:
-        OSError: when the folder cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OSError(f"cannot make the folder of the plots {folder}: {error.strerror}") from error
-    flew, plant = found.candidate, found.plant.name
+def flown_again(found: Validation) -> dict[str, Pair]:
+    """Some starts of each criterion, failures first, on the plant and by the same runtime in the training simulator."""
+    flew = found.candidate
     contract = flew.policy.contract
     nominal = flew.flown.body if contract.vehicle_ranges else load_vehicle(flew.env.vehicle)
+    pairs = {}
     for name, suite in flew.task.criteria().items():
         v = found.criteria[name]
-        shown = [int(i) for i in np.argsort(v.flown.success, kind="stable")[:DRAWN]]  # failures first
+        shown = [int(i) for i in np.argsort(v.flown.success, kind="stable")[:DRAWN]]
         home = Reality(nominal, contract.latency_of(nominal))
         env = flew.at_home.environment(suite)
         sights = v.starts.sights(env, found.seed)
@@ -127,11 +121,33 @@ def plot_validation(found: Validation, folder: Path) -> None:
         again = fly_all(mission, asked, processes=1)
         verdicts = judge(env, v.starts.of(shown), again)
         there = [v.flights[i] for i in shown]
-        flown = {
-            "training simulator": _flights(flew.policy, again, verdicts.duration, verdicts.success),
-            plant: _flights(flew.policy, there, v.flown.duration[shown], v.flown.success[shown]),
-        }
-        plot_overlay(suite, flown, folder / f"{plant}_{name}.png", f"{name} on {contract.vehicle}: {plant}")
+        flown = (
+            _flights(flew.policy, again, verdicts.duration, verdicts.success),
+            _flights(flew.policy, there, v.flown.duration[shown], v.flown.success[shown]),
+        )
+        pairs[name] = Pair(np.array(shown), dict(zip(PLACES, flown, strict=True)))
+    return pairs
+
+
+def plot_validation(found: Validation, pairs: Mapping[str, Pair], folder: Path) -> None:
+    """Lay the flights of either place over each other, a picture for each criterion.
+
+    Args:
+        found: the validation.
+        pairs: of `flown_again`.
+        folder: of the pictures; made where it is not there.
+
+    Raises:
+        OSError: when the folder cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"cannot make the folder of the plots {folder}: {error.strerror}") from error
+    plant, vehicle = found.plant.name, found.candidate.policy.contract.vehicle
+    for name, suite in found.candidate.task.criteria().items():
+        flown = dict(zip(("training simulator", plant), pairs[name].flown.values(), strict=True))
+        plot_overlay(suite, flown, folder / f"{plant}_{name}.png", f"{name} on {vehicle}: {plant}")
 
 
 def _flights(policy: Acting, flights: list[Any], duration: np.ndarray, success: np.ndarray) -> Any:

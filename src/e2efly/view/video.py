@@ -13,12 +13,14 @@ from PIL import Image, ImageDraw, ImageFont
 from e2efly.config import CameraConfig
 from e2efly.scenes.meshes.scene import MeshScene
 from e2efly.scenes.scene import Scene
-from e2efly.view.images import in_colours, look_around, shape_of
+from e2efly.view.images import exposure, in_colours, look_around, shape_of
 from e2efly.view.tour import Tour
 
 PANELS = {"rgb": "Colour", "depth": "Depth", "label": "Class"}
 HEAD, GAP = 20, 6
 """Room of a title over a panel, and between panels, pixels."""
+LOOKS = 5
+"""Places of a flight by which its camera is exposed."""
 FILMS = (".gif", ".mp4", ".webm", ".png")
 """Endings of the names of what `write_film` writes."""
 STRETCHED = 3.0
@@ -27,7 +29,16 @@ STRETCHED = 3.0
 Frame = UInt8[np.ndarray, "h w 3"]
 
 
-def frames(camera: CameraConfig, scene: Scene | MeshScene, tour: Tour, width: int) -> Iterator[Frame]:
+def exposure_of(camera: CameraConfig, scene: Scene | MeshScene, tour: Tour) -> float:
+    """For `frames`: how a camera on this flight is exposed, see `e2efly.view.images.exposure`."""
+    rows = np.linspace(0, len(tour.time) - 1, LOOKS).astype(int)
+    places = zip(tour.time[rows], tour.position[rows], tour.quaternion[rows], strict=True)
+    return exposure(look_around(camera, scene, *place, tuple(PANELS)).images["rgb"] for place in places)
+
+
+def frames(
+    camera: CameraConfig, scene: Scene | MeshScene, tour: Tour, width: int, exposed: float = 1.0
+) -> Iterator[Frame]:
     """The flight, frame by frame.
 
     Args:
@@ -35,11 +46,12 @@ def frames(camera: CameraConfig, scene: Scene | MeshScene, tour: Tour, width: in
         scene: one world.
         tour: the flight.
         width: of a panel, pixels.
+        exposed: factor on the colours.
     """
     high, wide = shape_of(camera)
     size = (width, max(round(width * high / wide), 24))
     for time, position, quaternion in zip(tour.time, tour.position, tour.quaternion, strict=True):
-        images = look_around(camera, scene, time, position, quaternion, tuple(PANELS)).images
+        images = look_around(camera, scene, time, position, quaternion, tuple(PANELS), exposed).images
         pictures = {name: in_colours(name, images[name], camera.reach[1]) for name in PANELS}
         yield compose(pictures, size, f"{time:.1f} s", stacked=wide > STRETCHED * high)
 

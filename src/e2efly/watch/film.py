@@ -4,13 +4,13 @@ Light is a hemisphere's: a face is bright by how far it looks up and towards the
 """
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 
 from e2efly.drawing import Face, Line
 from e2efly.scenes.faces import box, cylinder
@@ -34,6 +34,8 @@ from e2efly.watch.shapes import (
 
 SIZE = (360, 640)
 """Rows and columns of a picture."""
+MARGIN = 8
+"""About an image of a camera, pixels."""
 SPREAD = 0.55
 """Half of the vertical field of view over the distance."""
 GROUND, GRID = np.array([236, 238, 240]) / 255, np.array([0.72, 0.74, 0.77])
@@ -109,17 +111,39 @@ def picture(soup: Soup, eye: np.ndarray, look_at: np.ndarray, ground: bool, size
     return np.rint(255 * seen).astype(np.uint8).reshape(rows, columns, 3)
 
 
+def beside(seen: UInt8[np.ndarray, "h w 3"], eyes: Mapping[str, np.ndarray]) -> UInt8[np.ndarray, "h v 3"]:
+    """A picture with images of cameras at its right, one under the other, as large as there is room.
+
+    Args:
+        seen: the picture.
+        eyes: by name, RGB or grey in [0, 1]; none: the picture stays as it is.
+    """
+    if not eyes:
+        return seen
+    rows, columns = seen.shape[:2]
+    high, wide = rows // len(eyes), columns // 2
+    strip = np.full((rows, wide, 3), np.rint(255 * np.array(SKY)), np.uint8)
+    for i, image in enumerate(eyes.values()):
+        h, w = image.shape[:2]
+        times = min((high - 2 * MARGIN) / h, (wide - 2 * MARGIN) / w)
+        across, down = (np.arange(int(times * n)) / times for n in (w, h))
+        large = np.rint(255 * np.clip(image, 0, 1)).astype(np.uint8)[down.astype(int)][:, across.astype(int)]
+        top, left = i * high + (high - len(down)) // 2, (wide - len(across)) // 2
+        strip[top : top + len(down), left : left + len(across)] = large if image.ndim == 3 else large[..., None]
+    return np.concatenate([seen, strip], axis=1)
+
+
 def film(
     source: Source, seconds: float, rate: float, camera: str = "follow", size: tuple[int, int] = SIZE
 ) -> Iterator[Any]:
-    """Pictures of a source, (h, w, 3) uint8.
+    """Pictures of a source, (h, w, 3) uint8, with what the first vehicle's cameras see beside them.
 
     Args:
         source: of the frames; the first vehicle is followed.
         seconds: of the flight.
         rate: pictures per second of the flight.
         camera: of `viewer.CAMERAS`; the one that stays looks at the first vehicle from where that began.
-        size: rows and columns.
+        size: rows and columns, without the cameras'.
     """
     first = source.stage_of(0)
     stage, still, shape = first, _standing(first), quadrotor(first.vehicle)
@@ -150,11 +174,12 @@ def film(
         ahead = turned(frame.quaternion[0], np.array([1.0, 0.0, 0.0]))
         match camera:
             case "first person":
-                yield picture(soup, here + NOSE * ahead, here + ahead, stage.ground, size)
+                place = here + NOSE * ahead, here + ahead
             case "orbit":
-                yield picture(soup, eye, here, stage.ground, size)
+                place = eye, here
             case _:
-                yield picture(soup, here + BEHIND, here, stage.ground, size)
+                place = here + BEHIND, here
+        yield beside(picture(soup, *place, stage.ground, size), frame.images)
 
 
 def _standing(stage: Stage) -> Soup:

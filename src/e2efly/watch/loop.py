@@ -10,7 +10,7 @@ from e2efly.watch.viewer import Viewer
 FASTEST = 1 / 33
 """Frames are shown no sooner after each other than this, s."""
 IDLE_S = 0.05
-"""Between two looks at the wishes while the flight is paused, s."""
+"""Between two looks at the wishes while the flight is paused, or while nobody looks at it, s."""
 
 
 def run(
@@ -19,6 +19,7 @@ def run(
     panel: Panel,
     until: Callable[[], bool] = lambda: False,
     between: Callable[[], None] = lambda: None,
+    watched: Callable[[], bool] = lambda: True,
 ) -> None:
     """Show a source until Ctrl-C.
 
@@ -28,12 +29,13 @@ def run(
         panel: of the controls.
         until: whether it is to end; asked before every frame.
         between: called before every frame.
+        watched: whether anybody looks; the source rests while nobody does.
     """  # fmt: skip
     due, shown, elapsed = time.monotonic(), 0.0, 0.0
     while not until():
         panel.fulfil()
         between()
-        if panel.paused:
+        if panel.paused or not watched():
             time.sleep(IDLE_S)
             due = time.monotonic()
             continue

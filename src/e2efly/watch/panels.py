@@ -1,7 +1,7 @@
 """The page's panel: buttons, sliders, pictures and plots. What people do is told to the loop as functions to call."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from queue import SimpleQueue
@@ -14,6 +14,7 @@ from e2efly.watch.viewer import CAMERAS, Viewer
 
 if TYPE_CHECKING:
     from e2efly.watch.recording import Recording
+    from e2efly.watch.report import Shown
     from e2efly.watch.simulation import Simulation
     from e2efly.watch.training import Progress
 
@@ -238,8 +239,11 @@ def times_on(panel: Panel, recording: "Recording") -> Callable[[], None]:
     Returns:
         What is to be called between frames: it moves the slider on.
     """
-    end = round(recording.length * recording.period, 2)
-    slider = panel.viewer.server.gui.add_slider("Time (s)", min=0.0, max=max(end, 0.1), step=0.05, initial_value=0.0)
+
+    def end() -> float:
+        return max(round(recording.length * recording.period, 2), 0.1)
+
+    slider = panel.viewer.server.gui.add_slider("Time (s)", min=0.0, max=end(), step=0.05, initial_value=0.0)
     moved = [0.0]
 
     def seek(event: Any) -> None:
@@ -254,6 +258,26 @@ def times_on(panel: Panel, recording: "Recording") -> Callable[[], None]:
         now = recording.at * recording.period
         if abs(now - moved[0]) > 0.25:
             moved[0] = now
-            slider.value = min(now, end)
+            slider.value = min(now, slider.max)
+        if slider.max != end():  # another start
+            slider.value = min(now, end())
+            slider.max = end()
 
     return between
+
+
+def starts_on(panel: Panel, recording: "Recording", starts: "Sequence[Shown]") -> None:
+    """Add a choice of the start of a report whose flights are shown.
+
+    Args:
+        panel: of the page.
+        recording: of the first of them.
+        starts: of the report.
+    """
+    by_name = {start.name: start for start in starts}
+    choice = panel.viewer.server.gui.add_dropdown("Start", tuple(by_name), initial_value=starts[0].name)
+
+    def choose(name: str) -> None:
+        recording.fly(by_name[name].flights, by_name[name].stage)
+
+    choice.on_update(lambda _: panel.wishes.put(partial(choose, choice.value)))

@@ -1,7 +1,7 @@
 """Flights that were recorded: one log, or several side by side, as ghosts of each other."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -58,29 +58,42 @@ def read_flight(path: Path, vehicle: Vehicle) -> Flight:
     if found is None:
         there = sorted({name for record in records for name in record.streams}) or ["nothing"]
         raise ValueError(f"{path}: has no poses ({', '.join(there)}); accepted: a log with position and quaternion")
-    begin, end = found.streams["position"].time[[0, -1]]
-    time = np.arange(begin, end, PERIOD)
+    streams = {name: (s.time, s.values) for name, s in found.streams.items() if found.has(name)}
+    if "rotor_speed" not in streams and "motor" in streams:
+        time, share = streams["motor"]
+        streams["rotor_speed"] = time, share * float(np.max(vehicle.rotor_speed_max))
+    if "setpoint" in streams:
+        streams["command"] = streams["setpoint"]
+    flight = even(path.name, streams)
+    if path.suffix == ".mcap":
+        goal, notes = _told(path, PERIOD * np.arange(len(flight.position)))
+        flight = replace(flight, goal=goal, notes=notes)
+    return flight
+
+
+def even(name: str, streams: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Flight:
+    """A flight at even times, from the first to the last of its positions.
+
+    Args:
+        name: of the flight.
+        streams: times, (n,) s, and values, (n, k): position and quaternion; velocity, rotor_speed, goal, command and
+            body_rate where they are known, of which the last columns count.
+    """
+    begin, end = streams["position"][0][[0, -1]]
+    time = np.arange(begin, max(end, begin + PERIOD), PERIOD)
 
     def at(name: str, width: int, missing: float = np.nan) -> np.ndarray:
-        if not found.has(name):
+        if name not in streams:
             return np.full((len(time), width), missing)
-        stream = found.streams[name]
-        return np.column_stack([np.interp(time, stream.time, column) for column in stream.values.T[-width:]])
+        when, values = streams[name]
+        return np.column_stack([np.interp(time, when, column) for column in values.T[-width:]])
 
-    position = at("position", 3)
-    flown = np.gradient(position, PERIOD, axis=0) if len(time) > 1 else np.zeros_like(position)
-    quaternion = at("quaternion", 4)
+    position, quaternion = at("position", 3), at("quaternion", 4)
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
-    rotors = at("rotor_speed", 4, 0.0)
-    if not found.has("rotor_speed"):
-        rotors = at("motor", 4, 0.0) * float(np.max(vehicle.rotor_speed_max))
-    rate = "setpoint" if found.has("setpoint") else "command"
-    goal, notes = np.full((len(time), 3), np.nan), list[tuple[float, str]]()
-    if path.suffix == ".mcap":
-        goal, notes = _told(path, time - begin)
+    flown = np.gradient(position, PERIOD, axis=0) if len(time) > 1 else np.zeros_like(position)
     return Flight(
-        path.name, position, quaternion, at("velocity", 3) if found.has("velocity") else flown, rotors, goal,
-        at(rate, 3), at("body_rate", 3), notes,
+        name, position, quaternion, at("velocity", 3) if "velocity" in streams else flown,
+        at("rotor_speed", 4, 0.0), at("goal", 3), at("command", 3), at("body_rate", 3),
     )  # fmt: skip
 
 
@@ -111,13 +124,19 @@ class Recording:
     """They begin together."""
     vehicle: Vehicle
     """As it is drawn."""
+    stage: Stage | None = None
+    """What stands there; None: level ground."""
     at: int = 0
     """The next frame."""
     period: float = field(default=PERIOD, init=False)
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3), init=False)
 
     def __post_init__(self) -> None:
-        self._stage = Stage(self.vehicle)
+        self._ground = Stage(self.vehicle)
+
+    def fly(self, flights: Sequence[Flight], stage: Stage) -> None:
+        """Show as many other flights, from their beginning."""
+        self.flights, self.stage, self.at = flights, stage, 0
 
     @property
     def length(self) -> int:
@@ -125,9 +144,9 @@ class Recording:
         return max(len(flight.position) for flight in self.flights)
 
     def stage_of(self, followed: int) -> Stage:
-        """Level ground."""
+        """What stands there; of a log, level ground."""
         del followed
-        return self._stage
+        return self.stage or self._ground
 
     def step(self, followed: int) -> Frame:
         """The next frame; after the last the first. A flight that is over stays where it ended."""

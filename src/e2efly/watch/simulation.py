@@ -20,6 +20,7 @@ from e2efly.env.stress import with_longer_queue
 from e2efly.episodes import Act
 from e2efly.scenes.faces import bodies
 from e2efly.vehicles import Vehicle
+from e2efly.view.images import in_colours
 from e2efly.watch.frames import Frame, Stage
 
 HELD = ("mass", "inertia", "thrust_map")
@@ -30,6 +31,20 @@ THROW_SPEED, THROW_RATE = 3.0, 8.0
 """Of a throw, m/s and rad/s: standard deviations per axis."""
 LAST = 100
 """Episodes of which the success is told."""
+
+
+def stage(vehicle: Vehicle, task: TaskConfig, scene: Any, world: int) -> Stage:
+    """What stands in one world of a task.
+
+    Args:
+        vehicle: as it is drawn.
+        task: its options, of a criterion.
+        scene: the worlds, as the task's part that trains gives them.
+        world: which of them.
+    """
+    solids = bodies(scene, world, ceilings=True)
+    drawn = task.drawing() or ()
+    return Stage(vehicle, solids, [thing for thing in drawn if not (solids and isinstance(thing, Face))])  # or twice
 
 
 @jax.tree_util.register_dataclass
@@ -214,10 +229,7 @@ class Simulation:
     def stage_of(self, followed: int) -> Stage:
         """What stands in a vehicle's world, in the task's own coordinates; the same object until it changes."""
         if self._stage is None or self._stage[0] != followed:
-            drawn = self.task.drawing() or ()
-            solids = bodies(self._scene(), followed, ceilings=True)
-            things = [thing for thing in drawn if not (solids and isinstance(thing, Face))]  # solids are such faces
-            self._stage = followed, Stage(self.vehicle, solids, things)
+            self._stage = followed, stage(self.vehicle, self.task, self._scene(), followed)
         return self._stage[1]
 
     def _scene(self) -> Any:
@@ -228,7 +240,7 @@ class Simulation:
 
     def _images(self, followed: int) -> dict[str, np.ndarray]:
         return {
-            f"{camera.sees} {i}": np.asarray(image[followed])
+            f"{camera.sees} {i}": in_colours(camera.sees, np.asarray(image[followed]), camera.reach[1])
             for i, (camera, image) in enumerate(zip(self.env.cameras, self._state.images, strict=True))
         }
 

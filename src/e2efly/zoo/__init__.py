@@ -66,6 +66,13 @@ def policy_file(policy: str | os.PathLike[str], vehicle: str | Path | None = Non
     return file
 
 
+def curve_file(policy: Path) -> Path:
+    """Where the curve of a policy's training is, where it was kept: hover.curve.csv beside hover.onnx, by evaluation
+    the columns `steps`, `seconds` and, by criterion, success.
+    """
+    return policy.with_suffix(".curve.csv")
+
+
 def _whose(body: Path, having: list[str]) -> str:
     """The shipped vehicle whose policy flies the vehicle of a file, where these have one."""
     if body.parent in (vehicle_file(USUAL).parent, FAMILIES) or load_family(body) is not None:

@@ -42,6 +42,8 @@ BLOWN = 3.0
 """Beyond this force across the body, m/s^2, the air pushes so hard that the force along it tells little of thrust."""
 THRUST_DELAY = (0.015, 0.075)
 """How long before a measured force its throttle was sent, s: the link, the rate loop and the motors' lag."""
+UNSTEADY = 0.15
+"""A throttle that has changed within so long before a force, s, is not known as well as one that has not."""
 _FIELDS = ("vehicle_hash", "voltage", "scale", "gain", "updates", "residual")
 
 
@@ -128,7 +130,9 @@ def _believed(m: ThrottleMap, voltage: float | None) -> bool:
     return voltage is not None and VOLTAGE_BELIEVED[0] < voltage / m.voltage < VOLTAGE_BELIEVED[1]
 
 
-def update(m: ThrottleMap, throttle: float, force: float, voltage: float | None, dt: float) -> ThrottleMap:
+def update(
+    m: ThrottleMap, throttle: float, force: float, voltage: float | None, dt: float, swing: float = 0.0
+) -> ThrottleMap:
     """Learn from the specific force, m/s^2, that a throttle gave; what cannot be is not learned from.
 
     Args:
@@ -137,6 +141,7 @@ def update(m: ThrottleMap, throttle: float, force: float, voltage: float | None,
         force: measured along body z.
         voltage: of a cell, V; None: unknown, the last known one is taken.
         dt: since the last update, s.
+        swing: largest less smallest throttle that the force may be due to: which one it is, is not known.
     """
     nominal = m.nominal(throttle)
     believed = force >= LOWEST_FORCE <= nominal and BELIEVED[0] * nominal < force < BELIEVED[1] * nominal
@@ -147,7 +152,8 @@ def update(m: ThrottleMap, throttle: float, force: float, voltage: float | None,
     row = np.array([1 + gain * change, scale * change]) * (nominal / GRAVITY)
     error = (force - scale * nominal * (1 + gain * change)) / GRAVITY
     covariance = np.array(m.covariance) + WANDER * dt
-    k = covariance @ row / (NOISE**2 + row @ covariance @ row)
+    unsure = (m.nominal(throttle + swing / 2) - m.nominal(max(throttle - swing / 2, 0.0))) / GRAVITY
+    k = covariance @ row / (NOISE**2 + unsure**2 + row @ covariance @ row)
     covariance = covariance - np.outer(k, row @ covariance)
     shrink = np.sqrt(np.minimum(np.diag(START) / np.diag(covariance), 1.0))
     (a, b), (c, d) = (covariance * np.outer(shrink, shrink)).tolist()
@@ -165,10 +171,12 @@ def update(m: ThrottleMap, throttle: float, force: float, voltage: float | None,
     )
 
 
-def learn(m: ThrottleMap, throttle: float, force: np.ndarray, voltage: float | None, dt: float) -> ThrottleMap:
+def learn(
+    m: ThrottleMap, throttle: float, force: np.ndarray, voltage: float | None, dt: float, swing: float = 0.0
+) -> ThrottleMap:
     """`update` by a specific force (3,), body FLU, m/s^2, unless the air pushes hard across the body."""
     blown = math.hypot(force[0], force[1]) > BLOWN
-    return m if blown else update(m, throttle, float(force[2]), voltage, dt)
+    return m if blown else update(m, throttle, float(force[2]), voltage, dt, swing)
 
 
 def _towards(value: float, goal: float, reach: float) -> float:
@@ -230,6 +238,16 @@ class ThrottleHistory:
     def felt(self, moment: float) -> float | None:
         """The mean throttle that the force at a moment, s, is due to; None: not known."""
         return self.between(moment - THRUST_DELAY[1], moment - THRUST_DELAY[0])
+
+    def swing(self, moment: float) -> float:
+        """Largest less smallest throttle in force from `UNSTEADY` before a moment, s, up to it."""
+        known = []
+        for time, throttle in reversed(self._sent):
+            if time <= moment:
+                known.append(throttle)
+            if time <= moment - UNSTEADY:
+                break
+        return max(known) - min(known) if known else 0.0
 
     def between(self, start: float, end: float) -> float | None:
         """The mean throttle in force from `start` to `end`, s; None: not known that far back."""

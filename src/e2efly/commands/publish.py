@@ -1,0 +1,47 @@
+"""`e2efly publish`: a run's metrics on an experiment tracker."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from e2efly.process import be_idle, raise_at_interrupt
+from e2efly.terminal import Terminal
+
+
+@dataclass(frozen=True)
+class Publish:
+    """Send a run's configuration and metrics to an experiment tracker; a run that goes on is followed to its end.
+
+    Started again, it sends what has come since. Where the tracker keeps what it is sent, its own settings say: see
+    docs/network.md for what leaves the machine.
+    """
+
+    run: tyro.conf.Positional[Path]
+    """Folder of a run: finished, cut short, or going on."""
+    to: Literal["trackio", "wandb"]
+    """The tracker: Trackio (pip install 'e2efly[trackio]') or Weights & Biases (pip install 'e2efly[wandb]')."""
+    project: str = "e2efly"
+    """Of the tracker."""
+    name: str | None = None
+    """Of the run there; the folder's name when left out."""
+
+
+def run(options: Publish) -> int:
+    """Send what there is, and what comes while the run goes on.
+
+    Raises:
+        ValueError: for a tracker that is not installed; for a folder without a run; for one that was published as
+            another project, that holds another run now, or that another process publishes.
+        OSError: when the tracker cannot be reached as its settings say.
+    """
+    from e2efly.learn.publish import publish
+    from e2efly.learn.rundir import RunDirectory
+
+    raise_at_interrupt()  # what the tracker was handed is written in order
+    o, console = options, Terminal()
+    name = o.name or o.run.resolve().name
+    rows = publish(RunDirectory(o.run), o.to, o.project, name, begun=be_idle)  # a training beside it goes first
+    console.print(f"Published {rows} {'update' if rows == 1 else 'updates'} of {o.run} to {o.to}, project {o.project}")
+    return 0
