@@ -124,3 +124,13 @@ def test_a_filter_is_refused_before_anything_is_opened_in_a_fence_too_small_to_s
     options = Fly(vehicle="vis_r", guard="filter", link="/dev/none", flight=FlightSettings(fence=fence))
     with pytest.raises(ValueError, match=r"guard 'filter': flight.fence.speed is 6 m/s.* 2 m long in x; accepted"):
         fly_command(options)
+
+
+def test_a_hover_controller_that_there_is_not_is_refused_before_anything_is_opened() -> None:
+    with pytest.raises(ValueError, match=r"unknown hover controller 'pdi'; did you mean 'pid'\?"):
+        fly_command(Fly(vehicle="vis_r", hover="pdi", link="/dev/none"))
+
+
+def test_a_hover_controller_that_needs_more_than_the_flight_controller_tells_is_refused_by_name() -> None:
+    with controller(recorded) as client, pytest.raises(ValueError, match=r"--hover is 'indi', which needs the speeds"):
+        fly_command(Fly(vehicle="vis_r", hover="indi", link=client.link.name, pose=f"udp:{free_port()}", check=True))  # type: ignore
