@@ -3,7 +3,7 @@
     python benchmarks/pad_masks.py [--train 4000] [--pictures 8192] [--more 0] [--unseen 512] [--json FILE]
 
 `--train` learns so many steps and writes `deploy/sight/segment/pad.onnx`; without it the file that ships is measured.
-`--more` begins from the file that ships, with other pictures for each number: the file that ships is of 0, then of 1.
+`--more N` begins from the file that is there, with other pictures for each N.
 Outlines, markings, grounds and seeds of the unseen pictures are none of the training's: `pad_renders`.
 """
 

@@ -71,13 +71,12 @@ def raise_at_interrupt() -> None:
 
 
 def be_idle() -> None:
-    """Let this process, and the threads that it starts from now on, compute only while no other wants a core.
-
-    A session of its own keeps a tenth of a core that another session wants, too: less would starve it for minutes.
+    """Let this process, and the threads that it starts from now on, compute only while no other of its session wants
+    a core; and where it has a session of its own, let that have a tenth of a core that another session wants, too.
     """
     with suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
-        if os.getsid(0) == os.getpid():  # Linux shares cores among sessions first: this one gets a tenth
+        if os.getsid(0) == os.getpid():  # Linux shares cores among sessions first; less would starve it for minutes
             Path("/proc/self/autogroup").write_text("10")
 
 
@@ -100,8 +99,15 @@ def be_punctual(priority: int) -> None:
     with suppress(OSError, AttributeError):  # pages that were touched stay: none is read from a disk in flight
         ctypes.CDLL(None).mlockall(MLOCK_CURRENT | MLOCK_FUTURE | MLOCK_ONFAULT)
     with suppress(OSError, AttributeError):
-        for thread in Path("/proc/self/task").iterdir():
-            os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(priority))
+        for thread in threads():
+            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
+
+
+def threads() -> list[int]:
+    """Of this process, as the operating system knows them; the one that asks, where it does not say."""
+    with suppress(OSError):
+        return [int(thread.name) for thread in Path("/proc/self/task").iterdir()]
+    return [threading.get_native_id()]
 
 
 def _end(*_: Any) -> None:

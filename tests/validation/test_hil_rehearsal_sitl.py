@@ -14,7 +14,10 @@ from e2efly.evaluation import candidate
 from e2efly.validation import firmware
 from e2efly.validation.hil_rehearsal import Plan, rehearse
 
-PATIENT = ("--flight.odometry-timeout", "0.6", "--flight.link-timeout", "1.5", "--flight.lateness", "0.2")
+PATIENT = (
+    "--flight.odometry-timeout", "0.6", "--flight.link-timeout", "1.5", "--flight.lateness", "0.2",
+    "--flight.policy-timeout", "0.1",
+)  # fmt: skip
 """A busy machine holds up the room, too: not what is looked at here."""
 
 

@@ -113,14 +113,7 @@ def run(asked: Asked) -> int:
     from e2efly.view.evaluation import plot_evaluation
 
     o, console = options, Terminal()
-    flies = {
-        "vehicle": o.vehicle,
-        "controller": o.controller,
-        "seed": o.seed,
-        "baseline": o.baseline,
-        "device": o.device,
-    }
-    found = evaluate(o.policy, o.episodes, env=asked.env, task=asked.task, **flies, kept=ROW if o.json else 0)
+    found = evaluate(o.policy, o.episodes, env=asked.env, task=asked.task, **_flies(o), kept=ROW if o.json else 0)
     for note in found.candidate.notes:
         console.print(note, style="dim")
     console.print(_table(found.flown, o.episodes, found.candidate.task.precision not in TIMED))
@@ -136,14 +129,7 @@ def run(asked: Asked) -> int:
 def _stress(o: Eval) -> int:
     from e2efly.stress import stress
 
-    flies = {
-        "vehicle": o.vehicle,
-        "controller": o.controller,
-        "seed": o.seed,
-        "baseline": o.baseline,
-        "device": o.device,
-    }
-    found = stress(o.policy, o.episodes, rows=o.rows, **flies)
+    found = stress(o.policy, o.episodes, rows=o.rows, **_flies(o))
     return report_stress(found, Terminal(), o.json, _folder(o, found.candidate) / "stress.png", o.least)
 
 

@@ -89,12 +89,13 @@ def run(options: Watch) -> int:
     logs = _logs(o.what)
     if o.idle:
         be_idle()
+    if o.video is not None:
+        return _draw(o, o.video, logs, console)
+    if o.idle:
         from e2efly.watch.waiting import asked_for
 
         if not asked_for(o.host, o.port, _abandoned):
             return 0
-    if o.video is not None:
-        return _draw(o, o.video, logs, console)
     from e2efly.watch.viewer import serve
 
     server = serve(o.host, o.port, f"e2efly watch {' '.join(o.what)}")

@@ -199,8 +199,7 @@ def excite(
 
 def kick_for(vehicle: Vehicle, room: Room) -> float:
     """How much thrust over mass a kick adds to hover's, m/s^2: as much as the room's height lets be stopped from."""
-    largest = 4 * float(vehicle.thrust_range[1]) / float(vehicle.mass)
-    return float(np.clip(KICK * largest - GRAVITY, 0.0, room.fastest[2] / PULSE))
+    return float(np.clip((KICK * vehicle.thrust_to_weight - 1) * GRAVITY, 0.0, room.fastest[2] / PULSE))
 
 
 def kicks(time: float, height: float) -> float:

@@ -153,6 +153,11 @@ class Quat:
             self.w * r.z + self.x * r.y - self.y * r.x,
         )
 
+    def turned(self, angle: Vec3) -> "Quat":
+        """After a small turn about the body's axes, rad."""
+        one = namespace(angle.x).ones_like(angle.x)
+        return self.compose(Quat(one, angle.x / 2, angle.y / 2, angle.z / 2)).normalized()
+
     def rotate(self, v: Vec3) -> Vec3:
         """Body to world."""
         u = Vec3(self.x, self.y, self.z)

@@ -119,7 +119,7 @@ class Excitation:
             self.vehicle, self.room, self.speed, self.seconds, before, float(seen[_ELAPSED.name][0]), motion
         )
         wanted = np.array([command.thrust, command.rate.x, command.rate.y, command.rate.z], np.float64)
-        return _action(self.contract.action, wanted), _memory(after)
+        return self.contract.action.asking(wanted), _memory(after)
 
 
 def excitation(
@@ -177,19 +177,13 @@ def _contract(vehicle: Vehicle, latency: float) -> Contract:
     mode = COMMAND_MODES["ctbr"]
     low, high = (tuple(map(float, limits)) for limits in command_limits(mode, vehicle))
     action = Action(mode.name, mode.fields, mode.units, low, high)
-    hover = tuple(map(float, _action(action, np.array([GRAVITY, 0.0, 0.0, 0.0]))))
+    hover = tuple(map(float, action.asking(np.array([GRAVITY, 0.0, 0.0, 0.0]))))
     return Contract(
         contract_version=CONTRACT_VERSION, e2efly_version=__version__, task=NAME, vehicle=vehicle.name,
         vehicle_hash=vehicle.hash, control_rate_hz=CONTROL_RATE, latency_s=latency, latency_range_s=(latency, latency),
         observation_latency_range_s=(0.0, 0.0), observation=(_ELAPSED, _PLACE, ATTITUDE, VELOCITY), images=(),
         memory_size=_MEMORY, action=action, hover_action=hover,
     )  # fmt: skip
-
-
-def _action(action: Action, command: np.ndarray) -> np.ndarray:
-    """The inverse of `ACTION_MAPPING`, float32 (4,)."""
-    low, high = np.array(action.low), np.array(action.high)
-    return np.clip(2 * (command - low) / (high - low) - 1, -1, 1).astype(np.float32)
 
 
 _MEMORY = 8

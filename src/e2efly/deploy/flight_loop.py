@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from e2efly.control import Ctbr
 from e2efly.deploy.betaflight.controller import ControllerInfo
@@ -23,6 +22,7 @@ from e2efly.deploy.pilot.flight_state import Mode
 from e2efly.deploy.pilot.hover import blind, blind_time, sink_time
 from e2efly.deploy.service import Service
 from e2efly.deploy.terminal import printable
+from e2efly.process import threads
 
 LOWEST_RATE = 100.0
 """The loop runs at least so often, Hz."""
@@ -189,36 +189,28 @@ def _status(bridge: Bridge) -> str:
 @contextmanager
 def _no_pauses(bridge: Bridge) -> Iterator[None]:
     """No garbage collection in flight, threads that give way at once, real-time scheduling where it is allowed."""
-    threads: dict[int, int | None] = dict.fromkeys(_threads(), OTHER_PRIORITY)
-    threads[threading.get_native_id()] = LOOP_PRIORITY
+    priorities: dict[int, int | None] = dict.fromkeys(threads(), OTHER_PRIORITY)
+    priorities[threading.get_native_id()] = LOOP_PRIORITY
     if bridge.worker is not None and bridge.worker.native_id is not None:
-        threads[bridge.worker.native_id] = POLICY_PRIORITY
+        priorities[bridge.worker.native_id] = POLICY_PRIORITY
     before = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_S)
     gc.collect()
     gc.freeze()
     gc.disable()
-    _schedule(threads)
+    _schedule(priorities)
     try:
         yield
     finally:
-        _schedule(dict.fromkeys(_threads()))
+        _schedule(dict.fromkeys(threads()))
         gc.enable()
         gc.unfreeze()
         sys.setswitchinterval(before)
 
 
-def _threads() -> list[int]:
-    """Of this process, as the operating system knows them."""
-    try:
-        return [int(thread.name) for thread in Path("/proc/self/task").iterdir()]
-    except OSError:
-        return [threading.get_native_id()]
-
-
-def _schedule(threads: Mapping[int, int | None]) -> None:
+def _schedule(priorities: Mapping[int, int | None]) -> None:
     """Real-time priorities by thread; None: as usual. An ordinary user's process is punctual enough on an idle core."""
-    for thread, priority in threads.items():
+    for thread, priority in priorities.items():
         with suppress(OSError, AttributeError):
             policy = os.SCHED_OTHER if priority is None else os.SCHED_FIFO
             os.sched_setscheduler(thread, policy, os.sched_param(priority or 0))

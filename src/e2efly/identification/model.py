@@ -183,10 +183,10 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
     added = {
         name: p[places[name]] if name in places else 0.0 for name in ("motor_curve", "motor_idle", "rotor_inertia")
     }
-    spun, asked = window["rotor_speed"], None
+    spun, earlier = window["rotor_speed"], None
     if model.driver in _MOTORS:  # nobody measured the speeds at the start: what the outputs before it have led to
-        asked = jnp.stack(_driven_speed(model, split4(before[:, :4]), added), -1)
-        spun = _spun_up(plant, asked)
+        earlier = _spinning(plant, jnp.stack(_driven_speed(model, split4(before[:, :4]), added), -1))
+        spun = earlier[-1]
     first = State(
         window["position"] + start[:3],
         window["velocity"] + start[3:6],
@@ -226,18 +226,7 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
         begin = dataclasses.replace(begin, rotor_speed=split4(acting[0]))
     _, later = jax.lax.scan(advance, begin, acting)
     whole = jax.tree.map(lambda a, b: jnp.concatenate([jnp.asarray(a)[None], b]), begin, later)
-    seen = _sensed(plant, whole, q)
-    if asked is not None and model.driver == "motor":
-        spun_up, turning = _spinning(plant, asked), jnp.stack(whole.rotor_speed, -1)
-        thrust = _collective(plant, jnp.concatenate([spun_up, turning]))
-        less = (thrust - _filtered(thrust, q))[len(spun_up) :] * plant.specific
-        seen["specific_force"] -= less[:, None] * jnp.array([0.0, 0.0, 1.0])
-    return seen
-
-
-def _collective(plant: Plant, rotor_speed: Array) -> Array:
-    """Thrust of all rotors, N, (t,), of their speeds, (t, 4)."""
-    return rotor_wrench(plant, rotor_thrust(plant, split4(rotor_speed)))[0]
+    return _sensed(plant, whole, q, earlier if model.driver == "motor" else None)
 
 
 def _spinning(plant: Plant, asked: Array) -> Array:
@@ -287,12 +276,6 @@ def _recoiled(model: Model, now: Parts, before: Parts, added: dict[str, Any]) ->
     return dataclasses.replace(now, body_rate=Vec3(rate.x, rate.y, rate.z + turned))
 
 
-def _spun_up(plant: Plant, asked: Array) -> Array:
-    """Rotor speeds after steps of first-order lag towards what was asked for in each, (steps, 4): (4,)."""
-    left = plant.decay ** jnp.arange(len(asked) - 1, -1, -1)
-    return jnp.asarray(left @ asked / jnp.sum(left))
-
-
 def commanded(model: Model, vehicle: Vehicle, driven: Array) -> tuple[Array, Array]:
     """What acts on average over each step, a latency after it was sent: (past, 4) before the window, and (m, 4) in it.
 
@@ -307,8 +290,13 @@ def commanded(model: Model, vehicle: Vehicle, driven: Array) -> tuple[Array, Arr
     return mean[: past_steps()], mean[past_steps() :]
 
 
-def _sensed(plant: Plant, parts: Parts, q: Array) -> dict[str, Array]:
+def _sensed(plant: Plant, parts: Parts, q: Array, earlier: Array | None = None) -> dict[str, Array]:
+    """What sensors say; the accelerometer through its filter, where the rotor speeds before, (past, 4), are known."""
     collective, _ = rotor_wrench(plant, rotor_thrust(plant, parts.rotor_speed))
+    felt = collective
+    if earlier is not None:
+        before, _ = rotor_wrench(plant, rotor_thrust(plant, split4(earlier)))
+        felt = _filtered(jnp.concatenate([before, collective]), q)[len(earlier) :]
     air = drag(plant, parts.attitude.unrotate(parts.velocity))
     force = Vec3(air.x, air.y, air.z + collective).stack() * plant.specific
     rate, velocity = parts.body_rate.stack(), parts.velocity.stack()
@@ -318,7 +306,7 @@ def _sensed(plant: Plant, parts: Parts, q: Array) -> dict[str, Array]:
     accelerated = parts.attitude.rotate(Vec3.of(force)).stack() - jnp.array([0.0, 0.0, 9.81])
     return {
         "body_rate": rate + q[0:3],
-        "specific_force": force + q[3:6],
+        "specific_force": Vec3(air.x, air.y, air.z + felt).stack() * plant.specific + q[3:6],
         "rotor_speed": jnp.stack(parts.rotor_speed, -1),
         "velocity": velocity - accelerated * late,
         "quaternion": _turned(parts.attitude.stack(), turn),
@@ -328,9 +316,7 @@ def _sensed(plant: Plant, parts: Parts, q: Array) -> dict[str, Array]:
 
 def _turned(quaternion: Array, angle: Array) -> Array:
     """An attitude turned by a small angle about its own axes, rad."""
-    half = angle / 2
-    small = jnp.concatenate([jnp.ones_like(half[..., :1]), half], -1)
-    return Quat.of(quaternion).compose(Quat.of(small)).normalized().stack()
+    return Quat.of(quaternion).turned(Vec3.of(angle)).stack()
 
 
 def attitude_error(measured: Array, simulated: Array) -> Array:

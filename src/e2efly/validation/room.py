@@ -22,8 +22,9 @@ START_S = 60.0
 FLIGHT_S = 40.0
 """How long each part of a flight may take on a busy machine, s."""
 LAST_LINES = 6
-"""So many different ones are told of a program that fails."""
+"""So many different ones are told of a program that fails: those that differ in numbers alone are one."""
 _TIME = re.compile(r"^ *[0-9.]+ +")
+_NUMBER = re.compile(r"-?[0-9]+[.]?[0-9]*")
 URGENT = -15
 """Niceness of an urgent program."""
 TAKEN = "the watchdog has taken over"
@@ -141,8 +142,8 @@ class Program:
         """How it has ended, if it has, and its last words."""
         status = self.process.poll()
         ended = "" if status is None else f" and ended with status {status}"
-        lines = dict.fromkeys(_TIME.sub("", line) for _, line in self.told)
-        return f"{ended}; it said: {list(lines)[-LAST_LINES:]}"
+        lines = {_NUMBER.sub("", line): line for line in (_TIME.sub("", line) for _, line in self.told)}
+        return f"{ended}; it said: {list(lines.values())[-LAST_LINES:]}"
 
     def end(self, seconds: float, by: int = signal.SIGINT) -> int | None:
         """Ask it to end, as Ctrl-C does; its exit status, or None where it had to be killed."""

@@ -92,10 +92,8 @@ def stress(
             meets = realities(drawn, flown, seed, steps, env.control_period)
             seen = starts.sights(env, seed, drawn.camera)
             asked += [Flight(*begin, met, sees) for begin, met, sees in zip(begins, meets, seen, strict=True)]
-        mission, total = (
-            Mission(found.file, plant_name(plant), own, believed, float(suite.episode_s), baseline=baseline),
-            len(asked),
-        )
+        mission = Mission(found.file, plant_name(plant), own, believed, float(suite.episode_s), baseline=baseline)
+        total = len(asked)
         flights = fly_all(mission, asked, lambda done: progress(name, done, total))  # noqa: B023
         for i, row in enumerate(chosen):
             report[row][name] = judge(env, starts, flights[i * episodes : (i + 1) * episodes], settling(suite))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, HTTPServer
-from typing import Any
+from threading import Event
 
 LOOK_S = 0.2
 """Between two looks whether it is still to wait, s."""
@@ -22,30 +22,6 @@ setInterval(async () => {{
 """.encode()
 
 
-class _Server(HTTPServer):
-    timeout = LOOK_S
-    asked = False
-
-    def finish_request(self, request: Any, client_address: Any) -> None:
-        super().finish_request(request, client_address)
-        self.asked = True
-
-
-class _Handler(BaseHTTPRequestHandler):
-    timeout = 1.0
-
-    def do_GET(self) -> None:
-        self.send_response(200)
-        self.send_header("Content-Type", "text/html; charset=utf-8")
-        self.send_header("Content-Length", str(len(PAGE)))
-        self.send_header("Connection", "close")
-        self.end_headers()
-        self.wfile.write(PAGE)
-
-    def log_message(self, format: str, *args: object) -> None:
-        del format, args
-
-
 def asked_for(host: str, port: int, over: Callable[[], bool]) -> bool:
     """Wait until a browser asks for the page; whether one did before it was over.
 
@@ -57,9 +33,25 @@ def asked_for(host: str, port: int, over: Callable[[], bool]) -> bool:
     Raises:
         OSError: for an address that this machine does not have, or a port in use.
     """
-    with _Server((host, port), _Handler) as server:
-        while not server.asked:
-            if over():
-                return False
+    asked = Event()
+
+    class Waiting(BaseHTTPRequestHandler):
+        timeout = 1.0
+
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html; charset=utf-8")
+            self.send_header("Content-Length", str(len(PAGE)))
+            self.send_header("Connection", "close")
+            self.end_headers()
+            self.wfile.write(PAGE)
+            asked.set()
+
+        def log_message(self, format: str, *args: object) -> None:
+            del format, args
+
+    with HTTPServer((host, port), Waiting) as server:
+        server.timeout = LOOK_S
+        while not asked.is_set() and not over():
             server.handle_request()
-    return True
+    return asked.is_set()

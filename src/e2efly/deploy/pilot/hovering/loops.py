@@ -24,7 +24,7 @@ def approach(vehicle: Vehicle, motion: Motion, place: Place) -> Vec3:
 
 def attainable(vehicle: Vehicle, wanted: Vec3) -> Vec3:
     """What the limits of the vehicle leave of an acceleration, world, m/s^2."""
-    force, most = pull(vehicle, wanted), 4 * vehicle.thrust_range[1] / vehicle.mass
+    force, most = pull(vehicle, wanted), vehicle.thrust_to_weight * GRAVITY
     return Vec3(force.x, force.y, namespace(force.z).minimum(force.z, most) - GRAVITY)
 
 

@@ -135,6 +135,6 @@ def _parts(v: Vec3) -> tuple[Array, Array, Array]:
 def _most(vehicle: Vehicle) -> tuple[float, float, float]:
     """The largest acceleration along each axis, within tilt and thrust, m/s^2."""
     level = GRAVITY * math.tan(float(vehicle.tilt_max)) / math.sqrt(2)
-    up = 4 * float(vehicle.thrust_range[1]) / float(vehicle.mass) - GRAVITY
+    up = (vehicle.thrust_to_weight - 1) * GRAVITY
     x, y, z = (float(limit) for limit in vehicle.acceleration_max)
     return min(x, level), min(y, level), min(z, max(up, 0.1 * GRAVITY))

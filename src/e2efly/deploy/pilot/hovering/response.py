@@ -52,8 +52,7 @@ def thrust_of(vehicle: Vehicle, speeds: Sequence[float]) -> float | None:
     """The collective thrust over mass of rotors that turn so fast, rad/s, m/s^2; None: not all of them are measured."""
     if len(speeds) != 4 or min(speeds) <= 0:
         return None
-    k2, k1, k0 = (float(k) for k in vehicle.thrust_map)
-    return sum(max((k2 * w + k1) * w + k0, 0.0) for w in speeds) / float(vehicle.mass)
+    return float(sum(map(vehicle.rotor_thrust, speeds)) / vehicle.mass)
 
 
 def residue(latency: float) -> float:
@@ -133,14 +132,8 @@ def ahead(
         for _ in range(count):
             turned = told + (rate - told).times(left)
             gives = command.thrust + (thrust - command.thrust) * kept
-            after = _turned(attitude, (rate + turned) * (h / 2))
+            after = attitude.turned((rate + turned) * (h / 2))
             pull = (attitude.z_axis() * thrust + after.z_axis() * gives) * 0.5 + push
             position = position + velocity * h + pull * (h * h / 2)
             velocity, attitude, rate, thrust = velocity + pull * h, after, turned, gives
     return replace(seen, position=position, velocity=velocity, attitude=attitude, body_rate=rate), thrust
-
-
-def _turned(attitude: Quat, angle: Vec3) -> Quat:
-    """An attitude after a small turn about the body's axes, rad."""
-    one = namespace(attitude.w).ones_like(attitude.w)
-    return attitude.compose(Quat(one, angle.x / 2, angle.y / 2, angle.z / 2)).normalized()
