@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from mcap.reader import make_reader
@@ -124,6 +125,19 @@ def test_a_filter_is_refused_before_anything_is_opened_in_a_fence_too_small_to_s
     options = Fly(vehicle="vis_r", guard="filter", link="/dev/none", flight=FlightSettings(fence=fence))
     with pytest.raises(ValueError, match=r"guard 'filter': flight.fence.speed is 6 m/s.* 2 m long in x; accepted"):
         fly_command(options)
+
+
+@pytest.mark.parametrize(
+    ("known", "told"),
+    [
+        ({"solids": ((1.0, -1.0, 0.0, 2.0, 1.0, 2.0),)}, r"flight.fence.solids is \(\(1.0, "),
+        ({"scene": "room.toml"}, "flight.fence.scene is 'room.toml'"),
+    ],
+)
+def test_solids_without_the_filter_that_knows_them_are_refused(known: Any, told: str) -> None:
+    flight = FlightSettings(fence=Fence(**known))
+    with pytest.raises(ValueError, match=told + r".* and --guard is 'switch'; accepted: with --guard filter"):
+        fly_command(Fly(vehicle="vis_r", link="/dev/none", flight=flight))
 
 
 def test_a_hover_controller_that_there_is_not_is_refused_before_anything_is_opened() -> None:

@@ -2,7 +2,9 @@
 
 import dataclasses
 import math
+from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -12,9 +14,13 @@ from e2efly.deploy.filter.backup import GUST, UNSEEN, Backup, brake, command
 from e2efly.deploy.filter.body import NOTHING, Command, Motion, moved
 from e2efly.deploy.filter.filter import Filter, Memory, filtered, remember, stopping_distance, watch
 from e2efly.deploy.filter.guard import FilterError, Keeper, keep
+from e2efly.deploy.filter.obstacle import obstacles
 from e2efly.deploy.filter.room import NAMES, Limits, rooms
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.settings import Fence
+from e2efly.scenes.file import load_scene
+from e2efly.scenes.scene import clearance
+from e2efly.solids import DISC, SIZES, SQUARE
 from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
@@ -154,6 +160,87 @@ def test_a_solid_is_kept_away_from() -> None:
     _, change = keep(filter, memory, seen, 0.0, Ctbr(GRAVITY, Vec3(0.0, 0.0, 0.0)))
     assert change is not None and change.limit == "solid 1"
     assert passes(HOVER, state(x=1.2, v=2.5))  # without it
+    far = (40.0, 40.0, 0.0, 41.0, 41.0, 1.0)  # is no limit here, and takes no name from the one that is
+    behind = Filter.of(VEHICLE, dataclasses.replace(FENCE, solids=(far, box)))
+    memory, seen = after(m=state(x=1.2, v=2.5), filter=behind)
+    _, change = keep(behind, memory, seen, 0.0, Ctbr(GRAVITY, Vec3(0.0, 0.0, 0.0)))
+    assert change is not None and change.limit == "solid 2"
+
+
+SOLIDS = """
+ground = false
+[[solids]]
+kind = "{kind}"
+centre = [2.5, 0.0, 3.0]
+size = {size}
+{more}
+"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "surface", "more"),
+    [
+        ("box", [0.5, 1.0, 3.0], 2.0, ""),
+        ("sphere", [0.5], 2.0, ""),
+        ("cylinder", [0.4, 3.0], 2.1, ""),
+        ("cylinder", [0.4, 3.0], -0.5, "roll = 90\nyaw = -90"),
+        ("capsule", [0.3, 3.0], 2.2, "path = { cosine = [0, 0, 1], rate = 0 }"),
+    ],
+)
+def test_a_solid_of_a_scene_file_is_kept_away_from(
+    tmp_path: Path, kind: str, size: list[float], surface: float, more: str
+) -> None:
+    scene = tmp_path / "room.toml"
+    scene.write_text(SOLIDS.format(kind=kind, size=size, more=more))
+    filter = Filter.of(VEHICLE, dataclasses.replace(FENCE, scene=str(scene)))
+    flown = fly(state(x=surface - 1.5, v=2.0), 3.0, filter=filter)
+    assert surface - 0.8 < max(m.px for m in flown) < surface - float(VEHICLE.radius)
+    assert fly(state(x=surface - 1.5, v=2.0), 1.0)[-1].px > surface  # without it
+
+
+def test_a_gate_is_flown_through_in_its_middle_and_not_at_its_bars(tmp_path: Path) -> None:
+    scene = tmp_path / "room.toml"
+    scene.write_text(SOLIDS.format(kind="gate", size=[0.9, 0.9, 0.3, 0.05], more="yaw = 180"))
+    filter = Filter.of(VEHICLE, dataclasses.replace(FENCE, scene=str(scene)))
+    assert max(m.px for m in fly(state(x=0.8, v=1.5), 3.0, filter=filter)) > 3.5
+    beside = state(x=0.8, v=1.5)._replace(py=1.05)
+    assert max(m.px for m in fly(beside, 3.0, filter=filter)) < 2.5 - float(VEHICLE.radius)
+
+
+@pytest.mark.parametrize("kind", ["box", "sphere", "cylinder", "capsule", "gate", "pad"])
+def test_gaps_are_the_distances_of_the_simulator_s_solids(tmp_path: Path, kind: str) -> None:
+    random, scene = np.random.default_rng(0), tmp_path / "room.toml"
+    size = random.uniform(0.2, 0.7, len(SIZES[kind])).round(2).tolist()
+    for outline in (DISC, SQUARE) if kind == "pad" else (None,):
+        size = [*size[:2], outline] if kind == "pad" else size
+        scene.write_text(SOLIDS.format(kind=kind, size=size, more="roll = 20\npitch = -35\nyaw = 130"))
+        places = random.uniform([1.0, -1.5, 1.5], [4.0, 1.5, 4.5], (400, 3))
+        wanted = np.asarray(clearance(load_scene(scene, 400), jnp.asarray(places), jnp.zeros(400)))
+        bodies = obstacles(dataclasses.replace(FENCE, scene=str(scene)))
+        for place, distance in zip(places.tolist(), wanted.tolist(), strict=True):
+            near = min((plane for body in bodies if (plane := body.plane(*place, 9.0))), key=lambda plane: plane.gap)
+            assert near.gap == pytest.approx(distance, abs=2e-5)
+            assert math.hypot(near.x, near.y, near.z) == pytest.approx(1.0)
+            nearer = [p + 1e-4 * n for p, n in zip(place, (near.x, near.y, near.z), strict=True)]
+            moved = min(plane.gap for body in bodies if (plane := body.plane(*nearer, 9.0)))
+            assert moved == pytest.approx(near.gap - 1e-4, abs=1e-6)
+            assert any(body.plane(*place, near.gap + 1e-6) for body in bodies)
+            assert all(body.plane(*place, near.gap - 1e-6) is None for body in bodies)  # what is farther is left out
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (SOLIDS.format(kind="bol", size=[1.0], more=""), r"solids\[0\].kind: .*'bol'"),
+        (SOLIDS.format(kind="sphere", size=[1.0], more="path = { sine = [0, 1, 0], rate = 2 }"),
+         r"flight.fence.scene: .*solids\[0\].path.rate is 2 rad/s; accepted: solids that stand"),
+    ],
+)  # fmt: skip
+def test_a_scene_file_that_cannot_be_kept_is_refused_by_name(tmp_path: Path, text: str, told: str) -> None:
+    scene = tmp_path / "room.toml"
+    scene.write_text(text)
+    with pytest.raises(ValueError, match=told):
+        Filter.of(VEHICLE, dataclasses.replace(FENCE, scene=str(scene)))
 
 
 def test_a_loss_of_thrust_is_noticed_and_made_up_for() -> None:
@@ -190,6 +277,13 @@ def test_a_fence_in_which_it_could_not_stop_is_refused_by_name(axis: int) -> Non
         Filter.of(VEHICLE, small)
     accepted = Filter.of(VEHICLE, dataclasses.replace(small, speed=3.0))
     assert stopping_distance(accepted, 3.0) <= 2.0 < stopping_distance(accepted, 6.0)
+
+
+def test_a_fence_too_low_to_stop_in_is_refused_by_name() -> None:
+    low = dataclasses.replace(FENCE, low=(-6.0, -6.0, 0.2), high=(6.0, 6.0, 0.7))
+    with pytest.raises(ValueError, match=r"stops within 0.[67] m, and the fence is 0.5 m high; accepted: a larger"):
+        Filter.of(VEHICLE, low)
+    Filter.of(VEHICLE, dataclasses.replace(low, high=(6.0, 6.0, 1.0)))
 
 
 def test_a_vehicle_that_cannot_brake_is_refused_by_name() -> None:

@@ -14,7 +14,8 @@ from e2efly.env import random_key
 from e2efly.physics.rotation import from_euler, multiply, rotate
 from e2efly.scenes import camera, cast
 from e2efly.scenes.scene import GATE, GROUND, OBSTACLE, SKY, Scene, Solids, first_instance
-from e2efly.scenes.shapes import FAR, SHAPES
+from e2efly.scenes.shapes import FAR
+from e2efly.solids import SIZES
 
 LEVEL = np.array([[1.0, 0.0, 0.0, 0.0]], np.float32)
 WIDE = CameraConfig(width=48, height=32, fov=(1.6, 1.2))
@@ -43,9 +44,9 @@ def crowd(n: int = 6, seed: int = 0) -> Scene:
     """Two solids of each kind in every world, before a camera at (0, 0, 2) that looks along x."""
     rng = np.random.default_rng(seed)
     solids = {}
-    for kind, shape in SHAPES.items():
+    for kind, names in SIZES.items():
         place = np.stack([rng.uniform(2, 7, (n, 2)), rng.uniform(-3, 3, (n, 2)), rng.uniform(0.5, 3.5, (n, 2))], -1)
-        size = rng.uniform(0.15, 0.6, (n, 2, len(shape.names)))
+        size = rng.uniform(0.15, 0.6, (n, 2, len(names)))
         if kind == "pad":
             size[..., 2] = rng.integers(0, 3, (n, 2))
         one = Solids.of(kind, place, size)

@@ -14,8 +14,9 @@ from e2efly.config import ClutterConfig, ForestConfig
 from e2efly.env import random_key
 from e2efly.scenes.file import load_scene
 from e2efly.scenes.generate import clutter, corridor, forest, room
-from e2efly.scenes.scene import CLASSES, Scene, Solids, approach, clearance, distances
-from e2efly.scenes.shapes import FAR, SHAPES
+from e2efly.scenes.scene import Scene, Solids, approach, clearance, distances
+from e2efly.scenes.shapes import FAR
+from e2efly.solids import CLASSES, SIZES
 
 
 def ball(centre: Any, radius: float = 0.5, **about: Any) -> Solids:
@@ -47,8 +48,8 @@ class TestClearance:
     def test_gradient_against_differences(self) -> None:
         rng = np.random.default_rng(0)
         solids = {
-            kind: Solids.of(kind, rng.uniform(-2, 2, (40, 2, 3)), rng.uniform(0.2, 0.5, (40, 2, len(shape.names))))
-            for kind, shape in SHAPES.items()
+            kind: Solids.of(kind, rng.uniform(-2, 2, (40, 2, 3)), rng.uniform(0.2, 0.5, (40, 2, len(names))))
+            for kind, names in SIZES.items()
         }
         scene, time = Scene.of(solids, 40, ground=-3.0), jnp.zeros(40)
         p = jnp.asarray(rng.uniform(-2, 2, (40, 3)), jnp.float32)

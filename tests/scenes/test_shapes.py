@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from e2efly.scenes.shapes import DISC, FAR, SHAPES, SQUARE, TRIANGLE
+from e2efly.scenes.shapes import FAR, SHAPES
+from e2efly.solids import DISC, SQUARE, TRIANGLE
 
-SIZES = {
+SIZED = {
     "box": [(0.5, 0.3, 0.2)],
     "sphere": [(0.4,)],
     "cylinder": [(0.3, 0.6), (0.6, 0.1)],
@@ -16,7 +17,7 @@ SIZES = {
     "gate": [(0.5, 0.4, 0.1, 0.05), (0.3, 0.5, 0.2, 0.3)],
     "pad": [(0.25, 0.1, DISC), (0.25, 0.1, SQUARE), (0.25, 0.1, TRIANGLE)],
 }
-CASES = [pytest.param(kind, size, id=f"{kind}{i}") for kind, sizes in SIZES.items() for i, size in enumerate(sizes)]
+CASES = [pytest.param(kind, size, id=f"{kind}{i}") for kind, sizes in SIZED.items() for i, size in enumerate(sizes)]
 RAYS = 4000
 
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from e2efly.config import CameraConfig
 from e2efly.scenes import camera
-from e2efly.scenes.scene import CLASSES, Scene
+from e2efly.scenes.scene import Scene
+from e2efly.solids import CLASSES
 
 SEES: dict[int, Any] = {0: "rgb", 1: "depth", 2: "range", 5: "label"}
 SKY = 65504.0

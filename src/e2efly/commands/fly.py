@@ -160,6 +160,10 @@ def run(options: Fly) -> int:
             f"--vehicle is left out; accepted: a name or .toml file, as the policy flies any vehicle within the ranges "
             f"of {loaded.contract.vehicle!r}"
         )
+    fence = settings.fence
+    if options.guard == "switch" and (known := fence.solids or fence.scene):
+        name = "solids" if fence.solids else "scene"
+        raise ValueError(f"flight.fence.{name} is {known!r} and --guard is 'switch'; accepted: with --guard filter")
     flies = options.vehicle or _own_vehicle(policy, loaded)
     body = load_vehicle(flies)
     hover = hover_controller(options.hover, body, body.latency if options.latency is None else options.latency)

@@ -27,6 +27,8 @@ class Fence:
     """Time before the braking acts, s."""
     solids: tuple[Box, ...] = ()
     """Boxes that the filter of --guard filter keeps the vehicle out of: smallest x, y, z, largest x, y, z of each."""
+    scene: str | None = None
+    """A scene file (.toml, docs/vision.md) in the poses' world: the filter keeps out of its solids, too. None: none."""
 
 
 @dataclass(frozen=True)

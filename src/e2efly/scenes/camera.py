@@ -14,7 +14,8 @@ from e2efly.scenes import cast as solids
 from e2efly.scenes.cast import Light, Pattern, usual_light
 from e2efly.scenes.meshes import cast as meshes
 from e2efly.scenes.meshes.scene import MeshScene
-from e2efly.scenes.scene import CLASSES, Scene
+from e2efly.scenes.scene import Scene
+from e2efly.solids import CLASSES
 from e2efly.vehicles.names import unknown
 
 PRESETS: dict[str, CameraConfig] = {

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from e2efly.physics.rotation import to_matrix
 from e2efly.scenes.scene import WALL, Scene
-from e2efly.scenes.shapes import DISC, SQUARE
+from e2efly.solids import DISC, SQUARE
 
 Quads = Float[np.ndarray, "f 4 3"]
 

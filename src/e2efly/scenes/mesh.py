@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from e2efly.physics.rotation import to_matrix
 from e2efly.scenes.meshes.scene import Part
 from e2efly.scenes.scene import Scene
-from e2efly.scenes.shapes import DISC, SQUARE
+from e2efly.solids import DISC, SQUARE
 
 GROUND = 500.0
 """Half the side of the square that stands for the ground, m."""

@@ -14,14 +14,11 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from e2efly.physics.rotation import from_euler, unrotate
-from e2efly.scenes.shapes import FAR, SHAPES, SIZES
+from e2efly.scenes.shapes import FAR, ROOM, SHAPES
+from e2efly.solids import CLASSES, USUAL_CLASS
 
 SKY, GROUND, OBSTACLE, GATE, PAD, WALL = range(6)
-"""Semantic classes."""
-CLASSES = ("sky", "ground", "obstacle", "gate", "pad", "wall")
-"""Their names."""
-USUAL_CLASS = dict.fromkeys(SHAPES, OBSTACLE) | {"gate": GATE, "pad": PAD}
-"""Of the solids of each kind, unless said otherwise."""
+"""Semantic classes, in the order of `solids.CLASSES`."""
 _BY_CLASS = [
     [0.55, 0.72, 0.92],
     [0.45, 0.47, 0.42],
@@ -44,7 +41,7 @@ class Solids:
     quaternion: Float[Array, "n k 4"]
     """Solid's frame to world, wxyz."""
     size: Float[Array, "n k 4"]
-    """What the entries are: `SHAPES[kind].names`."""
+    """What the entries are: `solids.SIZES[kind]`."""
     active: Bool[Array, "n k"]
     """Whether it is there."""
     label: Int[Array, "n k"]
@@ -81,15 +78,15 @@ class Solids:
         """
         centre = jnp.asarray(centre, jnp.float32)
         n, k, _ = centre.shape
-        label = USUAL_CLASS[kind] if label is None else label
+        label = CLASSES.index(USUAL_CLASS[kind]) if label is None else label
         size = jnp.asarray(size, jnp.float32)
-        size = jnp.pad(size, [(0, 0)] * (size.ndim - 1) + [(0, SIZES - size.shape[-1])])
+        size = jnp.pad(size, [(0, 0)] * (size.ndim - 1) + [(0, ROOM - size.shape[-1])])
         angle = jnp.broadcast_to(jnp.asarray(yaw, jnp.float32), (n, k))
         zero = jnp.zeros((n, k, 3), jnp.float32)
         return Solids(
             centre=centre,
             quaternion=from_euler(jnp.zeros_like(angle), jnp.zeros_like(angle), angle),
-            size=jnp.broadcast_to(size, (n, k, SIZES)),
+            size=jnp.broadcast_to(size, (n, k, ROOM)),
             active=jnp.broadcast_to(jnp.asarray(active, bool), (n, k)),
             label=jnp.full((n, k), label, jnp.int32),
             colour=jnp.broadcast_to(jnp.asarray(COLOURS[label] if colour is None else colour, jnp.float32), (n, k, 3)),

@@ -13,11 +13,10 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from e2efly.control.vectors import safe_sqrt
+from e2efly.solids import DISC, SQUARE
 
 FAR = 1e9
 """Parameter of a ray that meets nothing."""
-DISC, SQUARE, TRIANGLE = 0, 1, 2
-"""Outlines of a pad."""
 _TINY = 1e-9
 
 Components = tuple[Array, Array, Array]
@@ -27,10 +26,8 @@ Interval = tuple[Array, Array]
 
 @dataclass(frozen=True)
 class Shape:
-    """One kind of solid. `size` has `SIZES` entries, of which a shape reads those that it names."""
+    """One kind of solid. `size` has `ROOM` entries, of which a shape reads those that `solids.SIZES` names."""
 
-    names: tuple[str, ...]
-    """What the entries of `size` are, m unless said."""
     enter: Callable[[Array, Components, Components], Array]
     """(size (4,), ray's origin, ray's direction) -> parameter of the first point inside, `FAR` for none. In the
     solid's frame."""
@@ -42,7 +39,7 @@ class Shape:
     """size -> radius of a ball about the centre that holds it, m."""
 
 
-SIZES = 4
+ROOM = 4
 """Entries of `size`."""
 
 
@@ -262,37 +259,14 @@ def _pad_distance(size: Array, p: Array) -> Array:
 
 
 SHAPES: dict[str, Shape] = {
-    "box": Shape(
-        ("half x", "half y", "half z"),
-        _box_enter,
-        _box_normal,
-        _box_distance,
-        lambda s: _length(s[..., 0], s[..., 1], s[..., 2]),
-    ),
-    "sphere": Shape(("radius",), _sphere_enter, _sphere_normal, _sphere_distance, lambda s: s[..., 0]),
-    "cylinder": Shape(
-        ("radius", "half length"),
-        _cylinder_enter,
-        _cylinder_normal,
-        _cylinder_distance,
-        lambda s: _length(s[..., 0], s[..., 1]),
-    ),
-    "capsule": Shape(
-        ("radius", "half length"), _capsule_enter, _capsule_normal, _capsule_distance, lambda s: s[..., 0] + s[..., 1]
-    ),
+    "box": Shape(_box_enter, _box_normal, _box_distance, lambda s: _length(s[..., 0], s[..., 1], s[..., 2])),
+    "sphere": Shape(_sphere_enter, _sphere_normal, _sphere_distance, lambda s: s[..., 0]),
+    "cylinder": Shape(_cylinder_enter, _cylinder_normal, _cylinder_distance, lambda s: _length(s[..., 0], s[..., 1])),
+    "capsule": Shape(_capsule_enter, _capsule_normal, _capsule_distance, lambda s: s[..., 0] + s[..., 1]),
     "gate": Shape(
-        ("half width of the opening", "half height of the opening", "width of the bars", "half depth of the bars"),
-        _gate_enter,
-        _gate_normal,
-        _gate_distance,
+        _gate_enter, _gate_normal, _gate_distance,
         lambda s: _length(s[..., 0] + s[..., 2], s[..., 1] + s[..., 2], s[..., 3]),
     ),
-    "pad": Shape(
-        ("half width", "half height", "outline: 0 disc, 1 square, 2 triangle"),
-        _pad_enter,
-        _pad_normal,
-        _pad_distance,
-        lambda s: _length(np.sqrt(2.0) * s[..., 0], s[..., 1]),
-    ),
-}
-"""Shapes by name. Lengths run along the local z axis; a gate is flown through along its x axis."""
+    "pad": Shape(_pad_enter, _pad_normal, _pad_distance, lambda s: _length(np.sqrt(2.0) * s[..., 0], s[..., 1])),
+}  # fmt: skip
+"""Shapes by name."""

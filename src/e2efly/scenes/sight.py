@@ -18,7 +18,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.scenes.scene import Scene, Solids, distances, join
-from e2efly.scenes.shapes import FAR, SHAPES, SIZES, Components
+from e2efly.scenes.shapes import FAR, ROOM, SHAPES, Components
 from e2efly.scenes.tiles import Pattern, following, longest, seen_by_tiles
 
 Kinds = tuple[tuple[str, int], ...]
@@ -129,7 +129,7 @@ class Form:
     def of(seen: Sight, i: Array) -> "Form":
         """The one at a place in the table."""
         row = seen.forms[:, i]
-        return Form(row[:SIZES], row[SIZES : SIZES + 3], row[SIZES + 3 :])
+        return Form(row[:ROOM], row[ROOM : ROOM + 3], row[ROOM + 3 :])
 
     def direction(self, d: Float[Array, "3 r"]) -> Components:
         """Of the sensor's rays in the solid's frame."""

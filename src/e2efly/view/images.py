@@ -24,7 +24,8 @@ from e2efly.scenes.camera import mount, pattern, pose
 from e2efly.scenes.cast import CHANNELS, cast, usual_light
 from e2efly.scenes.meshes import cast as meshes
 from e2efly.scenes.meshes.scene import MeshScene
-from e2efly.scenes.scene import CLASSES, COLOURS, Scene
+from e2efly.scenes.scene import COLOURS, Scene
+from e2efly.solids import CLASSES
 from e2efly.view.style import GREY, WIDTH, figure
 
 DISTANCE = colormaps["turbo_r"].with_extremes(bad="#BDBDBD")

@@ -6,14 +6,16 @@ is a backup-controller barrier (Singletary et al., Onboard safety guarantees for
 Backup control barrier functions, 2021), with the manoeuvre's way in closed form where it can be.
 """
 
+import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from e2efly.deploy.filter.arithmetic import SCALARS, Number, clip
 from e2efly.deploy.filter.backup import TIMING, Backup, axes_z, brake, command
 from e2efly.deploy.filter.body import NOTHING, Actuators, Command, Motion, Residual, actuated, moved
-from e2efly.deploy.filter.room import Limits, against, near, retreat, rooms
+from e2efly.deploy.filter.room import NAMES, Limits, against, near, retreat, rooms
 from e2efly.deploy.filter.way import stopping
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.settings import Fence
@@ -63,24 +65,33 @@ def stopping_distance(filter: Filter, speed: float) -> float:
     return speed * (filter.latency + TIMING) + stopping(filter.backup, speed) + filter.backup.margin
 
 
+def stopping_height(filter: Filter, speed: float) -> float:
+    """Height that level flight at a speed, m/s, needs between floor and ceiling to stop in, m, with both margins."""
+    b, m = filter.backup, Motion(0.0, 0.0, 0.0, speed, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
+    left = rooms(SCALARS, b, Limits((0.0,) * 3, (0.0,) * 3, speed, math.inf), m, NOTHING)
+    return 2 * b.margin - left[NAMES.index("floor")] - left[NAMES.index("ceiling")]
+
+
 def _check(filter: Filter, fence: Fence) -> None:
-    distance = stopping_distance(filter, fence.speed)
-    for axis, low, high in zip("xy", fence.low[:2], fence.high[:2], strict=True):
-        if high - low < distance:
-            fastest = _fastest(filter, high - low)
+    sizes = [high - low for low, high in zip(fence.low, fence.high, strict=True)]
+    for size, needed, what in (
+        (sizes[0], stopping_distance, "long in x"),
+        (sizes[1], stopping_distance, "long in y"),
+        (sizes[2], stopping_height, "high"),
+    ):
+        if size < (least := needed(filter, fence.speed)):
+            fastest = _fastest(filter, needed, size, fence.speed)
+            accepted = "a larger fence" if fastest is None else f"up to {fastest:.1f} m/s, or a larger fence"
             raise ValueError(
                 f"guard 'filter': flight.fence.speed is {fence.speed:g} m/s, from which the vehicle stops within "
-                f"{distance:.1f} m, and the fence is {high - low:g} m long in {axis}; accepted: up to {fastest:.1f} "
-                "m/s, or a larger fence"
+                f"{least:.1f} m, and the fence is {size:g} m {what}; accepted: {accepted}"
             )
 
 
-def _fastest(filter: Filter, length: float) -> float:
-    """The largest speed, m/s, that stops within a length, m, in steps of 0.1."""
-    speed = 0.1
-    while stopping_distance(filter, speed + 0.1) <= length:
-        speed += 0.1
-    return speed
+def _fastest(filter: Filter, needed: Callable[[Filter, float], float], size: float, below: float) -> float | None:
+    """The largest speed below another, m/s, that stops within a size, m, in steps of 0.1; None: none does."""
+    speeds = [tenth / 10 for tenth in range(1, math.ceil(10 * below))]
+    return max(itertools.takewhile(lambda speed: needed(filter, speed) <= size, speeds), default=None)
 
 
 @dataclass(frozen=True)
@@ -111,7 +122,14 @@ class Filtered:
     room: Number
     """The least that the manoeuvre would have left after the command as it came, m; NaN after what is not finite."""
     limit: Any
-    """The index of that limit in `room.NAMES`; beyond them: a solid."""
+    """The index of that limit in `room.NAMES`; beyond them: in `solids`."""
+    solids: tuple[str, ...] = ()
+    """Names of the solids that were near."""
+
+    @property
+    def name(self) -> str:
+        """Of that limit, of one vehicle alone."""
+        return (*NAMES, *self.solids)[self.limit]
 
 
 def remember(memory: Memory, sent: Command, now: float) -> Memory:
@@ -218,8 +236,9 @@ def filtered(
         return rooms(xp, b, filter.limits, after, air, solids, floor, m)
 
     found = left(wanted)
+    names = tuple(plane.name for plane in solids)
     if xp is SCALARS and min(found) >= 0.0:
-        return Filtered(wanted, 0.0, *_worst(xp, found))
+        return Filtered(wanted, 0.0, *_worst(xp, found), names)
     back = retreat(xp, filter.limits, m, floor)
     own = command(xp, b, m, brake(xp, b, m, against(xp, m, air), back))
     short, limit = _worst(xp, found)
@@ -229,7 +248,7 @@ def filtered(
     given = Command(*(
         xp.where(passes, a, xp.where(share >= 1.0, c, a + share * (c - a))) for a, c in zip(wanted, own, strict=True)
     ))  # fmt: skip
-    return Filtered(given, share, short, limit)
+    return Filtered(given, share, short, limit, names)
 
 
 def _worst(xp: Any, rooms: tuple[Number, ...]) -> tuple[Number, Any]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from e2efly.control import Ctbr, Vec3
 from e2efly.deploy.filter.body import Command
 from e2efly.deploy.filter.filter import Filter, Memory, filtered, remember, watch
-from e2efly.deploy.filter.room import NAMES
 from e2efly.deploy.odometry import Odometry
 
 
@@ -15,7 +14,7 @@ class Change:
     """How the filter changed a command."""
 
     limit: str
-    """What would not have been kept: a name of `NAMES`, or the number of a solid."""
+    """What would not have been kept: a name of `room.NAMES`, or of a solid."""
     room: float
     """What the backup manoeuvre would have left to it after the wanted command, m; negative: beyond it."""
     share: float
@@ -54,8 +53,7 @@ def keep(
     if found.share == 0.0:
         return wanted, None
     thrust, x, y, z = found.command
-    limit = NAMES[found.limit] if found.limit < len(NAMES) else f"solid {found.limit - len(NAMES) + 1}"
-    return Ctbr(thrust, Vec3(x, y, z)), Change(limit, found.room, found.share, wanted)
+    return Ctbr(thrust, Vec3(x, y, z)), Change(found.name, found.room, found.share, wanted)
 
 
 def sent(memory: Memory, command: Ctbr | None, now: float) -> Memory:

@@ -7,6 +7,7 @@ from typing import Any
 from e2efly.deploy.filter.arithmetic import Number, clip
 from e2efly.deploy.filter.backup import TIMING, TURNING, WAY_GAINS, Backup, Brake, brake
 from e2efly.deploy.filter.body import Motion, Residual
+from e2efly.deploy.filter.obstacle import Obstacle, Plane, obstacles
 from e2efly.deploy.filter.way import Way, run_out, way
 from e2efly.deploy.settings import Fence
 
@@ -35,41 +36,30 @@ class Limits:
     """m/s."""
     tilt: float
     """rad; infinite where no tilt is too much."""
-    solids: tuple[tuple[float, ...], ...] = ()
-    """Boxes: smallest x, y, z, largest x, y, z, world."""
+    solids: tuple[Obstacle, ...] = ()
+    """To keep out of."""
     radius: float = 0.0
     """What is kept between the centre of mass and a solid."""
 
     @staticmethod
     def of(fence: Fence, radius: float, margin: float) -> "Limits":
-        """Of a fence, for a vehicle of this radius, m, that stays inside by a margin, m."""
+        """Of a fence, for a vehicle of this radius, m, that stays inside by a margin, m.
+
+        Raises:
+            ValueError: as `obstacles`.
+        """
         (a, b, c), (d, e, f) = fence.low, fence.high
         m = margin
         return Limits(
             (a + m, b + m, c + m), (d - m, e - m, f - m), fence.speed - SPEED_MARGIN,
-            fence.tilt - TILT_MARGIN if fence.tilt < math.pi else math.inf, fence.solids, radius + m,
+            fence.tilt - TILT_MARGIN if fence.tilt < math.pi else math.inf, obstacles(fence), radius + m,
         )  # fmt: skip
 
 
-def near(limits: Limits, m: Motion, reach: float) -> tuple[tuple[float, float, float, float], ...]:
-    """Of each solid within `reach` m: the direction to its nearest point, and the gap to it, m. Of one vehicle alone.
-
-    The plane through the nearest point, square to that direction, has all of a convex solid behind it.
-    """
-    found = []
-    for x0, y0, z0, x1, y1, z1 in limits.solids:
-        dx = min(max(m.px, x0), x1) - m.px
-        dy = min(max(m.py, y0), y1) - m.py
-        dz = min(max(m.pz, z0), z1) - m.pz
-        away = math.sqrt(dx * dx + dy * dy + dz * dz)
-        if away == 0.0:  # inside of it: out by the shortest way
-            sides = ((m.px - x0, 1, 0, 0), (x1 - m.px, -1, 0, 0), (m.py - y0, 0, 1, 0), (y1 - m.py, 0, -1, 0),
-                     (m.pz - z0, 0, 0, 1), (z1 - m.pz, 0, 0, -1))  # fmt: skip
-            depth, nx, ny, nz = min(sides)
-            found.append((float(nx), float(ny), float(nz), -depth - limits.radius))
-        elif away - limits.radius < reach:
-            found.append((dx / away, dy / away, dz / away, away - limits.radius))
-    return tuple(found)
+def near(limits: Limits, m: Motion, reach: float) -> tuple[Plane, ...]:
+    """The nearest sides of the solids within `reach` m, their gaps less what is kept. Of one vehicle alone."""
+    found = (solid.plane(m.px, m.py, m.pz, reach + limits.radius) for solid in limits.solids)
+    return tuple(plane._replace(gap=plane.gap - limits.radius) for plane in found if plane is not None)
 
 
 def rooms(
@@ -78,7 +68,7 @@ def rooms(
     limits: Limits,
     m: Motion,
     air: Residual,
-    solids: tuple[tuple[float, float, float, float], ...] = (),
+    solids: tuple[Plane, ...] = (),
     floor: bool = True,
     at: Motion | None = None,
 ) -> tuple[Number, ...]:
@@ -116,7 +106,7 @@ def rooms(
         low_z - off_z, z1 - high_z - off_z,
         SPEED_S * (limits.speed - xp.sqrt(w.speed2)) - rough, _tilt_room(xp, limits, k) - TILT_M * rough,
     ]  # fmt: skip
-    for nx, ny, nz, gap in solids:
+    for nx, ny, nz, gap, _ in solids:
         assert at is not None
         off = rough + TIMING * xp.maximum(nx * m.vx + ny * m.vy + nz * m.vz, 0.0)
         found.append(gap - off - _towards(xp, w, at, (nx, ny, nz), (dx, dy, dz)))

@@ -11,7 +11,8 @@ import jax
 import numpy as np
 from jaxtyping import Array, Float, Int, UInt8
 
-from e2efly.scenes.scene import CLASSES, COLOURS, GROUND, OBSTACLE, SKY
+from e2efly.scenes.scene import COLOURS, GROUND, OBSTACLE, SKY
+from e2efly.solids import CLASSES
 from e2efly.vehicles.tables import LARGEST
 
 _FLAT = 1e-7
