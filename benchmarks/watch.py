@@ -1,12 +1,13 @@
 """The viewer: when its first picture is there, how many frames of many vehicles it shows, what it costs a training.
 
-    python benchmarks/watch.py [--vehicles 256] [--seconds 10] [--runs 3] [--task race] [--json FILE]
+    python benchmarks/watch.py [--vehicles 256] [--seconds 10] [--runs 3] [--pairs 10] [--task race] [--json FILE]
 
 The browser is Debian's Chromium, headless, which draws by software on the same cores: a desktop's draws elsewhere.
 Let the machine be quiet.
 """
 
 import json
+import math
 import os
 import re
 import signal
@@ -128,7 +129,7 @@ def trained(task: str, watched: bool, folder: Path) -> float:
 
 def main() -> None:
     """Measure, print the table, write the figures."""
-    args = arguments(__doc__ or "", vehicles=256, seconds=10.0, runs=3, task="race", look="")
+    args = arguments(__doc__ or "", vehicles=256, seconds=10.0, runs=3, pairs=10, task="race", look="")
     if args.look:
         return look(args.look)
     first_picture(args.task)  # compiles
@@ -138,17 +139,18 @@ def main() -> None:
     times: dict[bool, list[float]] = {False: [], True: []}
     with tempfile.TemporaryDirectory() as text:
         trained(args.task, False, Path(text) / "first")
-        for i in range(args.runs):
+        for i in range(args.pairs):
             for watched in (False, True):
                 times[watched].append(trained(args.task, watched, Path(text) / f"{i}-{watched}"))
-    plain, beside = (statistics.median(times[watched]) for watched in (False, True))
+    more = [100 * (beside / plain - 1) for plain, beside in zip(times[False], times[True], strict=True)]
+    error = statistics.stdev(more) / math.sqrt(len(more)) if len(more) > 1 else math.nan
     rows = [
         {"figure": "first picture, warm", "measured": f"{statistics.median(first):.1f} s", "asked": "4 s"},
         {"figure": f"frames, {args.vehicles} vehicles, nobody looks", "measured": f"{alone:.1f} per s", "asked": "30"},
         {"figure": "the same, a browser draws by software", "measured": f"{seen:.1f} per s", "asked": "30"},
         {
-            "figure": f"training of {args.task} with --watch", "measured": f"{100 * (beside / plain - 1):+.1f} %",
-            "asked": "3 %",
+            "figure": f"training of {args.task} with --watch", "asked": "3 %",
+            "measured": f"{statistics.mean(more):+.1f} % ± {error:.1f} %, {len(more)} pairs of runs",
         },
     ]  # fmt: skip
     print(table(rows))

@@ -8,7 +8,7 @@ from e2efly.watch.panels import Panel
 from e2efly.watch.viewer import Viewer
 
 FASTEST = 1 / 33
-"""Frames are shown no sooner after each other than this, s."""
+"""Frames are shown no more often than this on average, s: a step that came late makes the next one no later."""
 IDLE_S = 0.05
 """Between two looks at the wishes while the flight is paused, or while nobody looks at it, s."""
 
@@ -31,7 +31,7 @@ def run(
         between: called before every frame.
         watched: whether anybody looks; the source rests while nobody does.
     """  # fmt: skip
-    due, shown, elapsed = time.monotonic(), 0.0, 0.0
+    due, turn, elapsed = time.monotonic(), 0.0, 0.0
     while not until():
         panel.fulfil()
         between()
@@ -42,9 +42,9 @@ def run(
         frame = source.step(viewer.followed)
         elapsed += source.period
         now = time.monotonic()
-        if now - shown >= FASTEST or frame.fresh:
+        if now >= turn or frame.fresh:
             viewer.show(source.stage_of(viewer.followed), source.origin, frame, elapsed)
             panel.show(frame, elapsed)
-            shown, elapsed = now, 0.0
+            turn, elapsed = max(turn + FASTEST, now), 0.0
         due = max(due + source.period / panel.speed, now - 0.25)
         time.sleep(max(due - time.monotonic(), 0.0))
