@@ -249,6 +249,8 @@ class Bridge:
                 flying=flying and flight.mode is not Mode.TAKEOFF,
                 climb=None if seen is None else float(seen.velocity[2]),
             )  # fmt: skip
+            if self.keeper is not None:
+                self.keeper.feel(measured.gyro, asked)
             self.estimate = estimate.feel(self.estimate, measured, asked + reply.latency / 2, flight.mode, now)
             if (force := self.estimate.inertial.force) is not None:
                 self.imu = Imu(measured.gyro, force)

@@ -35,6 +35,8 @@ LONGEST = 0.02
 """Longest step of the forecast, s."""
 OLDEST = 0.5
 """Commands that were sent so long ago act no more, s."""
+FELT_S = 0.03
+"""Answers of the gyro that are no farther apart tell the angular acceleration, s."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,8 @@ class Memory:
     """When it came, s."""
     air: Residual = NOTHING
     """What the forecast does not explain."""
+    felt: tuple[tuple[float, tuple[float, float, float]], ...] = ()
+    """When the flight controller's gyro was asked, s, and the body rate that it felt, rad/s; oldest first."""
 
 
 @dataclass(frozen=True)
@@ -140,6 +144,12 @@ def remember(memory: Memory, sent: Command, now: float) -> Memory:
     while len(kept) > 1 and kept[1][0] < now - OLDEST:
         kept = kept[1:]
     return replace(memory, sent=(*kept, (now, sent)))
+
+
+def feel(memory: Memory, rate: tuple[float, float, float], asked: float) -> Memory:
+    """The memory after an answer of the gyro, rad/s, that was asked for with the command of `asked` s."""
+    kept = tuple(one for one in memory.felt if asked - OLDEST < one[0] < asked)
+    return replace(memory, felt=(*kept, (asked, rate)))
 
 
 def watch(filter: Filter, memory: Memory, odometry: Odometry, now: float, *, flying: bool) -> Memory:
@@ -208,9 +218,22 @@ def forecast(filter: Filter, memory: Memory, odometry: Odometry, now: float) -> 
     a = memory.actuators
     ax, ay, f = (0.0, 0.0, GRAVITY) if a is None else (a.ax, a.ay, a.f)
     m = Motion(px, py, pz, vx, vy, vz, qw, qx, qy, qz, wx, wy, wz, ax, ay, f)
-    for c, h in _between(memory.sent, memory.since - filter.latency, now):
+    begin, before = memory.since - filter.latency, None
+    for at, rate in (one for one in memory.felt if begin < one[0] <= now):
+        for c, h in _between(memory.sent, begin, at):
+            m = moved(xp, filter.backup.response, m, c, memory.air, h)
+        m, begin, before = _turning(m, rate, at, before), at, (at, rate)
+    for c, h in _between(memory.sent, begin, now):
         m = moved(xp, filter.backup.response, m, c, memory.air, h)
     return m
+
+
+def _turning(m: Motion, rate: tuple[float, float, float], at: float, before: tuple[float, Any] | None) -> Motion:
+    """The state with the body rate that was felt, and the angular acceleration since the answer before."""
+    ax, ay = m.ax, m.ay
+    if before is not None and 0.0 < at - before[0] < FELT_S:
+        ax, ay = ((rate[i] - before[1][i]) / (at - before[0]) for i in range(2))
+    return m._replace(wx=rate[0], wy=rate[1], wz=rate[2], ax=ax, ay=ay)
 
 
 def filtered(

@@ -3,9 +3,11 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from e2efly.control import Ctbr, Vec3
 from e2efly.deploy.filter.body import Command
-from e2efly.deploy.filter.filter import Filter, Memory, filtered, remember, watch
+from e2efly.deploy.filter.filter import Filter, Memory, feel, filtered, remember, watch
 from e2efly.deploy.odometry import Odometry
 
 
@@ -80,6 +82,12 @@ class Keeper:
         self.change = None
         if odometry is not None:
             self.memory = watch(self.filter, self.memory, odometry, now, flying=flying)
+
+    def feel(self, rate: np.ndarray, asked: float) -> None:
+        """Take in an answer of the flight controller's gyro, (3,) rad/s, that was asked for at `asked` s."""
+        x, y, z = rate.tolist()
+        if all(map(math.isfinite, (x, y, z))):
+            self.memory = feel(self.memory, (x, y, z), asked)
 
     def keep(self, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool) -> Ctbr | None:
         """The command in place of a policy's, arguments as of the function `keep`; None, with `problem`: it failed."""
