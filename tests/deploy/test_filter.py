@@ -286,6 +286,11 @@ def test_a_fence_too_low_to_stop_in_is_refused_by_name() -> None:
     Filter.of(VEHICLE, dataclasses.replace(low, high=(6.0, 6.0, 1.0)))
 
 
+def test_a_tilt_too_small_to_brake_by_is_refused_by_name() -> None:
+    with pytest.raises(ValueError, match=r"flight.fence.tilt is 0.3 rad; accepted: 0.38 or more"):
+        Filter.of(VEHICLE, dataclasses.replace(FENCE, tilt=0.3))
+
+
 def test_a_vehicle_that_cannot_brake_is_refused_by_name() -> None:
     weak = dataclasses.replace(VEHICLE, rotor_thrust_max=float(VEHICLE.mass) * GRAVITY / 4 * 1.4)
     with pytest.raises(ValueError, match=r"thrust is 1.40 of its weight; accepted: 2.50 or more"):

@@ -19,6 +19,8 @@ UNSEEN = 0.85
 """Share of the thrust that is left before a loss of it is noticed."""
 STEEPEST = math.radians(65)
 """Largest tilt of the manoeuvre, rad, where the fence allows it."""
+TILT_MARGIN, LEAST_TILT = 0.28, 0.1
+"""The largest tilt is kept to with this margin, rad, in which a rate loop may overshoot; so much must be left."""
 COUNTED = (0.5, 0.55)
 """Shares of what is commanded that are counted on, sideways and of a fall: until a loss of thrust is noticed."""
 DIAGONAL = 1.4 / THRUST_SHARE
@@ -80,7 +82,7 @@ class Backup:
         """Of a loaded vehicle, within a tilt, rad.
 
         Raises:
-            ValueError: for a vehicle with too little thrust to brake with, naming it.
+            ValueError: for a vehicle with too little thrust to brake with, or a tilt that is too small, naming it.
         """
         response = Response.of(vehicle)
         most = response.thrust[1] * THRUST_SHARE
@@ -91,8 +93,11 @@ class Backup:
                 f"guard 'filter': the vehicle's thrust is {vehicle.thrust_to_weight:.2f} of its weight; accepted: "
                 f"{least:.2f} or more, so that it brakes with a flat battery"
             )
+        if tilt < TILT_MARGIN + LEAST_TILT:
+            least = TILT_MARGIN + LEAST_TILT
+            raise ValueError(f"guard 'filter': flight.fence.tilt is {tilt:g} rad; accepted: {least:g} or more")
         climb = CLIMB_SHARE * most - GRAVITY
-        steepest = min(STEEPEST, 0.9 * tilt)
+        steepest = min(STEEPEST, tilt - TILT_MARGIN)
         level = min(0.8 * most, GRAVITY * math.tan(min(steepest, 1.05)))
         braking = (COUNTED[0] * level - GUST, COUNTED[1] * climb - GUST, SINK - GUST)
         rate = TURN_RATE * min(response.rate_max[:2])

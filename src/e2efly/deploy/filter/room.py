@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from e2efly.deploy.filter.arithmetic import Number, clip
-from e2efly.deploy.filter.backup import TIMING, TURNING, WAY_GAINS, Backup, Brake, brake
+from e2efly.deploy.filter.backup import TILT_MARGIN, TIMING, TURNING, WAY_GAINS, Backup, Brake, brake
 from e2efly.deploy.filter.body import Motion, Residual
 from e2efly.deploy.filter.obstacle import Obstacle, Plane, obstacles
 from e2efly.deploy.filter.way import Way, run_out, way
@@ -13,8 +13,8 @@ from e2efly.deploy.settings import Fence
 
 SPEED_MARGIN, SPEED_S = 0.6, 0.25
 """The largest speed is kept to with this margin, m/s; so much of it counts as a metre of room, s."""
-TILT_MARGIN, TILT_M = 0.28, 0.3
-"""The largest tilt is kept to with this margin, rad; a radian counts as so much room, m."""
+TILT_M = 0.3
+"""A radian of tilt counts as so much room, m."""
 FADES = 2.0
 """At this speed against it, m/s, the air's push is not counted on at all."""
 RETREAT, BACK, BACK_UP = 2.0, 0.05, 0.35
