@@ -138,7 +138,7 @@ def test_commands_on_their_way_count() -> None:
 
 def test_a_longer_delay_steps_in_earlier() -> None:
     late = Filter.of(VEHICLE, FENCE, 0.15)
-    m = state(x=4.6, v=3.5)
+    m = state(x=4.4, v=3.5)
     assert passes(HOVER, m)
     assert not passes(HOVER, m, filter=late)
     for speed in (1.0, 4.0):
@@ -287,7 +287,7 @@ def test_a_fence_too_low_to_stop_in_is_refused_by_name() -> None:
 
 
 def test_a_tilt_too_small_to_brake_by_is_refused_by_name() -> None:
-    with pytest.raises(ValueError, match=r"flight.fence.tilt is 0.3 rad; accepted: 0.38 or more"):
+    with pytest.raises(ValueError, match=r"flight.fence.tilt is 0.3 rad; accepted: 0.46 or more"):
         Filter.of(VEHICLE, dataclasses.replace(FENCE, tilt=0.3))
 
 
@@ -384,5 +384,5 @@ def test_what_the_filter_admits_lies_inside_of_what_can_be_kept_in_one_dimension
     needed += backup.margin
     assert (needed >= exact).all()
     ahead = SPEEDS > 1.0  # and it gives away no more room than lags, unseen losses and margins explain
-    assert np.median((needed - exact)[ahead]) < 0.9
+    assert np.median((needed - exact)[ahead]) < 1.0
     assert UNSEEN < 1

@@ -19,7 +19,7 @@ UNSEEN = 0.85
 """Share of the thrust that is left before a loss of it is noticed."""
 STEEPEST = math.radians(65)
 """Largest tilt of the manoeuvre, rad, where the fence allows it."""
-TILT_MARGIN, LEAST_TILT = 0.28, 0.1
+TILT_MARGIN, LEAST_TILT = 0.36, 0.1
 """The largest tilt is kept to with this margin, rad, in which a rate loop may overshoot; so much must be left."""
 COUNTED = (0.5, 0.55)
 """Shares of what is commanded that are counted on, sideways and of a fall: until a loss of thrust is noticed."""
@@ -36,7 +36,7 @@ GUST = 0.4
 MARGIN_S2 = 0.0065
 """The manoeuvre stays inside by so much of the vehicle's largest thrust over mass, s^2: what the forecast leaves out
 grows with the thrust. That is 0.18 m for VIS-R. It is more ..."""
-TIMING, TURNING = 0.03, 0.012
+TIMING, TURNING = 0.05, 0.02
 """... by the way of so long, s: in the forecast's time, too, there are errors; and by so much of the body rate, m s:
 fast turns are foreseen less well."""
 SPEED_GAIN = 12.0
