@@ -12,7 +12,7 @@ from e2efly.control import Ctbr, Vec3
 from e2efly.deploy.filter.arithmetic import SCALARS
 from e2efly.deploy.filter.backup import GUST, UNSEEN, Backup, brake, command
 from e2efly.deploy.filter.body import NOTHING, Command, Motion, moved
-from e2efly.deploy.filter.filter import Filter, Memory, filtered, remember, stopping_distance, watch
+from e2efly.deploy.filter.filter import Filter, Memory, feel, filtered, forecast, remember, stopping_distance, watch
 from e2efly.deploy.filter.guard import FilterError, Keeper, keep
 from e2efly.deploy.filter.obstacle import obstacles
 from e2efly.deploy.filter.room import NAMES, Limits, rooms
@@ -143,6 +143,22 @@ def test_a_longer_delay_steps_in_earlier() -> None:
     assert not passes(HOVER, m, filter=late)
     for speed in (1.0, 4.0):
         assert stopping_distance(late, speed) == pytest.approx(stopping_distance(FILTER, speed) + 0.09 * speed)
+
+
+def test_what_the_gyro_felt_since_the_odometry_counts() -> None:
+    memory, seen = after()
+    told = forecast(FILTER, memory, seen, 0.0)
+    assert told.wy == pytest.approx(0.0, abs=1e-9) and told.qy == pytest.approx(0.0, abs=1e-9)
+    for asked in (-0.05, -0.03, -0.01):  # a rate loop that overshoots: no command explains it
+        memory = feel(memory, (0.0, 3.0, 0.0), asked)
+    felt = forecast(FILTER, memory, seen, 0.0)
+    assert 1.0 < felt.wy < 3.0  # the commands have 10 ms left to stop it
+    assert 2 * felt.qy == pytest.approx(0.04 * 3.0 + 0.02, abs=0.03)
+    old = feel(memory, (0.0, 9.0, 0.0), 0.7)  # after it, what was felt half a second ago is forgotten
+    assert [at for at, _ in old.felt] == [0.7]
+    keeper = Keeper(FILTER)
+    keeper.feel(np.array([0.0, math.nan, 0.0]), 0.0)
+    assert keeper.memory.felt == ()
 
 
 def test_the_floor_is_open_to_a_policy_that_lands() -> None:
