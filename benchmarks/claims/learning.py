@@ -133,6 +133,11 @@ def shipped(one: Mapping[str, Any]) -> float:
     return min(criterion["success"] for criterion in one["shipped"].values())
 
 
+def ended(one: Mapping[str, Any]) -> float:
+    """Share of the starts in which the policy that a run ships fails, of its worst criterion."""
+    return max(criterion["crashed"] / criterion["episodes"] for criterion in one["shipped"].values())
+
+
 def rows(found: Found) -> list[dict[str, str]]:
     """A row a task and kind of run."""
     out = []
@@ -144,6 +149,7 @@ def rows(found: Found) -> list[dict[str, str]]:
             row["M steps, theirs"] = f"{THEIRS['steps'][algo][at] / 1e6:.0f}"
             row["M steps, ours"] = " ".join(f"{one['steps'] / 1e6:.1f}" for one in runs) or NOTHING.word
             row["success, %"] = percents([shipped(one) for one in runs])
+            row["crashed, %"] = percents([ended(one) for one in runs])
             row["end error, cm"] = each(
                 runs, lambda one: f"{100 * max(c['final_error_m'] for c in one['shipped'].values()):.1f}"
             )
@@ -192,7 +198,9 @@ The preset `paper`: the paper's weights, 100 environments, its batches, horizon,
 networks and observations for both, 13 numbers (track 40, race 16), by `--env.past-actions 0`. The paper says that
 rewards are identical, but its reward tables give PPO an action term and sparse ones besides: both are measured. A run
 of fewer steps than theirs was stopped; what it had not reached by then it may reach later. Seconds are of one core's
-CPU, compilation included; end error: of the worst criterion. A reward has settled where it stays within 5 % of its
+CPU, compilation included; crashes and end error: of the worst criterion. With these weights the reward of a step is
+negative nearly everywhere, and a failure ends the episode: PPO, which maximises the sum, may learn to fail early, as in
+the rows in which all starts crash. BPTT follows the gradient of the reward, and does not. A reward has settled where it stays within 5 % of its
 whole change from its mean over the last tenth of the run.""",
     short=2,
 )  # fmt: skip

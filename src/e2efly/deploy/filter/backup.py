@@ -19,8 +19,9 @@ UNSEEN = 0.85
 """Share of the thrust that is left before a loss of it is noticed."""
 STEEPEST = math.radians(65)
 """Largest tilt of the manoeuvre, rad, where the fence allows it."""
-TILT_MARGIN, LEAST_TILT = 0.36, 0.1
-"""The largest tilt is kept to with this margin, rad, in which a rate loop may overshoot; so much must be left."""
+TILT_MARGIN, LEAN_MARGIN, LEAST_TILT = 0.32, 0.36, 0.1
+"""The largest tilt is kept to with this margin, rad; the manoeuvre itself, whose turns a rate loop may overshoot, leans
+no farther than the second; so much must be left."""
 COUNTED = (0.5, 0.55)
 """Shares of what is commanded that are counted on, sideways and of a fall: until a loss of thrust is noticed."""
 DIAGONAL = 1.4 / THRUST_SHARE
@@ -36,7 +37,7 @@ GUST = 0.4
 MARGIN_S2 = 0.0065
 """The manoeuvre stays inside by so much of the vehicle's largest thrust over mass, s^2: what the forecast leaves out
 grows with the thrust. That is 0.18 m for VIS-R. It is more ..."""
-TIMING, TURNING = 0.05, 0.02
+TIMING, TURNING = 0.05, 0.016
 """... by the way of so long, s: in the forecast's time, too, there are errors; and by so much of the body rate, m s:
 fast turns are foreseen less well."""
 SPEED_GAIN = 12.0
@@ -93,11 +94,11 @@ class Backup:
                 f"guard 'filter': the vehicle's thrust is {vehicle.thrust_to_weight:.2f} of its weight; accepted: "
                 f"{least:.2f} or more, so that it brakes with a flat battery"
             )
-        if tilt < TILT_MARGIN + LEAST_TILT:
-            least = TILT_MARGIN + LEAST_TILT
+        if tilt < LEAN_MARGIN + LEAST_TILT:
+            least = LEAN_MARGIN + LEAST_TILT
             raise ValueError(f"guard 'filter': flight.fence.tilt is {tilt:g} rad; accepted: {least:g} or more")
         climb = CLIMB_SHARE * most - GRAVITY
-        steepest = min(STEEPEST, tilt - TILT_MARGIN)
+        steepest = min(STEEPEST, tilt - LEAN_MARGIN)
         level = min(0.8 * most, GRAVITY * math.tan(min(steepest, 1.05)))
         braking = (COUNTED[0] * level - GUST, COUNTED[1] * climb - GUST, SINK - GUST)
         rate = TURN_RATE * min(response.rate_max[:2])
