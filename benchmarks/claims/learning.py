@@ -200,7 +200,7 @@ rewards are identical, but its reward tables give PPO an action term and sparse 
 of fewer steps than theirs was stopped; what it had not reached by then it may reach later. Seconds are of one core's
 CPU, compilation included; crashes and end error: of the worst criterion. With these weights the reward of a step is
 negative nearly everywhere, and a failure ends the episode: PPO, which maximises the sum, may learn to fail early, as in
-the rows in which all starts crash. BPTT follows the gradient of the reward, and does not. A reward has settled where it stays within 5 % of its
-whole change from its mean over the last tenth of the run.""",
+the rows in which all starts crash. BPTT follows the gradient of the reward, and does not. A reward has settled where it
+stays within 5 % of its whole change from its mean over the last tenth of the run.""",
     short=2,
 )  # fmt: skip
