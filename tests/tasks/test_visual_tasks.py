@@ -14,7 +14,7 @@ from e2efly.env import random_key
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.scene import Solids, clearance
-from e2efly.scenes.shapes import DISC, SQUARE, TRIANGLE
+from e2efly.solids import DISC, SQUARE, TRIANGLE
 from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.land_visual import LandVisualConfig
 from e2efly.tasks.race.any_goal import Ahead

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from e2efly.control.vectors import safe_sqrt
-from e2efly.solids import DISC, SQUARE
+from e2efly.solids import DISC, SQUARE, TRIANGLE
 
 FAR = 1e9
 """Parameter of a ray that meets nothing."""

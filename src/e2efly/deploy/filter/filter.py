@@ -70,7 +70,8 @@ def stopping_distance(filter: Filter, speed: float) -> float:
 def stopping_height(filter: Filter, speed: float) -> float:
     """Height that level flight at a speed, m/s, needs between floor and ceiling to stop in, m, with both margins."""
     b, m = filter.backup, Motion(0.0, 0.0, 0.0, speed, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
-    left = rooms(SCALARS, b, Limits((0.0,) * 3, (0.0,) * 3, speed, math.inf), m, NOTHING)
+    here = (0.0, 0.0, 0.0)
+    left = rooms(SCALARS, b, Limits(here, here, speed, math.inf), m, NOTHING)
     return 2 * b.margin - left[NAMES.index("floor")] - left[NAMES.index("ceiling")]
 
 

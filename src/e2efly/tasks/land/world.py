@@ -12,7 +12,7 @@ from e2efly.goal import Shape
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.scene import Scene, Solids
-from e2efly.scenes.shapes import DISC
+from e2efly.solids import DISC
 from e2efly.tasks.land import LandConfig
 from e2efly.tasks.land.goal import LandGoal
 from e2efly.tasks.task import at_rest, uniform

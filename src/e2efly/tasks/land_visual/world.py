@@ -11,7 +11,7 @@ from e2efly.goal import Outcome, Shape
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.scene import Scene, Solids, distances
-from e2efly.scenes.shapes import DISC, TRIANGLE
+from e2efly.solids import DISC, TRIANGLE
 from e2efly.tasks.land_visual import LandVisualConfig
 from e2efly.tasks.land_visual.goal import LandVisualGoal
 from e2efly.tasks.task import at_rest, uniform
