@@ -396,8 +396,8 @@ def test_loading_imports_no_jax_and_no_simulator(path: Path) -> None:
 
 
 OURS = (
-    "__version__", "control", "courses", "deploy", "goal", "numbers", "observation", "process", "registry", "storage",
-    "vehicles", "zoo",
+    "__version__", "control", "courses", "deploy", "goal", "numbers", "observation", "process", "registry", "solids",
+    "storage", "vehicles", "zoo",
 )  # fmt: skip
 """Parts of the package that flight may import."""
 
