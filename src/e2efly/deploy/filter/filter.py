@@ -220,12 +220,12 @@ def forecast(filter: Filter, memory: Memory, odometry: Odometry, now: float) -> 
     ax, ay, f = (0.0, 0.0, GRAVITY) if a is None else (a.ax, a.ay, a.f)
     m = Motion(px, py, pz, vx, vy, vz, qw, qx, qy, qz, wx, wy, wz, ax, ay, f)
     begin, before = memory.since - filter.latency, None
-    for at, rate in (one for one in memory.felt if begin < one[0] <= now):
+    felt = [one for one in memory.felt if begin < one[0] <= now]
+    for at, rate in (*felt, (now, None)):
         for c, h in _between(memory.sent, begin, at):
             m = moved(xp, filter.backup.response, m, c, memory.air, h)
-        m, begin, before = _turning(m, rate, at, before), at, (at, rate)
-    for c, h in _between(memory.sent, begin, now):
-        m = moved(xp, filter.backup.response, m, c, memory.air, h)
+        if rate is not None:
+            m, begin, before = _turning(m, rate, at, before), at, (at, rate)
     return m
 
 

@@ -8,6 +8,7 @@ it, has all of the body behind it.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -46,7 +47,7 @@ class Obstacle:
     ball: float = 0.0
     """Radius of the ball, m."""
 
-    @property
+    @cached_property
     def reach(self) -> float:
         """Radius of a ball about its centre that holds it, m."""
         x, y, z = self.half
