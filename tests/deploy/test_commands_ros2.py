@@ -94,10 +94,11 @@ def test_a_relay_that_ends_is_the_reason_of_the_silence(ros: None) -> None:
     still = Odometry(0.0, np.array([0.0, 0.0, 1.0]), zero, np.array([1.0, 0, 0, 0]), zero)
     try:
         deadline = time.monotonic() + 20
-        while commander.stream.command is None and time.monotonic() < deadline:
+        # its stamp stands, so that all but the first are refused: what comes last is the reason
+        while not (commander.stream.taken and commander.stream.refused) and time.monotonic() < deadline:
             commander.hear(still, time.monotonic())
             time.sleep(0.01)
-        assert commander.stream.command is not None
+        assert commander.stream.taken and commander.stream.refused
         source._child.process.kill()
         source._child.process.wait(10)
         ended = time.monotonic()

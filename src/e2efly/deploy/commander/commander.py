@@ -110,15 +110,13 @@ class Commander:
 
     def hear(self, odometry: Odometry | None, now: float) -> None:
         """Take in what has come."""
-        commands, refused = self.source.read(now), self.source.refused
-        if refused > self._counted:
-            self.stream = refuse(self.stream, self.source.problem or "malformed", now, refused - self._counted)
-            self._counted = refused
         flying = self.state is not None
-        for command in commands:
+        for command in self.source.read(now):
             self.stream = take(self.stream, command, self.limits, odometry, now, self.timeout, flying=flying)
-        if self.stream.accepted == now:
-            self._known = self.source.problem
+        refused, problem = self.source.refused, self.source.problem
+        if refused > self._counted or (problem and problem != self._known):
+            self.stream = refuse(self.stream, problem or "malformed", now, refused - self._counted)
+        self._counted, self._known = refused, problem
 
     def readiness(self, odometry: Odometry, now: float) -> str | None:
         """Why it must not take over now; None: it may."""
@@ -127,7 +125,7 @@ class Commander:
             ("tilt", tilt_of(odometry.quaternion), self.envelope.tilt, "rad"),
         )
         stands = beyond(limits)
-        return self._silence(now) or unsteady(self.stream, now) or "; ".join(stands) or None
+        return silence(self.stream, now, self.timeout) or unsteady(self.stream, now) or "; ".join(stands) or None
 
     def start(self, odometry: Odometry, now: float) -> None:
         """It takes over, in the vehicle's heading."""
@@ -149,7 +147,7 @@ class Commander:
         command, before = self.stream.command, self.state
         if before is None:
             return False
-        self.problem = self._silence(now)
+        self.problem = silence(self.stream, now, self.timeout)
         if self.problem or command is None:
             return False
         yaw = heading(command, before, odometry, now)
@@ -166,10 +164,6 @@ class Commander:
     def close(self) -> None:
         """Close the source."""
         self.source.close()
-
-    def _silence(self, now: float) -> str | None:
-        said = self.source.problem
-        return silence(self.stream, now, self.timeout, said if said != self._known else None)
 
 
 def heading(command: Command, before: Heading, odometry: Odometry, now: float) -> float:

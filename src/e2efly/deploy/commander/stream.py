@@ -34,7 +34,7 @@ class Stream:
     clipped: int = 0
     """Commands with a number beyond the vehicle's limits."""
     problem: str = ""
-    """Why the last message was refused that was."""
+    """Why the last message was refused that was, or what ails the source: whichever came later."""
     problem_time: float = -math.inf
     """When it was, s."""
 
@@ -99,24 +99,23 @@ def _dated(clock: ClockMap | None, command: Command) -> tuple[ClockMap | None, f
 
 
 def refuse(stream: Stream, problem: str, now: float, count: int = 1) -> Stream:
-    """Count messages that are no commands: they move nothing."""
+    """Count messages that are no commands, or with a count of 0 note what ails the source: they move nothing."""
     return replace(stream, since=math.inf, refused=stream.refused + count, problem=problem, problem_time=now)
 
 
-def silence(stream: Stream, now: float, timeout: float, source_problem: str | None = None) -> str | None:
+def silence(stream: Stream, now: float, timeout: float) -> str | None:
     """Why there is no command to fly by now; None: there is one.
 
     Args:
         stream: so far.
         now: s.
         timeout: an older command is too old, s.
-        source_problem: what ails the source.
     """
     age = stream.age(now)
     if age <= timeout:
         return None
     none = "no command has come yet" if math.isinf(age) else f"no good command for {age:.2f} s; accepted: {timeout:g}"
-    why = stream.problem if stream.problem_time > stream.accepted else source_problem
+    why = stream.problem if stream.problem_time > stream.accepted else None
     return f"{none} ({why})" if why else none
 
 
