@@ -35,7 +35,7 @@ NOISE = (0.0005, 0.01, 0.02, 0.001)
 WIND, GUST_S = 3.0, 2.0
 """Largest speed of the air, m/s, and the mean time between its gusts, s."""
 LOSS = 0.2
-"""Share of the thrust that is lost from a moment of the flight on."""
+"""Share of the thrust that is lost, from the begin or from a moment of the flight on."""
 KINDS = ("rush", "wander", "random", "dive", "climb", "swing", "last step", "spin")
 """What flies: at a wall as fast as it goes; by random velocities; by random thrusts and rates; at the floor; at the
 ceiling; with the largest rates to and fro; at a wall, and with the largest rate and thrust towards it once the filter
@@ -192,6 +192,7 @@ def fly(
     seconds: float,
     latency: float,
     believed: float | None = None,
+    sudden: bool = True,
     seed: int = 0,
     filters: bool = True,
     watched: tuple[int, ...] = (),
@@ -206,6 +207,7 @@ def fly(
         seconds: of each flight.
         latency: from motion to rate loop, s.
         believed: what the filter takes it for, s; None: the same.
+        sudden: whether the thrust is lost at once in flight, and not before it.
         seed: of starts, air, noise.
         filters: whether the filter acts.
         watched: flights whose steps are kept.
@@ -228,7 +230,7 @@ def fly(
     sent, memory = deque([hover] * late), Memory()
     for i in range(20):
         memory = remember(memory, _command(hover), (i - 20) / RATE)
-    wind, lost_at = np.zeros((n, 3)), random.uniform(0, seconds / 2, n)
+    wind, lost_at = np.zeros((n, 3)), random.uniform(0, seconds / 2, n) if sudden else np.full(n, -1.0)
     gap, over_speed, over_tilt, top_speed = np.full(n, np.inf), np.full(n, -np.inf), np.full(n, -np.inf), np.zeros(n)
     changed, limits, acted = np.zeros(n), np.zeros((n, len(NAMES))), np.full(n, False)
     trace: list[dict[str, Any]] = []

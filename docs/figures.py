@@ -147,12 +147,13 @@ by the code that judges training. All are of the preset `robust`. What the last 
 rendered at the body's true pose, in another world each time; touching a solid is no success.""",
     "filter": """
 VIS-R on the simulator's body, each flight in a fence of its own with a largest speed of its own, 3 to 10
-m/s; 90 ms of delay, noise of motion capture, gusts of up to 3 m/s, and a fifth of the thrust lost from a
-moment of the flight on, of which the filter is not told. Its margins were set on other flights of these
-kinds. A breach is any moment outside the fence, or above its speed or tilt. The tables after that: the steps
-of the zoo's own flights in which the filter would change the command, in fences around all of them with 1 m/s
-and 0.4 rad to spare; the share of the default fence in which the vehicle may fly level at a speed in every
-direction; milliseconds of the processor for a call, beside other programs; flights at walls through the real
+m/s; 90 ms of delay, noise of motion capture, gusts of up to 3 m/s, and a fifth less thrust, of which the
+filter is not told. In the second half of the table that fifth is lost at once, at a moment of the flight,
+which is faster than a battery sags. The margins were set on other flights of these kinds. A breach is any
+moment outside the fence, or above its speed or tilt. The tables after that: the steps of the zoo's own
+flights in which the filter would change the command, in fences around all of them with 1 m/s and 0.4 rad to
+spare; the share of the default fence in which the vehicle may fly level at a speed in every direction;
+milliseconds of the processor for a call, beside other programs; flights at walls through the real
 firmware, with the way that the switch takes to stop where it ended them.""",
     "controllers": """
 Flights of VIS-R at 100 Hz with poses that are 30 ms old and noisy, and 10 ms from the command to the rate

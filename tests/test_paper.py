@@ -1,6 +1,7 @@
 """The paper's experiments, in their short versions: what they write, what they do not repeat, what they make of it."""
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -20,10 +21,20 @@ sys.path.insert(0, str(BENCHMARKS))
 
 import paper  # noqa: E402
 from claims import EXPERIMENTS  # noqa: E402
+from claims.ablations import without  # noqa: E402
 from claims.alignment import NOMINAL  # noqa: E402
-from claims.experiment import CONFIRMED, NOTHING, REFUTED, UNMEASURED, UNTESTABLE, Found, Run  # noqa: E402
+from claims.experiment import (  # noqa: E402
+    CONFIRMED,
+    NOTHING,
+    REFUTED,
+    UNMEASURED,
+    UNTESTABLE,
+    Found,
+    Run,
+    Verdict,
+)
 from claims.learning import LEARNING, OWN, TASKS  # noqa: E402
-from claims.running import SHORT, SMALL, How, converged, figures, trained, wanted  # noqa: E402
+from claims.running import SHORT, SMALL, How, converged, figures, process, trained, wanted  # noqa: E402
 
 WITH_RUNS = [name for name, experiment in EXPERIMENTS.items() if experiment.runs]
 
@@ -76,11 +87,11 @@ def test_what_was_killed_goes_on_where_it_was(folder: Path, tmp_path: Path) -> N
     file = tmp_path / "paper.json"
     with subprocess.Popen(
         command("learning", file=file, runs=folder), env=environment(), start_new_session=True
-    ) as process:
+    ) as running:
         while not (file.exists() and json.loads(file.read_text())["learning"]["runs"]):
-            assert process.poll() is None
+            assert running.poll() is None
             time.sleep(0.01)
-        os.killpg(process.pid, signal.SIGKILL)  # with the training that it waits for
+        os.killpg(running.pid, signal.SIGKILL)  # with the training that it waits for
     before = json.loads(file.read_text())["learning"]["runs"]
     (first,) = before[:1]
     run("learning", file=file, runs=folder)
@@ -180,3 +191,30 @@ def test_verdicts_of_learning_follow_the_figures() -> None:
     failed = {"hover": {"success": 0.2}}
     assert verdicts(bptt, learned("ppo", None, shipped=failed))[4] == REFUTED
     assert verdicts(bptt, learned("ppo", None, shipped=failed, finished=False))[4] == UNMEASURED
+
+
+def test_an_ablation_counts_where_the_full_reward_learns() -> None:
+    def row(task: str, algo: str, full: float, sparse: float) -> dict[str, Any]:
+        rates = {"success": [[full], [sparse]], "error": [[0.0], [0.0]]}
+        return {"task": task, "algo": algo, "variant": "paper", "variants": ["full", "sparse"], "seed": 0, **rates}
+
+    def judge(*runs: dict[str, Any]) -> Verdict:
+        return without("sparse", ("land", "race"), ("ppo",), 2)(Found(runs, lambda name: None))
+
+    learned, lost = row("race", "ppo", 1.0, 0.2), row("land", "ppo", 0.0, 0.0)
+    assert judge().word == UNMEASURED
+    assert judge(learned).word == UNMEASURED  # the other one is still to come
+    found = judge(learned, lost)
+    assert found.word == CONFIRMED
+    assert found.why == "not learned with the full reward either: land by PPO"
+    assert judge(row("race", "ppo", 1.0, 1.0), lost).word == REFUTED
+    assert judge(row("race", "ppo", 0.4, 0.0), lost).word == UNTESTABLE
+
+
+def test_the_seconds_of_a_process_that_was_killed_are_not_known(tmp_path: Path) -> None:
+    times = tmp_path / "run.time"
+    process(["list"], times)
+    assert sum(map(float, times.read_text().split())) > 0
+    times.with_suffix(".log").touch()  # as a process leaves it that was killed
+    process(["list"], times)
+    assert math.isnan(sum(map(float, times.read_text().split())))

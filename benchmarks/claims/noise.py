@@ -58,15 +58,16 @@ def worst_noise(found: Found, task: str, variant: str) -> tuple[str, float] | No
 
 
 def noiseless(tasks: tuple[str, ...], flies: bool) -> Any:
-    """A judge: whether policies that were trained without noise fly in the worst noise, or do not, as is claimed."""
+    """A judge: whether policies trained without noise succeed as often in the worst noise, or less, as is claimed."""
 
     def judge(found: Found) -> Verdict:
         told, right = [], []
         for task in tasks:
             if worst := worst_noise(found, task, CLEAN):
-                right.append((worst[1] > 1 - LOST) == flies)
-                told.append(f"{task} {worst[0]}: {100 * worst[1]:.1f} %")
-        return verdict(right, told, "trained without noise, flown in the worst of ours", len(tasks))
+                still = mean(found.flown(CLEAN, task=task, variant=CLEAN))
+                right.append((worst[1] > still - LOST) == flies)
+                told.append(f"{task} {worst[0]}: {100 * worst[1]:.1f} %, {CLEAN}: {100 * still:.1f} %")
+        return verdict(right, told, "trained without noise, flown in the worst of ours and in none", len(tasks))
 
     return judge
 

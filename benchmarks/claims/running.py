@@ -112,13 +112,17 @@ def trained(run: Run, seed: int, out: Path, how: How) -> dict[str, Any]:
 
 
 def process(arguments: list[str], times: Path, over: Callable[[], bool] = lambda: False) -> None:
-    """Run a command of e2efly; stop it in order once it is over. Its user and system seconds join a file.
+    """Run a command of e2efly; stop it in order once it is over. Its user and system seconds join a file: NaN for what
+    an earlier process took that was killed, whose log is still there.
 
     Raises:
         SystemExit: with what it says, when it fails.
     """
     times.parent.mkdir(parents=True, exist_ok=True)
     before, log = resource.getrusage(resource.RUSAGE_CHILDREN), times.with_suffix(".log")
+    if log.exists():
+        with times.open("a") as file:
+            file.write("nan nan\n")
     with log.open("w") as told:
         child = subprocess.Popen([sys.executable, "-m", "e2efly", *arguments], stdout=told, stderr=subprocess.STDOUT)
         accepted = (0,)
@@ -155,7 +159,7 @@ def figures(out: Path) -> dict[str, Any]:
     run = RunDirectory(out)
     summary, rows = run.read_json("summary.json"), run.rows()
     times = out.with_suffix(".time")
-    cpu = sum(sum(map(float, line.split()[:2])) for line in times.read_text().splitlines()) if times.exists() else None
+    cpu = sum(map(float, times.read_text().split())) if times.exists() else math.nan
     last = [i for i, row in enumerate(rows) if "seconds" in row]
     points = []
     for before, i in zip([-1, *last], last, strict=False):
@@ -172,7 +176,7 @@ def figures(out: Path) -> dict[str, Any]:
         "finished": bool(summary["finished"]),
         "steps": summary["env_steps"],
         "seconds": summary["seconds_trained_from_process_start"],
-        "cpu_seconds": cpu,
+        "cpu_seconds": None if math.isnan(cpu) else cpu,
         "rate": float(np.median([rows[i]["rate"] for i in last])),
         "cores": len(os.sched_getaffinity(0)),
         "reached": {x: p and {name: p[name] for name in ("steps", "seconds")} for x, p in reached.items()},

@@ -11,7 +11,7 @@ from e2efly.deploy.filter.obstacle import Obstacle, Plane, obstacles
 from e2efly.deploy.filter.way import Way, run_out, way
 from e2efly.deploy.settings import Fence
 
-SPEED_MARGIN, SPEED_S = 0.6, 0.25
+SPEED_MARGIN, SPEED_S = 0.7, 0.25
 """The largest speed is kept to with this margin, m/s; so much of it counts as a metre of room, s."""
 TILT_M = 0.3
 """A radian of tilt counts as so much room, m."""
