@@ -21,7 +21,7 @@ sys.path.insert(0, str(BENCHMARKS))
 
 import paper  # noqa: E402
 from claims import EXPERIMENTS  # noqa: E402
-from claims.ablations import without  # noqa: E402
+from claims.ablations import missed, without  # noqa: E402
 from claims.alignment import NOMINAL  # noqa: E402
 from claims.experiment import (  # noqa: E402
     CONFIRMED,
@@ -209,6 +209,7 @@ def test_an_ablation_counts_where_the_full_reward_learns() -> None:
     assert found.why == "not learned with the full reward either: land by PPO"
     assert judge(row("race", "ppo", 1.0, 1.0), lost).word == REFUTED
     assert judge(row("race", "ppo", 0.4, 0.0), lost).word == UNTESTABLE
+    assert missed(row("track", "ppo", 1.0, 0.0), "sparse")  # all crash before an error counts
 
 
 def test_the_seconds_of_a_process_that_was_killed_are_not_known(tmp_path: Path) -> None:
