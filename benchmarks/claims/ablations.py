@@ -25,20 +25,24 @@ LEARNED = 0.5
 """A case counts where the full reward has learned the task: so many starts succeed."""
 
 
-def counted(found: Found, tasks: tuple[str, ...], algos: tuple[str, ...] = ("ppo", "bptt")) -> tuple[list[Any], str]:
-    """The ablations of the paper's rewards that say something, and which do not, in words."""
-    asked = [one for one in found.of(variant=THEIRS) if one["task"] in tasks and one["algo"] in algos]
-    good = [mean(one["success"][one["variants"].index(FULL)]) >= LEARNED for one in asked]
-    lost = [f"{one['task']} by {one['algo'].upper()}" for one, told in zip(asked, good, strict=True) if not told]
-    why = f"not learned with the full reward either: {', '.join(lost)}" if lost else ""
-    return [one for one, told in zip(asked, good, strict=True) if told], why
+def counted(runs: list[Any]) -> tuple[list[Any], list[str]]:
+    """The ablations that say something, as the full reward learns their task, and the cases of the others."""
+    learned = [mean(one["success"][one["variants"].index(FULL)]) >= LEARNED for one in runs]
+    good = [one for one, right in zip(runs, learned, strict=True) if right]
+    return good, [case(one) for one, right in zip(runs, learned, strict=True) if not right]
 
 
-def judged(right: list[bool], told: list[str], why: str, lost: str, cases: float) -> Verdict:
-    """The verdict, of cases that count; where all were measured and none does, the claim cannot be tested."""
+def case(one: Mapping[str, Any]) -> str:
+    """Task and algorithm, in words."""
+    return f"{one['task']} by {one['algo'].upper()}"
+
+
+def judged(right: list[bool], told: list[str], why: str, lost: list[str], cases: float) -> Verdict:
+    """The verdict, of so many cases that count; where no case that was measured does, the claim cannot be tested."""
+    unlearned = f"not learned with the full reward either: {', '.join(lost)}" if lost else ""
     if not right and lost and cases == 0:
-        return Verdict(UNTESTABLE, "-", lost)
-    return verdict(right, told, "; ".join(text for text in (why, lost) if text), cases)
+        return Verdict(UNTESTABLE, "-", unlearned)
+    return verdict(right, told, "; ".join(text for text in (why, unlearned) if text), cases)
 
 
 def missed(one: Mapping[str, Any], part: str) -> bool:
@@ -52,30 +56,28 @@ def missed(one: Mapping[str, Any], part: str) -> bool:
 def all_needed(found: Found) -> Verdict:
     """Whether hover, land and track get worse without any of prog, act, v and anglev."""
     told, right = [], []
-    good, lost = counted(found, STABLE)
+    runs = [one for one in found.of(variant=THEIRS) if one["task"] in STABLE]
+    good, lost = counted(runs)
     for one in good:
         parts = [part for part in one["variants"] if part in ("prog", "act", "v", "anglev")]
         spared = [part for part in parts if not missed(one, part)]
         right += [part not in spared for part in parts]
         if spared:
-            told.append(f"{one['task']} by {one['algo'].upper()} without {', '.join(spared)}")
-    whole = sum(one["task"] in STABLE for one in found.of(variant=THEIRS)) == 2 * len(STABLE)
+            told.append(f"{case(one)} without {', '.join(spared)}")
     why = f"not worse: {'; '.join(told)}" if told else ""
-    return judged(right, [f"{sum(right)} of {len(right)} parts are missed"], why, lost, 0 if whole else math.inf)
+    cases = 0 if len(runs) == 2 * len(STABLE) else math.inf
+    return judged(right, [f"{sum(right)} of {len(right)} parts are missed"], why, lost, cases)
 
 
 def without(part: str, tasks: tuple[str, ...], algos: tuple[str, ...], cases: int) -> Any:
     """A judge: whether tasks get worse without a part; cases: rewards that have it."""
 
     def judge(found: Found) -> Verdict:
-        good, lost = counted(found, tasks, algos)
-        good = [one for one in good if part in one["variants"]]
-        right = [missed(one, part) for one in good]
-        told = [
-            f"{one['task']} by {one['algo'].upper()}: {shown(one, FULL)} with, {shown(one, part)} without"
-            for one in good
-        ]
-        return judged(right, told, "", lost, cases - lost.count(" by "))
+        runs = found.of(variant=THEIRS)
+        runs = [x for x in runs if x["task"] in tasks and x["algo"] in algos and part in x["variants"]]
+        good, lost = counted(runs)
+        told = [f"{case(one)}: {shown(one, FULL)} with, {shown(one, part)} without" for one in good]
+        return judged([missed(one, part) for one in good], told, "", lost, cases - len(lost))
 
     return judge
 

@@ -199,11 +199,10 @@ networks and observations for both, 13 numbers (track 40, race 16), by `--env.pa
 rewards are identical, but its reward tables give PPO an action term and sparse ones besides: both are measured. A run
 of fewer steps than theirs was stopped; what it had not reached by then it may reach later. Seconds are of one core's
 CPU, compilation included; crashes and end error: of the worst criterion; of landing the error is sideways. With these
-weights the sum of the rewards, which PPO maximises, favours failure. In hovering and tracking the reward of a step is
-negative nearly everywhere, and a crash ends the episode: PPO may learn to crash early, as in the rows in which all
+weights the sum of the rewards, which PPO maximises, can favour failure. In hovering and tracking the reward of a step
+is negative nearly everywhere, and a crash ends the episode: PPO may learn to crash early, as in the rows in which all
 starts crash. In landing the reward of a step is positive, and the touch ends the episode: PPO learns to hover 20 cm
 over the pad until the time is over. BPTT differentiates the rewards of the steps that it flies, and does neither. A
-reward has settled where it
-stays within 5 % of its whole change from its mean over the last tenth of the run.""",
+reward has settled where it stays within 5 % of its whole change from its mean over the last tenth of the run.""",
     short=2,
 )  # fmt: skip

@@ -122,7 +122,7 @@ def process(arguments: list[str], times: Path, over: Callable[[], bool] = lambda
     before, log = resource.getrusage(resource.RUSAGE_CHILDREN), times.with_suffix(".log")
     if log.exists():
         with times.open("a") as file:
-            file.write("nan nan\n")
+            file.write("nan\n")
     with log.open("w") as told:
         child = subprocess.Popen([sys.executable, "-m", "e2efly", *arguments], stdout=told, stderr=subprocess.STDOUT)
         accepted = (0,)
