@@ -13,7 +13,7 @@ import pytest
 from e2efly import presets
 from e2efly.config import EnvConfig, ForestConfig, ImuConfig, NoiseConfig, RewardConfig, TaskConfig
 from e2efly.env import UNSEEN, Env, numbers_of, random_key
-from e2efly.env.environment import STARTS
+from e2efly.env.state import STARTS
 from e2efly.learn.judge import CONFIRMED, REPORTED, WATCHED
 from e2efly.physics.rotation import yaw_pitch_roll
 from e2efly.sensors import imu

@@ -30,17 +30,19 @@ from e2efly.control import COMMAND_MODES
 from e2efly.env import disturbance, expert
 from e2efly.env.check import check
 from e2efly.env.draws import between, delays, deviations, perturbed
+from e2efly.env.images import newest
 from e2efly.env.limits import latencies_of, limits_of, posterior_of
-from e2efly.env.state import EnvState, Step
+from e2efly.env.signals import dangers, happened
+from e2efly.env.state import DISTURBED, INERTIAL, SEEN, STARTS, EnvState, Step, pushed, where
 from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field, past_actions
-from e2efly.physics import Physics, State, started, step
+from e2efly.physics import Physics, started, step
 from e2efly.physics.body import hover_rotor_speed
-from e2efly.physics.rotation import from_euler, unrotate, yaw
+from e2efly.physics.rotation import unrotate
 from e2efly.scenes import scene as scenes
 from e2efly.scenes.meshes.scene import MeshScene
 from e2efly.scenes.scene import Scene
 from e2efly.sensors import imu, latency
-from e2efly.sensors.eyes import Eye, image_shape, see, steady, steps_between
+from e2efly.sensors.eyes import Eye, image_shape, steady
 from e2efly.sensors.noise import add_noise
 from e2efly.tasks.task import Guided, Shape, Task, into_ball, make_task, uniform
 from e2efly.vehicles import Family, Flown, load_family, load_vehicle
@@ -49,8 +51,6 @@ from e2efly.vehicles.posterior import IDENTIFIED, Posterior
 
 LEADS = (0.0, 0.25, 0.5, 1.0, 1.5)
 """How far ahead a critic is told the clearance, s."""
-STARTS, INERTIAL, SEEN, IMAGES, DISTURBED = range(5)
-"""What is random in a control step: each has keys of its own."""
 DEFAULT = EnvConfig()
 """The VIS-R, nothing random but the starts."""
 
@@ -252,27 +252,8 @@ class Env:
         """
         if not self.cameras:
             return state
-        still = jax.lax.stop_gradient(state)
-        scene = self.task.scene(still.memory) if world is None else world
-        images = []
-        for index, (camera, eye, old) in enumerate(zip(self.cameras, still.eyes, still.images, strict=True)):
-            every = steps_between(camera, self.control_period)
-            due = state.tick % (every if eye.every is None else eye.every) == 0
-
-            def new(_: None, index: int = index, camera: CameraConfig = camera, eye: Eye = eye) -> Array:
-                then, seen = still.time, still.vehicle
-                if still.past is not None:
-                    then = jnp.maximum(then - eye.latency, 0.0)
-                    seen = latency.delayed_state(still.past, eye.latency, self.control_period)
-                key = jax.random.fold_in(_key(still, IMAGES), index)
-                return see(camera, eye, scene.at(then), seen, key)
-
-            if every == 1 and eye.every is None:
-                images.append(new(None))
-                continue
-            fresh = jax.lax.cond(jnp.any(due | renewed), new, lambda _, old=old: old, None)
-            images.append(_where(due | renewed, fresh, old))
-        return dataclasses.replace(state, images=tuple(images))
+        scene = self.task.scene(jax.lax.stop_gradient(state.memory)) if world is None else world
+        return dataclasses.replace(state, images=newest(self.cameras, scene, state, renewed, self.control_period))
 
     @property
     def privileged_size(self) -> int:
@@ -297,8 +278,8 @@ class Env:
         """Start anew where `out` says that the episode ended."""
 
         def anew(_: None) -> tuple[EnvState, Array]:
-            fresh = self._start(_key(state, STARTS), out.reward.shape[0], state.tick)
-            chosen = _where(out.done, dataclasses.replace(fresh, key=state.key), state)
+            fresh = self._start(state.key_of(STARTS), out.reward.shape[0], state.tick)
+            chosen = where(out.done, dataclasses.replace(fresh, key=state.key), state)
             return chosen, self._observe(chosen)
 
         state, observation = jax.lax.cond(jnp.any(out.done), anew, lambda _: (state, out.final_observation), None)
@@ -316,56 +297,31 @@ class Env:
             gust = jnp.asarray(disturbed.gust)
             wind = gust if wind is None else wind + gust
             share = disturbed.share(state.time / self.task.episode_s)
-            disturbed = disturbance.advance(disturbed, _key(state, DISTURBED), period)
+            disturbed = disturbance.advance(disturbed, state.key_of(DISTURBED), period)
         after = step(physics, plant, before, new, previous=old, switch_time=switch, wind=wind, rotor_share=share)
 
         time = (jnp.round(state.time / period) + 1) * period  # whole periods: float32 sums drift
         late = time >= self.task.episode_s - 1e-3 * period
         memory, outcome = self.task.advance(state.memory, before, after, time, late)
-        tick = state.tick + 1
         inertial = state.imu
         if self.imu is not None and inertial is not None:
-            inertial = imu.measure(self.imu, _key(state, INERTIAL), inertial, before, after, period)
-        reached = EnvState(
+            inertial = imu.measure(self.imu, state.key_of(INERTIAL), inertial, before, after, period)
+        reached = dataclasses.replace(
+            state,
             vehicle=after,
             memory=memory,
             time=time,
             actions=actions,
-            action_latency=state.action_latency,
-            plant=state.plant,
-            wind=state.wind,
-            family=state.family,
             disturbance=disturbed,
-            past=None if state.past is None else _push(state.past, after),
-            observation_latency=state.observation_latency,
+            past=None if state.past is None else pushed(state.past, after),
             imu=inertial,
-            eyes=state.eyes,
-            images=state.images,
-            key=state.key,
-            tick=tick,
+            tick=state.tick + 1,
         )
-        goal_before, goal_now = (self.task.goal(state.memory, t) for t in (state.time, time))
-        wanted_yaw = self.task.desired_yaw(state.memory, after)
-        zero = jnp.zeros_like(wanted_yaw)
-        signals = {
-            "offset": goal_now - after.position,
-            "previous_offset": goal_before - before.position,
-            "velocity": after.velocity,
-            "quaternion": after.quaternion,
-            "body_rate": after.body_rate,
-            "action": action,
-            "previous_action": state.actions[:, 0],
-            "height": after.position[:, 2] - goal_now[:, 2],
-            "yaw_error": _wrap(yaw(after.quaternion) - wanted_yaw),
-            "desired_quaternion": from_euler(zero, zero, wanted_yaw),
-            "arrived": outcome.arrived,
-            "crashed": outcome.crashed,
-        }
-        signals |= outcome.signals
+        signals = happened(self.task, state, reached, action, outcome)
         if self._reads("expert_action") and isinstance(self.task, Guided) and physics.command_mode == "ctbr":
             signals["expert_action"] = self.expert_action(state)
         if self._reads("clearance", "gaps"):
-            signals |= self._dangers(memory, after, time)
+            signals |= dangers(self.task, memory, after, time)
         total, terms = rewards.reward(self.weights, self.parameters, signals)
         observation = self._observe(reached)
         return reached, Step(
@@ -438,26 +394,6 @@ class Env:
         """Whether a term of the reward reads one of them."""
         return any(signal in rewards.TERMS[name].inputs for name in self.weights for signal in signals)
 
-    def _dangers(self, memory: Any, state: State, time: Float[Array, " n"]) -> dict[str, Array]:
-        """How far the vehicle's sphere is from things, m, and how fast they come nearer, m/s.
-
-        Gates do not count: kept away from, they are not flown through.
-        """
-        scene, radius = self.task.scene(memory), self.task.shape.radius
-        scene = dataclasses.replace(scene, solids={k: s for k, s in scene.solids.items() if k != "gate"})
-
-        def gaps(position: Array, time: Array) -> Array:
-            return scenes.gaps(scene, position, time) - radius
-
-        each, growing = jax.jvp(gaps, (state.position, time), (state.velocity, jnp.ones_like(time)))
-        nearest = jax.nn.one_hot(jnp.argmin(each, axis=-1), each.shape[-1])
-        return {
-            "gaps": each,
-            "closing": -growing,
-            "clearance": jnp.sum(nearest * each, axis=-1),
-            "approach_speed": -jnp.sum(nearest * growing, axis=-1),
-        }
-
     def expert_action(self, state: EnvState) -> Float[Array, "n 4"]:
         """What one who knows the whole world, and this vehicle, would do now; no gradient.
 
@@ -486,35 +422,10 @@ class Env:
         if state.disturbance is not None:
             seen = dataclasses.replace(seen, position=seen.position + state.disturbance.drift)
         if self.noise is not None:
-            seen = add_noise(self.noise, _key(state, SEEN), seen)
+            seen = add_noise(self.noise, state.key_of(SEEN), seen)
         n = seen.position.shape[0]
         parts = [self.task.observe(state.memory, state.time, seen), seen.quaternion, seen.velocity, seen.body_rate]
         if state.imu is not None:
             parts += [state.imu.gyroscope, state.imu.accelerometer]
         parts.append(state.actions[:, : self.seen_actions].reshape(n, -1))
         return jnp.concatenate(parts, axis=-1)
-
-
-def _key(state: EnvState, of: int) -> PRNGKeyArray:
-    """The key of one of the things that are random in a control step."""
-    return jax.random.fold_in(jax.random.fold_in(state.key, state.tick), of)
-
-
-def _where(mask: Bool[Array, " n"], a: Any, b: Any) -> Any:
-    """Leaf by leaf, `a` where the mask holds; leaves without the batch axis come from `b`."""
-
-    def choose(x: Array, y: Array) -> Array:
-        if y.shape[:1] != mask.shape:
-            return y
-        return jnp.where(mask.reshape(mask.shape + (1,) * (y.ndim - 1)), x, y)
-
-    return jax.tree.map(choose, a, b)
-
-
-def _push(past: State, newest: State) -> State:
-    return jax.tree.map(lambda old, new: jnp.concatenate([new[:, None], old[:, :-1]], axis=1), past, newest)
-
-
-def _wrap(angle: Array) -> Array:
-    """Into [-pi, pi]."""
-    return jnp.arctan2(jnp.sin(angle), jnp.cos(angle))

@@ -4,12 +4,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from e2efly.env.disturbance import Disturbance
 from e2efly.physics import State
 from e2efly.sensors import imu
 from e2efly.sensors.eyes import Eye
+
+STARTS, INERTIAL, SEEN, IMAGES, DISTURBED = range(5)
+"""What is random in a control step: each has keys of its own."""
 
 
 @jax.tree_util.register_dataclass
@@ -48,6 +52,10 @@ class EnvState:
     tick: Int[Array, ""]
     """Steps since `reset`; with the key it seeds everything random."""
 
+    def key_of(self, what: int) -> PRNGKeyArray:
+        """The key of one of the things that are random in a control step."""
+        return jax.random.fold_in(jax.random.fold_in(self.key, self.tick), what)
+
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
@@ -76,3 +84,19 @@ class Step:
     def done(self) -> Bool[Array, " n"]:
         """Terminated or truncated."""
         return self.terminated | self.truncated
+
+
+def where(mask: Bool[Array, " n"], a: Any, b: Any) -> Any:
+    """Leaf by leaf, `a` where the mask holds; leaves without the batch axis come from `b`."""
+
+    def choose(x: Array, y: Array) -> Array:
+        if y.shape[:1] != mask.shape:
+            return y
+        return jnp.where(mask.reshape(mask.shape + (1,) * (y.ndim - 1)), x, y)
+
+    return jax.tree.map(choose, a, b)
+
+
+def pushed(past: State, newest: State) -> State:
+    """The last states with the newest before them, and without the oldest."""
+    return jax.tree.map(lambda old, new: jnp.concatenate([new[:, None], old[:, :-1]], axis=1), past, newest)
