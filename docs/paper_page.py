@@ -14,10 +14,9 @@ HEAD = """# The paper's claims
 
 e2efly implements *E2E-Fly: An Integrated Training-to-Deployment System for End-to-End Quadrotor Autonomy* by Fangyu
 Sun, Fanxing Li, Linzuo Zhang, Yu Hu, Renbiao Jin, Shuyu Wu, Wenxian Yu and Danping Zou (Shanghai Jiao Tong
-University). This
-page takes every table and figure of its experiments, puts our figures beside theirs, and says of each claim whether we
-find the same. It is written by `make docs` from what `benchmarks/paper.py` has measured; the rules of the verdicts are
-code, in `benchmarks/claims`.
+University). This page takes every table and figure of its experiments, puts our figures beside theirs, and says of each
+claim whether we find the same. It is written by `make docs` from what `benchmarks/paper.py` has measured. The rules of
+the verdicts are code, in `benchmarks/claims`.
 
 - **confirmed**: our measurement, in our simulator, says the same.
 - **refuted**: it says otherwise, under the conditions that stand beside it. The paper's simulator, VisFly, may differ.
@@ -69,15 +68,18 @@ PICTURES = {
     "ablation": ("paper_ablation.png", "rewards without one of their parts against steps"),
 }
 """The curves of an experiment, once there are any."""
+TASKS = ("hover", "land", "track", "race")
+"""In the order of the paper."""
 LINES = {"identical rewards": "-", "its own rewards": "--"}
 
 
 def page() -> str:
     """The page."""
     parts = json.loads(FILE.read_text(encoding="utf-8"))
-    counts = []
+    counts, total = [], Counter()
     for part in parts.values():
         of = Counter(claim["verdict"] for claim in part["claims"])
+        total += of
         anchor = part["title"].lower().replace(" ", "-").replace(",", "")
         counts.append(
             {
@@ -85,6 +87,7 @@ def page() -> str:
                 **{word: str(of[word]) if of[word] else "" for word in WORDS},
             }
         )
+    counts.append({"experiment": "all", **{word: str(total[word]) for word in WORDS}})
     lines = [HEAD, *markdown(counts), ""]
     for name, part in parts.items():
         lines += [*section(name, part), ""]
@@ -117,16 +120,21 @@ def measured(name: str, part: dict[str, Any]) -> str:
     return f"`benchmarks/paper.py {name}`, {part['date']}, {of} cores of {m['cpu']}, JAX {m['jax']}."
 
 
+def numbers(line: str) -> list[float]:
+    """A column of a curve, which the file has in one line."""
+    return [float(x) for x in line.split()]
+
+
 def curve(one: dict[str, Any], name: str) -> list[float]:
     """A column of a run's curve."""
-    return [float(x) for x in one["curve"][name].split()]
+    return numbers(one["curve"][name])
 
 
 def learning(runs: list[dict[str, Any]]) -> None:
     """docs/paper_learning.png: reward and success of every run against steps, a column a task."""
     from e2efly.view.style import CYCLE, figure
 
-    tasks = list(dict.fromkeys(one["task"] for one in runs))
+    tasks = [task for task in TASKS if any(one["task"] == task for one in runs)]
     notes = ["a line a run; the preset paper; dashed: PPO with the action and sparse terms of its own table"]
     with figure(DOCS / PICTURES["learning"][0], "PPO against BPTT", 5.6, notes) as fig:
         axes = fig.subplots(2, len(tasks), squeeze=False, sharex=True)
@@ -153,23 +161,26 @@ def ablation(runs: list[dict[str, Any]]) -> None:
     from e2efly.drawing import INK
     from e2efly.view.style import CYCLE, figure
 
-    columns = min(4, len(runs))
-    rows = -(-len(runs) // columns)
+    tasks = [task for task in TASKS if any(one["task"] == task for one in runs)]
+    kinds = sorted({(one["variant"], one["algo"]) for one in runs})
     notes = ["mean of the seeds; error of hover and track, success of land and race; black: the full reward"]
-    with figure(DOCS / PICTURES["ablation"][0], "Rewards without one of their parts", 1.0 + 2.6 * rows, notes) as fig:
-        axes = fig.subplots(rows, columns, squeeze=False)
+    title, height = "Rewards without one of their parts", 1.0 + 2.6 * len(kinds)
+    with figure(DOCS / PICTURES["ablation"][0], title, height, notes) as fig:
+        axes = fig.subplots(len(kinds), len(tasks), squeeze=False)
         parts = list(dict.fromkeys(name for one in runs for name in one["variants"][1:]))
-        for ax, one in zip(axes.ravel(), runs, strict=False):
+        for ax in axes.ravel():
+            ax.set_axis_off()
+        for one in runs:
+            ax = axes[kinds.index((one["variant"], one["algo"])), tasks.index(one["task"])]
+            ax.set_axis_on()
             by_error = one["task"] in ("hover", "track")
-            steps = [float(x) / 1e6 for x in one["curve"]["steps"].split()]
+            steps = [x / 1e6 for x in numbers(one["curve"]["steps"])]
             for variant, told in zip(one["variants"], one["curve"]["error" if by_error else "success"], strict=True):
-                values = [float(x) * (1 if by_error else 100) for x in told.split()]
                 full = variant == "full"
-                color = INK if full else CYCLE[parts.index(variant) % len(CYCLE)]
                 ax.plot(
                     steps,
-                    values,
-                    color=color,
+                    [x * (1 if by_error else 100) for x in numbers(told)],
+                    color=INK if full else CYCLE[parts.index(variant) % len(CYCLE)],
                     linewidth=2.2 if full else 1.4,
                     label=variant if full else f"w/o {variant}",
                 )
@@ -179,8 +190,6 @@ def ablation(runs: list[dict[str, Any]]) -> None:
                 ax.set_yscale("log")
             else:
                 ax.set_ylim(-4, 104)
-        for ax in axes.ravel()[len(runs) :]:
-            ax.set_axis_off()
         known = {
             label: line for ax in axes.ravel() for line, label in zip(*ax.get_legend_handles_labels(), strict=True)
         }
