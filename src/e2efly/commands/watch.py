@@ -113,7 +113,7 @@ def _logs(what: tuple[str, ...]) -> list[Path]:
     """The flight logs among what is to be watched: all of it, or none.
 
     Raises:
-        ValueError: for several things that are not all logs.
+        ValueError: for several things that are not all logs; for a path at which there is nothing.
     """
     logs = [Path(text) for text in what if Path(text).suffix.lower() in LOGS]
     if len(what) > 1 and len(logs) < len(what):
@@ -121,6 +121,10 @@ def _logs(what: tuple[str, ...]) -> list[Path]:
     for path in logs:
         if not path.exists():
             raise ValueError(f"flight log {str(path)!r} does not exist")
+    for text in what:
+        if (os.sep in text or text.endswith((".onnx", ".json"))) and ":" not in text and not Path(text).exists():
+            accepted = "a task, a policy.onnx, a run's folder, a flight log, a report of `e2efly validate --json`"
+            raise ValueError(f"there is no file or folder {text!r}; accepted: {accepted}")
     return logs
 
 
