@@ -61,113 +61,120 @@ SCRIPTS = {
 }  # fmt: skip
 """What measured a file of results that has not the name of its script."""
 FIRST = """
-Rates and times below that are older than 2026-11-24 were measured with the first-order integrator, which
-was the default until then. The default of today takes three times as long per physics sub-step
+The rates and times below that are older than 2026-11-24 were measured with the first-order integrator,
+which was the default until then. Today's default takes three times as long per physics sub-step
 ([physics](physics.md))."""
 """What stands over all tables."""
 NOTES = {
     "c_export": """
-Plain: `cc -O2`. Native: `cc -O3 -march=native`. Difference: the largest of the actions on 200 inputs by
-chance, from the value of the policy.onnx in double precision; of ONNX Runtime likewise.
+Plain: `cc -O2`. Native: `cc -O3 -march=native`. Difference: the largest difference of an action from the
+value of the policy.onnx in double precision, on 200 random inputs; for ONNX Runtime likewise.
 [What is exported](onboard.md#as-c).""",
     "onboard": """
-Each flies hover beside a controller that answers as recorded firmware did. [How to install
+Each flies hover with a controller that gives the answers of recorded firmware. [How to install
 it](onboard.md).""",
     "rates": """
 Third-order sub-steps, today's default. First-order ones (`semi_implicit`) run at 168 M/s on the same
 machine and day. On the 22nd, on a faster machine of the same name, first order gave 453 M/s, 38 times
 the best of the others; Crazyflow gave 11.9 M/s there.""",
     "any_track": """
-A specialist begins as the one policy and learns on one track alone for 2.5 million steps.
-Eight were trained, not fifty. What is missed and what was tried:
+A specialist begins with the weights of the one policy and learns on one track alone for 2.5 million
+steps. Eight specialists were trained, not fifty. The goals that were missed and what was tried:
 [any track](any-track.md#how-well-it-flies).""",
     "cold_start": """
 Cold: with an empty compilation cache. Later: the same command again.
 
 ![a bar for each command, in parts](cold_start.png)""",
     "visual_tasks": """
-The presets `nominal` of that day, of race_clutter one policy for each track. Today's presets are
-`robust`, and race_clutter has one policy for all: [the zoo by
+The policies are by the presets `nominal` of that day, in race_clutter one policy for each track.
+Today's presets are `robust`, and race_clutter has one policy for all tracks: [the zoo by
 sight](#the-zoos-policies-that-see-under-stress-of-the-vehicle-and-of-its-cameras).""",
     "expert": """
 It knows every trunk, and the mass, thrust, delay, motors and rate loop of its vehicle, but not its
 inertia or the wind. Policies that imitate it have to see the trunks.""",
     "raptor": """
-Success: within 0.1 m for the last second of 8 s. What stands in which row:
+Success: within 0.1 m for the last second of 8 s. The rows are explained in
 [any quadrotor](any-vehicle.md).""",
     "identify": """
-30 s in MuJoCo each, with noise, biases, gaps, late poses and sag; errors are absolute values, of
-inertia per axis. The structural part of sigma (`STRUCTURE`) was set on other vehicles than these. It
-makes the intervals of thrust, lag, delay and roll and pitch inertia wider than MuJoCo needs: real firmware and real
-logs differ from the model by more. [How it is done](identification.md).""",
+Each log has 30 s in MuJoCo, with noise, biases, gaps, late poses and sag. Errors are absolute values;
+those of inertia are per axis. The structural part of sigma (`STRUCTURE`) was set on other vehicles than
+these. It makes the intervals of thrust, lag, delay and roll and pitch inertia wider than MuJoCo needs,
+because real firmware and real logs differ more from the model. [How it is done](identification.md).""",
     "step_response": """
-VIS-R; mean of four steps of each command. Time until 10 % and 63 % of the step, and overshoot (of
-thrust, which an accelerometer shakes, none). [How it is done, and the picture](identification.md#align).""",
+VIS-R; mean of four steps of each command. The table has the time until 10 % and 63 % of the step, and
+the overshoot. No overshoot is given for thrust, because an accelerometer shakes its measurement.
+[How it is done, and the picture](identification.md#align).""",
     "tune": """
-Race with VIS-R's file; the body has mass up to 25 % more, thrust up to 20 % less, inertia up to x1.5,
-motor lag up to x1.6, delay up to 30 ms more and drag up to x2, at least half of each. Success is that of
-100 flights in MuJoCo on the hidden body. A vehicle takes 91 s (median; 114 s at most) from the log to the
-policy: 18 s to identify, 46 s to train, 26 s to evaluate with stress. Other programs ran beside it for
-most of the time.""",
+Race with VIS-R's file. The body has up to 25 % more mass, up to 20 % less thrust, inertia up to x1.5,
+motor lag up to x1.6, up to 30 ms more delay and drag up to x2, and at least half of each of these changes.
+Success is that of 100 flights in MuJoCo on the hidden body. A vehicle takes 91 s (median; 114 s at most)
+from the log to the policy: 18 s to identify, 46 s to train, 26 s to evaluate with stress. Other programs
+ran at the same time for most of it.""",
     "plants_by_sight": """
 The starts and worlds are those of `e2efly eval`. Images are rendered at the plant's true pose.""",
     "image_faults": """
 The policy of avoid flies by rendered images for a second before its camera breaks. *From its notice*: from
 the first control step in which the images are no longer good. A late or silent camera is noticed when its
-newest image is older than training's oldest, one image and 50 ms.""",
+newest image is older than the oldest image of the training, plus the time of one image, plus 50 ms.""",
     "hil_rehearsal": """
 The zoo's race_clutter of VIS-H, commanded to fly at 4 to 6 m/s, with a radio of 57 ms between the bridge and
 the vehicle. Motion capture, HIL node, bridge with watchdog, radio and firmware are processes in real time on
-two cores. Times are the worst lap's median / 99 %. The second table: each process killed once in flight.
-[What stands where](hil.md#rehearse-it-first).""",
+two cores. Times are the median / 99 % of the worst lap. In the second table each process is killed once
+in flight. [How the rehearsal works](hil.md#rehearse-it-first).""",
     "identify_betaflight": """
-30 s of `e2efly fly excitation` each, in a fence of 12 x 12 x 4.8 m, by the bridge, through Betaflight 4.6
-in virtual time. The delay's truth is on the rig's own clock: the age of the poses, and the time from a
-command to the setpoint. Thrust is a quadratic of motor outputs, and a log with less than 200 Hz of them
-gives thrust, lag and drag, but no inertia.
+Each log has 30 s of `e2efly fly excitation`, in a fence of 12 x 12 x 4.8 m, flown by the bridge through
+Betaflight 4.6 in virtual time. The true delay is measured by the rig's own clock: the age of the poses, and
+the time from a command to the setpoint. Thrust is a quadratic function of the motor outputs. A log with
+fewer than 200 motor outputs a second gives thrust, lag and drag, but no inertia.
 [What to fly](identification.md#what-to-fly).""",
     "robust": """
-Five seeds, 1000 starts a row. While track's last two and race's first three trained, other programs
-ran on the same two cores: they took up to twice the time of the others.""",
+Five seeds, 1000 starts per row. While the last two seeds of track and the first three of race trained,
+other programs ran on the same two cores: these seeds took up to twice the time of the others.""",
     "zoo_stress": """
-Percent of 1000 unseen starts, of the worst criterion, in the training simulator. The rows:
-[robustness](robustness.md#stress). "preset nominal" has no memory and was trained on the
+Percent of 1000 unseen starts that succeed, by the worst criterion, in the training simulator. The rows
+are explained in [robustness](robustness.md#stress). "preset nominal" has no memory and was trained on the
 nominal vehicle (seed 0).""",
     "zoo_stress_gap_hover_aware": """
 As above. A Crazyflie of 27 g does not stay within 10 cm of its target in such gusts and wind.""",
     "zoo_stress_by_sight": """
-Percent of 250 unseen starts, of the worst criterion: land_visual has one, avoid three speeds,
-race_clutter three tracks. The rows: [robustness](robustness.md#stress). Three seeds of avoid on the
-nominal vehicle, 1000 unseen forests each, at 5 / 8 / 10 m/s: 99.7 / 99.3 / 98.7, 99.8 / 98.9 / 97.7
-and 99.4 / 98.8 / 98.4 %, the 40 m from a standing start in 9.1, 7.5 and 7.7 s, 87, 67 and 52 % of
-what is commanded; the first was trained in 273 s.""",
+Percent of 250 unseen starts that succeed, by the worst criterion: land_visual has one, avoid three
+speeds, race_clutter three tracks. The rows are explained in [robustness](robustness.md#stress). Three
+seeds of avoid on the nominal vehicle, with 1000 unseen forests each, succeed at 5 / 8 / 10 m/s in
+99.7 / 99.3 / 98.7, 99.8 / 98.9 / 97.7 and 99.4 / 98.8 / 98.4 %. They fly the 40 m from a standing start
+in 9.1, 7.5 and 7.7 s, which is 87, 67 and 52 % of the commanded speed. The first seed was trained in
+273 s.""",
     "firmware_flights": """
-The zoo's policies of VIS-R, as they ship; all nine tasks. Success is the task's own verdict,
-by the code that judges training. All are of the preset `robust`. What the last three see is
-rendered at the body's true pose, in another world each time; touching a solid is no success.""",
+The zoo's policies of VIS-R, as they ship, in all nine tasks. Success is the task's own verdict,
+by the code that judges training. All policies are by the preset `robust`. What the last three see is
+rendered at the body's true pose, in another world each time. A flight that touches a solid does not
+succeed.""",
     "filter": """
-VIS-R on the simulator's body, each flight in a fence of its own with a largest speed of its own, 3 to 10
-m/s; 90 ms of delay, noise of motion capture, gusts of up to 3 m/s, and a fifth less thrust, of which the
-filter is not told. In the second half of the table that fifth is lost at once, at a moment of the flight,
-which is faster than a battery sags. The margins were set on other flights of these kinds. A breach is any
-moment outside the fence, or above its speed or tilt. The tables after that: the steps of the zoo's own
-flights in which the filter would change the command, in fences around all of them with 1 m/s and 0.4 rad to
-spare; the share of the default fence in which the vehicle may fly level at a speed in every direction;
-milliseconds of the processor for a call, beside other programs; flights at walls through the real
-firmware, with the way that the switch takes to stop where it ended them.""",
+VIS-R on the simulator's body. Each flight has a fence of its own with a largest speed of its own, 3 to 10
+m/s. There are 90 ms of delay, noise of motion capture, gusts of up to 3 m/s, and a fifth less thrust, of
+which the filter is not told. In the second half of the table that fifth is lost suddenly at one moment of
+the flight, which is faster than a battery sags. The margins were set on other flights of these kinds. A
+breach is any moment outside the fence, or above its speed or tilt. The tables after the first one have:
+
+1. the steps of the zoo's own flights in which the filter would change the command, in fences around all of
+   them with 1 m/s and 0.4 rad to spare;
+2. the share of the default fence in which the vehicle may fly level at a speed in every direction;
+3. milliseconds of the processor for a call, while other programs run;
+4. flights at walls through the real firmware, with the distance in which the switch stops the vehicle where
+   it ended them.""",
     "controllers": """
 Flights of VIS-R at 100 Hz with poses that are 30 ms old and noisy, and 10 ms from the command to the rate
-loop. Through the firmware the bridge does not know the age of the poses, and a circle is off by that time; its
-throttle map learns the mass. There INDI is told the speeds of the rig's rotors, as the SITL measures none.
-`pid` is the default ([which one](flying.md#hover-controllers)). The tables after that: percent of 250 unseen
-starts, of the worst criterion, under stress, flown by the zoo's policy and by each controller in its place,
-under its contract: at 30 Hz, 60 ms late. The controllers race at 3 m/s, the policy as fast as it can.""",
+loop. Through the firmware, the bridge does not know the age of the poses, so a circle is flown late by that age.
+The bridge's throttle map learns the mass. There INDI is told the speeds of the rig's rotors, because the
+SITL measures none. `pid` is the default ([which one](flying.md#hover-controllers)). The tables after the
+first one have the percent of 250 unseen starts that succeed under stress, by the worst criterion. They are
+flown by the zoo's policy and by each controller in its place, under the policy's contract: at 30 Hz, 60 ms
+late. The controllers race at 3 m/s, the policy as fast as it can.""",
     "firmware_faults": """
-Five times each, on the packaged Betaflight 4.6. On a SITL of 2026.6.1, built from its source
+Each fault five times, on the packaged Betaflight 4.6. On a SITL of 2026.6.1, built from its source
 and flown by `e2efly firmware --binary`, each of the 35 ended as documented, 2 of 2.""",
     "fault_campaign": """
-240 flights; the worst of those that break no rule beyond the bridge. What each mode and rule
-means, and what the eight are: [faults](faults.md#faults-by-chance-the-campaign).""",
+240 flights. The worst values are of the flights that break no rule beyond the bridge. The meaning of
+each mode and rule, and the eight flights: [faults](faults.md#faults-by-chance-the-campaign).""",
 }
 """What a reader must know beside a table."""
 

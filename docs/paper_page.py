@@ -19,17 +19,18 @@ claim whether we find the same. It is written by `make docs` from what `benchmar
 the verdicts are code, in `benchmarks/claims`.
 
 - **confirmed**: our measurement, in our simulator, says the same.
-- **refuted**: it says otherwise, under the conditions that stand beside it. The paper's simulator, VisFly, may differ.
-- **not testable here**: it needs a vehicle, or the paper does not say what is to be measured.
-- **not measured yet**: the experiment is there, its runs are not.
+- **refuted**: our measurement contradicts the claim, under the conditions given beside it. The paper's simulator,
+  VisFly, may give another result.
+- **not testable here**: a test needs a vehicle, or the paper does not say what is to be measured.
+- **not measured yet**: the experiment is defined, but its runs are missing.
 
-A table says how many seeds each row has. Few seeds show what happens, not how often.
+The tables say how many seeds each row has. With few seeds, a row shows that something can happen, but not how often.
 """
 COMMANDS = {
     "Training by PPO and BPTT: hovering, landing, tracking, racing": "`e2efly train race --preset paper --algo ppo "
     "--env.past-actions 0`: its rewards, sizes and observations",
-    "Identical rewards for both": "`--reward.weights act3 0 goal 0 crash 0` takes away what PPO alone has",
-    "Reward ablation": "`e2efly ablate --by group`; with `--preset paper --past-actions 0` of the paper's rewards",
+    "Identical rewards for both": "`--reward.weights act3 0 goal 0 crash 0` removes the terms that only PPO has",
+    "Reward ablation": "`e2efly ablate --by group`; with `--preset paper --past-actions 0` for the paper's rewards",
     "Visual landing by a segmentation mask, on three shapes of pad": "`e2efly train land_visual`",
     "Racing in clutter by depth: S-shaped, 3D circle, J-shaped": "`e2efly train race_clutter`",
     "Sim-to-sim in AirSim": "`e2efly validate hover --plant airsim:127.0.0.1:41451`",
@@ -40,19 +41,19 @@ COMMANDS = {
 }
 TAIL = """## Where it differs
 
-- The paper trains on an RTX 4090 and 32 cores; our figures are of CPU cores, from the start of the process, with
-  compilation.
-- Our starts are wider than those of the code around the paper, and our default preset, `robust`, trains for many
-  vehicles and not for one. `--preset nominal` trains for the one of the file, `--preset paper` with the paper's
-  weights, steps and sizes.
-- By default our policies see as many of their own past actions as the latency holds. The paper's observations have
-  none: 13 numbers, of tracking 40, of racing 16. `--env.past-actions 0` is the switch; the experiments above that say
-  *the paper's observations* have it.
+- The paper trains on an RTX 4090 and 32 cores. Our figures are measured on CPU cores, from the start of the process,
+  with compilation.
+- Our starts are wider than those of the code around the paper. Our default preset, `robust`, trains for many vehicles
+  and not for one. `--preset nominal` trains for the vehicle of the file alone. `--preset paper` trains with the
+  paper's weights, steps and sizes.
+- By default our policies see as many of their own past actions as fit into the latency. The paper's observations have
+  no past actions: they have 13 numbers, in tracking 40, in racing 16. `--env.past-actions 0` gives the same. The
+  experiments above that say *the paper's observations* use this option.
 - Where the paper contradicts itself or is silent, the page of the subject says what we do: [physics](physics.md),
   [rewards](rewards.md), [vehicles](hardware-vis-r.md).
 
 `VIS-R` and `VIS-H` are the paper's vehicles. VIS-R computes on board (0.75 kg, a Radxa X4 and a RealSense D435i,
-3.5-inch propellers). VIS-H is lighter (0.47 kg); its policy runs on the ground and its images come by radio or from a
+3.5-inch propellers). VIS-H is lighter (0.47 kg); its policy runs on the ground, and its images come by radio or from a
 virtual world.
 
 ## Citation
@@ -131,11 +132,11 @@ def curve(one: dict[str, Any], name: str) -> list[float]:
 
 
 def learning(runs: list[dict[str, Any]]) -> None:
-    """docs/paper_learning.png: reward and success of every run against steps, a column a task."""
+    """docs/paper_learning.png: reward and success of every run against steps, one column per task."""
     from e2efly.view.style import CYCLE, figure
 
     tasks = [task for task in TASKS if any(one["task"] == task for one in runs)]
-    notes = ["a line a run; the preset paper; dashed: PPO with the action and sparse terms of its own table"]
+    notes = ["one line per run; the preset paper; dashed: PPO with the action and sparse terms of its own table"]
     with figure(DOCS / PICTURES["learning"][0], "PPO against BPTT", 5.6, notes) as fig:
         axes = fig.subplots(2, len(tasks), squeeze=False, sharex=True)
         for column, task in zip(axes.T, tasks, strict=True):
@@ -157,7 +158,7 @@ def learning(runs: list[dict[str, Any]]) -> None:
 
 
 def ablation(runs: list[dict[str, Any]]) -> None:
-    """docs/paper_ablation.png: the full reward and each without one part, a panel a task, algorithm and preset."""
+    """docs/paper_ablation.png: the full reward and each without one part, one panel per task, algorithm and preset."""
     from e2efly.drawing import INK
     from e2efly.view.style import CYCLE, figure
 

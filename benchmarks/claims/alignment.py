@@ -56,7 +56,7 @@ def uncompensated(late: int) -> Any:
                 )
                 right.append(mean(flown) < 1 - LOST or rough > ROUGHER)
                 told.append(f"{task}: {percents(flown)} %, actions change {rough:.1f} times as much")
-        why = f"trained without, flown with it; confirmed: success lost, or actions change {ROUGHER:g} times as much"
+        why = f"trained without, flown with latency; confirmed: success is lost, or actions change > {ROUGHER:g} times"
         return verdict(right, told, why, 2)
 
     return judge
@@ -71,11 +71,11 @@ def compensated(found: Found) -> Verdict:
             if none and (own := found.flown(f"{late} ms", task=task, variant=f"{late} ms")):
                 right.append(mean(own) > max(mean(none), FLIES) - LOST)
                 told.append(f"{task}, {late} ms: {percents(own)} %")
-    return verdict(right, told, "success where flown with the latency of the training", 6)
+    return verdict(right, told, "success, flown with the latency of the training", 6)
 
 
 def flights_table(experiment: Experiment, found: Found, figure: str = "success") -> list[dict[str, str]]:
-    """A row a task and kind of run, a column a flight: a figure of each seed."""
+    """One row per task and kind of run, one column per flight: a figure of each seed."""
     names = list(dict.fromkeys(name for run in experiment.runs for name in run.flights))
     out = []
     for run in experiment.runs:
@@ -95,9 +95,9 @@ LATENCY = Experiment(
     "Latency compensated against not",
     "section Latency Compensation",
     (
-        Claim("90 ms that are not compensated cause oscillation, even loss of control", "VIS-H's", uncompensated(90)),
-        Claim("60 ms that are not compensated cause oscillation, even loss of control", "VIS-R's", uncompensated(60)),
-        Claim("Compensated, the closed loop behaves nearly as without", "nearly identical", compensated),
+        Claim("90 ms without compensation cause oscillation, even loss of control", "for VIS-H", uncompensated(90)),
+        Claim("60 ms without compensation cause oscillation, even loss of control", "for VIS-R", uncompensated(60)),
+        Claim("With compensation, the closed loop behaves nearly as without latency", "nearly identical", compensated),
     ),
     tuple(
         Run(task, "bptt", f"{late} ms", late_options(late), FLOWN_LATE)
@@ -106,9 +106,10 @@ LATENCY = Experiment(
     ),
     lambda found: flights_table(LATENCY, found),
     """
-Preset `nominal` by BPTT, the paper's observations, on VIS-R. Trained with a latency from observation to command of 0,
-30, 60 and 90 ms, and flown with each: percent of 1000 unseen starts, every seed. Compensated is what is flown with the
-latency of its training, not compensated what was trained with 0 ms. At 30 Hz 90 ms are three frames.""",
+The policies are trained by BPTT with the preset `nominal` and the paper's observations, on VIS-R. Each is trained with
+a latency from observation to command of 0, 30, 60 or 90 ms, and flown with each of these latencies. The table has the
+percent of 1000 unseen starts that succeed, one number per seed. *Compensated* means flown with the latency of the
+training. *Not compensated* means trained with 0 ms. At 30 Hz, 90 ms are nearly three frames.""",
     seeds=3,
 )  # fmt: skip
 
@@ -147,14 +148,14 @@ def starts_needed(found: Found) -> Verdict:
         if few := found.flown(RANDOM, task=task, variant=ONE):
             right.append(mean(few) < 1 - LOST)
             told.append(f"{task}: {percents(few)} %")
-    return verdict(right, told, "trained from one start, flown from random ones", 3)
+    return verdict(right, told, "success, trained from one start and flown from random ones", 3)
 
 
 RANDOMISATION = Experiment(
     "randomisation",
     "Random starts against one",
     "table of domain randomisation; section Domain Randomization",
-    (Claim("Insufficient randomisation transfers poorly", "p, of hovering v too", starts_needed),),
+    (Claim("Insufficient randomisation transfers poorly", "position; in hovering velocity, too", starts_needed),),
     tuple(
         Run(task, "bptt", variant, (*NOMINAL, *options), from_both(task))
         for task in STARTS
@@ -162,8 +163,9 @@ RANDOMISATION = Experiment(
     ),
     lambda found: flights_table(RANDOMISATION, found),
     """
-Preset `nominal` by BPTT, the paper's observations. *Random starts* are those of the task, of hovering attitude and body
-rate, too. *One start*: the same place, at rest. Percent of 1000 unseen starts, every seed.""",
+The policies are trained by BPTT with the preset `nominal` and the paper's observations. *Random starts* are those of
+the task; in hovering, attitude and body rate are random, too. *One start* is always the same place, at rest. The table
+has the percent of 1000 unseen starts that succeed, one number per seed.""",
     seeds=3,
 )  # fmt: skip
 
@@ -193,7 +195,7 @@ def no_need(found: Found) -> Verdict:
         if flown := found.flown(IDENTIFIED, **own):
             right.append(mean(flown) > max(mean(found.flown(FILE, **own)), FLIES) - LOST)
             told.append(f"{task}: {percents(flown)} %")
-    return verdict(right, told, "success on vehicles as far off as identification leaves them", 3)
+    return verdict(right, told, "success on vehicles that are off by the errors of an identification", 3)
 
 
 def needed_without(found: Found) -> Verdict:
@@ -204,7 +206,7 @@ def needed_without(found: Found) -> Verdict:
         if plain and many:
             right.append(mean(plain) < mean(many) - LOST)
             told.append(f"{task}: {percents(plain)} % and {percents(many)} %")
-    return verdict(right, told, "on vehicles that nobody measured: trained for one, and for many", 3)
+    return verdict(right, told, "success on vehicles that nobody measured: trained for one vehicle, and for many", 3)
 
 
 IDENTIFICATION = Experiment(
@@ -212,7 +214,7 @@ IDENTIFICATION = Experiment(
     "Identification against randomised vehicles",
     "sections System Identification and Domain Randomization",
     (
-        Claim("With accurate identification physical parameters need no randomisation", "none randomised", no_need),
+        Claim("With accurate identification, physical parameters need no randomisation", "none randomised", no_need),
         Claim("Model inaccuracy severely compromises policies", "no figure", needed_without),
     ),
     tuple(
@@ -225,9 +227,10 @@ IDENTIFICATION = Experiment(
     ),
     lambda found: flights_table(IDENTIFICATION, found),
     """
-Preset `nominal` by BPTT with the paper's observations, and the zoo's policies, which were trained for many vehicles and
-have a memory. *As identified*: mass, inertia, motor lag, torque, rate loop and drag off by at most what 90 % of [our
+There are two kinds of policies. The first are trained by BPTT with the preset `nominal` and the paper's observations.
+The others are the zoo's, which were trained for many vehicles and have a memory. *As identified*: the mass, inertia,
+motor lag, torque, rate loop and drag differ from the file by at most an error that 90 % of [our
 identifications](benchmarks.md#identification-of-hidden-vehicles-from-the-logs-of-a-flight) stay below. *Not
-identified*: the ranges of the preset `robust`, in still air.""",
+identified*: the vehicles are in the ranges of the preset `robust`, in still air.""",
     seeds=3,
 )  # fmt: skip

@@ -18,7 +18,7 @@ def aligned(found: Found) -> Verdict:
         if name in rates or name == "thrust"
     )
     right = all(of["aligned"] < 0.5 * of["before"] for of in rates.values())
-    why = "error of steps that the fit did not see, before and after; confirmed: of all rates at most half"
+    why = "error in steps that the fit did not see, before and after; confirmed if that of every rate is halved"
     return Verdict(CONFIRMED if right else REFUTED, told, why)
 
 
@@ -36,13 +36,13 @@ STEPS = Experiment(
     "step_response",
     "Step response",
     "figure of the step-response alignment",
-    (Claim("Aligned, the simulator's step response matches the vehicle's", "curves lie on one another", aligned),),
+    (Claim("After alignment, the simulator's step response matches the vehicle's", "curves coincide", aligned),),
     (),
     table_of("step_response"),
     made_of=("step_response",),
     about="""
-The real firmware in the vehicle's place, on a simulated body ([how](identification.md#align)); time until 10 % and
-63 % of the step, and overshoot.
+The real firmware takes the place of the vehicle, on a simulated body ([how](identification.md#align)). The table has
+the time until 10 % and 63 % of the step, and the overshoot.
 
 ![Steps through real Betaflight firmware, and the simulator](step_response.png)""",
 )
@@ -53,7 +53,7 @@ PLANTS = {"sim_to_sim": "the PPO presets", "airsim": "the zoo", "plants_by_sight
 
 
 def plant_rows(found: Found) -> list[dict[str, str]]:
-    """A row a file, criterion and plant: success in training and on the plant."""
+    """One row per file, criterion and plant: success in training and on the plant."""
     out = []
     for name, policies in PLANTS.items():
         known = found.results(name) or {"table": ()}
@@ -80,20 +80,21 @@ def transfers(found: Found) -> Verdict:
     right = all(drop <= most for drop, most in zip(drops.values(), allowed, strict=True))
     worst = max(drops, key=lambda name: drops[name])
     ours = f"{len(drops)} cases; worst: {worst}, {drops[worst]:.1f} points"
-    return Verdict(CONFIRMED if right else REFUTED, ours, f"at most {DROP:.0f} points lost, or a single flight")
+    return Verdict(CONFIRMED if right else REFUTED, ours, f"at most {DROP:.0f} points or one flight may be lost")
 
 
 SIM_TO_SIM = Experiment(
     "sim_to_sim",
     "Sim-to-sim",
     "section Sim-to-sim: From VisFly to AirSim",
-    (Claim("Policies transfer to another simulator as they are", "in AirSim, no figure", transfers),),
+    (Claim("Policies transfer to another simulator without a change", "in AirSim, no figure", transfers),),
     (),
     plant_rows,
     made_of=tuple(PLANTS),
     about="""
-MuJoCo's body, real Betaflight firmware on it, and a server that speaks AirSim's RPC. AirSim itself has not run here.
-Vehicle: VIS-R. Policies by BPTT are those of the zoo, by PPO those of its `nominal` presets.""",
+The plants are MuJoCo, the real Betaflight firmware on a simulated body, and a server that speaks AirSim's RPC. AirSim
+itself was not used for these figures. The vehicle is VIS-R. The policies by BPTT are those of the zoo; those by PPO are
+trained with its presets `nominal`.""",
 )
 
 FRAMES = 6000
@@ -132,14 +133,14 @@ REAL = Experiment(
     "What needs a vehicle",
     "figures of the policy response, of zero-shot transfer, of hardware in the loop; table of vehicle parameters",
     (
-        Claim("Zero-shot transfer of all tasks to VIS-R", "shown by flights, no success rate",
-              not_here(f"{NEEDS}; [flights through the real firmware]({FLIGHTS}) stand in")),
-        Claim("The policy's response in flight matches the simulator's", "curves lie on one another", not_here(NEEDS)),
+        Claim("Zero-shot transfer of all tasks to VIS-R", "shown by flights, without a success rate",
+              not_here(f"{NEEDS}; [flights through the real firmware]({FLIGHTS}) take their place")),
+        Claim("The policy's response in flight matches the simulator's", "curves coincide", not_here(NEEDS)),
         Claim("Hardware in the loop on VIS-H, racing with random obstacles", "shown by a flight",
               not_here("needs the vehicle and motion capture; [rehearsed](hil.md) without them")),
-        Claim("A latency of 90 ms by telemetry and below 30 ms on board", "90 ms, 30 ms", not_here(NEEDS)),
+        Claim("The latency is 90 ms by telemetry and below 30 ms on board", "90 ms, 30 ms", not_here(NEEDS)),
         Claim("Parameters of VIS-R and VIS-H", "table of parameters",
-              not_here("needs the vehicles; inertia [by a list of parts](identification.md) lies beside the paper's")),
-        Claim("Costs of 630 and 280 USD", "630, 280 USD", not_here("prices of one day and place")),
+              not_here("needs the vehicles; inertia [by a list of parts](identification.md) is compared")),
+        Claim("Costs of 630 and 280 USD", "630, 280 USD", not_here("prices depend on day and place")),
     ),
 )  # fmt: skip

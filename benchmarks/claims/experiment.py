@@ -132,8 +132,8 @@ def verdict(right: Sequence[bool], told: Sequence[str], why: str, cases: float) 
         return NOTHING
     ours = "; ".join(told) or "-"
     if not all(right):
-        return Verdict(REFUTED, ours, f"{right.count(False)} of {len(right)} cases say otherwise; {why}".rstrip("; "))
+        return Verdict(REFUTED, ours, f"{right.count(False)} of {len(right)} cases contradict it; {why}".rstrip("; "))
     if len(right) < cases:
         of = "" if math.isinf(cases) else f" of {cases:g}"
-        return Verdict(UNMEASURED, ours, f"so far {len(right)}{of} cases, which confirm; {why}".rstrip("; "))
+        return Verdict(UNMEASURED, ours, f"so far {len(right)}{of} cases, and all confirm it; {why}".rstrip("; "))
     return Verdict(CONFIRMED, ours, why)
