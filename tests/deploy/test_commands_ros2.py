@@ -1,9 +1,5 @@
 """Commands on topics of ROS 2: a real rclpy publisher in a process of its own."""
 
-import importlib.util
-import os
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -17,8 +13,8 @@ from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.settings import FlightSettings
 from e2efly.vehicles import load_vehicle
 from tests.deploy.command_streams import TOPICS, first, refused
+from tests.deploy.ros_domain import publisher, ros_domain
 
-PACKAGES = 'pip install "ros-rclpy[fastrtps]" ros-nav-msgs ros-geometry-msgs'
 PUBLISHER = """
 import math, time, rclpy
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, Vector3
@@ -54,17 +50,8 @@ while True:
 @pytest.fixture(scope="module")
 def ros() -> Iterator[None]:
     """A publisher in a domain of its own that no other machine hears."""
-    if importlib.util.find_spec("rclpy") is None:
-        pytest.fail(f"needs ROS 2: {PACKAGES}; or E2EFLY_WITHOUT=ros2 to go without these tests")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_DOMAIN_ID", str(101 + os.getpid() % 100))
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        publisher = subprocess.Popen([sys.executable, "-c", PUBLISHER], start_new_session=True)
-        try:
-            yield
-        finally:
-            publisher.terminate()
-            publisher.wait(10)
+    with ros_domain(), publisher(PUBLISHER):
+        yield
 
 
 @pytest.mark.parametrize("topic", TOPICS)

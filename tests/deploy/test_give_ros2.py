@@ -1,14 +1,10 @@
 """Images on topics of ROS 2: a real rclpy subscriber in a process of its own."""
 
-import importlib.util
-import os
 import sys
 
-import pytest
-
 from tests.deploy.given_on_ros import check_given
+from tests.deploy.ros_domain import ros_domain
 
-PACKAGES = 'pip install "ros-rclpy[fastrtps]" ros-sensor-msgs'
 SUBSCRIBER = """
 import json, sys, rclpy
 from sensor_msgs.msg import CameraInfo, Image
@@ -28,9 +24,6 @@ print(json.dumps(got), flush=True)
 """
 
 
-def test_depth_is_published_in_metres_with_its_camera(monkeypatch: pytest.MonkeyPatch) -> None:
-    if importlib.util.find_spec("rclpy") is None:
-        pytest.fail(f"needs ROS 2: {PACKAGES}; or E2EFLY_WITHOUT=ros2 to go without these tests")
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(101 + os.getpid() % 100))
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    check_given("ros2", sys.executable, SUBSCRIBER)
+def test_depth_is_published_in_metres_with_its_camera() -> None:
+    with ros_domain():
+        check_given("ros2", sys.executable, SUBSCRIBER)

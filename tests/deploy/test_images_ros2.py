@@ -1,8 +1,5 @@
 """Image topics of ROS 2: a real rclpy publisher in a process of its own."""
 
-import importlib.util
-import os
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -11,6 +8,7 @@ import pytest
 
 from e2efly.deploy.child import ROS_PYTHON
 from e2efly.deploy.sight.sources import open_image
+from tests.deploy.ros_domain import publisher, ros_domain
 from tests.deploy.ros_images import (
     DEPTH,
     PUBLISHED,
@@ -54,18 +52,10 @@ while True:
 @pytest.fixture(scope="module")
 def ros() -> Iterator[None]:
     """A publisher in a domain of its own that no other machine hears."""
-    if importlib.util.find_spec("rclpy") is None:
-        pytest.fail('needs ROS 2: pip install "e2efly[ros2]"; or E2EFLY_WITHOUT=ros2 to go without these tests')
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    with ros_domain() as patch:
         patch.setenv(ROS_PYTHON, sys.executable)
-        publisher = subprocess.Popen([sys.executable, "-c", PUBLISHER], start_new_session=True)
-        try:
+        with publisher(PUBLISHER):
             yield
-        finally:
-            publisher.terminate()
-            publisher.wait(10)
 
 
 @pytest.mark.parametrize(("topic", "sees"), TOPICS)

@@ -1,15 +1,14 @@
 """Live topics of ROS 2: a real rclpy subscriber in a process of its own."""
 
 import importlib.util
-import os
 import sys
 from collections.abc import Iterator
 
 import pytest
 
 from tests.deploy.live_ros import TAKE, check, heard, latched, opened
+from tests.deploy.ros_domain import ros_domain
 
-PACKAGES = 'pip install "ros-rclpy[fastrtps]" ros-nav-msgs ros-geometry-msgs ros-sensor-msgs'
 SUBSCRIBER = f"""{TAKE}
 import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
@@ -29,11 +28,7 @@ while missing:
 @pytest.fixture(scope="module")
 def ros() -> Iterator[None]:
     """A domain of its own that no other machine hears."""
-    if importlib.util.find_spec("rclpy") is None:
-        pytest.fail(f"needs ROS 2: {PACKAGES}; or E2EFLY_WITHOUT=ros2 to go without these tests")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    with ros_domain():
         yield
 
 

@@ -1,0 +1,36 @@
+"""A domain of ROS 2 of the tests' own, which no other machine hears, and a publisher in it."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+PACKAGES = 'pip install "ros-rclpy[fastrtps]" ros-nav-msgs ros-geometry-msgs ros-sensor-msgs'
+DOMAINS = 200
+"""As many test processes have a domain each; DDS has 233."""
+
+
+@contextmanager
+def ros_domain() -> Iterator[pytest.MonkeyPatch]:
+    """The environment leads to the domain; more of it may be set."""
+    if importlib.util.find_spec("rclpy") is None:
+        pytest.fail(f"needs ROS 2: {PACKAGES}; or E2EFLY_WITHOUT=ros2 to go without these tests")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_DOMAIN_ID", str(1 + os.getpid() % DOMAINS))
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        yield patch
+
+
+@contextmanager
+def publisher(script: str) -> Iterator[None]:
+    """A process that runs a script of rclpy."""
+    process = subprocess.Popen([sys.executable, "-c", script], start_new_session=True)
+    try:
+        yield
+    finally:
+        process.terminate()
+        process.wait(10)

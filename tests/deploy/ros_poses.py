@@ -1,0 +1,49 @@
+"""What a pose source reads of the topics that the tests of ROS 1 and ROS 2 publish."""
+
+import time
+
+import numpy as np
+
+from e2efly.deploy.odometry import Sample
+from e2efly.deploy.pose.source import PoseSource
+
+PATIENCE_S = 20.0
+TOPICS = ("/odometry", "/pose", "/estimate")
+"""One for each type of message; `/text` has another type."""
+
+
+def first(source: PoseSource) -> Sample:
+    """The first sample that comes."""
+    deadline = time.monotonic() + PATIENCE_S
+    while time.monotonic() < deadline:
+        if samples := source.read(time.monotonic()):
+            assert 0 <= time.monotonic() - samples[0].received < 5
+            return samples[0]
+        time.sleep(0.01)
+    raise AssertionError(f"{source.describe()} delivered nothing: {source.problem}")
+
+
+def check_published(sample: Sample, topic: str) -> None:
+    """Whether a sample is what the publishers of both tests send."""
+    half = np.sqrt(0.5)
+    np.testing.assert_array_equal(sample.position, [1, 2, 3])
+    np.testing.assert_allclose(sample.quaternion, [half, 0, 0, half], atol=1e-12)
+    assert sample.stamp == 1700000000.5
+    assert sample.frame == "map"
+    if topic == "/odometry":  # forward of a body that looks along world y
+        assert sample.velocity is not None
+        np.testing.assert_allclose(sample.velocity, [0, 0.5, 0], atol=1e-12)
+        np.testing.assert_array_equal(sample.body_rate, [0, 0.25, 0])
+    else:
+        assert sample.velocity is None
+        assert sample.body_rate is None
+
+
+def problem_of(source: PoseSource) -> str:
+    """What a source says that delivers nothing."""
+    deadline = time.monotonic() + PATIENCE_S
+    while source.problem is None and time.monotonic() < deadline:
+        assert source.read(time.monotonic()) == []
+        time.sleep(0.01)
+    assert source.problem is not None
+    return source.problem
