@@ -11,9 +11,9 @@ from e2efly.device import prepare
 from e2efly.tasks import TASKS
 
 TaskLike = str | type[TaskConfig] | TaskConfig
-"""A name, a reference (`path/to/file.py:Name`), a class of options, or options."""
+"""A task name, a reference (`path/to/file.py:Name`), a class of options, or an instance of it."""
 AlgoLike = str | type[AlgorithmConfig]
-"""A name, a reference, or a class of options."""
+"""An algorithm name, a reference, or a class of options."""
 
 
 def list_tasks() -> list[str]:
@@ -22,16 +22,17 @@ def list_tasks() -> list[str]:
 
 
 def preset(task: TaskLike, algo: AlgoLike | None = None, name: str | None = None) -> TrainConfig:
-    """The configuration by which a task is learned.
+    """The configuration for learning a task.
 
     Args:
-        task: what to learn; options take the place of the preset's.
-        algo: ppo, bptt, shac, abpt, foppo, a reference, or a class of options; left out: what learns the task best.
-        name: robust, nominal, paper, or a variant of the task; left out: robust, where the task has that for the
-            algorithm, else nominal.
+        task: what to learn. An instance of options replaces the task options of the preset.
+        algo: ppo, bptt, shac, abpt, foppo, a reference, or a class of options. If omitted, the algorithm that learns
+            the task best.
+        name: robust, nominal, paper, or a variant of the task. If omitted, robust if the task has it for the
+            algorithm, otherwise nominal.
 
     Raises:
-        ValueError: for an unknown name, with the nearest one and all there are.
+        ValueError: for an unknown name. The message gives the nearest name and all known names.
     """
     options = task if isinstance(task, TaskConfig) else None
     if not isinstance(task, str):
@@ -62,32 +63,32 @@ def train(
     device: str | None = None,
     **changes: Any,
 ) -> dict[str, Any]:
-    """Train a policy, as `e2efly train` does; it lies in `out` as policy.onnx.
+    """Train a policy, as `e2efly train` does, and write it to `out` as policy.onnx.
 
     Args:
         task: what to learn.
-        algo: by which algorithm; left out: the one that learns it best.
-        preset_name: where the defaults come from; left out: robust, where the task has it, else nominal.
-        out: the run directory; left out: as `e2efly train` names it, runs/TASK-ALGO-SEED.
-        vehicle: a shipped one, or the path of a .toml file.
-        reward: weights in place of the preset's.
-        env: in place of the preset's.
-        network: in place of the preset's.
-        options: of the algorithm, in place of the preset's.
-        start_from: a policy whose weights it begins with: a task of the zoo, a run directory, a policy.onnx. The
-            learning rate then is that with which others end, unless `options` say another.
-        resume: go on with the run in `out`.
-        overwrite: delete the run in `out`, and begin anew.
+        algo: the learning algorithm. If omitted, the one that learns the task best.
+        preset_name: where the defaults come from. If omitted, robust if the task has it, otherwise nominal.
+        out: the run directory. If omitted, the name that `e2efly train` chooses: runs/TASK-ALGO-SEED.
+        vehicle: the name of a shipped vehicle, or the path of a .toml file.
+        reward: weights that replace those of the preset.
+        env: environment options that replace those of the preset.
+        network: network options that replace those of the preset.
+        options: algorithm options that replace those of the preset.
+        start_from: a policy whose weights the training starts from: a task of the zoo, a run directory, or a
+            policy.onnx. The learning rate is then the one with which other trainings end, unless `options` sets it.
+        resume: continue the run in `out`.
+        overwrite: delete the run in `out` and start again.
         progress: print what the command line prints.
         device: cpu or gpu.
         changes: other fields of `TrainConfig`, such as steps or seed.
 
     Returns:
-        The run's summary; success is at `summary["shipped"][criterion]["success"]`.
+        The run's summary. The success rate is at `summary["shipped"][criterion]["success"]`.
 
     Raises:
         ValueError: naming the field, the value and what is accepted.
-        FloatingPointError: when a loss is not finite; the checkpoint before is kept.
+        FloatingPointError: when a loss is not finite. The previous checkpoint is kept.
     """
     config = preset(task, algo, preset_name)
     config = config if start_from is None else presets.gentle(config)
@@ -117,10 +118,10 @@ def make_env(task: TaskLike, num_envs: int | None = None, **options: Any) -> Any
     """The environment of a task.
 
     Args:
-        task: which.
-        num_envs: None: the functional environment of JAX, `e2efly.env.Env`; else a Gymnasium vector environment of so
-            many vehicles (needs the extra `gym`).
-        options: of `EnvConfig`, such as vehicle, wind or randomize.
+        task: the task.
+        num_envs: None returns the functional JAX environment, `e2efly.env.Env`. A number returns a Gymnasium vector
+            environment with this many vehicles (needs the extra `gym`).
+        options: fields of `EnvConfig`, such as vehicle, wind or randomize.
 
     Raises:
         ValueError: naming the field, the value and what is accepted.

@@ -1,6 +1,7 @@
-"""The command line: a table of commands. A command's file is imported, and JAX by it, when the command runs.
+"""The command line: a table of commands. The file of a command is imported only when the command runs, and so is JAX.
 
-The file `commands/NAME.py` has the command's options, a dataclass, and `run(options)`, which returns the exit status.
+The file `commands/NAME.py` holds a dataclass with the command's options, and `run(options)`, which returns the exit
+status.
 """
 
 import gc
@@ -40,14 +41,14 @@ _EXAMPLES = {
     "list": "tasks, algorithms, vehicles, tracks, plants, reward terms",
 }
 WHOLE = ("jax", "jaxlib", "jaxtyping", "matplotlib", "onnx", "optax", "safetensors", "scipy", "tensorboardX")
-"""Packages that the distribution `e2efly` needs and `e2efly-fly`, the part that flies, does not: onboard/."""
+"""Packages that the distribution `e2efly` needs, but `e2efly-fly` (the part that flies, see onboard/) does not need."""
 _COMMANDS = dict.fromkeys(example.split()[0] for example in _EXAMPLES)
 
 
 def main() -> NoReturn:
     """Run the command line and exit: 0 when it did what was asked, 2 for bad input, 130 after Ctrl-C.
 
-    When nobody reads its output any more it ends without a word, with 141.
+    When nobody reads its output any more, it ends silently with status 141.
     """
     # importing and tracing make many objects and no garbage: looking for it costs a third of a second
     gc.set_threshold(100_000)

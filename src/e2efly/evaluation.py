@@ -1,4 +1,4 @@
-"""Fly a policy's file from unseen starts of its task: what `e2efly.evaluate` and `e2efly eval` do, and validation."""
+"""Fly a policy's file from unseen starts of its task. Used by `e2efly.evaluate`, `e2efly eval` and validation."""
 
 import dataclasses
 import os
@@ -29,9 +29,9 @@ from e2efly.vehicles import Controller, Flown, Vehicle, family_names, load_famil
 from e2efly.zoo import policy_file
 
 SEED = 1_000_000
-"""Seed of the starts unless told."""
+"""Default seed of the starts."""
 BATCH = 250
-"""Starts that are flown at once."""
+"""Number of starts that are flown at once."""
 FIXED = (
     "vehicle",
     "command_mode",
@@ -44,9 +44,9 @@ FIXED = (
 )
 """Options of the environment that the contract fixes."""
 FIXED_OF_CAMERAS = ("sees", "of", "width", "height", "projection", "encoding", "reach")
-"""The same, of a camera: what its numbers mean, and how many there are."""
+"""The same for a camera: what the numbers of its images mean, and how many there are."""
 FIGURES, ROW = 200, 3000
-"""Bytes that the figures of a start take, and its row of the report."""
+"""Bytes for the figures of one start, and for its row of the report."""
 UNITS = {
     "duration": "s", "final_error": "m", "mean_error": "m",
     "top_speed": "m/s", "mean_speed": "m/s", "top_rate": "rad/s",
@@ -64,35 +64,35 @@ class Candidate:
     file: Path
     """The policy.onnx."""
     policy: Policy | Baseline
-    """As loaded, or the hover controller that flies in its place."""
+    """The loaded policy, or the hover controller that flies in its place."""
     task: TaskConfig
-    """Of its run, or of its contract."""
+    """The task of its run or its contract."""
     env: EnvConfig
-    """The same; with the vehicle that the policy was trained on."""
+    """The environment of its run or its contract, with the vehicle that the policy was trained on."""
     run: RunDirectory | None
-    """Its run, where the file lies in one."""
+    """The run of the policy, if the file lies in one."""
     vehicle: str
-    """What flies: a name or a .toml file."""
+    """The vehicle that flies: a name or a .toml file."""
     controller: Controller = "policy"
-    """The vehicle that the flight controller believes in."""
+    """The vehicle for which the flight controller is tuned."""
     changes: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
-    """Where task and environment are not what the run or the contract says: that and what flies, by dotted name
-    (`env.wind`, `task.track`)."""
+    """Where the task, the environment or the vehicle differ from the run or the contract, by dotted name (`env.wind`,
+    `task.track`): both values."""
     baseline: str | None = None
     """Name of the hover controller that flies in place of the policy; None: the policy flies."""
 
     @property
     def draws(self) -> bool:
-        """Whether every episode flies another vehicle, of the family that the policy was trained on."""
+        """Whether every episode flies a different vehicle of the family that the policy was trained on."""
         return load_family(self.vehicle) is not None
 
     @cached_property
     def flown(self) -> Flown:
-        """What flies, and what its flight controller takes it for: of a family's policy, the vehicle as it is.
+        """The vehicle that flies, and the one that its flight controller assumes. Both are equal for a family's policy.
 
         Raises:
-            ValueError: for a vehicle or a controller that there is not, or that is none of the policy's family; where
-                every episode flies another vehicle.
+            ValueError: for a vehicle or a controller that does not exist, or that does not belong to the policy's
+                family. Also if every episode flies a different vehicle.
         """
         vehicle = load_vehicle(self.vehicle)
         if load_family(self.env.vehicle) is None:
@@ -104,24 +104,24 @@ class Candidate:
 
     @property
     def known(self) -> Vehicle:
-        """The vehicle that the policy was trained on; of a family's policy, the one that it flies."""
+        """The vehicle that the policy was trained on. For a family's policy, the vehicle that flies."""
         return load_vehicle(self.env.vehicle) if self.policy.contract.vehicle_ranges is None else self.flown.body
 
     @property
     def latency(self) -> float:
-        """Seconds from observation to command with which one vehicle flies."""
+        """Latency from observation to command with which one vehicle flies, s."""
         return self.policy.contract.latency_of(self.flown.body)
 
     @property
     def at_home(self) -> "Candidate":
-        """The same on the vehicle that it was trained on; of a family's policy, on the one that it flies."""
+        """The same on the vehicle that the policy was trained on. For a family's policy, on the vehicle that flies."""
         if load_family(self.env.vehicle) is not None:
             return self
         return dataclasses.replace(self, vehicle=self.env.vehicle, controller="policy")
 
     @property
     def notes(self) -> list[str]:
-        """In which ways it does not fly what its run or its contract says, in words."""
+        """The differences from the run or the contract, in words."""
         contract, notes = self.policy.contract, []
         if self.baseline is not None:
             notes.append(f"What flies is the hover controller {self.baseline}, in place of the policy.")
@@ -140,10 +140,10 @@ class Candidate:
         return notes
 
     def environment(self, suite: TaskConfig) -> Env:
-        """The environment of a criterion; its reward judges nothing.
+        """The environment of a criterion. Its reward is not used.
 
         Raises:
-            ValueError: when the policy expects another observation or other images.
+            ValueError: when the policy expects a different observation or different images.
         """
         env = Env.of(suite, RewardConfig({"prog2": 1.0}), self.env, flown=None if self.draws else self.flown)
         check_observation(self.policy, env)
@@ -158,20 +158,20 @@ def candidate(
     task: Mapping[str, Any] | None = None,
     baseline: str | None = None,
 ) -> Candidate:
-    """Find a policy, and what it is judged in.
+    """Find a policy, and the task and environment in which it is judged.
 
     Args:
         policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
-        vehicle: what flies, a name or a .toml file; left out: the policy's own vehicle.
-        controller: the vehicle that the flight controller believes in: the policy's own, whatever flies (policy), or
-            the one that flies (plant).
-        env: values that are to be changed in what the run or the contract says of the environment, by dotted name.
-        task: the same of its task, where another was meant to be flown: {"track": "four_gates"}.
-        baseline: the hover controller that flies in place of the policy, under its contract; None: the policy flies.
+        vehicle: the vehicle that flies, a name or a .toml file. If omitted, the policy's own vehicle.
+        controller: the vehicle for which the flight controller is tuned. policy: the policy's own vehicle, whatever
+            flies. plant: the vehicle that flies.
+        env: environment options to change from the run or the contract, by dotted name.
+        task: task options to change likewise: {"track": "four_gates"}.
+        baseline: the hover controller that flies in place of the policy, under its contract. None: the policy flies.
 
     Raises:
-        ValueError: when there is none; for changes that the contract does not allow; when the vehicle that it was
-            trained on cannot be found.
+        ValueError: when there is no such policy, for changes that the contract does not allow, and when the vehicle
+            that it was trained on cannot be found.
     """
     file = policy_file(policy, vehicle)
     loaded, run = load_policy(file), run_of(file)
@@ -202,7 +202,7 @@ def candidate(
 
 
 def _flown_by(found: Candidate, baseline: str) -> Candidate:
-    """The same, flown by a hover controller."""
+    """The same, with a hover controller in place of the policy."""
     if found.draws:
         raise ValueError(
             f"--baseline is {baseline!r}, and every episode flies another vehicle of {found.vehicle}; accepted: one "
@@ -213,7 +213,7 @@ def _flown_by(found: Candidate, baseline: str) -> Candidate:
 
 
 def _hash(vehicle: str) -> str:
-    """Of a vehicle or a family."""
+    """The hash of a vehicle or a family."""
     family = load_family(vehicle)
     return load_vehicle(vehicle).hash if family is None else family.hash
 
@@ -225,10 +225,10 @@ def _trained_on(policy: Policy) -> str | None:
 
 
 def with_changes(own: EnvConfig, changes: Mapping[str, Any]) -> EnvConfig:
-    """The environment of a policy with changes that leave its observation, its images and its commands what they are.
+    """The environment of a policy with changes that do not affect its observation, its images and its commands.
 
     Args:
-        own: as its run or its contract says.
+        own: the environment of its run or its contract.
         changes: the new values, by dotted name.
 
     Raises:
@@ -258,18 +258,18 @@ def pinned(env: EnvConfig, policy: Acting) -> EnvConfig:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """How a policy did on each criterion of its task."""
+    """Results of a policy in each criterion of its task."""
 
     candidate: Candidate
     """What flew."""
     seed: int
-    """Of the starts."""
+    """Seed of the starts."""
     flown: dict[str, Episodes]
-    """By criterion; NumPy arrays."""
+    """The episodes of each criterion; NumPy arrays."""
     starts: dict[str, State]
-    """What each episode began from, by criterion; NumPy arrays."""
+    """The initial states of the episodes, by criterion; NumPy arrays."""
     drawn: dict[str, dict[str, np.ndarray]]
-    """What else each episode has of its own, by criterion: `Goal.drawn`."""
+    """What else each episode draws, by criterion: `Goal.drawn`."""
 
     def __repr__(self) -> str:
         """The success rate of each criterion."""
@@ -282,7 +282,7 @@ class Evaluation:
         return min(float(np.mean(e.success)) for e in self.flown.values())
 
     def as_json(self) -> dict[str, Any]:
-        """The report that `e2efly eval --json` writes: by criterion a summary, and a row for every start."""
+        """The report that `e2efly eval --json` writes: a summary for each criterion, and a row for every start."""
         return {
             "policy": str(self.candidate.file),
             "task": self.candidate.policy.contract.task,
@@ -315,13 +315,13 @@ def course_rows(suite: TaskConfig, drawn: Mapping[str, np.ndarray], n: int) -> l
 
 
 def _rounded(column: np.ndarray) -> list[Any]:
-    """Numbers as JSON; what is true or false, or counted, as it is."""
+    """Numbers as JSON, rounded. Boolean values and counts are unchanged."""
     values = np.asarray(column)
     return (values.round(6) if np.issubdtype(values.dtype, np.floating) else values).tolist()
 
 
 def drawn_by(task: Any, memory: Any) -> dict[str, Any]:
-    """What episodes of a task draw beside their starts; a task of one's own need not say."""
+    """What episodes of a task draw in addition to their starts. A user's own task need not define this."""
     return task.drawn(memory) if hasattr(task, "drawn") else {}
 
 
@@ -342,18 +342,18 @@ def evaluate(
 
     Args:
         policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
-        episodes: starts of each criterion.
-        vehicle: what flies, a name or a .toml file; left out: the policy's own vehicle.
-        controller: policy: the flight controller believes in the policy's own vehicle, whatever flies; plant: it is
-            tuned to the vehicle that flies. Neither changes the policy.
-        env: options of `EnvConfig` by dotted name, in place of what the policy's run or contract says:
+        episodes: number of starts per criterion.
+        vehicle: the vehicle that flies, a name or a .toml file. If omitted, the policy's own vehicle.
+        controller: the vehicle for which the flight controller is tuned. policy: the policy's own vehicle, whatever
+            flies. plant: the vehicle that flies. Neither choice changes the policy.
+        env: options of `EnvConfig` by dotted name, which replace the values from the policy's run or contract:
             {"wind": 3.0, "randomize": {"mass": 0.2}, "disturbance.gust": 1.0}.
         task: options of its task by dotted name, likewise: {"track": "four_gates"}.
-        seed: of the starts.
+        seed: the seed of the starts.
         device: cpu or gpu.
-        kept: bytes that the caller keeps of every start (`ROW` for a report), for the check of the memory.
+        kept: bytes that the caller keeps for every start (`ROW` for a report), for the check of the memory.
         baseline: the hover controller that flies in place of the policy, under its contract: pid, geometric, indi, mpc,
-            or the reference of one of your own.
+            or the reference of your own controller.
 
     Raises:
         ValueError: naming the field or the option, its value and what is accepted.
@@ -372,15 +372,15 @@ def fly_criteria(
 
     Args:
         found: the policy, its task and environment.
-        episodes: starts of each criterion.
-        seed: of the starts.
-        kept: bytes that the caller keeps of every start, beside the figures.
+        episodes: number of starts per criterion.
+        seed: the seed of the starts.
+        kept: bytes that the caller keeps for every start, in addition to the figures.
 
     Returns:
-        By the criterion's name: how each episode went, where it started, and what else it drew; NumPy arrays.
+        For each criterion name: the results of the episodes, their starts, and what else they drew; NumPy arrays.
 
     Raises:
-        ValueError: for more starts than fit into the machine's memory, or than anybody can wait for.
+        ValueError: for more starts than fit into the machine's memory, or that would take far too long.
     """
     flown, starts, drawn = {}, {}, {}
     suites = found.task.criteria()
@@ -401,7 +401,7 @@ def fly_criteria(
 
 
 def settling(suite: TaskConfig) -> float:
-    """Seconds of a criterion before the mean error counts."""
+    """Time of a criterion after which the mean error counts, s."""
     return float(getattr(suite, "settle_s", 0.0))
 
 
@@ -420,15 +420,15 @@ def act_of(policy: Policy | Baseline) -> Act:
 
 
 def episode_steps(task: TaskConfig, env: Any) -> int:
-    """Control steps of the longest episode."""
+    """Number of control steps of the longest episode."""
     return int(np.ceil(float(task.episode_s) / env.control_period - 1e-6))
 
 
 def check_observation(policy: Acting, env: Any) -> None:
-    """Refuse a policy whose observation or images are not the environment's.
+    """Refuse a policy whose observation or images differ from those of the environment.
 
     Raises:
-        ValueError: naming the field or the image, and what either side has.
+        ValueError: naming the field or the image, and what each side has.
     """
     wanted = [(f.name, f.size, f.frame, f.unit) for f in policy.contract.observation]
     offered = [(f.name, f.size, f.frame, f.unit) for f in env.fields]
@@ -444,11 +444,11 @@ def check_observation(policy: Acting, env: Any) -> None:
 
 
 def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[TaskConfig, EnvConfig]:
-    """Task and environment as the contract of a lone policy.onnx says; the task's options are those of its preset.
+    """Task and environment from the contract of a policy.onnx without a run. The task has the options of its preset.
 
     Args:
-        policy: as loaded.
-        vehicle: what it is to fly; may be the file of the vehicle that it was trained on.
+        policy: the loaded policy.
+        vehicle: the vehicle that is to fly. It may be the file of the vehicle that the policy was trained on.
 
     Raises:
         ValueError: when the vehicle that it was trained on cannot be found.
@@ -482,7 +482,7 @@ def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[Ta
 
 
 def _camera(image: Image) -> CameraConfig:
-    """The camera of a contract's image."""
+    """The camera options for an image of a contract."""
     known: dict[str, Any] = {"sees": image.sees, "projection": image.projection}
     known |= {"of": image.of} if image.of != NONE else {}
     known |= {"encoding": image.encoding} if image.encoding != NONE else {}

@@ -1,11 +1,11 @@
-"""The paper's reward manual: one pure function a term, batched over leading axes.
+"""The paper's reward manual: one pure function per term, batched over leading axes.
 
-Every term is unweighted and signed so that its weight is positive: the reward of a step is the sum of weight times
-term. A term asks for what it reads by the names of its arguments; `reward` finds them among the signals of the step
-and the parameters of the configuration. Terms are tagged: `differentiable`, `partly` (differentiable between jumps)
-or `sparse` (an event; first-order methods drop its gradient, which is zero anyway).
+Every term is unweighted. Its sign is such that its weight is positive: the reward of a step is the sum of weight times
+term. The argument names of a term are its inputs; `reward` finds them among the signals of the step and the parameters
+of the configuration. Terms are tagged: `differentiable`, `partly` (differentiable between jumps) or `sparse` (an event;
+first-order methods drop its gradient, which is zero anyway).
 
-The equation names are those of the E2E-Fly paper, section Reward Design. Where the paper contradicts itself the
+The equation names are those of the E2E-Fly paper, section Reward Design. Where the paper contradicts itself, the
 docstring says what we do; docs/rewards.md has the table.
 """
 
@@ -33,7 +33,7 @@ def norm(v: Float[Array, "*n k"]) -> Scalar:
 
 
 def prog1(offset: Vector, previous_offset: Vector) -> Scalar:
-    """Distance to the goal gained in this step, m (Eq. prog1; signed, where the paper's norm also pays for losing)."""
+    """Distance to the goal gained in this step, m (Eq. prog1; signed: the paper's norm also rewards moving away)."""
     return norm(previous_offset) - norm(offset)
 
 
@@ -63,17 +63,17 @@ def progz(offset: Vector) -> Scalar:
 
 
 def progway(way: Scalar, previous_way: Scalar) -> Scalar:
-    """What was gained in this step of a way to the goal that need not be straight, m. Ours."""
+    """Progress in this step along a way to the goal that may be curved, m. Ours."""
     return previous_way - way
 
 
 def act1(action: Float[Array, "*n 4"]) -> Scalar:
-    """Minus the length of the action (Eq. act1, with the sign it has in act3)."""
+    """Minus the length of the action (Eq. act1, with the sign of act3)."""
     return -norm(action)
 
 
 def act2(action: Float[Array, "*n 4"], previous_action: Float[Array, "*n 4"]) -> Scalar:
-    """Minus the length of the change of the action (Eq. act2, with the sign it has in act3)."""
+    """Minus the length of the change of the action (Eq. act2, with the sign of act3)."""
     return -norm(action - previous_action)
 
 
@@ -83,17 +83,20 @@ def act3(
     act3_size: float | Array = 0.025,
     act3_change: float | Array = 0.002,
 ) -> Scalar:
-    """Both: -(lambda7 |u| + lambda8 |u - u'|), with the paper's racing values as defaults (Eq. act3)."""
+    """act1 and act2 together: -(lambda7 |u| + lambda8 |u - u'|), the paper's racing values as defaults (Eq. act3)."""
     return act3_size * act1(action) + act3_change * act2(action, previous_action)
 
 
 def ori1(yaw_error: Scalar) -> Scalar:
-    """exp(-|yaw error|), rad (Eq. ori1; of the absolute angle, or one side would pay)."""
+    """exp(-|yaw error|), rad (Eq. ori1; the angle is absolute, otherwise one direction would be rewarded)."""
     return jnp.exp(-jnp.abs(yaw_error))
 
 
 def ori2(quaternion: Float[Array, "*n 4"], desired_quaternion: Float[Array, "*n 4"]) -> Scalar:
-    """Minus the distance of the quaternion to the desired one (Eq. ori2), of q and -q the nearer: both are one turn."""
+    """Minus the distance of the quaternion to the desired one (Eq. ori2). The nearer of q and -q counts.
+
+    Both are the same attitude.
+    """
     inner = jnp.sum(quaternion * desired_quaternion, axis=-1, keepdims=True)
     return -norm(quaternion - jnp.where(inner < 0, -1.0, 1.0) * desired_quaternion)
 
@@ -104,7 +107,7 @@ def ori3(pixel: Float[Array, "*n 2"], pixel_velocity: Float[Array, "*n 2"]) -> S
 
 
 def ori4(roll_error: Scalar, approaching: Bool[Array, "*n"], ori4_limit: float | Array = 2.0) -> Scalar:
-    """-min(tan|roll error|, lambda12) while approaching a gap, else 0 (Eq. ori4); limited past a right angle too."""
+    """-min(tan|roll error|, lambda12) while approaching a gap, else 0 (Eq. ori4); limited beyond a right angle, too."""
     angle = jnp.abs(roll_error)
     bounded = jnp.minimum(angle, jnp.arctan(ori4_limit))
     return jnp.where(approaching, -jnp.tan(bounded), 0.0)
@@ -116,7 +119,7 @@ def v1(velocity: Vector) -> Scalar:
 
 
 def v2(velocity: Vector, desired_speed: Scalar | float = 1.0) -> Scalar:
-    """-(speed - v_d) (Eq. linearv2, as written: it pays for being slow without bound)."""
+    """-(speed - v_d) (Eq. linearv2, as written: the reward for being slow has no bound)."""
     return -(norm(velocity) - desired_speed)
 
 
@@ -128,7 +131,7 @@ def v3(velocity: Vector, desired_speed: Scalar | float = 1.0) -> Scalar:
 def descent_speed(
     height: Scalar, vz_slope: float | Array = 1.0, vz_min: float | Array = 0.2, vz_max: float | Array = 1.0
 ) -> Scalar:
-    """Wanted speed of descent at a height: clamp(alpha height, min, max), m/s (Eq. linearvz)."""
+    """Desired speed of descent at a height: clamp(alpha height, min, max), m/s (Eq. linearvz)."""
     return jnp.clip(vz_slope * height, vz_min, vz_max)
 
 
@@ -139,7 +142,7 @@ def vz(
     vz_min: float | Array = 0.2,
     vz_max: float | Array = 1.0,
 ) -> Scalar:
-    """1 / (1 + |v_h + v_z|): 1 at the wanted speed of descent (Eq. linearv4)."""
+    """1 / (1 + |v_h + v_z|): 1 at the desired speed of descent (Eq. linearv4)."""
     return 1.0 / (1.0 + jnp.abs(descent_speed(height, vz_slope, vz_min, vz_max) + velocity[..., 2]))
 
 
@@ -149,7 +152,7 @@ def anglev(body_rate: Vector) -> Scalar:
 
 
 def avoid1(clearance: Scalar, avoid1_offset: float | Array = 0.1) -> Scalar:
-    """-1 / (d + b) (Eq. avoid1; negative, where the paper's sign pays for being near)."""
+    """-1 / (d + b) (Eq. avoid1; negative, because the paper's sign rewards being near)."""
     return -1.0 / (jnp.maximum(clearance, 0.0) + avoid1_offset)
 
 
@@ -162,8 +165,8 @@ def avoid2(
 ) -> Scalar:
     """-|v_c| (max(1 - (d - r), 0)^2 + lambda19 softplus(-lambda20 (d - r))), v_c >= 0 only while approaching.
 
-    Eq. avoid2, with the softplus falling with distance (the paper's grows) and inside the scaling by the approach
-    speed, as its text says. Steepness 32 is DiffPhysDrone's.
+    Eq. avoid2, with two changes. The softplus falls with distance, while the paper's grows. It is inside the scaling by
+    the approach speed, as the paper's text says. The steepness 32 is that of DiffPhysDrone.
     """
     gap = clearance - avoid2_radius
     near = jnp.maximum(1.0 - gap, 0.0) ** 2 + avoid2_barrier * jax.nn.softplus(-avoid2_steepness * gap)
@@ -171,12 +174,12 @@ def avoid2(
 
 
 def vel(velocity: Vector, desired_velocity: Vector) -> Scalar:
-    """Minus the error of the velocity as a share of the desired speed, at least 1 m/s. Ours."""
+    """Minus the velocity error relative to the desired speed, which counts as at least 1 m/s. Ours."""
     return -norm(velocity - desired_velocity) / jnp.maximum(norm(desired_velocity), 1.0)
 
 
 def overspeed(velocity: Vector, desired_speed: Scalar | float = 1.0) -> Scalar:
-    """-relu(speed - v_d)^2, (m/s)^2: only being too fast costs. Ours."""
+    """-relu(speed - v_d)^2, (m/s)^2: only excess speed is penalised. Ours."""
     return -(jnp.maximum(norm(velocity) - desired_speed, 0.0) ** 2)
 
 
@@ -187,10 +190,10 @@ def avoid(
     avoid_barrier: float | Array = 0.5,
     avoid_steepness: float | Array = 16.0,
 ) -> Scalar:
-    """Of all things within reach: -(relu(reach - d)^2 + barrier softplus(-k d)) (1 + v), v the closing speed, m/s.
+    """Sum over things in reach: -(relu(reach - d)^2 + barrier softplus(-k d)) (1 + v), v the closing speed, m/s. Ours.
 
-    The gradient goes through the distances alone. Ours: the sum over things, not the nearest, so that a gap between
-    two of them has a middle.
+    The gradient passes through the distances only. The sum, instead of the nearest thing alone, gives a gap between two
+    things a middle.
     """
     speed = jax.lax.stop_gradient(jnp.maximum(closing, 0.0))
     near = jnp.maximum(avoid_reach - gaps, 0.0) ** 2 + avoid_barrier * jax.nn.softplus(-avoid_steepness * gaps)
@@ -198,7 +201,7 @@ def avoid(
 
 
 def goal(arrived: Bool[Array, "*n"]) -> Scalar:
-    """1 in the step that arrives at a goal (Eq. goal)."""
+    """1 in the step that reaches a goal (Eq. goal)."""
     return arrived.astype(jnp.float32)
 
 
@@ -214,12 +217,12 @@ def near(offset: Vector, near_steepness: float | Array = 8.0) -> Scalar:
 
 
 def anglev_sq(body_rate: Vector) -> Scalar:
-    """Minus the body rate squared, (rad/s)^2: no corner at zero. Ours."""
+    """Minus the squared body rate, (rad/s)^2: smooth at zero. Ours."""
     return -jnp.sum(body_rate**2, axis=-1)
 
 
 def act2_sq(action: Float[Array, "*n 4"], previous_action: Float[Array, "*n 4"]) -> Scalar:
-    """Minus the squared change of the action: no corner at zero. Ours."""
+    """Minus the squared change of the action: smooth at zero. Ours."""
     return -jnp.sum((action - previous_action) ** 2, axis=-1)
 
 
@@ -232,7 +235,7 @@ def descent(
     vz_max: float | Array = 1.0,
     descent_cone: float | Array = 0.3,
 ) -> Scalar:
-    """-|v_h s + v_z|, m/s: the wanted descent of `vz`, slowed by s = 1 / (1 + (d_xy / cone)^2) until centred. Ours."""
+    """-|v_h s + v_z|, m/s: vz's desired descent, slowed by s = 1 / (1 + (d_xy / cone)^2) until centred. Ours."""
     centred = 1.0 / (1.0 + jnp.sum(offset[..., :2] ** 2, axis=-1) / descent_cone**2)
     return -jnp.abs(descent_speed(height, vz_slope, vz_min, vz_max) * centred + velocity[..., 2])
 
@@ -240,24 +243,24 @@ def descent(
 def imitate(
     action: Float[Array, "*n 4"], expert_action: Float[Array, "*n 4"], imitate_rounding: float | Array = 0.05
 ) -> Scalar:
-    """Minus the distance to an expert's action, number by number: sqrt(e^2 + r^2) - r. Ours.
+    """Minus the distance to an expert's action, summed over its entries: sqrt(e^2 + r^2) - r. Ours.
 
-    The expert acts where the policy has led (DAgger, Ross et al. 2011), and knows what the policy only sees. For
-    tasks that have one, `avoid` does, and policies that command thrust and body rates.
+    The expert acts in the states that the policy reaches (DAgger, Ross et al. 2011). It knows the world that the policy
+    only sees. For tasks that have an expert, such as `avoid`, and for policies that command thrust and body rates.
     """
     error, r = action - expert_action, imitate_rounding
     return -jnp.sum(jnp.sqrt(error**2 + r**2) - r, axis=-1)
 
 
 def upright(quaternion: Float[Array, "*n 4"]) -> Scalar:
-    """-(1 - cos tilt): level is 0, upside down -2; heading free. Ours."""
+    """-(1 - cos tilt): level is 0, upside down is -2; any heading. Ours."""
     return -2.0 * (quaternion[..., 1] ** 2 + quaternion[..., 2] ** 2)
 
 
 def fit(overhang: Float[Array, "*n k"], fit_margin: float | Array = 0.02, fit_limit: float | Array = 0.1) -> Scalar:
-    """Minus how far parts of the vehicle stand out of the opening that they pass, and of a margin in it, m. Ours.
+    """Minus how far parts of the vehicle extend beyond the opening that they pass, shrunk by a margin, m. Ours.
 
-    What stands out farther than the limit costs no more: being beside the opening is not worse than turning back.
+    Beyond the limit, the penalty does not grow: being beside the opening is not worse than turning back.
     """
     return -jnp.sum(jnp.clip(overhang + fit_margin, 0.0, fit_limit), axis=-1)
 
@@ -265,9 +268,10 @@ def fit(overhang: Float[Array, "*n k"], fit_margin: float | Array = 0.02, fit_li
 def fitlog(
     overhang: Float[Array, "*n k"], fitlog_margin: float | Array = 0.1, fitlog_scale: float | Array = 0.02
 ) -> Scalar:
-    """-log(1 + o / scale), o how far parts stand out of the opening and of a margin in it, m: steep near fitting. Ours.
+    """-log(1 + o / scale), o how far parts extend beyond the opening shrunk by a margin, m: steep near fitting. Ours.
 
-    What stands far out still costs more than what stands out less, but never so much that turning back is better.
+    A part that extends far is still penalised more than one that extends less, but never so much that turning back is
+    better.
     """
     out = jnp.maximum(overhang + fitlog_margin, 0.0)
     return -jnp.sum(jnp.log1p(out / fitlog_scale), axis=-1)
@@ -278,20 +282,20 @@ Kind = Literal["differentiable", "partly", "sparse"]
 
 @dataclass(frozen=True)
 class Term:
-    """A reward term: its function, and how far it can be differentiated."""
+    """A reward term: its function, and to what extent it can be differentiated."""
 
     function: Callable[..., Array]
     kind: Kind
 
     @property
     def inputs(self) -> list[str]:
-        """Signals that it must be given."""
+        """The signals that the term needs."""
         parameters = inspect.signature(self.function).parameters.values()
         return [p.name for p in parameters if p.default is inspect.Parameter.empty]
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Constants that a configuration may set, with their defaults."""
+        """The constants that a configuration may set, with their defaults."""
         parameters = inspect.signature(self.function).parameters.values()
         return {p.name: p.default for p in parameters if p.default is not inspect.Parameter.empty}
 
@@ -315,7 +319,7 @@ def register(kind: Kind) -> Callable[[F], F]:
         kind: `differentiable`, `partly` or `sparse`; see the head of this module.
 
     Raises:
-        ValueError: for another kind, or a name that another function has.
+        ValueError: for another kind, or for a name that another function already has.
     """
     if kind not in _KINDS:
         raise ValueError(f"kind of a reward term is {kind!r}; accepted: {', '.join(_KINDS)}")
@@ -341,11 +345,12 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "avoid": ("avoid1", "avoid2", "avoid"),
     "sparse": ("goal", "crash"),
 }
-"""The parts of a reward that the paper's ablations take away, and their terms; ours stand with what they reward."""
+"""The parts of a reward that the paper's ablations remove, with their terms. Our terms are in the part that they belong
+to."""
 
 
 def grouped(terms: Iterable[str]) -> dict[str, tuple[str, ...]]:
-    """The paper's parts that a reward has, with its terms of each. A term of no part is one of its own."""
+    """The paper's parts that a reward has, with its terms of each part. A term that is in no part forms its own."""
     of = {term: group for group, members in GROUPS.items() for term in members}
     found: dict[str, tuple[str, ...]] = {}
     for term in terms:
@@ -355,7 +360,7 @@ def grouped(terms: Iterable[str]) -> dict[str, tuple[str, ...]]:
 
 
 def constants() -> set[str]:
-    """Constants of all terms."""
+    """The constants of all terms."""
     return {name for term in TERMS.values() for name in term.parameters}
 
 
@@ -363,7 +368,7 @@ def check(weights: Mapping[str, float], parameters: Mapping[str, float]) -> None
     """Check the names of a reward's terms and parameters.
 
     Raises:
-        ValueError: naming the unknown name, the nearest one and all there are.
+        ValueError: naming the unknown name, the nearest name and all known names.
     """
     for name in weights:
         if name not in TERMS:
@@ -381,9 +386,9 @@ def reward(
     """The weighted sum of the terms, and each weighted term.
 
     Args:
-        weights: a weight a term; an array leaf, so that changing it does not recompile.
+        weights: one weight per term. It is an array leaf, so that changing it does not recompile.
         parameters: constants of the terms that differ from their defaults.
-        signals: what the step offers to the terms, by name.
+        signals: the signals of the step, by name.
 
     Raises:
         ValueError: when a term needs a signal that the task does not have.

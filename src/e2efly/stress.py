@@ -1,4 +1,4 @@
-"""How a policy does in the rows of the stress, through one compiled program."""
+"""Results of a policy in the rows of the stress, with one compiled program."""
 
 import os
 from collections.abc import Mapping
@@ -20,16 +20,16 @@ from e2efly.vehicles.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class Report:
-    """How a policy did in each row."""
+    """Results of a policy in each row."""
 
     candidate: Candidate
     seed: int
     flown: dict[str, dict[str, Any]]
-    """By row and criterion: `Episodes`, or the verdicts on a plant; NumPy arrays."""
+    """For each row and criterion: `Episodes`, or the verdicts on a plant; NumPy arrays."""
     plant: str = "training"
-    """Where: the training simulator, or a plant."""
+    """Where it flew: the training simulator, or a plant."""
     left_out: Mapping[str, str] = field(default_factory=dict)
-    """Rows that the plant cannot be given, and what it cannot change."""
+    """Rows that the plant cannot reproduce, and what it cannot change."""
 
     @property
     def success(self) -> dict[str, float]:
@@ -38,7 +38,7 @@ class Report:
 
     @property
     def worst(self) -> str:
-        """The row with the smallest success."""
+        """The row with the lowest success rate."""
         return min(self.success, key=lambda row: self.success[row])
 
     def as_json(self) -> dict[str, Any]:
@@ -72,10 +72,11 @@ def stress(
     Args:
         policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
         episodes: starts per row and criterion.
-        rows: names of rows; empty: all, those of cameras where the policy has some.
-        vehicle: what flies in the nominal row, and what the other rows change; left out: the policy's own vehicle.
-        controller: the vehicle that the flight controller believes in, in every row: policy or plant.
-        seed: of the starts.
+        rows: names of rows. Empty: all rows; the rows of cameras only if the policy has cameras.
+        vehicle: the vehicle that flies in the nominal row and that the other rows change. If omitted, the policy's own
+            vehicle.
+        controller: the vehicle for which the flight controller is tuned in every row: policy or plant.
+        seed: the seed of the starts.
         device: cpu or gpu.
         baseline: the hover controller that flies in place of the policy; see `evaluate`.
 
@@ -116,7 +117,7 @@ def fly_rows(found: Candidate, rows: tuple[str, ...], episodes: int, seed: int) 
 
 
 def draws(row: Row, vehicle: Vehicle, seed: int, n: int) -> Draw:
-    """The first n episodes of a row by the seed of the starts, whatever their number."""
+    """The first n episodes of a row for the seed of the starts. They do not depend on the number of episodes."""
     batches = [Draw.of(row, vehicle, _generator(row, seed, i), BATCH) for i in range(-(-n // BATCH))]
     return jax.tree.map(lambda *x: np.concatenate(x)[:n], *batches)
 

@@ -20,38 +20,39 @@ from e2efly.terminal import Terminal, TerminalProgress, console_table, markdown
 
 @dataclass(frozen=True)
 class Ablate:
-    """Learn tasks without each term of their reward in turn, over several seeds in one compiled program; draw it.
+    """Train tasks with each reward term removed in turn, over several seeds in one compiled program; draw the curves.
 
-    With `--by group` all terms of a group go together, as in the paper's figures: prog, act, ori, v, anglev, sparse.
+    With `--by group`, all terms of a group are removed together, as in the paper's figures: prog, act, ori, v, anglev,
+    sparse.
     """
 
     tasks: tyro.conf.Positional[tuple[str, ...]] = ("hover", "land", "track", "race")
     """Tasks to ablate (default: hover land track race)."""
     algos: tuple[str, ...] = ("ppo", "bptt")
-    """By which algorithms; a figure each."""
+    """Learning algorithms. One figure is drawn per algorithm."""
     preset: str = "nominal"
-    """Where rewards and sizes come from: nominal, robust, paper or thrown; their curricula are left out."""
+    """Preset of the rewards and sizes; see `e2efly train --help`. Its curriculum is not used."""
     seeds: int = 3
-    """Runs of each variant."""
+    """Number of runs per variant."""
     by: Literal["term", "group"] = "term"
-    """What is left out at a time: a term, or all terms of one of the paper's groups."""
+    """What is removed at a time: one term, or all terms of one of the paper's groups."""
     steps: int | None = None
-    """Environment steps of each run; the preset's when left out."""
+    """Environment steps of each run. If omitted, those of the preset."""
     past_actions: int | None = None
-    """How many past actions the policies see, 0 as in the paper; as many as the latency holds when left out."""
+    """How many past actions the policies see; 0 as in the paper. If omitted, as many as the latency spans."""
     out: Path = Path("runs/ablation")
-    """Folder of the figures, the table and the curves. What is there already is not trained again."""
+    """Folder for the figures, the table and the curves. Curves that it already holds are not trained again."""
     device: Literal["cpu", "gpu"] | None = None
-    """Where to compute."""
+    """Device to compute on."""
 
 
 def run(options: Ablate) -> int:
-    """Train every variant of every task by every algorithm; write JSON, a table and a figure an algorithm.
+    """Train every variant of every task with every algorithm. Write JSON, a table, and one figure per algorithm.
 
-    What an earlier run with the same configuration wrote is taken, not trained again, and what it was at goes on.
+    Curves that an earlier run with the same configuration wrote are reused. Training that it did not finish continues.
 
     Raises:
-        ValueError: for unknown names, and numbers that cannot be used.
+        ValueError: for unknown names, and for numbers that cannot be used.
         OSError: when the folder cannot be written.
     """
     if options.seeds < 1:
@@ -64,7 +65,7 @@ def run(options: Ablate) -> int:
 
 
 def _ablate(options: Ablate, configs: dict[tuple[str, str], TrainConfig], console: Console) -> int:
-    """In a folder that is this ablation's alone."""
+    """Run the ablation in a folder that no other process uses."""
     from e2efly.view.ablation import Panel, plot_ablation
 
     known = {pair: _known(options, config) for pair, config in configs.items()}
@@ -103,7 +104,7 @@ def _path(options: Ablate, config: TrainConfig) -> Path:
 
 
 def _about(options: Ablate, config: TrainConfig) -> dict[str, Any]:
-    """What decides the curves."""
+    """The settings that determine the curves."""
     from e2efly.learn.checkpoint import FORMAT
     from e2efly.learn.rundir import to_json
 
@@ -127,7 +128,7 @@ def _known(options: Ablate, config: TrainConfig) -> Any:
 
 
 def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
-    """Train all variants of a configuration; keep their curves."""
+    """Train all variants of a configuration and keep their curves."""
     from e2efly.learn.ablation import Kept, ablate
     from e2efly.rewards import grouped
 
@@ -159,7 +160,7 @@ def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
 
 
 def _rows(curves: Any) -> list[dict[str, str]]:
-    """A row a variant: its last evaluation, over seeds."""
+    """One row per variant: its last evaluation, over all seeds."""
     from e2efly.view.ablation import worst
 
     success, error = worst(curves, False), worst(curves, True)

@@ -12,23 +12,23 @@ from e2efly.terminal import Terminal
 
 @dataclass(frozen=True)
 class AirsimSettings:
-    """Write AirSim's settings.json for a vehicle, and say what it cannot tell AirSim of it."""
+    """Write AirSim's settings.json for a vehicle, and list what these settings cannot express about the vehicle."""
 
     vehicle: tyro.conf.Positional[str] = "vis_r"
-    """A vehicle's name or a .toml file."""
+    """Name of a vehicle, or a .toml file."""
     policy: Path | None = None
-    """A run directory, a policy.onnx, or a task of the zoo: its cameras are written, too."""
+    """A run directory, a policy.onnx, or a task of the zoo. The cameras of this policy are written, too."""
     out: Path = Path("settings.json")
-    """The file; AirSim reads Documents/AirSim/settings.json."""
+    """The file to write. AirSim reads Documents/AirSim/settings.json."""
     port: int = 41451
-    """On which AirSim listens, on its own machine only."""
+    """Port on which AirSim listens, for connections from its own machine only."""
 
 
 def run(options: AirsimSettings) -> int:
     """Write the file.
 
     Raises:
-        ValueError: for an unknown vehicle or policy, or a port that is none. Nothing is written then.
+        ValueError: for an unknown vehicle or policy, or an invalid port. Nothing is written then.
     """
     from e2efly.deploy.policy.loader import load_policy
     from e2efly.validation.airsim.settings import named, settings, unsaid

@@ -18,28 +18,29 @@ if TYPE_CHECKING:
     from e2efly.identification.record import Record
 
 THRUST = 0.03
-"""By how much the thrust may differ before it is told."""
+"""Relative difference of the thrust above which it is reported."""
 
 
 @dataclass(frozen=True)
 class Align:
-    """Make the simulator answer to commands as the vehicle did: fit delay and rate loop to flights, show both.
+    """Make the simulator respond to commands as the vehicle did: fit the delay and the rate loop to flights.
 
-    The commands that were really sent are replayed through the simulator, and its response is laid over the measured
-    one, before and after.
+    The commands of the flights are replayed through the simulator. The plots show the simulated response over the
+    measured one, before and after the fit.
     """
 
     logs: tyro.conf.Positional[tuple[Path, ...]]
-    """Flights with commands (thrust over mass and body rates) and body rates: our .mcap, CSV, Betaflight's blackbox."""
+    """Logs with commands (thrust over mass and body rates) and body rates: our .mcap, CSV, or a Betaflight blackbox
+    log."""
     vehicle: str = "vis_r"
-    """A vehicle's name or a .toml file: what is aligned. All but delay and rate loop stays as it is there."""
+    """The vehicle to align: a name or a .toml file. Everything except the delay and the rate loop stays as it is."""
     out: Path = Path("aligned")
-    """Folder of vehicle.toml, align.json and the plots."""
+    """Folder for vehicle.toml, align.json and the plots."""
     pose_delay: float | None = None
-    """How late the poses are when a command is made from them, s: the part of the vehicle's latency that commands and
-    body rates do not show. Left out: what the logs tell, as our .mcap does, and else 0."""
+    """Age of the poses when a command is made from them, s. Commands and body rates do not show this part of the
+    vehicle's latency. If omitted, the value in the logs (our .mcap has it), otherwise 0."""
     columns: tuple[str, ...] = ()
-    """Names of a CSV log's columns for ours: OURS=THEIRS or OURS=THEIRS*FACTOR, as wx=gyro_x*0.01745."""
+    """Maps the column names of a CSV log to ours: OURS=THEIRS or OURS=THEIRS*FACTOR, as in wx=gyro_x*0.01745."""
 
 
 def run(options: Align) -> int:
@@ -110,14 +111,15 @@ def run(options: Align) -> int:
 
 
 def pose_delay_of(given: float | None, records: "list[Record]") -> tuple[float, str, bool]:
-    """How late the poses were when they were flown by, s; from where that is known, in words; and whether it is.
+    """The age of the poses when the vehicle flew by them, s; the origin of this value, in words; whether it is known.
 
-    In a log of ours the poses are behind the gyroscope by what their source does not tell, and older by their age when
-    they are used. How late the gyroscope itself is cancels: the delay from command to response has it the other way.
+    In our logs this age has two parts: the delay behind the gyroscope, which the pose source does not tell, and the age
+    of the poses when they are used. The delay of the gyroscope itself cancels, because it appears with the opposite
+    sign in the delay from command to response.
 
     Args:
-        given: by the user, s.
-        records: the flights, checked: poses on the gyroscope's clock.
+        given: the value from the user, s.
+        records: the flights, checked, with the poses on the gyroscope's clock.
     """
     if given is not None:
         return given, f"The poses are taken to be {1e3 * given:.0f} ms late (--pose-delay).", True
@@ -134,7 +136,7 @@ def pose_delay_of(given: float | None, records: "list[Record]") -> tuple[float, 
 
 
 def _rows(vehicle: Vehicle, found: "Alignment") -> list[dict[str, Any]]:
-    """Parameters before and after."""
+    """Parameters before and after the fit."""
     own, late, sigma = found.delay
     rows: list[dict[str, Any]] = []
     if np.isfinite(late):

@@ -1,4 +1,4 @@
-"""`e2efly bench`: what this machine does in a few seconds. The published figures are made by benchmarks/."""
+"""`e2efly bench`: a measurement of this machine in a few seconds. The published figures come from benchmarks/."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +13,12 @@ from e2efly.terminal import Terminal
 
 @dataclass(frozen=True)
 class Bench:
-    """Measure this machine: physics sub-steps/s, environment steps/s, training steps/s."""
+    """Measure this machine: physics sub-steps per second, environment steps per second, training steps per second."""
 
     json: Path | None = None
     """Write the figures to this file."""
     device: Literal["cpu", "gpu"] | None = None
-    """Where to compute."""
+    """Device to compute on."""
 
 
 def run(options: Bench) -> int:
@@ -39,7 +39,7 @@ def run(options: Bench) -> int:
 
 
 def measure() -> dict[str, float]:
-    """Steps a second by what is counted: the best of several runs after compilation."""
+    """Steps per second, by kind of step: the best of several runs after compilation."""
     from e2efly.learn.benchmark import environment_steps, physics_substeps, training_steps
 
     return {

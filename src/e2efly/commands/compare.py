@@ -10,21 +10,24 @@ from e2efly.terminal import Terminal, console_table
 
 @dataclass(frozen=True)
 class Compare:
-    """Lay runs side by side: in what they differ, when they were there, how well they did. A table and a plot."""
+    """Compare runs side by side: the options that differ, when each run reached 99 % success, and its final success.
+
+    Write a table and a plot.
+    """
 
     runs: tyro.conf.Positional[tuple[Path, ...]]
-    """Folders of runs."""
+    """Run directories."""
     out: Path = Path("runs") / "compare.png"
-    """The plot."""
+    """The file for the plot."""
     json: Path | None = None
-    """Write the table to this file, too."""
+    """Also write the table to this file."""
 
 
 def run(options: Compare) -> int:
-    """Print the table, draw the plot.
+    """Print the table and draw the plot.
 
     Raises:
-        ValueError: when a folder holds no run, or one of another version.
+        ValueError: when a folder holds no run, or a run of another version.
         OSError: when a file cannot be written.
     """
     from e2efly.learn.comparison import Compared, table

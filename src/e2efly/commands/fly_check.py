@@ -1,4 +1,4 @@
-"""What `e2efly fly` shows before a flight: the controller's settings, and with `--check` all that it hears."""
+"""What `e2efly fly` shows before a flight: the controller's settings, and with `--check` all that it receives."""
 
 import time
 from pathlib import Path
@@ -24,13 +24,13 @@ from e2efly.deploy.terminal import printable
 LOOK_S = 1.5
 """How long `--check` watches poses and receiver, s."""
 STATUS_S, STATUSES = 1.0, 3
-"""So long, s, and in so many messages, the controller may say whether it is armed, before a bridge begins."""
+"""Time, s, and number of messages in which the controller may report whether it is armed, before a bridge begins."""
 PICTURES = Path("flights")
-"""Where `--check` puts pictures of what the network is shown."""
+"""Folder in which `--check` puts pictures of the input images of the network."""
 
 
 def settings_table(rows: tuple[Row, ...]) -> Table:
-    """Each setting of the controller: what it is, what is needed, what mends it."""
+    """Each setting of the controller: its value, the required value, and how to correct it."""
     table = Table(box=None, header_style="bold", pad_edge=False)
     for heading in ("", "setting", "is", "needed", "mend with"):
         table.add_column(heading, overflow="fold")
@@ -45,14 +45,14 @@ def settings_table(rows: tuple[Row, ...]) -> Table:
 def look(
     bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row, ...], policy: Path | None = None
 ) -> int:
-    """Watch poses, images, receiver and attitude for a while, and say what forbids a take-off. Sends no sticks.
+    """Watch poses, images, receiver and attitude for a while, and say what forbids a take-off. Sends no stick commands.
 
     Args:
-        bridge: that would fly.
-        source: of its poses.
-        console: for the table.
+        bridge: the bridge that would fly.
+        source: the source of its poses.
+        console: where the table is printed.
         rows: the controller's settings.
-        policy: its file, beside which images of its training may lie; None: there is none.
+        policy: the file of the policy, beside which images from its training may lie. None: there is no policy.
 
     Returns:
         1 when a setting or missing poses forbid a take-off, else 0.
@@ -87,12 +87,12 @@ def look(
 
 
 def refuse_in_flight(bridge: Bridge) -> None:
-    """Refuse to begin where the controller would obey at once: the first frame of a bridge closes the throttle.
+    """Refuse to begin when the controller would obey at once: the first frame of a bridge closes the throttle.
 
-    A bridge that a service manager starts anew while the vehicle flies must not take it over. Sends no sticks.
+    A bridge that a service manager restarts while the vehicle flies must not take it over. Sends no stick commands.
 
     Args:
-        bridge: that is about to begin.
+        bridge: the bridge that is about to begin.
 
     Raises:
         ValueError: when the controller is armed and its override is on.
@@ -153,7 +153,7 @@ def _image(camera: ImageSource, seen: Seen, now: float, rate: float) -> str:
 
 
 def _commands(commander: Commander, bridge: Bridge) -> str:
-    """What comes from a commander, in words."""
+    """What a commander sends, in words."""
     stream, now, where = commander.stream, time.monotonic(), commander.source.describe()
     counted = f"{stream.taken} accepted, {stream.refused} refused, from {where}"
     if bridge.odometry is not None and (problem := commander.readiness(bridge.odometry, now)):
@@ -163,5 +163,5 @@ def _commands(commander: Commander, bridge: Bridge) -> str:
 
 
 def _cell(text: str) -> Text:
-    """What may come from outside, such as a craft's name: no escape sequences."""
+    """Text for a table cell. It may come from outside, such as a craft name: escape sequences are removed."""
     return Text(printable(text))

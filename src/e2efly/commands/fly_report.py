@@ -12,19 +12,19 @@ from rich.table import Table
 from e2efly.terminal import Terminal
 
 LONGEST = 20
-"""So many of the times at which the filter stepped in are printed."""
+"""At most this many of the times at which the filter intervened are printed."""
 
 
 @dataclass(frozen=True)
 class FlyReport:
-    """Draw a flight: tracks, commands against response, latency, timing, modes and their reasons."""
+    """Draw a flight: tracks, response to commands, latency, timing, and the modes with the reason for each."""
 
     log: tyro.conf.Positional[Path]
     """A flight log (.mcap)."""
     out: Path | None = None
-    """Folder of the figures; LOG_report when left out."""
+    """Folder for the figures. If omitted, LOG_report."""
     blackbox: Path | None = None
-    """A Betaflight blackbox log of the flight, to be laid over it."""
+    """A Betaflight blackbox log of the same flight, to be drawn over it."""
     bag1: Path | None = None
     """Also write a ROS 1 bag."""
     bag2: Path | None = None
@@ -32,10 +32,10 @@ class FlyReport:
 
 
 def run(options: FlyReport) -> int:
-    """Draw a flight, print and write its summary, export bags where asked.
+    """Draw a flight, print and write its summary, and export bags if requested.
 
     Raises:
-        ValueError: for files that cannot be read or that exist already.
+        ValueError: for files that cannot be read, or that exist already.
     """
     from e2efly.deploy.log.bags import export_bag
     from e2efly.deploy.log.flight_log import read_log
@@ -85,7 +85,7 @@ def _print(console: Console, table: dict[str, Any]) -> None:
 
 
 def _filter(found: dict[str, Any]) -> Table:
-    """Where the filter stepped in."""
+    """Where the filter intervened."""
     title = f"the filter changed {found['commands']} of {found['of']} commands of the policy"
     table = Table("for", "from", "to", "commands", "largest share", box=None, header_style="bold", pad_edge=False)
     table.title, table.title_justify = title, "left"

@@ -32,90 +32,92 @@ if TYPE_CHECKING:
 
 _ROW = "six numbers, room_x,room_y,room_z,x,y,z"
 PRIORITY = 4
-"""Real-time priority of the rendering: below the bridge's."""
+"""Real-time priority of the rendering: lower than the bridge's."""
 FASTEST = 240.0
 """Largest rate of images, Hz."""
 
 
 @dataclass(frozen=True)
 class Hil:
-    """Put a real vehicle into a virtual world: images of it, rendered at the poses that a motion capture system sees.
+    """Put a real vehicle into a virtual world: render camera images at the poses that a motion capture system measures.
 
-    Fly the policy beside it with `e2efly fly POLICY --image NAME=shm:...`, which reads the images. See docs/hil.md.
+    At the same time, run `e2efly fly POLICY --image NAME=shm:...`: it reads the images and flies the policy. See
+    docs/hil.md.
     """
 
     policy: tyro.conf.Positional[Path]
-    """Whose cameras and world are rendered: a policy.onnx, a run directory, or a task of the zoo."""
+    """The policy whose cameras and world are rendered: a policy.onnx, a run directory, or a task of the zoo."""
     pose: str = "udp:9870"
-    """Pose source, as of `e2efly fly`."""
+    """Pose source, as in `e2efly fly`."""
     image: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """Where each image goes, as often as wanted: image_0=shm:NAME, tcp:PORT (tcp:PORT:exact: not rounded to mm),
-    ros1:/topic, ros2:/topic."""
+    """Where each image is sent: image_0=shm:NAME, tcp:PORT (tcp:PORT:exact: depth is not rounded to mm), ros1:/topic,
+    ros2:/topic. May be repeated."""
     host: str = "127.0.0.1"
-    """Address on which tcp is served; 0.0.0.0: to every computer of the network."""
+    """Address on which tcp images are served. 0.0.0.0 serves every computer of the network."""
     vehicle: str | None = None
-    """A shipped vehicle or a .toml file; left out: the policy's."""
+    """A shipped vehicle or a .toml file. If omitted, the policy's vehicle."""
     seed: int = 0
-    """Of the world."""
+    """Seed of the world."""
     task: TaskConfig = TaskConfig()
-    """The world, in place of what the policy's run or contract says: options of its task, as `train` has them
-    (--task.track my.toml, --task.speed 4 5, --task.clutter.obstacles 8)."""
+    """Options of the policy's task, which determine the world, as in `train` (--task.track my.toml, --task.speed 4 5,
+    --task.clutter.obstacles 8). They replace the values from the policy's run or contract."""
     scene: str | None = None
-    """Show this in place of the task's world: a scan or model (.glb, .gltf, .obj, .ply, .stl), a scene file (.toml),
-    or warehouse, garage, terrain. The course stays the task's."""
+    """Scene that is shown in place of the task's world: a scan or model (.glb, .gltf, .obj, .ply, .stl), a scene file
+    (.toml), or warehouse, garage, terrain. The task's course stays the same."""
     scene_unit: float | None = None
-    """Length of the unit of a scan's file, m (0.001: mm); 1 when left out."""
+    """Length unit of a scan's file, m (0.001: mm). If omitted, 1."""
     scene_up: Literal["y", "z"] | None = None
-    """Axis of a scan's file that points up; as its format has it when left out."""
+    """Axis of a scan's file that points up. If omitted, the one that the file's format defines."""
     beside: bool = False
-    """Show what stands in the task's world (gates, trees, a pad) beside the scene."""
+    """Show the objects of the task's world (gates, trees, a pad) in addition to the scene."""
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Where the origin of the world lies in the room, m; as --goal.origin of `e2efly fly`."""
+    """Position of the origin of the world in the room, m; the same as --goal.origin of `e2efly fly`."""
     origin_yaw: float = 0.0
-    """By how much its x axis is turned from the room's about up, rad."""
+    """Angle from the room's x axis to the world's x axis, about the up axis, rad."""
     points: Path | None = None
-    """In place of both: a CSV file with a row room_x,room_y,room_z,x,y,z for each point measured in the room, m."""
+    """A CSV file that replaces both: one row room_x,room_y,room_z,x,y,z for each point measured in the room, m."""
     rate: float | None = None
-    """Images per second; the contract's when left out."""
+    """Images per second. If omitted, the rate in the contract."""
     seconds: float | None = None
-    """End after so long; left out: at Ctrl-C."""
+    """End after this time, s. If omitted, run until Ctrl-C."""
     track: Path = Path("flights") / "hil-track.toml"
-    """Where to write the gates of a drawn race, for --goal.track of `e2efly fly`; other tasks write nothing."""
+    """File for the gates of a randomly drawn race, for --goal.track of `e2efly fly`. Other tasks write nothing."""
     watch: int | None = None
-    """Port of a page of 127.0.0.1 that shows the vehicle in the scene, by a process of its own. See docs/watch.md."""
+    """Port on 127.0.0.1 for a web page that shows the vehicle in the scene. A separate process serves it. See
+    docs/watch.md."""
     record: Path | None = None
     """A new .mcap file with the images, their poses, latencies and virtual collisions."""
     report: Path | None = None
     """Folder for a histogram of the latencies, latency.png, and their numbers, latency.json."""
     json: Path | None = None
-    """Write at the end what was measured to this file."""
+    """Write the measurements to this file at the end."""
     rehearse: bool = False
-    """Fly it first without hardware: a simulated motion capture system, this command, `e2efly fly` and the real
-    firmware as processes, in real time. The options below are its own."""
+    """Rehearse the flight without hardware first. A simulated motion capture system, this command, `e2efly fly` and the
+    real firmware run as separate processes, in real time. The options below are for the rehearsal only."""
     laps: int = 1
-    """Flights of the rehearsal, each in another world, from --seed on."""
+    """Number of flights of the rehearsal. Each flies in another world, starting with --seed."""
     kill: Victim | None = None
     """Kill one of the processes in each flight while the policy flies, to see what happens then."""
     pose_delay: float = 0.004
-    """How late the poses of the rehearsal come, s: what cameras and network of your room take."""
+    """Delay of the poses in the rehearsal, s: that of the cameras and the network of your room."""
     link_delay: float | None = None
-    """How late what the bridge sends reaches the vehicle in the rehearsal, s: its radio. Left out: so late that the
-    whole is the vehicle's latency; 0 for a bridge on board."""
+    """Delay of the commands from the bridge to the vehicle in the rehearsal, s: that of its radio. If omitted, it is
+    chosen so that the total delay equals the vehicle's latency. Use 0 for a bridge on board."""
     out: Path | None = None
-    """Folder of the rehearsal's report; left out: a new one in the folder `rehearsals`."""
+    """Folder for the rehearsal's report. If omitted, a new folder in the folder `rehearsals`."""
 
 
 def parse(arguments: list[str]) -> Asked:
-    """The options of `hil`; the defaults of `--task` are what the policy's run or contract says.
+    """The options of `hil`. The defaults of `--task` come from the policy's run or contract.
 
     Raises:
-        ValueError: for unknown names, and for a policy that is not there.
+        ValueError: for unknown names, and for a policy that does not exist.
     """
     return asked_of(Hil, "hil", arguments)
 
 
 def run(asked: Asked) -> int:
-    """Render until the time is out.
+    """Render until the time is over.
 
     Raises:
         ValueError: naming the option, its value and what is accepted.
@@ -225,7 +227,7 @@ def _where(o: Hil, scenery: "Scenery", task: str, radius: float, console: Termin
 
 
 def _watch(node: "Node", o: Hil, other_world: bool, stack: ExitStack, console: Terminal) -> None:
-    """Show each pose of the scene on a page, beside what is told already; and the world, where that is the policy's."""
+    """Show each pose of the scene on a page, besides what is reported already, and the world if it is the policy's."""
     from e2efly.watch.beside import Shown
 
     same = not other_world and o.scene is None
@@ -282,17 +284,17 @@ def _report(node: "Node", folder: Path) -> None:
 
 
 def _memory(image: str, outputs: "list[Output]") -> str:
-    """Name of the shared memory of an image: the one that was given, or one of this process."""
+    """Name of the shared memory of an image: the given name, or a name that belongs to this process."""
     return next((output.where for output in outputs if output.kind == "shm"), f"hil-{os.getpid()}-{image}")
 
 
 def _reached(host: str) -> str:
-    """The address by which others reach this computer, as far as it is known."""
+    """The address at which other computers reach this one, as far as it is known."""
     return socket.gethostname() if host in ("0.0.0.0", "::") else host
 
 
 def _measured(path: Path) -> Origin:
-    """The origin by measured points.
+    """The origin from measured points.
 
     Raises:
         ValueError: naming the file and what is wrong with it.

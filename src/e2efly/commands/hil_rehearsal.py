@@ -21,20 +21,20 @@ if TYPE_CHECKING:
     from e2efly.validation.hil_lap import Lap, Spread
 
 LAP_S = 30.0
-"""What a flight takes with the start of its processes, at least, s."""
+"""Minimum duration of a flight, including the start of its processes, s."""
 LATEST_S = 0.2
 """Largest `--pose-delay` and `--link-delay`, s."""
 WANTED_S = 0.015
-"""From a pose to its image in 99 of 100, s: more is told of."""
+"""Wanted delay from a pose to its image in 99 of 100 cases, s. A longer delay is reported."""
 LATE_S = 0.01
-"""Control steps and a room that are later than this in 99 of 100 say that the machine is too slow or busy, s."""
+"""If control steps and the room are later than this in 99 of 100 cases, the machine is too slow or too busy, s."""
 STALL_S = 0.05
-"""... and so do single ones later than this, s."""
+"""The same holds if a single one is later than this, s."""
 REHEARSALS, OWN = (
     ("laps", "kill", "pose_delay", "link_delay", "out"),
     ("pose", "image", "seconds", "json", "track", "watch"),
 )
-"""Options that only a rehearsal has, and those that it sets itself."""
+"""Options for rehearsals only, and options that a rehearsal sets itself."""
 
 
 def check_rehearsal(o: "Hil") -> None:
@@ -57,15 +57,15 @@ def check_rehearsal(o: "Hil") -> None:
 
 
 def rehearse(o: "Hil", task: dict[str, Any], origin: Origin) -> int:
-    """Fly, print a table, write report and pictures.
+    """Fly, print a table, and write a report and pictures.
 
     Args:
         o: the options.
-        task: values of the task that are not the policy's own, by dotted name.
-        origin: of the world, in the room.
+        task: values of the task that differ from the policy's own, by dotted name.
+        origin: position and turn of the world's origin in the room.
 
     Returns:
-        0, or 1 when a flight was not as it is to be.
+        0, or 1 when a flight did not go as required.
 
     Raises:
         ValueError: naming the option, its value and what is accepted.
@@ -132,7 +132,7 @@ def laps_table(laps: "list[Lap]") -> Table:
 
 
 def told(laps: "list[Lap]") -> list[str]:
-    """What there is to say under the table."""
+    """The remarks under the table."""
     lines = ["Times: 99 % of them are shorter, ms. Medians and maxima are in the report."]
     if any(lap.kill is None for lap in laps):
         whole = [lap for lap in laps if lap.kill is None]

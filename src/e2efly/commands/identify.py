@@ -23,35 +23,36 @@ if TYPE_CHECKING:
     from e2efly.identification.record import Record
 
 KINDS = ("parts", "pendulum", "stand", "flight", "step")
-"""Sources, by what the command line calls them."""
+"""Kinds of sources, as the command line names them."""
 AHEAD = (0.048, 0.1, 0.2, 0.4)
-"""How far ahead the report tells the errors of the prediction, s."""
+"""Prediction horizons for which the report gives the prediction errors, s."""
 
 
 @dataclass(frozen=True)
 class Identify:
-    """Find a vehicle's parameters from what you can measure; write a vehicle file with standard deviations.
+    """Find a vehicle's parameters from measurements. Write a vehicle file with their standard deviations.
 
-    Sources are named by their kind, and then their files: `e2efly identify parts my.toml flight a.csv b.csv`.
+    Give each source as its kind, followed by its files: `e2efly identify parts my.toml flight a.csv b.csv`.
     """
 
     sources: tyro.conf.Positional[tuple[str, ...]]
-    """parts FILE: a list of parts. pendulum FILE: periods of a bifilar pendulum. stand FILE: a thrust stand's record.
-    flight LOG...: flights. step LOG...: flights with steps of body rate, for delay and rate loop alone. LOG:BEGIN-END
-    takes what lies between two times, s after the log begins."""
+    """parts FILE: a list of parts. pendulum FILE: periods of a bifilar pendulum. stand FILE: a record of a thrust
+    stand. flight LOG...: flights. step LOG...: flights with steps of the body rate, for the delay and the rate loop
+    only. LOG:BEGIN-END selects the part between two times, in s from the beginning of the log."""
     vehicle: str = "vis_r"
-    """The base: a vehicle's name or a .toml file. What the sources do not say stays as it is there, and the flight
-    controller of the flights is taken to have believed in it."""
+    """The base vehicle: a name or a .toml file. Parameters that the sources do not determine keep its values. The
+    flight controller is assumed to have been tuned for it in the flights."""
     out: Path = Path("identified")
-    """Folder of vehicle.toml, identified.json and the plots."""
+    """Folder for vehicle.toml, identified.json and the plots."""
     columns: tuple[str, ...] = ()
-    """Names of a CSV log's columns for ours: OURS=THEIRS or OURS=THEIRS*FACTOR, as az=acc_z*9.81."""
+    """Maps the column names of a CSV log to ours: OURS=THEIRS or OURS=THEIRS*FACTOR, as in az=acc_z*9.81."""
     mass: tuple[float, float] | None = None
-    """What the vehicle weighs, and the scale's sigma, kg. Flights give thrust, inertia and drag over it."""
+    """Mass of the vehicle and standard deviation of the scale, kg. Flights only give thrust, inertia and drag relative
+    to the mass."""
 
 
 def run(options: Identify) -> int:
-    """Read all sources, fuse what they say, write the vehicle file, the report and the plots.
+    """Read all sources and fuse their results. Write the vehicle file, the report and the plots.
 
     Raises:
         ValueError: naming the source, what is wrong with it and what is accepted. Nothing is written then.
@@ -173,7 +174,7 @@ def _flown(vehicle: Vehicle, believed: Vehicle, records: "Sequence[Record]", ste
 
 
 def _with_mass(estimates: "list[Estimate]", said: "Sequence[Estimate]") -> "list[Estimate]":
-    """What is proportional to the mass is no better known than it."""
+    """Parameters that are proportional to the mass are not known more precisely than the mass."""
     from dataclasses import replace
 
     from e2efly.identification.correlation import OVER_MASS
@@ -183,7 +184,7 @@ def _with_mass(estimates: "list[Estimate]", said: "Sequence[Estimate]") -> "list
 
 
 def _mass_spread(said: "Sequence[Estimate]") -> float:
-    """Relative standard deviation of the mass; 0 where no source says it."""
+    """Relative standard deviation of the mass; 0 if no source gives it."""
     return float(min((e.sigma / e.value for e in said if e.name == "mass"), default=0.0))
 
 

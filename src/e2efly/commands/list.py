@@ -16,11 +16,11 @@ from e2efly.vehicles import family_names, load_family, load_vehicle, vehicle_nam
 
 @dataclass(frozen=True)
 class List:
-    """What there is: tasks, algorithms, vehicles, tracks, command modes, hover controllers, plants, reward terms."""
+    """List tasks, algorithms, vehicles, tracks, command modes, hover controllers, plants and reward terms."""
 
 
 def run(options: List) -> int:
-    """Print what there is."""
+    """Print the lists."""
     del options
     load_installed()
     prepare("cpu")

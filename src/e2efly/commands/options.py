@@ -16,7 +16,7 @@ _TYPES = ConstructorRegistry()
 
 @_TYPES.primitive_rule
 def _whole_numbers(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[int] | None:
-    """Whole numbers may be written as 1e6, too."""
+    """Whole numbers may also be written as 1e6."""
     if info.type is not int:
         return None
     return PrimitiveConstructorSpec(
@@ -34,16 +34,16 @@ def _whole(text: str) -> int:
 
 
 def parse(options: type[T], command: str, arguments: list[str], **default: Any) -> T:
-    """The parsed options of a command. Where there is a path, there must be a file, a folder or nothing.
+    """The parsed options of a command. A path must lead to a file, to a folder, or to nothing.
 
     Args:
-        options: their dataclass.
-        command: its name, for help.
-        arguments: what follows it.
-        default: an instance, where the defaults are not those of the class.
+        options: the dataclass of the options.
+        command: the name of the command, for its help.
+        arguments: the arguments that follow the command.
+        default: an instance, if the defaults differ from those of the class.
 
     Raises:
-        ValueError: for the path of a device or of a pipe: it may never end, and a report written there replaces it.
+        ValueError: for the path of a device or a pipe. Reading it may never end, and a report would replace it.
     """
     config = (tyro.conf.AvoidSubcommands,)
     found = tyro.cli(
@@ -56,7 +56,7 @@ def parse(options: type[T], command: str, arguments: list[str], **default: Any) 
 
 
 def _once(arguments: list[str]) -> list[str]:
-    """`--env.randomize identified` with the factor that it leaves out: once the file's standard deviations."""
+    """Add the factor that `--env.randomize identified` omits: 1, which means the file's standard deviations."""
     out: list[str] = []
     flag = ""
     for argument, following in pairwise([*arguments, "--"]):
@@ -76,7 +76,7 @@ def _is_number(text: str) -> bool:
 
 
 def peek(arguments: list[str], flag: str, default: str) -> str:
-    """The value of a flag, before the rest is parsed: it decides which other flags there are."""
+    """The value of a flag, read before the other arguments are parsed: it decides which other flags exist."""
     for i, argument in enumerate(arguments):
         if argument.startswith(flag + "="):
             return argument.split("=", 1)[1]

@@ -1,4 +1,4 @@
-"""Options of commands whose defaults are those of a policy."""
+"""Options of commands whose defaults come from a policy."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -19,21 +19,21 @@ class Asked:
     """What a command is asked to do with a policy."""
 
     options: Any
-    """As given."""
+    """The options as given."""
     task: dict[str, Any]
-    """Values of `--task`, by dotted name, that are not the policy's own."""
+    """Values of `--task` that differ from the policy's own, by dotted name."""
 
 
 def asked_of(options: type, command: str, arguments: list[str]) -> Asked:
-    """The options of a command; the defaults of `--task` are what the policy's run or contract says.
+    """The options of a command. The defaults of `--task` come from the policy's run or contract.
 
     Args:
-        options: of the command, with a field `task`.
-        command: its name.
-        arguments: what follows it.
+        options: the dataclass of the options, with a field `task`.
+        command: the name of the command.
+        arguments: the arguments that follow it.
 
     Raises:
-        ValueError: for unknown names, and for a policy that is not there.
+        ValueError: for unknown names, and for a policy that does not exist.
     """
     given = [argument for argument in arguments if argument.startswith("--task.")]
     if not given or "--help" in arguments:
@@ -45,15 +45,15 @@ def asked_of(options: type, command: str, arguments: list[str]) -> Asked:
 
 
 def named_first(command: str, arguments: list[str], given: str) -> "Candidate":
-    """The policy that a command names first.
+    """The policy that is the first argument of a command.
 
     Args:
-        command: its name.
-        arguments: what follows it.
-        given: an option among them whose default is the policy's own.
+        command: the name of the command.
+        arguments: the arguments that follow it.
+        given: an option among them whose default is the policy's own value.
 
     Raises:
-        ValueError: where something else stands first, or there is no such policy.
+        ValueError: when the first argument is something else, or when there is no such policy.
     """
     if arguments[0].startswith("-"):
         option = given.split(".")[0]
@@ -64,11 +64,11 @@ def named_first(command: str, arguments: list[str], given: str) -> "Candidate":
 
 
 def with_task(options: type, task: TaskConfig) -> Any:
-    """Options of a command whose field `task` is of the class of a policy's task."""
+    """The options of a command, with a field `task` of the class of the policy's task."""
     kind = Annotated[type(task), tyro.conf.arg(help="What the policy is to fly.")]
     return dataclasses.make_dataclass(options.__name__, [("task", kind, task)], bases=(options,), frozen=True)
 
 
 def values(own: Any, given: Any) -> dict[str, Any]:
-    """What is given in place of a policy's own options, by dotted name."""
+    """The values that replace a policy's own options, by dotted name."""
     return {name: value for name, (_, value) in differing(own, given).items()}

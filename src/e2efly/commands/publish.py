@@ -12,28 +12,28 @@ from e2efly.terminal import Terminal
 
 @dataclass(frozen=True)
 class Publish:
-    """Send a run's configuration and metrics to an experiment tracker; a run that goes on is followed to its end.
+    """Send a run's configuration and metrics to an experiment tracker. A run in progress is followed to its end.
 
-    Started again, it sends what has come since. Where the tracker keeps what it is sent, its own settings say: see
-    docs/network.md for what leaves the machine.
+    A second call sends what is new since the first one. The tracker's own settings determine where it stores the data.
+    See docs/network.md for what leaves the machine.
     """
 
     run: tyro.conf.Positional[Path]
-    """Folder of a run: finished, cut short, or going on."""
+    """Run directory. The run may be finished, interrupted, or in progress."""
     to: Literal["trackio", "wandb"]
     """The tracker: Trackio (pip install 'e2efly[trackio]') or Weights & Biases (pip install 'e2efly[wandb]')."""
     project: str = "e2efly"
-    """Of the tracker."""
+    """Name of the project in the tracker."""
     name: str | None = None
-    """Of the run there; the folder's name when left out."""
+    """Name of the run in the tracker. If omitted, the folder's name."""
 
 
 def run(options: Publish) -> int:
-    """Send what there is, and what comes while the run goes on.
+    """Send the metrics that exist, and those that follow while the run is in progress.
 
     Raises:
-        ValueError: for a tracker that is not installed; for a folder without a run; for one that was published as
-            another project, that holds another run now, or that another process publishes.
+        ValueError: for a tracker that is not installed, and for a folder without a run. Also for a folder that was
+            published as another project, that holds another run now, or that another process publishes.
         OSError: when the tracker cannot be reached as its settings say.
     """
     from e2efly.learn.publish import publish

@@ -16,9 +16,10 @@ from e2efly.vehicles import Vehicle
 
 
 def fly_whole(found: Candidate, vehicle: Vehicle, count: int, console: Console, seed: int = 0) -> list[Rehearsal]:
-    """Take off, hover, hand over to the policy, land: so many times, from another place each.
+    """Take off, hover, hand over to the policy, and land: the given number of flights, each from another place.
 
-    A policy that sees flies in another world of its training's environment each time, of the first criterion.
+    A policy with cameras flies in another world each time. The worlds come from the training environment of the first
+    criterion.
 
     Raises:
         OSError: when the firmware cannot be built or started.
@@ -35,9 +36,9 @@ def fly_whole(found: Candidate, vehicle: Vehicle, count: int, console: Console, 
 
 
 def flights_table(flights: list[Rehearsal]) -> RenderableType:
-    """A row for every flight, and under them the modes of those that were not complete, each with why it began.
+    """One row for every flight. Below them, the modes of each incomplete flight, with the reason why each mode began.
 
-    It is made for 80 columns: the modes of a complete flight are always the same, and stand in its JSON alone.
+    The table fits 80 columns. The modes of a complete flight are always the same and are only in its JSON.
     """
     table = Table(box=None, header_style="bold", pad_edge=False)
     for heading in ("whole flight", "complete", "hover error", "policy", "top speed"):
@@ -57,6 +58,6 @@ def _modes(number: int, flight: Rehearsal) -> RenderableType:
 
 
 def flight_row(flight: Rehearsal) -> dict[str, Any]:
-    """A flight as JSON: all of it but its track; what there is none of is null."""
+    """A flight as JSON, without its track. Missing values are null."""
     row = {f.name: getattr(flight, f.name) for f in dataclasses.fields(flight) if f.name != "flown"}
     return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}

@@ -1,4 +1,4 @@
-"""`e2efly render`: what sensors see of a world, as pictures and as a video of a flight; or a policy's flight."""
+"""`e2efly render`: pictures of what sensors see of a world, a video of a flight, or a video of a policy's flight."""
 
 import math
 from dataclasses import dataclass
@@ -24,33 +24,34 @@ PICTURE, PANEL = 640, 256
 class Render:
     """Draw what sensors see of a world: pictures, a contact sheet with every noise, and a video of a flight.
 
-    Of a run or a policy.onnx: a GIF of it in flight, and beside it what its cameras see, as `e2efly watch --video`
-    draws it.
+    For a run or a policy.onnx: a GIF of the policy in flight, with the images of its cameras beside it, as
+    `e2efly watch --video` draws it.
     """
 
     scene: tyro.conf.Positional[str]
-    """forest, clutter, room, corridor, garage, terrain, warehouse, a race track, or a file: .toml, .glb, .obj, .ply,
-    .stl; a run's folder or a policy.onnx."""
+    """forest, clutter, room, corridor, garage, terrain, warehouse, a race track, or a scene file (.toml, .glb, .obj,
+    .ply, .stl). Or a run directory or a policy.onnx."""
     camera: Literal["d435i", "fpv", "down", "lidar"] = "d435i"
-    """The sensor of the pictures and the video: a RealSense, an FPV camera, one that looks down, a LiDAR."""
+    """The sensor of the pictures and the video: a RealSense (d435i), an FPV camera, a downward camera, or a LiDAR."""
     width: int | None = None
-    """Columns of its image; 640, and 256 in the video, when left out."""
+    """Columns of its image. If omitted, 640 (256 in the video)."""
     height: int | None = None
-    """Rows; those of square pixels when left out."""
+    """Rows of its image. If omitted, the number that gives square pixels."""
     position: tuple[float, float, float] | None = None
-    """Where the pictures are taken, world, m; after a tenth of the flight when left out."""
+    """Position from which the pictures are taken, world frame, m. If omitted, the position after a tenth of the
+    flight."""
     yaw: float | None = None
-    """Heading there, degrees; the flight's when left out."""
+    """Heading for the pictures, degrees. If omitted, the flight's heading."""
     pitch: float = 0.0
-    """Nose down, degrees."""
+    """Downward pitch for the pictures, degrees."""
     time: float = 0.0
-    """When the pictures are taken, s: of what moves."""
+    """Time at which the pictures are taken, s. It determines where moving objects are."""
     seed: int = 0
     """Seed of a random world and of the noise."""
     flight: Path | None = None
-    """A .csv file with columns t, x, y, z (s, m) to fly in the video; a flight clear of the solids when left out."""
+    """A .csv file with columns t, x, y, z (s, m) to fly in the video. If omitted, a flight that avoids all solids."""
     out: Path | None = None
-    """Folder of the files; runs/render/SCENE when left out."""
+    """Folder for the files. If omitted, runs/render/SCENE."""
 
 
 def run(options: Render) -> int:
@@ -102,7 +103,7 @@ def run(options: Render) -> int:
 
 
 def _policy(options: Render) -> int:
-    """A video of a policy in flight, with what its cameras see."""
+    """A video of a policy in flight, with the images of its cameras."""
     from e2efly.commands.watch import Watch, run
 
     path = Path(options.scene)
@@ -112,7 +113,7 @@ def _policy(options: Render) -> int:
 
 
 def viewpoint(options: Render, tour: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Where the pictures are taken: as asked for, or on the flight after a tenth of it. Level but for `--pitch`."""
+    """The viewpoint of the pictures: as requested, or on the flight after a tenth of it. Level except for `--pitch`."""
     i = len(tour.time) // 10
     yaw = float(Quat.of(tour.quaternion[i]).yaw()) if options.yaw is None else math.radians(options.yaw)
     pitch = math.radians(options.pitch)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def check_stress(stress: bool, rows: tuple[str, ...], least: float | None) -> None:
-    """Refuse `--rows` and `--least` that say nothing.
+    """Refuse `--rows` and `--least` where they have no effect or no meaning.
 
     Raises:
         ValueError: naming the option, its value and what is accepted.
@@ -32,14 +32,14 @@ def check_stress(stress: bool, rows: tuple[str, ...], least: float | None) -> No
 
 
 def report_stress(found: "Report", console: Console, json: Path | None, plot: Path, least: float | None) -> int:
-    """Print the table, write the report and the plot.
+    """Print the table; write the report and the plot.
 
     Args:
-        found: how the policy did in each row.
+        found: the results of the policy in each row.
         console: where to print.
-        json: the report's file; None: none.
-        plot: the picture's file.
-        least: the success that is asked for in each row; None: none.
+        json: the file for the report. None: no report is written.
+        plot: the file for the plot.
+        least: the success rate that each row must reach. None: no requirement.
 
     Returns:
         0, or 1 when a row succeeds less often than `least`.

@@ -1,7 +1,7 @@
-"""`e2efly sweep`: a task learned over seeds and options, many runs side by side on Ray.
+"""`e2efly sweep`: train a task over seeds and options, with many runs in parallel on Ray.
 
-Each run is a process of `e2efly train` in a folder of its own. What is finished there is not trained again, what was
-cut short goes on: after an end of the sweep, and, by Ray, after the loss of a worker.
+Each run is a process of `e2efly train` in its own folder. A finished run is not trained again. An interrupted run
+continues when the sweep is started again, or, through Ray, after the loss of a worker.
 """
 
 import dataclasses
@@ -33,49 +33,50 @@ from e2efly.tasks import TASKS
 from e2efly.terminal import Terminal, console_table, markdown
 
 RUN_S = 5.0
-"""The least that a run takes, s; on one core alone."""
+"""Minimum duration of a run, s; on one core alone."""
 _GIVEN = ("seed", "out", "resume", "algo", "preset", "device", "devices", "plots", "no-plots")
-"""Options of `e2efly train` that a sweep gives itself."""
+"""Options of `e2efly train` that a sweep sets itself."""
 _ALONE = {
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",  # otherwise Ray replaces 127.0.0.1 by the machine's outward address
     # Ray asks a cloud's metadata service which cloud this is, even with its usage statistics off: close the way there
     "http_proxy": "http://127.0.0.1:9",
     "no_proxy": "127.0.0.1,localhost",
 }
-"""Environment variables that keep a Ray of this machine alone on this machine."""
+"""Environment variables that keep a local Ray on this machine only."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """Learn a task over seeds and options, runs side by side on Ray (pip install 'e2efly[ray]')."""
+    """Train a task over seeds and options, with many runs in parallel on Ray (pip install 'e2efly[ray]')."""
 
     task: tyro.conf.Positional[str]
-    """What to learn."""
+    """The task to learn."""
     algo: str | None = None
-    """By which algorithm; what learns the task best when left out."""
+    """Learning algorithm. If omitted, the one that learns the task best."""
     preset: str | None = None
-    """Where everything that is not varied comes from; left out: robust, where the task has it, else nominal."""
+    """Source of all options that are not varied. If omitted, robust if the task has it, otherwise nominal."""
     seeds: int = 5
-    """Runs of each variant: seeds 0, 1, ..."""
+    """Number of runs per variant, with seeds 0, 1, ..."""
     vary: tuple[str, ...] = ()
-    """Options of `e2efly train` with their values: algo.learning-rate=1e-3,4e-3 steps=500000. Each with each."""
+    """Options of `e2efly train` with their values: algo.learning-rate=1e-3,4e-3 steps=500000. All combinations are
+    run."""
     out: Path | None = None
-    """Folder of the runs and the table; runs/sweep-TASK-ALGO when left out. All machines of a cluster must share it."""
+    """Folder for the runs and the table. If omitted, runs/sweep-TASK-ALGO. All machines of a cluster must share it."""
     cores: int = 1
-    """Cores of a run, each a device where there are no GPUs."""
+    """Cores per run. Without GPUs, each core is one device."""
     gpus: int = 0
-    """GPUs of a run, each a device; 0: it computes on the CPU."""
+    """GPUs per run; each GPU is one device. 0: the run computes on the CPU."""
     address: str | None = None
-    """A Ray cluster's address, or auto; left out: this machine alone, bound to loopback."""
+    """Address of a Ray cluster, or auto. If omitted, only this machine is used, bound to the loopback interface."""
 
     @property
     def algorithm(self) -> str:
-        """`algo`, or what learns the task best."""
+        """`algo`, or the algorithm that learns the task best."""
         return self.algo or TASKS.find(self.task).best
 
     @property
     def defaults(self) -> str:
-        """`preset`, or the one that `e2efly train` takes."""
+        """`preset`, or the one that `e2efly train` uses."""
         return self.preset or presets.default(TASKS.find(self.task), ALGORITHMS.find(self.algorithm))
 
     @property
@@ -89,14 +90,14 @@ class Trial:
     """One run."""
 
     variant: str
-    """What is the same for all its seeds."""
+    """The options that all its seeds share."""
     seed: int
     arguments: tuple[str, ...]
-    """Of `e2efly train`."""
+    """Arguments of `e2efly train`."""
     out: Path
 
     def ended(self) -> dict[str, Any] | None:
-        """The summary of the run, where it has come to its end."""
+        """The summary of the run, if it has finished."""
         if not (self.out / "summary.json").exists():
             return None
         found = RunDirectory(self.out).read_json("summary.json")
@@ -104,11 +105,11 @@ class Trial:
 
 
 def run(options: Sweep) -> int:
-    """Run every variant with every seed; write sweep.json and a table. Exit status 1 when a run failed.
+    """Run every variant with every seed. Write sweep.json and a table. The exit status is 1 if a run failed.
 
     Raises:
-        ValueError: for options that cannot be varied so, and for a folder with runs of another configuration.
-        OSError: when the folder cannot be written or the cluster not reached.
+        ValueError: for options that cannot be varied, and for a folder with runs of another configuration.
+        OSError: when the folder cannot be written, or when the cluster cannot be reached.
     """
     console, trials = Terminal(), list(trials_of(options))
     if len({trial.out for trial in trials}) < len(trials):
@@ -121,7 +122,7 @@ def run(options: Sweep) -> int:
 
 
 def _sweep(options: Sweep, trials: list[Trial], console: Console) -> int:
-    """In a folder that is this sweep's alone."""
+    """Run the sweep in a folder that no other process uses."""
     from e2efly.learn.judge import reported
 
     found = {trial.out: summary for trial in trials if (summary := trial.ended())}
@@ -182,7 +183,7 @@ def trials_of(options: Sweep) -> Iterator[Trial]:
 
 
 def train_trial(trial: Trial) -> int:
-    """Run `e2efly train` into a folder, or go on with what it holds; its words go to train.log there."""
+    """Run `e2efly train` in a folder, or continue the run in it. The output goes to train.log in this folder."""
     trial.out.mkdir(parents=True, exist_ok=True)
     with (trial.out / "train.log").open("ab") as log:
         fcntl.flock(log, fcntl.LOCK_EX)  # the process holds it, too: one that outlives its worker is waited for
@@ -201,7 +202,7 @@ def _check(trial: Trial, config: TrainConfig) -> None:
 
 
 def _run(trials: list[Trial], options: Sweep) -> Iterator[tuple[Trial, str]]:
-    """The trials as they end, and how each did."""
+    """The trials in the order in which they end, with the result of each."""
     if options.address is None:
         os.environ.update(_ALONE)  # before the import, which reads it
     try:
@@ -242,7 +243,7 @@ def _last_line(trial: Trial) -> str:
 
 
 def _report(options: Sweep, trials: list[Trial], found: dict[Path, dict[str, Any]], console: Console) -> None:
-    """A row a variant, and a file with every run."""
+    """One row per variant, and a file with every run."""
     from e2efly.learn.judge import reported
 
     rows = []

@@ -1,4 +1,4 @@
-"""`e2efly train`. Its options are those of the task and the algorithm, with the defaults of a preset."""
+"""`e2efly train`. Its options are those of the task and the algorithm. Their defaults come from a preset."""
 
 import dataclasses
 import os
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from e2efly.watch.beside import Beside
 
 _FLOWN = {"nominal": "best, nominal", "stress": "best, stress", "shipped": "best", "last": "last"}
-"""Parts of a summary that say how a policy flew, and what the table calls them."""
+"""Parts of a summary that hold evaluations of a policy, and their names in the table."""
 _POLICY = "a policy: a task of the zoo, a run, or a policy.onnx"
-_OWN = "a task of your own: path/to/file.py:Name"
+_OWN = "or one of your own: path/to/file.py:Name"
 
 
 @dataclass(frozen=True)
@@ -37,27 +37,27 @@ class Train:
     """What `e2efly train` is asked to do."""
 
     config: TrainConfig
-    """Everything that decides the outcome."""
+    """Everything that determines the result."""
     out: Path
     """The run directory."""
     resume: bool
-    """Go on with the run in it."""
+    """Continue the run in the run directory."""
     overwrite: bool
-    """Delete the run in it."""
+    """Delete the run in the run directory."""
     device: str | None
-    """Where to compute."""
+    """Device to compute on."""
     plots: bool
-    """Evaluate and draw at the end."""
+    """Evaluate the policy and draw plots at the end."""
     hosts: Hosts
     """The processes of the run."""
     watch: int | None
-    """Port of the page on which it can be watched; None: there is none."""
+    """Port of the page on which the run can be watched. None: there is no page."""
     arguments: list[str]
-    """As given, for the process that a run on several hosts is."""
+    """The arguments as given. A run on several hosts passes them to its process."""
 
 
 def run(options: Train) -> int:
-    """Train, ship the best policy, evaluate it and draw plots.
+    """Train, export the best policy, evaluate it and draw plots.
 
     Returns:
         0, or 130 when the user stopped it.
@@ -81,7 +81,7 @@ def parse(arguments: list[str]) -> Train:
     """The options of `train`.
 
     Raises:
-        ValueError: for unknown names, options that contradict each other, a run that is not there.
+        ValueError: for unknown names, for options that contradict each other, and for a run that does not exist.
     """
     from e2efly.learn.rundir import run_folder
 
@@ -95,7 +95,7 @@ def parse(arguments: list[str]) -> Train:
 
 
 def _again(o: Train) -> str:
-    """How to go on with a run that was stopped."""
+    """How to continue a run that was stopped."""
     command = ["e2efly", "train", "--resume", str(o.out)]
     command += ["--device", o.device] if o.device else []
     command += [] if o.plots else ["--no-plots"]
@@ -131,7 +131,7 @@ def _page(o: Train) -> "Beside | None":
     """The page of `--watch`.
 
     Raises:
-        ValueError: for a port that there is not, or that is in use; where viser is not installed.
+        ValueError: for a port that is invalid or in use, or when viser is not installed.
     """
     if o.watch is None or o.hosts.index > 0:
         return None
@@ -141,7 +141,7 @@ def _page(o: Train) -> "Beside | None":
 
 
 class _Shown(TerminalProgress):
-    """The terminal's progress, and a page that begins with the first policy."""
+    """The progress in the terminal, and a page that begins with the first policy."""
 
     def __init__(self, console: Console, title: str, page: "Beside") -> None:
         super().__init__(console, title)
@@ -207,27 +207,30 @@ def _options(config: TrainConfig, preset: str) -> tuple[type, Any]:
     """The options of `train`: a dataclass and its defaults, which are those of a configuration."""
     task, algo = config.task.name, config.algo.name
     every: list[tuple[str, Any]] = [
-        ("task_name", tyro.conf.Positional[_help(str, f"What to learn: {_join(TASKS)}; or {_OWN}.", metavar="TASK")]),
-        ("algo_name", _help(str, f"Algorithm: {_join(ALGORITHMS)}; or {_OWN}.", name="algo")),
+        (
+            "task_name",
+            tyro.conf.Positional[_help(str, f"What to learn: {_join(TASKS)}, {_OWN}.", metavar="TASK")],
+        ),
+        ("algo_name", _help(str, f"Algorithm: {_join(ALGORITHMS)}, {_OWN}.", name="algo")),
         ("preset", _help(str, f"Where the defaults come from: {_join(presets.names())}.")),
         (
             "vehicle",
             _help(str, "A shipped vehicle, `any` for a family of vehicles, or the path of a .toml file of either."),
         ),
         ("seed", _help(int, "Seed of everything random.")),
-        ("out", _help(Path | None, "Run directory; left out: runs/TASK-ALGO-SEED, or runs/TASK-ALGO-VEHICLE-SEED.")),
-        ("resume", _help(bool, "Go on with the run in --out. `e2efly train --resume DIR` is enough.")),
-        ("start_from", _help(str | None, f"Begin with the weights of {_POLICY}; None: with fresh ones.", name="from")),
-        ("overwrite", _help(bool, "Delete the run that is in --out, and begin anew.")),
+        ("out", _help(Path | None, "Run directory. If omitted, runs/TASK-ALGO-SEED, or runs/TASK-ALGO-VEHICLE-SEED.")),
+        ("resume", _help(bool, "Continue the run in --out. `e2efly train --resume DIR` is enough.")),
+        ("start_from", _help(str | None, f"Start from {_POLICY}. If omitted, from fresh weights.", name="from")),
+        ("overwrite", _help(bool, "Delete the run in --out, and start again.")),
         ("device", _help(Literal["cpu", "gpu"] | None, "Where to compute.")),
         ("plots", _help(bool, "Evaluate and draw plots at the end.")),
         ("steps", _help(int, "Environment steps of the whole run.")),
         ("chunk", _help(int, "Updates between two evaluations (sets shapes).")),
-        ("eval_episodes", _help(int, "Starts of an evaluation while training (sets shapes).")),
-        ("devices", _help(int | None, "Devices (CPU: cores) to share the environments among.")),
-        ("fast_compile", _help(bool, "On a CPU: compile faster, run slower; right for runs of seconds.")),
+        ("eval_episodes", _help(int, "Starts per evaluation during training (sets shapes).")),
+        ("devices", _help(int | None, "Devices (on a CPU: cores) that share the environments.")),
+        ("fast_compile", _help(bool, "On a CPU: compile faster but run slower. Good for runs of a few seconds.")),
         ("curriculum", _help(bool, "Go through the stages of the preset's curriculum, if it has one.")),
-        ("stop_at", _help(float | None, "Stop once the success on 1000 starts is at least this.")),
+        ("stop_at", _help(float | None, "Stop when the success rate on 1000 starts is at least this.")),
         (
             "watch",
             _help(int | None, "Serve a page with the policy in flight, as it learns, on this port of 127.0.0.1."),
@@ -262,7 +265,7 @@ def _help(kind: Any, text: str, **names: Any) -> Any:
 
 
 def _config(options: Any, config: TrainConfig) -> TrainConfig:
-    """The `TrainConfig` of parsed options, whose defaults were those of a configuration."""
+    """The `TrainConfig` for parsed options whose defaults came from a configuration."""
     shared = {f.name: getattr(options, f.name) for f in dataclasses.fields(config)}
     shared["curriculum"] = config.curriculum if options.curriculum else ()
     changes, old = options.reward, config.reward
@@ -279,12 +282,12 @@ def _config(options: Any, config: TrainConfig) -> TrainConfig:
 
 
 def _changed(preset: Mapping[str, float], given: Mapping[str, float]) -> dict[str, float]:
-    """The preset's numbers with those given in their place; 0 takes one out."""
+    """The preset's numbers, replaced by those that were given. 0 removes a number."""
     return {name: value for name, value in {**preset, **given}.items() if value != 0}
 
 
 def _parsed(arguments: list[str]) -> tuple[Any, TrainConfig]:
-    """The options of `train` and the configuration that they make."""
+    """The options of `train`, and the configuration that they give."""
     arguments = _with_folder(arguments)
     if "--resume" in arguments and (not arguments or arguments[0].startswith("-")) and "--help" not in arguments:
         return _parsed_of_run(arguments)
@@ -303,7 +306,7 @@ def _parsed(arguments: list[str]) -> tuple[Any, TrainConfig]:
 
 
 def _parsed_as(config: TrainConfig, preset: str, arguments: list[str]) -> tuple[Any, TrainConfig]:
-    """As `_parsed`, where the defaults are those of a configuration."""
+    """The same as `_parsed`, with the defaults of a configuration."""
     options, defaults = _options(config, preset)
     _vehicle(arguments)
     parsed = parse_options(options, "train", arguments, default=defaults)
@@ -311,7 +314,7 @@ def _parsed_as(config: TrainConfig, preset: str, arguments: list[str]) -> tuple[
 
 
 def _vehicle(arguments: list[str]) -> str:
-    """The vehicle that is asked for; empty where none is."""
+    """The requested vehicle; empty if none is requested."""
     given = [vehicle for flag in ("--vehicle", "--env.vehicle") if (vehicle := peek(arguments, flag, ""))]
     if len(set(given)) > 1:
         raise ValueError(f"--vehicle is {given[0]} and --env.vehicle is {given[1]}; accepted: one of them alone")
@@ -319,7 +322,7 @@ def _vehicle(arguments: list[str]) -> str:
 
 
 def _with_folder(arguments: list[str]) -> list[str]:
-    """`--resume DIR` as `--out DIR --resume`."""
+    """Rewrite `--resume DIR` as `--out DIR --resume`."""
     for i, argument in enumerate(arguments):
         if argument.startswith("--resume="):
             return [*arguments[:i], "--out", argument.removeprefix("--resume="), "--resume", *arguments[i + 1 :]]
@@ -329,10 +332,10 @@ def _with_folder(arguments: list[str]) -> list[str]:
 
 
 def _parsed_of_run(arguments: list[str]) -> tuple[Any, TrainConfig]:
-    """As `_parsed`, of a run that goes on, where no task is named: everything comes from the run.
+    """The same as `_parsed`, for a run that continues and no named task: everything comes from the run.
 
     Raises:
-        ValueError: when there is no such run, or an option says otherwise.
+        ValueError: when there is no such run, or when an option contradicts it.
     """
     from e2efly.learn.rundir import RunDirectory
 

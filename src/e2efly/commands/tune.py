@@ -18,41 +18,42 @@ from e2efly.vehicles.posterior import IDENTIFIED
 
 @dataclass(frozen=True)
 class Tune:
-    """From logs of your vehicle to a policy for it: identify, train under what stays uncertain, evaluate with stress.
+    """Make a policy for a vehicle from its logs: identify, train over the remaining uncertainty, evaluate with stress.
 
-    It does what `identify flight LOG...`, `train TASK --preset identified` and `eval --stress` do, one after the other.
+    It runs `identify flight LOG...`, `train TASK --preset identified` and `eval --stress`, one after the other.
     """
 
     logs: tyro.conf.Positional[tuple[Path, ...]]
-    """Flights of the vehicle, as `e2efly identify flight` reads them."""
+    """Logs of flights of the vehicle, as `e2efly identify flight` reads them."""
     task: str = "race"
-    """What to learn: a task that has the preset `identified`."""
+    """The task to learn. It must have the preset `identified`."""
     vehicle: str = "vis_r"
-    """The base: a vehicle's name or a .toml file, in which the flight controller of the flights believed."""
+    """The base vehicle: a name or a .toml file. The flight controller is assumed to have been tuned for it in the
+    flights."""
     mass: tuple[float, float] | None = None
-    """What the vehicle weighs, and the scale's sigma, kg."""
+    """Mass of the vehicle and standard deviation of the scale, kg."""
     columns: tuple[str, ...] = ()
-    """Names of a CSV log's columns for ours, as of `identify`."""
+    """Maps the column names of a CSV log to ours, as in `identify`."""
     out: Path = Path("tuned")
-    """Folder of identified/ (the vehicle file and its plots), run/ (the training) and policy.onnx."""
+    """Folder for identified/ (the vehicle file and its plots), run/ (the training) and policy.onnx."""
     steps: int | None = None
-    """Environment steps of the training; the preset's when left out."""
+    """Environment steps of the training. If omitted, those of the preset."""
     seed: int = 0
     """Seed of the training."""
     overwrite: bool = False
-    """Delete the run that is in --out, and begin anew."""
+    """Delete the run that is in --out, and start again."""
     least: float | None = None
-    """Exit status 1 when a row of the stress succeeds less often than this, such as 0.9."""
+    """Return exit status 1 if the success rate in any row of the stress is below this, such as 0.9."""
 
 
 def run(options: Tune) -> int:
-    """Identify, train, evaluate; leave policy.onnx.
+    """Identify, train and evaluate. Write policy.onnx.
 
     Returns:
         0, or 1 when a row of the stress succeeds less often than `least`.
 
     Raises:
-        ValueError: naming the option, the log or the parameter. What was done before stays in the folder.
+        ValueError: naming the option, the log or the parameter. Results of earlier steps stay in the folder.
     """
     began, console, o = time.perf_counter(), Terminal(), options
     folder, learned = o.out / "identified", o.out / "run"

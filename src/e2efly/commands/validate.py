@@ -26,62 +26,65 @@ if TYPE_CHECKING:
     from e2efly.validation.validate import Validation
 
 WHOLE_S = 1.0
-"""The least that a whole flight through the firmware takes, s."""
+"""Minimum duration of a whole flight with the firmware, s."""
 
 
 @dataclass(frozen=True)
 class Validate:
-    """Fly a policy on another plant, from the starts of `eval`; exit status 1 when success drops too far."""
+    """Fly a policy on another plant, from the starts of `eval`. The exit status is 1 if success drops too far."""
 
     policy: tyro.conf.Positional[Path]
-    """A run directory, a policy.onnx, or a task: the zoo's policy of it. That is --vehicle's where the zoo has such a
-    vehicle, and else VIS-R's; `any/hover` is that of any vehicle."""
+    """A run directory, a policy.onnx, or a task. A task selects its policy in the zoo: the one for --vehicle if the zoo
+    has that vehicle, otherwise the one for VIS-R. `any/hover` is the policy for any vehicle."""
     plant: str = "mujoco"
-    """What flies: simulator (our own, by the bridge's runtime), mujoco, betaflight (the real firmware over our rigid
-    body), airsim:HOST:PORT (an AirSim that runs), or one of your own: path/to/plant.py:Name."""
+    """The plant that flies: simulator (our own, with the bridge's runtime), mujoco, betaflight (the real firmware with
+    our rigid-body model), airsim:HOST:PORT (a running AirSim), or your own plant, path/to/plant.py:Name."""
     episodes: int | None = None
-    """Starts of each criterion; when left out 200, of betaflight and airsim 20, and 10 in each row of --stress."""
+    """Number of starts per criterion. If omitted, 200; 20 for betaflight and airsim; 10 per row of --stress."""
     flights: int = 3
-    """With the firmware: whole flights, from take-off to landing, besides; not with --stress."""
+    """With the firmware: number of additional whole flights, from take-off to landing. Not with --stress."""
     out: Path | None = None
-    """Folder of the plots; the folder `validation` beside the policy when left out."""
+    """Folder for the plots. If omitted, the folder `validation` beside the policy."""
     max_drop: float = 2.0
-    """Points of success by which the plant may lie under the training simulator; --stress has --least."""
+    """Largest allowed drop of the success rate below that of the training simulator, in percentage points. Use --least
+    with --stress."""
     json: Path | None = None
-    """Write the report, with a row for every start, to this file, and some flights beside it, for `e2efly watch`."""
+    """Write the report to this file, with one row for every start. Some flights are written beside it, for `e2efly
+    watch`."""
     log: Path | None = None
-    """Folder for a CSV log of each flight, for `e2efly identify flight`; not with --stress."""
+    """Folder for a CSV log of each flight, for `e2efly identify flight`. Not with --stress."""
     image: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """What a policy that sees is shown by airsim's own cameras: IMAGE=plant:CAMERA, for a mask
-    IMAGE=plant:CAMERA:RED,GREEN,BLUE, its colour in AirSim's segmentation; images that are not named are rendered of
-    the task's world. Not with --stress; see docs/airsim.md."""
+    """Cameras of AirSim that provide the policy's images: IMAGE=plant:CAMERA, or for a mask
+    IMAGE=plant:CAMERA:RED,GREEN,BLUE with its colour in AirSim's segmentation. Other images are rendered from the
+    task's world. Not with --stress. See docs/airsim.md."""
     seed: int = 1_000_000
     """Seed of the starts."""
     vehicle: str | None = None
-    """What flies, a name or a .toml file; left out: the policy's own vehicle. The policy is not changed."""
+    """The vehicle that flies: a name or a .toml file. If omitted, the policy's own vehicle. The policy is not
+    changed."""
     baseline: str | None = None
-    """What flies in place of the policy, under its contract: a hover controller, pid, geometric, indi, mpc, or one of
-    your own, path/to/file.py:Name. For hover, hover_aware, land, track and race."""
+    """Controller that flies in place of the policy, under the policy's contract: a hover controller (pid, geometric,
+    indi, mpc), or your own, path/to/file.py:Name. For hover, hover_aware, land, track and race."""
     controller: Controller = "policy"
-    """The vehicle that the flight controller believes in: the policy's own, whatever flies (policy), or the one that
-    flies (plant)."""
+    """The vehicle for which the flight controller is tuned. policy: the policy's own vehicle, whatever flies. plant:
+    the vehicle that flies."""
     task: TaskConfig = TaskConfig()
-    """What the policy is to fly, in place of what its run or its contract says: options of its task, as `train` has
-    them (--task.track four_gates); not with --stress."""
+    """Options of the policy's task, as in `train` (--task.track four_gates). They replace the values from the run or
+    the contract. Not with --stress."""
     stress: bool = False
-    """Fly the rows of `eval --stress` on the plant: vehicles, air and sensors that are not those of the training. Rows
-    that the plant cannot be given are named; see docs/robustness.md."""
+    """Fly the rows of `eval --stress` on the plant: vehicles, air and sensors that differ from the training. Rows that
+    the plant cannot reproduce are listed. See docs/robustness.md."""
     rows: tuple[str, ...] = ()
-    """Rows of --stress; when left out all that the plant can be given."""
+    """Names of the rows of --stress. If omitted, all rows that the plant can reproduce."""
     least: float | None = None
-    """Exit status 1 when a row of --stress succeeds less often than this, such as 0.9."""
+    """Return exit status 1 if the success rate in any row of --stress is below this, such as 0.9."""
 
 
 def parse(arguments: list[str]) -> Asked:
-    """The options of `validate`; the defaults of `--task` are what the policy's run or contract says.
+    """The options of `validate`. The defaults of `--task` come from the policy's run or contract.
 
     Raises:
-        ValueError: for unknown names, and for a policy that is not there.
+        ValueError: for unknown names, and for a policy that does not exist.
     """
     asked = asked_of(Validate, "validate", arguments)
     if asked.task and asked.options.stress:
@@ -90,11 +93,11 @@ def parse(arguments: list[str]) -> Asked:
 
 
 def run(asked: Asked) -> int:
-    """Fly policy.onnx by the bridge's runtime on another plant; print a table, write the report and the plots.
+    """Fly policy.onnx with the bridge's runtime on another plant. Print a table; write the report and the plots.
 
     Returns:
-        0, or 1 when success drops by more than `max_drop` in any criterion, or a whole flight is not complete, or a row
-        of the stress succeeds less often than `least`.
+        0. 1 if the success rate drops by more than `max_drop` in any criterion, if a whole flight is not complete, or
+        if a row of the stress succeeds less often than `least`.
     """
     options = asked.options
     check_stress(options.stress, options.rows, options.least)
@@ -166,7 +169,7 @@ def _stress(o: Validate) -> int:
 
 @contextmanager
 def _progress(plant: str, console: Console) -> Iterator[Callable[[str, int, int], None]]:
-    """A bar for each criterion, from its first flight on: (criterion, flights that are over, of how many)."""
+    """A progress bar for each criterion, from its first flight on: (criterion, finished flights, all flights)."""
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     bars, known = Progress(*columns, console=console, transient=True), dict[str, TaskID]()
 
@@ -184,12 +187,14 @@ def _progress(plant: str, console: Console) -> Iterator[Callable[[str, int, int]
 
 
 def _folder(o: Validate, flew: "Candidate") -> Path:
-    """Of the plots."""
+    """The folder for the plots."""
     return o.out or (flew.run.path if flew.run else beside(flew.file)) / "validation"
 
 
 def _whole_flights(found: "Validation", count: int, console: Console) -> bool:
-    """Fly them, where the plant is the firmware and the vehicle the policy's; whether all were complete."""
+    """Fly whole flights, if the plant is the firmware and the vehicle is the policy's. Returns whether all were
+    complete.
+    """
     from e2efly.commands.rehearsals import flights_table, fly_whole
     from e2efly.vehicles import load_vehicle
 

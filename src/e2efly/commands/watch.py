@@ -25,51 +25,55 @@ if TYPE_CHECKING:
     from e2efly.watch.training import Progress
 
 MOST = 1024
-"""Vehicles at most."""
+"""Largest number of vehicles."""
 LOGS = (".mcap", ".csv", ".bbl", ".bfl", ".bf", ".ulg", ".bag")
-"""Endings of the names of flight logs."""
+"""File name extensions of flight logs."""
 WAIT_S = 600.0
-"""How long a run's first policy is waited for, s."""
+"""How long to wait for the first policy of a run, s."""
 USUAL = "vis_r"
-"""How the vehicle of a log that does not say is drawn."""
+"""The vehicle that is drawn for a log that does not name its vehicle."""
 FILM_S, FILM_HZ = 8.0, 25.0
-"""Of a video, unless told; pictures per second."""
+"""Default length of a video, s, and its pictures per second."""
 
 
 @dataclass(frozen=True)
 class Watch:
-    """Watch flights in a browser: a policy, live; a training as it goes; flight logs; a validation.
+    """Watch flights in a browser: a live policy, a training in progress, flight logs, or a validation.
 
     A policy flies in the simulator: drag its goal, throw it, change wind, mass, thrust and delay while it flies. See
     docs/watch.md.
     """
 
     what: tyro.conf.Positional[tuple[str, ...]]
-    """A task (the zoo's policy of it), a policy.onnx, a run's folder; flight logs, as many as wanted: the first is
-    followed, the others are its ghosts; a report of `e2efly validate --json`, or its folder: the policy on the plant,
-    and in the training simulator as its ghost; or a pose source, as of `e2efly fly`: udp:PORT, ros1:/topic, ..."""
+    """One of: a task (the zoo's policy for it), a policy.onnx, or a run directory. One or more flight logs: the first
+    is followed, the others are shown as its ghosts. A report of `e2efly validate --json`, or its folder: it shows the
+    policy on the plant, with its flight in the training simulator as a ghost. A pose source, as in `e2efly fly`:
+    udp:PORT, ros1:/topic, ..."""
     world: str | None = None
-    """Of a pose source: a policy in whose world the vehicle is, which `--seed` draws, as `e2efly hil` does."""
+    """For a pose source: a policy, in whose world the vehicle is shown. `--seed` draws the world, as in `e2efly
+    hil`."""
     vehicle: str | None = None
-    """A shipped vehicle or a .toml file; left out: the policy's, or the log's."""
+    """A shipped vehicle or a .toml file. If omitted, the vehicle of the policy or the log."""
     criterion: str | None = None
-    """Of the task; its first when left out."""
+    """Criterion of the task. If omitted, the first one."""
     count: int = 1
-    """Vehicles that fly at once."""
+    """Number of vehicles that fly at once."""
     seed: int = 0
-    """Of the starts."""
+    """Seed of the starts."""
     host: str = "127.0.0.1"
-    """Address on which the page is served; 0.0.0.0: to every computer of the network."""
+    """Address on which the page is served. 0.0.0.0 serves every computer of the network."""
     port: int = 8080
-    """Of the page; 0: any that is free."""
+    """Port of the page. 0: any free port."""
     seconds: float | None = None
-    """End after so long; left out: at Ctrl-C. Of a video, its length; left out: 8 s, or the log's."""
+    """End after this time, s. If omitted, run until Ctrl-C. For a video, its length, s; if omitted, 8 s, or the length
+    of the log."""
     idle: bool = False
-    """For a viewer beside another program: compute only while no other wants a core, and end with standard input."""
+    """For a viewer beside another program: compute only while no other program needs a core, and end when standard
+    input ends."""
     video: Path | None = None
-    """Draw no page, but this file: .gif, .mp4, .webm, or .png, a picture of the last moment."""
+    """Write a video to this file (.gif, .mp4 or .webm), or a picture of the last moment (.png). No page is served."""
     camera: Literal["follow", "orbit", "first person"] = "follow"
-    """Of the video."""
+    """Camera of the video."""
 
 
 def run(options: Watch) -> int:
@@ -110,10 +114,10 @@ def run(options: Watch) -> int:
 
 
 def _logs(what: tuple[str, ...]) -> list[Path]:
-    """The flight logs among what is to be watched: all of it, or none.
+    """The flight logs, if flight logs are to be watched; otherwise none.
 
     Raises:
-        ValueError: for several things that are not all logs; for a path at which there is nothing.
+        ValueError: for several arguments that are not all logs, and for a path that does not exist.
     """
     logs = [Path(text) for text in what if Path(text).suffix.lower() in LOGS]
     if len(what) > 1 and len(logs) < len(what):
@@ -163,12 +167,12 @@ def _serve(o: Watch, server: Any, logs: list[Path]) -> None:
 
 
 def _abandoned() -> bool:
-    """Whether standard input has ended: with whoever started this, however that ended."""
+    """Whether standard input has ended. It ends together with the program that started this one."""
     return bool(select.select([sys.stdin], [], [], 0)[0]) and not os.read(sys.stdin.fileno(), 1)
 
 
 def _is_source(text: str) -> bool:
-    """Whether it names a pose source, and nothing else."""
+    """Whether the argument names a pose source and nothing else."""
     from e2efly.deploy.pose.sources import SOURCES
 
     return text.partition(":")[0] in SOURCES and ":" in text
@@ -176,7 +180,7 @@ def _is_source(text: str) -> bool:
 
 @contextmanager
 def _poses(o: Watch) -> "Iterator[Any]":
-    """A vehicle where a pose source sees it."""
+    """A vehicle at the poses of a pose source."""
     from e2efly.deploy.pose.sources import open_source
     from e2efly.scenes.faces import bodies
     from e2efly.vehicles import load_vehicle
@@ -234,7 +238,7 @@ def _recording(o: Watch, logs: list[Path]) -> Any:
 
 
 def _report(what: tuple[str, ...]) -> Path | None:
-    """The validation report that is to be watched; None: something else is."""
+    """The validation report that is to be watched. None: something else is to be watched."""
     path = Path(what[0])
     if path.suffix != ".json" and not path.is_dir():
         return None
@@ -247,10 +251,10 @@ def _report(what: tuple[str, ...]) -> Path | None:
 
 
 def _reported(o: Watch, report: Path) -> "tuple[Recording, list[Shown]]":
-    """The first start of a report, of the criterion that is asked for, and all of them.
+    """The first start of a report in the requested criterion, and all starts.
 
     Raises:
-        ValueError: for a vehicle, which the report says; for a criterion that it does not have.
+        ValueError: for a given vehicle, which the report determines, and for a criterion that the report does not have.
     """
     if o.vehicle is not None:
         raise ValueError(f"--vehicle is {o.vehicle!r}; accepted: left out, as {report} says what flew")
@@ -265,10 +269,10 @@ def _reported(o: Watch, report: Path) -> "tuple[Recording, list[Shown]]":
 
 
 def _flown(o: Watch, console: Terminal) -> "tuple[Simulation, Progress | None]":
-    """The simulation of a policy, and the progress of its run where it is one.
+    """The simulation of a policy, and the progress of its run if it belongs to one.
 
     Raises:
-        ValueError: for a policy or a criterion that there is not; for a run that has no policy in `WAIT_S`.
+        ValueError: for a policy or a criterion that does not exist, and for a run that has no policy within `WAIT_S`.
     """
     from e2efly.device import prepare
 
@@ -301,7 +305,7 @@ def _criterion(asked: str | None, there: Any) -> str:
     """The criterion that is flown.
 
     Raises:
-        ValueError: for one that the task does not have.
+        ValueError: for a criterion that the task does not have.
     """
     if asked is not None and asked not in there:
         raise ValueError(f"--criterion is {asked!r}; accepted: {', '.join(there)}")

@@ -1,7 +1,7 @@
-"""Every option of a run, as frozen dataclasses: at once the configuration, the command line and its help.
+"""Every option of a run, as frozen dataclasses. They are the configuration, the command line and its help at once.
 
-Imports no JAX, so that `--help` is instant. Numbers are leaves of the compiled programs (changing one does not
-recompile) unless the field says that it sets a shape.
+Imports no JAX, so that `--help` is instant. Numbers are leaves of the compiled programs, so changing one does not
+recompile, unless the field says that it sets shapes.
 """
 
 from e2efly.config.algorithms import (

@@ -11,35 +11,35 @@ from e2efly.registry import Registry
 
 @dataclass(frozen=True)
 class AlgorithmConfig:
-    """Options of an algorithm, and all that commands ask of an algorithm.
+    """Options of an algorithm, and everything that the commands need to know about it.
 
     An algorithm extends this and registers itself by `register`. Its numbers of type float are leaves of the compiled
     program; the others decide which program is compiled.
     """
 
     name: ClassVar[str] = ""
-    """By which it is registered."""
+    """The name under which it is registered."""
     program: ClassVar[Any] = ""
     """The class of `e2efly.learn.algorithm.Algorithm` that learns, or its reference: `package.module:Name`."""
     like: ClassVar[str] = "ppo"
-    """Whose recipe of a task it takes its rewards from, where it has none of its own: ppo or bptt."""
+    """The algorithm whose rewards it uses for tasks that have none for it: ppo or bptt."""
     exact: ClassVar[bool] = False
-    """Whether it differentiates the simulator, whose steps it then keeps."""
+    """Whether it differentiates the simulator. If so, it keeps the steps of the simulator for the gradient."""
 
     envs: int = number(64, above=0)
-    """Environments side by side (sets shapes)."""
+    """Number of environments that are simulated in parallel (sets shapes)."""
     horizon: int = number(64, above=0)
-    """Steps of each environment between updates: a rollout, a window (sets shapes)."""
+    """Steps of each environment between two updates: the length of a rollout or a window (sets shapes)."""
     max_grad_norm: float = number(0.5, above=0)
-    """Norm to which a gradient is clipped."""
+    """Largest norm of the gradient; larger gradients are clipped."""
 
     @property
     def steps(self) -> int:
-        """Environment steps of an update."""
+        """Environment steps per update."""
         return self.envs * self.horizon
 
     def check(self) -> None:
-        """Check the numbers, each by itself and together.
+        """Check the numbers, individually and in combination.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.
@@ -47,7 +47,7 @@ class AlgorithmConfig:
         check_numbers("algo", self)
 
     def kept(self) -> dict[str, tuple[int, str]]:
-        """What it keeps of earlier steps: by option how many, and whether each is a `transition` or a `state`."""
+        """What it keeps of earlier steps. For each option: how many, and whether they are `transition` or `state`."""
         return {}
 
     def fitted(self) -> tuple[int, str]:
@@ -57,16 +57,16 @@ class AlgorithmConfig:
 
 
 ALGORITHMS: Registry[type[AlgorithmConfig]] = Registry("algorithm")
-"""The options of the algorithms, by name."""
+"""The option classes of the algorithms, by name."""
 
 C = TypeVar("C", bound=type[AlgorithmConfig])
 
 
 def register(name: str) -> Callable[[C], C]:
-    """Register the options of an algorithm under a name, by which commands and runs know it.
+    """Register the options of an algorithm under the name that commands and runs use.
 
     Raises:
-        ValueError: for a name that is taken, or a class that is no `AlgorithmConfig`.
+        ValueError: for a name that is already used, or a class that is not an `AlgorithmConfig`.
     """
 
     def registered(options: C) -> C:
@@ -86,17 +86,18 @@ def _check_minibatch(steps: int, minibatch: int) -> None:
 
 @dataclass(frozen=True)
 class _FirstOrder(AlgorithmConfig):
-    """What every algorithm has that differentiates the simulator."""
+    """Options of every algorithm that differentiates the simulator."""
 
     exact: ClassVar = True
 
     gradient_decay: float = 0.0
-    """Decay of the gradient from step to step through the vehicle's state, 1/s of backward time; what goes through the
-    policy's observation of it does not decay. 0: the exact gradient."""
+    """Decay of the gradient from step to step through the vehicle's state, 1/s of backward time. The part that passes
+    through the policy's observation of the state does not decay. 0: the exact gradient."""
     horizon_start: int = number(0, low=-math.inf)
-    """Steps, of the horizon, after which the gradient is cut at first; they grow over the run. 0: never cut."""
+    """Number of steps after which the gradient is cut at the start of a run. It grows over the run, up to the horizon.
+    0: never cut."""
     term_gradients: bool = False
-    """Whether to log the norm of the gradient of each term of the reward; an update takes as many times as long."""
+    """Whether to log the norm of the gradient of each reward term. Each update then has one backward pass per term."""
 
     def check(self) -> None:
         """See `AlgorithmConfig.check`."""
@@ -107,22 +108,23 @@ class _FirstOrder(AlgorithmConfig):
 
 @dataclass(frozen=True)
 class _Proximal(AlgorithmConfig):
-    """What proximal policy optimisation and what builds on it have."""
+    """Options of proximal policy optimisation and of algorithms that build on it."""
 
     epochs: int = number(2, above=0)
     """Passes over the samples of an update (sets shapes)."""
     minibatch: int = number(512, above=0)
-    """Samples of a gradient step; divides envs * horizon (sets shapes)."""
+    """Samples per gradient step; must divide envs * horizon (sets shapes)."""
     sequence: int = number(16, above=0)
-    """Steps through which the gradient of a GRU goes back; divides horizon and minibatch (sets shapes)."""
+    """Number of steps over which the gradient of a GRU is propagated back; must divide horizon and minibatch (sets
+    shapes)."""
     learning_rate: float = number(3e-3, above=0)
-    """Adam's step at the start."""
+    """Learning rate of Adam at the start."""
     learning_rate_end: float = number(3e-4, above=0)
-    """Adam's step at the end; exponential in between."""
+    """Learning rate of Adam at the end. It changes exponentially in between."""
     gae_lambda: float = number(0.95, high=1)
     """Lambda of the generalised advantage estimate."""
     clip: float = 0.2
-    """Clip of the probability ratio."""
+    """Clipping range of the probability ratio."""
     value_weight: float = 0.5
     """Weight of the critic's loss."""
     entropy_weight: float = 0.0
@@ -155,20 +157,20 @@ class BPTTConfig(_FirstOrder):
     program: ClassVar = "e2efly.learn.bptt:BPTT"
 
     learning_rate: float = number(4e-3, above=0)
-    """Adam's step at the start."""
+    """Learning rate of Adam at the start."""
     learning_rate_end: float = number(1e-4, above=0)
-    """Adam's step at the end; exponential in between."""
+    """Learning rate of Adam at the end. It changes exponentially in between."""
     gamma: float = number(0.99, above=0, high=1)
     """Discount per step within the window."""
     average: float | None = number(None, high=0.9999)
-    """Share of the old in a running mean of the policy, an update, at most; as long as there are few, their plain mean.
-    The mean is judged and shipped. None: the policy itself (sets the program)."""
+    """Largest weight of the old value in a running mean of the policy, per update. While there are few policies, their
+    plain mean is used. The running mean is evaluated and exported. None: no mean (sets the program)."""
 
 
 @register("shac")
 @dataclass(frozen=True)
 class SHACConfig(_FirstOrder):
-    """Short-horizon actor-critic (Xu et al. 2022): the exact gradient over a window, and a critic's beyond it."""
+    """Short-horizon actor-critic (Xu et al. 2022): the exact gradient over a window, and a critic's value beyond it."""
 
     program: ClassVar = "e2efly.learn.shac:SHAC"
 
@@ -177,19 +179,19 @@ class SHACConfig(_FirstOrder):
     epochs: int = number(4, above=0)
     """Passes of the critic over the samples of a window (sets shapes)."""
     minibatch: int = number(512, above=0)
-    """Samples of a gradient step of the critic; divides envs * horizon (sets shapes)."""
+    """Samples per gradient step of the critic; must divide envs * horizon (sets shapes)."""
     learning_rate: float = number(4e-3, above=0)
-    """Adam's step at the start."""
+    """Learning rate of Adam at the start."""
     learning_rate_end: float = number(1e-4, above=0)
-    """Adam's step at the end; exponential in between."""
+    """Learning rate of Adam at the end. It changes exponentially in between."""
     critic_rate: float = 0.5
-    """The critic's step over the policy's."""
+    """The critic's learning rate relative to the policy's."""
     gamma: float = number(0.98, above=0, high=1)
     """Discount per step."""
     td_lambda: float = number(0.95, high=1)
-    """Lambda of the returns that the critic learns."""
+    """Lambda of the returns that the critic learns to predict."""
     target_share: float = number(0.2, high=1)
-    """How far the critic's slow copy follows it, an update."""
+    """Fraction by which the slow copy of the critic moves towards the critic, per update."""
     noise: float = 0.0
     """Standard deviation of the noise on the action."""
 
@@ -211,29 +213,30 @@ class ABPTConfig(_FirstOrder):
     horizon: int = number(32, above=0)
     """Steps of a window (sets shapes)."""
     collect: int = number(8, above=0)
-    """Steps of each environment into the replay buffer, an update (sets shapes)."""
+    """Steps of each environment that are added to the replay buffer per update (sets shapes)."""
     buffer: int = 65_536
     """Transitions in the replay buffer, a multiple of envs * collect (sets shapes)."""
     places: int = 1024
-    """Visited states that windows may begin at, a multiple of envs (sets shapes)."""
+    """Number of visited states from which windows may begin; a multiple of envs (sets shapes)."""
     minibatch: int = number(1024, above=0)
-    """Samples of a gradient step of the critics (sets shapes)."""
+    """Samples per gradient step of the critics (sets shapes)."""
     fits: int = number(8, above=0)
-    """Gradient steps of the critics, an update (sets shapes)."""
+    """Gradient steps of the critics per update (sets shapes)."""
     learning_rate: float = number(4e-3, above=0)
-    """Adam's step at the start."""
+    """Learning rate of Adam at the start."""
     learning_rate_end: float = number(1e-4, above=0)
-    """Adam's step at the end; exponential in between."""
+    """Learning rate of Adam at the end. It changes exponentially in between."""
     critic_rate: float = 0.5
-    """The critics' step over the policy's."""
+    """The critics' learning rate relative to the policy's."""
     gamma: float = number(0.98, above=0, high=1)
     """Discount per step."""
     target_share: float = number(0.02, high=1)
-    """How far the critics' slow copies follow them, a gradient step."""
+    """Fraction by which the slow copies of the critics move towards the critics, per gradient step."""
     fresh_share: float = number(0.5, high=1)
     """Share of the windows that begin at a new start; the others begin at visited states."""
     at_once: float = number(0.5, high=1)
-    """Weight of the critics' value of a window's first action; the window's own return has the rest."""
+    """Weight of the critics' value of the first action of a window. The window's own return has the remaining
+    weight."""
     entropy_weight: float = 1e-3
     """Weight of the entropy bonus."""
     log_std: float = number(-2.0, low=-10, high=2)
@@ -241,7 +244,7 @@ class ABPTConfig(_FirstOrder):
 
     @property
     def steps(self) -> int:
-        """Environment steps of an update."""
+        """Environment steps per update."""
         return self.envs * (self.collect + self.horizon)
 
     def check(self) -> None:
@@ -252,7 +255,7 @@ class ABPTConfig(_FirstOrder):
                 raise ValueError(f"algo.{name} is {value}; accepted: a positive multiple of {of}, what an update adds")
 
     def kept(self) -> dict[str, tuple[int, str]]:
-        """The replay buffer, and the places that windows may begin at."""
+        """The replay buffer, and the states from which windows may begin."""
         return {"buffer": (self.buffer, "transition"), "places": (self.places, "state")}
 
     def fitted(self) -> tuple[int, str]:
@@ -263,15 +266,15 @@ class ABPTConfig(_FirstOrder):
 @register("foppo")
 @dataclass(frozen=True)
 class FOPPOConfig(_Proximal, _FirstOrder):
-    """PPO refined by first-order gradients: epochs over a rollout, then a step along its exact gradient. Ours."""
+    """PPO refined by first-order gradients: epochs over a rollout, then a step along its exact gradient. Our method."""
 
     program: ClassVar = "e2efly.learn.foppo:FOPPO"
 
     horizon: int = number(32, above=0)
-    """Steps of a rollout, which is the window of the exact gradient (sets shapes)."""
+    """Steps of a rollout. The rollout is also the window of the exact gradient (sets shapes)."""
     log_std: float = number(-1.5, low=-10, high=2)
     """Initial log standard deviation of the action noise."""
     exact_rate: float = 3.0
-    """The step along the exact gradient over that of the epochs."""
+    """Learning rate of the step along the exact gradient, relative to that of the epochs."""
     gamma: float = number(0.98, above=0, high=1)
     """Discount per step."""

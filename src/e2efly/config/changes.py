@@ -14,12 +14,13 @@ def changed(options: T, changes: Mapping[str, Any], where: str) -> T:
     """Options with some of their values changed.
 
     Args:
-        options: a dataclass; its fields may be dataclasses, and tuples of those.
+        options: a dataclass. Its fields may be dataclasses, or tuples of dataclasses.
         changes: the new values, by dotted name.
-        where: what the options are called, for errors.
+        where: the name of the options in error messages.
 
     Raises:
-        ValueError: naming the field, its value and what is accepted; for an unknown name, with the nearest.
+        ValueError: naming the field, its value and what is accepted. For an unknown name, the message gives the nearest
+            name.
     """
     for name, value in changes.items():
         options = _with(options, name.split("."), value, where)
@@ -27,7 +28,7 @@ def changed(options: T, changes: Mapping[str, Any], where: str) -> T:
 
 
 def differing(a: Any, b: Any, prefix: str = "") -> dict[str, tuple[Any, Any]]:
-    """Where two values of the same options differ: both values, by dotted name."""
+    """The differences between two values of the same options: both values, by dotted name."""
     if dataclasses.is_dataclass(a) and type(a) is type(b):
         pairs = [(f.name, getattr(a, f.name), getattr(b, f.name)) for f in dataclasses.fields(a)]
     elif isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b) and any(map(dataclasses.is_dataclass, a)):
@@ -61,5 +62,5 @@ def _with(options: Any, path: list[str], value: Any, where: str) -> Any:
 
 
 def _as_read(value: Any) -> Any:
-    """A value as JSON has it."""
+    """A value in the form that JSON gives it."""
     return [_as_read(x) for x in value] if isinstance(value, tuple) else value

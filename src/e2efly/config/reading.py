@@ -7,24 +7,24 @@ from collections.abc import Mapping
 from typing import Any, Literal, Union, get_args, get_origin
 
 _LARGEST = 10**300
-"""Whole numbers below this are numbers of floating point, too."""
+"""Whole numbers below this value can also be represented as floating-point numbers."""
 _WORDS: dict[Any, str] = {
     int: "a whole number", float: "a number", bool: "true or false", str: "a text", type(None): "null"
 }  # fmt: skip
 
 
 def read(kind: Any, value: Any, where: str, kinds: Mapping[str, Any] | None = None) -> Any:
-    """A value of a type of the configurations' fields, as `json` reads what `dataclasses.asdict` made of it.
+    """A value of a configuration field, from the JSON form that `dataclasses.asdict` and `json` gave it.
 
     Args:
         kind: the type: a number, a text, a choice, a tuple, a dictionary or a dataclass of those.
-        value: as read.
-        where: file and field, for the error.
-        kinds: types of fields of a dataclass that say less themselves.
+        value: the value, as read from JSON.
+        where: the file and the field, for error messages.
+        kinds: precise types for dataclass fields whose own annotation is too general.
 
     Raises:
-        ValueError: naming the field, its value and what is accepted; for unknown keys, and missing ones without a
-            default, naming them.
+        ValueError: naming the field, its value and what is accepted. Also for unknown keys, and for missing keys
+            without a default, naming them.
     """
     if dataclasses.is_dataclass(kind):
         return _read_fields(kind, value, where, kinds or {})
@@ -58,7 +58,7 @@ def _read_fields(kind: Any, value: Any, where: str, kinds: Mapping[str, Any]) ->
 
 
 def _could_be(kind: Any, value: Any) -> bool:
-    """Whether a value is of a type, as far as JSON tells types apart at the top."""
+    """Whether a value can be of a type, as far as JSON distinguishes types at the top level."""
     if get_origin(kind) is Literal:
         return isinstance(value, str) and value in get_args(kind)
     if kind in (int, float) and isinstance(value, int):

@@ -1,4 +1,4 @@
-"""Options of a run: all of the others, and how to learn."""
+"""Options of a run: all other options, and how to learn."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,32 +11,34 @@ from e2efly.drawing import Thing
 
 @dataclass(frozen=True)
 class RewardConfig:
-    """The reward: a weighted sum of the manual's terms."""
+    """The reward: a weighted sum of the terms of the reward manual."""
 
     weights: dict[str, float] = field(default_factory=dict)
-    """Weight of each term by name; see `e2efly list`. On the command line: changes to the preset's, 0 drops a term."""
+    """Weight of each term by name; see `e2efly list`. On the command line, these are changes to the preset's weights,
+    and 0 removes a term."""
     parameters: dict[str, float] = field(default_factory=dict)
     """Constants of the terms that differ from their defaults."""
 
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """The policy network (and the critic's, where there is one)."""
+    """The policy network, and the critic's network if there is one."""
 
     hidden: tuple[int, ...] = (64, 64)
     """Units of the hidden layers (sets shapes)."""
     activation: Literal["relu", "tanh", "elu"] = "relu"
     """Activation of the hidden layers (sets the program)."""
     pool: tuple[int, int] = (16, 16)
-    """Rows and columns that an image is brought to: the mean of each cell, of depth the nearest; divide the camera's
-    (sets shapes)."""
+    """Rows and columns to which an image is reduced. Each cell becomes its mean value, or for depth its nearest value.
+    They must divide the camera's rows and columns (sets shapes)."""
     convolution: tuple[int, ...] = ()
-    """Channels of the convolutions that take an image in place of its averages; their stride is their size, 4 (2 where
-    4 does not divide the image), so that they are products of matrices (sets shapes)."""
+    """Channels of the convolutions that process an image in place of the reduction by `pool`. Their kernel size
+    equals their stride: 4, or 2 where 4 does not divide the image. They can then be computed as matrix products
+    (sets shapes)."""
     encoder: tuple[int, ...] = (64,)
-    """Units of the layers that each image passes before it joins the rest (sets shapes)."""
+    """Units of the layers that process each image before it joins the other inputs (sets shapes)."""
     recurrent: int = 0
-    """Units of a gated recurrent unit (GRU) before the hidden layers; 0: none (sets shapes)."""
+    """Units of a gated recurrent unit (GRU) before the hidden layers. 0: no GRU (sets shapes)."""
 
 
 @dataclass(frozen=True)
@@ -44,33 +46,36 @@ class StageConfig:
     """A stage of a curriculum: the task with a few numbers changed, until it is mastered or its time is over."""
 
     changes: dict[str, float | tuple[float, ...]]
-    """Values of the task's fields by dotted path: {"forest.density": 0.0}; none that sets shapes or the program."""
+    """New values of the task's fields, by dotted path: {"forest.density": 0.0}. Fields that set shapes or the program
+    are not allowed."""
     success: float | None = None
-    """Promotion: success of an evaluation in this stage."""
+    """Promotion: the success rate in an evaluation at which this stage ends."""
     steps: int | None = None
     """Promotion at the latest after so many environment steps."""
 
 
 @dataclass(frozen=True)
 class Paper:
-    """What the paper gives of a task's training (its tables)."""
+    """The paper's values for the training of a task (from its tables)."""
 
     weights: Mapping[str, float]
-    """Of the reward."""
+    """Weights of the reward."""
     ppo: Mapping[str, float]
-    """Those that PPO has in addition."""
+    """Weights that PPO has in addition."""
     millions: tuple[int, int]
-    """Environment steps by PPO and by BPTT, millions."""
+    """Environment steps for PPO and for BPTT, in millions."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Robust:
-    """How a task's recipe changes where every episode has another vehicle, which the policy has to feel."""
+    """Changes to the recipe of a task for training in which every episode has a different vehicle, which the policy
+    must sense.
+    """
 
     weights: Mapping[str, float] | None = None
-    """Of the reward, in place of the recipe's; None: those."""
+    """Weights of the reward, in place of the recipe's. None: the recipe's weights."""
     parameters: Mapping[str, float] = field(default_factory=dict)
-    """Constants of its terms, beside the recipe's."""
+    """Constants of the reward terms, in addition to the recipe's."""
     algo: Mapping[str, Any] = field(default_factory=dict)
     """Options of the algorithm."""
     steps: int
@@ -83,7 +88,7 @@ class Robust:
     """Units of the hidden layers."""
 
     def into(self, config: "TrainConfig") -> "TrainConfig":
-        """A configuration that learns so."""
+        """A configuration that learns in this way."""
         given = config.reward.parameters
         return replace(
             config,
@@ -98,68 +103,71 @@ class Robust:
 
 
 TIMED = ("duration", "pace")
-"""Values of `TaskConfig.precision` of tasks flown against time: a distance from the goal says nothing of them."""
+"""Values of `TaskConfig.precision` for tasks flown against time. For them the distance from the goal has no meaning."""
 
 
 @dataclass(frozen=True)
 class TaskConfig:
-    """Options of a task, and all that commands ask of a task.
+    """Options of a task, and everything that the commands need to know about it.
 
     A task extends this and registers itself by `e2efly.tasks.register`. Its numbers are leaves of the compiled
-    programs; texts and fields made by `shape` decide which program is compiled.
+    programs. Texts, and fields made by `shape`, decide which program is compiled.
     """
 
     name: ClassVar[str] = ""
-    """By which it is registered."""
+    """The name under which it is registered."""
     world: ClassVar[Any] = ""
-    """The class of `e2efly.tasks.task.Task` that flies it, or its reference: `package.module:Name`."""
+    """The class of `e2efly.tasks.task.Task` that simulates it, or a reference to that class: `package.module:Name`."""
     goal_class: ClassVar[Any] = None
-    """The class of `e2efly.goal.Goal` that flight uses, without JAX, or its reference; None: `world`."""
+    """The class of `e2efly.goal.Goal` that flight uses, without JAX, or a reference to it. None: `world`."""
     route: ClassVar[Any] = None
-    """The class of `e2efly.tasks.route.Route` that says where to fly, or its reference; None: `fly` refuses it."""
+    """The class of `e2efly.tasks.route.Route` that says where to fly, or a reference to it. None: `fly` refuses the
+    task."""
     reward: ClassVar[Mapping[str, float]] = {}
-    """Weights of the reward's terms, where there is no `recipe`."""
+    """Weights of the reward terms, if there is no `recipe`."""
     best: ClassVar[str] = "ppo"
-    """The algorithm that learns it best."""
+    """The algorithm that learns the task best."""
     precision: ClassVar[Literal["final_error", "mean_error", "duration", "pace"]] = "final_error"
-    """What is to be small among policies that succeed as often; `pace`: a success counts by one over its duration."""
+    """The measure that ranks policies with equal success; smaller is better. With `pace`, a success counts as one
+    divided by its duration."""
     smooth: ClassVar[Mapping[str, float] | None] = None
-    """Rewards for methods that have both a gradient and a critic; None: PPO's. To a critic nothing follows a crash:
-    where every step costs, as in BPTT's rewards, an early crash would be the best end; these pay for living on, and
-    charge for a crash."""
+    """Rewards for methods that have both a gradient and a critic. None: PPO's rewards. For a critic, nothing follows a
+    crash. If every step costs, as in BPTT's rewards, an early crash would be the best outcome. These rewards therefore
+    pay for staying alive and charge for a crash."""
     robust: ClassVar[Mapping[str, Robust]] = {}
-    """How it is learned for vehicles that are not the file's, by algorithm: those have the preset `robust`."""
+    """Recipe for training with vehicles that differ from the vehicle file, by algorithm. These algorithms have the
+    preset `robust`."""
     family: ClassVar[Mapping[str, Robust]] = {}
-    """How it is learned for all vehicles of a family together, by algorithm."""
+    """Recipe for training with all vehicles of a family together, by algorithm."""
     cameras: ClassVar[tuple[CameraConfig, ...]] = ()
-    """What its policies see."""
+    """The cameras of its policies."""
     curriculum: ClassVar[tuple["StageConfig", ...]] = ()
-    """No obstacles, few, and then the task itself."""
+    """Stages of the training: no obstacles, few obstacles, then the task itself."""
     paper: ClassVar[Paper | None] = None
-    """What the paper gives."""
+    """The paper's values."""
     goal: ClassVar[str] = "goal"
-    """What plots call where it is to be."""
+    """Label in the plots for the place that the vehicle must reach."""
     shows_error: ClassVar[bool] = False
-    """Whether the curves of an ablation show its error, as in the paper; else they show success."""
+    """Whether the curves of an ablation show the error, as in the paper. Otherwise they show the success rate."""
     variants: ClassVar[tuple[str, ...]] = ()
-    """Presets of its own, beside `robust`, `nominal` and `paper`."""
+    """Presets of its own, in addition to `robust`, `nominal` and `paper`."""
     asked: ClassVar[Mapping[tuple[str, str], str]] = {}
-    """Of its own presets, those that the value of an option asks for where none is named."""
+    """Presets of its own that an option value selects when no preset is named."""
 
     episode_s: float = 10.0
     """Length of an episode, s."""
 
     @classmethod
     def training(cls) -> "TaskConfig":
-        """The options that it is trained with."""
+        """The options with which it is trained."""
         return cls()
 
     def criteria(self) -> "dict[str, TaskConfig]":
-        """What a policy is judged by, by name. It counts by its worst."""
+        """The criteria by which a policy is judged, by name. The worst result counts."""
         return {self.name: self}
 
     def course(self) -> dict[str, Any]:
-        """What all its episodes share of what is to be flown, for reports; `Goal.drawn` says what each has besides."""
+        """The part of the course that all episodes share, for reports. `Goal.drawn` gives what each episode adds."""
         return {}
 
     def limits(self) -> dict[str, float]:
@@ -168,38 +176,40 @@ class TaskConfig:
 
     @property
     def own_worlds(self) -> bool:
-        """Whether each episode has a world of its own, for plots."""
+        """Whether each episode has its own world, for plots."""
         return False
 
     def showing(self, names: Sequence[str]) -> "TaskConfig":
-        """These options for a policy whose observation has fields of these names, where a task has several."""
+        """These options, adapted to a policy whose observation has fields with these names, if the task has several
+        observations.
+        """
         del names
         return self
 
     def drawing(self) -> list[Thing] | None:
-        """What it has in space, for plots; None: nothing but its goal."""
+        """The task's objects in space, for plots. None: only its goal."""
         return None
 
     @classmethod
     def recipe(cls, algo: str) -> "TrainConfig":
-        """How it is learned by an algorithm of `ALGORITHMS`; others build on that by ppo or bptt."""
+        """How it is learned by an algorithm of `ALGORITHMS`. Other algorithms build on the recipe for ppo or bptt."""
         return TrainConfig(cls.training(), ALGORITHMS[algo](), RewardConfig(dict(cls.reward)))
 
     @classmethod
     def with_critic(cls, algo: str) -> dict[str, Any]:
-        """Options of an algorithm that has both a gradient and a critic, where they are not BPTT's."""
+        """Options of an algorithm that has both a gradient and a critic, where they differ from BPTT's."""
         del algo
         return {}
 
     @classmethod
     def variant(cls, preset: str, config: "TrainConfig") -> "TrainConfig":
-        """Its configuration by one of `variants`, made from `recipe`'s."""
+        """The configuration of one of `variants`, made from that of `recipe`."""
         raise NotImplementedError(preset)
 
 
 @dataclass(frozen=True)
 class TrainConfig:
-    """Everything that decides the outcome of a run."""
+    """Everything that determines the result of a run."""
 
     task: TaskConfig
     """The task."""
@@ -212,7 +222,7 @@ class TrainConfig:
     network: NetworkConfig = NetworkConfig()
     """The networks."""
     start_from: str | None = None
-    """The policy whose weights it begins with, as a name of the zoo or a file; left out: fresh ones."""
+    """The policy whose weights the training starts from: a name of the zoo or a file. If omitted, fresh weights."""
     seed: int = 0
     """Seed of everything random."""
     steps: int = 2_000_000
@@ -222,10 +232,12 @@ class TrainConfig:
     eval_episodes: int = 250
     """Starts of an evaluation while training (sets shapes)."""
     devices: int | None = None
-    """Devices (CPU: cores) that share the environments; left out: all there are, 32 environments or more on each."""
+    """Devices (on a CPU: cores) that share the environments. If omitted, all devices, with at least 32 environments on
+    each."""
     fast_compile: bool = True
-    """On a CPU: compile faster, run slower: right for runs of seconds; half the rate or less with cameras."""
+    """On a CPU: compile faster but run slower. Good for runs of a few seconds. With cameras, it runs at half the rate
+    or less."""
     curriculum: tuple[StageConfig, ...] = ()
     """Stages before the task itself."""
     stop_at: float | None = None
-    """Stop once the success on 1000 starts is at least this; left out: use all steps."""
+    """Stop when the success rate on 1000 starts is at least this. If omitted, use all steps."""

@@ -1,4 +1,4 @@
-"""Options of the environment: the vehicle, its sensors, and what is random about them."""
+"""Options of the environment: the vehicle, its sensors, and their random variation."""
 
 import math
 from dataclasses import dataclass, field
@@ -23,36 +23,39 @@ class NoiseConfig:
 
 @dataclass(frozen=True)
 class DisturbanceConfig:
-    """What the vehicle file does not know, drawn per episode between none and the largest, which stands here."""
+    """Effects that the vehicle file does not include.
+
+    The strengths are the largest ones: each episode draws its own between zero and these.
+    """
 
     gust: float = 0.0
     """Standard deviation of gusts, m/s per axis."""
     gust_time: float = number(1.0, above=0)
     """Correlation time of the gusts, s."""
     thrust: float = number(0.0, high=0.9)
-    """Relative half-width of the factor on the thrust of all rotors."""
+    """Relative half-width of the random factor on the thrust of all rotors."""
     rotor: float = number(0.0, high=0.9)
-    """Relative half-width of the factor on the thrust of each rotor."""
+    """Relative half-width of the random factor on the thrust of each rotor."""
     sag: float = number(0.0, high=0.9)
-    """Share of the thrust that is lost, evenly, by the end of the episode, as by a battery that empties."""
+    """Share of the thrust that is lost by the end of the episode. The loss is steady, as with a battery that drains."""
     centre_of_mass: float = 0.0
-    """Half-width of the offset of the centre of mass, forward and left, m per axis; of a family: of its middle vehicle,
-    and of the others in proportion to their arms."""
+    """Half-width of the offset of the centre of mass, forward and left, m per axis. For a family, this is the value of
+    its middle vehicle; that of the others is proportional to their arm length."""
     drift: float = 0.0
     """Standard deviation of the observed position's random walk after one second, m per axis."""
 
     @property
     def weakest(self) -> float:
-        """The smallest share of the nominal thrust that an episode can end with."""
+        """The smallest share of the nominal thrust with which an episode can end."""
         return (1 - self.thrust) * (1 - self.rotor) * (1 - self.sag)
 
 
 @dataclass(frozen=True)
 class ImuConfig:
-    """Noise of a consumer IMU: white noise, given as a density, and a bias that walks at random."""
+    """Noise of a consumer IMU: white noise, given as a density, and a bias that follows a random walk."""
 
     observed: bool = False
-    """Whether gyroscope and accelerometer join the observation (sets shapes)."""
+    """Whether the gyroscope and the accelerometer are part of the observation (sets shapes)."""
     gyro_noise: float = 8.7e-5
     """Gyroscope white noise, rad/s/sqrt(Hz)."""
     gyro_bias: float = 2.23e-5
@@ -69,25 +72,26 @@ class ImuConfig:
 
 @dataclass(frozen=True)
 class ImageNoiseConfig:
-    """Noises of a camera's images, applied in this order; None leaves one out. See docs/noise.md.
+    """Noise types of a camera's images, applied in this order. None switches a noise off. See docs/noise.md.
 
-    Which noises are switched on sets the program; their strengths do not.
+    The choice of noises sets the program; their strengths do not.
     """
 
     inverse_depth: float | None = None
     """Depth: standard deviation of the inverse depth, 1/m."""
     d435i: bool = False
-    """Depth: disparity noise, stereo shadows and range of an Intel D435i."""
+    """Depth: disparity noise, stereo shadows and limited range of an Intel D435i."""
     redwood: str | None = None
     """Depth: the Redwood model; `synthetic`, or the path of a .npy file of measured distortion factors, (80, 80, 5)."""
     speckle: float | None = None
     """Image: standard deviation as a share of the value."""
     poisson: float | None = number(None, low=2, high=65536)
-    """Image: levels of brightness, such as 256, whose shot noise it has."""
+    """Image: shot noise, for this number of brightness levels, such as 256."""
     gaussian: float | None = None
-    """Image: standard deviation, of values in [0, 1]; of depth, as a share of the farthest."""
+    """Image: standard deviation, for values in [0, 1]. Depth: as a share of the farthest distance."""
     salt_and_pepper: float | None = number(None, high=1)
-    """Image: share of the values that become 1 or 0, half of them each; of depth, the farthest or a hole."""
+    """Image: share of the values that become 1 or 0, half of them each. Depth: they become the farthest distance or a
+    hole."""
     own: str | None = None
     """Your own function (key, images, camera) -> images: path/to/file.py:name or module:name."""
 
@@ -97,31 +101,32 @@ class CameraConfig:
     """A camera on the vehicle, or a LiDAR."""
 
     sees: Literal["depth", "range", "mask", "rgb", "normal", "label", "instance"] = "depth"
-    """What its image shows: planar depth, distance, where a class is, colour, surface normals, semantic class or
-    instances; a policy takes the first five (sets the program)."""
+    """What its image shows: planar depth, distance (range), the mask of one class, colour, surface normals, semantic
+    class or instances. A policy can use only the first five (sets the program)."""
     width: int = 64
     """Columns (sets shapes)."""
     height: int = 64
     """Rows (sets shapes)."""
     projection: Literal["pinhole", "spherical"] = "pinhole"
-    """pinhole: a camera; spherical: equal angles between columns and rows, a LiDAR."""
+    """pinhole: a camera. spherical: equal angles between columns and between rows, as in a LiDAR."""
     fov: tuple[float, float] = (1.518436449235301, 1.0122909661567112)
     """Horizontal and vertical field of view, rad (sets the program)."""
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Where it sits, body frame (forward, left, up), m."""
+    """Position of the camera in the body frame (forward, left, up), m."""
     pitch: float = 0.0
-    """Downwards from straight ahead, rad."""
+    """Downward pitch from straight ahead, rad."""
     reach: tuple[float, float] = (0.0, 20.0)
-    """Depth: nearest and farthest, m; nearer is a hole, farther is the farthest (sets the program)."""
+    """Depth: nearest and farthest distance, m. Nearer points become holes; farther points get the farthest distance
+    (sets the program)."""
     of: str = "pad"
-    """mask: the class that it is of: sky, ground, obstacle, gate, pad or wall (sets the program)."""
+    """mask: the class that it shows: sky, ground, obstacle, gate, pad or wall (sets the program)."""
     encoding: Literal["inverse", "log", "linear"] = "inverse"
-    """How a policy takes depth d, f the farthest: 1 m / d - 1 m / f, log(f / d) or 1 - d / f. 0 is the farthest, and a
-    hole (sets the program)."""
+    """How the depth d is given to a policy, with the farthest distance f. inverse: 1 m / d - 1 m / f. log: log(f / d).
+    linear: 1 - d / f. The value 0 means the farthest distance or a hole (sets the program)."""
     rate: float | None = None
-    """Images per second, a whole part of the control rate; one per control step when left out (sets the program)."""
+    """Images per second; must divide the control rate. If omitted, one image per control step (sets the program)."""
     latency: tuple[float, float] = (0.0, 0.0)
-    """Age of an image when it is first seen, s, uniform per episode (its top sets shapes)."""
+    """Age of an image when the policy first sees it, s, uniform per episode (the upper bound sets shapes)."""
     fov_spread: float = 0.0
     """Relative half-width of the random factor on the field of view, per episode."""
     angle_spread: float = 0.0
@@ -131,49 +136,52 @@ class CameraConfig:
     noise: ImageNoiseConfig = ImageNoiseConfig()
     """Noise of its images."""
     noise_share: float = 1.0
-    """Share of the episodes that have the noise; the others have clean images."""
+    """Share of the episodes in which the images have the noise. In the other episodes they are clean."""
     light_spread: float = 0.0
-    """Colours: relative half-width of the sun's random strength and direction, per episode."""
+    """Colour images: relative half-width of the random variation of the sun's strength and direction, per episode."""
     colour_spread: float = 0.0
-    """Colours: half-width of what is added at random to red, green and blue of each solid, per episode."""
+    """Colour images: half-width of the random offset of the red, green and blue of each solid, per episode."""
 
 
 D435I = CameraConfig(fov=(math.radians(87), math.radians(58)), reach=(0.28, 10.0))
-"""Depth of an Intel RealSense D435i."""
+"""Depth camera of an Intel RealSense D435i."""
 
 
 @dataclass(frozen=True)
 class EnvConfig:
-    """The vehicle, its controller, and what is random about them."""
+    """The vehicle, its controller, and their random variation."""
 
     vehicle: str = "vis_r"
-    """A shipped vehicle's name, `any`, or the path of a .toml file: of a vehicle, or of ranges of many (a family)."""
+    """Name of a shipped vehicle, `any`, or the path of a .toml file. The file describes one vehicle, or the parameter
+    ranges of many (a family)."""
     command_mode: str = "ctbr"
     """What the policy commands: a command mode of `e2efly list` (sets the program)."""
     integrator: str = "rk3"
-    """euler, semi_implicit, rk3 or rk4 (sets the program)."""
+    """Integrator of the physics: euler, semi_implicit, rk3 or rk4 (sets the program)."""
     control_rate: float | None = None
-    """Hz; the vehicle's own when left out (sets shapes)."""
+    """Control rate, Hz. If omitted, the vehicle's own rate (sets shapes)."""
     largest_step: float = 0.005
     """Largest physics sub-step, s (sets shapes)."""
     action_latency: tuple[float, float] | None = None
-    """Seconds from observation to command, uniform per episode; the vehicle's own when left out (top sets shapes)."""
+    """Latency from observation to command, s, uniform per episode. If omitted, the vehicle's own (the upper bound sets
+    shapes)."""
     latency_spread: tuple[float, float] = (0.0, 0.0)
-    """Seconds by which that latency lies below or above the vehicle's own at most, uniform per episode, where
-    action_latency is left out (the second sets shapes)."""
+    """Largest deviation of that latency below and above the vehicle's own, s, uniform per episode. Used if
+    action_latency is omitted (the second value sets shapes)."""
     observation_latency: tuple[float, float] = (0.0, 0.0)
-    """Age of the observed state, s, uniform per episode (its top sets shapes)."""
+    """Age of the observed state, s, uniform per episode (the upper bound sets shapes)."""
     command_range: tuple[tuple[float, float, float, float], tuple[float, float, float, float]] | None = None
-    """Commands that actions of -1 and of 1 stand for, in the units of the command mode; the vehicle's own limits when
-    left out. What is beyond those the flight controller clips."""
+    """Commands that correspond to the actions -1 and 1, in the units of the command mode. If omitted, the vehicle's own
+    limits. The flight controller clips commands beyond the vehicle's limits."""
     past_actions: int | None = None
-    """How many past actions the policy sees: 0 as in the paper, as many as the latency holds when left out (sets
+    """Number of past actions that the policy sees; 0 as in the paper. If omitted, as many as the latency spans (sets
     shapes)."""
     randomize: dict[str, float] = field(default_factory=dict)
-    """Relative half-width of the uniform factor on a vehicle parameter, per episode: {"mass": 0.1} is 0.9 to 1.1.
-    {"identified": 1.0} draws from the standard deviations and correlations of the vehicle's file, times so much."""
+    """Relative half-width of the uniform random factor on a vehicle parameter, per episode: {"mass": 0.1} means 0.9 to
+    1.1. {"identified": 1.0} draws from the standard deviations, multiplied by this number, and the correlations of the
+    vehicle's file."""
     wind: float = 0.0
-    """Largest wind speed, m/s: constant in an episode, uniform in a ball."""
+    """Largest wind speed, m/s. The wind is constant in an episode and is drawn uniformly from a ball."""
     disturbance: DisturbanceConfig = DisturbanceConfig()
     """Gusts, uneven rotors, a sagging battery, an offset of the centre of mass, and drifting poses."""
     noise: NoiseConfig = NoiseConfig()
@@ -181,12 +189,12 @@ class EnvConfig:
     imu: ImuConfig = ImuConfig()
     """The IMU."""
     cameras: tuple[CameraConfig, ...] = ()
-    """What the policy sees besides; the task's preset has its own."""
+    """Cameras whose images the policy sees in addition to the state. The task's preset has its own cameras."""
     position_range: float = 5.0
-    """Reach of the position command mode, m per axis about the origin."""
+    """Largest distance that the position command mode can command, m per axis from the origin."""
 
     @property
     def weakest(self) -> float:
-        """The smallest thrust over weight that an episode can have, over that of the vehicle's file."""
+        """The smallest thrust-to-weight ratio that an episode can have, relative to that of the vehicle's file."""
         lost = self.randomize.get("thrust_map", 0.0)
         return (1 - lost) * self.disturbance.weakest / (1 + self.randomize.get("mass", 0.0))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from e2efly.numbers import number, shape
 
 CLUTTER = ("box", "capsule", "cylinder", "sphere")
-"""Forms of obstacles, which share the places of a world."""
+"""Shapes of obstacles. All shapes share the available places of a world."""
 
 
 @dataclass(frozen=True)
@@ -14,22 +14,22 @@ class ForestConfig:
     """Trees at random places of a lane along world x."""
 
     density: float = 0.1
-    """Trees a square metre."""
+    """Number of trees per square metre."""
     length: float = number(40.0, above=0)
-    """Length of the lane from the start on, m."""
+    """Length of the lane, measured from the start, m."""
     width: float = number(16.0, above=0)
-    """Its width, m."""
+    """Width of the lane, m."""
     radius: tuple[float, float] = number((0.1, 0.35), above=0, rising=True)
-    """Of the trunks, m."""
+    """Radius of the trunks, m."""
     height: tuple[float, float] = number((4.0, 8.0), rising=True)
-    """Of the trunks, m."""
+    """Height of the trunks, m."""
     clear: float = 2.0
-    """No tree within this of the start and of the goal, m."""
+    """No tree is nearer than this to the start or to the goal, m."""
     room: int = shape(64)
-    """Most trees of a world (sets shapes)."""
+    """Largest number of trees in a world (sets shapes)."""
 
     def check(self, name: str) -> None:
-        """Check that there are places for the trees.
+        """Check that `room` is large enough for the trees.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.
@@ -43,25 +43,25 @@ class ForestConfig:
 
 @dataclass(frozen=True)
 class ClutterConfig:
-    """Boxes, balls, columns and capsules at random places along a track."""
+    """Boxes, spheres, cylinders and capsules at random places along a track."""
 
     obstacles: float = 16.0
-    """How many on average; each of `room` places is taken with the same probability."""
+    """Average number of obstacles. Each of the `room` places is occupied with the same probability."""
     sideways: float = 2.5
-    """Their centres lie within this of the straight lines from gate to gate, m per axis."""
+    """Largest distance of their centres from the straight lines between gates, m per axis."""
     size: tuple[float, float] = number((0.15, 0.4), rising=True)
-    """Half-lengths and radii, m."""
+    """Half-lengths and radii of the obstacles, m."""
     clear: float = 0.5
     """No obstacle nearer than this to a gate's opening or to the start, m."""
     moving: float = 0.0
-    """Share of them that swings to and fro."""
+    """Share of the obstacles that swing back and forth."""
     swing: float = 1.0
-    """Amplitude of those, m."""
+    """Amplitude of the swinging obstacles, m."""
     room: int = shape(16)
-    """Most obstacles of a world; a multiple of 4 (sets shapes)."""
+    """Largest number of obstacles in a world; a multiple of 4 (sets shapes)."""
 
     def check(self, name: str) -> None:
-        """Check that there are places for the obstacles.
+        """Check that `room` is large enough for the obstacles, and that the numbers make sense.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.

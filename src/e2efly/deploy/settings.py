@@ -1,4 +1,4 @@
-"""What a flight may do: heights, speeds, time-outs, fence, pilot's channels. Checked before the first flight."""
+"""Limits of a flight: heights, speeds, time-outs, fence, and the pilot's channels. Checked before the first flight."""
 
 import math
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ Box = tuple[float, float, float, float, float, float]
 
 @dataclass(frozen=True)
 class Fence:
-    """Outside of it no policy flies. World ENU, m, m/s, rad."""
+    """The volume in which policies may fly. Units: world ENU, m, m/s, rad."""
 
     low: Point = number((-3.0, -3.0, 0.2), low=-math.inf)
     """Smallest x, y, z."""
@@ -20,25 +20,27 @@ class Fence:
     speed: float = number(6.0, above=0)
     """Largest speed, m/s."""
     tilt: float = number(1.4, above=0)
-    """Largest angle between the body's z axis and up, rad."""
+    """Largest angle between the body's z axis and the up direction, rad."""
     braking: float = number(6.0, above=0)
-    """Deceleration that hovering can count on, m/s^2: the guard takes over while that still stops inside."""
+    """Deceleration that the hover controller can rely on, m/s^2. The guard takes over while this can still stop the
+    vehicle inside."""
     reaction: float = number(0.15, above=0)
-    """Time before the braking acts, s."""
+    """Time until the braking takes effect, s."""
     solids: tuple[Box, ...] = ()
-    """Boxes that the filter of --guard filter keeps the vehicle out of: smallest x, y, z, largest x, y, z of each."""
+    """Boxes that `--guard filter` keeps the vehicle out of. Each box is smallest x, y, z, largest x, y, z."""
     scene: str | None = None
-    """A scene file (.toml, docs/vision.md) in the poses' world: the filter keeps out of its solids, too. None: none."""
+    """A scene file (.toml, see docs/vision.md) in the frame of the poses. The filter also keeps the vehicle out of its
+    solids. None: no scene."""
 
 
 @dataclass(frozen=True)
 class PilotChannels:
-    """Which channels of the receiver carry what, counted from 1 as in Betaflight's receiver tab."""
+    """The receiver channels of the pilot's inputs, counted from 1 as in Betaflight's receiver tab."""
 
     mission: int = 8
-    """Three positions: low = stay on the ground or land, middle = take off and hover, high = policy."""
+    """Three-position switch: low = stay on the ground or land, middle = take off and hover, high = policy."""
     roll: int | None = 9
-    """Copy of the roll stick: under MSP override the stick itself cannot be read. None: no stick input."""
+    """Copy of the roll stick, because the stick itself cannot be read under MSP override. None: no stick input."""
     pitch: int | None = 10
     """Copy of the pitch stick."""
     throttle: int | None = 11
@@ -52,58 +54,59 @@ class FlightSettings:
     """How the bridge flies."""
 
     takeoff_height: float = number(1.0, above=0)
-    """Height of the hover after take-off over where it stood, m."""
+    """Height of the hover after take-off, above the place of take-off, m."""
     takeoff_speed: float = number(0.4, above=0)
-    """m/s."""
+    """Climb speed at take-off, m/s."""
     land_speed: float = number(0.35, above=0)
-    """m/s."""
+    """Descent speed when landing, m/s."""
     reposition_speed: float = number(0.8, above=0)
     """Speed of the hover point at full stick, m/s."""
     odometry_timeout: float = number(0.1, above=0)
-    """Odometry older than this is lost, s."""
+    """Odometry that is older than this counts as lost, s."""
     link_timeout: float = number(0.25, above=0)
-    """Silence of the flight controller after which the link is lost, s."""
+    """The link counts as lost when the flight controller has been silent for this time, s."""
     policy_timeout: float = number(0.01, above=0)
     """How long a control step waits for the policy, s."""
     command_timeout: float = number(0.2, above=0, high=1.0)
-    """Commands from outside that are older end their flight, s."""
+    """Largest age of commands from another program, s. Older commands end its flight."""
     missed_deadlines: int = number(3, low=1)
-    """So many late control steps within a second end a policy's flight."""
+    """This number of late control steps within one second ends a policy's flight."""
     lateness: float = number(0.02, above=0)
-    """A control step this late missed its deadline, s."""
+    """A control step that is late by this time has missed its deadline, s."""
     battery_low: float = number(3.5, above=0)
-    """Volts per cell: no take-off below, and hovering lands."""
+    """Smallest battery voltage, V per cell. Below this, take-off is refused, and a hovering vehicle lands."""
     battery_unknown: bool = False
     """Fly although the flight controller reports no battery voltage."""
     stick_deadband: float = number(0.12, above=0, high=0.99)
-    """Stick deflection, of 1, that counts as the pilot's will."""
+    """Stick deflection, from 0 to 1, above which the pilot's input takes effect."""
     still_speed: float = number(0.1, above=0)
-    """Largest speed before take-off, and when landed, m/s."""
+    """Largest speed before take-off and after landing, m/s."""
     ground_height: float = number(0.0, low=-math.inf)
     """Height of the ground, world, m."""
     land_settle: float = number(1.0, above=0)
-    """Still for so long, with the target well below: landed, s."""
+    """The vehicle has landed if it stays still for this time while the target is well below it, s."""
     attitude_agreement: float = number(0.2, above=0)
-    """Largest roll and pitch between the controller's estimate and the odometry before take-off, rad."""
+    """Largest difference in roll and in pitch between the flight controller's estimate and the odometry before
+    take-off, rad."""
     follow_distance: float = number(1.0, above=0)
-    """A vehicle that flies so far away from its target, having come to rest nearer, has odometry that is not its own:
-    a wrong heading, another vehicle's body, m."""
+    """How much farther from its target than the nearest point that it had reached the vehicle may fly, m. Beyond this,
+    the odometry is judged to be wrong: a wrong heading, or the rigid body of another vehicle."""
     heading_agreement: float = number(0.7, above=0)
-    """Largest error of the odometry's heading, as the flight itself shows it, rad."""
+    """Largest error of the odometry's heading, as estimated from the flight itself, rad."""
     fence: Fence = Fence()
-    """Where policies may fly."""
+    """The volume in which policies may fly."""
     channels: PilotChannels = PilotChannels()
     """The pilot's channels."""
 
 
 SMALLEST = 0.5
-"""The fence is at least so long, wide and high, m."""
+"""Smallest length, width and height of the fence, m."""
 CHANNELS = (5, 18)
-"""First and last channel that a switch or a copy of a stick can be on: 1 to 4 are the sticks."""
+"""First and last channel for a switch or a copy of a stick. Channels 1 to 4 are the sticks."""
 
 
 def check(settings: FlightSettings) -> None:
-    """Refuse what cannot be flown with.
+    """Refuse settings with which no flight is possible.
 
     Raises:
         ValueError: naming the field, the value and what is accepted.

@@ -1,4 +1,4 @@
-"""Whether the numbers of an environment's configuration make sense."""
+"""Checks of the numbers of an environment's configuration."""
 
 import dataclasses
 import math
@@ -15,7 +15,7 @@ from e2efly.vehicles.terms import battery_share
 from e2efly.vehicles.vehicle import principal_moments, quantities, terms
 
 COUNTED = 2**24
-"""Control steps that an episode can have: float32 counts no further."""
+"""Largest number of control steps in an episode: float32 does not count further."""
 
 
 def check(
@@ -24,10 +24,10 @@ def check(
     """Check the numbers of a configuration.
 
     Args:
-        config: of the environment.
-        task: its options.
-        flown: whose parameters are randomised; None: the configuration's vehicle.
-        posterior: what an identified vehicle is drawn from.
+        config: the configuration of the environment.
+        task: the options of the task.
+        flown: the vehicle whose parameters are randomised. None: the configuration's vehicle.
+        posterior: the distribution from which an identified vehicle is drawn.
 
     Raises:
         ValueError: naming the field, the value and what is accepted.

@@ -1,4 +1,4 @@
-"""What a vehicle file does not know: gusts, uneven rotors, a battery that sags, poses that drift."""
+"""Effects that a vehicle file does not include: gusts, uneven rotors, a sagging battery, and drifting poses."""
 
 from dataclasses import dataclass, fields
 
@@ -18,22 +18,22 @@ jax.tree_util.register_dataclass(
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Disturbance:
-    """The disturbances of n vehicles: what is drawn for an episode, and what changes in it."""
+    """The disturbances of n vehicles: values drawn for an episode, and values that change in it."""
 
     gust_speed: Float[Array | np.ndarray, " n"]
     """Standard deviation of the gusts per axis, m/s."""
     gust_time: Float[Array | np.ndarray, " n"]
     """Correlation time of the gusts, s."""
     gust: Float[Array | np.ndarray, "n 3"]
-    """The gust now, world, m/s."""
+    """Current gust, world, m/s."""
     rotor_share: Float[Array | np.ndarray, "n 4"]
-    """Thrust of each rotor over that of the thrust map, with a full battery."""
+    """Thrust of each rotor relative to that of the thrust map, with a full battery."""
     sag: Float[Array | np.ndarray, " n"]
     """Share of all thrust that is lost by the end of the episode."""
     drift_rate: Float[Array | np.ndarray, " n"]
     """Standard deviation of the poses' drift after one second, m per axis."""
     drift: Float[Array | np.ndarray, "n 3"]
-    """Error of the observed position now, world, m."""
+    """Current error of the observed position, world, m."""
 
     @staticmethod
     def none(n: int) -> "Disturbance":
@@ -42,7 +42,7 @@ class Disturbance:
         return Disturbance(zero, jnp.ones(n), zeros, jnp.ones((n, 4)), zero, zero, zeros)
 
     def share(self, progress: Float[Array, " n"]) -> Float[Array, "n 4"]:
-        """Thrust of each rotor over that of the thrust map, when this share of the episode is over."""
+        """Thrust of each rotor relative to that of the thrust map, after this share of the episode."""
         return jnp.asarray(self.rotor_share) * (1 - self.sag * progress)[:, None]
 
 
@@ -50,9 +50,9 @@ def draw(config: DisturbanceConfig, key: PRNGKeyArray, n: int) -> Disturbance:
     """The disturbances of n episodes.
 
     Args:
-        config: the largest; each episode draws its own strength uniformly between none and that.
-        key: random.
-        n: episodes.
+        config: the largest strengths. Each episode draws its own strength uniformly between zero and these.
+        key: the random key.
+        n: the number of episodes.
     """
     strength_key, rotor_key, gust_key = jax.random.split(key, 3)
     strength = jax.random.uniform(strength_key, (3, n))
@@ -72,8 +72,8 @@ def draw(config: DisturbanceConfig, key: PRNGKeyArray, n: int) -> Disturbance:
 def advance(d: Disturbance, key: PRNGKeyArray, dt: float) -> Disturbance:
     """The disturbances `dt` s later.
 
-    Each axis of a gust is a first-order Gauss-Markov process, whose spectrum is the longitudinal one of Dryden's model
-    (MIL-F-8785C, 3.7.2); the drift is a random walk.
+    Each axis of a gust is a first-order Gauss-Markov process. Its spectrum is the longitudinal spectrum of the Dryden
+    model (MIL-F-8785C, 3.7.2). The drift is a random walk.
     """
     noise = jax.random.normal(key, (2, *d.gust.shape), d.gust.dtype)
     kept = jnp.exp(-dt / d.gust_time)

@@ -1,4 +1,4 @@
-"""What is drawn for each episode of a batch."""
+"""Values that are drawn for each episode of a batch."""
 
 from typing import Any
 
@@ -15,14 +15,14 @@ jax.tree_util.register_dataclass(Posterior, data_fields=["root"], meta_fields=["
 
 
 def between(key: PRNGKeyArray, n: int, bounds: Float[Array | np.ndarray, "2"]) -> Float[Array, " n"]:
-    """Numbers between two bounds, uniform."""
+    """Uniform random numbers between two bounds."""
     return bounds[0] + (bounds[1] - bounds[0]) * jax.random.uniform(key, (n,), jnp.asarray(bounds).dtype)
 
 
 def perturbed(key: PRNGKeyArray, n: int, nominal: Vehicle, widths: dict[str, Any], flown: Vehicle) -> dict[str, Array]:
-    """Each named parameter of what flies times a uniform factor in 1 +- its width, entry by entry.
+    """Multiply each named parameter of what flies by a uniform factor in 1 +- its width, entry by entry.
 
-    `nominal` has the same fields without the axis of the batch that `flown` may have.
+    `nominal` has the same fields, without the batch axis that `flown` may have.
     """
     values = {name: jnp.asarray(getattr(nominal, name)) for name in sorted(widths)}
     ends = np.cumsum([value.size for value in values.values()])
@@ -36,7 +36,7 @@ def perturbed(key: PRNGKeyArray, n: int, nominal: Vehicle, widths: dict[str, Any
 
 
 def deviations(key: PRNGKeyArray, n: int, posterior: Posterior, dtype: Any) -> Float[Array, "n d"]:
-    """Deviations of vehicles that are as likely as their file says."""
+    """Deviations of vehicles from their file, drawn from the distribution that the file gives."""
     return posterior.deviation(jax.random.normal(key, (n, posterior.root.shape[1]), dtype))
 
 
@@ -47,14 +47,14 @@ def delays(
     posterior: Posterior,
     deviation: Float[Array, "n d"],
 ) -> Float[Array, " n"]:
-    """Delays, s: uniform within bounds, but for the posterior's part of them, which goes with the other deviations.
+    """Delays, s: uniform within bounds, except the posterior's part, which is drawn with the other deviations.
 
     Args:
-        key: of the uniform part.
-        bounds: of the whole, s. The lower one may have been cut off at zero.
-        nominal: the vehicle's, s.
-        posterior: of the vehicle.
-        deviation: of its entries.
+        key: the random key of the uniform part.
+        bounds: the bounds of the total delay, s. The lower one may have been clipped at zero.
+        nominal: the vehicle's delay, s.
+        posterior: the posterior of the vehicle.
+        deviation: the deviations of its entries.
     """
     n = deviation.shape[0]
     if posterior.latency is None:

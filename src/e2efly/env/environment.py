@@ -1,9 +1,9 @@
 """The one environment, for every task and algorithm: pure `reset` and `step`, batched over one leading axis.
 
-A control step: the action joins the queue of the latency, the physics runs its sub-steps under the commands that
-the queue lets through, the task judges, the reward is summed, the policy's observation is built from the (delayed,
-noisy) state, vehicles whose episode ended start anew, and their cameras look. All of it is differentiable but the
-events and the images.
+A control step has these parts, in this order. The action joins the latency queue. The physics runs its sub-steps with
+the commands that leave the queue. The task judges the result. The reward is summed. The policy's observation is built
+from the (delayed, noisy) state. Vehicles whose episode ended start again. Their cameras render. All of it is
+differentiable, except the events and the images.
 """
 
 import dataclasses
@@ -50,9 +50,9 @@ from e2efly.vehicles.family import DRAWN
 from e2efly.vehicles.posterior import IDENTIFIED, Posterior
 
 LEADS = (0.0, 0.25, 0.5, 1.0, 1.5)
-"""How far ahead a critic is told the clearance, s."""
+"""Look-ahead times for which a critic is given the clearance, s."""
 DEFAULT = EnvConfig()
-"""The VIS-R, nothing random but the starts."""
+"""The VIS-R; only the starts are random."""
 
 
 @partial(
@@ -76,13 +76,13 @@ class Env:
     half: Float[Array, "4"]
     """Half of the command's range."""
     hover: Float[Array, "4"]
-    """The action that hovers a level vehicle, where the command mode has one; else the middle of the range."""
+    """The action with which a level vehicle hovers, if the command mode has one. Otherwise the middle of the range."""
     latency_range: Float[Array | np.ndarray, "2"]
     observation_latency_range: Float[Array | np.ndarray, "2"]
     randomize: dict[str, Any]
     """Relative half-width of each randomised vehicle parameter."""
     posterior: Posterior | None
-    """What an identified vehicle is drawn from; None: it is not."""
+    """The distribution from which an identified vehicle is drawn. None: the vehicle is not drawn."""
     wind: Any
     """Largest wind speed, m/s; None: still air."""
     disturbance: DisturbanceConfig | None
@@ -90,13 +90,14 @@ class Env:
     imu: ImuConfig | None
     cameras: tuple[CameraConfig, ...]
     queue: int
-    """Actions that are kept."""
+    """Number of actions that are kept."""
     seen_actions: int
-    """Past actions in the observation."""
+    """Number of past actions in the observation."""
     past: int
-    """States that are kept for late observations and images; 0: none."""
+    """Number of states that are kept for delayed observations and images. 0: none."""
     family: Family | None = None
-    """Where every episode has another vehicle, of which its flight controller knows; `physics` has the middle one."""
+    """The family, if every episode has a different vehicle, which its flight controller knows. `physics` holds the
+    middle one."""
 
     @staticmethod
     def of(
@@ -109,12 +110,12 @@ class Env:
         """Build the environment of a configuration.
 
         Args:
-            task: its options.
-            reward: what it pays for.
-            config: its vehicle gives the limits of the commands, the control rate and the latency.
-            dtype: of all numbers.
-            flown: what flies, and what the flight controller takes it for; None: both are the configuration's vehicle,
-                or, where that is a family, every episode draws one.
+            task: the options of the task.
+            reward: the reward.
+            config: the configuration. Its vehicle gives the limits of the commands, the control rate and the latency.
+            dtype: the type of all numbers.
+            flown: the vehicle that flies, and the one that the flight controller assumes. None: both are the
+                configuration's vehicle. If that is a family, every episode draws a vehicle.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.
@@ -166,7 +167,7 @@ class Env:
 
     @property
     def is_disturbed(self) -> bool:
-        """Whether episodes have vehicles, delays, air or cameras that are not those of the files."""
+        """Whether episodes have vehicles, delays, air or cameras that differ from those of the files."""
         sooner, later = self.latency_range
         spread = sooner != later and self.family is None
         spread = spread or any(camera != steady(camera) for camera in self.cameras)
@@ -174,8 +175,10 @@ class Env:
         return bool(spread or drawn or self.wind or self.disturbance)
 
     def undisturbed(self) -> "Env":
-        """The environment with the vehicle of the file, its delay, still air and cameras as they are meant to be; of a
-        family, with its vehicles and their delays. Numbers alone differ, so that the same compiled programs take it.
+        """The environment with the vehicle of the file, its delay, still air, and nominal cameras.
+
+        For a family, it has the family's vehicles and their delays. Only numbers differ, so the same compiled programs
+        accept it.
         """
         nominal = np.clip(np.asarray(self.physics.nominal.latency, self.latency_range.dtype), *self.latency_range)
         return dataclasses.replace(
@@ -197,16 +200,16 @@ class Env:
 
     @property
     def observation_size(self) -> int:
-        """Numbers of the observation."""
+        """Number of entries of the observation."""
         return sum(f.size for f in self.fields)
 
     @property
     def control_period(self) -> float:
-        """Seconds a step."""
+        """Duration of a control step, s."""
         return self.physics.control_period
 
     def command(self, action: Float[Array, "n 4"]) -> Float[Array, "n 4"]:
-        """The nominal action map: [-1, 1] linearly onto the command's range, clipped to it."""
+        """The nominal action map: linear from [-1, 1] to the command's range, and clipped to it."""
         return self.center + self.half * jnp.clip(action, -1.0, 1.0)
 
     def reset(self, key: PRNGKeyArray, n: int) -> tuple[EnvState, Float[Array, "n o"]]:
@@ -224,9 +227,9 @@ class Env:
         """One control step.
 
         Args:
-            state: of `reset`, or of the step before.
-            action: in [-1, 1]; what is beyond is clipped.
-            restart: start anew where an episode ended; without, it goes on.
+            state: the state from `reset` or from the previous step.
+            action: in [-1, 1]. Values outside are clipped.
+            restart: whether to start a new episode where one ended. Otherwise the ended episode continues.
             privileged: fill `Step.final_privileged`, for a critic.
 
         Returns:
@@ -241,14 +244,14 @@ class Env:
         return self.look(reached, out.done), out
 
     def look(self, state: EnvState, renewed: Bool[Array, " n"], world: Scene | MeshScene | None = None) -> EnvState:
-        """The state with the images that are there to act on.
+        """The state with the images that are available to act on.
 
-        New are those of cameras whose turn it is, and those of vehicles whose episode is new.
+        Cameras whose next image is due render a new image, and so do the cameras of vehicles whose episode is new.
 
         Args:
-            state: of the vehicles, with the images so far.
-            renewed: whose episode is new.
-            world: what is seen in place of the task's worlds: n worlds, or the one of triangles that all are in.
+            state: the state of the vehicles, with the images so far.
+            renewed: which vehicles have a new episode.
+            world: what is seen in place of the task's worlds: n worlds, or one world of triangles for all vehicles.
         """
         if not self.cameras:
             return state
@@ -257,14 +260,14 @@ class Env:
 
     @property
     def privileged_size(self) -> int:
-        """Numbers of `privileged`."""
+        """Number of entries of `privileged`."""
         return 3 + len(LEADS) if self.cameras else 0
 
     def privileged(self, state: EnvState) -> Float[Array, "n p"]:
-        """What a critic may know beside the observation, where there are cameras; nothing without.
+        """What a critic may know in addition to the observation, if there are cameras. Empty without cameras.
 
-        The way to the goal, body frame, and the clearance where the vehicle will be after each of `LEADS` if it flies
-        straight on: m, clipped to a few metres.
+        It is the vector to the goal in the body frame, and the clearance where the vehicle will be after each of
+        `LEADS` if it flies straight on. Unit m, clipped to a few metres.
         """
         n = state.time.shape[0]
         if not self.cameras:
@@ -275,7 +278,7 @@ class Env:
         return jnp.concatenate([jnp.clip(away, -5.0, 5.0), jnp.clip(ahead(jnp.asarray(LEADS)), -1.0, 3.0)], axis=-1)
 
     def _restart(self, state: EnvState, out: Step) -> tuple[EnvState, Step]:
-        """Start anew where `out` says that the episode ended."""
+        """Start a new episode where `out` says that the episode ended."""
 
         def anew(_: None) -> tuple[EnvState, Array]:
             fresh = self._start(state.key_of(STARTS), out.reward.shape[0], state.tick)
@@ -286,7 +289,7 @@ class Env:
         return state, dataclasses.replace(out, observation=observation)
 
     def _advance(self, state: EnvState, action: Float[Array, "n 4"]) -> tuple[EnvState, Step]:
-        """One control step without new starts, with the images of the last."""
+        """One control step without new starts, with the images of the previous step."""
         period = self.control_period
         actions = jnp.concatenate([action[:, None], state.actions[:, :-1]], axis=1)
         old, new, switch = latency.acting_commands(self.command(actions), state.action_latency, period)
@@ -391,13 +394,13 @@ class Env:
         return self.physics.of_each(self.family.draw(family))
 
     def _reads(self, *signals: str) -> bool:
-        """Whether a term of the reward reads one of them."""
+        """Whether a reward term reads one of these signals."""
         return any(signal in rewards.TERMS[name].inputs for name in self.weights for signal in signals)
 
     def expert_action(self, state: EnvState) -> Float[Array, "n 4"]:
-        """What one who knows the whole world, and this vehicle, would do now; no gradient.
+        """The action of an expert that knows the whole world and this vehicle. It has no gradient.
 
-        Of tasks that have an `expert`, by thrust and body rates.
+        For tasks that have an `expert`, and for commands of thrust and body rates.
         """
         assert isinstance(self.task, Guided)
         state = jax.lax.stop_gradient(state)

@@ -1,7 +1,7 @@
-"""An expert's command: how to fly at a velocity that only one who knows the whole world can choose.
+"""An expert's command: how to fly at a velocity that requires knowledge of the whole world.
 
-The task chooses the velocity, and the flight controller's cascade makes thrust and body rates of it. They are those of
-the moment when an action that is chosen now begins to act: until then the vehicle follows the actions under way.
+The task chooses the velocity. The flight controller's cascade converts it to thrust and body rates. They are computed
+for the moment when an action that is chosen now takes effect. Until then, the vehicle follows the actions under way.
 """
 
 import dataclasses
@@ -17,10 +17,10 @@ from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
 RESERVE = 1.15
-"""The expert leans so far that this times its weight is what its rotors have to carry at most."""
+"""The expert tilts only so far that its rotors have to carry at most this times its weight."""
 
 DAMPED = 0.6
-"""The expert's gains of attitude are at most this over the lag of the body rates."""
+"""The expert's attitude gains are at most this, divided by the lag of the body rates."""
 
 
 @dataclass(frozen=True)
@@ -39,16 +39,16 @@ def ahead(
     latency: Float[Array, " n"],
     period: float,
 ) -> Motion:
-    """Where a vehicle will be when the command that is chosen now begins to act.
+    """Where a vehicle will be when the command that is chosen now takes effect.
 
-    Body rates follow with one lag for rate loop and motors, the thrust at once.
+    Body rates follow with a single lag for the rate loop and the motors. The thrust follows at once.
 
     Args:
-        vehicle: what flies.
-        state: now.
+        vehicle: the vehicle that flies.
+        state: the current state.
         commands: collective thrusts, m/s^2, and body rates, rad/s, under way, newest first.
-        latency: from a command to its effect, s.
-        period: between two commands, s.
+        latency: the time from a command to its effect, s.
+        period: the time between two commands, s.
     """
     position, velocity = Vec3.of(state.position), Vec3.of(state.velocity)
     attitude, rate = Quat.of(state.quaternion), Vec3.of(state.body_rate)
@@ -73,11 +73,11 @@ def command(
     """Collective thrust, m/s^2, and body rates, rad/s, towards a velocity in the world, m/s, and a yaw, rad.
 
     Args:
-        vehicle: what flies; its own limits of tilt and acceleration do not count.
-        largest: collective thrust of all rotors over mass, m/s^2.
-        motion: where it is.
-        velocity: wanted.
-        yaw: wanted.
+        vehicle: the vehicle that flies. Its own limits of tilt and acceleration are not used.
+        largest: the largest collective thrust of all rotors over mass, m/s^2.
+        motion: the motion of the vehicle.
+        velocity: the desired velocity.
+        yaw: the desired yaw.
     """
     tilt = jnp.arccos(jnp.clip(RESERVE * GRAVITY / largest, 0.0, 1.0))
     level = GRAVITY * jnp.tan(tilt)
@@ -92,5 +92,5 @@ def command(
 
 
 def _lag(vehicle: Vehicle) -> Array:
-    """Of the body rates behind the commanded ones, an axis each, s."""
+    """Lag of the body rates behind the commanded ones, one value per axis, s."""
     return 1 / jnp.asarray(vehicle.rate_gain) + jnp.asarray(vehicle.motor_time_constant)[..., None]

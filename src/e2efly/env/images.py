@@ -1,4 +1,4 @@
-"""What the vehicles' cameras show after a control step."""
+"""The images of the vehicles' cameras after a control step."""
 
 import jax
 import jax.numpy as jnp
@@ -18,14 +18,15 @@ def newest(
 ) -> tuple[Float[Array, "n *image"], ...]:  # fmt: skip
     """The newest image of each camera, without gradient.
 
-    New are those of cameras whose turn it is, and those of vehicles whose episode is new; the others stay.
+    Cameras whose next image is due render a new image, and so do the cameras of vehicles whose episode is new. The
+    other images stay.
 
     Args:
-        cameras: of every vehicle.
+        cameras: the cameras of every vehicle.
         scene: what they look at.
-        state: of the vehicles, with the images so far.
-        renewed: whose episode is new.
-        period: of a control step, s.
+        state: the state of the vehicles, with the images so far.
+        renewed: which vehicles have a new episode.
+        period: the duration of a control step, s.
     """
     still, images = jax.lax.stop_gradient(state), []
     for index, (camera, eye, old) in enumerate(zip(cameras, still.eyes, still.images, strict=True)):

@@ -1,4 +1,4 @@
-"""What a configuration comes to for its vehicle: the limits of the commands, and the delays."""
+"""Limits of the commands, and delays, that follow from a configuration and its vehicle."""
 
 import numpy as np
 
@@ -8,15 +8,15 @@ from e2efly.vehicles import Family, Vehicle, load_family, load_vehicle
 from e2efly.vehicles.posterior import IDENTIFIED, WIDEST, Posterior, load_posterior
 
 MOST = 10.0
-"""Times the standard deviations of an identified vehicle that episodes may draw from."""
+"""Largest factor on the standard deviations of an identified vehicle from which episodes may draw."""
 
 
 def limits_of(config: EnvConfig) -> np.ndarray:
-    """Smallest and largest command, (2, 4): of the nominal vehicle, or all vehicles of a family together, where the
-    configuration does not say.
+    """Smallest and largest command, (2, 4). If the configuration gives none, those of the nominal vehicle, or of all
+    vehicles of a family together.
 
     Raises:
-        ValueError: for a family in a command mode that its vehicles do not share, and for a range that is none.
+        ValueError: for a family in a command mode that its vehicles do not share, and for an invalid range.
     """
     if config.command_range is not None:
         given = np.asarray(config.command_range, np.float64)
@@ -35,7 +35,7 @@ def limits_of(config: EnvConfig) -> np.ndarray:
 def latencies_of(
     config: EnvConfig, vehicle: Vehicle, family: Family | None, posterior: Posterior | None
 ) -> tuple[float, float]:
-    """Seconds from observation to command where the configuration does not say."""
+    """Latency from observation to command, if the configuration does not give it, s."""
     low, high = (vehicle.latency,) * 2 if family is None else family.ranges.latency
     sooner, later = config.latency_spread
     margin = 0.0 if posterior is None else WIDEST * float(posterior.latency_sigma)
@@ -43,11 +43,11 @@ def latencies_of(
 
 
 def posterior_of(config: EnvConfig) -> Posterior | None:
-    """The distribution about the vehicle's file that episodes draw from; None: they do not.
+    """The distribution around the vehicle's file from which episodes draw. None: they do not draw from one.
 
     Raises:
-        ValueError: for a file that has no standard deviations, a factor out of range, and a parameter that is drawn in
-            another way, too.
+        ValueError: for a file without standard deviations, for a factor out of range, and for a parameter that is also
+            drawn in another way.
     """
     width = config.randomize.get(IDENTIFIED, 0.0)
     if not 0 <= width <= MOST:

@@ -8,18 +8,18 @@ import numpy as np
 from jaxtyping import Array, PRNGKeyArray
 
 UNSEEN = 4
-"""The stream of the starts of `e2efly eval` and `validate`; those before it are of training (`e2efly.learn.judge`)."""
+"""The stream of the starts of `e2efly eval` and `validate`. Lower streams are for training (`e2efly.learn.judge`)."""
 GENERATOR = "rbg"
 """XLA's own random generator: it compiles in a seventh of the time of JAX's default."""
 
 
 def random_key(*seed: int) -> PRNGKeyArray:
-    """The key of a seed, or of several numbers; made by NumPy: nothing to compile. Zeros at the end change nothing.
+    """The key for a seed or for several numbers. NumPy makes it, so nothing is compiled. Trailing zeros have no effect.
 
-    A run draws from (seed,), what is flown for a purpose from (seed, stream, batch), streams being 1 and more.
+    A run draws from (seed,). Flights for a particular purpose draw from (seed, stream, batch), with streams from 1.
 
     Raises:
-        ValueError: for a negative one.
+        ValueError: for a negative number.
     """
     if min(seed, default=0) < 0:
         raise ValueError(f"seed is {min(seed)}; accepted: 0 or more")
@@ -32,10 +32,10 @@ def is_key(x: Any) -> bool:
 
 
 def numbers_of(x: Any) -> Any:
-    """The numbers of keys; any other array as it is."""
+    """The numbers of keys. Any other array is returned unchanged."""
     return jax.random.key_data(x) if is_key(x) else x
 
 
 def key_of(numbers: Array | np.ndarray) -> PRNGKeyArray:
-    """The keys of numbers."""
+    """The keys for numbers."""
     return jax.random.wrap_key_data(jnp.asarray(numbers), impl=GENERATOR)

@@ -1,4 +1,4 @@
-"""What the terms of the reward read of a control step."""
+"""Signals of a control step that the reward terms read."""
 
 import dataclasses
 from typing import Any
@@ -17,14 +17,14 @@ from e2efly.tasks.task import Outcome, Task
 def happened(
     task: Task, before: EnvState, after: EnvState, action: Float[Array, "n 4"], outcome: Outcome
 ) -> dict[str, Array]:
-    """The signals of every task, and those of this one, by name.
+    """The signals of every task, and those of this task, by name.
 
     Args:
-        task: what the vehicles are asked for.
-        before: the state that was acted on.
-        after: what was reached, before any new start.
+        task: the task of the vehicles.
+        before: the state in which the action was taken.
+        after: the state that was reached, before any new start.
         action: in [-1, 1], before it is clipped.
-        outcome: what the task says of the step.
+        outcome: the outcome of the step, from the task.
     """
     goal_before, goal_now = (task.goal(before.memory, t) for t in (before.time, after.time))
     vehicle = after.vehicle
@@ -48,9 +48,9 @@ def happened(
 
 
 def dangers(task: Task, memory: Any, state: State, time: Float[Array, " n"]) -> dict[str, Array]:
-    """How far the vehicle's sphere is from things, m, and how fast they come nearer, m/s.
+    """The distances from the vehicle's sphere to things, m, and how fast the things come nearer, m/s.
 
-    Gates do not count: kept away from, they are not flown through.
+    Gates do not count: a vehicle that keeps away from them does not fly through them.
     """
     scene, radius = task.scene(memory), task.shape.radius
     scene = dataclasses.replace(scene, solids={k: s for k, s in scene.solids.items() if k != "gate"})
@@ -69,5 +69,5 @@ def dangers(task: Task, memory: Any, state: State, time: Float[Array, " n"]) -> 
 
 
 def _wrap(angle: Array) -> Array:
-    """Into [-pi, pi]."""
+    """Wrap an angle into [-pi, pi]."""
     return jnp.arctan2(jnp.sin(angle), jnp.cos(angle))

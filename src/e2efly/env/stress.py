@@ -1,7 +1,7 @@
-"""Vehicles, air and sensors that are not those of a policy's training: one fixed set of rows, and what they draw.
+"""Vehicles, air and sensors that differ from a policy's training: one fixed set of rows, and what they draw.
 
-The flight controller believes in the policy's own vehicle in every row. A row is numbers of the episodes, so that one
-compiled program flies all of them.
+In every row, the flight controller is tuned for the policy's own vehicle. A row only sets numbers of the episodes, so
+that one compiled program flies all rows.
 """
 
 import dataclasses
@@ -24,7 +24,7 @@ from e2efly.vehicles.names import unknown
 from e2efly.vehicles.vehicle import Vehicle
 
 ALL = "all at once"
-"""The row in which each vehicle draws everything."""
+"""The row in which each vehicle draws all changes at once."""
 LATEST = 0.04
 """Largest delay that a row adds to commands, and to images, s."""
 MOCAP = NoiseConfig(position=0.005, velocity=0.05, attitude=0.005, body_rate=0.02)
@@ -33,13 +33,13 @@ VIO = NoiseConfig(position=0.02, velocity=0.1, attitude=0.01, body_rate=0.02)
 
 @dataclass(frozen=True)
 class Row:
-    """One way in which reality differs."""
+    """One way in which reality differs from the training."""
 
     name: str
     factors: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    """Of fields of the vehicle."""
+    """Factors on fields of the vehicle."""
     latency: float = 0.0
-    """Added to the vehicle's time from observation to command, s; the sum is at least 0."""
+    """Time added to the vehicle's latency from observation to command, s. The sum is at least 0."""
     wind: float = 0.0
     """Steady wind, m/s, from a random horizontal direction."""
     gust: float = 0.0
@@ -47,23 +47,23 @@ class Row:
     sag: float = 0.0
     """Share of the thrust that is lost by the end of the episode."""
     rotor: float = 0.0
-    """Share of its thrust that one rotor, a random one, lacks."""
+    """Share of its thrust that one randomly chosen rotor loses."""
     centre_of_mass: float = 0.0
-    """Offset of the centre of mass, m, in a random direction of the rotors' plane."""
+    """Offset of the centre of mass, m, in a random direction in the plane of the rotors."""
     plain_mixer: bool = False
-    """Whether the mixer clips each rotor by itself."""
+    """Whether the mixer clips each rotor separately."""
     noise: NoiseConfig = NoiseConfig()
     """White noise of the observed state."""
     drift: float = 0.0
     """Random walk of the observed position after one second, m per axis."""
     camera: CameraRow = CameraRow()
-    """What is different about the cameras."""
+    """Changes of the cameras."""
 
     @property
     def alters(self) -> frozenset[str]:
-        """What a plant has to change for it behind the flight controller's back: `e2efly.validation.plant.EVERYTHING`.
+        """What a plant must change for it, unknown to the flight controller: `e2efly.validation.plant.EVERYTHING`.
 
-        Delay, noise, drift and cameras lie between plant and policy: every plant can be flown with them.
+        Delay, noise, drift and cameras act between the plant and the policy, so every plant can be flown with them.
         """
         if self.name == ALL:
             others = frozenset().union(*(row.alters for row in ROWS.values() if row.name != ALL))
@@ -105,11 +105,11 @@ ROWS: dict[str, Row] = {
         *(Row(name, camera=row) for name, row in CAMERAS.items()),
     )
 }
-"""The rows by name. The place of a row decides what it draws: new ones come last."""
+"""The rows by name. The position of a row determines what it draws, so new rows are added at the end."""
 
 
 def rows_for(cameras: tuple[CameraConfig, ...]) -> tuple[str, ...]:
-    """The names of the rows that mean anything to a policy with these cameras, in the order of the tables."""
+    """The names of the rows that apply to a policy with these cameras, in the order of the tables."""
     return (*(name for name, row in ROWS.items() if name != ALL and row.camera.fits(cameras)), ALL)
 
 
@@ -120,14 +120,14 @@ class Draw:
     plant: dict[str, np.ndarray]
     """Fields of the vehicle, (n, ...)."""
     latency: np.ndarray
-    """(n,), from observation to command, s."""
+    """(n,) latency from observation to command, s."""
     wind: np.ndarray
-    """(n, 3), m/s."""
+    """(n, 3) wind, m/s."""
     disturbance: Disturbance
     plain_mixer: np.ndarray
-    """(n,)."""
+    """(n,) whether the mixer clips each rotor separately."""
     noise: NoiseConfig
-    """Of (n, 1)."""
+    """White noise of the observed state, with values of shape (n, 1)."""
     camera: CameraDraw
 
     @staticmethod
@@ -185,19 +185,19 @@ class Draw:
         )
 
     def vehicle(self, nominal: Vehicle, i: int) -> Vehicle:
-        """The body of an episode. What the rotors' thrust is multiplied by goes for its maximum, too."""
+        """The body of an episode. A factor on the rotors' thrust also applies to their maximum thrust."""
         body = dataclasses.replace(nominal, **{name: _number(value[i]) for name, value in self.plant.items()})
         stronger = float(body.thrust_map[0] / nominal.thrust_map[0])
         return dataclasses.replace(body, rotor_thrust_max=nominal.rotor_thrust_max * stronger)
 
     def env(self, env: Env) -> Env:
-        """The environment with what a row changes of it."""
+        """The environment with the changes of a row."""
         mixer = dataclasses.replace(env.physics.mixer, plain=self.plain_mixer)
         physics = dataclasses.replace(env.physics, mixer=mixer)
         return dataclasses.replace(env, physics=physics, noise=self.noise, cameras=with_noise(env.cameras))
 
     def state(self, env: Env, state: EnvState) -> EnvState:
-        """The beginning of the episodes with what a row changes of it."""
+        """The initial state of the episodes with the changes of a row."""
         return dataclasses.replace(
             state,
             eyes=self.camera.eyes(env.cameras, state.eyes, env.control_period),
@@ -212,8 +212,8 @@ jax.tree_util.register_dataclass(Draw, data_fields=[f.name for f in dataclasses.
 
 
 def with_longer_queue(env: Env) -> Env:
-    """The environment with room for the largest delays of the rows, of commands and of images; the policy sees as many
-    actions.
+    """The environment with queues for the largest delays of the rows, for commands and images. The policy sees the same
+    number of past actions as before.
     """
     latest = latency.frames(float(env.physics.nominal.latency) + LATEST, env.control_period)
     oldest = max((camera.latency[0] + LATEST for camera in env.cameras), default=0.0)
@@ -222,10 +222,10 @@ def with_longer_queue(env: Env) -> Env:
 
 
 def check_rows(rows: tuple[str, ...]) -> None:
-    """Refuse a row that there is not.
+    """Refuse a row that does not exist.
 
     Raises:
-        ValueError: naming it, with the nearest and all there are.
+        ValueError: naming it, the nearest name and all known names.
     """
     for name in rows:
         if name not in ROWS:
@@ -233,7 +233,7 @@ def check_rows(rows: tuple[str, ...]) -> None:
 
 
 def check_seen(rows: tuple[str, ...], cameras: tuple[CameraConfig, ...]) -> None:
-    """Refuse a row of cameras that a policy has not.
+    """Refuse a row for cameras that a policy does not have.
 
     Raises:
         ValueError: naming it, what the policy sees, and the rows that are accepted.

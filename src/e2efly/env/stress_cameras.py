@@ -1,4 +1,4 @@
-"""What the rows of the stress change about cameras: how they sit, what they take in, when their images come."""
+"""What the rows of the stress change about cameras: mounting, field of view, noise, and the timing of images."""
 
 import dataclasses
 import math
@@ -13,7 +13,7 @@ from e2efly.scenes.camera import mounted
 from e2efly.sensors.eyes import Eye, steps_between
 
 DEPTH = "depth"
-"""What a D435i's noise is of."""
+"""The kind of image to which the noise of a D435i applies."""
 
 
 @dataclass(frozen=True)
@@ -21,15 +21,15 @@ class CameraRow:
     """One way in which real cameras differ from those of a policy's contract."""
 
     turn: float = 0.0
-    """Mounting, about a random axis, rad."""
+    """Rotation of the mounting about a random axis, rad."""
     offset: float = 0.0
-    """Mounting, in a random direction, m."""
+    """Offset of the mounting in a random direction, m."""
     fov: float = 0.0
-    """Relative, of the field of view, of both axes."""
+    """Relative change of the field of view, for both axes."""
     latency: float = 0.0
-    """Added to the age of the images, s."""
+    """Time added to the age of the images, s."""
     every: int = 1
-    """Images that would come until one comes."""
+    """Only every Nth image arrives."""
     noise: bool = False
     """Whether depth has the noise of a D435i."""
 
@@ -39,7 +39,7 @@ class CameraRow:
         return self != CameraRow()
 
     def fits(self, cameras: tuple[CameraConfig, ...]) -> bool:
-        """Whether it means anything to a policy with these cameras."""
+        """Whether it applies to a policy with these cameras."""
         if self.noise:
             return any(camera.sees == DEPTH for camera in cameras)
         return bool(cameras) or not self.there
@@ -63,13 +63,13 @@ class CameraDraw:
     angles: np.ndarray
     """(n, 3) roll, pitch and yaw of the mounting, rad."""
     offset: np.ndarray
-    """(n, 3), body frame, m."""
+    """(n, 3) offset of the mounting, body frame, m."""
     fov: np.ndarray
-    """(n, 1), a factor."""
+    """(n, 1) factor on the field of view."""
     latency: np.ndarray
-    """(n,), s."""
+    """(n,) time added to the age of the images, s."""
     every: np.ndarray
-    """(n,), images."""
+    """(n,) only every Nth image arrives."""
     noisy: np.ndarray
     """(n,), 1: depth has the noise of a D435i, 0: it is clean."""
 
@@ -95,7 +95,7 @@ class CameraDraw:
         )
 
     def eyes(self, cameras: tuple[CameraConfig, ...], eyes: tuple[Eye, ...], period: float) -> tuple[Eye, ...]:
-        """The eyes of n vehicles with what a row changes of them, and nothing else random but the light."""
+        """The eyes of n vehicles with the changes of a row. Only the light is otherwise random."""
         return tuple(self._eye(camera, eye, period) for camera, eye in zip(cameras, eyes, strict=True))
 
     def _eye(self, camera: CameraConfig, eye: Eye, period: float) -> Eye:
@@ -113,6 +113,6 @@ jax.tree_util.register_dataclass(CameraDraw, data_fields=_FIELDS, meta_fields=[]
 
 
 def with_noise(cameras: tuple[CameraConfig, ...]) -> tuple[CameraConfig, ...]:
-    """The cameras with the noise of a D435i in place of their own, where they see depth."""
+    """The cameras with the noise of a D435i in place of their own noise, if they see depth."""
     noise = ImageNoiseConfig(d435i=True)
     return tuple(dataclasses.replace(c, noise=noise) if c.sees == DEPTH else c for c in cameras)

@@ -1,6 +1,6 @@
 """The contract of an exported policy: what it sees, what it commands, and what it was trained for.
 
-It travels as JSON in the metadata of `policy.onnx` under the key `METADATA_KEY`. Imports no JAX and no simulator.
+It is stored as JSON in the metadata of `policy.onnx` under the key `METADATA_KEY`. Imports no JAX and no simulator.
 """
 
 import dataclasses
@@ -26,11 +26,11 @@ CONTRACT_VERSION = 2
 METADATA_KEY = "contract"
 """Key of the contract in the metadata of the ONNX file."""
 ACTION_SIZE = 4
-"""Numbers of an action."""
+"""Number of entries of an action."""
 ACTION_LIMITS = (-1.0, 1.0)
-"""Smallest and largest entry of an action; what lies outside is clipped before it is mapped."""
+"""Smallest and largest entry of an action. Values outside are clipped before the mapping to a command."""
 ACTION_MAPPING = "command = low + (action + 1) / 2 * (high - low)"
-"""From action to physical command, entry by entry."""
+"""Mapping from an action to a physical command, entry by entry."""
 RATES = (0.1, 10_000.0)
 """Smallest and largest control rate, Hz."""
 FRAMES = ("world", "body", "world_body", "none")
@@ -48,9 +48,9 @@ class Action:
     units: tuple[str, ...]
     """Their units."""
     low: tuple[float, ...]
-    """Command at action -1, the smallest that is ever sent, in `units`."""
+    """Command at action -1, in `units`. It is the smallest command that is ever sent."""
     high: tuple[float, ...]
-    """Command at action +1, the largest that is ever sent, in `units`."""
+    """Command at action +1, in `units`. It is the largest command that is ever sent."""
     limits: tuple[float, ...] = ACTION_LIMITS
     """Smallest and largest entry of an action."""
     mapping: str = ACTION_MAPPING
@@ -63,50 +63,53 @@ class Action:
         return (a, b, c, d), (e, f, g, h)
 
     def asking(self, command: np.ndarray) -> np.ndarray:
-        """The action that asks for a command, (..., 4), float32: the inverse of `mapping`, clipped to `limits`."""
+        """The action that gives a command, (..., 4), float32: the inverse of `mapping`, clipped to `limits`."""
         low, high = np.array(self.low), np.array(self.high)
         return np.clip(2 * (command - low) / (high - low) - 1, *ACTION_LIMITS).astype(np.float32)
 
 
 @dataclass(frozen=True)
 class Contract:
-    """Everything that whoever flies a policy must agree with."""
+    """Everything on which a policy and the program that flies it must agree."""
 
     contract_version: int
     """`CONTRACT_VERSION`."""
     e2efly_version: str
-    """Version of the package that exported it, to be told to people; not compared."""
+    """Version of the package that exported it. It is shown to people, but not compared."""
     task: str
     """Name of the task."""
     vehicle: str
     """Name of the vehicle, or of the family of vehicles."""
     vehicle_hash: str | None
-    """Hash of the vehicle's parameters: 16 hex digits. None, and no key of the JSON: there are ranges."""
+    """Hash of the vehicle's parameters: 16 hex digits. None, and no JSON key, if there are ranges instead."""
     control_rate_hz: float
-    """How often the policy is asked, Hz."""
+    """Rate at which the policy is called, Hz."""
     latency_s: float
-    """Time from observation to command for which it is made, s: the vehicle's; the mean where training had others."""
+    """Latency from observation to command for which the policy is made, s: the vehicle's. If training used other
+    latencies, their mean."""
     latency_range_s: tuple[float, ...]
-    """Smallest and largest of it, s."""
+    """Smallest and largest latency, s."""
     observation_latency_range_s: tuple[float, ...]
     """Smallest and largest age of the observed state in training, s."""
     observation: tuple[Field, ...]
-    """What the policy is told, in order."""
+    """The fields of the observation, in order."""
     images: tuple[Image, ...]
-    """What it sees besides, camera by camera."""
+    """The images that the policy sees in addition, camera by camera."""
     memory_size: int
-    """Numbers that it hands from one question to the next (the state of its GRU); 0: none."""
+    """Number of values that it carries from one call to the next (the state of its GRU). 0: none."""
     action: Action
     """What it commands."""
     hover_action: tuple[float, ...]
-    """The past actions that it is shown before it has acted; it hovers, where the command mode has a hover."""
+    """The past actions that the policy is shown before its first action. They hover, if the command mode has a
+    hover."""
     vehicle_ranges: Ranges | None = None
-    """Of the vehicles that it flies, all of the family. None, and no key of the JSON: one vehicle, that of the hash."""
+    """Ranges of the vehicles that it flies, for a family. None, and no JSON key, for a single vehicle, identified by
+    the hash."""
 
     def refusals(self, vehicle: Vehicle) -> tuple[str, ...]:
-        """Why the policy does not fly a (loaded) vehicle, in words; empty: it does.
+        """The reasons why the policy does not fly a (loaded) vehicle, in words. Empty: it flies it.
 
-        It flies the vehicle that it was trained on, or all within its ranges, with the delays of its training.
+        It flies the vehicle that it was trained on, or all vehicles within its ranges, with the delays of its training.
         """
         if self.vehicle_ranges is not None:
             late = self.latency_range_s
@@ -119,23 +122,23 @@ class Contract:
         )
 
     def latency_of(self, vehicle: Vehicle) -> float:
-        """Seconds from observation to command with which a vehicle flies: of one of a family its own."""
+        """Latency from observation to command with which a vehicle flies, s. A vehicle of a family has its own."""
         return self.latency_s if self.vehicle_ranges is None else float(vehicle.latency)
 
     @cached_property
     def observation_size(self) -> int:
-        """Numbers of the observation."""
+        """Number of entries of the observation."""
         return sum(field.size for field in self.observation)
 
     @cached_property
     def slices(self) -> dict[str, slice]:
-        """Where each field lies in the observation, by name, in order."""
+        """The position of each field in the observation, by name, in order."""
         ends = list(accumulate(field.size for field in self.observation))
         return {f.name: slice(end - f.size, end) for f, end in zip(self.observation, ends, strict=True)}
 
     @cached_property
     def attitude(self) -> str:
-        """Name of the field that is the attitude."""
+        """Name of the field that holds the attitude."""
         return next(field.name for field in self.observation if field.frame == "world_body")
 
     def to_json(self) -> str:

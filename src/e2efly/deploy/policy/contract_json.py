@@ -1,4 +1,4 @@
-"""A contract's JSON, read strictly: every value is checked, and what is wrong is named."""
+"""The strict reading of a contract's JSON: every value is checked, and errors name what is wrong."""
 
 import dataclasses
 from collections.abc import Collection
@@ -8,9 +8,10 @@ from e2efly.vehicles.names import nearest
 from e2efly.vehicles.tables import shown
 
 LARGEST = 1e6
-"""Largest size of a number, in whatever unit."""
+"""Largest magnitude of a number, in any unit."""
 LATEST = 1.0
-"""Longest delay, s, that an environment trains with: by an older state, or so long after an answer, nothing flies."""
+"""Longest delay with which an environment trains, s. No vehicle flies with an older state, or so long after a
+command."""
 
 
 def table(value: Any, where: str, kind: type) -> dict[str, Any]:
@@ -33,7 +34,7 @@ def table(value: Any, where: str, kind: type) -> dict[str, Any]:
 
 
 def text(value: Any, where: str) -> str:
-    """A text that is not empty."""
+    """A non-empty text."""
     if not isinstance(value, str) or not value.strip():
         raise refusal(where, value, "a text that is not empty")
     return value
@@ -47,33 +48,33 @@ def one_of(value: Any, where: str, known: Collection[str]) -> str:
 
 
 def number(value: Any, where: str) -> float:
-    """A finite number of a size that physics has."""
+    """A finite number of a physically plausible size."""
     if type(value) in (int, float) and abs(value) <= LARGEST:  # false for NaN; not bool, which is an int to Python
         return float(value)
     raise refusal(where, value, f"a finite number, at most {LARGEST:g} in size")
 
 
 def whole(value: Any, where: str, least: int) -> int:
-    """A whole number, not less than `least` and not more than `LARGEST`."""
+    """A whole number from `least` to `LARGEST`."""
     if type(value) is not int or not least <= value <= LARGEST:
         raise refusal(where, value, f"a whole number, {least} or more, at most {LARGEST:g}")
     return value
 
 
 def entries(value: Any, where: str, count: int | None) -> list[Any]:
-    """A list that is not empty, of so many entries where `count` is given."""
+    """A non-empty list, with `count` entries if that is given."""
     if not isinstance(value, list) or not value or (count is not None and len(value) != count):
         raise refusal(where, value, "a list that is not empty" if count is None else f"a list of {count} numbers")
     return value
 
 
 def numbers(value: Any, where: str, count: int) -> tuple[float, ...]:
-    """So many finite numbers."""
+    """The given number of finite numbers."""
     return tuple(number(entry, f"{where}[{i}]") for i, entry in enumerate(entries(value, where, count)))
 
 
 def seconds_range(value: Any, where: str) -> tuple[float, ...]:
-    """Smallest and largest, s."""
+    """Smallest and largest time, s."""
     low, high = numbers(value, where, 2)
     if not 0 <= low <= high <= LATEST:
         raise refusal(where, value, f"two rising numbers of seconds in [0, {LATEST:g}]")

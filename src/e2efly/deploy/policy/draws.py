@@ -1,4 +1,4 @@
-"""Observations and images by chance, to compare two forms of one policy."""
+"""Random observations and images, to compare two forms of one policy."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from e2efly.observation import Field
 
 
 def random_observations(rng: np.random.Generator, fields: tuple[Field, ...], count: int) -> np.ndarray:
-    """Float32 (count, o): any attitude, past actions all over their range, the rest normal, of twice its scale."""
+    """Float32 (count, o): any attitude, past actions over their full range, the rest normal with twice its scale."""
 
     def draw(field: Field) -> np.ndarray:
         if field.frame == "none":
@@ -21,7 +21,7 @@ def random_observations(rng: np.random.Generator, fields: tuple[Field, ...], cou
 
 
 def random_images(rng: np.random.Generator, image: Image, count: int) -> np.ndarray:
-    """Float32 (count, h, w) or (count, h, w, 3): values all over their range, a part of them 0; a mask: 0 and 1."""
+    """Float32 (count, h, w) or (count, h, w, 3): values over their full range, some of them 0. Masks have 0 and 1."""
     low, high = image.limits
     x = rng.uniform(low, high, (count, *image.shape))
     shown = rng.random((count, *image.shape)) < rng.random((count, *(1,) * len(image.shape)))

@@ -9,60 +9,61 @@ import numpy as np
 from e2efly.deploy.policy import contract_json as read
 
 SEES = ("depth", "range", "mask", "rgb", "normal")
-"""What the image of a policy can show."""
+"""What a policy's image can show."""
 PROJECTIONS = ("pinhole", "spherical")
-"""A camera, or equal angles between columns and rows."""
+"""A camera, or a sensor with equal angles between columns and between rows."""
 ENCODINGS = ("inverse", "log", "linear")
-"""How the graph takes depth and range."""
+"""How the graph encodes depth and range."""
 SLOWEST = 0.01
-"""Smallest rate of images, Hz."""
+"""Lowest image rate, Hz."""
 NONE = "none"
-"""In place of what an image does not have: a class but of a mask, an encoding but of depth and range."""
+"""Value of a field that an image does not have: a class if it is no mask, an encoding if it is not depth or range."""
 _COLOURS = ("rgb", "normal")
 ROUNDING = 1e-5
-"""Relative, of what lies at the end of a range."""
+"""Relative tolerance for values at the ends of a range."""
 
 
 @dataclass(frozen=True)
 class Image:
-    """One camera's image: what the camera measures. What becomes of it is inside the graph."""
+    """One camera's image, as the camera measures it. Further processing is inside the graph."""
 
     name: str
-    """Of the graph's input."""
+    """Name of the graph's input."""
     sees: str
     """One of `SEES`."""
     of: str
-    """The class that a mask is of, else `NONE`."""
+    """The class that a mask shows, otherwise `NONE`."""
     width: int
-    """Columns, from the left."""
+    """Number of columns, counted from the left."""
     height: int
-    """Rows, from the top."""
+    """Number of rows, counted from the top."""
     projection: str
     """One of `PROJECTIONS`."""
     fov_rad: tuple[float, ...]
     """Horizontal and vertical field of view, rad."""
     reach_m: tuple[float, ...]
-    """Nearest and farthest that depth and range measure, m."""
+    """Nearest and farthest distance that depth and range measure, m."""
     position_m: tuple[float, ...]
-    """Where the camera sits in the body frame (forward, left, up), m."""
+    """Position of the camera in the body frame (forward, left, up), m."""
     pitch_rad: float
-    """Downwards from straight ahead, rad."""
+    """Downward pitch from straight ahead, rad."""
     rate_hz: float
-    """New images a second; in between the policy is shown the last one."""
+    """Rate of new images, Hz. Between two images, the policy is shown the last one."""
     latency_range_s: tuple[float, ...]
-    """Smallest and largest age of an image when it was first seen in training, s."""
+    """Smallest and largest age of an image when the policy first saw it in training, s."""
     encoding: str
     """Inside the graph: one of `ENCODINGS`, or `NONE`."""
     pool: tuple[int, ...]
-    """Inside the graph: rows and columns that the image is averaged to; its own where it is taken as it is."""
+    """Inside the graph: rows and columns to which the image is reduced, by the mean of each cell, or for depth by its
+    nearest value. If it is not reduced, its own rows and columns."""
     description: str
-    """What a value is."""
+    """Meaning of a value."""
     preprocessing: str
-    """What the graph does to it."""
+    """Processing of the image inside the graph."""
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """(h, w), or (h, w, 3) of colours and normals."""
+        """(h, w), or (h, w, 3) for colours and normals."""
         return (self.height, self.width, *((3,) if self.sees in _COLOURS else ()))
 
     @property

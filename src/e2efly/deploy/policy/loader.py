@@ -1,7 +1,7 @@
 """Load `policy.onnx` and act with it. Imports no JAX and no simulator, so that it starts fast on a companion computer.
 
-The file is refused when it is damaged, when it does not agree with its own contract, or with what the caller is about
-to fly.
+The file is refused when it is damaged. It is also refused when it does not agree with its own contract, or with what
+the caller is about to fly.
 """
 
 import os
@@ -18,19 +18,19 @@ from e2efly.vehicles import Vehicle, load_vehicle, vehicle_names
 from e2efly.zoo import policy_file
 
 INPUT, OUTPUT = "observation", "action"
-"""Names of the graph's first input and output; images go in under their own names."""
+"""Names of the graph's first input and of its output. The inputs for images have the names of the images."""
 MEMORY, NEXT_MEMORY = "memory", "next_memory"
 """Names of the input and the output of a policy with memory."""
 UNIT_TOLERANCE = 0.01
-"""How far the length of the attitude quaternion may be from 1."""
+"""Largest deviation of the length of the attitude quaternion from 1."""
 ROUNDING = 1e-6
-"""How far beyond 1 an action or a memory may lie: ONNX Runtime's tanh reaches 1.0000001."""
+"""Largest amount by which an action or a memory may exceed 1: ONNX Runtime's tanh reaches 1.0000001."""
 _LARGEST = np.finfo(np.float32).max
 
 
 @dataclass(frozen=True)
 class Policy:
-    """A checked policy, on one thread. Make it with `load_policy`."""
+    """A checked policy, which runs on one thread. Create it with `load_policy`."""
 
     contract: Contract
     """What it sees and commands."""
@@ -40,21 +40,21 @@ class Policy:
     def act(
         self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The actions of observations and images, and what to remember.
+        """The actions for observations and images, and the memory for the next call.
 
         Args:
             observation: shape (o,) or (n, o), laid out as `contract.observation` says, in its units and frames.
-            images: as `contract.images` says, in that order; shape (h, w) or (n, h, w), of colours (..., h, w, 3).
+            images: as `contract.images` says, in that order; shape (h, w) or (n, h, w), for colours (..., h, w, 3).
             memory: what the last call returned, (k,) or (n, k); None at the start of a flight.
 
         Returns:
-            The action, float32 in [-1, 1], shape (4,) or (n, 4); and the memory for the next call, (k,) or (n, k):
-            of size 0 where `contract.memory_size` is.
+            The action, float32 in [-1, 1], shape (4,) or (n, 4); and the memory for the next call, (k,) or (n, k), with
+            k = 0 if `contract.memory_size` is 0.
 
         Raises:
-            ValueError: naming the observation field or the image, for a wrong shape, a number that is not finite or
-                out of range, or an attitude that is no unit quaternion; for an observation so large that the network
-                overflows.
+            ValueError: naming the observation field or the image, for a wrong shape, for a number that is not finite
+                or is out of range, and for an attitude that is not a unit quaternion. Also for an observation so large
+                that the network overflows.
         """
         x = np.asarray(observation)
         self._check(x)
@@ -79,7 +79,7 @@ class Policy:
         return action if lead else action[0], known
 
     def command(self, action: np.ndarray) -> np.ndarray:
-        """The commands of actions, shape (4,) or (n, 4), in `contract.action.units`; actions are clipped to [-1, 1].
+        """The commands for actions, shape (4,) or (n, 4), in `contract.action.units`. Actions are clipped to [-1, 1].
 
         Raises:
             ValueError: for a wrong shape or a non-finite number.
@@ -113,7 +113,9 @@ class Policy:
         return m
 
     def _check(self, x: np.ndarray) -> None:
-        """Refuse what the network must not see; quick when all is well, as it runs at every control step."""
+        """Refuse an observation that the network must not see. The check is fast, because it runs at every control
+        step.
+        """
         slices = self.contract.slices
         if x.ndim not in (1, 2) or x.shape[-1] != self.contract.observation_size or x.dtype.kind not in "fiu":
             raise ValueError(_wrong_shape(self.contract, x))
@@ -136,17 +138,17 @@ def load_policy(
     control_rate_hz: float | None = None,
     command_mode: str | None = None,
 ) -> Policy:
-    """Load a policy and check it against its contract and against what it is going to fly.
+    """Load a policy. Check it against its contract, and against what it is going to fly.
 
     Args:
         policy: a `policy.onnx`, a run directory, or the name of a task: the zoo's policy of it.
         task: name of the task that will be flown.
-        vehicle: the vehicle that will fly: its name, the path of its .toml file, or as loaded.
-        control_rate_hz: how often the policy will be asked, Hz.
-        command_mode: what the flight controller will be sent.
+        vehicle: the vehicle that will fly: its name, the path of its .toml file, or the loaded vehicle.
+        control_rate_hz: the rate at which the policy will be called, Hz.
+        command_mode: the command mode of the flight controller.
 
     Raises:
-        ValueError: naming the file and the field, what it is, what was wanted, and what to do. What is left out is
+        ValueError: naming the file and the field, its value, the expected value, and what to do. Omitted arguments are
             not compared.
     """
     if vehicle is not None and not isinstance(vehicle, Vehicle):
@@ -158,10 +160,10 @@ def load_policy(
 
 
 def sealed_policy(path: str | Path) -> bytes:
-    """The content of a policy's file with its digest, for the file of an older e2efly, which has none.
+    """The content of a policy's file with its digest, for a file of an older e2efly, which has no digest.
 
     Raises:
-        ValueError: naming the file, where it cannot be loaded with a digest either, or has one already.
+        ValueError: naming the file, if it cannot be loaded even with a digest, or if it already has one.
     """
     content = _read(path)
     if is_sealed(content):
@@ -204,7 +206,7 @@ def _policy(where: str, content: bytes) -> Policy:
 
 
 def level_and_still(contract: Contract) -> np.ndarray:
-    """An observation, shape (o,): the level attitude, heading along world x, and zeros."""
+    """An observation, shape (o,), with a level attitude, a heading along world x, and zeros elsewhere."""
     observation = np.zeros(contract.observation_size, np.float32)
     observation[contract.slices[contract.attitude].start] = 1.0
     return observation
@@ -227,7 +229,7 @@ def _session(where: str, content: bytes) -> ort.InferenceSession:
 
 
 def _check_graph(where: str, session: ort.InferenceSession, contract: Contract) -> None:
-    """Float32 inputs and outputs, of the names and sizes of the contract, with a free batch axis."""
+    """Check for float32 inputs and outputs with the names and sizes of the contract, and a free batch axis."""
     remembers = next((node.shape[-1] for node in session.get_inputs() if node.name == MEMORY and node.shape), 0)
     if remembers != contract.memory_size:
         raise ValueError(
@@ -260,7 +262,7 @@ def _check_use(
     control_rate_hz: float | None,
     command_mode: str | None,
 ) -> None:
-    """What the policy was trained for against what it is going to fly."""
+    """Compare what the policy was trained for with what it is going to fly."""
     if task is not None and task != contract.task:
         raise _mismatch(where, "task", contract.task, task, "load a policy that was trained for this task")
     if vehicle is not None and contract.vehicle_ranges is not None:
@@ -285,14 +287,14 @@ def _mismatch(where: str, field: str, has: object, wanted: object, remedy: str) 
 
 
 def _refusal(name: str, part: np.ndarray, good: np.ndarray, accepted: str) -> ValueError:
-    """Names the field, and the first row of a batch that is not good."""
+    """The error. It names the field and the first invalid row of a batch."""
     row = int(np.argmin(good))
     where = "observation" if part.ndim == 1 else f"observation[{row}]"
     return ValueError(f"{where}: field {name!r} is {np.atleast_2d(part)[row].tolist()}; accepted: {accepted}")
 
 
 def _wrong_shape(contract: Contract, x: np.ndarray) -> str:
-    """What is wrong with the shape, and the field at which a vector of this length breaks off."""
+    """What is wrong with the shape, and the field in which a vector of this length ends."""
     size = contract.observation_size
     layout = ", ".join(f"{field.name} {field.size}" for field in contract.observation)
     accepted = f"float32 of shape ({size},) or (n, {size}): {layout}"

@@ -1,15 +1,16 @@
-"""What the file of a policy must be before ONNX Runtime reads it: whole, and a graph that comes to an end.
+"""Checks of a policy's file before ONNX Runtime reads it: it must be complete, and its graph must terminate.
 
-An ONNX file is a protocol buffer: a row of fields, each a tag (its number and kind) and a value. The last field of a
-policy's file is a metadata entry of a fixed size, `sha256`: the digest of all bytes before it, contract included. So a
-flipped bit anywhere is found without understanding the rest, and ONNX Runtime takes the entry for what it is.
+An ONNX file is a protocol buffer: a sequence of fields, each with a tag (its number and kind) and a value. The last
+field of a policy's file is a metadata entry of fixed size, `sha256`. It holds the digest of all bytes before it,
+including the contract. A changed bit anywhere is therefore found without parsing the rest. ONNX Runtime reads the entry
+as ordinary metadata.
 """
 
 from collections.abc import Iterator
 from hashlib import sha256
 
 _ENTRY = b"\x72\x4a\x0a\x06sha256\x12\x40"
-"""Field 14 (metadata) of 74 bytes: field 1 (key) of 6 bytes, and field 2 (value) of 64 bytes, which follow."""
+"""Field 14 (metadata) of 74 bytes: field 1 (key) of 6 bytes, followed by field 2 (value) of 64 bytes."""
 _SIZE = len(_ENTRY) + 64
 _PARTS: dict[str, dict[int, str]] = {
     "model": {7: "graph"},
@@ -18,7 +19,7 @@ _PARTS: dict[str, dict[int, str]] = {
     "attribute": {5: "tensor", 10: "tensor", 22: "sparse", 23: "sparse"},
     "sparse": {1: "tensor", 2: "tensor"},
 }
-"""By kind of message, the fields that are messages to be looked into, and their kinds."""
+"""For each kind of message: the fields that are messages to be checked, and their kinds."""
 _REFUSED: dict[tuple[str, int], str] = {
     ("model", 20): "information on training",
     ("model", 25): "functions of its own",
@@ -26,21 +27,21 @@ _REFUSED: dict[tuple[str, int], str] = {
     ("attribute", 11): "graphs inside of a node",
     ("tensor", 13): "numbers in another file",
 }
-"""By kind of message and field, what no policy needs."""
+"""For each kind of message and field: content that no policy needs."""
 
 
 def sealed(content: bytes) -> bytes:
-    """An ONNX file with its digest behind it."""
+    """An ONNX file with its digest appended."""
     return content + _ENTRY + sha256(content).hexdigest().encode()
 
 
 def is_sealed(content: bytes) -> bool:
-    """Whether a digest stands at the end, be it right or wrong."""
+    """Whether the file ends with a digest, correct or not."""
     return content[-_SIZE:].startswith(_ENTRY)
 
 
 def check_file(content: bytes) -> None:
-    """Refuse a file that is damaged, or whose graph may never end or reads other files.
+    """Refuse a file that is damaged, or whose graph may never terminate or reads other files.
 
     Raises:
         ValueError: saying what is wrong and what is accepted.
@@ -68,10 +69,10 @@ def _look_into(message: memoryview, kind: str) -> None:
 
 
 def _messages(data: memoryview) -> Iterator[tuple[int, memoryview]]:
-    """Number and value of the fields that have a length; all messages are among them.
+    """Number and value of the fields that have a length. All messages are such fields.
 
     Raises:
-        ValueError: for what is no protocol buffer.
+        ValueError: for data that is not a protocol buffer.
     """
     at = 0
     while at < len(data):

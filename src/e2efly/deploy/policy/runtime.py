@@ -1,6 +1,6 @@
-"""A policy in flight: what it sees, when it is asked, what it commands. Pure but for the clock around the network.
+"""A policy in flight: what it sees, when it is called, what it commands. Pure, except for timing the network.
 
-`begin` hands the vehicle over to the policy, `act` asks it once a period; the state goes in and comes out.
+`begin` hands the vehicle over to the policy. `act` calls the policy once per period; it takes and returns the state.
 """
 
 import dataclasses
@@ -20,11 +20,12 @@ from e2efly.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, PA
 from e2efly.vehicles import Vehicle
 
 MODES = tuple(name for name, mode in COMMAND_MODES.items() if mode.controller is not None)
-"""Command modes that become collective thrust and body rates; a flight controller takes no rotor thrusts."""
+"""Command modes that are converted to collective thrust and body rates. A flight controller accepts no rotor
+thrusts."""
 _STATE_FIELDS = (ATTITUDE, VELOCITY, BODY_RATE, GYROSCOPE, ACCELEROMETER)
 _IMU_FIELDS = (GYROSCOPE.name, ACCELEROMETER.name)
 _ROUNDING = 1e-6
-"""Of the clock, in periods."""
+"""Rounding tolerance of the clock, in periods."""
 
 
 @dataclass(frozen=True)
@@ -39,23 +40,25 @@ class Imu:
 
 @dataclass(frozen=True)
 class Envelope:
-    """In which state of the vehicle a policy may take over; beyond it lies what training rarely showed it."""
+    """The states of the vehicle in which a policy may take over. Training rarely had states beyond these limits."""
 
     speed: float = 5.0
     """Largest speed, m/s."""
     tilt: float = 0.7853981633974483
     """Largest tilt, rad."""
     distance: float | None = None
-    """Largest distance to where the goal is, m; left out: where an episode of the training ends. Of a place that a
-    commander outside names, at any time: 3 m."""
+    """Largest distance to the goal, m. If omitted, the distance at which an episode of the training ends. For a place
+    that another program commands, at any time: 3 m."""
     start: float = 1.5
-    """Largest distance to where a course with a heading of its own begins, m."""
+    """Largest distance to the start of a course that has its own heading, m."""
     heading: float = 0.35
-    """Largest angle between the heading and that with which such a course begins, rad."""
+    """Largest angle between the heading of the vehicle and the start heading of such a course, rad."""
 
 
 class Acting(Protocol):
-    """What flies by observations and actions: a policy (`e2efly.deploy.policy.loader.Policy`), or what acts as one."""
+    """What flies by observations and actions: a policy (`e2efly.deploy.policy.loader.Policy`), or an object that acts
+    as one.
+    """
 
     @property
     def contract(self) -> Contract:
@@ -65,23 +68,25 @@ class Acting(Protocol):
     def act(
         self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: Any = None
     ) -> tuple[np.ndarray, Any]:
-        """The action of an observation, (4,) in [-1, 1], and the memory for the next call; None: there was none."""
+        """The action for an observation, (4,) in [-1, 1], and the memory for the next call. Memory None: there was
+        none.
+        """
         ...
 
 
 @dataclass(frozen=True)
 class Runtime:
-    """A policy and where it is to fly. Make it with `Runtime.of`."""
+    """A policy, and where it has to fly. Create it with `Runtime.of`."""
 
     policy: Acting
     course: Course
     envelope: Envelope
     period: float
-    """Seconds between two questions to the policy."""
+    """Time between two calls of the policy, s."""
     low: np.ndarray
     """(4,) command at action -1."""
     span: np.ndarray
-    """(4,) from there to the command at action +1."""
+    """(4,) difference between the commands at action +1 and -1."""
 
     @staticmethod
     def of(
@@ -94,19 +99,19 @@ class Runtime:
         imu: bool = False,
         images: bool = False,
     ) -> "Runtime":
-        """Check that they fit together.
+        """Check that the parts fit together.
 
         Args:
-            policy: as loaded, or what acts as one.
-            course: as `e2efly.tasks.route.course_for` makes it.
-            vehicle: that flies.
-            control_rate: at which the policy will be asked, Hz; None: as it was trained.
-            envelope: in which state it may take over.
-            imu: whether `act` will be given measurements of an IMU.
+            policy: the loaded policy, or an object that acts as one.
+            course: the course, from `e2efly.tasks.route.course_for`.
+            vehicle: the vehicle that flies.
+            control_rate: the rate at which the policy will be called, Hz. None: the rate of its training.
+            envelope: the states in which the policy may take over.
+            imu: whether `act` will be given IMU measurements.
             images: whether `act` will be given the images that the contract asks for.
 
         Raises:
-            ValueError: naming all that does not fit, one a line.
+            ValueError: naming everything that does not fit, one item per line.
         """
         contract, envelope = policy.contract, envelope or Envelope()
         reasons = check(contract, vehicle, course.goal.fields, control_rate, imu=imu, images=images)
@@ -121,41 +126,42 @@ class Runtime:
 
 @dataclass(frozen=True)
 class RuntimeState:
-    """What one question to the policy hands to the next."""
+    """The state that one call of the policy passes to the next."""
 
     task: Any
     """State of the task."""
     outcome: Outcome | None
-    """Of the last step; None: there was none."""
+    """Outcome of the last step. None: there was no step."""
     failure: str
-    """Why the task can no longer be done; empty while it can."""
+    """The reason why the task can no longer be completed. Empty while it can."""
     odometry: Odometry
     """The motion that was last judged, in the task's world."""
     past_actions: np.ndarray
-    """(k, 4) float32, the policy's last actions, newest first; of k as many as it sees."""
+    """(k, 4) float32, the policy's last actions, newest first, where k is the number that it sees."""
     recurrent: Any
-    """Of a policy (m,) float32, its recurrent state; what another that acts remembers; None: it was not yet asked."""
+    """For a policy, (m,) float32: its recurrent state. For another object that acts, its memory. None: not yet
+    called."""
     began: float
     """When the policy took over, s on the monotonic clock."""
     slots: int
-    """Periods since then that are over: acted or missed."""
+    """Number of periods that are over since then: acted or missed."""
     steps: int
-    """Times that the policy has acted."""
+    """Number of times that the policy has acted."""
 
     judged: float = 0.0
     """When the outcome was judged, s since the policy took over."""
     done: bool = False
-    """Whether the task is over, and not for having failed in flight."""
+    """Whether the task is over, but not because of a failure in flight."""
 
     @property
     def missed(self) -> int:
-        """Periods in which the policy was not asked."""
+        """Number of periods in which the policy was not called."""
         return self.slots - self.steps
 
 
 @dataclass(frozen=True)
 class Decision:
-    """What the policy saw and wants."""
+    """What the policy saw and what it commands."""
 
     observation: np.ndarray
     """(o,) float32, as `contract.observation` says."""
@@ -166,11 +172,11 @@ class Decision:
     mode: str
     """The command mode."""
     position: np.ndarray | None
-    """(3,) where the goal is, world, m; None: there is no place to be."""
+    """(3,) position of the goal, world, m. None: there is no such place."""
     late_s: float
-    """By how much the question came after it was due, s."""
+    """Delay of the call after it was due, s."""
     inference_s: float
-    """What the network and its checks took, s."""
+    """Duration of the network and its checks, s."""
 
 
 def check(
@@ -182,15 +188,15 @@ def check(
     imu: bool = False,
     images: bool = False,
 ) -> tuple[str, ...]:
-    """Why a policy cannot fly here; empty: it can.
+    """The reasons why a policy cannot fly here. Empty: it can.
 
     Args:
-        contract: of the policy.
-        vehicle: that flies.
+        contract: the contract of the policy.
+        vehicle: the vehicle that flies.
         shown: the task's own fields of the observation.
-        control_rate: at which the policy will be asked, Hz; None: as it was trained.
-        imu: whether there are measurements of an IMU.
-        images: whether there are the images that the contract asks for.
+        control_rate: the rate at which the policy will be called, Hz. None: the rate of its training.
+        imu: whether IMU measurements are available.
+        images: whether the images that the contract asks for are available.
     """
     reasons = list(contract.refusals(vehicle))
     rate = contract.control_rate_hz
@@ -232,12 +238,12 @@ def check(
 
 
 def begin(runtime: Runtime, odometry: Odometry, now: float) -> RuntimeState:
-    """Hand over to the policy: the task starts, and it is shown hovering actions as its last ones, as in training.
+    """Hand over to the policy. The task starts. The policy is shown hover actions as its past actions, as in training.
 
     Args:
         runtime: the policy and its course.
         odometry: the newest motion.
-        now: s on the monotonic clock; the first action is due at once.
+        now: the time on the monotonic clock, s. The first action is due at once.
     """
     contract = runtime.policy.contract
     past = contract.slices.get(PAST_ACTIONS, slice(0, 0))
@@ -248,7 +254,9 @@ def begin(runtime: Runtime, odometry: Odometry, now: float) -> RuntimeState:
 
 
 def due(runtime: Runtime, state: RuntimeState) -> float:
-    """When the policy is next to be asked, s on the monotonic clock: on a grid from `begin`, without drift."""
+    """When the policy must be called next, s on the monotonic clock. The times lie on a grid from `begin`, without
+    drift.
+    """
     return state.began + state.slots * runtime.period
 
 
@@ -262,20 +270,22 @@ def act(
     seen: Odometry | None = None,
     images: Sequence[np.ndarray] = (),
 ) -> tuple[RuntimeState, Decision]:
-    """Ask the policy once.
+    """Call the policy once.
 
     Args:
         runtime: the policy and its course.
         state: from `begin` or the last `act`.
         odometry: the newest motion.
-        now: s on the monotonic clock; at or after `due`. Whole periods that have passed since count as missed.
-        imu: the newest measurement, for a policy that sees it.
-        seen: what the policy sees, where a simulation judges by the truth and shows it with an error; None: `odometry`.
-        images: the newest of each camera, in the contract's order.
+        now: the time on the monotonic clock, s, at or after `due`. Whole periods since `due` count as missed.
+        imu: the newest measurement, for a policy that sees an IMU.
+        seen: the motion that the policy sees, for a simulation that judges by the true motion but shows it with an
+            error. None: `odometry`.
+        images: the newest image of each camera, in the contract's order.
 
     Raises:
-        ValueError: whatever goes wrong, naming the field where there is one: a non-finite observation or action, an
-            attitude that is no unit quaternion, no IMU, an error of the network. Nothing is to be commanded then.
+        ValueError: for every problem, naming the field if there is one: a non-finite observation or action, an
+            attitude that is not a unit quaternion, a missing IMU, or an error of the network. The caller must then
+            command nothing.
     """
     course, local = runtime.course, odometry.seen_from(runtime.course.origin)
     state = judged(runtime, state, local, now)
@@ -310,7 +320,7 @@ def act(
 
 
 def judged(runtime: Runtime, state: RuntimeState, odometry: Odometry, now: float) -> RuntimeState:
-    """Let the task judge what the vehicle has done since the policy was last asked.
+    """Let the task judge what the vehicle has done since the last call of the policy.
 
     Args:
         runtime: the policy and its course.
@@ -336,14 +346,14 @@ def judged(runtime: Runtime, state: RuntimeState, odometry: Odometry, now: float
 def observe(
     runtime: Runtime, shown: np.ndarray, past_actions: np.ndarray, odometry: Odometry, imu: Imu | None = None
 ) -> np.ndarray:
-    """The observation, float32 (o,), as the training's environment makes it.
+    """The observation, float32 (o,), as the training environment makes it.
 
     Args:
         runtime: the policy and its course.
         shown: (k,) the task's own fields, in their order.
         past_actions: (a, 4) newest first.
         odometry: the motion, in the task's world.
-        imu: for a policy that sees it.
+        imu: the measurement, for a policy that sees an IMU.
 
     Raises:
         ValueError: when the policy sees an IMU and there is none.
@@ -371,13 +381,13 @@ def observe(
 
 
 def outside(runtime: Runtime, odometry: Odometry, now: float, state: RuntimeState | None = None) -> tuple[str, ...]:
-    """Why the policy should not fly from this state of the vehicle; empty: it may.
+    """The reasons why the policy should not fly from this state of the vehicle. Empty: it may.
 
     Args:
         runtime: the policy, its goal and its envelope.
         odometry: the newest motion.
         now: s on the monotonic clock.
-        state: of a flight that has begun; None: as if the policy took over now.
+        state: the state of a flight that has begun. None: as if the policy took over now.
     """
     envelope, course = runtime.envelope, runtime.course
     local = odometry.seen_from(course.origin)
@@ -400,7 +410,7 @@ def outside(runtime: Runtime, odometry: Odometry, now: float, state: RuntimeStat
 
 
 def beyond(limits: Sequence[tuple[str, float, float, str]]) -> tuple[str, ...]:
-    """Which values are beyond their limits, in words, of (name, value, limit, unit)."""
+    """The values beyond their limits, in words. Each is given as (name, value, limit, unit)."""
     return tuple(
         f"{name} is {value:.3g} {unit}; accepted: at most {limit:.3g}"
         for name, value, limit, unit in limits

@@ -1,4 +1,4 @@
-"""Ask the policy in a thread of its own, so that a slow or stuck policy never holds up the control loop."""
+"""Call the policy in its own thread, so that a slow or stuck policy never delays the control loop."""
 
 import os
 import threading
@@ -19,80 +19,82 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 
 class Worker(Protocol):
-    """What flies in mode POLICY: a policy, or a commander outside (`e2efly.deploy.commander`). Nothing here raises."""
+    """What flies in mode POLICY: a policy, or commands from another program (`e2efly.deploy.commander`). It never
+    raises.
+    """
 
     name: str
-    """What the log calls it."""
+    """The name in the log."""
     state: Any
-    """Of the flight under way; None: it does not fly."""
+    """State of the current flight. None: it does not fly."""
     decision: Decision | None
-    """The last one: it is flown until the next."""
+    """The last decision. It is flown until the next one."""
     problem: str | None
-    """Why it failed in this flight."""
+    """The reason for its failure in this flight."""
 
     @property
     def native_id(self) -> int | None:
-        """Of its thread, as the operating system knows it; None: it has none."""
+        """The operating system's id of its thread. None: it has no thread."""
         ...
 
     @property
     def images(self) -> tuple[Image, ...]:
-        """What it sees."""
+        """The images that it sees."""
         ...
 
     @property
     def lands(self) -> bool:
-        """Its task is to land."""
+        """Whether its task is to land."""
         ...
 
     @property
     def done(self) -> bool:
-        """Its task is over."""
+        """Whether its task is over."""
         ...
 
     def hear(self, odometry: Odometry | None, now: float) -> None:
-        """At every control step, whoever flies: take in what has come for it."""
+        """Receive new data for it. Called at every control step, whatever flies."""
         ...
 
     def readiness(self, odometry: Odometry, now: float) -> str | None:
-        """Why it must not take over now; None: it may."""
+        """The reason why it must not take over now. None: it may."""
         ...
 
     def start(self, odometry: Odometry, now: float) -> None:
-        """It takes over."""
+        """Let it take over."""
         ...
 
     def stop(self) -> None:
-        """It flies no more."""
+        """Stop its flight."""
         ...
 
     def step(
         self, odometry: Odometry, now: float, slack: float, imu: Imu | None, images: Sequence[np.ndarray] = ()
     ) -> bool:
-        """Let it decide; whether there is something new to record."""
+        """Let it decide. Returns whether there is a new decision to record."""
         ...
 
     def close(self) -> None:
-        """Let go of everything."""
+        """Release all resources."""
         ...
 
 
 class PolicyWorker:
-    """The policy of a flight. None of its methods raises for what the policy does."""
+    """The policy of a flight. No method raises, whatever the policy does."""
 
     name = "policy"
 
     def __init__(self, runtime: Runtime, timeout: float) -> None:
         self.runtime, self.timeout = runtime, timeout
-        """The policy with its goal; how long a step waits for it, s."""
+        """The policy with its goal, and how long a step waits for it, s."""
         self.state: RuntimeState | None = None
-        """Of the flight under way."""
+        """State of the current flight."""
         self.last: RuntimeState | None = None
-        """The newest of the flight under way, or of the last one."""
+        """The newest state of the current flight, or of the last one."""
         self.decision: Decision | None = None
-        """The last one: it is flown until the next is due."""
+        """The last decision. It is flown until the next one is due."""
         self.problem: str | None = None
-        """Why the policy failed in this flight."""
+        """The reason for the policy's failure in this flight."""
         self._questions: SimpleQueue[tuple[Future, tuple[Any, ...]] | None] = SimpleQueue()
         self._running: Future | None = None
         # a daemon: not even a policy that never answers keeps the program from ending
@@ -101,47 +103,49 @@ class PolicyWorker:
 
     @property
     def native_id(self) -> int:
-        """Of its thread, as the operating system knows it."""
+        """The operating system's id of its thread."""
         assert self._thread.native_id is not None
         return self._thread.native_id
 
     @property
     def images(self) -> tuple[Image, ...]:
-        """What its contract says that it sees."""
+        """The images that the contract names."""
         return self.runtime.policy.contract.images
 
     @property
     def lands(self) -> bool:
-        """Its task is to land."""
+        """Whether its task is to land."""
         return self.runtime.course.goal.lands
 
     @property
     def done(self) -> bool:
-        """Its task is over."""
+        """Whether its task is over."""
         return self.state is not None and self.state.done
 
     def hear(self, odometry: Odometry | None, now: float) -> None:
-        """Nothing comes for a policy."""
+        """Do nothing: a policy receives no data."""
 
     def readiness(self, odometry: Odometry, now: float) -> str | None:
-        """Why it must not take over now; None: it may."""
+        """The reason why it must not take over now. None: it may."""
         if self._busy:
             return "it is still busy with an earlier question"
         return "; ".join(outside(self.runtime, odometry, now)) or None
 
     def start(self, odometry: Odometry, now: float) -> None:
-        """It takes over."""
+        """Let it take over."""
         self.problem = self.decision = None
         self.state = begin(self.runtime, odometry, now)
 
     def stop(self) -> None:
-        """It flies no more."""
+        """Stop its flight."""
         self.state = self.decision = None
 
     def step(
         self, odometry: Odometry, now: float, slack: float, imu: Imu | None, images: Sequence[np.ndarray] = ()
     ) -> bool:
-        """Ask it, where it is due within `slack` s; whether it has decided anew. What goes wrong is in `problem`."""
+        """Call the policy if it is due within `slack` s. Returns whether it made a new decision. Errors are in
+        `problem`.
+        """
         state = self.state
         if state is None or now + slack < due(self.runtime, state):
             return False
@@ -166,7 +170,7 @@ class PolicyWorker:
         return False
 
     def close(self) -> None:
-        """End the thread, once the policy lets it."""
+        """End the thread as soon as the policy returns."""
         self._questions.put(None)
 
     @property
@@ -186,7 +190,9 @@ class PolicyWorker:
 
 
 def _try_out(runtime: Runtime) -> None:
-    """Ask once for nothing, in the thread that will be asked in flight: the first answer takes longer than others."""
+    """Call the policy once without effect, in the thread that is used in flight: the first call takes longer than
+    others.
+    """
     course, zero = runtime.course, np.zeros(3)
     still = Odometry(0.0, np.asarray(course.origin.points(course.start)), zero, np.array([1.0, 0.0, 0.0, 0.0]), zero)
     images = [np.zeros(image.shape, np.float32) for image in runtime.policy.contract.images]

@@ -1,4 +1,4 @@
-"""Options and recipes: fly fast through a random forest that is only seen."""
+"""Options and recipes: fly fast through a random forest, seen only by a camera."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ from e2efly.tasks.registry import register
 @register("avoid")
 @dataclass(frozen=True)
 class AvoidConfig(TaskConfig):
-    """Fly fast through a random forest that is only seen."""
+    """Fly fast through a random forest, seen only by a camera."""
 
     world: ClassVar[str] = "e2efly.tasks.avoid.world:Avoid"
     goal_class: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidGoal"
@@ -49,17 +49,17 @@ class AvoidConfig(TaskConfig):
     episode_s: float = 20.0
     """Length of an episode, s."""
     forest: ForestConfig = ForestConfig()
-    """The forest; its lane is also the fence."""
+    """The forest. Its lane is also the fence."""
     speed: tuple[float, float] = number((3.0, 10.0), rising=True)
     """Commanded speed, m/s, uniform per episode."""
     sideways: float = 3.0
-    """Start within this of the middle of the lane, m."""
+    """Largest start distance from the middle of the lane, m."""
     altitude: float = 1.5
-    """Where to fly, m over the ground."""
+    """Height to fly at above the ground, m."""
     ceiling: float = number(3.0, endless=True)
-    """Higher than this the episode fails, m."""
+    """The episode fails above this height, m."""
     collisions_end: bool = True
-    """Whether a collision ends the episode; training goes on, so that it learns from what comes after."""
+    """Whether a collision ends the episode. In training it does not, so that the policy learns from what follows."""
 
     @classmethod
     def training(cls) -> "AvoidConfig":
@@ -67,7 +67,7 @@ class AvoidConfig(TaskConfig):
         return cls(collisions_end=False)
 
     def criteria(self) -> dict[str, TaskConfig]:
-        """Three speeds; collisions end the episode."""
+        """Three speeds. Collisions end the episode."""
         return {
             f"{self.name}_{speed:g}": dataclasses.replace(self, speed=(speed, speed), collisions_end=True)
             for speed in (5.0, 8.0, 10.0)
@@ -75,7 +75,7 @@ class AvoidConfig(TaskConfig):
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """By gradients, an expert who knows every tree is imitated, and its trees are kept off."""
+        """With gradients: imitate an expert that knows every tree, and keep away from the trees."""
         weights = {"imitate": 1.0, "avoid": 10.0}
         parameters = {"avoid_reach": 0.5}
         settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=3e-4, gradient_decay=1.5, average=0.99)

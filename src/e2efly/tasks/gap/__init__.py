@@ -1,4 +1,4 @@
-"""Options and recipes: fly through a narrow slit in a wall, tilted so that only a banked vehicle fits."""
+"""Options and recipes: fly through a narrow slit in a wall. The slit is tilted, so only a banked vehicle fits."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from e2efly.tasks.registry import register
 @register("gap")
 @dataclass(frozen=True)
 class GapConfig(TaskConfig):
-    """Fly through a narrow slit in a wall, tilted so that only a banked vehicle fits."""
+    """Fly through a narrow slit in a wall. The slit is tilted, so only a banked vehicle fits."""
 
     world: ClassVar[str] = "e2efly.tasks.gap.world:Gap"
     goal_class: ClassVar[str] = "e2efly.tasks.gap.goal:GapGoal"
@@ -22,33 +22,33 @@ class GapConfig(TaskConfig):
     episode_s: float = 6.0
     """Length of an episode, s."""
     distance: tuple[float, float] = number((2.5, 4.0), rising=True)
-    """From the start to the slit, m, uniform."""
+    """Distance from the start to the slit, m, uniform."""
     sideways: float = 0.5
-    """Half-width of the slit's random place about straight ahead, m per axis."""
+    """Half-width of the slit's random offset from straight ahead, m per axis."""
     altitude: float = 2.0
     """Height of the start, m."""
     yaw: float = 0.3
-    """Half-width of the wall's random turn about up, rad."""
+    """Half-width of the wall's random rotation about the up axis, rad."""
     roll: tuple[float, float] = number((0.4, 0.8), rising=True)
     """Tilt of the slit to either side, rad, uniform."""
     opening: tuple[float, float] = number((0.7, 0.18), above=0)
     """Long and short side of the slit, m."""
     thickness: float = 0.1
-    """Of the wall, m."""
+    """Thickness of the wall, m."""
     approach: float = 1.5
-    """From this distance to the wall on, the vehicle counts as approaching, m."""
+    """The vehicle counts as approaching when it is nearer to the wall than this, m."""
     beyond: float = 2.0
-    """Success: reach the point this far behind the slit ..."""
+    """Success: distance behind the slit of the point that must be reached, m."""
     radius: float = number(0.5, above=0)
-    """... to within this, m."""
+    """Success: largest distance from that point, m."""
     fence: float = number(6.0, above=0, endless=True)
-    """Farther than this from the next target the episode fails, m."""
+    """The episode fails farther than this from the next target, m."""
     collisions_end: bool = True
-    """Whether a collision ends the episode; training goes on, so that it learns from what comes after."""
+    """Whether a collision ends the episode. In training it does not, so that the policy learns from what follows."""
 
     @property
     def own_worlds(self) -> bool:
-        """Its wall."""
+        """Each episode has its own wall."""
         return True
 
     @classmethod
@@ -62,7 +62,7 @@ class GapConfig(TaskConfig):
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """Rewards for coming nearer, and for an attitude and a place that fit through."""
+        """Rewards for coming nearer, and for an attitude and a position with which the vehicle fits."""
         constants = {"desired_speed": 2.0, "fit_margin": 0.02, "fit_limit": 0.1}
         if algo == "ppo":
             weights = {

@@ -56,43 +56,43 @@ class HoverConfig(TaskConfig):
     episode_s: float = 8.0
     """Length of an episode, s."""
     judged_s: float = 0.0
-    """Length of the episodes that the policy is judged by, s; 0: the same."""
+    """Length of the episodes by which the policy is judged, s. 0: the same as `episode_s`."""
     target: tuple[float, float, float] = number(defaults.TARGET, low=-math.inf)
     """Where to hover, world, m."""
     position: float = 2.0
-    """Start within this of the target, m per axis."""
+    """Largest start distance from the target, m per axis."""
     velocity: float = 1.0
-    """Start velocity, m/s per axis, uniform in +-."""
+    """Largest start velocity, m/s per axis, in either direction; drawn uniformly."""
     tilt: float = 0.5235987755982988
-    """Start roll and pitch, rad, uniform in +-."""
+    """Largest start roll and pitch, rad, in either direction; drawn uniformly."""
     body_rate: float = 1.0
-    """Start body rates, rad/s per axis, uniform in +-."""
+    """Largest start body rates, rad/s per axis, in either direction; drawn uniformly."""
     radius: float = number(0.1, above=0)
-    """Success: within this of the target, m, ..."""
+    """Success: largest distance from the target, m."""
     hold_s: float = 1.0
-    """... for this last part of the episode, s."""
+    """Success: the distance must hold during this last part of the episode, s."""
     fence: float = number(defaults.HOVER_FENCE, above=0, endless=True)
-    """Farther than this from the target the episode fails, m."""
+    """The episode fails farther than this from the target, m."""
     spin: float = number(35.0, above=0, endless=True)
-    """Turning faster than this the episode fails, rad/s: gyroscopes measure up to 2000 degrees per second. Without a
-    rate loop nothing else ends a tumble."""
+    """The episode fails at a higher body rate than this, rad/s: gyroscopes measure up to 2000 degrees per second.
+    Without a rate loop, nothing else ends a tumble."""
 
     def criteria(self) -> dict[str, TaskConfig]:
-        """Episodes of `judged_s`, where that is not 0."""
+        """Episodes of length `judged_s`, if that is not 0."""
         return {self.name: dataclasses.replace(self, episode_s=self.judged_s or self.episode_s)}
 
     def limits(self) -> dict[str, float]:
-        """The radius."""
+        """The largest distance from the target."""
         return {"final_error": float(self.radius)}
 
     def drawing(self) -> list[Thing]:
-        """The target and the circle about it."""
+        """The target and the circle of the success radius."""
         target = np.asarray(self.target, float)
         return [Mark(target, marker="*", label="target"), Line(circle(target, float(self.radius)), INK, 1.0)]
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """PPO's reward pays for being near; BPTT's for coming nearer."""
+        """PPO's reward pays for being near the target; BPTT's reward pays for coming nearer."""
         if algo == "ppo":
             weights = {"near": 1.0, "v1": 0.02, "anglev_sq": 0.002, "act2_sq": 0.02}
             return TrainConfig(cls(), PPOConfig(), RewardConfig(weights), steps=2_500_000)
@@ -101,12 +101,12 @@ class HoverConfig(TaskConfig):
 
     @classmethod
     def variant(cls, preset: str, config: TrainConfig) -> TrainConfig:
-        """`thrown`: hover from any attitude, tumbling and fast, as a vehicle that was thrown.
+        """`thrown`: hover after being thrown: from any attitude, tumbling, and at high speed.
 
-        Training has short episodes: what is to be learned is in their first seconds. The target is 5 m up: from 3 m
-        some starts hit the ground whatever is done (docs/tasks.md).
+        The training episodes are short, because the behaviour to learn happens in the first seconds. The target is at
+        a height of 5 m: at 3 m, some starts hit the ground whatever the policy does (docs/tasks.md).
 
-        `rotors`: hover by the thrusts of the rotors, 100 times a second, with a memory; delays of up to 34 ms.
+        `rotors`: hover by rotor thrusts at 100 Hz, with a memory, and with delays of up to 34 ms.
         """
         if preset == "rotors":
             if not isinstance(config.algo, BPTTConfig):

@@ -29,44 +29,45 @@ class HoverAwareConfig(TaskConfig):
     episode_s: float = 8.0
     """Length of an episode, s."""
     target: tuple[float, float, float] = number(defaults.TARGET, low=-math.inf)
-    """Where to hover, world, m."""
+    """The hover point, world frame, m."""
     position: float = 1.5
-    """Start within this of the target, m per axis."""
+    """Largest start distance from the hover point, m per axis."""
     velocity: float = 0.5
-    """Start velocity, m/s per axis, uniform in +-."""
+    """Largest start velocity, m/s per axis, in either direction; drawn uniformly."""
     tilt: float = 0.2617993877991494
-    """Start roll and pitch, rad, uniform in +-; any heading."""
+    """Largest start roll and pitch, rad, in either direction; drawn uniformly. The heading is arbitrary."""
     distance: tuple[float, float] = number((4.0, 6.0), rising=True)
-    """From where to hover to what to look at, m, uniform."""
+    """Distance from the hover point to the object to look at, m, uniform."""
     elevation: float = 0.2
-    """What to look at is within this of the height of where to hover, m."""
+    """Largest height difference between the object and the hover point, m."""
     turn_rate: float = 0.2
-    """It circles around where to hover at up to this, rad/s, either way."""
+    """Largest rate at which the object circles around the hover point, in either direction, rad/s."""
     size: float = 0.2
-    """Radius of what to look at, m."""
+    """Radius of the object to look at, m."""
     fov: tuple[float, float] = number((1.518436449235301, 1.0122909661567112), above=0)
-    """Of the camera: horizontal and vertical, rad."""
+    """Horizontal and vertical field of view of the camera, rad."""
     camera_position: tuple[float, float, float] = number((0.0, 0.0, 0.0), low=-math.inf)
-    """Where the camera sits, body frame (forward, left, up), m."""
+    """Position of the camera in the body frame (forward, left, up), m."""
     camera_pitch: float = number(0.0, low=-math.inf)
-    """Of the camera, downwards from straight ahead, rad."""
+    """Downward pitch of the camera from straight ahead, rad."""
     radius: float = number(0.1, above=0)
-    """Success: within this of the target, m, ..."""
+    """Success: largest distance from the hover point, m."""
     centred: float = 0.25
-    """... what to look at within this share of half the image from its middle, across and down, ..."""
+    """Success: largest offset of the object from the image centre, horizontally and vertically, as a share of half the
+    image."""
     hold_s: float = 1.0
-    """... for this last part of the episode, s."""
+    """Success: both must hold during this last part of the episode, s."""
     fence: float = number(defaults.HOVER_FENCE, above=0, endless=True)
-    """Farther than this from the target the episode fails, m."""
+    """The episode fails farther than this from the hover point, m."""
 
     @property
     def own_worlds(self) -> bool:
-        """What it looks at."""
+        """Each episode has its own object to look at."""
         return True
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """As hover's, with rewards for looking at the target."""
+        """As for hover, with rewards for looking at the object."""
         if algo == "ppo":
             weights = {"near": 1.0, "ori1": 1.0, "ori3": 1.0, "v1": 0.02, "anglev_sq": 0.002, "act2_sq": 0.02}
             return TrainConfig(cls(), PPOConfig(), RewardConfig(weights), steps=3_000_000)

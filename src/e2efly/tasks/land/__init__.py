@@ -58,21 +58,21 @@ class LandConfig(TaskConfig):
     episode_s: float = 10.0
     """Length of an episode, s."""
     sideways: float = 2.0
-    """Start within this of the pad's centre, m per axis."""
+    """Largest start distance from the pad's centre, m per axis."""
     height: tuple[float, float] = number((1.0, 3.0), rising=True)
-    """Start height of the feet, m."""
+    """Height of the feet at the start, m."""
     velocity: float = 0.5
-    """Start velocity, m/s per axis, uniform in +-."""
+    """Largest start velocity, m/s per axis, in either direction; drawn uniformly."""
     radius: float = number(0.10, above=0)
-    """Success: horizontal error at touch, m."""
+    """Success: largest horizontal error at touchdown, m."""
     height_error: float = 0.05
-    """Success: height error at touch, m."""
+    """Success: largest height error at touchdown, m."""
     speed: float = 0.5
-    """Success: speed at touch, m/s."""
+    """Success: largest speed at touchdown, m/s."""
     tilt: float = 0.2617993877991494
-    """Success: tilt at touch, rad."""
+    """Success: largest tilt at touchdown, rad."""
     fence: float = number(defaults.LAND_FENCE, above=0, endless=True)
-    """Farther than this from the pad, sideways or up, the episode fails, m."""
+    """The episode fails farther than this from the pad, sideways or upwards, m."""
 
     def limits(self) -> dict[str, float]:
         """The pad's radius."""
@@ -85,7 +85,7 @@ class LandConfig(TaskConfig):
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """Rewards for coming nearer, sinking and staying upright."""
+        """Rewards for coming nearer, descending and staying upright."""
         if algo == "ppo":
             weights = {
                 "prog1": 4.0, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02,

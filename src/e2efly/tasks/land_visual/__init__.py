@@ -1,4 +1,4 @@
-"""Options and recipes: touch down gently on a pad that is only seen."""
+"""Options and recipes: touch down gently on a pad, seen only by a camera."""
 
 import math
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from e2efly.tasks.registry import register
 @register("land_visual")
 @dataclass(frozen=True)
 class LandVisualConfig(TaskConfig):
-    """Touch down gently on a pad that is only seen."""
+    """Touch down gently on a pad, seen only by a camera."""
 
     world: ClassVar[str] = "e2efly.tasks.land_visual.world:LandVisual"
     goal_class: ClassVar[str] = "e2efly.tasks.land_visual.goal:LandVisualGoal"
@@ -42,29 +42,29 @@ class LandVisualConfig(TaskConfig):
     episode_s: float = 10.0
     """Length of an episode, s."""
     sideways: float = 1.0
-    """Start within this of the pad's centre, m per axis."""
+    """Largest start distance from the pad's centre, m per axis."""
     height: tuple[float, float] = number((1.0, 3.0), rising=True)
-    """Start height of the feet over the pad, m."""
+    """Height of the feet above the pad at the start, m."""
     velocity: float = 0.5
-    """Start velocity, m/s per axis, uniform in +-."""
+    """Largest start velocity, m/s per axis, in either direction; drawn uniformly."""
     pad_size: tuple[float, float] = number((0.4, 0.6), rising=True)
-    """Width of the pad, m, uniform; its shape is a disc, a square or a triangle."""
+    """Width of the pad, m, uniform. Its shape is a disc, a square or a triangle."""
     pad_height: float = 0.2
-    """Height of the pad over the ground, m."""
+    """Height of the pad above the ground, m."""
     radius: float = number(0.10, above=0)
-    """Success: horizontal error at touch, m."""
+    """Success: largest horizontal error at touchdown, m."""
     height_error: float = 0.05
-    """Success: height error at touch, m."""
+    """Success: largest height error at touchdown, m."""
     speed: float = 0.5
-    """Success: speed at touch, m/s."""
+    """Success: largest speed at touchdown, m/s."""
     tilt: float = 0.2617993877991494
-    """Success: tilt at touch, rad."""
+    """Success: largest tilt at touchdown, rad."""
     fence: float = number(defaults.LAND_FENCE, above=0, endless=True)
-    """Farther than this from the pad, sideways or up, the episode fails, m."""
+    """The episode fails farther than this from the pad, sideways or upwards, m."""
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """As landing's, with small images."""
+        """As for landing, with small images."""
         weights = {"progxy": 1.0, "descent": 1.0, "upright": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02}
         settings: AlgorithmConfig = BPTTConfig(envs=32, horizon=48, learning_rate_end=1.2e-4)
         steps = 650_000

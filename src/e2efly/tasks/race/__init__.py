@@ -27,11 +27,11 @@ from e2efly.drawing import ORANGE, Face, Mark, Thing
 from e2efly.tasks.registry import register
 
 ANY = "any"
-"""The name of a track that is another one in every episode."""
+"""The track name that gives a different track in every episode."""
 ANY_TRACK = "any_track"
-"""The preset for that."""
+"""The preset for such tracks."""
 LONGEST = 30.0
-"""Length of its episodes, s."""
+"""Length of episodes on such tracks, s."""
 
 
 @register("race")
@@ -76,40 +76,40 @@ class RaceConfig(TaskConfig):
     episode_s: float = 12.0
     """Length of an episode, s."""
     track: str = shape(defaults.TRACK)
-    """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file (its gate count sets shapes); any: every
-    episode another one, at random."""
+    """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file (the number of gates sets shapes). any: a
+    random track in every episode."""
     position: float = 1.0
-    """Start within this ball about the track's start, m."""
+    """Radius of the ball around the track's start in which episodes start, m."""
     laps: int = 1
-    """Laps that end the episode with success; 0: fly on until time is out."""
+    """Number of laps that end the episode with success. 0: fly on until the time is over."""
     fence: float = number(defaults.RACE_FENCE, above=0, endless=True)
-    """Farther than this from the next gate the episode fails, m; where more is shown, by so much farther than the gate
-    before it."""
+    """The episode fails farther than this from the next gate, m. With shows_more, the distance between the previous
+    gate (or the start) and the next gate is added."""
     shows_more: bool = shape(False)
-    """Whether the policy is shown what any track needs: the next three gates with axes and openings, and the height
-    over the ground; with track any it always is."""
+    """Whether the policy sees what it needs for any track: the next three gates with their axes and openings, and the
+    height above the ground. With track any, it always does."""
 
     @property
     def any_track(self) -> bool:
-        """Whether the policy is shown what any track needs."""
+        """Whether the policy sees what it needs for any track."""
         return self.shows_more or self.track == ANY
 
     @classmethod
     def training(cls) -> "RaceConfig":
-        """Lap after lap; it is judged on one."""
+        """Lap after lap in training. The policy is judged on one lap."""
         return cls(laps=0)
 
     def criteria(self) -> dict[str, TaskConfig]:
-        """One lap, or as many as are asked for."""
+        """One lap, or the requested number of laps."""
         return {self.name: dataclasses.replace(self, laps=max(self.laps, 1))}
 
     @property
     def own_worlds(self) -> bool:
-        """With any track."""
+        """With track any, each episode has its own world."""
         return self.track == ANY
 
     def showing(self, names: Sequence[str]) -> "RaceConfig":
-        """For a policy that is shown axes of gates: any track, where none else is named."""
+        """For a policy whose observation has the gates' axes: track any, if no other track is named."""
         if "gate_axes" not in names:
             return self
         other = {} if self.any_track else {"track": ANY, "episode_s": LONGEST}
@@ -132,7 +132,7 @@ class RaceConfig(TaskConfig):
 
     @classmethod
     def variant(cls, preset: str, config: TrainConfig) -> TrainConfig:
-        """`any_track`: another track in every episode; the way to a gate leads around from behind it."""
+        """`any_track`: a different track in every episode. From behind a gate, the way leads around it."""
         del preset
         weights = {"progway" if name == "prog1" else name: weight for name, weight in config.reward.weights.items()}
         weights = {name: weight for name, weight in weights.items() if name != "near"} | {"fitlog": 1.0}
@@ -154,7 +154,7 @@ class RaceConfig(TaskConfig):
 
     @classmethod
     def with_critic(cls, algo: str) -> dict[str, Any]:
-        """Longer windows than other tasks have; SHAC needs smaller steps and more noise."""
+        """Longer windows than for other tasks. SHAC needs a smaller learning rate and more noise."""
         longer = {} if algo == "abpt" else {"horizon": 64}
         return longer | ({"learning_rate": 4e-3, "noise": 0.1} if algo == "shac" else {})
 

@@ -1,4 +1,4 @@
-"""Options and recipes: fly through gates in order, among obstacles that are only seen."""
+"""Options and recipes: fly through gates in order, among obstacles seen only by a camera."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ from e2efly.tasks.registry import register
 @register("race_clutter")
 @dataclass(frozen=True)
 class RaceClutterConfig(TaskConfig):
-    """Fly through gates in order, among obstacles that are only seen."""
+    """Fly through gates in order, among obstacles seen only by a camera."""
 
     world: ClassVar[str] = "e2efly.tasks.race_clutter.world:RaceClutter"
     goal_class: ClassVar[str] = "e2efly.tasks.race_clutter.goal:RaceClutterGoal"
@@ -55,36 +55,36 @@ class RaceClutterConfig(TaskConfig):
     episode_s: float = 20.0
     """Length of an episode, s."""
     track: tuple[str, ...] = shape(("s_shaped", "circle_3d", "j_shaped"))
-    """One or more of four_gates, s_shaped, circle_3d, j_shaped, or paths of .toml files; every episode has one of them
+    """One or more of four_gates, s_shaped, circle_3d, j_shaped, or paths of .toml files. Every episode uses one of them
     (their number and their gates set shapes)."""
     only: float = number(-1.0, low=-1)
-    """Which of them every episode has, counted from 0; -1: any."""
+    """Number of the track that every episode uses, counted from 0. -1: any of them."""
     scale: float = number(2.0, above=0)
-    """The track's ground plan is this many times larger: wide enough for 10 m/s."""
+    """Factor on the track's ground plan. The default makes it wide enough for 10 m/s."""
     clutter: ClutterConfig = ClutterConfig()
     """The obstacles."""
     gate_position: float = 0.3
-    """Half-width of each gate's random place about the track's, m per axis."""
+    """Half-width of each gate's random offset from its place on the track, m per axis."""
     gate_yaw: float = 0.2
-    """Half-width of each gate's random turn, rad."""
+    """Half-width of each gate's random rotation, rad."""
     speed: tuple[float, float] = number((4.0, 12.0), rising=True)
     """Commanded speed, m/s, uniform per episode."""
     position: float = 0.5
-    """Start within this ball about the track's start, m."""
+    """Radius of the ball around the track's start in which episodes start, m."""
     laps: int = 1
-    """Laps that end the episode with success; 0: fly on until time is out."""
+    """Number of laps that end the episode with success. 0: fly on until the time is over."""
     fence: float = number(20.0, above=0, endless=True)
-    """Farther than this from the next gate the episode fails, m."""
+    """The episode fails farther than this from the next gate, m."""
     collisions_end: bool = True
-    """Whether a collision ends the episode; training goes on, so that it learns from what comes after."""
+    """Whether a collision ends the episode. In training it does not, so that the policy learns from what follows."""
 
     @classmethod
     def training(cls) -> "RaceClutterConfig":
-        """Lap after lap, through whatever it strikes."""
+        """Lap after lap. Collisions do not end the episode."""
         return cls(laps=0, collisions_end=False)
 
     def criteria(self) -> dict[str, TaskConfig]:
-        """Each track: one lap, or as many as are asked for; collisions end the episode."""
+        """Each track, with one lap or the requested number of laps. Collisions end the episode."""
         judged = dataclasses.replace(self, laps=max(self.laps, 1), collisions_end=True)
         if len(self.track) == 1:
             return {self.name: judged}
@@ -92,7 +92,7 @@ class RaceClutterConfig(TaskConfig):
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """Rewards for the velocity that leads through the gates, and for keeping off the obstacles."""
+        """Rewards for the velocity that leads through the gates, and for keeping away from the obstacles."""
         weights = {
             "vel": 1.5, "near": 1.0, "avoid": 12.0, "fit": 20.0, "ori2": 0.3, "anglev_sq": 0.01, "act2_sq": 0.02,
         }  # fmt: skip

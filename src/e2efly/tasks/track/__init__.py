@@ -1,4 +1,4 @@
-"""Options and recipes: follow a reference that is seen one second ahead."""
+"""Options and recipes: follow a reference trajectory that is known one second ahead."""
 
 import dataclasses
 import math
@@ -24,7 +24,7 @@ from e2efly.tasks.registry import register
 @register("track")
 @dataclass(frozen=True)
 class TrackConfig(TaskConfig):
-    """Follow a reference that is seen one second ahead."""
+    """Follow a reference trajectory that is known one second ahead."""
 
     world: ClassVar[str] = "e2efly.tasks.track.world:Track"
     goal_class: ClassVar[str] = "e2efly.tasks.track.goal:TrackGoal"
@@ -59,32 +59,33 @@ class TrackConfig(TaskConfig):
     episode_s: float = 10.0
     """Length of an episode, s (sets shapes)."""
     reference: str = shape("polynomial")
-    """polynomial (random, smooth), circle, lemniscate, or the path of a .csv file with columns t, x, y, z."""
+    """Reference: polynomial (random, smooth), circle, lemniscate, or the path of a .csv file with columns t, x, y,
+    z."""
     centre: tuple[float, float, float] = number(defaults.CENTRE, low=-math.inf)
     """Centre of the reference, world, m."""
     position: float = 1.0
-    """Start within this ball about the reference, m."""
+    """Radius of the ball around the reference in which episodes start, m."""
     velocity: float = 0.5
-    """Start velocity, m/s per axis, uniform in +-."""
+    """Largest start velocity, m/s per axis, in either direction; drawn uniformly."""
     settle_s: float = 2.0
-    """The error counts after this time, s."""
+    """Time after which the error counts, s."""
     mean_error: float = 0.08
-    """Success: mean distance to the reference, m."""
+    """Success: largest mean distance to the reference, m."""
     fence: float = number(defaults.TRACK_FENCE, above=0, endless=True)
-    """Farther than this from the reference the episode fails, m."""
+    """The episode fails farther than this from the reference, m."""
     radius: float = number(defaults.RADIUS, above=0)
-    """Circle: radius; lemniscate: half its length, m."""
+    """Circle: its radius, m. Lemniscate: half its length, m."""
     circle_rate: float = number(defaults.CIRCLE_RATE, low=-math.inf)
     """Circle: angular rate, rad/s."""
     lemniscate_speed: float = defaults.LEMNISCATE_SPEED
-    """Lemniscate: top speed, m/s."""
+    """Lemniscate: highest speed, m/s."""
     polynomial_reach: float = 2.0
-    """Random polynomial: its knots lie within this of the centre, m per axis."""
+    """Random polynomial: largest distance of its knots from the centre, m per axis."""
     polynomial_speed: float = 2.5
     """Random polynomial: largest speed at a knot, m/s."""
 
     def criteria(self) -> dict[str, TaskConfig]:
-        """Trained on random references it is judged on a circle and on a lemniscate, which it never saw."""
+        """A policy trained on random references is judged on a circle and a lemniscate, which it has never seen."""
         if self.reference != "polynomial":
             return {self.name: self}
         return {
@@ -93,7 +94,9 @@ class TrackConfig(TaskConfig):
         }
 
     def course(self) -> dict[str, Any]:
-        """The reference, but for the phase that an episode draws, or the knots of its polynomial."""
+        """The reference. For a random reference, without the phase that an episode draws or the knots of its
+        polynomial.
+        """
         shared: dict[str, Any] = {"reference": self.reference, "duration_s": float(self.episode_s)}
         centre = {"centre_m": [float(x) for x in self.centre]}
         if self.reference == "circle":
@@ -109,7 +112,7 @@ class TrackConfig(TaskConfig):
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """PPO's reward pays for being near; BPTT's for coming nearer."""
+        """PPO's reward pays for being near the reference; BPTT's reward pays for coming nearer."""
         if algo == "ppo":
             weights = {"near": 1.0, "anglev_sq": 0.002, "act2_sq": 0.02}
             settings: AlgorithmConfig = PPOConfig(horizon=48, gamma=0.95, learning_rate=5e-3)
