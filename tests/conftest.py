@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from e2efly.device import set_xla_options
+from e2efly import device
 
 QUICK = (
     "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
@@ -18,7 +18,7 @@ QUICK = (
 What tests start has them where a test hands them on: where it waits for compilation, and not for what is compiled.
 """
 os.environ["JAX_NUM_CPU_DEVICES"] = "2"
-set_xla_options()  # as the commands do, before anything computes
+device.set_xla_options()  # as the commands do, before anything computes
 _usual = os.environ["XLA_FLAGS"]
 os.environ["XLA_FLAGS"] = f"{_usual} {QUICK}"
 
@@ -56,6 +56,12 @@ def _programs_go() -> Iterator[None]:
     """A file's compiled programs go with it: all together they are many gigabytes."""
     yield
     jax.clear_caches()
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No options for single programs: QUICK compiles sooner than `fast_compile` does. For runs of a few updates."""
+    monkeypatch.setattr(device, "FAST_COMPILE", {})
 
 
 @pytest.fixture

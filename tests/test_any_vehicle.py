@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import jax
@@ -10,10 +11,10 @@ import numpy as np
 import pytest
 
 import e2efly
-from e2efly import presets
+from e2efly import device, presets
 from e2efly.cli import run
 from e2efly.commands.train import parse
-from e2efly.config import BPTTConfig, DisturbanceConfig, NetworkConfig
+from e2efly.config import DisturbanceConfig, NetworkConfig, PPOConfig
 from e2efly.deploy.policy.contract import Contract
 from e2efly.deploy.policy.loader import level_and_still
 from e2efly.env import Env, random_key
@@ -24,12 +25,20 @@ from e2efly.vehicles import Vehicle, load_family, load_vehicle, vehicle_file
 from e2efly.vehicles.family import Family, _loaded
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _quick() -> Iterator[None]:
+    """The suite's options (QUICK) hold as they are, which compile sooner than `fast_compile` does: for tiny runs."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(device, "FAST_COMPILE", {})
+        yield
+
+
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The run of a policy that has learned next to nothing, of any vehicle."""
     out = tmp_path_factory.mktemp("runs") / "any"
-    algo, network = BPTTConfig(envs=4, horizon=4), NetworkConfig(hidden=(8,), recurrent=8)
-    e2efly.train("hover", preset_name="nominal", vehicle="any", out=out, steps=16, chunk=1, eval_episodes=10,
+    algo, network = PPOConfig(envs=4, horizon=16, minibatch=64), NetworkConfig(hidden=(8,), recurrent=8)
+    e2efly.train("hover", "ppo", preset_name="nominal", vehicle="any", out=out, steps=64, chunk=1, eval_episodes=10,
                  options=algo, network=network, devices=1)  # fmt: skip
     return out
 

@@ -1,5 +1,6 @@
 """What a vehicle file does not know: gusts, uneven rotors, sag, an offset centre of mass, drifting poses."""
 
+from functools import partial
 from typing import Any
 
 import jax
@@ -16,6 +17,9 @@ from e2efly.vehicles.vehicle import GRAVITY
 from tests.gradients import central, reverse
 
 STILL = HoverConfig(position=0.0, velocity=0.0, tilt=0.0, body_rate=0.0)
+ACTS = ("gust", "rotor_share", "sag", "drift")
+"""What acts in a flight, through which gradients go."""
+step = jax.jit(partial(Env.step, restart=False))
 
 
 def make(**config: Any) -> Env:
@@ -72,8 +76,8 @@ def test_poses_drift_as_a_random_walk_and_the_vehicle_does_not() -> None:
     clean = flown(make(), 30)
     np.testing.assert_allclose(state.vehicle.position, clean.vehicle.position, atol=1e-6)
     assert state.disturbance is not None
-    shown = env.step(state, jnp.broadcast_to(env.hover, (4, 4)), restart=False)[1].observation
-    true = make().step(clean, jnp.broadcast_to(env.hover, (4, 4)), restart=False)[1].observation
+    shown = step(env, state, jnp.broadcast_to(env.hover, (4, 4)))[1].observation
+    true = step(make(), clean, jnp.broadcast_to(env.hover, (4, 4)))[1].observation
     assert np.abs(shown - true)[:, :3].max() > 1e-3
     np.testing.assert_allclose(shown[:, 3:], true[:, 3:], atol=1e-5)
 
@@ -114,36 +118,51 @@ def test_the_rate_loop_is_the_plants_and_the_rest_of_the_controller_is_nominal()
         state = env.reset(random_key(0), 1)[0]
         gain = np.asarray(load_vehicle("vis_r").rate_gain) * (1 - width)
         state.plant["rate_gain"] = jnp.asarray(gain, jnp.float32)[None]
-        state = env.step(state, env.hover + jnp.array([[0.0, 0.2, 0.0, 0.0]]), restart=False)[0]
+        state = step(env, state, env.hover + jnp.array([[0.0, 0.2, 0.0, 0.0]]))[0]
         rates[name] = float(state.vehicle.body_rate[0, 0])
     assert rates["slow"] == pytest.approx(0.5 * rates["nominal"], rel=0.15)
 
 
-@pytest.mark.usefixtures("x64")
-@pytest.mark.parametrize("what", ["gust", "rotor_share", "sag", "drift"])
-def test_gradients_reach_through_each_disturbance(what: str) -> None:
-    """Of the observation two steps later, against central differences."""
-    config = EnvConfig(action_latency=(0.0, 0.0), disturbance=DisturbanceConfig(gust=1.0, sag=0.1))
-    env = Env.of(HoverConfig(), RewardConfig({"prog2": 1.0}), config, np.float64)
-    state = env.reset(random_key(0), 1)[0]
-    state = jax.tree.map(lambda x: x.astype(np.float64) if x.dtype == np.float32 else x, state)
-    state = EnvState(**{**vars(state), "time": state.time + 2.0})  # a battery that has sagged
-    assert state.disturbance is not None
-    values = getattr(state.disturbance, what)
+@pytest.fixture(scope="module")
+def jacobians() -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Of the observation two steps later by each disturbance: by reverse mode and by central differences."""
+    with jax.enable_x64(True):
+        config = EnvConfig(action_latency=(0.0, 0.0), disturbance=DisturbanceConfig(gust=1.0, sag=0.1))
+        env = Env.of(HoverConfig(), RewardConfig({"prog2": 1.0}), config, np.float64)
+        state = env.reset(random_key(0), 1)[0]
+        state = jax.tree.map(lambda x: x.astype(np.float64) if x.dtype == np.float32 else x, state)
+        state = EnvState(**{**vars(state), "time": state.time + 2.0})  # a battery that has sagged
+        assert state.disturbance is not None
+        values = [getattr(state.disturbance, what) for what in ACTS]
+        ends = np.cumsum([value.size for value in values])
 
-    def shown(x: jax.Array) -> jax.Array:
-        def one(row: jax.Array) -> jax.Array:
-            changed = Disturbance(**{**vars(state.disturbance), what: row.reshape(values.shape)})
-            s, out = EnvState(**{**vars(state), "disturbance": changed}), None
-            for _ in range(2):
-                s, out = env.step(s, env.hover[None], restart=False)
-            return out.observation[0]  # type: ignore[union-attr]
+        @jax.jit
+        def shown(x: jax.Array) -> jax.Array:
+            def one(row: jax.Array) -> jax.Array:
+                parts = [part.reshape(v.shape) for part, v in zip(jnp.split(row, ends[:-1]), values, strict=True)]
+                changed = Disturbance(**{**vars(state.disturbance), **dict(zip(ACTS, parts, strict=True))})
 
-        return jax.vmap(one)(x)
+                def forward(s: EnvState, _: None) -> tuple[EnvState, jax.Array]:
+                    s, out = env.step(s, env.hover[None], restart=False)
+                    return s, out.observation[0]
 
-    x = values.reshape(1, -1)
-    exact = np.asarray(reverse(shown, x, env.observation_size))
-    np.testing.assert_allclose(exact, central(shown, x), rtol=1e-5, atol=1e-7)
+                begun = EnvState(**{**vars(state), "disturbance": changed})
+                return jax.lax.scan(forward, begun, length=2)[1][-1]
+
+            return jax.vmap(one)(x)
+
+        x = jnp.concatenate([value.reshape(1, -1) for value in values], axis=1)
+        exact, numeric = np.asarray(reverse(shown, x, env.observation_size)), np.asarray(central(shown, x))
+    split = (np.split(each, ends[:-1], axis=2) for each in (exact, numeric))
+    return dict(zip(ACTS, zip(*split, strict=True), strict=True))
+
+
+@pytest.mark.parametrize("what", ACTS)
+def test_gradients_reach_through_each_disturbance(
+    what: str, jacobians: dict[str, tuple[np.ndarray, np.ndarray]]
+) -> None:
+    exact, numeric = jacobians[what]
+    np.testing.assert_allclose(exact, numeric, rtol=1e-5, atol=1e-7)
     assert np.abs(exact).max() > 1e-4
 
 

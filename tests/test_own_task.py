@@ -18,6 +18,9 @@ from e2efly.deploy.policy.runtime import Runtime, act, begin
 from e2efly.registry import load
 from e2efly.tasks import TASKS
 from e2efly.tasks.route import course_for, route_of
+from tests.learn.test_runner import compile_once
+
+pytestmark = pytest.mark.usefixtures("quick")
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "06_own_task.py"
 SMALL = [
@@ -41,7 +44,10 @@ def _as_before(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(TASKS, "_known", dict(TASKS._known))
 
 
-def test_a_task_of_ones_own_goes_all_the_way(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_task_of_ones_own_goes_all_the_way(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compile_once(monkeypatch)
     file, out = tmp_path / "orbit.py", tmp_path / "run"
     shutil.copy(EXAMPLE, file)
     file.write_text(file.read_text().replace('register_task("orbit")', 'register_task("orbit_of_the_test")'))
@@ -110,8 +116,8 @@ def test_a_reward_term_of_ones_own_is_learned_by_and_never_from_an_old_program(m
     assert traced_folder(config) is not None
     assert traced_folder(mine) is None
     env = Env.of(mine.task, mine.reward, mine.env)
-    state, _ = env.reset(jax.random.key(0), 4)
-    _, out = env.step(state, jnp.broadcast_to(env.hover, (4, 4)))
+    state, _ = jax.eval_shape(lambda key: env.reset(key, 4), jax.random.key(0))
+    _, out = jax.eval_shape(env.step, state, jnp.zeros((4, 4)))
     assert set(out.terms) == {"near", "low"}
     with pytest.raises(ValueError, match=r"'near' of .*<locals>.near is also the name of e2efly.rewards:near"):
 

@@ -116,7 +116,7 @@ def test_images_are_as_old_and_as_rare_as_a_row_says() -> None:
     for row in rows:
         env = Env.of(TASKS["hover"].training(), RewardConfig({"v1": 1.0}), EnvConfig(cameras=(down,)))
         draw = drawn(row, 3, np.float32)
-        state, _ = with_longer_queue(env).reset(random_key(1), 3)
+        state, _ = jax.jit(Env.reset, static_argnums=2)(with_longer_queue(env), random_key(1), 3)
         vehicle = dataclasses.replace(
             state.vehicle, position=jnp.array([[0.0, 0, 5]] * 3), velocity=jnp.array([[0.0, 0, 3]] * 3),
             quaternion=jnp.array([[1.0, 0, 0, 0]] * 3), body_rate=jnp.zeros((3, 3)),

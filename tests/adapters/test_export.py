@@ -19,6 +19,8 @@ from e2efly.adapters.torch import TorchEnv
 from e2efly.config import NetworkConfig
 from e2efly.deploy.policy.draws import random_observations
 
+pytestmark = pytest.mark.usefixtures("quick")
+
 NETWORK = {"net_arch": [16, 16]}
 
 

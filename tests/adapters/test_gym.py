@@ -12,6 +12,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 from e2efly import presets
+from e2efly.adapters import picture
 from e2efly.adapters.gym import QuadrotorEnv, QuadrotorVectorEnv
 from e2efly.config import TrainConfig
 from e2efly.env import Env, random_key
@@ -24,13 +25,20 @@ def short(seconds: float = 0.2) -> TrainConfig:
     return dataclasses.replace(config, task=dataclasses.replace(config.task, episode_s=seconds, hold_s=0.0))
 
 
+def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of what is made from here on: a picture of full size takes a second."""
+    monkeypatch.setattr(picture, "WIDTH", 48)
+    monkeypatch.setattr(picture, "HEIGHT", 32)
+
+
 def vector(task: Any = "hover", n: int = 4, **given: Any) -> QuadrotorVectorEnv:
     return QuadrotorVectorEnv(task, n, **given)
 
 
 @pytest.mark.filterwarnings("ignore:.*Box observation space.*")
 @pytest.mark.parametrize("task", ["hover", "avoid"])
-def test_gymnasiums_checker_accepts_it(task: str) -> None:
+def test_gymnasiums_checker_accepts_it(task: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    small_pictures(monkeypatch)
     check_env(gymnasium.make(f"e2efly/{task}-v0", render_mode="rgb_array").unwrapped)  # which draws, too
 
 
@@ -43,12 +51,13 @@ def test_every_task_is_registered_both_ways() -> None:
     assert envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
 
 
-def test_a_task_of_ones_own_is_made_by_its_reference() -> None:
+def test_a_task_of_ones_own_is_made_by_its_reference(monkeypatch: pytest.MonkeyPatch) -> None:
     task = f"{Path(__file__).parents[2] / 'examples' / '06_own_task.py'}:OrbitConfig"
     env: Any = gymnasium.make("e2efly/task-v0", task=task, render_mode="rgb_array").unwrapped
     assert type(env.stepper.config.task).__name__ == "OrbitConfig"
     env.reset(seed=0)
     assert env.render().shape == (320, 480, 3)
+    small_pictures(monkeypatch)
     kind = {"vectorization_mode": "vector_entry_point", "render_mode": "rgb_array"}
     envs: Any = gymnasium.make_vec("e2efly/task-v0", 3, task=task, **kind)
     envs.reset(seed=0)
@@ -152,7 +161,7 @@ def test_it_is_drawn_from_behind_with_its_goal(task: str) -> None:
     assert env.metadata["render_fps"] == 30
 
 
-def test_all_of_a_batch_are_drawn_and_other_modes_are_refused() -> None:
+def test_all_of_a_batch_are_drawn_and_other_modes_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     envs = QuadrotorVectorEnv("hover", 3, render_mode="rgb_array")
     with pytest.raises(RuntimeError, match="render before the first reset"):
         envs.render()
@@ -161,6 +170,7 @@ def test_all_of_a_batch_are_drawn_and_other_modes_are_refused() -> None:
     assert pictures is not None
     assert [picture.shape for picture in pictures] == [(320, 480, 3)] * 3
     assert np.any(pictures[0] != pictures[1])
+    small_pictures(monkeypatch)
     gates = QuadrotorVectorEnv("race_clutter", 6, render_mode="rgb_array")  # of as many gates as vehicles
     gates.reset(seed=0)
     assert len(gates.render() or ()) == 6

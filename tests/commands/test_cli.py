@@ -14,6 +14,9 @@ from e2efly.cli import run
 from e2efly.commands.train import parse
 from e2efly.learn.judge import verdict
 from e2efly.vehicles import vehicle_file
+from tests.learn.test_runner import compile_once
+
+pytestmark = pytest.mark.usefixtures("quick")
 
 
 def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
@@ -153,11 +156,14 @@ def test_runs_of_another_vehicle_have_a_folder_of_their_own(
     assert parse(arguments.split()).out == Path(folder)
 
 
-def test_a_run_is_deleted_only_when_that_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_is_deleted_only_when_that_is_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compile_once(monkeypatch)
     folder, mine = tmp_path / "run", tmp_path / "run" / "notes.txt"
-    flags = ["--algo", "ppo", "--steps", "1024", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16",
-             "--algo.horizon", "16", "--algo.minibatch", "128", "--task.episode-s", "1", "--no-plots",
-             "--out", str(folder)]  # fmt: skip
+    flags = ["--algo", "ppo", "--preset", "nominal", "--steps", "1024", "--chunk", "2", "--eval-episodes", "20",
+             "--algo.envs", "16", "--algo.horizon", "16", "--algo.minibatch", "128", "--task.episode-s", "1",
+             "--no-plots", "--out", str(folder)]  # fmt: skip
     assert run(["train", "hover", *flags]) == 0
     mine.write_text("mine")
     before = (folder / "checkpoint.safetensors").read_bytes()

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from e2efly.commands.sweep import Sweep, trials_of
-from tests.conftest import NetworkTrace
+from tests.conftest import QUICK, NetworkTrace
 
 SMALL = ["steps=6144", "chunk=2", "eval-episodes=20", "algo.envs=16", "algo.horizon=16", "algo.minibatch=128",
          "task.episode-s=1"]  # fmt: skip
@@ -37,7 +37,10 @@ def sweep(cwd: Path, *flags: str) -> subprocess.Popen[str]:
         "sweep",
         *flags,
     ]
-    return subprocess.Popen(command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    environment = os.environ | {"XLA_FLAGS": QUICK}
+    return subprocess.Popen(
+        command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment
+    )
 
 
 def test_every_value_goes_with_every_other_and_every_seed() -> None:
@@ -105,7 +108,7 @@ def test_a_sweep_trains_on_ray_on_this_machine_alone_and_nothing_twice(tmp_path:
 
 
 def test_a_run_that_was_cut_goes_on_and_a_lost_worker_is_replaced(tmp_path: Path) -> None:
-    flags = [item if not item.startswith("steps") else "steps=80000" for item in SMALL]
+    flags = [item if not item.startswith("steps") else "steps=40000" for item in SMALL]
     folder = tmp_path / "sweep/seed-0"
 
     def training() -> Path:
@@ -128,7 +131,7 @@ def test_a_run_that_was_cut_goes_on_and_a_lost_worker_is_replaced(tmp_path: Path
     os.kill(worker, signal.SIGKILL)
     told, _ = second.communicate()
     assert second.returncode == 0, told
-    assert json.loads((folder / "summary.json").read_text())["env_steps"] >= 80_000
+    assert json.loads((folder / "summary.json").read_text())["env_steps"] >= 40_000
     assert (folder / "config.json").stat().st_mtime_ns == began
     updates = [int(line.split(",")[0]) for line in (folder / "metrics.csv").read_text().splitlines()[1:]]
     assert updates == list(range(1, len(updates) + 1))

@@ -9,13 +9,17 @@ import pytest
 import e2efly
 from e2efly.cli import run
 from e2efly.identification.csv_file import write_csv
+from e2efly.stress import stress
 from e2efly.validation.excitation import Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
 from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.posterior import load_posterior
 
 
-def test_a_log_becomes_a_policy_for_the_vehicle_that_it_shows(tmp_path: Path) -> None:
+def test_a_log_becomes_a_policy_for_the_vehicle_that_it_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("e2efly.view.style.DPI", 30)
+    # every row of the stress, from one batch of starts instead of four
+    monkeypatch.setattr("e2efly.stress.stress", lambda policy, _, **flies: stress(policy, 50, **flies))
     vehicle = load_vehicle("vis_r")
     plant = find_plant("mujoco")(vehicle)
     log, out = tmp_path / "flight.csv", tmp_path / "tuned"

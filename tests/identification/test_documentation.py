@@ -113,6 +113,7 @@ def test_a_command_of_the_page_writes_a_vehicle(
     for file in bench.iterdir():
         (tmp_path / file.name).symlink_to(file)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("e2efly.view.style.DPI", 30)
     words = shlex.split(command)[1:]
     assert run(words) == 0
     out = words[words.index("--out") + 1] if "--out" in words else "identified"

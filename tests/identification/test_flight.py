@@ -193,8 +193,9 @@ def test_logs_without_what_is_needed_are_refused_by_name(tmp_path: Path) -> None
 
 
 def test_the_command_writes_a_vehicle_that_loads_and_says_what_it_did(
-    tmp_path: Path, record: Record, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, record: Record, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("e2efly.view.style.DPI", 30)
     from e2efly.cli import run
     from e2efly.vehicles.vehicle import read_sigmas
 

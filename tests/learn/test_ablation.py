@@ -13,7 +13,7 @@ from e2efly.config import TrainConfig
 from e2efly.learn.ablation import FULL, Kept, ablate
 from e2efly.learn.rundir import RunDirectory
 from e2efly.learn.runner import train
-from tests.learn.test_runner import Silent
+from tests.learn.test_runner import Silent, compile_once
 
 
 def small(algo: str, steps: int = 4096) -> TrainConfig:
@@ -28,8 +28,9 @@ def small(algo: str, steps: int = 4096) -> TrainConfig:
 
 
 @pytest.mark.parametrize("algo", ["ppo", "bptt"])
-def test_a_member_learns_as_a_run_alone_does(algo: str, tmp_path: Path) -> None:
+def test_a_member_learns_as_a_run_alone_does(algo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     config = small(algo)
+    compile_once(monkeypatch)
     curves = ablate(config, 2)
     assert curves.variants == (FULL, *config.reward.weights)
     assert curves.success["hover"].shape == (len(curves.variants), 2, 4)
@@ -68,7 +69,7 @@ def test_members_differ_and_an_ablation_that_was_stopped_ends_bit_for_bit_like_o
 
 
 def test_the_papers_groups_are_left_out_whole() -> None:
-    config = small("bptt", 1024)
+    config = small("ppo")
     reward = dataclasses.replace(config.reward, weights={"prog2": 1.0, "near": 1.0, "v1": 0.1, "anglev_sq": 0.1})
     config = dataclasses.replace(config, reward=reward)
     curves = ablate(config, 1, by="group")

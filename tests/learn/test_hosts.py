@@ -71,13 +71,14 @@ def test_four_devices_learn_as_one(tmp_path: Path) -> None:
     """By a method without noise, far from what ends an episode: each device draws its new starts for itself."""
     flags = ["20" if BPTT[i - 1] == "--task.episode-s" else flag for i, flag in enumerate(BPTT)]
     flags += ["--preset", "nominal", "--task.fence", "1000", "--task.target", "0", "0", "900"]
+    flags += ["--chunk", "24", "--eval-episodes", "250"]  # a single evaluation, which is not compared
     for devices in ("4", "1"):
         ended(tmp_path, start(tmp_path, f"on{devices}", *flags, "--devices", devices, devices=4))
     same_learning(tmp_path, "on4", "on1", 1e-3, flown=False)  # flights of 20 s tell every last bit
 
 
 def test_a_run_that_lost_a_process_says_so_and_resumes(tmp_path: Path) -> None:
-    flags = [*BPTT[2:], "--steps", "100000", "--devices", "2"]
+    flags = [*PPO[2:], "--steps", "100000", "--devices", "2"]
     first, other = pair(tmp_path, "run", *flags)
     wait_for_update(tmp_path / "run", first, 6)
     other.kill()

@@ -10,6 +10,9 @@ import e2efly
 from e2efly.cli import run
 from e2efly.config import ALGORITHMS, AlgorithmConfig
 from e2efly.learn.programs import traced_folder
+from tests.learn.test_runner import compile_once
+
+pytestmark = pytest.mark.usefixtures("quick")
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "08_own_algorithm.py"
 SMALL = ["--algo.envs", "32", "--algo.horizon", "20", "--chunk", "2", "--eval-episodes", "10", "--no-plots"]
@@ -21,7 +24,10 @@ def _forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ALGORITHMS, "_known", dict(ALGORITHMS))
 
 
-def test_it_goes_all_the_way(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_goes_all_the_way(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compile_once(monkeypatch)
     file, out = tmp_path / "es.py", tmp_path / "run"
     shutil.copy(EXAMPLE, file)
     file.write_text(file.read_text().replace('register_algorithm("es")', 'register_algorithm("es_of_a_test")'))

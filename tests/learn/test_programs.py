@@ -18,6 +18,8 @@ from e2efly.learn.programs import Programs, evaluation_program
 from e2efly.learn.setup import Setup
 from e2efly.tasks import TASKS
 
+pytestmark = pytest.mark.usefixtures("quick")
+
 
 def config(**changes: Any) -> TrainConfig:
     base = presets.preset("land", "bptt")

@@ -20,6 +20,8 @@ from e2efly.cli import run as command
 from e2efly.config import ALGORITHMS, TrainConfig
 from e2efly.episodes import Episodes
 from e2efly.learn import runner
+from e2efly.learn.checkpoint import read_about
+from e2efly.learn.programs import Programs
 from e2efly.learn.rundir import RunDirectory, from_json, to_json
 from e2efly.learn.runner import NonFiniteError, train
 from e2efly.learn.setup import Setup
@@ -56,6 +58,18 @@ class Silent:
         self.seen.append((steps, success))
 
 
+def compile_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs of a test that differ in numbers alone share the programs of the first."""
+    compiled, programs = Programs.compile, []
+
+    def first(*args: Any) -> Programs:
+        if not programs:
+            programs.append(compiled(*args))
+        return programs[0]
+
+    monkeypatch.setattr(Programs, "compile", staticmethod(first))
+
+
 def small(task: str = "hover", algo: str = "ppo", **changes: Any) -> TrainConfig:
     config = presets.preset(task, algo)
     sizes: dict[str, Any] = {"envs": 16, "horizon": 16}
@@ -78,8 +92,9 @@ def small(task: str = "hover", algo: str = "ppo", **changes: Any) -> TrainConfig
      ("track", "bptt", 900_000, 0.9)],
 )  # fmt: skip
 def test_a_short_training_learns(task: str, algo: str, steps: int, success: float, tmp_path: Path) -> None:
-    config = dataclasses.replace(presets.preset(task, algo), steps=steps)
+    config = dataclasses.replace(presets.preset(task, algo), steps=steps, stop_at=max(success, 0.97))
     summary = train(config, tmp_path / "run", Silent())
+    assert summary["reached_criterion"]
     reached = [value["success"] for name, value in summary["shipped"].items() if name != "update"]
     assert min(reached) >= success, summary
 
@@ -96,6 +111,7 @@ def test_a_thrown_vehicle_is_caught(tmp_path: Path) -> None:
     assert summary["shipped"]["hover"]["success"] >= 0.985  # of other starts than those that it was stopped by
 
 
+@pytest.mark.usefixtures("quick")
 def test_what_met_the_criterion_is_shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Though another policy had a better score before, and failed."""
     successes, scores = iter([0.0, 0.0, 1.0, 1.0]), iter([3.0, 2.0, 1.0])
@@ -131,26 +147,62 @@ def timeless(rows: list[dict[str, float]]) -> list[dict[str, float]]:
     return [{name: value for name, value in row.items() if name not in ("seconds", "rate")} for row in rows]
 
 
-@pytest.mark.parametrize("algo", ["ppo", "bptt", "abpt"])
-def test_a_killed_run_ends_bit_for_bit_like_one_that_was_not(algo: str, tmp_path: Path) -> None:
-    preset = "robust" if algo == "bptt" else "nominal"  # with a memory, and without
-    flags = ["train", "hover", "--algo", algo, "--preset", preset, *SMALL, "--devices", "2", *MORE[algo]]
+def alike(folder: Path) -> None:
+    """The runs `whole` and `cut` ended bit for bit the same."""
+    a, b = (load_file(folder / run / "checkpoint.safetensors") for run in ("whole", "cut"))
+    assert a.keys() == b.keys()
+    for name in a:
+        np.testing.assert_array_equal(a[name], b[name], err_msg=name)
+    assert (folder / "whole/policy.onnx").read_bytes() == (folder / "cut/policy.onnx").read_bytes()
+    rows_a, rows_b = (RunDirectory(folder / run).rows() for run in ("whole", "cut"))
+    assert timeless(rows_a) == timeless(rows_b)
+
+
+def test_a_killed_run_ends_bit_for_bit_like_one_that_was_not(tmp_path: Path) -> None:
+    flags = ["train", "hover", "--algo", "ppo", "--preset", "nominal", *SMALL, "--devices", "2", *MORE["ppo"]]
     whole = cli(*flags, "--out", "whole", cwd=tmp_path)
     assert whole.wait() == 0, output_of(tmp_path)
     process = cli(*flags, "--out", "cut", cwd=tmp_path)
     wait_for_update(tmp_path / "cut", process, 6)
     process.send_signal(signal.SIGKILL)
     process.wait()
-    alone = ["train", "--resume", "cut", "--no-plots"]  # the run says all the rest
-    resumed = cli(*(alone if algo == "bptt" else [*flags, "--out", "cut", "--resume"]), cwd=tmp_path)
+    resumed = cli(*flags, "--out", "cut", "--resume", cwd=tmp_path)
     assert resumed.wait() == 0, output_of(tmp_path)
-    a, b = (load_file(tmp_path / run / "checkpoint.safetensors") for run in ("whole", "cut"))
-    assert a.keys() == b.keys()
-    for name in a:
-        np.testing.assert_array_equal(a[name], b[name], err_msg=name)
-    assert (tmp_path / "whole/policy.onnx").read_bytes() == (tmp_path / "cut/policy.onnx").read_bytes()
-    rows_a, rows_b = (RunDirectory(tmp_path / run).rows() for run in ("whole", "cut"))
-    assert timeless(rows_a) == timeless(rows_b)
+    alike(tmp_path)
+
+
+class Killed(BaseException):
+    """Ends a run where it is, as a signal does."""
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("algo", ["bptt", "abpt"])
+def test_what_other_algorithms_keep_is_enough_to_go_on_bit_for_bit(
+    algo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Here a run ends where its rows are ahead of its checkpoint; its programs are compiled once."""
+    monkeypatch.chdir(tmp_path)
+    compile_once(monkeypatch)
+    preset = "robust" if algo == "bptt" else "nominal"  # with a memory, and without
+    flags = ["train", "hover", "--algo", algo, "--preset", preset, *SMALL, "--devices", "2", *MORE[algo]]
+    assert command([*flags, "--out", "whole"]) == 0
+    save, saved = runner._save, []
+
+    def killed_at_the_fourth(*args: Any) -> None:
+        saved.append(args)
+        if len(saved) == 4:
+            raise Killed
+        save(*args)
+
+    with monkeypatch.context() as cut:
+        cut.setattr(runner, "_save", killed_at_the_fourth)
+        with pytest.raises(Killed):
+            command([*flags, "--out", "cut"])
+    assert len(RunDirectory(tmp_path / "cut").rows()) == 8
+    assert read_about(tmp_path / "cut/checkpoint.safetensors")["update"] == 6
+    alone = ["train", "--resume", "cut", "--no-plots"]  # the run says all the rest
+    assert command(alone if algo == "bptt" else [*flags, "--out", "cut", "--resume"]) == 0
+    alike(tmp_path)
 
 
 def test_a_run_is_one_process_s_and_ctrl_c_saves_and_stops_it(
@@ -174,8 +226,9 @@ def test_a_run_is_one_process_s_and_ctrl_c_saves_and_stops_it(
     assert updates == list(range(1, len(updates) + 1))
 
 
+@pytest.mark.usefixtures("quick")
 def test_a_loss_that_is_not_finite_stops_the_run_and_keeps_the_checkpoint(tmp_path: Path) -> None:
-    config = small("hover", "bptt")
+    config = small("hover", "ppo")
     config = dataclasses.replace(
         config, algo=dataclasses.replace(config.algo, learning_rate=1e30, learning_rate_end=1e30)
     )

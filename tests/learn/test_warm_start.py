@@ -13,13 +13,19 @@ import pytest
 import e2efly
 from e2efly.cli import run
 from e2efly.deploy.policy.draws import random_images, random_observations
+from e2efly.learn import runner
 from e2efly.learn.checkpoint import read_arrays
+from e2efly.learn.judge import reported
 from e2efly.learn.setup import Setup
 from e2efly.learn.warm_start import started_from
 from e2efly.presets import begun
 from e2efly.zoo import policy_file
+from tests.learn.test_runner import compile_once
 
-SMALL = {"steps": 4096, "chunk": 1, "eval_episodes": 10, "preset_name": "nominal"}
+pytestmark = pytest.mark.usefixtures("quick")
+
+
+SMALL = {"steps": 4096, "chunk": 1, "eval_episodes": 100, "preset_name": "nominal"}
 
 
 @pytest.mark.parametrize("task", ["hover", "land_visual", "avoid"])
@@ -38,13 +44,28 @@ def test_what_is_read_acts_as_the_file(task: str) -> None:
     np.testing.assert_allclose(found[1], wanted[1], atol=1e-5)
 
 
-def test_a_run_begins_where_the_policy_was(tmp_path: Path) -> None:
-    task, algo, options = "hover_aware", "bptt", {**SMALL, "preset_name": "robust"}
+def test_a_run_begins_where_the_policy_was_and_says_how_it_flies_the_file_s_vehicle(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compile_once(monkeypatch)
+    monkeypatch.setattr(runner, "REPORT_EPISODES", 250)
+    task, algo, options = "hover", "bptt", {**SMALL, "eval_episodes": 250, "preset_name": "robust"}
     begun = e2efly.train(task, algo, out=tmp_path / "run", start_from=task, **options)
     assert begun["shipped"][task]["success"] > 0.9
     more = e2efly.train(task, algo, out=tmp_path / "more", start_from=tmp_path / "run", **options)
     assert more["shipped"][task]["success"] > 0.9
     assert e2efly.train(task, algo, out=tmp_path / "fresh", **options)["shipped"][task]["success"] < 0.5
+    # on the vehicle of the file the same starts end nearer than on the others
+    assert begun["nominal"][task]["success"] > 0.98
+    assert begun["nominal"][task]["final_error_m"] < 0.8 * begun["shipped"][task]["final_error_m"]
+    assert begun["stress"][task]["success"] > 0.9
+    assert begun["stress"][task]["final_error_m"] > 2 * begun["nominal"][task]["final_error_m"]
+    assert reported(begun) == begun["nominal"][task]["success"]
+    # the file says for which vehicle it is, and which delays it has seen
+    contract, vehicle = e2efly.load_policy(tmp_path / "run").contract, e2efly.load_vehicle("vis_r")
+    assert contract.memory_size == 64
+    assert contract.latency_s == vehicle.latency
+    assert contract.latency_range_s == pytest.approx((vehicle.latency - 0.04, vehicle.latency + 0.05))
 
 
 def test_actions_of_a_policy_of_many_vehicles_go_on_to_mean_the_same_commands() -> None:
@@ -125,7 +146,8 @@ def test_a_run_hands_on_what_its_algorithm_has_beside_the_policy(tmp_path: Path)
         assert np.array_equal(begun.critic[0][0], fresh.critic[0][0]) != handed
 
 
-def test_the_file_is_recorded_and_may_go_away(tmp_path: Path) -> None:
+def test_the_file_is_recorded_and_may_go_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compile_once(monkeypatch)
     first, more = tmp_path / "run", tmp_path / "more"
     e2efly.train("hover", "ppo", out=first, **SMALL)
     digest = hashlib.sha256((first / "policy.onnx").read_bytes()).hexdigest()

@@ -1,6 +1,7 @@
 """What a vehicle on a plant sees is what the environment shows at the same pose, and policies fly by it."""
 
 import dataclasses
+from functools import partial
 from typing import Any
 
 import jax
@@ -25,14 +26,15 @@ STEPS = 12
 
 def flown(env: Env, actions: np.ndarray) -> tuple[list[RigidState], list[list[np.ndarray]], Any]:
     """States of one vehicle, and what the environment showed it at each."""
-    state, _ = env.reset(jax.random.key(3), 1)
+    state, _ = jax.jit(Env.reset, static_argnums=2)(env, jax.random.key(3), 1)
+    step = jax.jit(partial(Env.step, restart=False))
     first, states, shown = state, [], []
     for action in actions:
         v = state.vehicle
         rows = [np.asarray(x, np.float64)[0] for x in (v.position, v.velocity, v.quaternion, v.body_rate)]
         states.append(RigidState(*rows))
         shown.append([np.asarray(image)[0] for image in state.images])
-        state, _ = env.step(state, action[None], restart=False)
+        state, _ = step(env, state, action[None])
     return states, shown, first
 
 

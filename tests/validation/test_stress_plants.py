@@ -10,7 +10,7 @@ import pytest
 import e2efly
 from e2efly.cli import run
 from e2efly.env.stress import ALL, ROWS, rows_for
-from e2efly.stress import draws
+from e2efly.stress import Report, draws
 from e2efly.stress import stress as in_training
 from e2efly.validation.plant import EVERYTHING, Plant
 from e2efly.validation.plants import PLANTS, find_plant
@@ -29,11 +29,16 @@ BLIND = rows_for(())
 """Rows of policies without cameras."""
 
 
+@pytest.fixture(scope="module")
+def wanted(policy_of: Callable[..., Path]) -> Report:
+    """What `eval --stress` says of the rows that are drawn alike."""
+    return in_training(policy_of("hover"), 2, rows=DRAWN_ALIKE)
+
+
 @pytest.mark.parametrize(("plant", "close"), [("simulator", 0.004), ("mujoco", 0.01)])
-def test_a_row_is_the_same_as_in_eval(plant: str, close: float, policy_of: Callable[..., Path]) -> None:
+def test_a_row_is_the_same_as_in_eval(plant: str, close: float, wanted: Report, policy_of: Callable[..., Path]) -> None:
     """Start by start: the same draw of the rotor that is weaker, of the wind's direction, of everything."""
-    policy = policy_of("hover")
-    wanted, found = in_training(policy, 2, rows=DRAWN_ALIKE), stress(policy, plant, 2, rows=DRAWN_ALIKE)
+    found = stress(policy_of("hover"), plant, 2, rows=DRAWN_ALIKE)
     assert list(found.flown) == list(DRAWN_ALIKE)
     errors = {}
     for row in DRAWN_ALIKE:

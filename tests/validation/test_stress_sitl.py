@@ -19,7 +19,7 @@ CLOSE = 0.12
 def test_the_firmware_meets_the_rows(policy_of: Callable[..., Path]) -> None:
     policy = policy_of("hover")
     found, wanted = (
-        each.flown for each in (stress(policy, "betaflight", 2, rows=ROWS), in_training(policy, 2, rows=ROWS))
+        each.flown for each in (stress(policy, "betaflight", 1, rows=ROWS), in_training(policy, 1, rows=ROWS))
     )
     error = {row: float(np.mean(found[row]["hover"].final_error)) for row in ROWS}
     for row in ROWS:
