@@ -40,9 +40,10 @@ SPUN = 0.003
 rotors that have not come to rest yet, and the lag for as long as they last."""
 STILL = 0.02
 """Standard deviations below which a step of all unknowns is the last."""
-BATCH = 32
-"""Windows that are computed together: one program for flights of any length. One batch after the other: programs that
-several threads start at once wait for each other for ever, as they share XLA's own threads."""
+BATCH = 4
+"""Windows that are computed together: one program for flights of any length. More at once take no less time for each,
+and a short flight has few to fill a batch. One batch after the other: programs that several threads start at once wait
+for each other for ever, as they share XLA's own threads."""
 
 
 @dataclass(frozen=True)
@@ -127,9 +128,9 @@ def _fit(
     def total(p: np.ndarray, q: np.ndarray, costs: np.ndarray) -> float:
         return float(np.sum(costs) + 0.5 * np.sum((p / prior_p) ** 2) + 0.5 * np.sum((q / prior_q) ** 2))
 
-    damping, cost, i = 1e-3, np.inf, 0
+    damping, i = 1e-3, 0
+    cost = total(p, q, _judged(model, p, q, starts, data, noise, free)[0])
     terms = _terms(model, p, q, starts, data, noise, free)
-    cost = total(p, q, terms["cost"])
     for i in range(1, iterations + 1):
         H, g = _assembled(terms, windows.flight, flights, u, v)
         H += np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
@@ -141,25 +142,24 @@ def _fit(
             dp, dq = np.maximum(step[:u], least - p), step[u:].reshape(flights, v)
             both = np.concatenate([np.broadcast_to(dp, (windows.count, u)), dq[windows.flight]], 1)
             moved = starts - terms["gain"] - np.einsum("nij,nj->ni", terms["slope"], both)
-            tried = _terms(model, p + dp, q + dq, moved, data, noise, free)
-            now = total(p + dp, q + dq, tried["cost"])
+            costs, spread = _judged(model, p + dp, q + dq, moved, data, noise, free)
+            now = total(p + dp, q + dq, costs)
             if np.isfinite(now) and now < cost:
                 break
             damping *= 10
         else:
             break
         gained = cost - now
-        p, q, starts, terms, cost, damping = p + dp, q + dq, moved, tried, now, max(damping / 10, 1e-9)
+        p, q, starts, cost, damping = p + dp, q + dq, moved, now, max(damping / 10, 1e-9)
         told(i, cost)
-        spread = {name: max(float(terms[f"spread/{name}"]), FLOOR[name]) for name in noise}
         settled = all(abs(np.log(spread[name] / noise[name])) < 0.02 for name in noise)
         still = np.abs(dp) < np.maximum(STILL * np.sqrt(np.diag(np.linalg.inv(H)))[:u], 1e-4)
-        if settled and (gained < 1e-3 or np.all(still)):
-            break
         if not settled:
             noise = spread
-            terms = _terms(model, p, q, starts, data, noise, free)
-            cost = total(p, q, terms["cost"])
+            cost = total(p, q, _judged(model, p, q, starts, data, noise, free)[0])
+        terms = _terms(model, p, q, starts, data, noise, free)
+        if settled and (gained < 1e-3 or np.all(still)):
+            break
     H, _ = _assembled(terms, windows.flight, flights, u, v)
     H += np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
     inverse = np.linalg.inv(H)
@@ -182,18 +182,8 @@ def cost(model: Model, windows: Windows, p: np.ndarray) -> float:
     """How badly windows are explained at `p`, their starts as measured."""
     with jax.enable_x64(True):
         noise = {name: NOISE[name] for name in windows.measured}
-        return float(np.sum(_by_batch(partial(_costs, model, p, noise), _data(model, windows))))
-
-
-@jax.jit
-def _costs(model: Model, p: Array, noise: dict[str, Any], data: dict[str, Any]) -> Array:
-    still = jnp.zeros(len(NUISANCES))
-
-    def one(data: dict[str, Any]) -> Array:
-        left = _residuals(model, p, still, jnp.zeros(START), data, noise)
-        return sum(jnp.sum(_huber((left[name] / noise[name]).ravel())) for name in noise) * data["counts"]
-
-    return jax.vmap(one)(data)
+        q, starts = np.zeros((int(windows.flight.max()) + 1, len(NUISANCES))), np.zeros((windows.count, START))
+        return float(np.sum(_judged(model, p, q, starts, _data(model, windows), noise, FREE)[0]))
 
 
 def _by_batch(computed: Callable[[Any], Any], data: dict[str, np.ndarray]) -> Any:
@@ -232,6 +222,26 @@ def _guesses(windows: Windows, hover: float) -> dict[str, np.ndarray]:
     return found
 
 
+def _judged(
+    model: Model,
+    p: np.ndarray,
+    q: np.ndarray,
+    starts: np.ndarray,
+    data: dict[str, Any],
+    noise: dict[str, float],
+    free: np.ndarray,
+) -> tuple[np.ndarray, dict[str, float]]:
+    """The cost of each window, and the spread of each sensor about the model. It needs no slopes, which cost most."""
+    found = _by_batch(partial(_costs, model, p, q, noise, free), _begun(data, starts))
+    spread = {}
+    for name in noise:
+        # of the windows that have this sensor
+        squares, there = found[f"square/{name}"], found[f"sum/{name}"]
+        mean = np.where(there > 0, squares / np.maximum(there, 1), np.nan)
+        spread[name] = max(float(np.sqrt(np.nanquantile(mean, CALM))), FLOOR[name])
+    return found["cost"][: len(starts)], spread
+
+
 def _terms(
     model: Model,
     p: np.ndarray,
@@ -240,20 +250,35 @@ def _terms(
     data: dict[str, Any],
     noise: dict[str, float],
     free: np.ndarray,
-) -> dict[str, Any]:
-    n, full = len(starts), len(data["counts"])
-    padded = np.concatenate([starts, np.zeros((full - n, START))])
-    found = _by_batch(partial(_computed, model, p, q, noise, free), {**data, "moved": padded})
-    for name in noise:
-        # of the windows that have this sensor
-        squares, there = found.pop(f"square/{name}"), found.pop(f"sum/{name}")
-        mean = np.where(there > 0, squares / np.maximum(there, 1), np.nan)
-        found[f"spread/{name}"] = np.sqrt(np.nanquantile(mean, CALM))
-    return {k: x if k.startswith("spread/") else x[:n] for k, x in found.items()}
+) -> dict[str, np.ndarray]:
+    """Gradient and curvature of each window, its start eliminated."""
+    found = _by_batch(partial(_slopes, model, p, q, noise, free), _begun(data, starts))
+    return {k: x[: len(starts)] for k, x in found.items()}
+
+
+def _begun(data: dict[str, Any], starts: np.ndarray) -> dict[str, Any]:
+    """The arrays of all windows, with where each starts."""
+    return {**data, "moved": np.concatenate([starts, np.zeros((len(data["counts"]) - len(starts), START))])}
 
 
 @jax.jit
-def _computed(
+def _costs(
+    model: Model, p: Array, q: Array, noise: dict[str, Any], free: Array, data: dict[str, Any]
+) -> dict[str, Array]:
+    def one(data: dict[str, Any]) -> dict[str, Array]:
+        left = _residuals(model, p, q[data["flight"]], data["moved"], data, noise)
+        costs = sum(jnp.sum(_huber(left[name] / noise[name])) for name in noise)
+        told = {"cost": costs * data["counts"] + 0.5 * jnp.sum((data["moved"] / free) ** 2)}
+        for name in noise:
+            told[f"square/{name}"] = jnp.sum(left[name] ** 2) * data["counts"]
+            told[f"sum/{name}"] = jnp.sum(data[f"there/{name}"]) * left[name].shape[-1] * data["counts"]
+        return told
+
+    return jax.vmap(one)(data)
+
+
+@jax.jit
+def _slopes(
     model: Model, p: Array, q: Array, noise: dict[str, Any], free: Array, data: dict[str, Any]
 ) -> dict[str, Array]:
     return jax.vmap(partial(_window, model, p, q, noise, free))(data)
@@ -262,36 +287,24 @@ def _computed(
 def _window(
     model: Model, p: Array, q: Array, noise: dict[str, Any], free: Array, data: dict[str, Any]
 ) -> dict[str, Array]:
-    """Cost, gradient and curvature of one window, its start eliminated."""
+    """Gradient and curvature of one window, its start eliminated."""
     u, v, start = p.shape[0], q.shape[1], data["moved"]
 
-    def residuals(z: Array) -> dict[str, Array]:
-        return _residuals(model, z[:u], z[u : u + v], z[u + v :], data, noise)
+    def residuals(z: Array) -> tuple[Array, Array]:
+        left = _residuals(model, z[:u], z[u : u + v], z[u + v :], data, noise)
+        r = jnp.concatenate([(left[name] / noise[name]).ravel() for name in noise])
+        return r, r
 
     z = jnp.concatenate([p, q[data["flight"]], start])
-    left = residuals(z)
-    slopes = jax.jacfwd(residuals)(z)
-    r = jnp.concatenate([(left[name] / noise[name]).ravel() for name in noise])
-    J = jnp.concatenate([(slopes[name] / noise[name]).reshape(-1, z.size) for name in noise])
-    size = jnp.abs(r)
-    weight = jnp.minimum(1.0, HUBER / jnp.maximum(size, 1e-12)) * data["counts"]
+    J, r = jax.jacfwd(residuals, has_aux=True)(z)
+    weight = jnp.minimum(1.0, HUBER / jnp.maximum(jnp.abs(r), 1e-12)) * data["counts"]
     A, g = (J * weight[:, None]).T @ J, J.T @ (weight * r)
     k = u + v
     Axx = A[k:, k:] + jnp.diag(free**-2.0)
     gx = g[k:] + start / free**2
     solved = jnp.linalg.solve(Axx, jnp.concatenate([gx[:, None], A[k:, :k]], 1))
     gain, slope = solved[:, 0], solved[:, 1:]
-    told = {
-        "cost": jnp.sum(_huber(r)) * data["counts"] + 0.5 * jnp.sum((start / free) ** 2),
-        "H": A[:k, :k] - A[:k, k:] @ slope,
-        "g": g[:k] - A[:k, k:] @ gain,
-        "gain": gain,
-        "slope": slope,
-    }
-    for name in noise:
-        told[f"square/{name}"] = jnp.sum(left[name] ** 2) * data["counts"]
-        told[f"sum/{name}"] = jnp.sum(data[f"there/{name}"]) * left[name].shape[-1] * data["counts"]
-    return told
+    return {"H": A[:k, :k] - A[:k, k:] @ slope, "g": g[:k] - A[:k, k:] @ gain, "gain": gain, "slope": slope}
 
 
 def _residuals(
