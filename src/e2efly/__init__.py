@@ -1,8 +1,8 @@
 """e2efly: train an end-to-end quadrotor policy in seconds, check it, and fly it.
 
-`e2efly.train("hover")` trains, `e2efly.evaluate("runs/hover-bptt-0")` flies what was trained from unseen starts,
-`e2efly.validate` flies it on another physics, `e2efly.load_policy` loads it. Importing the package imports no JAX:
-each name of this face is imported when it is used.
+`e2efly.train("hover")` trains. `e2efly.evaluate("runs/hover-bptt-0")` flies the trained policy from unseen starts,
+`e2efly.validate` flies it on another physics, and `e2efly.load_policy` loads it. Importing the package imports no JAX:
+each name of this interface is imported when it is used.
 """
 
 import importlib
@@ -47,12 +47,12 @@ __all__ = [
 __version__ = "0.1.0"
 
 _SILENT = {"ORT_DISABLE_TELEMETRY": "1", "RAY_USAGE_STATS_ENABLED": "0", "WANDB_ERROR_REPORTING": "false"}
-"""Environment variables with which ONNX Runtime, Ray and W&B report to nobody of themselves. Processes started from
-here inherit them."""
+"""Environment variables that stop ONNX Runtime, Ray and W&B from sending usage reports. Processes started from here
+inherit them."""
 
 _too_late = "onnxruntime" in sys.modules and not os.environ.get("ORT_DISABLE_TELEMETRY")
 for _name, _value in _SILENT.items():
-    if not os.environ.get(_name):  # what the user's environment says stays
+    if not os.environ.get(_name):  # a value of the user's environment stays
         os.environ[_name] = _value
 if _too_late:  # ONNX Runtime reads its variable once, while it is imported
     sys.modules["onnxruntime"].disable_telemetry_events()

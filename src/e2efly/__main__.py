@@ -4,7 +4,7 @@ from e2efly.process import end_at_interrupt, open_streams
 
 
 def main() -> None:
-    """Run the command line; Ctrl-C ends it from here on, also while it is being imported."""
+    """Run the command line. Ctrl-C ends it from here on, also during imports."""
     open_streams()
     end_at_interrupt()
     from e2efly.cli import main

@@ -1,6 +1,6 @@
-"""A hover controller in place of a policy: what it sees, commands and flies is what the policy's contract says.
+"""A hover controller in place of a policy, with the observations, commands and vehicle of the policy's contract.
 
-So that a policy and a controller that was not trained are judged alike. Imports no JAX.
+It allows a policy and a controller that was not trained to be judged alike. Imports no JAX.
 """
 
 from collections.abc import Sequence
@@ -24,42 +24,42 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 @dataclass(frozen=True)
 class Memory:
-    """What one question to a baseline hands to the next."""
+    """The state that one call of a baseline passes to the next."""
 
     controller: Any
-    """Of the controller."""
+    """State of the controller."""
     under_way: UnderWay
-    """What was commanded and does not act yet."""
+    """Commands that were sent and do not act yet."""
     last: Ctbr
     """The last command."""
     velocity: Vec3
-    """World, m/s."""
+    """Velocity, world, m/s."""
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """Acts as a policy does. Make it with `Baseline.of`."""
+    """Acts like a policy. Make it with `Baseline.of`."""
 
     contract: Contract
-    """Of the policy in whose place it flies."""
+    """Contract of the policy that it replaces."""
     goal: type[Goal]
-    """Of the task: where to be, by what is shown."""
+    """Goal class of the task. It gives the place to be at from the observation."""
     controller: HoverController
-    """That flies."""
+    """The controller that flies."""
     vehicle: Vehicle
-    """That it is made for."""
+    """The vehicle for which it is made."""
 
     @staticmethod
     def of(contract: Contract, name: str, vehicle: Vehicle) -> "Baseline":
         """A hover controller that flies the task of a contract.
 
         Args:
-            contract: of the policy in whose place it flies.
-            name: of the controller, or its reference.
-            vehicle: as the policy knows it.
+            contract: contract of the policy that it replaces.
+            name: name of the controller, or its reference.
+            vehicle: the vehicle as the policy knows it.
 
         Raises:
-            ValueError: for an unknown name, with all there are; for a task or a command mode that it does not fly.
+            ValueError: for an unknown name, with all names; or for a task or a command mode that it cannot fly.
         """
         goal = goal_of(TASKS.find(contract.task)).showing([field.name for field in contract.observation])
         if not _aims(goal):
@@ -83,15 +83,15 @@ class Baseline:
     def act(
         self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: Memory | None = None
     ) -> tuple[np.ndarray, Memory]:
-        """The actions of observations, and what to remember.
+        """The actions for observations, and the memory for the next call.
 
-        Its heading is free where the task's goal names none. What it feels is the change of the velocity that it is
-        shown, and what the rotors gave is what was commanded, through the motors' lag.
+        The heading is free if the task's goal gives none. The measured acceleration is the change of the observed
+        velocity. The thrust of the rotors is the commanded thrust after the lag of the motors.
 
         Args:
             observation: (o,) or (n, o), as `contract.observation` says.
-            images: are not looked at.
-            memory: what the last call returned; None: the flight begins here, hovering.
+            images: not used.
+            memory: the memory from the last call. None: the flight begins here, in hover.
 
         Returns:
             The action, float32 (4,) or (n, 4) in [-1, 1]; the memory for the next call.
@@ -114,19 +114,19 @@ class Baseline:
 
 
 def _aims(goal: type[Goal]) -> bool:
-    """Whether a task's goal says where a controller is to be."""
+    """Whether a task's goal gives a place at which a controller is to be."""
     return getattr(goal, "aim", Goal.aim).__func__ is not Goal.aim.__func__  # type: ignore[attr-defined]
 
 
 def acting(policy: Policy, baseline: str | None, vehicle: Vehicle) -> Policy | Baseline:
-    """What flies: a policy, or the hover controller in its place.
+    """The policy, or the hover controller that flies in its place.
 
     Args:
         policy: as loaded.
-        baseline: name or reference of the controller; None: the policy flies.
-        vehicle: as the policy knows it.
+        baseline: name or reference of the controller. None: the policy flies.
+        vehicle: the vehicle as the policy knows it.
 
     Raises:
-        ValueError: as `Baseline.of` does.
+        ValueError: as for `Baseline.of`.
     """
     return policy if baseline is None else Baseline.of(policy.contract, baseline, vehicle)

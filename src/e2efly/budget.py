@@ -1,6 +1,6 @@
-"""What a command would take, in memory and in time, against what there is. What cannot be is refused before it begins.
+"""Memory and time that a command would need, compared with what is available. Impossible commands are refused early.
 
-Estimates are low rather than high: what is refused would not fit, what is taken may still be too much.
+Estimates are low rather than high: a refused command would not fit, but an accepted one may still be too large.
 """
 
 import os
@@ -10,16 +10,16 @@ from contextlib import suppress
 from pathlib import Path
 
 FASTEST = 1e8
-"""Environment steps/s: no machine trains or evaluates faster."""
+"""Limit of environment steps per second. No machine trains or evaluates faster."""
 LONGEST_S = 30 * 86_400.0
-"""A command that takes longer than this even at `FASTEST` is a mistake, s."""
+"""A command that takes longer than this, s, even at `FASTEST`, is a mistake."""
 _UNITS = {"year": 365.25 * 86_400, "day": 86_400.0, "hour": 3600.0, "minute": 60.0}
 
 
 def machine_memory() -> float:
-    """Bytes of main memory, swap included, that this process may use."""
+    """Main memory, including swap, that this process may use, bytes."""
     limits = [float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES") + _swap()]
-    limits.append(float(resource.getrlimit(resource.RLIMIT_AS)[0] % 2**64))  # none is -1
+    limits.append(float(resource.getrlimit(resource.RLIMIT_AS)[0] % 2**64))  # -1 means no limit
     for file in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
         with suppress(OSError, ValueError):  # "max", or no such group
             limits.append(float(Path(file).read_text()))
@@ -27,14 +27,14 @@ def machine_memory() -> float:
 
 
 def check_memory(parts: Mapping[str, float], memory: float | None = None) -> None:
-    """Refuse what does not fit.
+    """Refuse a command that does not fit into memory.
 
     Args:
-        parts: bytes, by the options that decide them, as `NAME is VALUE, ...`.
-        memory: bytes that there are; left out: the machine's.
+        parts: bytes, by the options that determine them, as `NAME is VALUE, ...`.
+        memory: available memory, bytes. If left out: that of the machine.
 
     Raises:
-        ValueError: naming the options of the largest part, what all of it takes, and what there is.
+        ValueError: naming the options of the largest part, the memory of all parts, and the available memory.
     """
     total, has = sum(parts.values()), machine_memory() if memory is None else memory
     if total > has:
@@ -45,14 +45,14 @@ def check_memory(parts: Mapping[str, float], memory: float | None = None) -> Non
 
 
 def check_time(seconds: Mapping[str, float], how: str = f"even at {FASTEST / 1e6:g} million steps per second") -> None:
-    """Refuse what nobody can wait for.
+    """Refuse a command that takes too long.
 
     Args:
-        seconds: the least that each part takes, by the options that decide it, as `NAME is VALUE, ...`.
-        how: what that assumes.
+        seconds: the least time of each part, by the options that determine it, as `NAME is VALUE, ...`.
+        how: the assumption behind this time.
 
     Raises:
-        ValueError: naming the options of the longest part, how long all of it takes, and what is accepted.
+        ValueError: naming the options of the longest part, the time of all parts, and what is accepted.
     """
     total = sum(seconds.values())
     if total > LONGEST_S:

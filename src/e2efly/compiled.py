@@ -1,4 +1,7 @@
-"""The cache of compiled programs, each with its digest: JAX keeps none, and a flipped bit in machine code is run."""
+"""The cache of compiled programs, each with a digest.
+
+JAX stores none, and would run machine code with a flipped bit.
+"""
 
 import hashlib
 import logging
@@ -10,16 +13,19 @@ from jax._src import compilation_cache
 from jax._src.compilation_cache_interface import CacheInterface
 
 _DIGEST = 32
-"""Bytes of a SHA-256, which stand before what they are of."""
+"""Length of a SHA-256, bytes. It stands before the data."""
 
 
 def sealed(data: bytes) -> bytes:
-    """Data behind its digest."""
+    """The data with its digest in front."""
     return hashlib.sha256(data).digest() + data
 
 
 def opened(data: bytes, file: Path) -> bytes | None:
-    """What stands behind a digest; None, and a word, where the file is damaged and goes: it is made anew."""
+    """The data behind a digest.
+
+    None, with a message, if the file is damaged. The file is then deleted, and made again.
+    """
     if hashlib.sha256(data[_DIGEST:]).digest() == data[:_DIGEST]:
         return data[_DIGEST:]
     file.unlink(missing_ok=True)
@@ -28,25 +34,25 @@ def opened(data: bytes, file: Path) -> bytes | None:
 
 
 class CheckedCache(CacheInterface):
-    """JAX's cache, with a digest before each entry."""
+    """JAX's cache, with a digest in front of each entry."""
 
     def __init__(self, base: Any) -> None:
         self._base, self._path = base, base._path
 
     def get(self, key: str) -> Any:
-        """An entry; None where there is none, or a damaged one."""
+        """An entry. None if it does not exist or is damaged."""
         data = self._base.get(key)
         return None if data is None else opened(data, Path(self._path) / f"{key}-cache")
 
     def put(self, key: str, value: bytes) -> None:
-        """Keep an entry."""
+        """Store an entry."""
         self._base.put(key, sealed(value))
 
 
 def check_programs(folder: Callable[[], Path]) -> None:
-    """Keep digests in our own cache of compiled programs, which lies in `folder()`. Before anything is compiled.
+    """Use digests in our own cache of compiled programs, which is in `folder()`. Call it before anything is compiled.
 
-    A folder that the user names by JAX's own variable is shared with other programs, and stays in JAX's own format.
+    A folder that the user names by JAX's own variable is shared with other programs. It keeps JAX's own format.
     """
     theirs = compilation_cache.get_file_cache
 

@@ -1,4 +1,4 @@
-"""Where JAX computes, and how it compiles. Call `prepare` before anything computes with JAX."""
+"""The device on which JAX computes, and how it compiles. Call `prepare` before anything computes with JAX."""
 
 import os
 import platform
@@ -18,34 +18,34 @@ def cache_folder() -> Path:
 
 
 def programs_folder() -> Path:
-    """Where compiled programs are kept."""
+    """Folder of the compiled programs."""
     return cache_folder() / "programs"
 
 
 XLA_OPTIONS = {
     # a loop over small arrays runs as one machine function instead of a task for each of its operations
     "xla_backend_extra_options": "xla_cpu_small_while_loop_byte_threshold=1000000",
-    # cores work on vehicles of their own (e2efly.learn.devices), not together on one small matrix
+    # each core works on its own vehicles (e2efly.learn.devices), not together with others on one small matrix
     "xla_cpu_multi_thread_eigen": "false",
     # see wide_vectors
     "xla_cpu_prefer_vector_width": "128",
 }
-"""What makes XLA fast on small batches on a CPU; docs/architecture.md says why."""
+"""Options that make XLA fast on small batches on a CPU. docs/architecture.md gives the reasons."""
 
 
 _USUAL = {
     "jax_enable_x64": False, "jax_disable_jit": False, "jax_numpy_dtype_promotion": "standard",
     "jax_numpy_rank_promotion": "allow",
 }  # fmt: skip
-"""Settings of JAX without which nothing here computes, or not to its end."""
+"""Settings of JAX that the programs here need in order to compute, or to finish."""
 
 
 def wide_vectors(vehicles: int) -> dict[str, Any]:
-    """Options of XLA for a program in which a device steps so many vehicles: `jax.jit(f, compiler_options=...)`.
+    """Options of XLA for a program in which a device steps `vehicles` vehicles: `jax.jit(f, compiler_options=...)`.
 
-    Programs on many vehicles run in a third of the time on whole vectors of AVX-512. Where arrays are no longer than
-    one vector, LLVM makes one block of all operations of a step, and takes gigabytes to compile its gradient; hence
-    narrow vectors for few vehicles, and wherever the number is not known. What the user's XLA_FLAGS say stays.
+    Programs on many vehicles take a third of the time with full vectors of AVX-512. If arrays are no longer than one
+    vector, LLVM makes one block of all operations of a step, and needs gigabytes to compile its gradient. Vectors are
+    therefore narrow for few vehicles, and if the number is not known. Options in the user's XLA_FLAGS stay.
     """
     import jax
 
@@ -59,20 +59,20 @@ FAST_COMPILE: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_backe
 
 
 def fast_compile() -> dict[str, Any]:
-    """Options of XLA for a program that runs for seconds only."""
+    """Options of XLA for a program that runs only for seconds."""
     import jax
 
     return unless_said(FAST_COMPILE) if jax.default_backend() == "cpu" else {}
 
 
 def unless_said(options: dict[str, Any]) -> dict[str, Any]:
-    """Options of XLA, without those that the user's XLA_FLAGS name: what they say stays."""
+    """Options of XLA without those that the user's XLA_FLAGS name. The user's options stay."""
     said = {flag.removeprefix("--").partition("=")[0] for flag in os.environ.get("XLA_FLAGS", "").split()}
     return {name: value for name, value in options.items() if name not in said}
 
 
 def set_xla_options() -> None:
-    """Set `XLA_OPTIONS` and make a device of each core, but for what the user's environment says.
+    """Set `XLA_OPTIONS` and make one device per core, unless the user's environment says otherwise.
 
     It has no effect once JAX has begun to compute.
     """
@@ -83,18 +83,18 @@ def set_xla_options() -> None:
     wanted = [f"--{name}={value}" for name, value in XLA_OPTIONS.items() if name not in flags]
     os.environ["XLA_FLAGS"] = " ".join([*flags.split(), *wanted])
     if "xla_force_host_platform_device_count" not in flags:
-        with suppress(RuntimeError):  # JAX computes already: the devices stay as they are
+        with suppress(RuntimeError):  # JAX has begun to compute: the devices stay as they are
             _configure("jax_num_cpu_devices", cores())
 
 
 @cache
 def _check_flags(flags: str) -> None:
-    """Refuse what XLA would abort the process for, by trying it in another one.
+    """Refuse flags for which XLA would abort the process, by a test in another process.
 
     Raises:
-        ValueError: naming the variable, its value and what XLA says of it.
+        ValueError: naming the variable, its value and the message of XLA.
     """
-    code = "from jaxlib import xla_client; xla_client.CompileOptions()"  # reads them, and takes no device
+    code = "from jaxlib import xla_client; xla_client.CompileOptions()"  # reads the flags, and takes no device
     tried = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     if tried.returncode:
         told = (line.rpartition("] ")[2] for line in tried.stderr.splitlines())
@@ -104,15 +104,15 @@ def _check_flags(flags: str) -> None:
 
 
 def cores() -> int:
-    """Cores that this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def processor(told: str | None = None) -> tuple[str, bool | None]:
-    """The model of the processor, and whether it has AVX-512, which decides what physics costs; None: not known.
+    """The model of the processor, and whether it has AVX-512, which determines the cost of physics. None: not known.
 
     Args:
-        told: what the system says of its processors; left out: /proc/cpuinfo, where there is one.
+        told: the system's description of its processors. If left out: /proc/cpuinfo, if it exists.
     """
     file = Path("/proc/cpuinfo")
     told = told if told is not None else file.read_text() if file.exists() else ""
@@ -125,10 +125,10 @@ def processor(told: str | None = None) -> tuple[str, bool | None]:
 
 @contextmanager
 def one_core() -> Iterator[None]:
-    """Keep the calling thread, and the threads and processes that it starts, on the core that it is on, where it can.
+    """Keep the calling thread, and the threads and processes that it starts, on its present core, if possible.
 
-    Right for processes that wait for each other in turn: waking one on another core takes several times as long. Where
-    two overlap in one thread, end the later one first.
+    This is right for processes that wait for each other in turn: waking a process on another core takes several times
+    as long. If two uses overlap in one thread, end the later one first.
     """
     if not hasattr(os, "sched_setaffinity"):
         yield
@@ -143,7 +143,7 @@ def one_core() -> Iterator[None]:
 
 
 def _configure(name: str, value: Any) -> None:
-    """Set an option of JAX that the user's environment does not set; it may be imported already."""
+    """Set an option of JAX that the user's environment does not set. JAX may be imported already."""
     import jax
 
     if name.upper() not in os.environ and getattr(jax.config, name) != value:
@@ -151,9 +151,10 @@ def _configure(name: str, value: Any) -> None:
 
 
 def compute_at_once() -> None:
-    """Compute in the thread that asks, where JAX has not begun to compute yet.
+    """Compute in the calling thread, if JAX has not begun to compute yet.
 
-    Right for one tiny program that is called again and again: handing it to another thread takes longer than it does.
+    This is right for one tiny program that is called again and again: passing it to another thread takes longer than
+    the program itself.
     """
     import jax
 
@@ -165,18 +166,18 @@ class Hosts:
     """Processes that train together, each on the devices of its own machine."""
 
     coordinator: str | None = None
-    """HOST:PORT that process 0 opens and the others find it at. Left out: one process alone."""
+    """HOST:PORT that process 0 opens and to which the others connect. If left out: a single process."""
     count: int = 1
-    """Processes."""
+    """Number of processes."""
     index: int = 0
-    """Which of them this is; 0 writes the files."""
+    """Index of this process. Process 0 writes the files."""
 
     def join(self) -> None:
-        """Wait for the others. Before anything computes.
+        """Wait for the other processes. Call it before anything computes.
 
         Raises:
             ValueError: naming the option, its value and what is accepted.
-            OSError: when they do not all come within a minute.
+            OSError: when not all processes come within a minute.
         """
         if self.coordinator is None:
             if (self.count, self.index) != (1, 0):
@@ -202,7 +203,7 @@ class Hosts:
 
 
 def _check_configuration() -> None:
-    """Refuse settings of JAX under which nothing here computes.
+    """Refuse settings of JAX with which the programs here cannot compute.
 
     Raises:
         ValueError: naming the variable, its value and what is accepted.
@@ -217,14 +218,15 @@ def _check_configuration() -> None:
 def prepare(device: str | None = None, hosts: Hosts = Hosts()) -> None:
     """Choose the device, set `XLA_OPTIONS` and turn on the persistent compilation cache, with digests.
 
-    What JAX's own variables and XLA_FLAGS say stays. Call it before anything computes with JAX.
+    Values of JAX's own variables and of XLA_FLAGS stay. Call it before anything computes with JAX.
 
     Args:
-        device: `cpu`, `gpu`, or None: whatever JAX finds.
+        device: `cpu`, `gpu`, or None for the device that JAX finds.
         hosts: the processes of the run.
 
     Raises:
-        ValueError: for an unknown device, or one that this machine or this JAX does not have: never another instead.
+        ValueError: for an unknown device, or one that this machine or this JAX does not have. Another device is never
+            used instead.
         OSError: when the processes do not come together.
     """
     if device not in (None, "cpu", "gpu"):

@@ -1,11 +1,11 @@
-"""What can be drawn in space: polylines, faces and marks. Plain data in world coordinates, m; imports no JAX."""
+"""Objects to draw in space: polylines, faces and marks. Plain data in world coordinates, m. Imports no JAX."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 INK, ORANGE = "#222222", "#E69F00"
-"""Colours of what a task has in space: of Okabe and Ito's palette."""
+"""Colours of a task's objects in space, from the palette of Okabe and Ito."""
 
 Points = np.ndarray
 """(m, 3)."""
@@ -32,7 +32,7 @@ class Face:
 
 @dataclass(frozen=True)
 class Mark:
-    """A point with a Matplotlib marker or, where `text` is given, a word."""
+    """A point with a Matplotlib marker, or with a word if `text` is given."""
 
     point: np.ndarray
     marker: str = ""
@@ -44,6 +44,6 @@ Thing = Line | Face | Mark
 
 
 def circle(centre: np.ndarray, radius: float) -> Points:
-    """A level circle."""
+    """A horizontal circle."""
     angle = np.linspace(0, 2 * np.pi, 49)
     return centre + radius * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=-1)

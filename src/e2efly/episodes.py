@@ -1,4 +1,4 @@
-"""Episodes of a policy from given seeds, without new starts: what training watches and `eval` reports."""
+"""Episodes of a policy from given seeds, without restarts, for the evaluations of training and for `eval`."""
 
 import dataclasses
 import math
@@ -19,69 +19,69 @@ from e2efly.physics import State
 
 @dataclass(frozen=True)
 class Act:
-    """A policy, as a function: JAX can compile it, or not (`run_stepwise`, `trace`)."""
+    """A policy as a function, which JAX can compile or not (`run_stepwise`, `trace`)."""
 
     act: Callable[[Any, tuple[Any, ...], Any], tuple[Any, Any]]
     """(observation (n, o), images, memory (n, k)) -> (action (n, 4), next memory)."""
     begin: Callable[[int], Any] = lambda n: jnp.zeros((n, 0))
-    """How many -> their memory at the start of an episode, (n, k)."""
+    """(number of vehicles) -> their memory at the start of an episode, (n, k)."""
 
     @staticmethod
     def of(function: Callable[[Float[Array, "n o"]], Float[Array, "n 4"]]) -> "Act":
-        """Of a function of the observation alone."""
+        """A policy that is a function of the observation only."""
         return Act(lambda observation, images, memory: (function(observation), memory))
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Episodes:
-    """How each of n episodes went."""
+    """The results of n episodes."""
 
     success: Bool[Array, " n"]
     duration: Float[Array, " n"]
-    """Until success, failure or time-out, s."""
+    """Time until success, failure or time-out, s."""
     final_error: Float[Array, " n"]
-    """The task's error at its end, m."""
+    """The task's error at the end, m."""
     mean_error: Float[Array, " n"]
     """Mean error over the episode after `settle`, m."""
     top_speed: Float[Array, " n"]
-    """m/s."""
+    """Largest speed, m/s."""
     mean_speed: Float[Array, " n"]
-    """Along the path, m/s."""
+    """Mean speed along the path, m/s."""
     top_rate: Float[Array, " n"]
     """Largest body rate, rad/s."""
     roughness: Float[Array, " n"]
-    """Mean length of the change of the action between two steps (its range is [-1, 1] per axis)."""
+    """Mean length of the change of the action between two steps (the action's range is [-1, 1] per axis)."""
     reward: Float[Array, " n"]
     """Sum over the episode."""
     crashed: Bool[Array, " n"]
-    """Ended for ill before time was out."""
+    """Ended by a failure before the time was over."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class UnderWay:
-    """Where n episodes are between two control steps, and how they went so far."""
+    """The state of n episodes between two control steps, and their results so far."""
 
     state: EnvState
     observation: Float[Array, "n o"]
     over: Bool[Array, " n"]
-    """Which have ended; they fly on, and count no more."""
+    """Which episodes have ended. They fly on, but their results do not change any more."""
     so_far: Episodes
-    """With the sums of the mean error, of the mean speed and of the roughness."""
+    """The results so far. The mean error, the mean speed and the roughness are sums."""
     counted: Float[Array, " n"]
-    """Control steps that the mean error counts."""
+    """Number of control steps in the mean error."""
 
     @staticmethod
     def of(state: EnvState, observation: Float[Array, "n o"]) -> "UnderWay":
-        """At their start."""
+        """The episodes at their start."""
         n = observation.shape[0]
         zero, no = jnp.zeros(n), jnp.zeros(n, bool)
         none = Episodes(no, zero, zero, zero, zero, zero, zero, zero, zero, no)
         return UnderWay(state, observation, no, none, zero)
 
     def after(self, env: Env, action: Float[Array, "n 4"], settle: Any) -> "UnderWay":
-        """A control step later; the mean error counts from `settle` s on."""
+        """The episodes one control step later. The mean error counts from `settle` s on."""
         state, over, e = self.state, self.over, self.so_far
         reached, out = env.step(state, action, restart=False)
         live = 1.0 - over
@@ -104,7 +104,7 @@ class UnderWay:
         return UnderWay(reached, out.final_observation, over | out.done, e, self.counted + counts)
 
     def episodes(self, env: Env) -> Episodes:
-        """How they went."""
+        """The results of the episodes."""
         e = self.so_far
         flown = jnp.maximum(e.duration / env.control_period, 1.0)
         mean_error = e.mean_error / jnp.maximum(self.counted, 1.0)
@@ -128,13 +128,14 @@ def run_episodes(
     Args:
         env: the environment.
         act: the policy, which JAX can compile.
-        key: decides the starts.
-        n: how many.
-        steps: control steps of the longest.
-        settle: seconds before the mean error counts.
-        part: which of how many equal parts of the episodes to fly. All parts together, in order, are the `n` episodes
-            of the one part (0, 1), whatever their number; where it does not divide `n`, the last ends with repetitions.
-        altered: what is to be different from what the environment draws for an episode.
+        key: random key that determines the starts.
+        n: number of episodes.
+        steps: control steps of the longest episode.
+        settle: time before the mean error counts, s.
+        part: which of how many equal parts of the episodes to fly. All parts together, in order, are the same `n`
+            episodes as the one part (0, 1), whatever their number. If this number does not divide `n`, the last part
+            ends with repetitions.
+        altered: function that changes what the environment draws for an episode.
     """
     state, observation = env.reset(key, n)
     state, observation = part_of(altered(state), observation, part)
@@ -161,12 +162,13 @@ def run_stepwise(
     settle: float = 0.0,
     altered: Callable[[EnvState], EnvState] = lambda state: state,
 ) -> tuple[Episodes, EnvState]:
-    """`run_episodes` of a policy that JAX need not compile, one control step after the other until all have ended.
+    """`run_episodes` for a policy that JAX need not compile.
 
-    The programs know nothing of the policy: each environment's are compiled once, and found again by later processes.
+    It runs one control step after the other until all episodes have ended. The programs do not depend on the policy.
+    Those of each environment are compiled once, and later processes find them in the cache.
 
     Returns:
-        How the episodes went, NumPy arrays; and where they began.
+        The results of the episodes, NumPy arrays; and the states at their starts.
     """
     begin, after, _ = _programs(n, bool(env.cameras))
     state, observation = begin(env, key)
@@ -186,9 +188,9 @@ def _asked(act: Act, observation: Array, state: EnvState, memory: Array) -> tupl
 
 @cache
 def _programs(n: int, seeing: bool) -> tuple[Callable, Callable, Callable]:
-    """Compiled for n episodes: their start; a step that judges; a step that shows, see `trace`.
+    """The compiled programs for n episodes: their start; a step that judges; a step that records, see `trace`.
 
-    Where there are cameras, drawing what they see takes longer than compiling how.
+    With cameras, the rendering takes longer than its compilation.
     """
 
     def shown(env: Env, state: EnvState, action: Array) -> tuple[EnvState, Step, Array, Array]:
@@ -202,8 +204,9 @@ def _programs(n: int, seeing: bool) -> tuple[Callable, Callable, Callable]:
 
 
 def part_of(state: EnvState, observation: Array, part: tuple[Array | int, int]) -> tuple[EnvState, Array]:
-    """One of so many equal parts of a batch, (index, count), with random numbers of its own; the last part is filled up
-    with repetitions.
+    """One of several equal parts of a batch, (index, count), with its own random numbers.
+
+    The last part is filled up with repetitions.
     """
     index, count = part
     if count == 1:
@@ -218,11 +221,12 @@ def part_of(state: EnvState, observation: Array, part: tuple[Array | int, int]) 
 def trace(
     env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int
 ) -> tuple[State, Float[np.ndarray, "t n 4"], Float[np.ndarray, "t n 3"], Step]:
-    """`n` episodes step by step, without new starts, of a policy that JAX need not compile.
+    """`n` episodes step by step, without restarts, for a policy that JAX need not compile.
 
     Returns:
-        Of every control step, each leaf (steps, n, ...): the state reached, the command in physical units, where to be
-        then, and the outcome; NumPy arrays. An episode goes on after its end: `Step.done` tells where that was.
+        For every control step, each leaf (steps, n, ...): the state reached, the command in physical units, the
+        position to be at then, and the outcome; NumPy arrays. An episode goes on after its end. `Step.done` gives its
+        end.
     """
     begin, _, shown = _programs(n, bool(env.cameras))
     (state, observation), memory, rows = begin(env, key), act.begin(n), []
@@ -235,10 +239,10 @@ def trace(
 
 
 def wilson(successes: int, n: int, z: float = 1.96) -> tuple[float, float]:
-    """Wilson's score interval of a success rate; with z = 1.96 it holds the true rate in 95 % of cases.
+    """Wilson's score interval of a success rate. With z = 1.96 it contains the true rate in 95 % of cases.
 
     Raises:
-        ValueError: when the counts are no counts of successes among trials.
+        ValueError: when the counts are not possible counts of successes among trials.
     """
     if not 0 <= successes <= n:
         raise ValueError(f"{successes} successes of {n}; accepted: from 0 to the number of trials")
@@ -250,15 +254,15 @@ def wilson(successes: int, n: int, z: float = 1.96) -> tuple[float, float]:
 
 
 def summary(e: Any) -> dict[str, Any]:
-    """How episodes went, as JSON: what training's report, `evaluate` and `validate` say of a criterion.
+    """A summary of episodes as JSON, for the reports of training, `evaluate` and `validate` on a criterion.
 
     Args:
-        e: n `Episodes`, or other columns of the same names, as NumPy arrays.
+        e: `Episodes` of n episodes, or other columns of the same names, as NumPy arrays.
 
     Returns:
-        The number of episodes, the rate of success with its 95 % interval by Wilson, how many crashed; means of the
-        errors and the roughness, the mean time of a success and its mean speed along the path (None without any), the
-        largest speed and body rate.
+        The number of episodes, the success rate with its 95 % interval by Wilson, and the number of crashes; the means
+        of the errors and the roughness, the mean time of a success and its mean speed along the path (None without any
+        success), the largest speed and body rate.
     """
     ok = np.asarray(e.success)
 
@@ -281,6 +285,6 @@ def summary(e: Any) -> dict[str, Any]:
 
 
 def rows(e: Any) -> list[dict[str, Any]]:
-    """Episodes as JSON: an object for each, with the names of the columns."""
+    """Episodes as JSON: one object per episode, with the names of the columns."""
     columns = {field.name: np.asarray(getattr(e, field.name)).tolist() for field in dataclasses.fields(e)}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]

@@ -1,4 +1,4 @@
-"""What a task shows a policy and how it judges it: the same code in training (JAX) and in flight (NumPy)."""
+"""What a task shows to a policy, and how it judges it: the same code in training (JAX) and in flight (NumPy)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -41,17 +41,17 @@ class Shape:
     """Collision shape of the vehicle."""
 
     feet_height: float | Array
-    """Height of the centre of mass over the feet, m."""
+    """Height of the centre of mass above the feet, m."""
     radius: float | Array
-    """Radius of the sphere that holds it, m."""
+    """Radius of the sphere that encloses it, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What a control step came to, each of shape (n,)."""
+    """The result of a control step; each field has shape (n,)."""
 
     terminated: Array
-    """The episode is over, for good or ill."""
+    """The episode is over, with success or failure."""
     success: Array
     """The episode is over and met the task's criterion."""
     arrived: Array
@@ -61,7 +61,7 @@ class Outcome:
     error: Array
     """The task's error now, m."""
     signals: dict[str, Array] = field(default_factory=dict)
-    """What the task offers to the terms of the reward, beside what every environment does."""
+    """Values that the task provides for the terms of the reward, in addition to those of every environment."""
 
 
 Observed = tuple[Field, Callable[[Any, Any, Array, Any], Array]]
@@ -69,17 +69,18 @@ Observed = tuple[Field, Callable[[Any, Any, Array, Any], Array]]
 
 
 class Goal:
-    """What a policy is to do: where to be, what it is shown, and when it has done it.
+    """The goal of a policy: where to be, what the policy observes, and when the task is done.
 
-    A subclass is a frozen dataclass with the methods below. `memory` is the state of the task, the time is that of the
-    episode in s, and all arrays have a leading axis of n vehicles. The arrays are JAX's in training and NumPy's in
-    flight, where n is 1: so a method computes in the library of its arguments (`e2efly.control.vectors.namespace`).
+    A subclass is a frozen dataclass with the methods below. `memory` is the state of the task, `time` is the time in
+    the episode in s, and all arrays have a leading axis of n vehicles. The arrays are JAX arrays in training, and NumPy
+    arrays in flight, where n is 1. A method therefore computes in the library of its arguments
+    (`e2efly.control.vectors.namespace`).
     """
 
     observation: ClassVar[tuple[Observed, ...]] = ()
-    """The task's own fields, in order."""
+    """The task's own observation fields, in order."""
     lands: ClassVar[bool] = False
-    """Whether the policy ends on the ground, where nobody may take off again by himself."""
+    """Whether the policy ends on the ground. Then the vehicle must not take off again by itself."""
 
     config: Any
     """The options of the task."""
@@ -91,7 +92,7 @@ class Goal:
 
     @classmethod
     def showing(cls, names: Sequence[str]) -> "type[Goal]":
-        """The class whose fields of the observation have these names among them, where the task has several."""
+        """The class whose observation fields include these names, if the task has several classes."""
         del names
         return cls
 
@@ -101,68 +102,68 @@ class Goal:
         return tuple(shown for shown, _ in self.observation)
 
     def observe(self, memory: Any, time: Array, state: Any) -> Array:
-        """(n, o) the task's own fields of the observation, of the body as the policy is told it."""
+        """(n, o) the task's own observation fields, for the body state that the policy is given."""
         parts = [value(self, memory, time, state) for _, value in self.observation]
         return parts[0] if len(parts) == 1 else namespace(*parts).concatenate(parts, axis=-1)
 
     @classmethod
     def state(cls, memory: Any) -> Any:
-        """Of the task's state in training, what flight knows."""
+        """The part of the task's state in training that is known in flight."""
         return memory
 
     def goal(self, memory: Any, time: Array) -> Array:
-        """(n, 3) where to be now, world, m."""
+        """(n, 3) position to be at now, world, m."""
         raise NotImplementedError
 
     @classmethod
     def aim(cls, shown: Mapping[str, Array]) -> Place:
-        """Where a controller that is no policy is to be, by what a policy is shown.
+        """The place at which a controller that is not a policy is to be, from a policy's observation.
 
         Args:
-            shown: the task's own fields of the observation by name, each (..., size).
+            shown: the task's own observation fields by name, each (..., size).
 
         Returns:
-            The place, its position relative to the vehicle's.
+            The place, with its position relative to the vehicle.
 
         Raises:
-            NotImplementedError: for a task that no such place does.
+            NotImplementedError: for a task that is not described by such a place.
         """
         raise NotImplementedError(f"{cls.__name__} names no place to fly to")
 
     def advance(self, memory: Any, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Any, Outcome]:
-        """Judge the control step that ended at `time`; the task's state after it, and its outcome."""
+        """Judge the control step that ended at `time`. Returns the task's state after it, and its outcome."""
         raise NotImplementedError
 
     def drawn(self, memory: Any) -> dict[str, Array]:
-        """What an episode draws beside where the vehicle starts, for reports: columns (n, ...) by name.
+        """Values that an episode draws in addition to the start of the vehicle, for reports: columns (n, ...) by name.
 
-        With `TaskConfig.course` it is enough to make again what was to be flown.
+        Together with `TaskConfig.course` they are enough to construct the course again.
         """
         del memory
         return {}
 
     def done(self, outcome: Outcome) -> bool:
-        """Whether the task of a single flight (n = 1) is over, and not for having failed in the air."""
+        """Whether the task of a single flight (n = 1) is over, but not because of a failure in the air."""
         return bool(outcome.success[0])
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
-        """How a whole flight of the policy went, in words.
+        """How a whole flight of the policy went, as text.
 
         Args:
-            arrivals: when goals were reached, s from its start.
-            mean_error: over its second half, m.
-            final_error: at its end, m.
-            speed: at its end, m/s.
+            arrivals: times at which goals were reached, s from the start of the policy's flight.
+            mean_error: mean error over the second half of this flight, m.
+            final_error: error at its end, m.
+            speed: speed at its end, m/s.
         """
         del arrivals, final_error, speed
         return f"{100 * mean_error:.1f} cm off"
 
     def failure(self, memory: Any, outcome: Outcome) -> str:
-        """Why a single flight (n = 1) has failed, in words.
+        """Why a single flight (n = 1) has failed, as text.
 
         Args:
             memory: the task's state before the step that failed.
-            outcome: of that step.
+            outcome: outcome of that step.
         """
         del memory
         return f"the task has failed, {float(outcome.error[0]):.2f} m from its goal"
@@ -170,21 +171,23 @@ class Goal:
 
 @dataclass(frozen=True)
 class Course:
-    """A goal and where it lies in the room (the world of the pose source)."""
+    """A goal and its place in the room (the world of the pose source)."""
 
     goal: Any
     """A `Goal` of NumPy arrays."""
     memory: Any
     """The task's state at the start, each leaf (1, ...)."""
     start: np.ndarray
-    """(3,) where the policy is to take over, in the task's world, m."""
+    """(3,) position at which the policy is to take over, in the task's world, m."""
     heading: float | None = None
-    """In which heading it is to take over, in the task's world, rad; None: in any, and anywhere near its goal."""
+    """Heading at which it is to take over, in the task's world, rad. None: at any heading, and anywhere near its
+    goal."""
     duration: float = np.inf
-    """Seconds after which the task is over."""
+    """Time after which the task is over, s."""
     lowest: float = np.inf
-    """Lowest height that the course asks for, in the task's world, m."""
+    """Lowest height in the course, in the task's world, m."""
     clearance: float | None = None
-    """What must lie between there and the ground, m; None: the height of the centre of mass over the feet."""
+    """Smallest distance required between this height and the ground, m. None: the height of the centre of mass above
+    the feet."""
     origin: Origin = Origin()
-    """Of the task's world, in the room."""
+    """Origin of the task's world in the room."""

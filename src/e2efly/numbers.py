@@ -12,18 +12,18 @@ RULE, SHAPE = "rule", "sets_shapes"
 
 @dataclass(frozen=True)
 class Rule:
-    """What a number may be; of several numbers, each of them."""
+    """The accepted values of a number, or of each of several numbers."""
 
     low: float = 0.0
-    """At least this ..."""
+    """Smallest accepted value."""
     above: float | None = None
-    """... and, where this is given, more than it."""
+    """If given, the value must also be larger than this."""
     high: float = math.inf
-    """At most this."""
+    """Largest accepted value."""
     rising: bool = False
-    """Two numbers, the smaller one first."""
+    """Whether there are two numbers, the smaller one first."""
     endless: bool = False
-    """Infinity is accepted, too."""
+    """Whether infinity is accepted, too."""
 
     @property
     def _between(self) -> str:
@@ -31,13 +31,13 @@ class Rule:
         return f"{self.low:g} to {most}" if self.above is None else f"above {self.above:g}, at most {most}"
 
     def problem(self, value: Any) -> str | None:
-        """What is accepted in place of a value; None: it is accepted."""
+        """What is accepted in place of a value. None: the value is accepted."""
         numbers = value if isinstance(value, tuple) else (value,)
         if not numbers or any(isinstance(x, bool) or not isinstance(x, int | float) for x in numbers):
             return None
         if math.isfinite(self.high):
             least = self.low if self.above is None else self.above
-            within = all(least <= x <= self.high and x != self.above for x in numbers)  # false for NaN
+            within = all(least <= x <= self.high and x != self.above for x in numbers)  # also false for NaN
             return None if within else self._between
         if not all(map(math.isfinite, numbers)) and not (self.endless and value == math.inf):
             return "finite numbers"
@@ -51,7 +51,7 @@ class Rule:
 
 
 NOT_NEGATIVE = Rule()
-"""Of fields that say nothing else."""
+"""The rule of fields that give no other rule."""
 
 
 def number(
@@ -63,21 +63,23 @@ def number(
     rising: bool = False,
     endless: bool = False,
 ) -> Any:
-    """A field of one number or several, with its default and what else than numbers of at least 0 is accepted.
+    """A field of one or several numbers, with its default and its rule.
+
+    Without a rule, numbers of at least 0 are accepted.
 
     Args:
-        default: of the field.
-        low: at least this; -inf for places, angles and rates.
-        above: more than this.
-        high: at most this.
-        rising: two numbers, the smaller one first.
-        endless: infinity is accepted, too.
+        default: default of the field.
+        low: smallest accepted value; -inf for positions, angles and rates.
+        above: the value must be larger than this.
+        high: largest accepted value.
+        rising: whether there are two numbers, the smaller one first.
+        endless: whether infinity is accepted, too.
     """
     return dataclasses.field(default=default, metadata={RULE: Rule(low, above, high, rising, endless)})
 
 
 def shape(default: Any) -> Any:
-    """A field that decides which program is compiled, with its default."""
+    """A field, with its default, that determines which program is compiled."""
     return dataclasses.field(default=default, metadata={SHAPE: True})
 
 
@@ -98,7 +100,10 @@ def check_numbers(prefix: str, part: Any) -> None:
 
 
 def _kind_problem(field: dataclasses.Field[Any], value: Any) -> str | None:
-    """What is accepted in place of a value that is no number where the default is one; None: it is of the same kind."""
+    """What is accepted in place of a value that is not a number although the default is one.
+
+    None: it has the same kind.
+    """
     default = field.default
     if value is None and type(None) in get_args(cast(Any, field.type)):
         return None

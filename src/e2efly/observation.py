@@ -1,4 +1,4 @@
-"""What a policy sees, field by field: the words of the contract. Imports no JAX."""
+"""What a policy observes, field by field, in the words of the contract. Imports no JAX."""
 
 from dataclasses import dataclass
 
@@ -8,15 +8,15 @@ class Field:
     """A part of the observation vector."""
 
     name: str
-    """What it is."""
+    """Name of the field."""
     size: int
-    """How many numbers."""
+    """Number of values."""
     frame: str
-    """`world` (ENU), `body` (FLU), `world_body` (a turn from body to world) or `none`."""
+    """`world` (ENU), `body` (FLU), `world_body` (a rotation from body to world) or `none`."""
     unit: str
-    """Unit of each number."""
+    """Unit of each value."""
     scale: float
-    """The number, in that unit, that the network sees as 1."""
+    """The value, in that unit, that the network gets as 1."""
     description: str
     """How to compute it."""
 
@@ -29,9 +29,9 @@ ACCELEROMETER = Field("accelerometer", 3, "body", "m/s^2", 10.0, "measured speci
 
 
 PAST_ACTIONS = "past_actions"
-"""The name of the field of the policy's own last outputs."""
+"""Name of the field with the policy's own last outputs."""
 
 
 def past_actions(count: int) -> Field:
-    """The policy's last outputs."""
+    """The field with the policy's last outputs."""
     return Field(PAST_ACTIONS, 4 * count, "none", "1", 1.0, "the policy's last outputs in [-1, 1], newest first")

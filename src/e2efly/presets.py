@@ -1,6 +1,6 @@
-"""The configurations that a task is learned by: robust, nominal, the paper's, variants of the task. Imports no JAX.
+"""The configurations with which a task is learned: robust, nominal, the paper's, and variants. Imports no JAX.
 
-A preset is a `TrainConfig`; a variant of one is `dataclasses.replace`.
+A preset is a `TrainConfig`. A variant of one is made by `dataclasses.replace`.
 """
 
 import dataclasses
@@ -31,7 +31,7 @@ from e2efly.zoo import policy_file
 
 ROBUST, IDENTIFIED, NOMINAL, PAPER = "robust", "identified", "nominal", "paper"
 FAMILY = "any"
-"""The family whose policies of the zoo the preset `identified` begins with."""
+"""The family whose policies of the zoo are the starting points of the preset `identified`."""
 OTHERS = EnvConfig(
     latency_spread=(0.04, 0.05),
     randomize={
@@ -47,37 +47,39 @@ AROUND = EnvConfig(
     wind=2.0,
     disturbance=DisturbanceConfig(gust=0.5, thrust=0.05, rotor=0.03, sag=0.12, centre_of_mass=0.002),
 )
-"""The vehicles of the preset `identified`: what the file's standard deviations leave open, and what no file knows."""
+"""The vehicles of the preset `identified`: the uncertainty that the file's standard deviations give, and effects that
+no file gives."""
 ONE_OF_A_FAMILY = 5
-"""By this the steps are fewer that the preset `identified` learns in than the recipe for a family, with whose policy it
-begins."""
+"""Factor by which the preset `identified` has fewer steps than the recipe for a family. It begins with a policy of that
+family."""
 BESIDE_CAMERA = {"angle_spread": 0.06, "position_spread": 0.012, "fov_spread": 0.04}
-"""What the preset `robust` draws of cameras beside what the task says of them ..."""
+"""Variations of cameras that the preset `robust` draws in addition to those of the task."""
 OLDER = 0.05
-"""... and how much older than the task says images are at most, s."""
+"""Largest additional age of images in the preset `robust`, s."""
 BESIDE_FAMILY = EnvConfig(
     latency_spread=(0.0, 0.012),
     randomize={"inertia": 0.2, "motor_time_constant": 0.2, "rate_gain": 0.2},
     wind=2.0,
     disturbance=DisturbanceConfig(gust=0.3, thrust=0.1, rotor=0.03, sag=0.1),
 )
-"""What the preset `robust` draws of a family beside its vehicles: what their files do not know."""
+"""Effects that the preset `robust` draws for a family in addition to its vehicles, because their files do not give
+them."""
 
 
 def names() -> tuple[str, ...]:
-    """The presets that there are; not every task has each."""
+    """The names of all presets. Not every task has each."""
     return ROBUST, IDENTIFIED, NOMINAL, PAPER, *dict.fromkeys(name for task in TASKS.values() for name in task.variants)
 
 
 def default(
     task: type[TaskConfig], learner: type[AlgorithmConfig], given: Callable[[str], Any] = lambda name: None
 ) -> str:
-    """The preset that a task is learned by where none is named: robust, where the algorithm has a recipe for that.
+    """The preset of a task if none is named: robust, if the algorithm has a recipe for it.
 
     Args:
-        task: the class of its options.
-        learner: the class of the algorithm's.
-        given: the value of an option of the task, by its name; some ask for presets of their own.
+        task: the class of the task's options.
+        learner: the class of the algorithm's options.
+        given: function from the name of a task option to its value. Some values require presets of their own.
     """
     for (name, value), asked in task.asked.items():
         if given(name) == value:
@@ -89,12 +91,13 @@ def preset(task: str, algo: str, name: str = NOMINAL) -> TrainConfig:
     """The configuration of a task and an algorithm.
 
     Args:
-        task: its name, or the reference of one's own: `path/to/file.py:Name`, `package.module:Name`.
-        algo: its name, or the reference of one's own.
-        name: of `names()`.
+        task: name of the task, or a reference to the user's own: `path/to/file.py:Name`, `package.module:Name`.
+        algo: name of the algorithm, or a reference to the user's own.
+        name: one of `names()`.
 
     Raises:
-        ValueError: for an unknown name, with the nearest one and all there are; for a preset that the task has not.
+        ValueError: for an unknown name, with the nearest one and all names; or for a preset that the task does not
+            have.
     """
     options = TASKS.find(task)
     learner = ALGORITHMS.find(algo)
@@ -114,14 +117,17 @@ def preset(task: str, algo: str, name: str = NOMINAL) -> TrainConfig:
 
 
 def _nominal(task: type[TaskConfig], learner: type[AlgorithmConfig]) -> TrainConfig:
-    """The task's recipe; for an algorithm of one's own its defaults, with the recipe of the one that it is like."""
+    """The task's recipe.
+
+    For a user's own algorithm: its defaults, with the recipe of the algorithm that it resembles.
+    """
     if not is_shipped(learner):
         return dataclasses.replace(task.recipe(learner.like), algo=learner())
     return task.recipe(learner.name) if learner.name in ("ppo", "bptt") else _with_critic(task, learner.name)
 
 
 def _with_critic(task: type[TaskConfig], algo: str) -> TrainConfig:
-    """BPTT's preset with critics, and rewards that suit them."""
+    """BPTT's preset with critics, and with rewards that suit them."""
     config = task.recipe("bptt")
     shared = ("max_grad_norm", "gradient_decay") if algo == "foppo" else (
         "max_grad_norm", "gradient_decay", "learning_rate", "learning_rate_end", "envs"
@@ -133,11 +139,11 @@ def _with_critic(task: type[TaskConfig], algo: str) -> TrainConfig:
 
 
 def _adaptive(task: type[TaskConfig], config: TrainConfig, name: str) -> TrainConfig:
-    """Other vehicles in every episode, and a policy with a memory by which it feels them."""
+    """A different vehicle in every episode, and a policy with a memory that senses it."""
     algo = config.algo.name
     given = task.robust.get(algo)
     if name == IDENTIFIED and (other := task.family.get(algo)):
-        # the zoo's policy of any quadrotor flies this one, too, and learns what is its own in a few steps
+        # the zoo's policy for any quadrotor also flies this vehicle, and adapts to it in a few steps
         given = dataclasses.replace(other, steps=other.steps // ONE_OF_A_FAMILY)
         if task.name in zoo.contents().get(FAMILY, {}):
             config = dataclasses.replace(config, start_from=f"{FAMILY}/{task.name}")
@@ -154,13 +160,13 @@ def _adaptive(task: type[TaskConfig], config: TrainConfig, name: str) -> TrainCo
 
 
 def _having(recipes: str) -> str:
-    """The tasks that have a recipe, and by which algorithms."""
+    """The tasks that have a recipe, with the algorithms of each recipe."""
     found = {name: getattr(known, recipes) for name, known in TASKS.items()}
     return ", ".join(f"{name} by {' or '.join(by)}" for name, by in found.items() if by)
 
 
 def _paper(task: type[TaskConfig], algo: str) -> TrainConfig:
-    """The paper's rewards, sizes and learning rates (its tables; see docs/rewards.md for what it leaves open)."""
+    """The paper's rewards, sizes and learning rates (its tables; docs/rewards.md lists what it does not give)."""
     if algo not in ("ppo", "bptt", "abpt"):
         raise ValueError(f"preset 'paper': the paper does not train by {algo!r}; accepted: ppo, bptt, abpt")
     given = task.paper
@@ -190,13 +196,13 @@ def _paper(task: type[TaskConfig], algo: str) -> TrainConfig:
 
 
 def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
-    """A configuration for another vehicle or a family, a name or a .toml file.
+    """A configuration for another vehicle or a family, given by name or .toml file.
 
-    What the preset `robust` draws of mass and thrust becomes narrower, all in the same share, where its weakest vehicle
-    could not hover. For a family it draws `BESIDE_FAMILY`, and learns as the task says of families.
+    If the weakest vehicle of the preset `robust` could not hover, the ranges of mass and thrust are all reduced by the
+    same factor. For a family the preset draws `BESIDE_FAMILY`, and learns as the task specifies for families.
 
     Raises:
-        ValueError: for a vehicle that there is not.
+        ValueError: for a vehicle that does not exist.
     """
     env = dataclasses.replace(config.env, vehicle=vehicle)
     robust = (env.randomize, env.disturbance) == (OTHERS.randomize, OTHERS.disturbance)
@@ -226,13 +232,14 @@ def _narrower(share: float) -> EnvConfig:
 
 
 def begun(config: TrainConfig) -> TrainConfig:
-    """A configuration with the file of the policy that it begins with, and with what that policy sees and commands.
+    """A configuration with the file of its initial policy, and with the observations and commands of that policy.
 
-    It sees as many past actions as that policy, where the configuration does not say. Actions of a policy of many
-    vehicles go on to mean the commands that they mean there; those of another one mean shares of the vehicle's own.
+    It has the same number of past actions as that policy, unless the configuration gives another number. The actions of
+    a policy of many vehicles keep their meaning as commands. Those of another policy are shares of the vehicle's own
+    command range.
 
     Raises:
-        ValueError: for a policy that there is not, or that cannot be read.
+        ValueError: for a policy that does not exist, or cannot be read.
     """
     if config.start_from is None:
         return config
@@ -247,7 +254,10 @@ def begun(config: TrainConfig) -> TrainConfig:
 
 
 def gentle(config: TrainConfig) -> TrainConfig:
-    """A configuration for a run that begins with a policy's weights: at the learning rate with which others end."""
+    """A configuration for a run that starts from a policy's weights.
+
+    Its learning rate is that with which other runs end.
+    """
     if not hasattr(config.algo, "learning_rate_end"):
         return config
     rate: Any = config.algo.learning_rate_end  # type: ignore[attr-defined]
@@ -261,7 +271,7 @@ def check(config: TrainConfig) -> None:
         ValueError: naming the field, the value and what is accepted.
     """
     for name, value in _whole_numbers("", config):
-        if abs(value) >= (10**300 if name == "steps" else 2**53):  # of steps, the time is told
+        if abs(value) >= (10**300 if name == "steps" else 2**53):  # for steps, another check reports the time
             raise ValueError(f"{name} is {value}; accepted: whole numbers below 2^53")
     for name in ("steps", "chunk", "eval_episodes"):
         if getattr(config, name) <= 0:

@@ -1,6 +1,6 @@
-"""What a process of the command line begins with: its standard streams, and what Ctrl-C does.
+"""The setup of a command-line process: its standard streams, and the effect of Ctrl-C.
 
-Imports next to nothing, so that it holds before anything else is imported.
+It imports almost nothing, so that it takes effect before anything else is imported.
 """
 
 import ctypes
@@ -18,16 +18,16 @@ _once = threading.Lock()
 
 
 def open_streams() -> None:
-    """Make standard streams that are there and take every text.
+    """Make sure that the standard streams exist and accept every text.
 
-    One that was closed (`>&-`) becomes the null device: a file of the run would get its number, and what is printed.
-    What the terminal's encoding lacks is printed as an escape.
+    A closed stream (`>&-`) becomes the null device. Otherwise a file of the run would get its number, and the output of
+    prints. Characters that the terminal's encoding lacks are printed as escapes.
     """
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
     sys.stdout = sys.stdout or os.fdopen(1, "w", closefd=False)
     sys.stderr = sys.stderr or os.fdopen(2, "w", closefd=False)
     for stream in (sys.stdout, sys.stderr):
@@ -36,17 +36,17 @@ def open_streams() -> None:
 
 
 def write_nowhere(number: int = 1) -> None:
-    """Let go of a stream by its number, or of standard output: what it still holds goes to the null device."""
+    """Release a stream by its number, or standard output. Its buffered content goes to the null device."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, number)
     os.close(nowhere)
 
 
 def end_at_interrupt() -> None:
-    """Make Ctrl-C end the process at once, with 130: also within an import, a compilation or a callback.
+    """Make Ctrl-C end the process at once, with status 130, also during an import, a compilation or a callback.
 
-    An exception cannot do that: it would pass through C++ code that does not expect it, or Python would end under XLA's
-    running threads. What the program was told to ignore stays ignored.
+    An exception cannot do this: it would pass through C++ code that does not expect it, or Python would end while XLA's
+    threads run. Signals that the program was told to ignore stay ignored.
     """
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         return
@@ -56,7 +56,7 @@ def end_at_interrupt() -> None:
     signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
 
     def watch() -> None:
-        """Python runs its handler between two of the main thread's instructions: after a compilation, not in it."""
+        """Python runs its handler between two instructions of the main thread, so only after a compilation."""
         while signals := os.read(reading, 64):
             if signal.SIGINT in signals and signal.getsignal(signal.SIGINT) is _end:
                 _end()
@@ -65,18 +65,20 @@ def end_at_interrupt() -> None:
 
 
 def raise_at_interrupt() -> None:
-    """Make Ctrl-C raise `KeyboardInterrupt` again, in a command that has other processes or devices to close."""
+    """Make Ctrl-C raise `KeyboardInterrupt` again, for a command that must close other processes or devices."""
     if signal.getsignal(signal.SIGINT) is _end:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def be_idle() -> None:
-    """Let this process, and the threads that it starts from now on, compute only while no other of its session wants
-    a core; and where it has a session of its own, let that have a tenth of a core that another session wants, too.
+    """Let this process, and the threads that it starts from now on, use only idle time.
+
+    They compute only while no other process of the session needs a core. If the process has a session of its own, this
+    session gets about a tenth of a core that another session needs, too.
     """
     with suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
-        if os.getsid(0) == os.getpid():  # Linux shares cores among sessions first; less would starve it for minutes
+        if os.getsid(0) == os.getpid():  # Linux shares cores among sessions first; less would stop it for minutes
             Path("/proc/self/autogroup").write_text("10")
 
 
@@ -85,18 +87,18 @@ MLOCK_CURRENT, MLOCK_FUTURE, MLOCK_ONFAULT = 1, 2, 4
 
 
 def be_punctual(priority: int) -> None:
-    """Let nothing hold up this process, whose work must not wait: neither other processes nor its own memory.
+    """Let nothing delay this process, whose work must not wait: neither other processes nor its own memory.
 
-    Its threads, and those that they start, are scheduled before all usual ones, where that is allowed; where it is not,
-    an idle core is needed. Objects that are there now are no longer looked at by the garbage collector: of a process
-    with JAX, it would take tenths of a second.
+    Its threads, and those that they start, are scheduled before all ordinary ones, if this is allowed. Otherwise an
+    idle core is needed. The garbage collector ignores all objects that exist now: in a process with JAX, it would take
+    tenths of a second for them.
 
     Args:
-        priority: of real time, 1 to 99.
+        priority: real-time priority, 1 to 99.
     """
     gc.collect()
     gc.freeze()
-    with suppress(OSError, AttributeError):  # pages that were touched stay: none is read from a disk in flight
+    with suppress(OSError, AttributeError):  # touched pages stay in memory: none is read from a disk in flight
         ctypes.CDLL(None).mlockall(MLOCK_CURRENT | MLOCK_FUTURE | MLOCK_ONFAULT)
     with suppress(OSError, AttributeError):
         for thread in threads():
@@ -104,20 +106,20 @@ def be_punctual(priority: int) -> None:
 
 
 def threads() -> list[int]:
-    """Of this process, as the operating system knows them; the one that asks, where it does not say."""
+    """The threads of this process by their system numbers. Only the calling thread if the system does not list them."""
     with suppress(OSError):
         return [int(thread.name) for thread in Path("/proc/self/task").iterdir()]
     return [threading.get_native_id()]
 
 
 def _end(*_: Any) -> None:
-    if not _once.acquire(blocking=False):  # another thread is about it, or an earlier Ctrl-C
+    if not _once.acquire(blocking=False):  # another thread or an earlier Ctrl-C already ends the process
         return
     if "multiprocessing" in sys.modules:
         import multiprocessing
 
         for child in multiprocessing.active_children():  # they ignore interrupts
             child.kill()
-    cursor = b"\x1b[?25h\r\n" if os.isatty(1) else b""  # a progress bar hides it
+    cursor = b"\x1b[?25h\r\n" if os.isatty(1) else b""  # a progress bar hides the cursor
     os.write(2, cursor + b"interrupted\n")
     os._exit(130)

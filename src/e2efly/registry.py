@@ -1,7 +1,7 @@
-"""Registries: what there is of a kind, by name, and users' own code by reference. Imports no JAX.
+"""Registries: objects of one kind by name, and users' own code by reference. Imports no JAX.
 
 A reference is `path/to/file.py:Name` or `package.module:Name`. It is accepted wherever a name is. Installed packages
-register by entry points, which are looked at when a name is unknown (`load_installed`).
+register through entry points, which are read when a name is unknown (`load_installed`).
 """
 
 import hashlib
@@ -23,11 +23,11 @@ _REFERENCE = re.compile(r"(?P<reference>(?:.+\.py|[\w.]+):[A-Za-z_]\w*)(?::(?P<w
 
 
 class Registry(Generic[T], Mapping[str, T]):
-    """Things of one kind by name, in the order in which they were registered."""
+    """Objects of one kind by name, in the order in which they were registered."""
 
     def __init__(self, kind: str, source: Callable[[T], Any] = lambda thing: thing) -> None:
         self.kind = kind
-        self._source = source  # what of a thing tells where it is from
+        self._source = source  # gives the part of an object that has its origin
         self._known: dict[str, T] = {}
 
     def __getitem__(self, name: str) -> T:
@@ -40,10 +40,10 @@ class Registry(Generic[T], Mapping[str, T]):
         return len(self._known)
 
     def add(self, name: str, thing: T) -> T:
-        """Register something; the same thing twice is one.
+        """Register an object. Registering the same object twice has no effect.
 
         Raises:
-            ValueError: for a name that is no word, or taken, naming where both are from.
+            ValueError: for a name that is not a word, or is taken, naming the origins of both objects.
         """
         if not name.isidentifier():
             raise ValueError(f"{self.kind} {name!r} of {origin(thing)}; accepted: a name of letters, digits and _")
@@ -54,11 +54,11 @@ class Registry(Generic[T], Mapping[str, T]):
         return thing
 
     def find(self, name: str) -> T:
-        """What a name or a reference stands for.
+        """The object for a name or a reference.
 
         Raises:
-            ValueError: for an unknown name, with the nearest one and all there are; for a reference that leads nowhere
-                or to something that is not registered, naming file and name.
+            ValueError: for an unknown name, with the nearest one and all names; or for a reference that does not lead
+                to a registered object, naming file and name.
         """
         if name not in self._known and ":" not in name:
             load_installed()
@@ -76,10 +76,12 @@ class Registry(Generic[T], Mapping[str, T]):
         return thing
 
     def reference(self, thing: T) -> str:
-        """By which `find` finds something again in another process: its name, or where it is from if that is not here.
+        """The text with which `find` finds an object in another process.
+
+        It is the object's name if the package ships the object, otherwise its reference.
 
         Raises:
-            ValueError: when it is not registered.
+            ValueError: when the object is not registered.
         """
         name = next((name for name, known in self._known.items() if known is thing), None)
         if name is None:
@@ -88,10 +90,10 @@ class Registry(Generic[T], Mapping[str, T]):
 
 
 def load_installed() -> None:
-    """Import what installed packages register: the modules that their entry points of the group `e2efly` name.
+    """Import the modules that installed packages register by their entry points of the group `e2efly`.
 
     Raises:
-        ValueError: naming the package and the entry point, where its module cannot be imported.
+        ValueError: naming the package and the entry point, if its module cannot be imported.
     """
     for point in metadata.entry_points(group="e2efly"):
         where = f"entry point {point.name} = {point.value} of the package {point.dist.name if point.dist else '?'}"
@@ -99,7 +101,7 @@ def load_installed() -> None:
 
 
 def load(reference: str) -> Any:
-    """What `path/to/file.py:Name` or `package.module:Name` names; a file is imported once.
+    """The object that `path/to/file.py:Name` or `package.module:Name` names. A file is imported once.
 
     Raises:
         ValueError: when the file or the module is missing, cannot be imported or has no such name.
@@ -118,7 +120,7 @@ def load(reference: str) -> Any:
 
 
 def referenced(text: str) -> tuple[str, str] | None:
-    """A reference and what stands behind another colon, `path/to/file.py:Name:TEXT`; None: the text is no reference."""
+    """A reference and the text after another colon, `path/to/file.py:Name:TEXT`. None: the text is not a reference."""
     found = _REFERENCE.fullmatch(text)
     if found is None or not ("." in text.partition(":")[0] or ".py:" in text):
         return None
@@ -126,17 +128,17 @@ def referenced(text: str) -> tuple[str, str] | None:
 
 
 def check_methods(thing: Any, methods: Sequence[str]) -> None:
-    """Refuse what lacks a method.
+    """Refuse an object that lacks a method.
 
     Raises:
-        ValueError: naming where it is from, what it lacks and what it must have.
+        ValueError: naming its origin, what it lacks and what it must have.
     """
     if lacking := [name for name in methods if not hasattr(thing, name)]:
         raise ValueError(f"{origin(type(thing))} has no {', '.join(lacking)}; accepted: all of {', '.join(methods)}")
 
 
 def origin(thing: Any) -> str:
-    """The reference of something: of its file where that was given as a file, else of its module."""
+    """The reference of an object: with its file if it was given as a file, otherwise with its module."""
     module = sys.modules.get(getattr(thing, "__module__", ""))
     name = getattr(thing, "__qualname__", repr(thing))
     if module is None:
@@ -147,14 +149,14 @@ def origin(thing: Any) -> str:
 
 
 def is_shipped(thing: Any) -> bool:
-    """Whether something comes with the package."""
+    """Whether an object is part of the package."""
     return str(getattr(thing, "__module__", "")).split(".")[0] == __name__.split(".")[0]
 
 
 _OF_FILES = "e2efly_file_"
 """Beginning of the names of modules that are imported from files."""
 _BEGUN: set[str] = set()
-"""The files whose import has begun and not ended."""
+"""Files whose import has begun but not ended."""
 
 
 def _file(path: Path) -> ModuleType:
@@ -189,5 +191,5 @@ def _imported(where: str, run: Callable[[], ModuleType]) -> ModuleType:
         return run()
     except ValueError:
         raise
-    except Exception as error:  # whatever the user's code raises
+    except Exception as error:  # any error of the user's code
         raise ValueError(f"{where} cannot be imported: {type(error).__name__}: {error}") from error

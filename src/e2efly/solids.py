@@ -1,4 +1,4 @@
-"""Scene files: one world of solids as TOML, for people to write, as docs/vision.md describes it. Imports no JAX."""
+"""Scene files: one world of solids as TOML, written by hand, as docs/vision.md describes it. Imports no JAX."""
 
 import math
 from dataclasses import dataclass
@@ -20,15 +20,14 @@ SIZES = {
     ),
     "pad": ("half width", "half height", "outline: 0 disc, 1 square, 2 triangle"),
 }  # fmt: skip
-"""What the sizes of each kind of solid are, m unless said. Lengths run along the local z axis; a gate is flown through
-along its x axis.
-"""
+"""Meaning of the size entries of each kind of solid, in m unless noted. Lengths are along the local z axis. A gate is
+flown through along its x axis."""
 DISC, SQUARE, TRIANGLE = 0, 1, 2
 """Outlines of a pad."""
 CLASSES = ("sky", "ground", "obstacle", "gate", "pad", "wall")
 """Semantic classes."""
 USUAL_CLASS = dict.fromkeys(SIZES, "obstacle") | {"gate": "gate", "pad": "pad"}
-"""Of the solids of each kind, unless said otherwise."""
+"""Class of each kind of solid, unless another is given."""
 _NEEDED = {"kind", "centre", "size"}
 _MORE = {"roll", "pitch", "yaw", "class", "colour", "path"}
 _PATH = {"cosine", "sine", "rate"}
@@ -36,7 +35,7 @@ _PATH = {"cosine", "sine", "rate"}
 
 @dataclass(frozen=True)
 class Orbit:
-    """The way of a solid that moves: centre + cosine cos(rate t) + sine sin(rate t)."""
+    """The path of a moving solid: centre + cosine cos(rate t) + sine sin(rate t)."""
 
     cosine: np.ndarray
     """(3,) world, m."""
@@ -54,19 +53,19 @@ class Solid:
     centre: np.ndarray
     """(3,) world, m."""
     size: np.ndarray
-    """What `SIZES` names."""
+    """Values whose meaning is given by `SIZES`."""
     angles: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Roll, pitch, yaw of its frame, rad."""
     label: str = "obstacle"
     """A name of `CLASSES`."""
     colour: np.ndarray | None = None
-    """(3,) RGB in [0, 1]; None: the usual one of its class."""
+    """(3,) RGB in [0, 1]. None: the default colour of its class."""
     path: Orbit | None = None
-    """None: it stands."""
+    """None: the solid does not move."""
 
 
 def read_solids(path: Path) -> tuple[float | None, list[Solid]]:
-    """The height of the ground of a file, m, None for none, and its solids.
+    """The height of the ground in a file, m (None: no ground), and the solids of the file.
 
     Raises:
         ValueError: naming the file, the solid, the key, the value and what is accepted.

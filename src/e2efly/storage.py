@@ -1,4 +1,4 @@
-"""Files that a crash cannot spoil: written whole, JSON without NaN, folders that one process at a time writes to."""
+"""Files that survive a crash: complete writes, JSON without NaN, folders with only one writing process at a time."""
 
 import fcntl
 import json
@@ -13,16 +13,16 @@ from pathlib import Path
 from typing import Any
 
 LOCK = ".lock"
-"""Name of the file in a folder that says who writes to it. Only the lock that the kernel keeps on it counts."""
+"""Name of the file in a folder that tells who writes to it. Only the kernel's lock on this file counts."""
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file so that at any moment it is whole: the old one or the new one.
+    """Write a file so that it is complete at any moment: either the old or the new one.
 
     Raises:
         OSError: naming the path, when the folder cannot be written or is full.
     """
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")  # others may write the same file
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")  # other processes may write the same file
     try:
         with part.open("wb") as file:
             file.write(data)
@@ -35,7 +35,7 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def write_json(path: Path, content: Any, indent: int | None = 1) -> None:
-    """Write a JSON file atomically, with null for numbers that JSON has not (NaN and infinities).
+    """Write a JSON file atomically, with null for numbers that JSON does not have (NaN and infinities).
 
     Raises:
         OSError: naming the path, when the folder cannot be written or is full.
@@ -47,7 +47,7 @@ def read_json(path: Path) -> dict[str, Any]:
     """The object in a JSON file.
 
     Raises:
-        ValueError: when the file is missing, no JSON, or JSON of something else than an object.
+        ValueError: when the file is missing, is not JSON, or contains something other than an object.
     """
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
@@ -61,7 +61,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def finite(value: Any) -> Any:
-    """A tree of JSON with None for every number that is not finite."""
+    """A JSON tree with None for every number that is not finite."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
@@ -73,16 +73,16 @@ def finite(value: Any) -> Any:
 
 @contextmanager
 def held(folder: Path, option: str = "--out") -> Iterator[None]:
-    """Keep other processes from writing to a folder, which is made where there is none.
+    """Keep other processes from writing to a folder. The folder is made if it does not exist.
 
-    The kernel lets go when the process ends, however it ends, so that no lock outlives its process.
+    The kernel releases the lock when the process ends, however it ends. So no lock outlives its process.
 
     Args:
-        folder: to hold.
-        option: that names the folder, for the error.
+        folder: the folder to lock.
+        option: the option that names the folder, for the error text.
 
     Raises:
-        ValueError: when another process holds it, naming process, host and since when.
+        ValueError: when another process holds it, naming the process, the host and the time since when.
         OSError: when the folder cannot be made, or its file system has no locks.
     """
     anew = not folder.exists()
@@ -103,7 +103,7 @@ def held(folder: Path, option: str = "--out") -> Iterator[None]:
     now = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
     about = json.dumps({"process": os.getpid(), "host": socket.gethostname(), "since": now})
     try:
-        with suppress(OSError):  # on a full disk it says nothing, and the lock holds as well
+        with suppress(OSError):  # on a full disk it gives no details, but the lock still holds
             os.ftruncate(file, 0)
             os.pwrite(file, about.encode(), 0)
         yield
@@ -111,15 +111,15 @@ def held(folder: Path, option: str = "--out") -> Iterator[None]:
         path.unlink(missing_ok=True)
         os.close(file)
         if anew:
-            with suppress(OSError):  # it holds something
+            with suppress(OSError):  # the folder is not empty
                 folder.rmdir()
 
 
 def is_held(folder: Path) -> bool:
-    """Whether another process, or this one, keeps a folder by `held`; a file that a killed one left counts for nothing.
+    """Whether another process, or this one, holds a folder by `held`. A file left by a killed process does not count.
 
     Raises:
-        OSError: when the file of the lock cannot be read.
+        OSError: when the lock file cannot be read.
     """
     try:
         file = os.open(folder / LOCK, os.O_RDONLY | os.O_CLOEXEC)
@@ -135,7 +135,7 @@ def is_held(folder: Path) -> bool:
 
 
 def _locked(path: Path) -> int:
-    """A descriptor of the file with the lock on it.
+    """A descriptor of the file, with the lock on it.
 
     Raises:
         BlockingIOError: when another process has it.
@@ -149,11 +149,11 @@ def _locked(path: Path) -> int:
         except OSError:
             os.close(file)
             raise
-        os.close(file)  # of a file that its last holder has removed in the meantime
+        os.close(file)  # of a file that its last holder has removed meanwhile
 
 
 def _holder(path: Path) -> str:
-    """Who holds a lock, as far as its file says."""
+    """The holder of a lock, as far as its file tells."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         return f"process {content['process']} on {content['host']} since {content['since']}"
@@ -162,7 +162,7 @@ def _holder(path: Path) -> str:
 
 
 def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A JSON object whose keys are there once."""
+    """A JSON object in which every key occurs once."""
     content: dict[str, Any] = {}
     for key, value in pairs:
         if key in content:

@@ -1,7 +1,7 @@
-"""A process under another one's eyes: where several hosts train together, a lost one makes JAX abort the others.
+"""A process supervised by another one. If several hosts train together and one is lost, JAX aborts the others.
 
-The coordination service of JAX ends its process with SIGABRT and a stack of C++ functions; nothing in that process can
-prevent it. So the run is a process of its own, and what watches it says in its place what happened.
+The coordination service of JAX ends its process with SIGABRT and a stack of C++ functions, and nothing in that process
+can prevent it. The run is therefore a separate process, and its supervisor reports what happened.
 """
 
 import ctypes
@@ -14,29 +14,29 @@ from collections.abc import Callable
 from typing import Any
 
 WATCHED = "E2EFLY_WATCHED"
-"""Variable of the environment that the watched process has: the number of the one that watches it."""
+"""Environment variable of the supervised process. It contains the process number of the supervisor."""
 _FATAL = re.compile(rb"[EF]\d{4} \d\d:\d\d:\d\d.*(coordination|client\.h)")
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG
 _LOST = "another process of the run ended, hangs, or cannot be reached, or HOST:PORT is of another program"
 
 
 def is_watched() -> bool:
-    """Whether this process is the watched one. If so, it ends with the one that watches."""
+    """Whether this process is supervised. If so, it ends when the supervisor ends."""
     watcher = os.environ.get(WATCHED)
     if watcher is None:
         return False
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGKILL)
-        if os.getppid() != int(watcher):  # it has ended already
+        if os.getppid() != int(watcher):  # the supervisor has already ended
             os._exit(2)
     return True
 
 
 def watched(command: list[str], lost: Callable[[str], str]) -> int:
-    """Run a command; its exit status, or 2 and an error in place of an abort of JAX's coordination service.
+    """Run a command. Returns its exit status, or 2 with an error message after an abort by JAX's coordination service.
 
-    Signals that ask this process to end are handed on. What the command writes to stderr is, too, but for the words
-    of the coordination service, which come at the end and only where there was no abort.
+    Signals that ask this process to end are passed on to the command. Its output to stderr is passed on, too. Only the
+    messages of the coordination service are held back until the end, and are shown only if there was no abort.
 
     Args:
         command: program and arguments.
@@ -72,7 +72,7 @@ def watched(command: list[str], lost: Callable[[str], str]) -> int:
 
 
 def _reason(lines: list[bytes]) -> str:
-    """What the coordination service says, as far as a user understands it."""
+    """The message of the coordination service, as far as a user can understand it."""
     text = b"".join(lines).decode(errors="replace")
     known = re.search(r"(UNAVAILABLE|DEADLINE_EXCEEDED|ABORTED|INVALID_ARGUMENT|ALREADY_EXISTS)[^\n]*", text)
     return f"{_LOST} ({known.group(0)[:160]})" if known else _LOST

@@ -1,4 +1,4 @@
-"""What commands print: text as it is, tables, and the progress of a run."""
+"""Output of commands: plain text, tables, and the progress of a run."""
 
 import signal
 import threading
@@ -14,16 +14,19 @@ from e2efly.process import write_nowhere
 
 
 class Terminal(Console):
-    """A console that prints text as it is: paths and messages may hold what rich would take for markup or emojis.
+    """A console that prints text unchanged, although paths and messages may contain rich markup or emoji codes.
 
-    A line goes on where the terminal is too narrow, so that commands and paths in it can be copied.
+    Lines are not broken in a narrow terminal, so that commands and paths in them can be copied.
     """
 
     def __init__(self, *, stderr: bool = False, quiet: bool = False) -> None:
         super().__init__(stderr=stderr, quiet=quiet, markup=False, emoji=False, highlight=False, soft_wrap=True)
 
     def on_broken_pipe(self) -> None:
-        """End as SIGPIPE would when whoever reads, as `head`, has enough; but from no thread beside the main one."""
+        """End like a process that receives SIGPIPE, if the reader, such as `head`, has stopped.
+
+        Only in the main thread.
+        """
         self.quiet = True
         write_nowhere()
         if threading.current_thread() is threading.main_thread():
@@ -31,14 +34,15 @@ class Terminal(Console):
 
 
 NARROW = 110
-"""Columns of a terminal below which the bar is short and tells less: the time left must be seen."""
+"""Width of a terminal in columns below which the bar is short and shows less. The time left must stay visible."""
 LINES_S = 5.0
-"""Between two lines where the output is no terminal, s."""
+"""Interval between two lines if the output is not a terminal, s."""
 
 
 class TerminalProgress:
-    """A bar with the rate, the time left and the success of the last and the best evaluation; lines where the output is
-    no terminal.
+    """A progress bar with the rate, the time left and the success of the last and the best evaluation.
+
+    If the output is not a terminal, it prints lines instead.
     """
 
     def __init__(self, console: Console, title: str) -> None:
@@ -58,7 +62,7 @@ class TerminalProgress:
         self._task = self._bar.add_task(title, total=None, figures="")
         self._began, self._told = time.monotonic(), -LINES_S
         self.end: tuple[Any, ...] = ()
-        """Of `ended`."""
+        """The arguments of `ended`."""
 
     def __enter__(self) -> "TerminalProgress":
         self._bar.start()
@@ -70,7 +74,7 @@ class TerminalProgress:
         self._bar.stop()
 
     def compiling(self) -> None:
-        """Show that nothing is flying yet."""
+        """Show that programs are being compiled and nothing flies yet."""
         self._say("compiling" if self._narrow else "compiling (seconds; cached for the next run)")
 
     def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
@@ -87,11 +91,11 @@ class TerminalProgress:
             self._told = now
 
     def judging(self, starts: int) -> None:
-        """Show that the training is over, and the policy flown from starts that it never saw."""
+        """Show that the training is over, and that the policy is flown from starts that it never saw."""
         self._say(f"flying {starts} starts" if self._narrow else f"flying {starts} starts that it never saw")
 
     def ended(self, *end: Any) -> None:
-        """Keep what the run has ended with, for the plots."""
+        """Keep the final results of the run, for the plots."""
         self.end = end
 
     def _say(self, text: str) -> None:
@@ -101,7 +105,7 @@ class TerminalProgress:
 
 
 def console_table(rows: list[dict[str, Any]]) -> Table:
-    """For `rich`: the first row's keys are the headings."""
+    """A table for `rich`. The keys of the first row are the headings."""
     table = Table(box=None, header_style="bold", pad_edge=False)
     for heading in rows[0]:
         table.add_column(heading, no_wrap=True)
@@ -111,7 +115,7 @@ def console_table(rows: list[dict[str, Any]]) -> Table:
 
 
 def markdown(rows: list[dict[str, Any]]) -> list[str]:
-    """Lines of a markdown table: the first row's keys are the headings."""
+    """Lines of a markdown table. The keys of the first row are the headings."""
     heads = list(rows[0])
     return [
         "| " + " | ".join(heads) + " |",
@@ -121,5 +125,5 @@ def markdown(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def seconds(value: float | None) -> str:
-    """A time for a table; None: of nothing."""
+    """A time for a table. None: there is no time."""
     return "none" if value is None else f"{value:.2f} s"

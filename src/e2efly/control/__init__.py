@@ -1,4 +1,4 @@
-"""The control cascade from positions to body rates, one implementation for the simulator and for flight. No JAX."""
+"""The control cascade from positions to body rates: one implementation for simulator and flight. Imports no JAX."""
 
 from e2efly.control.cascade import Ctbr, Motion
 from e2efly.control.modes import COMMAND_MODES, CommandMode, command_limits

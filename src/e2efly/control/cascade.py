@@ -1,7 +1,7 @@
 """The cascade of controllers down to collective thrust and body rates (CTBR).
 
 velocity + yaw -> acceleration + yaw -> attitude + thrust -> CTBR. A command mode (`control/modes.py`) enters at its own
-level. The simulator and the flight bridge run these same functions, on JAX and on NumPy arrays.
+level. The simulator and the flight bridge run the same functions, on JAX arrays and on NumPy arrays.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ Command = tuple[Array, Array, Array, Array]
 
 
 class Motion(Protocol):
-    """What the controllers know of the vehicle: world ENU, body FLU, SI units."""
+    """The vehicle's motion as the controllers know it: world ENU, body FLU, SI units."""
 
     @property
     def position(self) -> Vec3:
@@ -24,18 +24,18 @@ class Motion(Protocol):
 
     @property
     def velocity(self) -> Vec3:
-        """World, m/s."""
+        """Velocity, world, m/s."""
         ...
 
     @property
     def attitude(self) -> Quat:
-        """Body to world."""
+        """Rotation from body to world."""
         ...
 
 
 @dataclass(frozen=True)
 class Ctbr:
-    """Collective thrust and body rates: what the flight controller's rate loop is told."""
+    """Collective thrust and body rates: the command of the flight controller's rate loop."""
 
     thrust: Array
     """Collective thrust over mass, m/s^2."""
@@ -48,16 +48,19 @@ Controller = Callable[[Vehicle, Motion, Command], Ctbr]
 
 
 def reach(vehicle: Vehicle, motion: Motion, wanted: Vec3, yaw: Array) -> Ctbr:
-    """Towards a velocity in the world, m/s, and a yaw, rad."""
+    """Control a velocity in the world, m/s, and a yaw, rad."""
     error = wanted - motion.velocity
     return accelerate(vehicle, motion, error.times(Vec3.of(vehicle.velocity_gain)), yaw)
 
 
 def pull(vehicle: Vehicle, wanted: Vec3) -> Vec3:
-    """What the rotors are to give for a wanted acceleration, both world, m/s^2: it less gravity, within the limits."""
+    """Specific force of the rotors for a wanted acceleration, both world, m/s^2.
+
+    It is the acceleration minus gravity, within the limits.
+    """
     wanted = wanted.clip(Vec3.of(vehicle.acceleration_max))
     xp = namespace(wanted.x, wanted.z)
-    up = xp.maximum(wanted.z + GRAVITY, 0.1 * GRAVITY)  # the rotors push up: a steeper fall is not commanded
+    up = xp.maximum(wanted.z + GRAVITY, 0.1 * GRAVITY)  # the rotors push up: a faster fall is not commanded
     level = safe_sqrt(wanted.x**2 + wanted.y**2)
     reach = up * xp.tan(vehicle.tilt_max)
     shrink = reach / xp.maximum(level, reach)
@@ -65,9 +68,10 @@ def pull(vehicle: Vehicle, wanted: Vec3) -> Vec3:
 
 
 def attitude_along(axis: Vec3, yaw: Array) -> Quat:
-    """The attitude whose z axis is a unit vector, world, at a yaw, rad.
+    """The attitude whose z axis is a given unit vector, world, at a yaw, rad.
 
-    The shortest turn from up to the axis, after a turn by the yaw about up: singular only upside down.
+    It is a rotation by the yaw about up, followed by the shortest rotation from up to the axis. It is singular only
+    upside down.
     """
     xp = namespace(axis.z, yaw)
     half = xp.sqrt((1 + axis.z) / 2)
@@ -77,16 +81,19 @@ def attitude_along(axis: Vec3, yaw: Array) -> Quat:
 
 
 def accelerate(vehicle: Vehicle, motion: Motion, wanted: Vec3, yaw: Array) -> Ctbr:
-    """Point the thrust along the wanted acceleration, world, m/s^2, less gravity, within the tilt limit; yaw, rad."""
+    """Point the thrust along the wanted acceleration, world, m/s^2, minus gravity, within the tilt limit.
+
+    The yaw is in rad.
+    """
     force = pull(vehicle, wanted)
     axis = force * (1 / force.norm())
-    along = motion.attitude.z_axis().dot(force)  # thrust for the acceleration along the axis as it is now
+    along = motion.attitude.z_axis().dot(force)  # thrust for the acceleration along the present axis
     xp = namespace(along)
     return turn(vehicle, motion, xp.maximum(along, 0.0), attitude_along(axis, yaw))
 
 
 def turn(vehicle: Vehicle, motion: Motion, thrust: Array, wanted: Quat) -> Ctbr:
-    """Towards an attitude, tilt first.
+    """Control an attitude, with priority for the tilt.
 
     Brescianini and D'Andrea, Tilt-prioritized quadrocopter attitude control, 2018.
     """

@@ -1,6 +1,6 @@
-"""Command modes: what the four numbers of a command are, how far they reach, and how they become CTBR. No JAX.
+"""Command modes: the meaning and limits of the four numbers of a command, and how they become CTBR. Imports no JAX.
 
-A mode is one entry of `COMMAND_MODES`. Simulator, contract, bridge and other plants know it by that entry alone.
+A mode is one entry of `COMMAND_MODES`. Simulator, contract, bridge and other plants use only this entry.
 """
 
 from collections.abc import Callable
@@ -28,15 +28,17 @@ class CommandMode:
     units: tuple[str, str, str, str]
     """Their units."""
     limits: Callable[[Vehicle, float], Limits]
-    """(nominal vehicle, reach of positions in m) -> smallest and largest command."""
+    """(nominal vehicle, range of positions in m) -> smallest and largest command."""
     controller: Controller | None
-    """How a command becomes CTBR; None: it is the thrusts of the rotors, below the flight controller's rate loop."""
+    """Controller that makes CTBR of a command. None: the command is the rotor thrusts, below the flight controller's
+    rate loop."""
     hover: Callable[[Vehicle], Four] = lambda vehicle: (0.0, 0.0, 0.0, 0.0)
-    """The command that hovers a level vehicle, where the mode has one."""
+    """The command that makes a level vehicle hover, if the mode has one."""
     fixed: tuple[str, ...] = ("origin_yaw",)
-    """Options of a goal that would move the world under the command: those of its axes, which no policy sees."""
+    """Options of a goal that would move the world under the command. They concern the world axes, which no policy
+    observes."""
     of_largest: bool = False
-    """Whether thrusts of rotors are shares of the largest; else they are N."""
+    """Whether rotor thrusts are shares of the largest thrust. Otherwise they are in N."""
 
 
 def ctbr(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
@@ -78,7 +80,7 @@ def _rotors(vehicle: Vehicle, _: float) -> Limits:
 
 
 def _with_thrust(vehicle: Vehicle, *limits: float) -> Limits:
-    """Of a collective thrust, which is never negative, and of three other numbers."""
+    """Limits of a collective thrust, which is never negative, and of three other numbers."""
     low, high = _symmetric(*limits)
     return [0.0, *low], [4 * vehicle.thrust_range[1] / vehicle.mass, *high]
 
@@ -123,5 +125,5 @@ COMMAND_MODES: dict[str, CommandMode] = {
 
 
 def command_limits(mode: CommandMode, vehicle: Vehicle, position_range: float = 5.0) -> np.ndarray:
-    """Smallest and largest command, (2, 4), of the nominal (loaded) vehicle."""
+    """Smallest and largest command, (2, 4), for the nominal (loaded) vehicle."""
     return np.asarray(mode.limits(vehicle, position_range), np.float64)

@@ -1,4 +1,4 @@
-"""Where a controller is to hold a vehicle, and how that moves."""
+"""The place at which a controller is to hold a vehicle, and the motion of this place."""
 
 from dataclasses import dataclass
 
@@ -9,21 +9,21 @@ ZERO = Vec3(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Place:
-    """Where to be; components are numbers, or arrays of the batch's shape. World ENU, SI units."""
+    """A place to be at. Components are numbers, or arrays of the batch's shape. World ENU, SI units."""
 
     position: Vec3
-    """m."""
+    """Position, m."""
     velocity: Vec3 = ZERO
-    """m/s."""
+    """Velocity, m/s."""
     acceleration: Vec3 = ZERO
-    """m/s^2."""
+    """Acceleration, m/s^2."""
     jerk: Vec3 = ZERO
-    """m/s^3."""
+    """Jerk, m/s^3."""
     yaw: Array | None = None
-    """rad; None: any, the vehicle keeps the one that it has."""
+    """Yaw, rad. None: any yaw; the vehicle keeps its own."""
 
     def after(self, seconds: float) -> "Place":
-        """Where it has moved to after some seconds, the jerk being constant."""
+        """The place after some seconds of constant jerk."""
         t = seconds
         return Place(
             self.position + self.velocity * t + self.acceleration * (t**2 / 2) + self.jerk * (t**3 / 6),

@@ -1,7 +1,7 @@
-"""Vectors and quaternions taken apart into components; of NumPy in flight, of JAX in the simulator.
+"""Vectors and quaternions split into components, with NumPy in flight and JAX in the simulator.
 
-Inside the physics every component is an array of the batch's shape. On whole batches of scalars XLA vectorises over
-the batch, which is 1.7 times faster on a CPU than the same formulas on arrays of shape (batch, 3).
+Inside the physics every component is an array of the batch's shape. On whole batches of scalars XLA vectorises over the
+batch, which is 1.7 times faster on a CPU than the same formulas on arrays of shape (batch, 3).
 """
 
 from dataclasses import dataclass
@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 Array = Any
-"""A number or an array of the batch's shape, of NumPy or of JAX: the formulas are the same."""
+"""A number or an array of the batch's shape, from NumPy or JAX. The formulas are the same."""
 
 
 def namespace(*values: Array) -> Any:
-    """The array library of the values: JAX's if any is JAX's, else NumPy."""
+    """The array library of the values: JAX if any of them is a JAX array, otherwise NumPy."""
     for value in values:
         if not isinstance(value, (float, int, np.ndarray, np.generic)):
             return value.__array_namespace__()
@@ -37,7 +37,7 @@ class Vec3:
 
     @staticmethod
     def of(array: Array) -> "Vec3":
-        """Take apart an array of shape (*n, 3)."""
+        """Split an array of shape (*n, 3)."""
         return Vec3(array[..., 0], array[..., 1], array[..., 2])
 
     def stack(self) -> Array:
@@ -83,13 +83,13 @@ class Vec3:
         )
 
     def norm(self) -> Array:
-        """Euclidean length; gradient 0 at zero."""
+        """Euclidean length. Its gradient is 0 at zero."""
         return safe_sqrt(self.dot(self))
 
 
 @dataclass(frozen=True)
 class Quat:
-    """A unit quaternion w + xi + yj + zk that turns body vectors into world vectors."""
+    """A unit quaternion w + xi + yj + zk that rotates body vectors into world vectors."""
 
     w: Array
     x: Array
@@ -98,7 +98,7 @@ class Quat:
 
     @staticmethod
     def of(array: Array) -> "Quat":
-        """Take apart an array of shape (*n, 4), wxyz."""
+        """Split an array of shape (*n, 4), wxyz."""
         return Quat(array[..., 0], array[..., 1], array[..., 2], array[..., 3])
 
     def stack(self) -> Array:
@@ -112,7 +112,7 @@ class Quat:
         return Quat(self.w * scale, self.x * scale, self.y * scale, self.z * scale)
 
     def compose(self, other: "Quat") -> "Quat":
-        """Hamilton product: turn by `other`, then by `self`."""
+        """Hamilton product: rotation by `other`, then by `self`."""
         a, b = self, other
         return Quat(
             a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z,
@@ -136,7 +136,7 @@ class Quat:
         )
 
     def conjugate(self) -> "Quat":
-        """The inverse turn."""
+        """The inverse rotation."""
         return Quat(self.w, -self.x, -self.y, -self.z)
 
     def normalized(self) -> "Quat":
@@ -154,18 +154,18 @@ class Quat:
         )
 
     def turned(self, angle: Vec3) -> "Quat":
-        """After a small turn about the body's axes, rad."""
+        """The attitude after a small rotation about the body axes, rad."""
         one = namespace(angle.x).ones_like(angle.x)
         return self.compose(Quat(one, angle.x / 2, angle.y / 2, angle.z / 2)).normalized()
 
     def rotate(self, v: Vec3) -> Vec3:
-        """Body to world."""
+        """Rotate from body to world."""
         u = Vec3(self.x, self.y, self.z)
         t = u.cross(v) * 2.0
         return v + t * self.w + u.cross(t)
 
     def unrotate(self, v: Vec3) -> Vec3:
-        """World to body."""
+        """Rotate from world to body."""
         return self.conjugate().rotate(v)
 
     def z_axis(self) -> Vec3:
@@ -179,7 +179,7 @@ class Quat:
     def yaw(self) -> Array:
         """Heading: the angle about world z of the body's x axis, rad in [-pi, pi].
 
-        Its gradient is finite, and the angle 0, where the axis points straight up or down.
+        If the axis points straight up or down, the angle is 0 and its gradient is finite.
         """
         sine, cosine = 2.0 * (self.w * self.z + self.x * self.y), 1.0 - 2.0 * (self.y**2 + self.z**2)
         xp, defined = namespace(sine), sine**2 + cosine**2 > 1e-12
@@ -187,7 +187,7 @@ class Quat:
         return xp.where(defined, angle, 0.0)
 
     def tilt(self) -> Array:
-        """The angle between the body's z axis and up, rad in [0, pi]; its gradient is not finite at either end."""
+        """The angle between the body's z axis and up, rad in [0, pi]. Its gradient is not finite at either end."""
         up = 1.0 - 2.0 * (self.x**2 + self.y**2)
         return namespace(up).arccos(namespace(up).clip(up, -1.0, 1.0))
 

@@ -1,8 +1,8 @@
-"""Gates, and what passing one is: the same arithmetic for NumPy's arrays and JAX's.
+"""Gates, and the definition of passing one: the same arithmetic for NumPy arrays and JAX arrays.
 
-A gate's frame: x along its yaw, the direction in which it is flown through; y left; z up. A gate is passed when the
-centre of mass crosses its plane forward with the vehicle's sphere inside the opening; crossing the next gate's plane
-forward anywhere else is a failure, and so is touching the frame of any gate in either direction.
+A gate's frame has x along its yaw, in the direction of flight through it, y to the left, and z up. A gate is passed
+when the centre of mass crosses its plane forward while the vehicle's sphere is inside the opening. Crossing the next
+gate's plane forward anywhere else is a failure. Touching the frame of any gate, in either direction, is a failure, too.
 """
 
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ from e2efly.courses.tracks import RaceTrack
 FRAME = 0.1
 """Width of a gate's frame around its opening, m."""
 STRAIGHT_ON = 3.0
-"""Behind the last gate of an open track lies a point this far straight on, m."""
+"""Distance of the point after the last gate of an open track, straight on, m."""
 BURIED = -1000.0
-"""Height of gates that a track of fewer gates has not, m: nobody meets them."""
+"""Height of gates that a track with fewer gates does not have, m. No vehicle meets them there."""
 
 
 @dataclass(frozen=True)
@@ -25,12 +25,12 @@ class Gates:
     """The gates of a track as arrays."""
 
     start: Any
-    """(3,) or, each world its own, (n, 3): where a race begins, world, m."""
+    """(3,), or (n, 3) with one row per world: start of a race, world, m."""
     start_yaw: Any
-    """Heading there, rad; a number or (n,)."""
+    """Heading at the start, rad; a number or (n,)."""
     position: Any
-    """(g + 1, 3) or, each world its own, (n, g + 1, 3): centres, world, m. The last row is what the policy is shown
-    behind the last gate."""
+    """(g + 1, 3), or (n, g + 1, 3) with one track per world: centres, world, m. The last row is the point that the
+    policy observes after the last gate."""
     cos: Any
     """(g,) or (n, g) cosine of each yaw."""
     sin: Any
@@ -40,7 +40,7 @@ class Gates:
 
     @staticmethod
     def of(track: RaceTrack) -> "Gates":
-        """The arrays of a loaded track: behind the last gate comes the first again, or a point 3 m straight on."""
+        """The arrays of a loaded track. After the last gate comes the first gate again, or a point 3 m straight on."""
         cos, sin = np.cos(track.yaw), np.sin(track.yaw)
         straight_on = track.position[-1] + STRAIGHT_ON * np.array([cos[-1], sin[-1], 0.0])
         position = np.vstack([track.position, track.position[0] if track.closed else straight_on])
@@ -50,7 +50,7 @@ class Gates:
 
     @property
     def count(self) -> int:
-        """Gates of the track."""
+        """Number of gates of the track."""
         return self.cos.shape[-1]
 
     def local(self, point: Any) -> tuple[Any, Any, Any]:
@@ -61,16 +61,16 @@ class Gates:
         return cos * x + sin * y, cos * y - sin * x, d[..., 2]
 
     def judge(self, index: Any, before: Any, after: Any, radius: Any) -> tuple[Any, Any, Any]:
-        """What steps along straight lines came to.
+        """Judge steps along straight lines.
 
         Args:
             index: (n,) the next gate of each vehicle, counted from 0 within a lap.
             before: (n, 3) centres of mass at the start of the step, world, m.
-            after: (n, 3) at its end.
+            after: (n, 3) centres of mass at the end of the step, world, m.
             radius: of the vehicle's sphere, m.
 
         Returns:
-            Booleans (n,): the next gate was passed; its plane was crossed forward elsewhere; a frame was struck.
+            Booleans (n,): the next gate was passed; its plane was crossed forward elsewhere; a frame was touched.
         """
         xp = before.__array_namespace__()
         x0, y0, z0 = self.local(before)
@@ -91,23 +91,23 @@ class Gates:
 
 @dataclass(frozen=True)
 class Tracks:
-    """The tracks of n worlds, which have room for the same number of gates."""
+    """The tracks of n worlds, in arrays for the same number of gates."""
 
     gates: Gates
-    """Each with a leading axis n. Gates beyond `count` are `BURIED`."""
+    """The gates, each array with a leading axis n. Gates beyond `count` are `BURIED`."""
     count: Any
-    """(n,) gates that there are."""
+    """(n,) number of gates."""
     closed: Any
     """(n,) whether the first gate follows the last."""
 
     @property
     def there(self) -> Any:
-        """(n, g) which gates there are."""
+        """(n, g) which gates exist."""
         return self.count.__array_namespace__().arange(self.gates.count) < self.count[:, None]
 
     @staticmethod
     def of(track: RaceTrack, room: int = 0) -> "Tracks":
-        """One world (n = 1) with a loaded track, with room for so many gates, or for as many as it has."""
+        """One world (n = 1) with a loaded track, in arrays for `room` gates, or for as many gates as the track has."""
         gates = Gates.of(track)
         more = max(room - gates.count, 0)
         buried = np.tile(np.array([0.0, 0.0, BURIED], np.float32), (more, 1))

@@ -1,4 +1,4 @@
-"""Where a course stands in the room that it is flown in."""
+"""The place of a course in the room in which it is flown."""
 
 import dataclasses
 import math
@@ -10,51 +10,52 @@ from e2efly.courses.references import Spline
 from e2efly.courses.tracks import RaceTrack
 
 RESIDUAL = 0.02
-"""Root mean square by which measured points may be off after a fit, m."""
+"""Largest accepted root mean square error of measured points after a fit, m."""
 FLAT = 0.05
-"""Extent of points across their longest line over that along it, below which they lie on a line."""
+"""Ratio of the extent of points across their longest line to the extent along it. Below this, they count as points on a
+line."""
 
 
 @dataclass(frozen=True)
 class Origin:
-    """A course's own origin, seen from the room's (the world of the pose source): turned about up, then moved."""
+    """The origin of a course relative to the room's (the world of the pose source): rotated about up, then moved."""
 
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """World, m."""
+    """Position in the room, m."""
     yaw: float = 0.0
-    """About world z, rad."""
+    """Rotation about world z, rad."""
 
     def vectors(self, vector: np.ndarray) -> np.ndarray:
-        """Vectors (..., 3) of the course, in the room."""
+        """Convert vectors (..., 3) from the course to the room."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         R_room_course = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         return np.asarray(vector, np.float64) @ R_room_course.T
 
     def points(self, point: np.ndarray | tuple[float, float, float]) -> np.ndarray:
-        """Points (..., 3) of the course, m, in the room."""
+        """Convert points (..., 3), m, from the course to the room."""
         return self.vectors(np.asarray(point, np.float64)) + np.asarray(self.position, np.float64)
 
     def seen_vectors(self, vector: np.ndarray) -> np.ndarray:
-        """Vectors (..., 3) of the room, in the course's axes."""
+        """Convert vectors (..., 3) from the room to the course."""
         return Origin(yaw=-self.yaw).vectors(vector)
 
     def seen(self, point: np.ndarray) -> np.ndarray:
-        """Points (..., 3) of the room, m, in the course's axes."""
+        """Convert points (..., 3), m, from the room to the course."""
         return self.seen_vectors(np.asarray(point, np.float64) - np.asarray(self.position, np.float64))
 
     @staticmethod
     def fitted(room: np.ndarray, course: np.ndarray) -> "Origin":
-        """The origin by which points of the course lie where they were measured in the room, by least squares.
+        """The origin that best maps points of the course to their measured positions in the room, by least squares.
 
-        Both have z up, so that a turn about it and a shift are looked for: B. K. P. Horn, "Closed-form solution of
-        absolute orientation using unit quaternions", 1987, of a rotation in the plane.
+        Both have z up, so only a rotation about z and a shift are fitted: B. K. P. Horn, "Closed-form solution of
+        absolute orientation using unit quaternions", 1987, for a rotation in the plane.
 
         Args:
-            room: (n, 3) measured in the room, m.
+            room: (n, 3) positions measured in the room, m.
             course: (n, 3) the same points in the course's world, m.
 
         Raises:
-            ValueError: for fewer than three points, points on a line, and a residual above `RESIDUAL`.
+            ValueError: for fewer than three points, for points on a line, and for a residual above `RESIDUAL`.
         """
         room, course = np.asarray(room, np.float64), np.asarray(course, np.float64)
         if room.shape != course.shape or room.ndim != 2 or room.shape[1] != 3 or len(room) < 3:
@@ -79,7 +80,7 @@ class Origin:
         return found
 
     def at(self, inner: "Origin") -> "Origin":
-        """The origin, in the room, of a course whose own origin `inner` is told in this one's axes."""
+        """The origin, in the room, of a course whose own origin `inner` is given in the axes of this one."""
         x, y, z = (float(value) for value in self.points(inner.position))
         return Origin((x, y, z), self.yaw + inner.yaw)
 

@@ -1,7 +1,7 @@
-"""Race tracks at random: one pure function of uniform numbers, the same arithmetic for NumPy's arrays and JAX's.
+"""Random race tracks: one pure function of uniform numbers, the same arithmetic for NumPy arrays and JAX arrays.
 
-Half of the tracks are open: a chain of pieces, each of which leads from a gate to the next. A piece says by how much
-the heading turns, in which bearing from the old heading the next gate lies, how far away, and how much higher:
+Half of the tracks are open: a chain of pieces, each of which leads from one gate to the next. A piece gives the turn of
+the heading, the bearing of the next gate from the old heading, its distance, and its rise:
 
 | piece | share | turn, rad | bearing, rad | distance | rise |
 | --- | --- | --- | --- | --- | --- |
@@ -10,18 +10,19 @@ the heading turns, in which bearing from the old heading the next gate lies, how
 | hairpin | 16 % | 2.2 to pi, to either side | half the turn, within 0.35 | 0.6 legs, 3 m at least | gentle or steep |
 | split-S, ladder | 16 % | pi - 0.4 to pi, to either side | 0 | up to 1 m | 2 to 4 m down, or up |
 
-A leg is 0.7 to 1.3 times that of the track, which is 3.5 to 18 m (logarithmically uniform): so tracks are flown at 8 to
-20 m/s. A rise is gentle (within 0.12 of the distance) or, one time in three, a climb or a dive (0.2 to 0.6 of it).
-Heights are reflected at the ground and at the top of the track (4 to 8 m): so a split-S that would end under the ground
-becomes a step of a ladder, and the other way round.
+A leg is 0.7 to 1.3 times the leg of the track, which is 3.5 to 18 m (logarithmically uniform). Such tracks are flown
+at 8 to 20 m/s. A rise is gentle (within 0.12 of the distance) or, with a probability of one third, a climb or a dive
+(0.2 to 0.6 of the distance). Heights are reflected at the ground and at the top of the track (4 to 8 m). So a split-S
+that would end under the ground becomes a step of a ladder, and the reverse.
 
-The others are closed: gates around an ellipse (axes up to 3 : 1) or a figure of eight, each up to 0.3 of a step early
-or late and up to a fifth nearer or farther, turned by up to 0.5 rad from the curve, and up to half a leg (2.5 m) higher
-or lower than their middle.
+The other tracks are closed: gates around an ellipse (axes up to 3 : 1) or a figure of eight. Each gate is up to 0.3 of
+a step early or late, up to a fifth nearer or farther, turned by up to 0.5 rad from the curve, and up to half a leg
+(2.5 m) higher or lower than the middle height.
 
 Openings are 0.6 to 1.5 m wide and high, half of them square. A race starts 2.5 to 6 m before the first gate, up to
-0.8 rad beside its axis and 1 m above or below, heading within 0.4 rad of it. Of `CANDIDATES` tracks the first is taken
-whose gates keep `CLEAR` from the straight lines between others; where none does, the one that comes nearest to that.
+0.8 rad beside its axis and 1 m above or below, heading within 0.4 rad of it. Of `CANDIDATES` tracks, the first is used
+whose gates are at least `CLEAR` away from the straight lines between other gates. If there is none, the track that
+comes nearest to this is used.
 """
 
 import math
@@ -32,28 +33,29 @@ import numpy as np
 from e2efly.courses.gates import BURIED, Gates, Tracks
 
 FEWEST, MOST = 3, 12
-"""Gates of a track."""
+"""Smallest and largest number of gates of a track."""
 LEG = (3.5, 18.0)
-"""Distance from gate to gate, of which a track has its own, m."""
+"""Range of the distance from gate to gate, m. Each track has its own distance."""
 OPENING = (0.6, 1.5)
-"""Width and height of an opening, m."""
+"""Range of the width and height of an opening, m."""
 CLEAR = 1.6
-"""What lies between a gate's centre and the straight line between two others, m; between two gates, too."""
+"""Smallest distance between a gate's centre and the straight line between two other gates, and between two gates, m."""
 CLOSED = 0.4
-"""Share of the candidates that are closed; of the tracks it is a half, as more of those are kept."""
+"""Share of the candidates that are closed. Of the tracks it is about a half, because more closed candidates are
+kept."""
 CANDIDATES = 4
-"""Tracks that are drawn for one that is taken."""
+"""Number of candidates that are drawn for each track."""
 HEAD, EACH = 11, 8
 NUMBERS = HEAD + MOST * EACH
-"""Uniform numbers that a candidate takes."""
+"""Uniform numbers per candidate."""
 FAR = 1e6
-"""Squared distance of what does not count, m^2."""
+"""Squared distance of gates that do not count, m^2."""
 LOWEST = 0.3
-"""The lower edge of an opening is at least so high over the ground, m."""
+"""Smallest height of the lower edge of an opening above the ground, m."""
 
 
 def random_tracks(u: Any) -> Tracks:
-    """Tracks of n worlds.
+    """Random tracks for n worlds.
 
     Args:
         u: (n, CANDIDATES, NUMBERS) uniform in [0, 1).
@@ -71,7 +73,7 @@ def random_tracks(u: Any) -> Tracks:
 
 
 def _candidates(u: Any) -> Tracks:
-    """Every candidate, with the leading axes (n, CANDIDATES)."""
+    """All candidates, with the leading axes (n, CANDIDATES)."""
     xp = u.__array_namespace__()
     head = [u[..., i] for i in range(HEAD)]
     each = u[..., HEAD:].reshape(*u.shape[:-1], MOST, EACH)
@@ -111,13 +113,13 @@ def _between(bounds: tuple[float, float], u: Any) -> Any:
 
 
 def _reflected(z: Any, low: Any, high: Any) -> Any:
-    """Heights that turn round at both bounds."""
+    """Heights that are reflected at both bounds."""
     room = high - low
     return low + room - z.__array_namespace__().abs((z - low) % (2 * room) - room)
 
 
 def _chain(leg: Any, kind: Any, stretch: Any, lie: Any, bend: Any, climb: Any, steep: Any) -> tuple[Any, ...]:
-    """x, y, z and yaw of the gates of an open track, piece after piece; numbers (..., MOST) for each."""
+    """x, y, z and yaw of the gates of an open track, piece by piece, from numbers (..., MOST) for each."""
     xp = leg.__array_namespace__()
     side, bend = xp.where(bend < 0.5, -1.0, 1.0), (2 * bend) % 1
     curve, hairpin, stacked = kind >= 0.30, kind >= 0.68, kind >= 0.84
@@ -134,14 +136,14 @@ def _chain(leg: Any, kind: Any, stretch: Any, lie: Any, bend: Any, climb: Any, s
     rise = xp.where(stacked, sign * _between((2.0, 4.0), stretch), slope * distance)
     distance = xp.where(stacked, lie, distance)
     heading = xp.cumsum(turn, axis=-1)
-    before = heading - turn  # the first piece leads from where nothing is to the first gate, and is as good as any
+    before = heading - turn  # the first piece leads from nowhere to the first gate, and is as good as any
     way = before + bearing
     x, y, z = (xp.cumsum(step, axis=-1) for step in (distance * xp.cos(way), distance * xp.sin(way), rise))
     return x, y, z, heading
 
 
 def _around(leg: Any, count: Any, whole: list[Any], stretch: Any, lie: Any, bend: Any, climb: Any) -> tuple[Any, ...]:
-    """The same of a closed track: an ellipse or, two times in five, a figure of eight."""
+    """The same for a closed track: an ellipse or, with a probability of 2/5, a figure of eight."""
     xp = leg.__array_namespace__()
     shape, aspect, side = whole
     mirrored = xp.where(side < 0.5, -1.0, 1.0)
@@ -160,10 +162,10 @@ def _around(leg: Any, count: Any, whole: list[Any], stretch: Any, lie: Any, bend
 
 
 def _clearance(tracks: Tracks) -> Any:
-    """(n, CANDIDATES) least distance of a gate from a line between others, and between two in a row, m."""
+    """(n, CANDIDATES) smallest distance of a gate from a line between others, and between consecutive gates, m."""
     g, lines, index = tracks.gates, np.arange(MOST + 1)[:, None], np.arange(MOST)
     xp, count = g.position.__array_namespace__(), tracks.count[..., None]
-    homeward = tracks.closed[..., None] & (index == count - 1)  # the gate from which the last line leads home
+    homeward = tracks.closed[..., None] & (index == count - 1)  # the last line begins at this gate
     leads = xp.concatenate([index < count, tracks.closed[..., None]], axis=-1)
     square: Any = 0.0
     product: Any = 0.0

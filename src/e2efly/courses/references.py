@@ -1,8 +1,8 @@
-"""References to follow: every kind becomes one quintic spline, so that all of them share one compiled program.
+"""References to follow. Every kind becomes one quintic spline, so that all of them share one compiled program.
 
 A spline has uniform knots with position, velocity and acceleration (quintic Hermite pieces, twice continuously
-differentiable). A circle of the tracking task differs from its spline by less than 0.01 mm, a 3 m/s lemniscate by
-less than 0.1 mm. The arithmetic is that of the arrays it is given: NumPy's or JAX's (also while it traces).
+differentiable). A circle of the tracking task differs from its spline by less than 0.01 mm, a 3 m/s lemniscate by less
+than 0.1 mm. The arithmetic uses the library of its arrays: NumPy or JAX (also during tracing).
 """
 
 import csv
@@ -16,13 +16,13 @@ import numpy as np
 from e2efly.vehicles.tables import LARGEST, shown
 
 KNOT_PERIOD = 0.5
-"""Seconds between the knots of all references but a user's."""
+"""Time between the knots of all references except the user's own, s."""
 POINTS = 10
-"""Reference points that the policy sees."""
+"""Number of reference points that the policy observes."""
 SPACING = 0.1
-"""Seconds between them; the first is the point to be at now."""
+"""Time between these points, s. The first is the point to be at now."""
 LONGEST = 3600.0
-"""Longest reference, s: its knots are made beforehand."""
+"""Longest reference, s. Its knots are computed beforehand."""
 _CLOSEST = 1e-3
 """Shortest time between the rows of a file, s."""
 _POWERS = np.arange(6)
@@ -30,22 +30,22 @@ _POWERS = np.arange(6)
 
 @dataclass(frozen=True)
 class Spline:
-    """Knots a vehicle: [:, :, 0] position, m; 1 velocity, m/s; 2 acceleration, m/s^2."""
+    """The knots of each vehicle: [:, :, 0] position, m; 1 velocity, m/s; 2 acceleration, m/s^2."""
 
     knots: Any
     """(n, m, 3, 3), a NumPy or JAX array."""
     period: float = KNOT_PERIOD
-    """Seconds between knots."""
+    """Time between knots, s."""
     end: float = math.inf
-    """Seconds after which the position is held, where that is before the last knot."""
+    """Time after which the position is held, s, if it is before the last knot."""
 
     @property
     def duration(self) -> float:
-        """Seconds after which the position is held."""
+        """Time after which the position is held, s."""
         return min(self.end, (self.knots.shape[1] - 1) * self.period)
 
     def position(self, time: Any) -> Any:
-        """Positions (n, k, 3) at the times (n, k), s, in the arrays' own library; held at the ends."""
+        """Positions (n, k, 3) at the times (n, k), s, in the arrays' own library. Positions are held at the ends."""
         xp = time.__array_namespace__()
         index, s = self.piece(time)
         rows, knots = xp.arange(self.knots.shape[0])[:, None], xp.asarray(self.knots)
@@ -54,7 +54,7 @@ class Spline:
         return c0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
 
     def piece(self, time: Any) -> tuple[Any, Any]:
-        """Index of the piece at each time, s, and how much of it is over, in [0, 1]."""
+        """Index of the piece at each time, s, and the part of this piece that has passed, in [0, 1]."""
         xp = time.__array_namespace__()
         u = xp.clip(time, 0.0, self.duration) / self.period
         index = xp.minimum(u.astype(xp.int32), self.knots.shape[1] - 2)
@@ -74,20 +74,20 @@ def _quintic(a: Any, b: Any, h: float) -> tuple[Any, ...]:
 
 @dataclass(frozen=True)
 class Polynomials:
-    """The spline of one vehicle in NumPy, its polynomials worked out beforehand: a fifth of the time a look."""
+    """The spline of one vehicle in NumPy with precomputed polynomials: a call takes a fifth of the time."""
 
     spline: Spline
     coefficients: np.ndarray
-    """(m - 1, 6, 3) of s^0 to s^5 of each piece."""
+    """(m - 1, 6, 3) coefficients of s^0 to s^5 of each piece."""
 
     @staticmethod
     def of(spline: Spline) -> "Polynomials":
-        """Of a spline with knots (1, m, 3, 3)."""
+        """The polynomials of a spline with knots (1, m, 3, 3)."""
         (knots,) = np.asarray(spline.knots, np.float64)
         return Polynomials(spline, np.stack(_quintic(knots[:-1], knots[1:], spline.period), axis=1))
 
     def position(self, time: np.ndarray) -> np.ndarray:
-        """Positions (k, 3) at the times (k,), s; held at the ends."""
+        """Positions (k, 3) at the times (k,), s. Positions are held at the ends."""
         index, s = self.spline.piece(time)
         return np.einsum("ke,kec->kc", s[:, None] ** _POWERS, self.coefficients[index])
 
@@ -99,7 +99,7 @@ def knot_count(duration: float) -> int:
 
 @dataclass(frozen=True)
 class Lissajous:
-    """A level curve x = X sin(w t + p + d), y = Y sin(k (w t + p)): a circle or a figure of eight, by its numbers.
+    """A horizontal curve x = X sin(w t + p + d), y = Y sin(k (w t + p)): a circle or a figure of eight, by its numbers.
 
     The numbers may be arrays of shape ().
     """
@@ -109,7 +109,7 @@ class Lissajous:
     half_y: Any
     """Y, m."""
     ratio: Any
-    """k: turns of y for one of x."""
+    """k: number of turns of y per turn of x."""
     shift: Any
     """d, rad."""
     rate: Any
@@ -117,30 +117,30 @@ class Lissajous:
 
     @staticmethod
     def circle(radius: float, rate: float) -> "Lissajous":
-        """Radius in m, angular rate in rad/s, counter-clockwise."""
+        """A circle, from its radius in m and its angular rate in rad/s, counter-clockwise."""
         return Lissajous(radius, radius, 1.0, math.pi / 2, rate)
 
     @staticmethod
     def lemniscate(half_length: float, speed: float) -> "Lissajous":
-        """Gerono's figure of eight, x = A sin, y = A sin cos: A in m, top speed (in the middle) in m/s."""
+        """Gerono's figure of eight, x = A sin, y = A sin cos, from A in m and the top speed (in the middle) in m/s."""
         return Lissajous(half_length, half_length / 2, 2.0, 0.0, speed / (half_length * math.sqrt(2.0)))
 
     def phase(self, centre: Any, start: Any) -> Any:
-        """The phases p in [-pi, pi], (n,), rad, of the curves about `centre` (3,), m, that begin so.
+        """The phases p in [-pi, pi], (n,), rad, of the curves about `centre` (3,), m, with these first knots.
 
         Args:
-            centre: of all.
-            start: (n, 3, 3) position, m; velocity, m/s; acceleration, m/s^2: the first knot of each.
+            centre: centre of all curves.
+            start: (n, 3, 3) the first knot of each: position, m; velocity, m/s; acceleration, m/s^2.
         """
         xp = start.__array_namespace__()
         away = (start[:, 0] - xp.asarray(centre)) / self.half_x
-        still = self.rate == 0  # then the speed says nothing, but of a circle the other axis does
+        still = self.rate == 0  # without rate, the velocity gives no phase, but for a circle the other axis does
         turning = start[:, 1, 0] / (self.half_x * xp.where(still, 1.0, self.rate))
         angle = xp.atan2(away[:, 0], xp.where(still, -away[:, 1], turning)) - self.shift
         return xp.atan2(xp.sin(angle), xp.cos(angle))
 
     def spline(self, centre: Any, phase: Any, m: int) -> Spline:
-        """The curve about `centre` (3,), m, from each phase p (n,), rad, as `m` knots in the phases' own library."""
+        """The curve about `centre` (3,), m, from each phase p (n,), rad, as `m` knots in the library of the phases."""
         xp = phase.__array_namespace__()
         angle = self.rate * KNOT_PERIOD * xp.arange(m) + phase[:, None]
         x, y = angle + self.shift, self.ratio * angle
@@ -152,10 +152,10 @@ class Lissajous:
 
 
 def read_csv(path: str | Path) -> np.ndarray:
-    """Read a reference: columns t, x, y, z with a header line, seconds and metres, t rising from any value.
+    """Read a reference: columns t, x, y, z with a header line, in seconds and metres. t rises from any value.
 
     Returns:
-        (rows, 4), t from zero.
+        (rows, 4) with t from zero.
 
     Raises:
         ValueError: naming the file, the line and what is accepted.
@@ -191,7 +191,7 @@ def read_csv(path: str | Path) -> np.ndarray:
 
 
 def through_points(table: np.ndarray) -> Spline:
-    """The natural cubic spline through the rows t, x, y, z, of one vehicle; held after the last row.
+    """The natural cubic spline through the rows t, x, y, z, for one vehicle. After the last row the position is held.
 
     Its knots are as close as the closest rows (0.02 to 0.5 s apart), so that no point is smoothed away.
     """

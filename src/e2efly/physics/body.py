@@ -1,4 +1,4 @@
-"""The rigid body: forces and torques on it, and the accelerations that they give (paper, Quadrotor Dynamics)."""
+"""The rigid body: its forces and torques, and the resulting accelerations (paper, Quadrotor Dynamics)."""
 
 import jax
 import jax.numpy as jnp
@@ -24,7 +24,7 @@ def rotor_thrust(plant: Plant, rotor_speed: Rotors) -> Rotors:
 
 
 def powered(plant: Plant, rotor_speed: Rotors, command: Rotors) -> Rotors:
-    """The speeds, rad/s, towards which rotors turn that are told `command`, at the voltage that their thrust leaves."""
+    """Speeds, rad/s, that rotors approach under speed commands, at the battery voltage under their present thrust."""
     battery = plant.battery
     if battery is None:
         return command
@@ -52,7 +52,7 @@ def hover_rotor_speed(vehicle: Vehicle) -> Array:
 
 
 def rotor_wrench(plant: Plant, thrust: Rotors) -> tuple[Array, Vec3]:
-    """Collective thrust along body z, N, and torque about the body axes, N*m: arms times thrust, and reaction."""
+    """Collective thrust along body z, N, and torque about the body axes, N*m, from rotor arms and reaction torques."""
     collective = thrust[0] + thrust[1] + thrust[2] + thrust[3]
     roll, pitch = _weighted(plant.arm_y, thrust), -_weighted(plant.arm_x, thrust)
     return collective, Vec3(roll, pitch, plant.torque_ratio * _weighted(plant.spin, thrust))
@@ -68,12 +68,12 @@ def drag(plant: Plant, air_velocity: Vec3) -> Vec3:
 
 
 def air_velocity(attitude: Quat, velocity: Vec3, wind: Vec3 | None) -> Vec3:
-    """Velocity relative to the air in the body frame, m/s, of a velocity in the world, m/s."""
+    """Velocity relative to the air, body frame, m/s, from a velocity and a wind in the world frame, m/s."""
     return attitude.unrotate(velocity if wind is None else velocity - wind)
 
 
 def acceleration(plant: Plant, attitude: Quat, force: Vec3, collective: Array) -> Vec3:
-    """Acceleration of the centre of mass in the world, m/s^2, under the drag, body, N, and the collective thrust, N."""
+    """Acceleration of the centre of mass, world, m/s^2, from the drag, body, N, and the collective thrust, N."""
     a = attitude.rotate(Vec3(force.x, force.y, force.z + collective)) * plant.specific
     return Vec3(a.x, a.y, a.z - GRAVITY)
 
@@ -85,7 +85,7 @@ def angular_acceleration(plant: Plant, body_rate: Vec3, torque: Vec3) -> Vec3:
 
 
 def tensor_times(diagonal: Vec3, products: Vec3 | None, v: Vec3) -> Vec3:
-    """A symmetric tensor, of which `products` are the entries xy, xz and yz (None: zero), times a vector."""
+    """Product of a symmetric tensor and a vector. `products` are the tensor's entries xy, xz and yz (None: zero)."""
     if products is None:
         return v.times(diagonal)
     d, o = diagonal, products
@@ -95,7 +95,7 @@ def tensor_times(diagonal: Vec3, products: Vec3 | None, v: Vec3) -> Vec3:
 
 
 def gyroscopic_torque(inertia: Vec3, body_rate: Vec3, products: Vec3 | None = None) -> Vec3:
-    """W x J w of an inertia J by its diagonal, and its entries xy, xz and yz (None: zero), N*m."""
+    """Gyroscopic torque w x J w, N*m. J is given by its diagonal and its entries xy, xz and yz (None: zero)."""
     j, w = inertia, body_rate
     if products is not None:
         return w.cross(tensor_times(inertia, products, w))
@@ -107,9 +107,9 @@ def rotor_momentum_torque(
 ) -> Vec3:
     """Torque on the body from the angular momentum h of its rotors about body z, N*m: -(dh/dt + w x h).
 
-    A rotor turns against the torque of the air on it, so h = -inertia * sum(spin * speed). The body's own inertia
-    includes the rotors as if they stood still, so that body and rotors together keep their angular momentum. `inertia`
-    is that of a rotor, kg*m^2; accelerations are in rad/s^2.
+    A rotor turns against the air's torque on it, so h = -inertia * sum(spin * speed). The body's own inertia includes
+    the rotors as if they stood still, so that body and rotors together keep their angular momentum. `inertia` is that
+    of one rotor, kg*m^2. Accelerations are in rad/s^2.
     """
     momentum = -inertia * _weighted(spin, rotor_speed)
     change = -inertia * _weighted(spin, rotor_acceleration)
@@ -119,13 +119,13 @@ def rotor_momentum_torque(
 def accelerations(
     plant: Plant, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None
 ) -> tuple[Vec3, Vec3]:
-    """Acceleration of the centre of mass in the world, m/s^2, and of the body about its axes, rad/s^2.
+    """Acceleration of the centre of mass in the world, m/s^2, and angular acceleration about the body axes, rad/s^2.
 
     Args:
-        plant: what flies.
-        parts: its state, with the rotor speeds that push.
+        plant: the vehicle that flies.
+        parts: its state, with the rotor speeds that produce the thrust.
         wind: velocity of the air in the world, m/s.
-        rotor_acceleration: rad/s^2; needed where the plant has rotor inertia.
+        rotor_acceleration: rad/s^2; required if the plant has rotor inertia.
     """
     collective, torque = rotor_wrench(plant, rotor_thrust(plant, parts.rotor_speed))
     if plant.rotor_inertia is not None and rotor_acceleration is not None:
@@ -133,7 +133,7 @@ def accelerations(
             plant.rotor_inertia, plant.spin, parts.body_rate, parts.rotor_speed, rotor_acceleration
         )
     air = air_velocity(parts.attitude, parts.velocity, wind)
-    if plant.centre is not None:  # the place of the drag moves around the centre of mass
+    if plant.centre is not None:  # the point at which the drag acts moves around the centre of mass
         air = air + plant.centre.cross(parts.body_rate)
     force = drag(plant, air)
     if plant.centre is not None:
@@ -145,7 +145,10 @@ def accelerations(
 
 
 def derivative(plant: Plant, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None) -> Parts:
-    """Time derivative of the body's state, arguments as of `accelerations`; the rotors' own entry is zero."""
+    """Time derivative of the body's state. Arguments are as for `accelerations`.
+
+    The entry of the rotor speeds is zero.
+    """
     linear, angular = accelerations(plant, parts, wind, rotor_acceleration)
     zero = jnp.zeros_like(linear.z)
     return Parts(

@@ -1,7 +1,8 @@
-"""From a command to rotor speed commands: the law of each command mode.
+"""From a command to rotor speed commands: the control law of each command mode.
 
-A command enters the cascade at its own level (`e2efly.control`); every level below runs at every physics sub-step, down
-to rotor thrusts and speeds. All laws use the nominal vehicle: the flight controller does not know what was randomised.
+A command enters the cascade at its own level (`e2efly.control`). Every level below it runs at every physics sub-step,
+down to rotor thrusts and speeds. All laws use the nominal vehicle: the flight controller does not know what was
+randomised.
 """
 
 from collections.abc import Callable
@@ -20,11 +21,11 @@ Command = tuple[Array, Array, Array, Array]
 Law = Callable[[Vehicle, Mixer, Parts, Command], Rotors]
 """(nominal vehicle, its mixer, state, command) -> rotor speed commands, rad/s."""
 RememberingLaw = Callable[[Vehicle, Mixer, Parts, Command, RateLoop, float], tuple[Rotors, RateLoop]]
-"""The same with what the rate loop remembers, taken apart into components, and the time since it last ran, s."""
+"""The same, with the state of the rate loop, split into components, and the time since the loop last ran, s."""
 
 
 def control_law(mode: CommandMode) -> Law:
-    """The law of a command mode: rotor thrusts within their limits, or body rates held by the rate loop."""
+    """The control law of a command mode: rotor thrusts within their limits, or body rates held by the rate loop."""
     controller = mode.controller
 
     def law(vehicle: Vehicle, mixer: Mixer, parts: Parts, command: Command) -> Rotors:
@@ -39,7 +40,7 @@ def control_law(mode: CommandMode) -> Law:
 
 
 def remembering_law(mode: CommandMode) -> RememberingLaw:
-    """The law of a command mode whose rate loop has an integral part, a filter of the body rates, or both."""
+    """The control law of a command mode whose rate loop has an integral part, a filter of the body rates, or both."""
     controller = mode.controller
     assert controller is not None, "no rate loop"
 
@@ -51,7 +52,8 @@ def remembering_law(mode: CommandMode) -> RememberingLaw:
             rate = rate + (loop.seen - rate) * jnp.exp(-dt / vehicle.gyro_time_constant)
         if loop.integral is not None:
             change = Vec3.of(vehicle.rate_integral_gain).times(wanted.rate - rate) * dt
-            # no more than a full error's proportional part, so that it does not wind up where the rotors saturate
+            # limited to the proportional part at an error of `body_rate_max`, so that it does not wind up when rotors
+            # saturate
             extra = (loop.integral + change).clip(Vec3.of(vehicle.rate_gain * vehicle.body_rate_max))
         rotors = _rates(vehicle, mixer, rate, wanted, extra)
         return rotors, RateLoop(extra, None if loop.seen is None else rate)
@@ -60,7 +62,10 @@ def remembering_law(mode: CommandMode) -> RememberingLaw:
 
 
 def _rates(vehicle: Vehicle, mixer: Mixer, rate: Vec3, wanted: Ctbr, extra: Vec3 | None = None) -> Rotors:
-    """The rate loop: torque = J (K (wanted - w) + extra) + w x J w, at body rates w; rad/s, rad/s^2."""
+    """The rate loop at body rates w: torque = J (K (wanted - w) + extra) + w x J w.
+
+    Units: rad/s, `extra` in rad/s^2.
+    """
     error, inertia = wanted.rate - rate, Vec3.of(vehicle.inertia)
     if vehicle.inertia_products is None:
         pushed, products = Vec3.of(vehicle.inertia * vehicle.rate_gain).times(error), None

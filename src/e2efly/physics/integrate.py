@@ -20,13 +20,13 @@ Integrator = Callable[[Plant, Parts, Rotors, Vec3 | None, float], Parts]
 def lagged(
     speed: Rotors, command: Rotors, decay: Array | np.ndarray, decay_down: Array | np.ndarray | None = None
 ) -> Rotors:
-    """Rotor speeds after a time of first-order lag towards a constant command: exact.
+    """Rotor speeds after some time of first-order lag towards a constant command: the exact solution.
 
     Args:
-        speed: at the start, rad/s.
-        command: towards which they go.
-        decay: what is left of the way after that time.
-        decay_down: the same of a rotor that slows down; None: as that of one that speeds up.
+        speed: rotor speeds at the start, rad/s.
+        command: speeds that the rotors approach, rad/s.
+        decay: fraction of the difference to the command that remains after that time.
+        decay_down: the same fraction for a rotor that slows down. None: the same as for a rotor that speeds up.
     """
     if decay_down is None:
         a, b, c, d = (u + (w - u) * decay for w, u in zip(speed, command, strict=True))
@@ -36,14 +36,17 @@ def lagged(
 
 
 def euler(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
-    """Explicit Euler: all rates at the start of the step. First order."""
+    """Explicit Euler: all derivatives at the start of the step. First order."""
     speed = lagged(parts.rotor_speed, command, plant.decay, plant.decay_down)
     moved = _advance(parts, derivative(plant, parts, wind, _mean_change(plant, parts.rotor_speed, speed, dt)), dt)
     return _finish(moved, speed)
 
 
 def semi_implicit(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
-    """Semi-implicit (symplectic) Euler: velocities first, poses with the new velocities. First order, most stable."""
+    """Semi-implicit (symplectic) Euler: first the velocities, then poses from the new velocities.
+
+    First order, most stable.
+    """
     speed = lagged(parts.rotor_speed, command, plant.decay, plant.decay_down)
     turning = dataclasses.replace(parts, rotor_speed=speed)
     linear, angular = accelerations(plant, turning, wind, _mean_change(plant, parts.rotor_speed, speed, dt))
@@ -59,7 +62,7 @@ def semi_implicit(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None
 
 
 def rk3(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
-    """Kutta's method with the exact rotor speeds at the start, middle and end. Third order.
+    """Kutta's method with the exact rotor speeds at the start, middle and end of the step. Third order.
 
     Source: W. Kutta, "Beitrag zur naeherungsweisen Integration totaler Differentialgleichungen", 1901.
     """
@@ -74,7 +77,10 @@ def rk3(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: floa
 
 
 def rk4(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
-    """Classical Runge-Kutta with the exact rotor speeds at the start, middle and end. Fourth order."""
+    """Classical Runge-Kutta method with the exact rotor speeds at the start, middle and end of the step.
+
+    Fourth order.
+    """
     middle = lagged(parts.rotor_speed, command, plant.half_decay, plant.half_decay_down)
     end = lagged(middle, command, plant.half_decay, plant.half_decay_down)
 
@@ -97,7 +103,10 @@ def _rate(plant: Plant, parts: Parts, rotor_speed: Rotors, command: Rotors, wind
 
 
 def _mean_change(plant: Plant, before: Rotors, after: Rotors, dt: float) -> Rotors | None:
-    """Mean acceleration of the rotors over a step, rad/s^2, where it matters: their momentum changes by just that."""
+    """Mean acceleration of the rotors over a step, rad/s^2, where the plant needs it.
+
+    It gives the exact change of momentum.
+    """
     if plant.rotor_inertia is None:
         return None
     a, b, c, d = ((end - start) / dt for start, end in zip(before, after, strict=True))

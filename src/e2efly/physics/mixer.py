@@ -15,7 +15,7 @@ from e2efly.vehicles.vehicle import Vehicle, allocation_matrix
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Mixer:
-    """The inverse of the rotor geometry, and the thrust limits, of the nominal vehicle."""
+    """The inverse of the rotor geometry of the nominal vehicle, and its thrust limits."""
 
     matrix: np.ndarray | Array
     """(*n, 4, 4): rotor thrusts, N, from [collective, N; roll, pitch, yaw torque, N*m]."""
@@ -24,7 +24,7 @@ class Mixer:
     thrust_max: float | Array
     """Largest thrust of a rotor, N."""
     plain: Array | None = None
-    """1: each rotor is clipped by itself, 0: attitude goes before thrust, (*n,); None: 0."""
+    """1: each rotor is clipped by itself. 0: attitude has priority over thrust. Shape (*n,). None: 0."""
 
     @staticmethod
     def of(vehicle: Vehicle, dtype: type = np.float32) -> "Mixer":
@@ -34,9 +34,10 @@ class Mixer:
 
     @staticmethod
     def of_each(vehicle: Vehicle) -> "Mixer":
-        """The mixers of a batch of vehicles whose rotors lie symmetrically to both axes, as a family draws them.
+        """The mixers of a batch of vehicles whose rotors lie symmetrically about both axes, as a family draws them.
 
-        There the rows of the allocation are orthogonal, and its inverse is its transpose over their squares.
+        For them the rows of the allocation matrix are orthogonal. Its inverse is its transpose, with each column
+        divided by the squared norm of its row.
         """
         x, y = vehicle.rotor_position[..., 0], vehicle.rotor_position[..., 1]
         yaw = vehicle.rotor_spin * vehicle.torque_ratio[..., None]
@@ -47,15 +48,15 @@ class Mixer:
         return Mixer(matrix, (k2 * idle + k1) * idle + k0, vehicle.rotor_thrust_max)
 
     def limit(self, thrust: Rotors) -> Rotors:
-        """Each rotor's thrust clipped to what it can give."""
+        """The thrust of each rotor, clipped to the rotor's limits."""
         a, b, c, d = (jnp.clip(f, self.thrust_min, self.thrust_max) for f in thrust)
         return a, b, c, d
 
     def thrusts(self, collective: Array, torque: Vec3) -> Rotors:
-        """Rotor thrusts within the limits, N; attitude goes before thrust, as in Betaflight's mixer.
+        """Rotor thrusts within the limits, N. Attitude has priority over thrust, as in Betaflight's mixer.
 
-        When the torque asks for more span than a rotor has, all of it is scaled down; then the collective is shifted
-        until every rotor is inside its limits.
+        If the torque needs a larger span than a rotor has, the whole torque is scaled down. Then the collective thrust
+        is shifted until every rotor is inside its limits.
         """
         m = self.matrix
         spread = [m[..., i, 1] * torque.x + m[..., i, 2] * torque.y + m[..., i, 3] * torque.z for i in range(4)]

@@ -1,4 +1,4 @@
-"""A vehicle as its sub-steps compute with it."""
+"""A vehicle in the form in which the physics sub-steps compute with it."""
 
 from dataclasses import dataclass
 
@@ -16,18 +16,18 @@ Rotors = tuple[Array, Array, Array, Array]
 
 @dataclass(frozen=True)
 class Battery:
-    """What a battery makes of the rotor speeds that are told; voltages over the nominal one."""
+    """Effect of the battery on commanded rotor speeds. Voltages are divided by the nominal voltage."""
 
     voltage: Array
-    """Without load."""
+    """Voltage without load."""
     sag: Array | None
-    """Lost for a newton of the thrust of all rotors, 1/N; None: nothing."""
+    """Voltage lost per newton of the thrust of all rotors, 1/N. None: no loss."""
     exponent: Array | None
-    """Relative change of the rotors' speed over relative change of the voltage; None: 1."""
+    """Relative change of rotor speed divided by relative change of voltage. None: 1."""
 
     @staticmethod
     def of(vehicle: Vehicle) -> "Battery | None":
-        """Of a vehicle, any field of which may be batched; None where its file has none."""
+        """The battery of a vehicle, any field of which may be batched. None if the vehicle file has no battery."""
         if vehicle.battery_voltage is None:
             return None
         nominal, sag = vehicle.nominal_voltage, vehicle.voltage_sag
@@ -38,60 +38,65 @@ class Battery:
 
 @dataclass(frozen=True)
 class Plant:
-    """What moves the body, taken apart into numbers of the batch's shape, with what follows from them.
+    """Parameters of the vehicle's motion, split into arrays of the batch's shape, with values derived from them.
 
-    Made once a control step: where every vehicle has parameters of its own, picking them out of arrays with an axis of
-    components, divisions and exponentials take most of a sub-step's time. Constants stay constants.
+    It is made once per control step. If every vehicle has its own parameters, most of a sub-step's time would otherwise
+    go into picking them out of arrays with a component axis, into divisions and into exponentials. Constants stay
+    constants.
     """
 
     thrust_map: tuple[Array, Array, Array]
-    """Of rotor speed squared, rotor speed, and one; N, s/rad."""
+    """Coefficients of squared rotor speed, of rotor speed, and the constant; N, s/rad."""
     arm_x: Rotors
-    """Places of the rotors from the centre of mass, body, m."""
+    """Positions of the rotors relative to the centre of mass, body, m."""
     arm_y: Rotors
     spin: Rotors
-    """Signs of their yaw torques."""
+    """Signs of the rotors' yaw torques."""
     torque_ratio: Array
-    """Yaw torque over thrust, m."""
+    """Yaw torque divided by thrust, m."""
     specific: Array
-    """One over the mass, 1/kg."""
+    """One divided by the mass, 1/kg."""
     inertia: Vec3
-    """kg*m^2."""
+    """Diagonal of the inertia tensor, kg*m^2."""
     mobility: Vec3
-    """The inverse of the inertia: its diagonal."""
+    """Diagonal of the inverse of the inertia tensor, 1/(kg*m^2)."""
     drag_linear: Vec3
-    """N*s/m."""
+    """Linear drag, N*s/m."""
     drag_quadratic: Vec3
-    """N*s^2/m^2."""
+    """Quadratic drag, N*s^2/m^2."""
     rotor_share: Rotors | None
-    """Thrust of each rotor over that of the thrust map; None: 1."""
+    """Thrust of each rotor divided by the thrust from the thrust map. None: 1."""
     decay: Array | np.ndarray
-    """What is left of a rotor's lag after a sub-step, ..."""
+    """Fraction of a rotor's difference to its command that remains after a sub-step."""
     half_decay: Array | np.ndarray
-    """... and after half of one."""
+    """The same fraction after half a sub-step."""
     rotor_inertia: Array | None = None
-    """Of each rotor about its axis, kg*m^2; None, here and below: the physics is without this term."""
+    """Inertia of each rotor about its axis, kg*m^2. None, here and in the fields below: the physics has no such
+    term."""
     lag_rate: Array | None = None
-    """One over the time constant of the rotors, 1/s, where their acceleration is needed."""
+    """One divided by the time constant of the rotors, 1/s, if their acceleration is needed."""
     decay_down: Array | np.ndarray | None = None
-    """`decay`, ..."""
+    """`decay` of a rotor that slows down."""
     half_decay_down: Array | np.ndarray | None = None
-    """... `half_decay` ..."""
+    """`half_decay` of a rotor that slows down."""
     lag_rate_down: Array | None = None
-    """... and `lag_rate` of a rotor that slows down."""
+    """`lag_rate` of a rotor that slows down."""
     drag_torque: Vec3 | None = None
-    """N*m*s."""
+    """Torque against rotation divided by body rate, N*m*s."""
     products: Vec3 | None = None
-    """Entries xy, xz and yz of the inertia, kg*m^2, ..."""
+    """Entries xy, xz and yz of the inertia tensor, kg*m^2."""
     mobility_products: Vec3 | None = None
-    """... and of its inverse."""
+    """Entries xy, xz and yz of the inverse of the inertia tensor, 1/(kg*m^2)."""
     battery: Battery | None = None
     centre: Vec3 | None = None
-    """Centre of mass from where the drag acts, body, m."""
+    """Centre of mass relative to the point where the drag acts, body, m."""
 
     @staticmethod
     def of(vehicle: Vehicle, dt: float, rotor_share: Array | None = None) -> "Plant":
-        """Of a vehicle, any field of which may be batched, for sub-steps of `dt` seconds; `rotor_share` is (*n, 4)."""
+        """The plant of a vehicle, any field of which may be batched.
+
+        Sub-steps take `dt` seconds, and `rotor_share` is (*n, 4).
+        """
         v, time, down = vehicle, vehicle.motor_time_constant, vehicle.motor_time_constant_down
         k2, k1, k0 = (v.thrust_map[..., i] for i in range(3))
         x, y = v.rotor_position[..., 0], v.rotor_position[..., 1]
@@ -129,7 +134,7 @@ class Plant:
 
 
 def _inverse(diagonal: Vec3, products: Vec3) -> tuple[Vec3, Vec3]:
-    """Diagonal, and entries xy, xz and yz, of the inverse of a symmetric tensor that is given by the same."""
+    """Diagonal and entries xy, xz and yz of the inverse of a symmetric tensor, from the same entries of the tensor."""
     a, b, c, xy, xz, yz = diagonal.x, diagonal.y, diagonal.z, products.x, products.y, products.z
     bc, ac, ab = b * c - yz * yz, a * c - xz * xz, a * b - xy * xy
     x, y, z = xz * yz - xy * c, xy * yz - b * xz, xy * xz - a * yz
@@ -138,5 +143,5 @@ def _inverse(diagonal: Vec3, products: Vec3) -> tuple[Vec3, Vec3]:
 
 
 def _exp(x: Array | np.ndarray) -> Array | np.ndarray:
-    """Constants stay constants."""
+    """Exponential that keeps NumPy constants as constants."""
     return jnp.exp(x) if isinstance(x, jax.Array) else np.exp(x)

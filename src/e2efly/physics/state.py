@@ -17,19 +17,20 @@ for _kind in (Vec3, Quat):
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class RateLoop:
-    """What the rate loop remembers from sub-step to sub-step, where it has an integral part or a filter.
+    """The state of the rate loop between sub-steps, if the loop has an integral part or a filter.
 
-    Arrays, or, inside a step, the `Vec3` of their components.
+    The fields are arrays, or inside a step `Vec3` of their components.
     """
 
     integral: Any
-    """The integral part of the commanded angular acceleration, rad/s^2, (*n, 3); None: it has none."""
+    """The integral part of the commanded angular acceleration, rad/s^2, (*n, 3). None: the loop has no integral
+    part."""
     seen: Any
-    """Filtered body rates, rad/s, (*n, 3); None: it sees them as they are."""
+    """Filtered body rates, rad/s, (*n, 3). None: the loop has no filter."""
 
     @staticmethod
     def at_rest(vehicle: Vehicle, body_rate: Float[Array, "*n 3"]) -> "RateLoop | None":
-        """At a start: no integral yet, and a filter that has settled; None where the vehicle's file has neither."""
+        """The state at a start: zero integral, settled filter. None if the vehicle file has neither."""
         if vehicle.rate_integral_gain is None and vehicle.gyro_time_constant is None:
             return None
         return RateLoop(
@@ -41,24 +42,24 @@ class RateLoop:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class State:
-    """What changes in flight. World ENU (z up), body FLU, SI units."""
+    """The state of a vehicle in flight. World ENU (z up), body FLU, SI units."""
 
     position: Float[Array, "*n 3"]
     """Centre of mass, world, m."""
     velocity: Float[Array, "*n 3"]
-    """World, m/s."""
+    """Velocity of the centre of mass, world, m/s."""
     quaternion: Float[Array, "*n 4"]
     """Unit quaternion wxyz, body to world."""
     body_rate: Float[Array, "*n 3"]
     """Angular velocity in the body frame, rad/s."""
     rotor_speed: Float[Array, "*n 4"]
-    """Rear right, front right, rear left, front left, rad/s."""
+    """Rotor speeds: rear right, front right, rear left, front left, rad/s."""
     rate_loop: RateLoop | None = None
-    """What the rate loop remembers, where it remembers anything; None at the start of a flight."""
+    """State of the rate loop, if the loop has one. None at the start of a flight."""
 
     @staticmethod
     def hovering(vehicle: Vehicle, position: Float[Array, "*n 3"]) -> "State":
-        """At rest and level at `position`, the rotors carrying the weight."""
+        """The state at rest and level at `position`, with rotors that carry the weight."""
         position = jnp.asarray(position)
         batch, dtype = position.shape[:-1], position.dtype
         return State(
@@ -73,7 +74,7 @@ class State:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Parts:
-    """A `State` taken apart into components."""
+    """A `State` split into components."""
 
     position: Vec3
     velocity: Vec3
@@ -83,7 +84,7 @@ class Parts:
 
     @staticmethod
     def of(state: State) -> "Parts":
-        """Take a state apart."""
+        """Split a state."""
         return Parts(
             Vec3.of(state.position),
             Vec3.of(state.velocity),
@@ -93,7 +94,7 @@ class Parts:
         )
 
     def join(self) -> State:
-        """The state again."""
+        """Join the components into a state."""
         return State(
             self.position.stack(),
             self.velocity.stack(),
@@ -104,5 +105,5 @@ class Parts:
 
 
 def split4(array: Float[Array, "*n 4"]) -> tuple[Array, Array, Array, Array]:
-    """The four entries of the last axis."""
+    """The four entries along the last axis."""
     return array[..., 0], array[..., 1], array[..., 2], array[..., 3]

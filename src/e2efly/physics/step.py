@@ -1,4 +1,4 @@
-"""One control step: physics sub-steps under a command, the rate loop running at each of them."""
+"""One control step: physics sub-steps under a command, with the rate loop at each of them."""
 
 import dataclasses
 import math
@@ -21,9 +21,9 @@ from e2efly.vehicles.names import unknown
 from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle
 
 RATES = (0.1, 10_000.0)
-"""Slowest and fastest control rate, Hz: no flight controller's loop is faster."""
+"""Slowest and fastest control rate that is accepted, Hz. No flight controller has a faster loop."""
 STEPS = (1e-6, 1.0)
-"""Shortest and longest of the largest physics sub-step, s."""
+"""Smallest and largest accepted value of the largest physics sub-step, s."""
 
 
 @partial(
@@ -33,7 +33,7 @@ STEPS = (1e-6, 1.0)
 )
 @dataclass(frozen=True)
 class Physics:
-    """How the physics is run. The nominal vehicle is what the flight controller believes in."""
+    """The settings of the physics. The flight controller is tuned to the nominal vehicle."""
 
     nominal: Vehicle
     """The vehicle of the control laws and of the action map, as arrays."""
@@ -44,13 +44,14 @@ class Physics:
     integrator: str
     """A name of `INTEGRATORS`."""
     control_period: float
-    """Seconds a control step."""
+    """Duration of a control step, s."""
     substeps: int
-    """Physics steps a control step."""
+    """Physics steps per control step."""
     body: Vehicle | None = None
-    """What flies, as arrays, where the flight controller does not know it; None: the nominal vehicle."""
+    """The vehicle that flies, as arrays, if the flight controller does not know it. None: the nominal vehicle."""
     full_speed: float | Array | None = None
-    """Largest speed of that body's rotors, rad/s, whatever they are told; None: the mixer's own limit."""
+    """Largest speed of that vehicle's rotors, rad/s, whatever the command. None: only the limit of the mixer
+    applies."""
 
     @property
     def flown(self) -> Vehicle:
@@ -58,12 +59,12 @@ class Physics:
         return self.nominal if self.body is None else self.body
 
     def flying(self, body: Vehicle, dtype: type = np.float32) -> "Physics":
-        """The same flight controller over another (loaded) body, of which it is not told."""
+        """The same flight controller on another (loaded) body, which it does not know."""
         moved = jax.tree.map(lambda x: np.asarray(x, dtype), body)
         return dataclasses.replace(self, body=moved, full_speed=dtype(body.full_rotor_speed))
 
     def of_each(self, vehicle: Vehicle) -> "Physics":
-        """The same for a batch of vehicles of a family, of each of which its own flight controller knows."""
+        """The same for a batch of vehicles of a family. The flight controller of each vehicle knows its vehicle."""
         return dataclasses.replace(self, nominal=vehicle, mixer=Mixer.of_each(vehicle))
 
     @staticmethod
@@ -75,7 +76,7 @@ class Physics:
         largest_step: float = 0.005,
         dtype: type = np.float32,
     ) -> "Physics":
-        """Physics of a loaded vehicle, with as few equal sub-steps as keep each at most `largest_step` seconds.
+        """Physics of a loaded vehicle, with the smallest number of equal sub-steps of at most `largest_step` seconds.
 
         Raises:
             ValueError: for an unknown mode or integrator, or a rate or step that is not positive.
@@ -96,14 +97,14 @@ class Physics:
 
 
 def vehicle_of_loop(physics: Physics, vehicle: Vehicle) -> Vehicle:
-    """The vehicle of the control laws: the nominal one, with the rate loop of the plant."""
+    """The vehicle of the control laws: the nominal vehicle with the rate loop of the plant."""
     return dataclasses.replace(physics.nominal, **{name: getattr(vehicle, name) for name in RATE_LOOP})
 
 
 def started(physics: Physics, vehicle: Vehicle, state: State) -> State:
-    """The state with what the plant's rate loop remembers at a start, where it will remember anything.
+    """Add the rate loop's initial state to a state, if the plant's rate loop has one.
 
-    `step` does so itself; loops whose state keeps its structure need it before their first step.
+    `step` does this itself. Loops whose state must keep its structure need it before their first step.
     """
     if state.rate_loop is not None or COMMAND_MODES[physics.command_mode].controller is None:
         return state
@@ -125,16 +126,16 @@ def step(
 
     Args:
         physics: how to integrate and control.
-        vehicle: the plant; any field may be batched. Its `rate_gain`, integral gain and filter are those of the rate
-            loop; in all else the flight controller believes in `physics.nominal`.
-        state: where it starts.
-        command: in the units of the command mode.
-        previous: the command that still acts before `switch_time`, for latencies that are no whole steps.
-        switch_time: seconds after the start of the step at which `command` takes over from `previous`, in
-            [0, control_period]. A sub-step that holds the switch gets the time average of the two, which keeps the
-            step differentiable in the latency.
+        vehicle: the plant; any field may be batched. Its rate gain, integral gain and filter are those of the rate
+            loop. For everything else the flight controller uses `physics.nominal`.
+        state: the state at the start of the step.
+        command: the command, in the units of the command mode.
+        previous: the command that still acts before `switch_time`, for latencies that are not a whole number of steps.
+        switch_time: time after the start of the step at which `command` replaces `previous`, s, in [0, control_period].
+            A sub-step in which the switch lies uses the time average of the two commands. This keeps the step
+            differentiable with respect to the latency.
         wind: velocity of the air in the world, m/s.
-        rotor_share: thrust of each rotor over that of the vehicle's thrust map; None: 1.
+        rotor_share: thrust of each rotor divided by the thrust from the vehicle's thrust map. None: 1.
     """
     mode = COMMAND_MODES[physics.command_mode]
     state = started(physics, vehicle, state)

@@ -1,1 +1,1 @@
-"""Worlds of solids, and what cameras see of them."""
+"""Worlds of solids, and the images of cameras in them."""

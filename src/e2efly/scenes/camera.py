@@ -1,4 +1,7 @@
-"""Cameras and LiDARs on vehicles: where their rays go. Camera frame: x right, y down, z ahead; body: x ahead, z up."""
+"""Cameras and LiDARs on vehicles: the directions of their rays.
+
+Camera frame: x right, y down, z ahead. Body frame: x ahead, z up.
+"""
 
 import math
 from dataclasses import dataclass
@@ -26,25 +29,28 @@ PRESETS: dict[str, CameraConfig] = {
         "range", width=360, height=16, projection="spherical", fov=(2 * math.pi, math.radians(30)), reach=(0.3, 50.0)
     ),
 }
-"""Cameras by name: Intel RealSense D435i depth, an FPV camera tilted up by 30 degrees, one that looks straight down, a
-LiDAR of 16 rings."""
+"""Cameras by name: Intel RealSense D435i depth, an FPV camera tilted up by 30 degrees, a camera that looks straight
+down, and a LiDAR with 16 rings."""
 _AHEAD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]], np.float32)
-"""Camera frame to body frame of a camera that looks straight ahead."""
+"""Rotation from camera frame to body frame for a camera that looks straight ahead."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Mount:
-    """How the camera of each vehicle sits and what it takes in; leaves."""
+    """The mounting and field of view of each vehicle's camera; leaves."""
 
     matrix: Float[Array, "n 3 3"]
-    """Pattern's frame to body; it also sets a pinhole's field of view."""
+    """Map from the pattern's frame to the body. It also sets a pinhole's field of view."""
     offset: Float[Array, "n 3"]
-    """Body frame, m."""
+    """Position in the body frame, m."""
 
 
 def pattern(config: CameraConfig) -> Pattern:
-    """Directions of a camera's rays: of a pinhole in units of half its field of view, depth along the optical axis."""
+    """Directions of a camera's rays.
+
+    For a pinhole they are in units of half its field of view, and depth is along the optical axis.
+    """
     rows, columns = ((np.arange(k) + 0.5) / k * 2 - 1 for k in (config.height, config.width))
     if config.projection == "pinhole":
         x, y = np.meshgrid(columns, rows)
@@ -55,7 +61,7 @@ def pattern(config: CameraConfig) -> Pattern:
 
 
 def mount(config: CameraConfig, n: int, key: PRNGKeyArray | None = None) -> Mount:
-    """The cameras of n vehicles: each a little different where the configuration says so and a key is given."""
+    """The cameras of n vehicles. They vary if the configuration has spreads and a key is given."""
     u = jnp.zeros((n, 8)) if key is None else jax.random.uniform(key, (n, 8), minval=-1.0, maxval=1.0)
     factor = 1 + config.fov_spread * u[:, 3:5]
     return mounted(config, config.angle_spread * u[:, :3], factor, config.position_spread * u[:, 5:8])
@@ -64,13 +70,13 @@ def mount(config: CameraConfig, n: int, key: PRNGKeyArray | None = None) -> Moun
 def mounted(
     config: CameraConfig, angles: Float[Array, "n 3"], factor: Float[Array, "n k"], offset: Float[Array, "n 3"]
 ) -> Mount:
-    """The cameras of n vehicles, each mounted in its own way.
+    """The cameras of n vehicles, each mounted individually.
 
     Args:
-        config: of all.
-        angles: roll, pitch and yaw, beside the configuration's pitch, rad.
-        factor: on a pinhole's field of view, of each axis or of both (k is 2 or 1).
-        offset: beside the configuration's position, body frame, m.
+        config: the configuration of all cameras.
+        angles: roll, pitch and yaw in addition to the configuration's pitch, rad.
+        factor: factor on a pinhole's field of view, for each axis or for both (k is 2 or 1).
+        offset: offset from the configuration's position, body frame, m.
     """
     turned = to_matrix(from_euler(angles[:, 0], angles[:, 1] + config.pitch, angles[:, 2])) @ _AHEAD
     if config.projection == "pinhole":
@@ -82,7 +88,7 @@ def mounted(
 def pose(
     mount: Mount, position: Float[Array, "n 3"], quaternion: Float[Array, "n 4"]
 ) -> tuple[Float[Array, "n 3"], Float[Array, "n 3 3"]]:
-    """Where the cameras of vehicles are, and pattern's frame to world: what `cast` takes."""
+    """Positions of the vehicles' cameras, and the map from the pattern's frame to the world, as `cast` takes them."""
     return position + rotate(quaternion, mount.offset), to_matrix(quaternion) @ mount.matrix
 
 
@@ -98,15 +104,16 @@ def look(
 
     Args:
         config: the camera.
-        scene: n worlds, standing still (`Scene.at`); or the one world of triangles that all of them are in.
-        mount: how each camera sits.
-        position: of the vehicles, world, m.
-        quaternion: of the vehicles, body to world.
-        light: for colours; `usual_light` when left out.
+        scene: n worlds, standing still (`Scene.at`), or the one world of triangles in which all of them are.
+        mount: how each camera is mounted.
+        position: positions of the vehicles, world, m.
+        quaternion: attitudes of the vehicles, body to world.
+        light: light for colours. If left out: `usual_light`.
 
     Returns:
-        What `config.sees`: (n, h, w), colours and normals (n, h, w, 3). Depth and range, m: 0 where something is nearer
-        than they reach, the farthest where nothing is within reach. A mask: 1 where the class is seen, else 0.
+        Images of the kind `config.sees`: (n, h, w); colours and normals (n, h, w, 3). Depth and range are in m: 0 if
+        something is nearer than the camera's reach, the farthest value if nothing is within reach. A mask is 1 where
+        the class is visible, otherwise 0.
     """
     rays = pattern(config)
     measures = config.sees in ("depth", "range")
@@ -130,13 +137,13 @@ def look(
 
 
 def _lengths(rays: Pattern, mount: Mount) -> Float[Array, "n h w"]:
-    """Metres a unit of depth along each ray."""
+    """Length of one unit of depth along each ray, m."""
     directions = jnp.einsum("nij,tjr->nitr", mount.matrix, rays.tiles)
     return rays.image(jnp.linalg.norm(directions, axis=1))
 
 
 def check(config: CameraConfig) -> None:
-    """Check a camera.
+    """Check the configuration of a camera.
 
     Raises:
         ValueError: naming the field, the value and what is accepted.

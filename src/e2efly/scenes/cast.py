@@ -1,8 +1,8 @@
-"""Rays against a batch of worlds: the first thing that each meets, exactly.
+"""Rays against a batch of worlds: the first hit of each ray, exactly.
 
-An image is cut into tiles; a solid is tried on a tile only if its ball reaches into the tile's cone. On a CPU one
-camera's tile follows another, and an image is put together while its tiles are at hand. On an accelerator all rays go
-side by side.
+An image is cut into tiles. A solid is tested on a tile only if its bounding ball reaches into the tile's cone. On a CPU
+the tiles of one camera are computed one after the other, and the image is assembled while they are in the cache. On an
+accelerator all rays are computed in parallel.
 """
 
 import math
@@ -18,7 +18,7 @@ from e2efly.scenes.sight import Kinds, Sight, depth, ground, hits, sight
 from e2efly.scenes.tiles import Pattern
 
 CHANNELS = ("depth", "label", "instance", "normal", "rgb")
-"""What can be asked for."""
+"""The channels that can be requested."""
 
 
 def cast(
@@ -30,23 +30,24 @@ def cast(
     light: Light | None = None,
     reach: float = math.inf,
 ) -> dict[str, Array]:
-    """What a sensor in each world sees.
+    """The images of one sensor in each world.
 
     Args:
         scene: n worlds, standing still (`Scene.at`).
-        origin: where the rays start, world, m.
-        matrix: sensor's frame to world; its columns may have any length, so that it also sets the field of view.
+        origin: start of the rays, world, m.
+        matrix: map from the sensor's frame to the world. Its columns may have any length, so that it also sets the
+            field of view.
         pattern: directions of the rays.
-        channels: of `CHANNELS`.
-        light: for rgb; `usual_light` when left out.
-        reach: solids that lie wholly beyond this depth may be left out, m.
+        channels: names from `CHANNELS`.
+        light: light for rgb. If left out: `usual_light`.
+        reach: solids that lie completely beyond this depth may be left out, m.
 
     Returns:
-        Images (n, h, w): `depth` along the ray's direction, `FAR` where nothing is met; `label`; `instance`; and
-        (n, h, w, 3): `normal`, outward, world, zero in the sky; `rgb` in [0, 1].
+        Images (n, h, w): `depth` along the ray's direction, `FAR` without a hit; `label`; `instance`; and (n, h, w, 3):
+        `normal`, outward, world, zero in the sky; `rgb` in [0, 1].
 
     Raises:
-        ValueError: for a channel that is none.
+        ValueError: for an unknown channel.
     """
     if unknown := set(channels) - set(CHANNELS):
         raise ValueError(f"channels has {sorted(unknown)}; accepted: {', '.join(CHANNELS)}")
@@ -73,7 +74,7 @@ def cast(
 def _tile(
     seen: Sight, light: Light | None, kinds: Kinds, index: Array, d: Float[Array, "3 r"], channels: tuple[str, ...]
 ) -> dict[str, Array]:
-    """Planes (rays of a tile) of the channels."""
+    """The channels of one tile as planes, with one value per ray."""
     if set(channels) == {"depth"}:
         return {"depth": depth(seen, kinds, index, d)}
     t = ground(seen, d)

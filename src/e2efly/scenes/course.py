@@ -15,7 +15,7 @@ HALF_DEPTH = 0.05
 
 
 def frames(gates: Gates, n: int, bar: float | Array = FRAME, active: bool | Array = True) -> Solids:
-    """The gates' frames, the same in each of n worlds or each world's own; those that are there are active."""
+    """The frames of gates as solids, the same in each of n worlds or individual ones. Gates that exist are active."""
     half = jnp.asarray(gates.half)
     size = jnp.concatenate([half, jnp.full_like(half[..., :1], bar), jnp.full_like(half[..., :1], HALF_DEPTH)], axis=-1)
     centre = jnp.asarray(gates.position)[..., :-1, :]

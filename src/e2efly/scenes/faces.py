@@ -1,4 +1,4 @@
-"""The faces of solids: for plots, for viewers, wherever worlds are drawn by others than their cameras. NumPy."""
+"""The faces of solids, for plots, viewers, and all other drawings of worlds that do not use their cameras. NumPy."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,24 +13,24 @@ from e2efly.solids import DISC, SQUARE
 Quads = Float[np.ndarray, "f 4 3"]
 
 _SIDES = 20
-"""Of what is drawn for a circle."""
+"""Number of sides with which a circle is drawn."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """A solid as it is drawn."""
+    """A solid in the form in which it is drawn."""
 
     quads: Quads
-    """Its faces, world, m; a triangle repeats a corner."""
+    """Its faces, world, m. A triangle repeats a corner."""
     colour: Float[np.ndarray, "3"]
     """RGB in [0, 1]."""
     path: Float[np.ndarray, "m 3"] | None
-    """Where its centre moves in one round, world, m; None: it stands still."""
+    """Path of its centre during one round, world, m. None: it does not move."""
     rate: float = 0.0
-    """At which it goes round, rad/s."""
+    """Angular rate on this path, rad/s."""
 
     def moved(self, time: float) -> Float[np.ndarray, "3"]:
-        """How far it has come since time 0, m, at a time, s."""
+        """Displacement since time 0, m, at a time, s."""
         if self.path is None:
             return np.zeros(3)
         quarter, half = len(self.path) // 4, len(self.path) // 2
@@ -40,21 +40,21 @@ class Body:
 
     @property
     def outline(self) -> Float[np.ndarray, "k 2"]:
-        """What it covers, seen from above: the convex hull, m."""
-        from scipy.spatial import ConvexHull  # a third of a second that only plots of obstacles need
+        """Its outline from above: the convex hull, m."""
+        from scipy.spatial import ConvexHull  # its import takes a third of a second; only plots of obstacles need it
 
         points = self.quads[..., :2].reshape(-1, 2)
         return points[ConvexHull(points).vertices]
 
 
 def bodies(scene: Scene, world: int = 0, time: float = 0.0, ceilings: bool = False) -> list[Body]:
-    """What stands in one world at a time, s.
+    """The solids of one world at a time, s.
 
     Args:
         scene: the worlds.
-        world: which of them.
-        time: of what moves, s.
-        ceilings: whether level walls, which hide everything from above, are among them.
+        world: index of the world.
+        time: time at which moving solids are drawn, s.
+        ceilings: whether to include horizontal walls, which hide everything from above.
     """
     found = []
     for kind in scene.kinds:
@@ -103,13 +103,13 @@ def _quads(kind: str, size: np.ndarray) -> Quads:
 
 
 def box(half: Any) -> Quads:
-    """(6, 4, 3) of a box about the origin, by half of its sides (3,), m."""
+    """(6, 4, 3) faces of a box about the origin, from half of its sides (3,), m."""
     corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     return _prism(corners * np.asarray(half)[:2], half[2])
 
 
 def cylinder(radius: float, half: float) -> Quads:
-    """(f, 4, 3) of an upright cylinder about the origin, by its radius and half of its height, m."""
+    """(f, 4, 3) faces of an upright cylinder about the origin, from its radius and half of its height, m."""
     return _turned(np.array([[0.0, -half], [radius, -half], [radius, half], [0.0, half]]))
 
 
@@ -122,14 +122,14 @@ def _capsule(radius: float, half: float) -> Quads:
 
 
 def _turned(profile: Float[np.ndarray, "k 2"]) -> Quads:
-    """What a line of (radius, height) sweeps about z."""
+    """The faces of a body of revolution about z, from its profile (radius, height)."""
     angle = np.linspace(0, 2 * np.pi, _SIDES + 1)
     rings = np.stack([profile[:, :1] * np.cos(angle), profile[:, :1] * np.sin(angle), profile[:, 1:] + 0 * angle], -1)
     return np.stack([rings[:-1, :-1], rings[:-1, 1:], rings[1:, 1:], rings[1:, :-1]], axis=2).reshape(-1, 4, 3)
 
 
 def _prism(corners: Float[np.ndarray, "k 2"], half: float) -> Quads:
-    """Between z of -half and half, over 3 or 4 corners."""
+    """The faces of a prism between z = -half and z = half, over 3 or 4 corners."""
     low, high = (np.column_stack([corners, np.full(len(corners), z)]) for z in (-half, half))
     sides = [np.stack([low[i - 1], low[i], high[i], high[i - 1]]) for i in range(len(corners))]
     ends = [np.concatenate([end, end[-1:]])[:4] for end in (low, high)]

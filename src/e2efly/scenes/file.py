@@ -1,4 +1,4 @@
-"""Worlds from scene files: `e2efly.solids` reads them."""
+"""Worlds from scene files, which `e2efly.solids` reads."""
 
 import dataclasses
 from pathlib import Path
@@ -12,7 +12,7 @@ from e2efly.solids import CLASSES, Solid, read_solids
 
 
 def load_scene(path: Path, n: int = 1) -> Scene:
-    """The world of a file, n times over.
+    """The world of a file, in n copies.
 
     Raises:
         ValueError: naming the file, the solid, the key, the value and what is accepted.
@@ -26,7 +26,7 @@ def load_scene(path: Path, n: int = 1) -> Scene:
 
 
 def _solids(one: Solid) -> Solids:
-    """As the only one of its world."""
+    """A solid as the only one of its world."""
     label = CLASSES.index(one.label)
     made = Solids.of(one.kind, one.centre[None, None], one.size[None, None], label=label, colour=one.colour)
     turned = from_euler(*(jnp.full((1, 1), angle) for angle in one.angles))

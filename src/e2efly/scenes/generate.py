@@ -1,4 +1,4 @@
-"""Random worlds: pure functions of a key, each world of the batch its own."""
+"""Random worlds: pure functions of a key. Each world of the batch is drawn separately."""
 
 import dataclasses
 import math
@@ -12,7 +12,7 @@ from e2efly.scenes.scene import WALL, Solids
 from e2efly.scenes.shapes import SHAPES
 
 TRIES = 8
-"""Places that are tried for an obstacle; where none is clear it is left out."""
+"""Number of places that are tried for an obstacle. If none is clear, the obstacle is left out."""
 
 
 def _between(key: PRNGKeyArray, shape: tuple[int, ...], bounds: tuple[float, float] | Array) -> Array:
@@ -20,17 +20,18 @@ def _between(key: PRNGKeyArray, shape: tuple[int, ...], bounds: tuple[float, flo
 
 
 def forest(key: PRNGKeyArray, n: int, config: ForestConfig, start: Array, goal: Array) -> Solids:
-    """Upright trunks, uniform over a lane from the start along x.
+    """Upright trunks, uniformly distributed over a lane that begins at the start and follows x.
 
     Args:
-        key: of the worlds.
-        n: how many worlds.
+        key: key for the worlds.
+        n: number of worlds.
         config: the forest.
-        start: (n, 3) kept clear, world, m.
-        goal: (n, 3) kept clear, world, m.
+        start: (n, 3) point that is kept clear, world, m.
+        goal: (n, 3) point that is kept clear, world, m.
 
     Returns:
-        Cylinders. As many as `config.density` says on average; where one would stand in a clear place it is left out.
+        Cylinders. Their mean number follows from `config.density`. A trunk that would stand in a clear place is left
+        out.
     """
     place, thick, tall, many = jax.random.split(key, 4)
     shape = (n, config.room)
@@ -60,16 +61,16 @@ def clutter(
     """Obstacles of all kinds around a polyline, clear of some points.
 
     Args:
-        key: of the worlds.
-        n: how many worlds.
+        key: key for the worlds.
+        n: number of worlds.
         config: the clutter.
         path: corners of the polyline, world, m.
         keep: points that are kept clear, world, m.
-        radius: of what is kept clear about each, beside `config.clear`, m.
-        legs: how many straight lines of its polyline each world has; None: all.
+        radius: radius of the clear space around each of these points, in addition to `config.clear`, m.
+        legs: number of straight segments of each world's polyline. None: all.
 
     Returns:
-        Solids by kind, their centres over the ground.
+        Solids by kind, with their centres above the ground.
     """
     each = config.room // len(CLUTTER)
     lines = path.shape[1] - 1 if legs is None else legs[:, None, None]
@@ -106,7 +107,7 @@ def clutter(
 def is_clear(
     places: Float[Array, "n k c 3"], reach: Float[Array, "n k"], points: Float[Array, "n p 3"], room: Array | float
 ) -> Bool[Array, "n k c"]:
-    """Whether balls at places are farther than `room` from all points."""
+    """Whether balls at these places are farther than `room` from all points."""
     away = jnp.linalg.norm(places[..., None, :] - points[:, None, None], axis=-1)
     return jnp.all(away - reach[..., None, None] > room, axis=-1)
 

@@ -1,4 +1,4 @@
-"""Worlds of solids as triangles: to look at them elsewhere, and to be checked by other ray casters."""
+"""Worlds of solids as triangles, to view them in other programs, and to check them with other ray casters."""
 
 from typing import Any
 
@@ -12,16 +12,18 @@ from e2efly.scenes.scene import Scene
 from e2efly.solids import DISC, SQUARE
 
 GROUND = 500.0
-"""Half the side of the square that stands for the ground, m."""
+"""Half the side of the square that represents the ground, m."""
 
 
 def parts(scene: Scene, world: int, segments: int = 64) -> list[Part]:
-    """One world as the objects of a `MeshScene`: the ground, then solids in the order of their instance numbers.
+    """One world as the parts of a `MeshScene`.
+
+    The ground comes first, then the solids in the order of their instance numbers.
 
     Args:
-        scene: worlds.
-        world: which of them.
-        segments: around round things, which are inscribed.
+        scene: the worlds.
+        world: index of the world.
+        segments: number of segments around round solids, which are inscribed.
     """
     found = []
     ground = float(scene.ground[world])
@@ -42,7 +44,7 @@ def parts(scene: Scene, world: int, segments: int = 64) -> list[Part]:
 
 
 def tessellate(scene: Scene, world: int, segments: int = 64) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, "f 3"]]:
-    """Vertices, m, and triangles of one world; round things are inscribed with so many segments around."""
+    """Vertices, m, and triangles of one world. Round solids are inscribed, with `segments` segments around."""
     found = parts(scene, world, segments)
     if not found:
         return np.zeros((0, 3)), np.zeros((0, 3), int)

@@ -1,7 +1,8 @@
-"""A batch of worlds: solids of fixed number, each there or not, and a ground. Every number is an array leaf.
+"""A batch of worlds: a fixed number of solids, each present or not, and a ground. Every number is an array leaf.
 
-World n has the same room for solids as every other, and its own numbers in it: changing a world never recompiles.
-World frame: x, y level, z up, m. What is not there (`active` false) is neither seen nor struck.
+All worlds have space for the same number of solids, and their own values in it. So changing a world never causes a
+recompilation. World frame: x, y horizontal, z up, m. A solid that is not present (`active` false) is neither visible
+nor an obstacle.
 """
 
 import dataclasses
@@ -28,31 +29,31 @@ _BY_CLASS = [
     [0.75] * 3,
 ]
 COLOURS = np.array(_BY_CLASS, np.float32)
-"""Usual colour of each class, RGB in [0, 1]."""
+"""Default colour of each class, RGB in [0, 1]."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Solids:
-    """The solids of one kind: room for k of them in each of n worlds."""
+    """The solids of one kind: space for k of them in each of n worlds."""
 
     centre: Float[Array, "n k 3"]
-    """Of the path that each follows, world, m."""
+    """Centre of each solid's path, world, m."""
     quaternion: Float[Array, "n k 4"]
-    """Solid's frame to world, wxyz."""
+    """Rotation from the solid's frame to the world, wxyz."""
     size: Float[Array, "n k 4"]
-    """What the entries are: `solids.SIZES[kind]`."""
+    """Size entries with the meaning `solids.SIZES[kind]`."""
     active: Bool[Array, "n k"]
-    """Whether it is there."""
+    """Whether the solid is present."""
     label: Int[Array, "n k"]
-    """Its semantic class."""
+    """Semantic class of the solid."""
     colour: Float[Array, "n k 3"]
     """RGB in [0, 1]."""
     cosine: Float[Array, "n k 3"]
     """The path: centre + cosine cos(rate t) + sine sin(rate t), world, m."""
     sine: Float[Array, "n k 3"]
     rate: Float[Array, "n k"]
-    """rad/s."""
+    """Rate of the path, rad/s."""
 
     @staticmethod
     def of(
@@ -68,13 +69,13 @@ class Solids:
         """Solids that stand still.
 
         Args:
-            kind: of `SHAPES`.
+            kind: one of `SHAPES`.
             centre: (n, k, 3), world, m.
-            size: (n, k, up to 4) or what broadcasts to it.
+            size: (n, k, up to 4), or an array that broadcasts to it.
             yaw: (n, k), rad.
             active: (n, k).
-            label: semantic class; usual for the kind when left out.
-            colour: (n, k, 3) RGB; usual for the class when left out.
+            label: semantic class. If left out: the default of the kind.
+            colour: (n, k, 3) RGB. If left out: the default of the class.
         """
         centre = jnp.asarray(centre, jnp.float32)
         n, k, _ = centre.shape
@@ -97,11 +98,11 @@ class Solids:
 
     @property
     def count(self) -> int:
-        """Room for so many in a world."""
+        """Number of solids for which a world has space."""
         return self.centre.shape[1]
 
     def position(self, time: Float[Array, " n"]) -> Float[Array, "n k 3"]:
-        """Where they are, world, m."""
+        """Positions of the solids, world, m."""
         angle = (self.rate * time[:, None])[..., None]
         return self.centre + self.cosine * jnp.cos(angle) + self.sine * jnp.sin(angle)
 
@@ -109,35 +110,35 @@ class Solids:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Scene:
-    """n worlds."""
+    """A batch of n worlds."""
 
     ground: Float[Array, " n"]
-    """Height of the ground, m; -`FAR`: none."""
+    """Height of the ground, m. -`FAR`: no ground."""
     solids: dict[str, Solids]
-    """By kind, a name of `SHAPES`."""
+    """The solids by kind, a name of `SHAPES`."""
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Of which there is room, in the order of instance numbers."""
+        """Kinds for which there is space, in the order of instance numbers."""
         return tuple(kind for kind in sorted(self.solids) if self.solids[kind].count)
 
     @staticmethod
     def of(solids: dict[str, Solids], n: int, ground: float | None = 0.0) -> "Scene":
-        """Worlds over level ground (None: over none)."""
+        """Worlds over level ground (None: without ground)."""
         return Scene(jnp.full(n, -FAR if ground is None else ground, jnp.float32), solids)
 
     @property
     def worlds(self) -> int:
-        """How many worlds."""
+        """Number of worlds."""
         return self.ground.shape[0]
 
     @property
     def capacity(self) -> int:
-        """Room for so many solids in a world."""
+        """Number of solids for which a world has space."""
         return sum(s.count for s in self.solids.values())
 
     def at(self, time: Float[Array, " n"]) -> "Scene":
-        """The worlds as they are at `time`, s: standing still."""
+        """The worlds at `time`, s, standing still."""
 
         def still(s: Solids) -> Solids:
             zero = jnp.zeros_like(s.cosine)
@@ -147,23 +148,26 @@ class Scene:
 
 
 def join(*solids: Solids) -> Solids:
-    """Those of one kind side by side."""
+    """Join solids of one kind."""
     return jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis=1), *solids)
 
 
 def first_instance(scene: Scene, kind: str) -> int:
-    """Instance number of the first solid of a kind; sky is 0, the ground 1, then kind after kind."""
+    """Instance number of the first solid of a kind. The sky is 0, the ground is 1, then kind follows kind."""
     before = scene.kinds[: scene.kinds.index(kind)]
     return 2 + sum(scene.solids[name].count for name in before)
 
 
 def clearance(scene: Scene, position: Float[Array, "n 3"], time: Float[Array, " n"]) -> Float[Array, " n"]:
-    """Signed distance of a point of each world to what is nearest, m; negative inside. Differentiable."""
+    """Signed distance of a point in each world to the nearest object, m, negative inside. Differentiable."""
     return jnp.min(gaps(scene, position, time), axis=1)
 
 
 def gaps(scene: Scene, position: Float[Array, "n 3"], time: Float[Array, " n"]) -> Float[Array, "n 1+k"]:
-    """Signed distance of a point of each world to the ground and to each solid, m; `FAR` to what is not there."""
+    """Signed distance of a point in each world to the ground and to each solid, m.
+
+    `FAR` for solids that are not present.
+    """
     each = [distances(kind, scene.solids[kind], position, time) for kind in scene.kinds]
     return jnp.concatenate([position[:, 2:] - scene.ground[:, None], *each], axis=1)
 
@@ -171,7 +175,7 @@ def gaps(scene: Scene, position: Float[Array, "n 3"], time: Float[Array, " n"]) 
 def distances(
     kind: str, solids: Solids, position: Float[Array, "n 3"], time: Float[Array, " n"]
 ) -> Float[Array, "n k"]:
-    """Signed distance of a point of each world to each solid, m; `FAR` to what is not there."""
+    """Signed distance of a point in each world to each solid, m. `FAR` for solids that are not present."""
     local = unrotate(solids.quaternion, position[:, None] - solids.position(time))
     return jnp.where(solids.active, SHAPES[kind].distance(solids.size, local), FAR)
 
@@ -179,7 +183,7 @@ def distances(
 def approach(
     scene: Scene, position: Float[Array, "n 3"], velocity: Float[Array, "n 3"], time: Float[Array, " n"]
 ) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
-    """Clearance, m, and how fast it shrinks, m/s: by the point's velocity and by what moves."""
+    """Clearance, m, and its rate of decrease, m/s, from the motion of the point and of the solids."""
     still = jnp.ones_like(time)
     gap, growing = jax.jvp(lambda p, t: clearance(scene, p, t), (position, time), (velocity, still))
     return gap, -growing

@@ -1,4 +1,4 @@
-"""What hits look like: labels, normals, and colours under a sun that throws shadows."""
+"""The appearance of hits: labels, normals, and colours under a sun that casts shadows."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,35 +13,35 @@ from e2efly.scenes.shapes import FAR, SHAPES, Components
 from e2efly.scenes.sight import Form, Kinds, Sight, number, over, turned
 
 ODD = 0.5
-"""Stands for instance 1, the ground, on every other square of it."""
+"""Value for instance 1, the ground, on every other square of the ground."""
 _DARK = 0.75
 """Brightness of these squares."""
 _BIAS = 1e-3
-"""A shadow is looked for from this far over the surface, m."""
+"""Distance above the surface from which a shadow is looked for, m."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Light:
-    """What makes colours of a scene; leaves."""
+    """The light of a scene; leaves."""
 
     sun: Float[Array | np.ndarray, "n 3"]
     """Unit vector to the sun, world."""
     strength: Float[Array | np.ndarray, " n"]
-    """Of the sun, beside the ambient light `1 - strength`."""
+    """Strength of the sun. The ambient light is `1 - strength`."""
     checker: Float[Array | np.ndarray, " n"]
-    """Side of the squares on the ground, m; 0: plain."""
+    """Side of the squares on the ground, m. 0: the ground is plain."""
 
 
 def usual_light(n: int) -> Light:
-    """A sun 50 degrees high in the south-west, squares of a metre on the ground."""
+    """A sun 50 degrees high in the south-west, and squares of one metre on the ground."""
     sun = np.array([-0.45, -0.45, 0.77], np.float32)
     sun = sun / np.linalg.norm(sun)
     return Light(np.tile(sun, (n, 1)), np.full(n, 0.65, np.float32), np.ones(n, np.float32))
 
 
 def squares(seen: Sight, light: Light, d: Float[Array, "3 r"], t: Float[Array, " r"]) -> Float[Array, " r"]:
-    """The instance on the ground, `ODD` on every other square, and the sky's."""
+    """The instance on the ground, with `ODD` on every other square, and that of the sky."""
     world = turned(seen.matrix.reshape(9), d)
     scale = jnp.where(light.checker > 0, 1.0 / jnp.where(light.checker > 0, light.checker, 1.0), 0.0)
     half = sum(jnp.floor((seen.origin[i] + t * world[i]) * scale) for i in (0, 1)) / 2.0
@@ -50,7 +50,7 @@ def squares(seen: Sight, light: Light, d: Float[Array, "3 r"], t: Float[Array, "
 
 @dataclass(frozen=True)
 class Hits:
-    """Of the rays of one tile of one camera."""
+    """The hits of the rays of one tile of one camera."""
 
     seen: Sight
     kinds: Kinds
@@ -96,7 +96,7 @@ class Hits:
         return planes
 
     def _shadowed(self, light: Light, bright: Array, table: Array) -> Array:
-        """The brightness, with the sun's part gone where something stands before it."""
+        """The brightness, without the sun's part where an obstacle casts a shadow."""
         if self.seen.shading is None:
             return bright
         near, dark, shading = self.t * (1.0 - _BIAS), 1.0 - light.strength, self.seen.shading[self.tile]
@@ -112,7 +112,7 @@ class Hits:
 
 
 def _brightness(light: Light, cosine: Array) -> Array:
-    """Of a surface that the sun shines on, by the cosine of the angle between it and the normal."""
+    """Brightness of a surface in the sun, from the cosine of the angle between the sun and the normal."""
     strength = jnp.asarray(light.strength)
     return 1.0 - strength + strength * jnp.maximum(cosine, 0.0)
 

@@ -1,8 +1,8 @@
-"""The shapes of solids, each in its own frame: where a ray enters it, and how far a point is from it.
+"""The shapes of solids, each in its own frame: where a ray enters it, and its distance from a point.
 
-A ray is `origin + t direction`; its parts come component by component, as arrays that broadcast, so that XLA
-vectorises over the rays (see `control.vectors`). A point inside a solid is hit at once, at t = 0. Distances are signed,
-negative inside, exact outside, and have gradient everywhere but on the medial axis, where it is that of one side.
+A ray is `origin + t direction`. Its components are separate arrays that broadcast, so that XLA vectorises over the rays
+(see `control.vectors`). A ray that begins inside a solid hits it at once, at t = 0. Distances are signed: negative
+inside, and exact outside. They have a gradient everywhere. On the medial axis it is the gradient of one side.
 """
 
 from collections.abc import Callable
@@ -16,52 +16,53 @@ from e2efly.control.vectors import safe_sqrt
 from e2efly.solids import DISC, SQUARE, TRIANGLE
 
 FAR = 1e9
-"""Parameter of a ray that meets nothing."""
+"""Parameter of a ray without a hit."""
 _TINY = 1e-9
 
 Components = tuple[Array, Array, Array]
 Interval = tuple[Array, Array]
-"""Where a ray is inside a convex part: from, to."""
+"""Part of a ray inside a convex part: from, to."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """One kind of solid. `size` has `ROOM` entries, of which a shape reads those that `solids.SIZES` names."""
+    """One kind of solid. `size` has `ROOM` entries. A shape reads those that `solids.SIZES` names."""
 
     enter: Callable[[Array, Components, Components], Array]
-    """(size (4,), ray's origin, ray's direction) -> parameter of the first point inside, `FAR` for none. In the
+    """(size (4,), ray's origin, ray's direction) -> parameter of the first point inside, `FAR` without a hit. In the
     solid's frame."""
     normal: Callable[[Array, Components], Components]
     """(size (4,), point on the surface) -> outward normal."""
     distance: Callable[[Float[Array, "*n 4"], Float[Array, "*n 3"]], Float[Array, "*n"]]
     """(size, point) -> signed distance of a point of the solid's frame, m."""
     reach: Callable[[Float[Array, "*n 4"]], Float[Array, "*n"]]
-    """size -> radius of a ball about the centre that holds it, m."""
+    """size -> radius of a ball about the centre that encloses the solid, m."""
 
 
 ROOM = 4
-"""Entries of `size`."""
+"""Number of entries of `size`."""
 
 
 def _slab(o: Array, d: Array, half: Array) -> Interval:
-    """Between two planes at +-half across an axis, of which these are the components."""
+    """Part of a ray between two planes at +-half across an axis, from the ray's components along this axis."""
     inverse = 1.0 / jnp.where(jnp.abs(d) < _TINY, _TINY, d)
     middle, width = -o * inverse, jnp.abs(half * inverse)
     return middle - width, middle + width
 
 
 def _plane(o: Components, d: Components, normal: tuple[float, float], offset: Array) -> Interval:
-    """On the inner side of a plane that stands upright, `normal . (x, y) <= offset`."""
+    """Part of a ray on the inner side of an upright plane, `normal . (x, y) <= offset`."""
     speed = normal[0] * d[0] + normal[1] * d[1]
     t = (offset - normal[0] * o[0] - normal[1] * o[1]) / jnp.where(jnp.abs(speed) < _TINY, _TINY, speed)
     return jnp.where(speed < 0, t, -FAR), jnp.where(speed < 0, FAR, t)
 
 
 def _round(radius: Array, *along: tuple[Array, Array]) -> Interval:
-    """Within a radius of the origin by some components (o, d): a ball by three, an endless cylinder by two.
+    """Part of a ray within a radius of the origin.
 
-    From the ray's point nearest to the origin, which float32 bears: Haines, Günther, Akenine-Möller, "Precision
-    improvements for ray/sphere intersection" (Ray Tracing Gems, 2019).
+    With three components (o, d) this is a ball, with two an infinite cylinder. The computation starts from the ray's
+    point nearest to the origin, for precision in float32: Haines, Günther, Akenine-Möller, "Precision improvements for
+    ray/sphere intersection" (Ray Tracing Gems, 2019).
     """
     inverse = 1.0 / (sum(d * d for _, d in along) + 1e-12)
     middle = -sum(o * d for o, d in along) * inverse
@@ -71,19 +72,19 @@ def _round(radius: Array, *along: tuple[Array, Array]) -> Interval:
 
 
 def _common(*parts: Interval) -> Interval:
-    """Inside all of them."""
+    """Part of a ray inside all of the parts."""
     enter, leave = zip(*parts, strict=True)
     return _largest(*enter), -_largest(*(-end for end in leave))
 
 
 def _first(part: Interval) -> Array:
-    """Where a ray that begins at t = 0 is first inside."""
+    """First point inside, for a ray that begins at t = 0."""
     enter, leave = part
     return jnp.where((enter <= leave) & (leave > 0), jnp.maximum(enter, 0.0), FAR)
 
 
 def _facing(*faces: tuple[Array, Components]) -> Components:
-    """The normal of the face that a point is on, of those given as (distance to its plane, normal)."""
+    """The normal of the face on which a point is, from faces given as (distance to its plane, normal)."""
     nearest, normal = faces[0]
     for distance, other in faces[1:]:
         nearer = jnp.abs(distance) < jnp.abs(nearest)
@@ -98,12 +99,12 @@ def _along(axis: int, value: Array) -> Components:
 
 
 def _face(p: Array, half: Array, axis: int) -> tuple[Array, Components]:
-    """Of the planes at +-half across an axis, the one on the point's side."""
+    """The plane at +-half across an axis that is on the point's side."""
     return jnp.abs(p) - half, _along(axis, jnp.sign(p))
 
 
 def _mantle(p: Components, radius: Array) -> tuple[Array, Components]:
-    """Of an upright cylinder."""
+    """The curved side of an upright cylinder."""
     x, y = p[0] / radius, p[1] / radius
     return (x * x + y * y - 1.0) * radius / 2.0, (x, y, jnp.zeros_like(x))
 
@@ -113,7 +114,7 @@ def _length(*parts: Array) -> Array:
 
 
 def _outside(*excess: Array) -> Array:
-    """Signed distance to a box-like solid, of the excess over its faces along independent directions."""
+    """Signed distance to a box-like solid, from the excess over its faces along independent directions."""
     return _length(*(jnp.maximum(x, 0.0) for x in excess)) + jnp.minimum(_largest(*excess), 0.0)
 
 
@@ -161,7 +162,7 @@ def _cylinder_distance(size: Array, p: Array) -> Array:
 
 
 def _capsule_enter(size: Array, o: Components, d: Components) -> Array:
-    """Through the side if the endless cylinder is entered between the ends, else through the ball at the end there."""
+    """The side, if the ray enters the infinite cylinder between the ends, otherwise the ball at that end."""
     radius, half = size[0], size[1]
     side, _ = _round(radius, (o[0], d[0]), (o[1], d[1]))
     height = o[2] + side * d[2]
@@ -182,7 +183,7 @@ def _capsule_distance(size: Array, p: Array) -> Array:
 
 
 def _gate_enter(size: Array, o: Components, d: Components) -> Array:
-    """The frame is a box without the opening through it: a ray that enters in the opening meets its inner side."""
+    """The frame is a box without its opening. A ray that enters through the opening hits the frame's inner side."""
     width, height, bar, depth = size
     opened, closed = _common(_slab(o[1], d[1], width), _slab(o[2], d[2], height))
     enter, leave = _common(_slab(o[0], d[0], depth), _slab(o[1], d[1], width + bar), _slab(o[2], d[2], height + bar))
@@ -199,7 +200,7 @@ def _gate_normal(size: Array, p: Components) -> Components:
 
 
 def _gate_distance(size: Array, p: Array) -> Array:
-    """Of the nearest of four bars; two by symmetry."""
+    """Distance to the nearest of four bars, of which two are computed, by symmetry."""
     x, y, z = (jnp.abs(p[..., i]) for i in range(3))
     width, height, bar, half = (size[..., i] for i in range(4))
     upright = _outside(x - half, jnp.abs(y - width - bar / 2) - bar / 2, z - height - bar)
@@ -208,7 +209,7 @@ def _gate_distance(size: Array, p: Array) -> Array:
 
 
 _CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [0.0, 2.0]]) * [1.0, 1.0 / np.sqrt(3.0)]
-"""Of the pad's triangle about its centre, in units of half its side."""
+"""Corners of the pad's triangle about its centre, in units of half its side."""
 _EDGES = tuple((tuple(_CORNERS[i]), tuple(_CORNERS[(i + 1) % 3])) for i in range(3))
 
 

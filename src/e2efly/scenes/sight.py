@@ -1,9 +1,9 @@
-"""Rays of one tile against the solids of one world: the nearest hit of each.
+"""Rays of one tile against the solids of one world: the nearest hit of each ray.
 
-Solids stand in a table, kind after kind. A list leads from each to the next that the tile may see, so that one loop
-for each kind visits these only. XLA makes one machine function of it, which works in the first-level cache. It fuses
-each array that a loop carries by itself, with all that it is computed from: so that an intersection is computed once,
-a loop compares the one of the round before.
+Solids are in a table, kind after kind. A list leads from each solid to the next that may be visible in the tile, so
+that one loop per kind visits only these. XLA makes one machine function of the loop, which works in the first-level
+cache. XLA fuses each array that a loop carries separately, with everything from which the array is computed. A loop
+therefore compares the intersection of the previous round, so that each intersection is computed only once.
 """
 
 import math
@@ -22,24 +22,24 @@ from e2efly.scenes.shapes import FAR, ROOM, SHAPES, Components
 from e2efly.scenes.tiles import Pattern, following, longest, seen_by_tiles
 
 Kinds = tuple[tuple[str, int], ...]
-"""Each kind of solids in a table, and where it ends."""
+"""The kinds of solids in a table, each with the index at which it ends."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Sight:
-    """What each of n cameras' loops need."""
+    """The data that the loops of n cameras need."""
 
     origin: Float[Array, "n 3"]
     matrix: Float[Array, "n 3 3"]
     ground: Float[Array, " n"]
     following: Int[Array, "n t k+1"]
     forms: Float[Array, "n 16 k"]
-    """Size, the rays' origin in the solid's frame, and the matrix from the sensor's frame to the solid's."""
+    """Size, the rays' origin in the solid's frame, and the matrix from the sensor's frame to the solid's frame."""
     looks: Float[Array, "n 13 k"] | None
-    """Label, colour, rotation from world to solid; for what is more than a distance."""
+    """Label, colour, and rotation from world to solid, for channels other than distances."""
     shading: Int[Array, "n t k+1"] | None
-    """Leads from each solid to the next that may throw a shadow on what the tile shows; for colours."""
+    """Leads from each solid to the next that may cast a shadow into the tile, for colours."""
 
 
 def sight(
@@ -51,7 +51,10 @@ def sight(
     sun: Float[Array, "n 3"] | None,
     farthest: float,
 ) -> tuple[Sight, Kinds]:
-    """The solids as cameras see them, but for those wholly beyond a depth; with a sun their shadows, too."""
+    """The solids as cameras see them, without those that are completely beyond a depth.
+
+    With a sun, also their shadows.
+    """
     each = [(kind, scene.solids[kind]) for kind in scene.kinds]
     kinds = tuple((kind, sum(s.count for _, s in each[: i + 1])) for i, (kind, _) in enumerate(each))
     if not each:
@@ -94,17 +97,17 @@ def _throwing(
     visible: Bool[Array, "n t k"],
     hollow: Bool[np.ndarray, " k"],
 ) -> Bool[Array, "n t k"]:
-    """Whether the shadows of solids' balls may fall on what tiles show: on the ground there, or on a solid's ball.
+    """Whether shadows of the solids' balls may fall on objects in the tiles: on the ground, or on another solid's ball.
 
     Args:
         pattern: the tiles.
-        matrix: sensor's frame to world.
-        away: from the sensor to the balls' centres, world, components (n, k), m.
+        matrix: map from the sensor's frame to the world.
+        away: vectors from the sensor to the balls' centres, world, components (n, k), m.
         reach: the balls' radii, m.
-        height: of the sensor over the ground, m.
-        sun: unit vectors to it, components (n, 1).
+        height: height of the sensor above the ground, m.
+        sun: unit vectors to the sun, components (n, 1).
         visible: solids in the cones of the tiles.
-        hollow: which throw shadows on themselves.
+        hollow: solids that cast shadows on themselves.
     """
     steep = jnp.maximum(sun.z, 1e-3)
     on_ground = seen_by_tiles(pattern, matrix, away - sun * ((away.z + height) / steep), reach / steep)
@@ -119,7 +122,7 @@ def _throwing(
 
 @dataclass(frozen=True)
 class Form:
-    """A solid as one camera sees it: scalars."""
+    """A solid as one camera sees it, in scalars."""
 
     size: Array
     origin: Array
@@ -127,17 +130,17 @@ class Form:
 
     @staticmethod
     def of(seen: Sight, i: Array) -> "Form":
-        """The one at a place in the table."""
+        """The solid at a place in the table."""
         row = seen.forms[:, i]
         return Form(row[:ROOM], row[ROOM : ROOM + 3], row[ROOM + 3 :])
 
     def direction(self, d: Float[Array, "3 r"]) -> Components:
-        """Of the sensor's rays in the solid's frame."""
+        """Directions of the sensor's rays in the solid's frame."""
         return turned(self.matrix, d)
 
 
 def turned(matrix: Float[Array, " 9"], d: Any) -> Components:
-    """A matrix, row after row, times a vector's components."""
+    """Product of a matrix, given row by row, and the components of a vector."""
     x, y, z = (sum(matrix[3 * i + j] * d[j] for j in range(3)) for i in range(3))
     return x, y, z  # pyright: ignore
 
@@ -148,7 +151,7 @@ def number(i: Array) -> Array:
 
 
 def over(kinds: Kinds, after: Callable[[Array], Array], body: Callable[[str, Array, Any], Any], state: Any) -> Any:
-    """Fold `body(kind, place, state)` over the places of a table; `after` leads from each to the next, from -1 on."""
+    """Fold `body(kind, place, state)` over places of a table. `after` leads from each to the next, starting from -1."""
     i = after(jnp.int32(-1))
     for kind, end in kinds:
         i, state = jax.lax.while_loop(
@@ -158,7 +161,7 @@ def over(kinds: Kinds, after: Callable[[Array], Array], body: Callable[[str, Arr
 
 
 def ground(seen: Sight, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
-    """Where rays meet the ground; `FAR`: nowhere."""
+    """Parameter at which rays meet the ground. `FAR`: they do not."""
     speed = turned(seen.matrix.reshape(9), d)[2]
     below = speed < -1e-6
     t = (seen.ground - seen.origin[2]) / jnp.where(below, speed, 1.0)
@@ -166,14 +169,14 @@ def ground(seen: Sight, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
 
 
 def entered(kind: str, seen: Sight, i: Array, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
-    """Where rays enter a solid."""
+    """Parameter at which rays enter a solid."""
     form = Form.of(seen, i)
     x, y, z = form.origin
     return SHAPES[kind].enter(form.size, (x, y, z), form.direction(d))
 
 
 def depth(seen: Sight, kinds: Kinds, tile: Array, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
-    """Of the nearest hits."""
+    """Depth of the nearest hits."""
     following = seen.following[tile]
     return over(
         kinds,
@@ -186,7 +189,7 @@ def depth(seen: Sight, kinds: Kinds, tile: Array, d: Float[Array, "3 r"]) -> Flo
 def hits(
     seen: Sight, kinds: Kinds, tile: Array, d: Float[Array, "3 r"], below: Float[Array, " r"]
 ) -> tuple[Float[Array, " r"], Float[Array, " r"]]:
-    """Depth of the nearest hits, and the instance number of what is hit; `below`: where it is no solid."""
+    """Depth of the nearest hits, and instance number of what is hit. `below` is the number where no solid is hit."""
     following = seen.following[tile]
 
     def settled(t: Array, who: Array, last: Array, name: Array) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""The rays of a sensor in tiles, and which balls each tile may see."""
+"""The rays of a sensor in tiles, and which balls each tile may contain."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -15,20 +15,20 @@ class Pattern:
     """Directions of the rays of a sensor, in its own frame, in tiles; static."""
 
     tiles: np.ndarray
-    """(tiles, 3, rays of a tile) directions; a ray is where it starts plus depth times direction."""
+    """(tiles, 3, rays of a tile) directions. A point on a ray is its start plus depth times direction."""
     rim: np.ndarray
-    """(tiles, c, 3) directions whose cone holds the tile."""
+    """(tiles, c, 3) directions whose cone contains the tile."""
     layout: tuple[int, int, int, int]
-    """Rows and columns of tiles, rows and columns of a tile."""
+    """Rows and columns of tiles, and rows and columns of a tile."""
 
     @staticmethod
     def of(directions: np.ndarray, flat: bool, tile: tuple[int, int] | None = None) -> "Pattern":
         """Cut (height, width, 3) directions into tiles.
 
         Args:
-            directions: of the rays.
-            flat: whether they end in a plane, so that a tile lies in the cone of its corners.
-            tile: rows and columns; of at most 16 when left out.
+            directions: directions of the rays.
+            flat: whether the directions end in a plane, so that a tile lies in the cone of its corners.
+            tile: rows and columns of a tile. If left out: at most 16 of each.
         """
         height, width, _ = directions.shape
         th, tw = tile or (_divisor(height, 16), _divisor(width, 16))
@@ -48,11 +48,11 @@ class Pattern:
 
     @property
     def directions(self) -> np.ndarray:
-        """Of the rays, (height, width, 3)."""
+        """Directions of the rays, (height, width, 3)."""
         return np.moveaxis(self.image(np.moveaxis(self.tiles, 1, 0)), 0, -1)
 
     def image(self, tiles: Any) -> Any:
-        """(*n, tiles, rays of a tile) as images (*n, height, width)."""
+        """Convert (*n, tiles, rays of a tile) to images (*n, height, width)."""
         n = tiles.shape[:-2]
         return tiles.reshape(*n, *self.layout).swapaxes(-3, -2).reshape(*n, *self.shape)
 
@@ -68,8 +68,8 @@ def seen_by_tiles(
 
     Args:
         pattern: the tiles.
-        matrix: sensor's frame to world.
-        away: from the sensor to the balls' centres, world, components (n, k), m.
+        matrix: map from the sensor's frame to the world.
+        away: vectors from the sensor to the balls' centres, world, components (n, k), m.
         reach: the balls' radii, m.
     """
     rim = _unit(_rim(pattern, matrix))
@@ -84,13 +84,13 @@ def seen_by_tiles(
 
 
 def longest(pattern: Pattern, matrix: Float[Array, "n 3 3"]) -> Float[Array, " n"]:
-    """Metres that a unit of depth is at most, along any ray."""
+    """Largest length of one unit of depth along any ray, m."""
     rim = _rim(pattern, matrix)
     return jnp.sqrt(jnp.max(rim.dot(rim), axis=(1, 2)))
 
 
 def _rim(pattern: Pattern, matrix: Float[Array, "n 3 3"]) -> Vec3:
-    """World directions, components (n, c, t)."""
+    """Directions of the rims in the world, components (n, c, t)."""
     rim = np.moveaxis(pattern.rim, 0, -1)
     return Vec3(*(sum(matrix[:, i, j, None, None] * rim[:, j] for j in range(3)) for i in range(3)))
 
@@ -104,7 +104,10 @@ def _parts(v: Vec3) -> tuple[Array, Array, Array]:
 
 
 def following(wanted: Bool[Array, "*n k"]) -> Int[Array, "*n k+1"]:
-    """Of each place in a list, the first one from there on that is wanted; k: none. It makes loops that skip."""
+    """For each place in a list, the first wanted place at or after it; k without one.
+
+    It allows loops that skip places.
+    """
     k = wanted.shape[-1]
     before = [(0, 0)] * (wanted.ndim - 1)
     first = jnp.pad(jnp.where(wanted, jnp.arange(k, dtype=jnp.int32), k), [*before, (0, 1)], constant_values=k)

@@ -1,1 +1,1 @@
-"""What the vehicle measures: noise of the state, IMU, age of measurements."""
+"""Measurements of the vehicle: noise of the state, IMU, age of measurements."""

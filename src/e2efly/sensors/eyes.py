@@ -1,4 +1,4 @@
-"""Cameras on a batch of vehicles: what they show at an instant, of worlds and poses as they were a while ago."""
+"""Cameras on a batch of vehicles: their images of worlds and poses as they were a latency ago."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from e2efly.scenes.scene import Scene
 from e2efly.sensors.image_noise import add_image_noise, chosen
 
 TINTS = 8
-"""Random tints in a world."""
+"""Number of random tints in a world."""
 _STATIC = ("sees", "of", "width", "height", "projection", "fov", "reach", "encoding", "rate")
 jax.tree_util.register_dataclass(
     CameraConfig,
@@ -36,13 +36,13 @@ class Eye:
     latency: Float[Array, " n"]
     """Age of the camera's images, s."""
     noisy: Bool[Array, " n"]
-    """Whether the camera's images have the noise."""
+    """Whether the camera's images are noisy."""
     light: Light | None
     """Light of the world, for a camera that sees colours."""
     tints: Float[Array, "n 8 3"] | None
-    """What is added to the colours of the solids, in turn, for a camera that sees colours."""
+    """Offsets that are added to the colours of the solids, in turn, for a camera that sees colours."""
     every: Float[Array, " n"] | None = None
-    """Control steps from an image to the next, of each vehicle; None: `steps_between`, of all of them."""
+    """Control steps from one image to the next, for each vehicle. None: `steps_between`, for all vehicles."""
 
     @staticmethod
     def of(config: CameraConfig, key: PRNGKeyArray, n: int) -> "Eye":
@@ -76,14 +76,12 @@ def _tinted(scene: Scene, tints: Float[Array, "n t 3"]) -> Scene:
 
 
 def steps_between(config: CameraConfig, period: float) -> int:
-    """Control steps from an image of a camera to the next."""
+    """Control steps from one image of a camera to the next."""
     return 1 if config.rate is None else round(1 / (config.rate * period))
 
 
 def steady(config: CameraConfig) -> CameraConfig:
-    """The camera as it is meant to be: mounted exactly, with its own field of view and its youngest images. Its noise
-    stays.
-    """
+    """The nominal camera: exact mounting, its own field of view, and the smallest latency. Its noise stays."""
     youngest = config.latency[0]
     return dataclasses.replace(
         config, angle_spread=0.0, position_spread=0.0, fov_spread=0.0, latency=(youngest, youngest)
@@ -91,7 +89,7 @@ def steady(config: CameraConfig) -> CameraConfig:
 
 
 def image_shape(config: CameraConfig) -> tuple[int, ...]:
-    """(h, w), or (h, w, 3) of colours and normals."""
+    """(h, w), or (h, w, 3) for colours and normals."""
     return (config.height, config.width, *((3,) if config.sees in ("rgb", "normal") else ()))
 
 
@@ -100,13 +98,15 @@ def see(config: CameraConfig, eye: Eye, scene: Scene | MeshScene, state: State, 
 
     Args:
         config: the camera.
-        eye: how it sits on each.
-        scene: n worlds, standing still; or the one world of triangles that all are in, whose colours are the file's.
-        state: of the vehicles.
-        key: of the noise.
+        eye: how it is mounted on each vehicle.
+        scene: n worlds, standing still, or the one world of triangles in which all vehicles are. Its colours are those
+            of its file.
+        state: state of the vehicles.
+        key: key of the noise.
 
     Returns:
-        Depth and range in m (0: a hole), a mask, 0 or 1, of shape (n, h, w); colours in [0, 1], normals, (n, h, w, 3).
+        Depth and range in m (0: a hole) or a mask of 0 and 1, of shape (n, h, w). Colours in [0, 1] and normals, (n, h,
+        w, 3).
     """
     position, quaternion = (x.astype(jnp.float32) for x in (state.position, state.quaternion))
     if eye.tints is not None and isinstance(scene, Scene):

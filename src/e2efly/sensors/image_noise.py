@@ -1,6 +1,6 @@
-"""What real cameras do to images: pure functions of a key and a batch of images.
+"""Effects of real cameras on images: pure functions of a key and a batch of images.
 
-Depth is planar, m, (n, h, w); 0 is a hole, where nothing was measured. Other images have values in [0, 1].
+Depth is planar, m, (n, h, w). 0 is a hole, where nothing was measured. Other images have values in [0, 1].
 """
 
 import dataclasses
@@ -28,32 +28,33 @@ Depth = Float[Array, "n h w"]
 Strength = float | Float[Array, ""]
 
 BASELINE, DISPARITY_DEVIATION = 0.05, 0.08
-"""Of a D435i: between its imagers, m; of a disparity, pixels of the 848 that its depth image is wide."""
+"""For a D435i: distance between its imagers, m, and standard deviation of a disparity, in pixels of its 848-pixel wide
+depth image."""
 NATIVE_WIDTH = 848
 REDWOOD_SIZE = (640, 480)
-"""Width and height of the image that the Redwood model was measured on."""
+"""Width and height of the image for which the Redwood model was measured."""
 REDWOOD_FOCAL_BASELINE = 35.130
-"""Focal length times baseline of that camera, in its disparity's unit, m."""
+"""Focal length times baseline of that camera, in the unit of its disparity, m."""
 REDWOOD_DISPARITY_DEVIATION = 0.027778
-"""Of the disparity, in its unit."""
+"""Standard deviation of the disparity, in its unit."""
 SYNTHETIC = "synthetic"
-"""The name of `synthetic_distortion` in a configuration."""
+"""Name of `synthetic_distortion` in a configuration."""
 BEYOND = 20.0
-"""What lies at the end of a camera's reach counts as this far at least, m: beyond what a D435i measures."""
+"""Objects at the end of a camera's reach count as at least this far away, m. A D435i cannot measure that far."""
 
 
 def add_image_noise(config: ImageNoiseConfig, key: PRNGKeyArray, image: Image, camera: CameraConfig) -> Image:
-    """Add every noise of a configuration to a camera's images, in the order of its fields.
+    """Add all noises of a configuration to a camera's images, in the order of its fields.
 
-    Depth and range go through `OF_DEPTH` in m and then, as shares of the farthest, through `OF_VALUES`; holes stay
-    holes but for salt. Other images have values in [0, 1]. The name of a noise decides its random stream: switching
-    one on changes no other.
+    Depth and range pass through `OF_DEPTH` in m and then, as shares of the farthest value, through `OF_VALUES`. Holes
+    stay holes, except for salt. Other images have values in [0, 1]. The name of a noise determines its random stream,
+    so switching one on changes no other.
 
     Args:
-        config: which noises (static) and how strong (leaves); see `check`.
-        key: of all noises.
-        image: what the camera sees: depth or range in m, (n, h, w); or values in [0, 1], (n, h, w) or (n, h, w, 3).
-        camera: static.
+        config: the noises (static) and their strengths (leaves); see `check`.
+        key: key of all noises.
+        image: the camera's image: depth or range in m, (n, h, w); or values in [0, 1], (n, h, w) or (n, h, w, 3).
+        camera: the camera, static.
 
     Returns:
         An image of the same kind and unit, within the camera's reach.
@@ -76,7 +77,7 @@ def add_image_noise(config: ImageNoiseConfig, key: PRNGKeyArray, image: Image, c
 
 
 def chosen(config: ImageNoiseConfig) -> dict[str, Any]:
-    """The noises that are switched on, and their options, by field."""
+    """The noises that are switched on, with their options, by field."""
     return {name: value for name, value in vars(config).items() if value is not None and value is not False}
 
 
@@ -108,12 +109,12 @@ def check(config: ImageNoiseConfig, camera: CameraConfig) -> None:
 
 
 def _check_own(reference: str, camera: CameraConfig) -> None:
-    """Try a function of the user's own on the shape of an image, before anything compiles."""
+    """Test a user's own function on the shape of an image, before anything compiles."""
     own = load(reference)
     image = jax.ShapeDtypeStruct((2, camera.height, camera.width, *(3,) * (camera.sees == "rgb")), jnp.float32)
     try:
         out = jax.eval_shape(lambda key, x: own(key, x, camera), jax.random.key(0), image)
-    except Exception as error:  # whatever it is that the user's code raises
+    except Exception as error:  # any error of the user's code
         raise ValueError(f"camera.noise.own is {reference}, which fails: {type(error).__name__}: {error}") from None
     if getattr(out, "shape", None) != image.shape:
         raise ValueError(f"camera.noise.own is {reference}, which returns {out}; accepted: an image of {image.shape}")
@@ -134,13 +135,13 @@ def speckle(key: PRNGKeyArray, image: Image, deviation: Strength, mean: Strength
 
 
 def salt_and_pepper(key: PRNGKeyArray, image: Image, amount: Strength, salt: Strength = 0.5) -> Image:
-    """A share `amount` of the pixels is replaced, `salt` of them by 1 and the others by 0."""
+    """Replace a share `amount` of the pixels. A share `salt` of these becomes 1, and the others become 0."""
     u = jax.random.uniform(key, image.shape, image.dtype)
     return jnp.where(u < amount * salt, 1.0, jnp.where(u < amount, 0.0, image))
 
 
 def poisson(key: PRNGKeyArray, image: Image, levels: Strength) -> Image:
-    """Shot noise: Pois(I v) / v with v = 2^ceil(log2 levels), of an image with so many levels, clipped to [0, 1]."""
+    """Shot noise: Pois(I v) / v with v = 2^ceil(log2 levels), for an image with `levels` levels, clipped to [0, 1]."""
     most = 2.0 ** jnp.ceil(jnp.log2(jnp.asarray(levels, image.dtype)))
     data = jax.random.key_data(key).reshape(-1)[:2]
     counts = jax.random.poisson(jax.random.wrap_key_data(data, impl="threefry2x32"), image * most, image.shape)
@@ -148,7 +149,10 @@ def poisson(key: PRNGKeyArray, image: Image, levels: Strength) -> Image:
 
 
 def inverse_depth(key: PRNGKeyArray, depth: Depth, deviation: Strength) -> Depth:
-    """1 / (1/d + deviation N): what noise of the disparity does to stereo depth; 1/m. Not under a millimetre."""
+    """1 / (1/d + deviation N): the effect of disparity noise on stereo depth; deviation in 1/m.
+
+    At least a millimetre.
+    """
     inverse = 1.0 / jnp.maximum(depth, 1e-3) + deviation * _normal(key, depth)
     return jnp.where(depth > 0, 1.0 / jnp.clip(inverse, 1e-3, 1e3), 0.0)
 
@@ -156,15 +160,15 @@ def inverse_depth(key: PRNGKeyArray, depth: Depth, deviation: Strength) -> Depth
 def d435i(key: PRNGKeyArray, depth: Depth, fov: float, least: float = 0.28, most: float = 10.0) -> Depth:
     """Intel D435i: noise of the disparity, the shadows of its second imager, and its range.
 
-    The deviation of the depth is z^2 d / (f B): 4 mm at 1 m, 10 cm at 5 m. A pixel that something nearer hides from
-    the left imager (B to the side) is a hole, and so is what is nearer than `least` or farther than `most`.
+    The deviation of the depth is z^2 d / (f B): 4 mm at 1 m, 10 cm at 5 m. A pixel is a hole if something nearer hides
+    it from the left imager (B to the side), and if it is nearer than `least` or farther than `most`.
 
     Args:
         key: of the noise.
         depth: planar, m, (n, h, w).
-        fov: horizontal, rad.
-        least: nearest depth that it measures, m.
-        most: farthest, m.
+        fov: horizontal field of view, rad.
+        least: smallest depth that it measures, m.
+        most: largest depth that it measures, m.
     """
     width = depth.shape[-1]
     native = NATIVE_WIDTH / 2 / math.tan(fov / 2)
@@ -173,7 +177,7 @@ def d435i(key: PRNGKeyArray, depth: Depth, fov: float, least: float = 0.28, most
     disparity = width / 2 / math.tan(fov / 2) * BASELINE * inverse
     hidden = jnp.zeros(depth.shape, bool)
     largest = math.ceil(width / 2 / math.tan(fov / 2) * BASELINE / least)
-    for shift in range(1, min(largest, width - 1) + 1):  # what is hidden by more lies outside of the image
+    for shift in range(1, min(largest, width - 1) + 1):  # points hidden by a larger shift lie outside the image
         nearer = jnp.pad(disparity[..., shift:], [(0, 0)] * (depth.ndim - 1) + [(0, shift)], mode="edge")
         hidden |= nearer - disparity > shift - 0.5
     measured = (depth > 0) & (noisy >= least) & (noisy <= most) & ~hidden
@@ -181,9 +185,10 @@ def d435i(key: PRNGKeyArray, depth: Depth, fov: float, least: float = 0.28, most
 
 
 def synthetic_distortion() -> Float[np.ndarray, "80 80 5"]:
-    """A smooth stand-in for the measured lens distortion of the Redwood model, of its range: 0.81 to 1.11, mean 1.0009.
+    """A smooth substitute for the measured lens distortion of the Redwood model.
 
-    Entries: depth is divided by the factor at (x // 8, y // 6, depth bin) of a 640 x 480 image, bins at 1 m, 3 m, ...
+    Its range is 0.81 to 1.11, its mean 1.0009. Depth is divided by the factor at (x // 8, y // 6, depth bin) of a 640 x
+    480 image, with bins at 1 m, 3 m, ...
     """
     x, y = np.meshgrid(np.linspace(-1, 1, 80), np.linspace(-1, 1, 80), indexing="ij")
     radius = x * x + y * y
@@ -218,8 +223,8 @@ def distortion(name: str) -> Float[np.ndarray, "80 80 5"]:
 def redwood(key: PRNGKeyArray, depth: Depth, table: Float[Array | np.ndarray, "80 80 5"]) -> Depth:
     """Depth as PrimeSense-like cameras measure it (Choi, Zhou, Koltun 2015; distortion after Teichman et al. 2013).
 
-    Pixels are jittered by a quarter of a pixel times depth and read at every second one; depth of 10 m and more is a
-    hole; depth is divided by the distortion; the disparity is rounded to eighths after noise.
+    Pixels are jittered by a quarter of a pixel times depth, and read at every second one. Depth of 10 m and more is a
+    hole. Depth is divided by the distortion. After noise, the disparity is rounded to eighths.
 
     Args:
         key: of the noise.
@@ -246,7 +251,7 @@ def redwood(key: PRNGKeyArray, depth: Depth, table: Float[Array | np.ndarray, "8
 
 
 def _except_holes(noise: Callable[[PRNGKeyArray, Image, Strength], Image]) -> "Noise":
-    """A noise of values that leaves alone what is 0 where 0 is a hole."""
+    """A noise of values that does not change zeros in images where 0 is a hole."""
 
     def applied(key: PRNGKeyArray, image: Image, strength: Strength, camera: CameraConfig) -> Image:
         noisy = noise(key, image, strength)
@@ -256,7 +261,7 @@ def _except_holes(noise: Callable[[PRNGKeyArray, Image, Strength], Image]) -> "N
 
 
 Noise = Callable[[PRNGKeyArray, Array, Any, CameraConfig], Array]
-"""What is done to images: of a key, images, the option of `ImageNoiseConfig` and the camera."""
+"""A change of images: a function of a key, the images, the option of `ImageNoiseConfig` and the camera."""
 OF_DEPTH: dict[str, Noise] = {
     "inverse_depth": lambda key, depth, deviation, _: inverse_depth(key, depth, deviation),
     "d435i": lambda key, depth, _, camera: d435i(key, depth, camera.fov[0]),
@@ -271,4 +276,4 @@ OF_VALUES: dict[str, Noise] = {
 }
 """Noises of values in [0, 1], in their order, by field of `ImageNoiseConfig`."""
 OWN: dict[str, Noise] = {"own": lambda key, image, reference, camera: load(reference)(key, image, camera)}
-"""The user's noise, which comes last, of images in their unit."""
+"""The user's noise of images in their own unit. It is applied last."""

@@ -1,4 +1,4 @@
-"""Inertial measurement unit: white noise and bias random walk on gyroscope and accelerometer."""
+"""Inertial measurement unit: white noise and bias random walk of gyroscope and accelerometer."""
 
 from dataclasses import dataclass
 
@@ -32,7 +32,7 @@ class ImuState:
 
     @staticmethod
     def at(state: State) -> "ImuState":
-        """No bias, and the measurement of a vehicle that does not accelerate."""
+        """Zero bias, and the measurement of a vehicle that does not accelerate."""
         zero = jnp.zeros_like(state.position)
         up = jnp.zeros_like(state.position).at[..., 2].set(GRAVITY)
         return ImuState(zero, zero, state.body_rate, unrotate(state.quaternion, up))

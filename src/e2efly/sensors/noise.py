@@ -15,10 +15,10 @@ jax.tree_util.register_dataclass(NoiseConfig)
 
 
 def add_noise(noise: NoiseConfig, key: PRNGKeyArray, state: State) -> State:
-    """The state as measured: Gaussian position, velocity and body rate; a small random turn of the attitude."""
+    """The measured state: Gaussian noise on position, velocity and body rate, and a small random rotation."""
     draw = jax.random.normal(key, (*state.position.shape[:-1], 12), state.position.dtype)
     half_turn = noise.attitude * draw[..., 6:9] / 2
-    # The turn is what is normalised, not the product: no noise then changes no bit of the attitude.
+    # The rotation is normalised, not the product. Without noise, no bit of the attitude changes.
     turn = normalize(stack(jnp.ones_like(half_turn[..., 0]), *(half_turn[..., i] for i in range(3))))
     return dataclasses.replace(
         state,

@@ -1,6 +1,6 @@
-"""Tasks: what a vehicle is to do, and when it has done it. Each has a folder, which registers its options.
+"""Tasks: what a vehicle is to do, and how its success is judged. Each task has a folder, which registers its options.
 
-Imports no JAX: a task's world, the part that trains, is in a module of its own.
+Imports no JAX: the world of a task, which trains, is in a module of its own.
 """
 
 import importlib

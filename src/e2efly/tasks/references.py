@@ -1,4 +1,4 @@
-"""Random references; splines and curves as pytrees, their numbers leaves of the compiled programs."""
+"""Random references, and splines and curves as pytrees whose numbers are leaves of the compiled programs."""
 
 import math
 
@@ -19,17 +19,17 @@ jax.tree_util.register_dataclass(Lissajous, data_fields=list(Lissajous.__datacla
 def polynomial(
     key: PRNGKeyArray, centre: Point, reach: float | Array, speed: float | Array, n: int, m: int, every: int = 4
 ) -> Spline:
-    """Random and smooth: minimum-jerk-like pieces of `every` knot periods between random points of a box.
+    """A random smooth reference: minimum-jerk-like pieces of `every` knot periods between random points of a box.
 
-    The way points lie uniformly within `reach` of the centre per axis. Their velocities are the mean slope to their
-    neighbours, the average speed of each vehicle's path being uniform between 0 and `speed`, m/s.
+    The points lie uniformly within `reach` of the centre per axis. Their velocities are the mean slope to their
+    neighbours. The average speed of each vehicle's path is uniform between 0 and `speed`, m/s.
     """
     points_key, speed_key = jax.random.split(key)
     count = math.ceil((m - 1) / every) + 1
     points = reach * jax.random.uniform(points_key, (n, count + 2, 3), minval=-1.0, maxval=1.0)
     period = every * KNOT_PERIOD
     slope = jnp.diff(points, axis=1) / period
-    # shrink about the centre so that no piece is faster, on average, than the speed drawn for this vehicle
+    # shrink the path about its centre so that no piece is faster, on average, than the speed drawn for this vehicle
     drawn = speed * jax.random.uniform(speed_key, (n, 1, 1))
     shrink = jnp.minimum(1.0, drawn / jnp.max(jnp.linalg.norm(slope, axis=-1), axis=1)[:, None, None])
     points, slope = points * shrink, slope * shrink
@@ -39,7 +39,10 @@ def polynomial(
 
 
 def _refine(coarse: Float[Array, "n c 3 3"], period: float, every: int, m: int) -> Float[Array, "n m 3 3"]:
-    """Quintic pieces over `every` knot periods, sampled with their derivatives at each knot: the same curve."""
+    """Sample quintic pieces over `every` knot periods, with their derivatives, at each knot.
+
+    The curve stays the same.
+    """
     s = np.arange(m) / every
     index = np.minimum(s.astype(int), coarse.shape[1] - 2)
     basis = np.stack([_basis(order, s - index) / period**order for order in range(3)])  # (order, 6, m)

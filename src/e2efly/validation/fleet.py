@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from e2efly.validation.sight import Sight
 
 WORTH = 20
-"""Flights below which processes of their own, which take a second to start, do not pay."""
+"""Number of flights below which separate processes are not worth the second that they take to start."""
 CHUNK = 5
-"""Flights that a process is handed at once."""
+"""Number of flights that a process gets at once."""
 
 
 @dataclass(frozen=True)
@@ -38,25 +38,25 @@ class Mission:
     policy: Path
     """The policy.onnx."""
     plant: str
-    """A name or a reference of a plant."""
+    """Name or reference of a plant."""
     trained: Vehicle
-    """The vehicle that the policy was trained on: the runtime refuses any other."""
+    """The vehicle that the policy was trained on. The runtime refuses any other."""
     believed: Vehicle
-    """The vehicle that the plant's flight controller believes in."""
+    """The vehicle to which the plant's flight controller is tuned."""
     duration: float
     """Longest flight, s."""
     cameras: Mapping[str, str] = field(default_factory=dict)
-    """By an image of the contract, which of the plant's own cameras gives it; the others are rendered."""
+    """By an image of the contract, the plant's own camera that provides it. The other images are rendered."""
     sample: float | None = None
-    """Seconds between two samples of a log, at most; None: none are kept."""
+    """Longest time between two samples of a log, s. None: no samples are kept."""
     baseline: str | None = None
-    """The hover controller that flies in place of the policy; None: the policy flies."""
+    """The hover controller that flies in place of the policy. None: the policy flies."""
 
     def acting(self) -> Policy | Baseline:
-        """What flies.
+        """The policy or the baseline that flies.
 
         Raises:
-            ValueError: for a policy or a baseline that cannot be had.
+            ValueError: for a policy or a baseline that cannot be loaded.
         """
         return acting(load_policy(self.policy), self.baseline, self.trained)
 
@@ -64,7 +64,7 @@ class Mission:
         """The class of the plant.
 
         Raises:
-            ValueError: for one that cannot be had.
+            ValueError: for a plant that cannot be loaded.
         """
         kind = find_plant(self.plant)
         return kind.seeing(self.cameras) if self.cameras else kind
@@ -75,13 +75,13 @@ class Flight:
     """One flight of a mission."""
 
     start: RigidState
-    """Where from."""
+    """The state at the start."""
     course: Course
-    """What to fly."""
+    """The course to fly."""
     reality: Reality
-    """What it meets."""
+    """The conditions of the flight."""
     sight: "Sight | None" = None
-    """What it sees, for a policy that sees."""
+    """The cameras and their world, for a policy that sees."""
 
 
 def fly_all(
@@ -93,13 +93,14 @@ def fly_all(
     """Fly every start, in order.
 
     Args:
-        mission: what they share.
+        mission: what the flights share.
         flights: the starts and their courses.
-        done: told the number of flights that are over.
-        processes: at once; left out: one a core, or none but this one where that does not pay.
+        done: called with the number of finished flights.
+        processes: number of processes at once. If left out: one per core, or only this process if more are not worth
+            it.
 
     Raises:
-        ValueError: for a policy or a plant that cannot be had, for a plant that cannot fly the realities, and for
+        ValueError: for a policy or a plant that cannot be loaded, for a plant that cannot fly the realities, and for
             `processes` below 1.
     """
     if processes is not None and processes < 1:
@@ -109,7 +110,7 @@ def fly_all(
     if not find_plant(mission.plant).parallel or count == 1:
         return _collect(_fly(mission, flights), done)
     chunks = [flights[i : i + CHUNK] for i in range(0, len(flights), CHUNK)]
-    context = multiprocessing.get_context("spawn")  # a fork would copy JAX's threads in an unknown state
+    context = multiprocessing.get_context("spawn")  # a fork would copy JAX's threads in an undefined state
     contract = load_policy(mission.policy).contract
     told = contract.task, bool(contract.images)
     pool = ProcessPoolExecutor(min(count, len(chunks)), context, _prepare, told)
@@ -155,7 +156,7 @@ def _fly(mission: Mission, flights: Sequence[Flight]) -> Iterator[Trajectory]:
 
 
 def _prepare(task: str, sees: bool) -> None:
-    """Import the task, whose file may be the user's own, and what renders; leave Ctrl-C to the parent."""
+    """Import the task, whose file may be the user's own, and the renderer. Leave Ctrl-C to the parent process."""
     TASKS.find(task)
     if sees:
         compute_at_once()

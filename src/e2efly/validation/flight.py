@@ -22,11 +22,11 @@ class Sample:
     state: RigidState
     """The vehicle."""
     rotor_speed: np.ndarray
-    """(4,) rad/s; NaN where the plant does not tell."""
+    """(4,) rad/s. NaN if the plant does not give rotor speeds."""
 
     @staticmethod
     def of(plant: Plant, time: float) -> "Sample":
-        """Of a plant now."""
+        """The sample of a plant now."""
         speed = np.asarray(getattr(plant, "rotor_speed", np.full(4, np.nan)), np.float64)
         return Sample(time, RigidState.of(plant.state), speed.copy())
 
@@ -46,21 +46,21 @@ class Trajectory:
     body_rate: np.ndarray
     """(t+1, 3) body, rad/s."""
     observation: np.ndarray
-    """(t, o) what the policy saw."""
+    """(t, o) the policy's observations."""
     action: np.ndarray
-    """(t, 4) what it answered, in [-1, 1]."""
+    """(t, 4) the policy's actions, in [-1, 1]."""
     command: np.ndarray
-    """(t, 4) the same in the units of the command mode; it acts a latency later."""
+    """(t, 4) the actions in the units of the command mode. Each acts a latency later."""
     goal: np.ndarray
-    """(t, 3) where to be, world, m."""
+    """(t, 3) the position to be at, world, m."""
     success: bool = False
-    """The task's verdict, by the runtime."""
+    """The task's verdict, from the runtime."""
     failure: str = ""
-    """Why the task failed in flight; empty: it did not."""
+    """Why the task failed in flight. Empty: it did not fail."""
     fault: str = ""
-    """Why the flight broke off before its time, where the policy or the plant refused to go on."""
+    """Why the flight ended early, if the policy or the plant could not go on."""
     samples: tuple[Sample, ...] = ()
-    """Moments between control steps, where they are asked for."""
+    """Moments between control steps, if they were requested."""
 
 
 def fly(
@@ -73,23 +73,23 @@ def fly(
     sample: float | None = None,
     images: Callable[[int, Sequence[RigidState]], Sequence[np.ndarray]] | None = None,
 ) -> Trajectory:
-    """Fly one start until the time is out, or the task is done or has failed.
+    """Fly from one start until the time is over, or the task is done or has failed.
 
     Args:
         runtime: policy, contract and course.
-        plant: what to fly.
-        start: where from.
-        duration: seconds of the flight, in whole control periods.
-        latency: seconds from observation to command.
-        air: wind, thrust and what the policy sees from step to step; None: still, full, and the truth.
-        sample: seconds between two samples, at most; None: none are kept.
-        images: of the cameras, by control step and the states until then (`e2efly.validation.sight.Watch.images`).
+        plant: the plant to fly.
+        start: the state at the start.
+        duration: longest flight, s, in whole control periods.
+        latency: time from observation to command, s.
+        air: wind, thrust and errors of the policy's state in each step. None: still air, full thrust, no errors.
+        sample: longest time between two samples, s. None: no samples are kept.
+        images: the cameras' images, by control step and the states until then (`e2efly.validation.sight.Watch.images`).
 
     Returns:
         The flight. A policy that refuses its observation, or a plant that fails, ends it with a `fault`.
 
     Raises:
-        ValueError: for a start, duration or latency that is not to be flown.
+        ValueError: for a start, duration or latency that cannot be flown.
     """
     contract = runtime.policy.contract
     period = 1 / contract.control_rate_hz
@@ -145,8 +145,10 @@ def fly(
 
 
 def imu_of(before: RigidState, after: RigidState, dt: float) -> Imu:
-    """What a perfect IMU measures, as in training (`e2efly.sensors.imu`): the body rate, and the mean specific force of
-    the last `dt` s in the axes of now. A vehicle that has just been placed does not accelerate.
+    """The measurement of a perfect IMU, as in training (`e2efly.sensors.imu`).
+
+    It is the body rate, and the mean specific force of the last `dt` s in the present body axes. A vehicle that has
+    just been placed does not accelerate.
     """
     pull = Vec3.of((after.velocity - before.velocity) / dt + np.array([0.0, 0.0, GRAVITY]))
     force = Quat.of(after.quaternion).unrotate(pull)

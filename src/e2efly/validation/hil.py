@@ -1,4 +1,4 @@
-"""A real vehicle in a virtual world: poses in, images of the world at those poses out, in real time."""
+"""A real vehicle in a virtual world: poses come in, and images of the world at those poses go out, in real time."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -18,43 +18,44 @@ from e2efly.validation.plant import RigidState
 from e2efly.validation.scenery import Scenery
 
 LOST_S = 0.1
-"""A pose older than this shows nothing any more, s."""
+"""Age above which a pose is not used for images, s."""
 RESTART_S = 1.0
-"""After so long without a good pose tracking starts anew, s."""
+"""Time without a valid pose after which tracking restarts, s."""
 STEPS = 4
-"""From one image to the next the way of the vehicle is looked at in so many pieces."""
+"""Number of parts into which the vehicle's path between two images is divided for the collision check."""
 STRUCK_S = 1.0
-"""For so long after a virtual collision there are no images, s: the policy's flight ends."""
+"""Time after a virtual collision without images, s. The policy's flight ends because of it."""
 
 
 @dataclass
 class Node:
-    """Renders what the vehicle's cameras would see, and publishes it."""
+    """Renders the images of the vehicle's cameras and publishes them."""
 
     scenery: Scenery
     source: PoseSource
     outputs: Sequence[SharedImages]
-    """One for each camera."""
+    """One output for each camera."""
     origin: Origin
-    """Of the scenery's world, in the room."""
+    """Origin of the scenery's world in the room."""
     rate: float
     """Images per second."""
     radius: float
-    """Of the vehicle, m."""
+    """Radius of the vehicle, m."""
     checks: Checks = field(default_factory=lambda: Checks(max_age=LOST_S))
-    """What a pose must satisfy."""
+    """Conditions that a pose must satisfy."""
     tell: Callable[[str, dict[str, Any]], None] = lambda topic, message: None
-    """Told each image's pose (`shown`), and by who runs it what else happens (`event`); it must not wait."""
+    """Function that is called with each image's pose (`shown`), and by the node's runner with other events (`event`).
+    It must not wait."""
     latencies: list[float] = field(default_factory=list, init=False)
-    """Of each image: from the arrival of the newest pose to its publication, s."""
+    """For each image: time from the arrival of the newest pose to publication, s."""
     times: list[float] = field(default_factory=list, init=False)
-    """Of each image: when it was published, s."""
+    """For each image: time of publication, s."""
     collisions: int = field(default=0, init=False)
-    """Virtual ones so far."""
+    """Number of virtual collisions so far."""
     refused: str | None = field(default=None, init=False)
-    """Why the newest pose was refused; None: it was not."""
+    """Why the newest pose was refused. None: it was not refused."""
     began: float | None = field(default=None, init=False)
-    """When the world's time was 0, on the monotonic clock, s; None: it has not begun."""
+    """Time at which the world's time was 0, on the monotonic clock, s. None: it has not begun."""
     _track: Track = field(default=Track(), init=False)
     _odometry: Odometry | None = field(default=None, init=False)
     _received: float = field(default=-math.inf, init=False)
@@ -62,27 +63,27 @@ class Node:
     _blind_until: float = field(default=-math.inf, init=False)
     _count: int = field(default=0, init=False)
     _at: np.ndarray | None = field(default=None, init=False)
-    """Where the vehicle was at the last image, in the scene, m; None: it was not seen then."""
+    """Position of the vehicle at the last image, in the scene, m. None: there was no valid pose then."""
 
     def warm(self) -> None:
-        """Compile, so that the first image of a flight is not late."""
+        """Compile the programs, so that the first image of a flight is not late."""
         state = RigidState(np.zeros(3), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3))
         self._images(state, 0.0)
         self._struck(np.zeros(3), np.zeros(3), 0.0)
 
     def step(self, now: float, clock: Callable[[], float]) -> str | None:
-        """Take in poses, and publish where it is time to.
+        """Read poses, and publish images if they are due.
 
         Args:
             now: this machine's monotonic clock, s.
-            clock: the same, to be read again once an image is out.
+            clock: the same clock, to be read again after an image is published.
 
         Returns:
-            What happened, for people; None: nothing new.
+            What happened, as text. None: nothing new.
         """
         began = self.began = now if self.began is None else self.began
         if self._track.fault and now - self._received > RESTART_S:
-            self._track = Track()  # it may have been carried elsewhere; the policy's flight has ended by now
+            self._track = Track()  # the vehicle may have been carried elsewhere; the policy's flight has ended by now
         for sample in self.source.read(now):
             self._track, odometry, self.refused = track(self.checks, self._track, sample)
             if odometry is not None:
@@ -113,7 +114,7 @@ class Node:
         return "images"
 
     def _struck(self, before: np.ndarray, here: np.ndarray, time: float) -> bool:
-        """Whether the vehicle comes too near to something on its way, scene, m."""
+        """Whether the vehicle comes too near to an obstacle on its way, scene, m."""
         way = list(np.linspace(before, here, STEPS + 1))
         return self.scenery.nearest(way, [time] * len(way), Origin(), self.radius) < self.radius
 
@@ -123,7 +124,7 @@ class Node:
 
 
 def ahead(odometry: Odometry, now: float) -> Odometry:
-    """Where a vehicle is at `now`, s, by the last that is known: it goes on as it flew, and turns as it turned."""
+    """The predicted motion of a vehicle at `now`, s, from its last known motion. Velocity and body rates are kept."""
     dt = min(max(now - odometry.time, 0.0), LOST_S)
     w, x, y, z = (1.0, *(0.5 * dt * odometry.body_rate).tolist())
     turned = Quat.of(odometry.quaternion).compose(Quat(w, x, y, z)).normalized()

@@ -1,4 +1,4 @@
-"""One flight of a rehearsal of hardware in the loop, from the records of room, HIL node and bridge, and the verdict."""
+"""One flight of a rehearsal of hardware in the loop, from the records of room, HIL node and bridge, and its verdict."""
 
 import json
 import math
@@ -17,14 +17,15 @@ from e2efly.validation.room_process import RECORDED
 from e2efly.validation.scenery import Scenery
 
 GRACE_S = 0.15
-"""The truth is judged for so long after the bridge has ended the policy's flight: its poses are late, s."""
+"""Time after the end of the policy's flight on the bridge for which the true motion is still judged, s. The bridge's
+poses are late."""
 TOUCH = 2.5
-"""A landing that touches the ground sinking faster than this was no landing, m/s."""
+"""Largest sink rate of a touch of the ground that counts as a landing, m/s."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Median, 99 % and maximum of what was measured, s; NaN where nothing was."""
+    """Median, 99 % quantile and maximum of measured values, s. NaN if there are none."""
 
     median: float = math.nan
     p99: float = math.nan
@@ -32,7 +33,7 @@ class Spread:
 
     @staticmethod
     def of(values: Any) -> "Spread":
-        """Of any numbers; those that are not finite do not count."""
+        """The spread of any numbers. Those that are not finite are ignored."""
         known = np.asarray(values, np.float64).ravel()
         known = known[np.isfinite(known)]
         return Spread(*(float(x) for x in np.quantile(known, (0.5, 0.99, 1.0)))) if len(known) else Spread()
@@ -51,11 +52,11 @@ class Truth:
     quaternion: np.ndarray
     """(t, 4) wxyz, body to room."""
     behind: np.ndarray
-    """(t,) by how much the room lagged behind the clock, s."""
+    """(t,) lag of the room behind the clock, s."""
 
     @staticmethod
     def read(path: Path) -> "Truth":
-        """From the record of `room_process`."""
+        """Read it from the record of `room_process`."""
         rows = np.loadtxt(path, delimiter=",", ndmin=2).reshape(-1, len(RECORDED))
         at = {name: i for i, name in enumerate(RECORDED)}
         return Truth(
@@ -67,12 +68,12 @@ class Truth:
         )
 
     def between(self, begin: float, end: float) -> "Truth":
-        """A part of it, by its times, s."""
+        """The part between two times, s."""
         rows = (self.time >= begin) & (self.time <= end)
         return Truth(*(x[rows] for x in (self.time, self.position, self.velocity, self.quaternion, self.behind)))
 
     def every(self, period: float) -> "Truth":
-        """The samples nearest to moments a period, s, apart, from the first on."""
+        """The samples nearest to times `period` s apart, from the first sample on."""
         if not len(self.time):
             return self
         moments = np.arange(self.time[0], self.time[-1] + 1e-9, period)
@@ -92,57 +93,56 @@ class Change:
 
 @dataclass(frozen=True)
 class Lap:
-    """What came of a flight."""
+    """The results of a flight."""
 
     seed: int
-    """Of its world."""
+    """Seed of its world."""
     kill: Victim | None = None
-    """The process that was killed in it."""
+    """The process that was killed during the flight."""
     success: bool = False
-    """The task's verdict on the true motion, and nothing of the world was hit."""
+    """The task's verdict on the true motion, with the condition that nothing in the world was hit."""
     told: str = "none"
-    """How the policy did, in words."""
+    """How the policy did, as text."""
     nearest: float = math.nan
-    """How near the policy's flight came to a solid, m; NaN: the world has none."""
+    """Smallest distance of the policy's flight to a solid, m. NaN: the world has none."""
     policy_s: float = 0.0
-    """How long the policy flew, s."""
+    """Duration of the policy's flight, s."""
     top_speed: float = 0.0
-    """Of the policy, m/s."""
+    """Largest speed of the policy, m/s."""
     changes: tuple[Change, ...] = ()
-    """The bridge's modes."""
+    """The bridge's changes of mode."""
     pose_to_image: Spread = Spread()
-    """From the arrival of the newest pose at the HIL node to the image, s."""
+    """Time from the arrival of the newest pose at the HIL node to the image, s."""
     image_age: Spread = Spread()
-    """At the policy, s."""
+    """Age of the images when the policy uses them, s."""
     to_stick: Spread = Spread()
-    """From the moment at which a control step that sees was due to its sticks: what they come later than the image's
-    age, s."""
+    """Time from the due time of a control step with images to its sticks, s. It adds to the age of the image."""
     pose_age: Spread = Spread()
-    """At the bridge's control steps of the policy's flight, s."""
+    """Age of the poses at the bridge's control steps during the policy's flight, s."""
     lateness: Spread = Spread()
-    """Of the bridge's control steps while it flew, s."""
+    """Lateness of the bridge's control steps during the policy's flight, s."""
     behind: Spread = Spread()
-    """By how much the room lagged behind real time, s."""
+    """Lag of the room behind real time, s."""
     reaction: float = math.nan
-    """From the kill to the bridge's next change of mode, s; NaN without either."""
+    """Time from the kill to the bridge's next change of mode, s. NaN without either."""
     touch_speed: float = math.nan
-    """Of the hardest touch of the ground, m/s."""
+    """Speed of the hardest touch of the ground, m/s."""
     touch_sink: float = math.nan
-    """The part of it that points down, m/s."""
+    """Downward part of this speed, m/s."""
     problems: tuple[str, ...] = ()
-    """What was not as it is to be; empty: all was."""
+    """Everything that was not as required. Empty: everything was as required."""
     truth: Truth | None = None
-    """The true motion, where it was recorded."""
+    """The true motion, if it was recorded."""
     window: tuple[float, float] = (math.nan, math.nan)
-    """When the policy began and ended, this machine's monotonic clock, s."""
+    """Begin and end of the policy's flight, on this machine's monotonic clock, s."""
 
     @property
     def good(self) -> bool:
-        """All was as it is to be, and the policy, if nothing was killed, did its task."""
+        """Whether everything was as required, and the policy, if nothing was killed, did its task."""
         return not self.problems and (self.success or self.kill is not None)
 
     def as_json(self) -> dict[str, Any]:
-        """All but the track."""
+        """All results except the true motion."""
         spreads = ("pose_to_image", "image_age", "to_stick", "pose_age", "lateness", "behind")
         return {
             **{name: getattr(self, name) for name in (
@@ -157,26 +157,26 @@ class Lap:
 
 @dataclass(frozen=True)
 class Verdict:
-    """The task's, on a true motion."""
+    """The task's verdict on a true motion."""
 
     success: bool
     told: str
     nearest: float
-    """m; infinite: there are no solids."""
+    """Smallest distance to a solid, m. Infinite: there are no solids."""
     top_speed: float
-    """m/s."""
+    """Largest speed, m/s."""
 
 
 def verdict(course: Course, scenery: Scenery, motion: Truth, began: float, period: float, radius: float) -> Verdict:
     """Let the task judge a true motion.
 
     Args:
-        course: what was to be flown.
+        course: the course to fly.
         scenery: the world.
-        motion: of the policy's flight.
-        began: when the world's time was 0, monotonic clock, s.
-        period: of the control steps, s.
-        radius: of the vehicle, m.
+        motion: the true motion in the policy's flight.
+        began: time at which the world's time was 0, monotonic clock, s.
+        period: period of the control steps, s.
+        radius: radius of the vehicle, m.
     """
     steps = motion.every(period)
     count, goal, memory = len(steps.time), course.goal, course.memory
@@ -212,7 +212,7 @@ def verdict(course: Course, scenery: Scenery, motion: Truth, began: float, perio
 
 
 def clock_of(log: FlightLog) -> float:
-    """What a stamp of a log is later than the monotonic clock of its machine, s; NaN without odometry."""
+    """Difference between the stamps of a log and the monotonic clock of its machine, s. NaN without odometry."""
     poses = log["odometry"]
     return (
         float(np.median(1e-9 * poses.stamp - poses.numbers("time") - poses.numbers("age"))) if len(poses) else math.nan
@@ -220,7 +220,7 @@ def clock_of(log: FlightLog) -> float:
 
 
 def changes_of(log: FlightLog) -> tuple[Change, ...]:
-    """The bridge's modes, by its log."""
+    """The bridge's changes of mode, from its log."""
     shift, modes = clock_of(log), log["mode"]
     return tuple(
         Change(1e-9 * float(stamp) - shift, str(message["mode"]), tuple(map(str, message.get("reasons") or ())))
@@ -230,7 +230,7 @@ def changes_of(log: FlightLog) -> tuple[Change, ...]:
 
 @dataclass
 class Heard:
-    """What was noted while a flight went on; times of the monotonic clock, s."""
+    """Notes taken during a flight, with times of the monotonic clock, s."""
 
     began: float = math.nan
     """When the policy took over."""
@@ -239,7 +239,7 @@ class Heard:
     struck: float = math.nan
     """When a process was killed."""
     touches: list[list[float]] = field(default_factory=list)
-    """As `room_process.State` has them."""
+    """Touches in the form of `room_process.State`."""
     problems: list[str] = field(default_factory=list)
 
 
@@ -247,17 +247,17 @@ def lap_of(
     heard: Heard, course: Course, scenery: Scenery, period: float, radius: float, folder: Path, seed: int,
     kill: Victim | None,
 ) -> Lap:  # fmt: skip
-    """A flight from its records.
+    """The results of a flight, from its records.
 
     Args:
-        heard: while it went on.
-        course: what was to be flown.
+        heard: the notes taken during the flight.
+        course: the course to fly.
         scenery: the world.
-        period: of the policy's control steps, s.
-        radius: of the vehicle, m.
-        folder: with `flight.mcap`, `truth.csv` and `node.json`, as far as there are.
-        seed: of the world.
-        kill: which process was killed.
+        period: period of the policy's control steps, s.
+        radius: radius of the vehicle, m.
+        folder: folder with `flight.mcap`, `truth.csv` and `node.json`, as far as they exist.
+        seed: seed of the world.
+        kill: the process that was killed.
     """
     truth, node = folder / "truth.csv", folder / "node.json"
     motion = Truth.read(truth) if truth.is_file() else None
@@ -304,7 +304,7 @@ def lap_of(
 
 
 def _to_stick(log: FlightLog) -> np.ndarray:
-    """Lateness and work of the rounds in which the policy was asked, s."""
+    """Lateness and computing time of the rounds in which the policy was called, s."""
     steps, timing = log["policy"], log["timing"]
     if not len(timing):
         return np.zeros(0)
@@ -313,7 +313,7 @@ def _to_stick(log: FlightLog) -> np.ndarray:
 
 
 def _window(changes: tuple[Change, ...], heard: Heard) -> tuple[float, float]:
-    """When the policy flew, by the log, or, where it ends too early, as it was heard."""
+    """Begin and end of the policy's flight from the log, or from the notes if the log ends too early."""
     begin = next((c.time for c in changes if c.mode == "policy"), heard.began)
     end = next((c.time for c in changes if c.time > begin), heard.ended)
     return begin, end

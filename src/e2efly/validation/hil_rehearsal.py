@@ -1,7 +1,7 @@
-"""The rehearsal of hardware in the loop: all of its processes in real time, but the vehicle and its room simulated.
+"""The rehearsal of hardware in the loop: all its processes in real time, with a simulated vehicle and room.
 
-A motion capture system, the HIL node, the bridge with its watchdog, and the real firmware in a room are a process each,
-and speak over the loopback interface and shared memory, as they would in the lab.
+A motion capture system, the HIL node, the bridge with its watchdog, and the real firmware in a room are separate
+processes. They communicate over the loopback interface and shared memory, as they would in the lab.
 """
 
 import json
@@ -30,86 +30,87 @@ from e2efly.validation.session import rehearsal_settings
 from e2efly.vehicles import Vehicle, load_vehicle
 
 SETTLE_S = 3.0
-"""How long the bridge hovers before the policy takes over, s."""
+"""Duration of the bridge's hover before the policy takes over, s."""
 STRIKES_S = (0.4, 1.2)
-"""How long the policy has flown when a process is killed, s: at random within."""
+"""Range of the random time in the policy's flight at which a process is killed, s."""
 PILOT_S = 0.5
-"""What a pilot takes to see that nobody flies, s."""
+"""Time that a pilot needs to notice that nobody flies, s."""
 WATCHDOG_S = 15.0
-"""How long the watchdog of a bridge may take to end after the pilot has disarmed, s."""
+"""Longest time for the watchdog of a bridge to end after the pilot has disarmed, s."""
 LOOP_S = 0.033
-"""From a pose to the rate loop's setpoint without a radio, s: 25 to 40 ms were measured."""
+"""Time from a pose to the rate loop's setpoint without a radio, s. 25 to 40 ms were measured."""
 ENDED = ("HOVER:", "LAND:", "DONE:", "PILOT:", "INIT:", TAKEN)
-"""The bridge's word on another mode than the policy's, and on the watchdog."""
+"""Messages of the bridge that tell of a mode other than the policy's, or of the watchdog."""
 DOCUMENTED: dict[Victim, tuple[str, str]] = {
     "mocap": ("land", "no good odometry"),
     "hil": ("hover", "policy: image"),
     "watchdog": ("", "no link to the flight controller"),
 }
-"""The bridge's next mode after a kill, empty for any, and how its reason begins; a bridge that was killed says none."""
+"""The bridge's next mode after a kill (empty: any), and the beginning of its reason. A bridge that was killed gives
+none."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is rehearsed."""
+    """The settings of a rehearsal."""
 
     found: Candidate
     """The policy."""
     origin: Origin = Origin()
-    """Of the world, in the room."""
+    """Origin of the world in the room."""
     rate: float | None = None
-    """Images per second; None: the contract's."""
+    """Images per second. None: the rate of the contract."""
     pose_delay: float = DELAY_S
-    """How late the motion capture's poses come, s."""
+    """Delay of the motion capture's poses, s."""
     link_delay: float | None = None
-    """How late what the bridge sends reaches the vehicle, s; None: what the vehicle's latency has beyond `LOOP_S`."""
+    """Delay between the bridge and the vehicle, s. None: the part of the vehicle's latency that exceeds `LOOP_S`."""
     world: Sequence[str] = ()
-    """Options of `e2efly hil` that say which world: `--task.*`."""
+    """Options of `e2efly hil` that select the world: `--task.*`."""
     options: tuple[str, ...] = ()
-    """More of `e2efly fly`."""
+    """Further options of `e2efly fly`."""
     scene: SceneFile | None = None
-    """What is shown in place of the task's world."""
+    """The scene that is shown in place of the task's world."""
 
     @property
     def vehicle(self) -> Vehicle:
-        """What flies."""
+        """The vehicle that flies."""
         return load_vehicle(self.found.vehicle)
 
     @property
     def radio(self) -> float:
-        """How late what the bridge sends reaches the vehicle, s."""
+        """Delay between the bridge and the vehicle, s."""
         if self.link_delay is not None:
             return self.link_delay
         return max(self.found.policy.contract.latency_of(self.vehicle) - LOOP_S, 0.0)
 
     @property
     def period(self) -> float:
-        """Of the policy's control steps, s."""
+        """Period of the policy's control steps, s."""
         return 1 / self.found.policy.contract.control_rate_hz
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A world and what is flown in it."""
+    """A world and the flight in it."""
 
     scenery: Scenery
     route: Route
-    """As `e2efly fly` is told it."""
+    """The route as `e2efly fly` gets it."""
     course: Course
-    """As the bridge makes it of that."""
+    """The course that the bridge makes from the route."""
 
 
 def draw(plan: Plan, seed: int, track: Path) -> Drawn:
     """The world of a seed, as `e2efly hil` draws it, and the course in it.
 
     Args:
-        plan: what is rehearsed.
-        seed: of the world.
-        track: a .toml file that is written where the task's gates are drawn.
+        plan: the settings of the rehearsal.
+        seed: seed of the world.
+        track: path of a .toml file that is written if the task draws its gates.
 
     Raises:
-        ValueError: for a policy that sees nothing, for a scene in which the course cannot begin, and for a task whose
-            options cannot ask for the course drawn.
+        ValueError: for a policy without images, for a scene in which the course cannot begin, and for a task whose
+            options cannot describe the course that was drawn.
     """
     found, contract = plan.found, plan.found.policy.contract
     scenery = Scenery.draw(found.environment(next(iter(found.task.criteria().values()))), seed)
@@ -131,19 +132,19 @@ def draw(plan: Plan, seed: int, track: Path) -> Drawn:
 
 
 def rehearse(plan: Plan, seed: int, folder: Path, kill: Victim | None = None) -> Lap:
-    """One flight, from take-off to landing, in processes of its own.
+    """Fly one flight, from take-off to landing, in separate processes.
 
     Args:
-        plan: what is rehearsed.
-        seed: of the world, of the poses' noise, of where the vehicle stands and of the moment of a kill.
-        folder: of the flight's record; made.
+        plan: the settings of the rehearsal.
+        seed: seed of the world, of the poses' noise, of the place where the vehicle stands, and of the time of a kill.
+        folder: folder of the flight's record. It is made.
         kill: the process that is killed while the policy flies.
 
     Returns:
-        What came of it; a program that fails stands in its problems with its last words.
+        The results of the flight. If a program fails, its last words are in the problems.
 
     Raises:
-        ValueError: as `draw`; where the folder holds an earlier flight.
+        ValueError: as for `draw`; or if the folder contains an earlier flight.
     """
     if (folder / "flight.mcap").exists():
         raise ValueError(f"folder {folder} holds an earlier flight; accepted: another one")
@@ -161,7 +162,7 @@ def rehearse(plan: Plan, seed: int, folder: Path, kill: Victim | None = None) ->
 
 
 def unlike(lap: Lap) -> list[str]:
-    """What a flight's records have that is not as it is documented."""
+    """Everything in a flight's records that is not as documented."""
     found = []
     if lap.touch_sink > TOUCH:
         found.append(f"touched the ground sinking at {lap.touch_sink:.1f} m/s")
@@ -198,7 +199,7 @@ class _Flight:
         node += ["--origin", *(f"{x:.9g}" for x in plan.origin.position), "--origin-yaw", f"{plan.origin.yaw:.9g}"]
         node += [] if plan.rate is None else ["--rate", f"{plan.rate:g}"]
         flies = ["--vehicle", plan.found.vehicle]
-        # rendering takes one core and no more: the firmware and the bridge need the others
+        # rendering takes only one core, because the firmware and the bridge need the others
         policy = str(plan.found.file)
         world = [*plan.world, *([] if plan.scene is None else plan.scene.options)]
         self.node = Program("the HIL node", ["-m", "e2efly", "hil", policy, *node, *flies, *world], cores[-1])
@@ -216,7 +217,7 @@ class _Flight:
         stack.enter_context(self.flies)
 
     def _radio(self, stack: ExitStack) -> str:
-        """Start the radio; the address that the bridge connects to."""
+        """Start the radio. Returns the address to which the bridge connects."""
         to = ["--to", self.room.link.rpartition(":")[2], "--delay", f"{self.plan.radio:.6g}"]
         self.radio = Program("the radio", ["-m", "e2efly.validation.link_process", *to])
         stack.enter_context(self.radio)
@@ -226,17 +227,17 @@ class _Flight:
         return self.drawn.course.origin.points(self.drawn.course.start)
 
     def _stand(self) -> tuple[float, float, float]:
-        """Where the vehicle is put down: x, y, m, and heading, rad."""
+        """The place where the vehicle is put down: x, y, m, and heading, rad."""
         course, (x, y) = self.drawn.course, self._first()[:2] + self.random.uniform(-0.2, 0.2, 2)
         yaw = self.random.uniform(-0.05, 0.05) + course.origin.yaw + (course.heading or 0.0)
         return float(x), float(y), float(yaw)
 
     def _height(self) -> float:
-        """Of the hover before the policy, over where the vehicle stood, m."""
+        """Height of the hover before the policy, above the place where the vehicle stood, m."""
         return float(self._first()[2] - self.plan.vehicle.feet_height)
 
     def fly(self, kill: Victim | None) -> None:
-        """The pilot flies, and one process is killed where one is to be."""
+        """Let the pilot fly, and kill one process if one is to be killed."""
         room, flies, heard = self.room, self.flies, self.heard
         take_off(room, flies)
         time.sleep(SETTLE_S)
@@ -280,7 +281,7 @@ class _Flight:
             self._land()
 
     def _land(self) -> None:
-        """Hover for a moment, unless it lands already; then the pilot asks for the landing."""
+        """Hover for a moment, unless the vehicle already lands. Then the pilot requests the landing."""
         room, flies = self.room, self.flies
         if "HOVER:" in flies.said[-1] and not self.drawn.course.goal.lands:
             room.set(mission="hover")
@@ -321,7 +322,7 @@ def _child(process: int) -> int | None:
 
 
 def _gone(process: int, seconds: float) -> bool:
-    """Whether a process ends within so long; one that its parent has not asked for its status counts as ended."""
+    """Whether a process ends within `seconds`. A process whose parent has not read its exit status counts as ended."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         try:
@@ -335,7 +336,7 @@ def _gone(process: int, seconds: float) -> bool:
 
 
 def _forget(names: Sequence[str]) -> None:
-    """Take the rehearsal's images out of the machine's memory."""
+    """Remove the rehearsal's images from the machine's memory."""
     for name in names:
         file = place(name)
         for left in [file, *file.parent.glob(f"{file.name}.*")]:

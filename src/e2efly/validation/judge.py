@@ -17,41 +17,41 @@ from e2efly.validation.starts import Starts
 
 @dataclass(frozen=True)
 class Verdicts:
-    """How each of `n` flights went: the fields of `evaluate.Episodes` that a flight alone decides."""
+    """Results of `n` flights: the fields of `evaluate.Episodes` that follow from the flight alone."""
 
     success: np.ndarray
     """(n,) bool."""
     crashed: np.ndarray
-    """(n,) bool: ended for ill before time was out."""
+    """(n,) bool: ended by a failure before the time was over."""
     duration: np.ndarray
     """(n,) until success, failure or time-out, s."""
     final_error: np.ndarray
-    """(n,) the task's error at its end, m."""
+    """(n,) the task's error at the end, m."""
     mean_error: np.ndarray
     """(n,) mean error over the episode after `settle`, m."""
     top_speed: np.ndarray
-    """(n,) m/s."""
+    """(n,) largest speed, m/s."""
     mean_speed: np.ndarray
     """(n,) along the path, m/s."""
     top_rate: np.ndarray
     """(n,) largest body rate, rad/s."""
     roughness: np.ndarray
-    """(n,) mean length of the change of the action between two steps."""
+    """(n,) mean length of the change of the action from one step to the next."""
 
 
 def judge(env: Env, starts: Starts, flights: list[Trajectory], settle: float = 0.0) -> Verdicts:
-    """Let the task judge flights, step by step, as it judges its own episodes.
+    """Let the task judge flights step by step, as it judges its own episodes.
 
     A flight that stopped before its episode was over (a fault) has not succeeded.
 
     Args:
-        env: the environment, for the task, its period and the action that comes before the first.
-        starts: what the flights began from, in the same order.
-        flights: one a start.
+        env: the environment, with the task, its period and the action before the first step.
+        starts: the starts of the flights, in the same order.
+        flights: one flight per start.
         settle: seconds before the mean error counts.
 
     Raises:
-        ValueError: when there is not one flight a start, or one of another control period.
+        ValueError: when there is not one flight per start, or when a flight has another control period.
     """
     period = env.control_period
     if len(flights) != len(starts) or not flights:
@@ -62,7 +62,7 @@ def judge(env: Env, starts: Starts, flights: list[Trajectory], settle: float = 0
                 f"flights[{i}] has a control period of {flight.time[1]} s; accepted: the task's, {period} s"
             )
     flown = np.array([len(flight.action) for flight in flights])
-    steps = int(np.ceil(float(env.task.episode_s) / period - 1e-6))  # the longest episode: one program for all flights
+    steps = int(np.ceil(float(env.task.episode_s) / period - 1e-6))  # the longest episode: one program for all
     states = _states(flights, steps)
     outcome = jax.tree.map(np.asarray, _advance(env.task, starts.memory, states, period))
     step = np.arange(steps)[:, None]
@@ -90,7 +90,7 @@ def judge(env: Env, starts: Starts, flights: list[Trajectory], settle: float = 0
 
 
 def _states(flights: list[Trajectory], steps: int) -> State:
-    """The states of all flights, each leaf (steps + 1, n, ...); rotor speeds, which no task looks at, are zero."""
+    """The states of all flights, each leaf (steps + 1, n, ...). Rotor speeds are zero, because no task uses them."""
 
     def column(name: str) -> Array:
         return jnp.asarray(_stack([getattr(f, name) for f in flights], steps + 1), jnp.float32)
@@ -100,7 +100,7 @@ def _states(flights: list[Trajectory], steps: int) -> State:
 
 
 def _stack(rows: list[np.ndarray], length: int) -> np.ndarray:
-    """(length, n, ...) from n arrays: each cut, or filled up with its last row."""
+    """(length, n, ...) from n arrays. Each is cut, or extended by repetitions of its last row."""
     return np.stack([x[np.minimum(np.arange(length), len(x) - 1)] for x in rows], axis=1)
 
 

@@ -2,9 +2,9 @@
 
     python -m e2efly.validation.link_process --to PORT --delay S
 
-It prints one line of JSON, `{"link": "tcp:127.0.0.1:PORT"}`: where the bridge connects in place of the firmware. What
-comes from the bridge goes on to the firmware's port after the delay, in order; the firmware's answers pass at once. One
-connection at a time. The process ends with its standard input.
+It prints one line of JSON, `{"link": "tcp:127.0.0.1:PORT"}`. The bridge connects to this address in place of the
+firmware. Bytes from the bridge go to the firmware's port after the delay, in order. The firmware's answers pass at
+once. There is one connection at a time. The process ends when its standard input ends.
 """
 
 import argparse
@@ -19,25 +19,25 @@ from collections import deque
 from e2efly.process import be_punctual
 
 PRIORITY = 8
-"""Real-time priority: below the bridge's."""
+"""Real-time priority, below that of the bridge."""
 LOOK_S = 0.001
-"""Between two looks at what is due, s."""
+"""Interval between two checks for bytes that are due, s."""
 _LARGEST = 65536
 
 
 class Line:
-    """Bytes under way; `now` is any steady clock, s, the same in both methods."""
+    """Bytes in transit. `now` is any steady clock, s, the same in both methods."""
 
     def __init__(self, delay: float) -> None:
         self.delay = delay
         self._waiting: deque[tuple[float, bytes]] = deque()
 
     def send(self, data: bytes, now: float) -> None:
-        """Take in what is to arrive a delay later."""
+        """Accept bytes that are to arrive a delay later."""
         self._waiting.append((now + self.delay, data))
 
     def arrived(self, now: float) -> bytes:
-        """What has arrived by now and was not read yet, in order."""
+        """The bytes that have arrived by now and were not read yet, in order."""
         ready = []
         while self._waiting and self._waiting[0][0] <= now:
             ready.append(self._waiting.popleft()[1])
@@ -45,7 +45,7 @@ class Line:
 
 
 def serve(listener: socket.socket, port: int, delay: float) -> None:
-    """Carry connections to a port of the loopback interface until standard input ends."""
+    """Forward connections to a port of the loopback interface until standard input ends."""
     while True:
         readable, _, _ = select.select([listener, sys.stdin], [], [])
         if sys.stdin in readable and not os.read(sys.stdin.fileno(), 1):
@@ -61,7 +61,7 @@ def serve(listener: socket.socket, port: int, delay: float) -> None:
 
 
 def _carry(bridge: socket.socket, firmware: socket.socket, line: Line) -> bool:
-    """One connection, until either end closes it; False when standard input has ended."""
+    """Forward one connection until either end closes it. False if standard input has ended."""
     while True:
         readable, _, _ = select.select([bridge, firmware, sys.stdin], [], [], LOOK_S)
         if sys.stdin in readable and not os.read(sys.stdin.fileno(), 1):

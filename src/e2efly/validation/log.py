@@ -1,4 +1,4 @@
-"""What a flight on a plant leaves in a log: the streams that `e2efly identify` reads. Imports no JAX."""
+"""The log of a flight on a plant: the streams that `e2efly identify` reads. Imports no JAX."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,16 +12,16 @@ from e2efly.validation.plant import RigidState
 from e2efly.vehicles.vehicle import GRAVITY
 
 SAMPLE = 0.004
-"""Between two lines of a log, s: 250 Hz."""
+"""Time between two lines of a log, s: 250 Hz."""
 
 
 def motion_streams(time: np.ndarray, states: Sequence[RigidState], rotor_speed: np.ndarray) -> dict[str, Stream]:
     """Streams of a flight without errors.
 
     Args:
-        time: (n,) s, in equal steps or nearly so.
-        states: of these times.
-        rotor_speed: (n, 4) rad/s; NaN where the plant does not tell them, and then left out.
+        time: (n,) s, in equal or nearly equal steps.
+        states: the states at these times.
+        rotor_speed: (n, 4) rad/s. NaN if the plant does not give rotor speeds, which are then left out.
     """
     velocity, attitude = np.array([s.velocity for s in states]), np.array([s.quaternion for s in states])
     change = np.gradient(velocity, time, axis=0) + np.array([0.0, 0.0, GRAVITY])
@@ -38,12 +38,12 @@ def motion_streams(time: np.ndarray, states: Sequence[RigidState], rotor_speed: 
 
 
 def record_of(path: Path, flight: Trajectory, mode: str) -> Record:
-    """The log of a flight that kept its samples.
+    """The log of a flight that has kept its samples.
 
     Args:
-        path: of the file that it is for.
+        path: path of the log's file.
         flight: as `fly` returns it with `sample`.
-        mode: the command mode; the commands are in the log where it is ctbr, at the times of their sending.
+        mode: the command mode. For ctbr the log contains the commands, at the times when they were sent.
     """
     streams = motion_streams(
         np.array([s.time for s in flight.samples]),

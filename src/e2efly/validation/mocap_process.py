@@ -1,10 +1,11 @@
-"""A motion capture system that is not there, as a process of its own: exact poses in, measured ones out, over UDP.
+"""A simulated motion capture system, as a process of its own: exact poses in, measured poses out, over UDP.
 
     python -m e2efly.validation.mocap_process --to PORT [PORT ...] [--delay S] [--gaps HZ] [--seed N]
 
-It prints one line of JSON, `{"from": PORT}`: the port of the loopback interface that takes exact poses, as
-docs/pose-sources.md has them. Each goes on to every port of `--to`, later and with noise, without velocity and body
-rate: cameras see none. Now and then the markers are hidden for a moment. The process ends with its standard input.
+It prints one line of JSON, `{"from": PORT}`: the port of the loopback interface that accepts exact poses, in
+the form of docs/pose-sources.md. Each pose goes to every port of `--to`, later and with noise. It has no velocity and
+no body rate, because cameras do not measure them. Sometimes the markers are hidden for a moment. The process ends when
+its standard input ends.
 """
 
 import argparse
@@ -23,34 +24,34 @@ import numpy as np
 from e2efly.process import be_punctual
 
 DELAY_S = 0.004
-"""What cameras and network take, s."""
+"""Delay of cameras and network, s."""
 JITTER_S = 0.001
-"""By how much more it is at most, uniform, s."""
+"""Largest additional random delay, uniform, s."""
 GAPS_HZ = 0.2
-"""How often the markers are hidden, Hz."""
+"""Rate at which the markers are hidden, Hz."""
 GAP_S = 0.03
-"""For how long at most, uniform, s."""
+"""Longest time for which they are hidden, uniform, s."""
 POSITION, ATTITUDE = 0.0005, 0.001
 """Noise, m and rad: standard deviations per axis."""
 PRIORITY = 8
-"""Real-time priority: below the bridge's."""
+"""Real-time priority, below that of the bridge."""
 _LARGEST = 4096
 
 
 @dataclass(frozen=True)
 class Marks:
-    """What a motion capture system makes of the truth."""
+    """The errors of a motion capture system."""
 
     delay: float = DELAY_S
-    """s."""
+    """Delay of the poses, s."""
     gaps: float = GAPS_HZ
-    """Hz; 0: none."""
+    """Rate at which the markers are hidden, Hz. 0: never."""
     rate: float = 200.0
-    """Of the poses, Hz."""
+    """Rate of the poses, Hz."""
 
 
 def measured(pose: dict[str, Any], random: np.random.Generator) -> dict[str, Any]:
-    """A pose as it is measured: position (3,), m, and attitude (4,), wxyz, with noise; the stamp stays."""
+    """A measured pose: position (3,), m, and attitude (4,), wxyz, with noise. The stamp does not change."""
     quaternion = np.asarray(pose["quaternion"]) + ATTITUDE / 2 * random.normal(size=4)
     return {
         "position": (np.asarray(pose["position"]) + POSITION * random.normal(size=3)).tolist(),
@@ -61,7 +62,7 @@ def measured(pose: dict[str, Any], random: np.random.Generator) -> dict[str, Any
 
 @dataclass
 class Camera:
-    """Delays, blurs and hides poses; `now` is any steady clock, s, the same in both methods."""
+    """Delays poses, adds noise to them, and drops some. `now` is any steady clock, s, the same in both methods."""
 
     marks: Marks
     random: np.random.Generator
@@ -71,7 +72,7 @@ class Camera:
         self._hidden_until = -np.inf
 
     def see(self, pose: dict[str, Any], now: float) -> None:
-        """Take in an exact pose."""
+        """Accept an exact pose."""
         marks, random = self.marks, self.random
         if random.random() < marks.gaps / marks.rate:
             self._hidden_until = now + GAP_S * random.random()
@@ -80,7 +81,7 @@ class Camera:
             self._waiting.append((due, json.dumps(measured(pose, random)).encode()))
 
     def ready(self, now: float) -> list[bytes]:
-        """The poses whose time has come, in the order in which they were seen."""
+        """The poses that are due, in the order in which they were accepted."""
         ready = []
         while self._waiting and self._waiting[0][0] <= now:
             ready.append(self._waiting.popleft()[1])
@@ -88,7 +89,7 @@ class Camera:
 
 
 def serve(inlet: socket.socket, ports: list[int], camera: Camera) -> None:
-    """Pass poses on until standard input ends."""
+    """Forward poses until standard input ends."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         while True:
             readable, _, _ = select.select([inlet, sys.stdin], [], [], 0.001)
@@ -109,7 +110,7 @@ def main() -> None:
     parser.add_argument("--gaps", type=float, default=GAPS_HZ, help="how often the markers are hidden, Hz")
     parser.add_argument("--seed", type=int, default=0, help="of noise and gaps")
     options = parser.parse_args()
-    be_punctual(PRIORITY)  # it stands for a machine of its own
+    be_punctual(PRIORITY)  # it stands for a separate machine
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as inlet:
         inlet.bind(("127.0.0.1", 0))
         print(json.dumps({"from": inlet.getsockname()[1]}), flush=True)

@@ -1,7 +1,7 @@
-"""A world of the training's environment, looked at from any pose by the environment's own program. Imports JAX.
+"""A world of the training environment, rendered from any pose by the environment's own program. Imports JAX.
 
-The images are `Env.look`'s bit for bit, as they come of the same function, compiled as it stands. All that stays as it
-is between images stays on the device: an image costs one call, whatever the world has.
+The images are bit for bit those of `Env.look`, because they come from the same function, compiled as it is. Everything
+that does not change between images stays on the device. So an image costs one call, whatever the world contains.
 """
 
 import dataclasses
@@ -24,14 +24,14 @@ from e2efly.validation.plant import RigidState
 
 @dataclass(frozen=True)
 class Outlook:
-    """One world of an environment, and its cameras with images that are not late."""
+    """One world of an environment, and its cameras with images without latency."""
 
     env: Env
-    """Numbers on the device."""
+    """The environment, with its numbers on the device."""
     state: EnvState
-    """Of one vehicle; where it is matters to nobody."""
+    """The state of one vehicle. Its pose does not matter."""
     world: Scene | MeshScene | None = None
-    """What is seen in place of the task's world."""
+    """The world that is rendered in place of the task's world."""
 
     @staticmethod
     def of(env: Env, memory: Any, eyes: tuple[Eye, ...], seed: int) -> "Outlook":
@@ -40,8 +40,8 @@ class Outlook:
         Args:
             env: the training's environment.
             memory: the task's state at its start, leaves (1, ...).
-            eyes: how the cameras sit, leaves (1, ...).
-            seed: of the noise.
+            eyes: how the cameras are mounted, leaves (1, ...).
+            seed: seed of the noise.
         """
         shapes = jax.eval_shape(lambda key: env.reset(key, 1)[0], jax.random.key(0))
         blank = dataclasses.replace(shapes, key=None, memory=None, eyes=None)
@@ -55,20 +55,20 @@ class Outlook:
         return dataclasses.replace(self, world=jax.device_put(world))
 
     def images(self, state: RigidState, time: float, count: int, which: tuple[int, ...]) -> list[np.ndarray]:
-        """What cameras show at once.
+        """The cameras' images without latency.
 
         Args:
-            state: of the vehicle, in this world.
-            time: of the world, s.
-            count: of the images so far: the noise of each is another.
-            which: of the cameras.
+            state: state of the vehicle, in this world.
+            time: time of the world, s.
+            count: number of images so far. Each image has other noise.
+            which: numbers of the cameras.
 
         Returns:
-            Of each: (h, w), or (h, w, 3) of colours.
+            One image for each camera: (h, w), or (h, w, 3) for colours.
         """
         place, turn = (np.asarray(part, np.float32)[None] for part in (state.position, state.quaternion))
         vehicle, past = dataclasses.replace(self.state.vehicle, position=place, quaternion=turn), self.state.past
-        if past is not None:  # it has been there for long
+        if past is not None:  # it has been in this state for long
             vehicle = jax.tree.map(np.asarray, vehicle)
             past = jax.tree.map(lambda old, x: np.broadcast_to(x[:, None], old.shape), past, vehicle)
         world = np.full(1, time, np.float32)

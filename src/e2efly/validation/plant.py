@@ -1,6 +1,6 @@
-"""What flies: one small interface over every physics, and the delay of commands that all of them share.
+"""The plant: one small interface to every physics, and the delay of commands that all of them share.
 
-Imports no JAX and no simulator: a plant imports its own when it is made.
+Imports no JAX and no simulator: a plant imports its own simulator when it is made.
 """
 
 import math
@@ -18,16 +18,16 @@ from e2efly.vehicles import Vehicle, unknown
 from e2efly.vehicles.vehicle import quantities, terms
 
 BESIDE = frozenset({"wind", "rotor_share", "plain_mixer"})
-"""What a flight may meet beside another body."""
+"""Disturbances that a flight may have in addition to another body."""
 EVERYTHING = BESIDE | {f.name for f in (*quantities(), *terms())}
-"""All that can be changed without the flight controller's knowledge."""
+"""Everything that can be changed without the knowledge of the flight controller."""
 MOMENT = 1e-9
-"""Seconds below which two times are one: rounding of sums of periods."""
+"""Two times that differ by less than this are equal, s. The difference is rounding in sums of periods."""
 
 
 @dataclass(frozen=True)
 class RigidState:
-    """Where a vehicle is and how it moves; float64. World ENU, body FLU."""
+    """The pose and motion of a vehicle, float64. World ENU, body FLU."""
 
     position: np.ndarray
     """(3,) centre of mass, world, m."""
@@ -40,10 +40,10 @@ class RigidState:
 
     @staticmethod
     def of(state: object) -> "RigidState":
-        """The same fields of anything that has them, as float64 copies.
+        """The same fields of any object that has them, as float64 copies.
 
         Raises:
-            ValueError: naming the field, for a wrong shape, a number that is not finite or a quaternion that is not
+            ValueError: naming the field, for a wrong shape, a number that is not finite, or a quaternion that is not
                 unit.
         """
         fields = {name: np.array(getattr(state, name), np.float64) for name in _SHAPES}
@@ -55,13 +55,13 @@ class RigidState:
         return RigidState(**fields)
 
     def odometry(self, time: float) -> Odometry:
-        """What a perfect pose source says of it at `time`, s."""
+        """The odometry that a perfect pose source gives for this state at `time`, s."""
         return Odometry(time, self.position, self.velocity, self.quaternion, self.body_rate)
 
 
 @dataclass(frozen=True)
 class Known:
-    """What the controllers know of the vehicle."""
+    """What the controllers know of the vehicle's motion."""
 
     position: Vec3
     velocity: Vec3
@@ -73,55 +73,57 @@ _SHAPES = {"position": (3,), "velocity": (3,), "quaternion": (4,), "body_rate": 
 
 @dataclass(frozen=True)
 class Shutter:
-    """When a camera of a plant exposes. Image n = 0, 1, ... is exposed at n times `every` less `latency`, or at the
-    start, and is shown from n times `every` on.
+    """The times at which a camera of a plant exposes.
+
+    Image n = 0, 1, ... is shown from time n times `every`. It is exposed `latency` before that, or at the start if that
+    would be earlier.
     """
 
     every: float
-    """Time from an image to the next, s."""
+    """Time from one image to the next, s."""
     latency: float
     """Age of an image when it is first shown, s."""
 
     def exposed(self, n: int) -> float:
-        """When image `n` is, s since the start."""
+        """Exposure time of image `n`, s since the start."""
         return max(n * self.every - self.latency, 0.0)
 
     def newest(self, now: float) -> int:
-        """The image that is shown at `now`, s since the start."""
+        """Number of the image that is shown at `now`, s since the start."""
         return math.floor(now / self.every + 1e-6)
 
 
 class Plant(ABC):
-    """A vehicle with its flight controller, in some physics. Commands act at once: latency is the `Delay`'s.
+    """A vehicle with its flight controller, in some physics. Commands act at once: `Delay` adds the latency.
 
-    A plant extends this, is made by `Plant(vehicle, command_mode)`, and registers itself by `register`. The vehicle
-    that it is made for is the one that its flight controller believes in; `meet` gives it another body.
+    A plant extends this class, is made by `Plant(vehicle, command_mode)`, and registers itself by `register`. Its
+    flight controller is tuned to the vehicle with which the plant is made. `meet` gives it another body.
     """
 
     name: ClassVar[str] = ""
-    """By which it is registered; tables call it so."""
+    """The name under which it is registered, and which tables show."""
     needs: ClassVar[Mapping[str, str]] = {}
-    """Packages that it imports, and what to give to `pip install` for each."""
+    """Packages that it imports, and the argument of `pip install` for each."""
     parallel: ClassVar[bool] = True
-    """Whether several may run at once, each in a process of its own."""
+    """Whether several plants may run at once, each in a process of its own."""
     latency: ClassVar[float] = 0.0
-    """Seconds that the plant itself takes from command to rate loop; the `Delay` adds only the rest."""
+    """Time that the plant itself takes from command to rate loop, s. The `Delay` adds only the rest of the latency."""
     episodes: ClassVar[int] = 200
-    """Starts of each criterion that `validate` flies unless told."""
+    """Default number of starts per criterion in `validate`."""
     whole_flights: ClassVar[bool] = False
-    """Whether `e2efly validate` also flies whole flights through the real firmware."""
+    """Whether `e2efly validate` also flies whole flights, from take-off to landing, through the real firmware."""
     takes_address: ClassVar[bool] = False
-    """Whether another program simulates it, and `validate` finds that by NAME:ADDRESS."""
+    """Whether another program simulates it, which `validate` finds by NAME:ADDRESS."""
     alters: ClassVar[frozenset[str]] = frozenset()
-    """What `meet` and `disturb` can change without the flight controller's knowledge: fields of the vehicle, and
-    names of `BESIDE`."""
+    """What `meet` and `disturb` can change without the flight controller's knowledge: fields of the vehicle, and names
+    of `BESIDE`."""
 
     @classmethod
     def of(cls, vehicle: Vehicle, contract: Contract) -> Self:
-        """The plant for a vehicle, and for the policy of a contract.
+        """Make the plant for a vehicle, and for the policy of a contract.
 
         Raises:
-            ValueError: for what it cannot simulate.
+            ValueError: for anything that it cannot simulate.
             OSError: when it cannot be started.
         """
         return cls(vehicle, contract.action.mode)  # type: ignore[call-arg]
@@ -131,16 +133,16 @@ class Plant(ABC):
         """The plant that another program simulates at an address.
 
         Raises:
-            ValueError: for an address that it does not take.
+            ValueError: for an address that it does not accept.
         """
         raise ValueError(f"--plant is {cls.name}:{address}; accepted: {cls.name}, which takes no address")
 
     @classmethod
     def seeing(cls, cameras: Mapping[str, str]) -> type[Self]:
-        """The plant whose own cameras a policy sees by. It then has `expose` and `shown`.
+        """The plant whose own cameras provide images for a policy. It then has `expose` and `shown`.
 
         Args:
-            cameras: by an image of the contract, what stands behind `--image IMAGE=plant:`.
+            cameras: by an image of the contract, the text after `--image IMAGE=plant:`.
 
         Raises:
             ValueError: for a plant without cameras.
@@ -153,10 +155,10 @@ class Plant(ABC):
 
     @classmethod
     def differences(cls, vehicle: Vehicle, contract: Contract) -> list[str]:
-        """In what the plant's vehicle is not the one that it is made for, a sentence each; asked before the flights.
+        """Differences between the plant's vehicle and this vehicle, one sentence each. It is called before the flights.
 
         Raises:
-            ValueError: for what it cannot simulate.
+            ValueError: for anything that it cannot simulate.
             OSError: when it cannot be started.
         """
         return []
@@ -164,51 +166,52 @@ class Plant(ABC):
     @property
     @abstractmethod
     def state(self) -> RigidState:
-        """The vehicle now."""
+        """The state of the vehicle now."""
 
     @abstractmethod
     def reset(self, state: RigidState) -> None:
-        """Put the vehicle there, the rotors at hover speed."""
+        """Put the vehicle into a state, with the rotors at hover speed."""
 
     @abstractmethod
     def step(self, command: np.ndarray, dt: float) -> None:
         """Hold a command for `dt` s.
 
         Args:
-            command: (4,) in the units of the command mode that the plant was made for (`COMMAND_MODES`); for `ctbr`
+            command: (4,) in the units of the command mode with which the plant was made (`COMMAND_MODES`). For `ctbr`:
                 collective thrust over mass, m/s^2, and body rates, rad/s.
             dt: seconds, above zero.
         """
 
     def meet(self, body: Vehicle, plain_mixer: bool = False) -> None:
-        """Fly another body from the next `reset` on; the flight controller goes on believing in the plant's vehicle.
+        """Fly another body from the next `reset` on. The flight controller stays tuned to the plant's vehicle.
 
         Args:
-            body: differs from the plant's vehicle in fields that `alters` names. Its `rate_gain` is the rate loop's.
-            plain_mixer: the mixer clips each rotor by itself, instead of attitude before thrust.
+            body: a body that differs from the plant's vehicle in fields that `alters` names. Its `rate_gain` is that of
+                the rate loop.
+            plain_mixer: the mixer clips each rotor by itself, and does not give attitude priority over thrust.
 
         Raises:
-            NotImplementedError: where `alters` promises what this plant does not do.
+            NotImplementedError: if `alters` names something that this plant does not do.
         """
         raise NotImplementedError(f"plant {self.name!r} has no method meet")
 
     def disturb(self, wind: np.ndarray, rotor_share: np.ndarray) -> None:
-        """What holds until the next `disturb` or `reset`: at first still air and full thrust.
+        """Set the disturbance until the next `disturb` or `reset`. At first the air is still and the thrust is full.
 
         Args:
             wind: (3,) velocity of the air, world, m/s.
-            rotor_share: (4,) thrust of each rotor over that of the body's thrust map.
+            rotor_share: (4,) thrust of each rotor divided by the thrust from the body's thrust map.
 
         Raises:
-            NotImplementedError: where `alters` promises what this plant does not do.
+            NotImplementedError: if `alters` names something that this plant does not do.
         """
         raise NotImplementedError(f"plant {self.name!r} has no method disturb")
 
     def expose(self, shutters: Mapping[str, Shutter]) -> None:
-        """Take images in flight from the next `reset` on.
+        """Take images in flight, from the next `reset` on.
 
         Args:
-            shutters: of each image for which `seeing` names a camera.
+            shutters: the shutter of each image for which `seeing` names a camera.
 
         Raises:
             NotImplementedError: for a plant without cameras.
@@ -216,7 +219,7 @@ class Plant(ABC):
         raise NotImplementedError(f"plant {self.name!r} has no method expose")
 
     def shown(self, name: str, now: float) -> np.ndarray:
-        """The newest image that a policy sees at `now`, s since `reset`.
+        """The newest image that a policy has at `now`, s since `reset`.
 
         Raises:
             NotImplementedError: for a plant without cameras.
@@ -224,23 +227,23 @@ class Plant(ABC):
         raise NotImplementedError(f"plant {self.name!r} has no method shown")
 
     def close(self) -> None:  # noqa: B027
-        """Let go of what it holds (processes, sockets); it is not used again."""
+        """Release its resources (processes, sockets). It is not used again."""
 
 
 @dataclass(frozen=True)
 class Delay:
-    """Commands under way: each acts a latency after it was sent, until the next one does."""
+    """Commands in transit. Each command acts a latency after it was sent, until the next one acts."""
 
     latency: float
-    """Seconds from sending to acting."""
+    """Time from sending to acting, s."""
     acting: np.ndarray
-    """(4,) what acts now."""
+    """(4,) the command that acts now."""
     coming: tuple[tuple[float, np.ndarray], ...] = ()
-    """When each command on its way will act, s, in order, and the command."""
+    """The commands in transit, in order: when each will act, s, and the command."""
 
     @staticmethod
     def of(latency: float, acting: np.ndarray) -> "Delay":
-        """Nothing under way.
+        """A delay with no command in transit.
 
         Raises:
             ValueError: for a latency that is negative or not finite.
@@ -257,7 +260,7 @@ class Delay:
         """Let time pass from `now` to `end`, s.
 
         Returns:
-            The delay then, and what acts meanwhile: commands with the seconds for which each is held.
+            The delay at `end`, and the commands that act in between, each with the seconds for which it is held.
         """
         acting, coming, parts = self.acting, self.coming, []
         while coming and coming[0][0] < end - MOMENT:
@@ -274,7 +277,7 @@ def check_mode(mode: str, plant: str) -> None:
     """Refuse an unknown command mode.
 
     Raises:
-        ValueError: naming the plant, the mode and all there are.
+        ValueError: naming the plant, the mode and all modes.
     """
     if mode not in COMMAND_MODES:
         raise ValueError(f"plant {plant!r}: " + unknown("command mode", mode, COMMAND_MODES))

@@ -1,4 +1,7 @@
-"""What a flight on a plant meets beside its start: the body, the delay, the air from step to step. Imports no JAX."""
+"""Conditions of a flight on a plant in addition to its start: body, latency, and the air in each step.
+
+Imports no JAX.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -15,15 +18,15 @@ from e2efly.vehicles.vehicle import quantities, terms
 
 @dataclass(frozen=True)
 class Air:
-    """What changes in a flight from control step to control step: `t` of them, as many as the longest flight has."""
+    """Conditions that change from control step to control step, for `t` steps, as many as the longest flight has."""
 
     wind: np.ndarray
     """(t, 3) velocity of the air, world, m/s."""
     rotor_share: np.ndarray
-    """(t, 4) thrust of each rotor over that of the body's thrust map."""
+    """(t, 4) thrust of each rotor divided by the thrust from the body's thrust map."""
     error: np.ndarray
-    """(t, 12) of what the policy sees: position, m; velocity, m/s; half of a small turn about the body's axes, rad;
-    body rate, rad/s."""
+    """(t, 12) errors of the policy's state: position, m; velocity, m/s; half of a small rotation about the body axes,
+    rad; body rate, rad/s."""
 
     @property
     def disturbs(self) -> bool:
@@ -31,7 +34,7 @@ class Air:
         return bool(self.wind.any() or (self.rotor_share != 1).any())
 
     def seen(self, k: int, odometry: Odometry) -> Odometry:
-        """What the policy sees of a motion in step `k`."""
+        """The odometry that the policy gets in step `k`."""
         error = self.error[k]
         turn = Quat(1.0, *error[6:9]).normalized()
         return dataclasses.replace(
@@ -45,20 +48,20 @@ class Air:
 
 @dataclass(frozen=True)
 class Reality:
-    """What one flight meets."""
+    """The conditions of one flight."""
 
     body: Vehicle
-    """Which moves; the flight controller need not know it. Its `rate_gain` is that of the rate loop."""
+    """The body that moves. The flight controller need not know it. Its `rate_gain` is that of the rate loop."""
     latency: float
-    """Seconds from observation to command."""
+    """Time from observation to command, s."""
     plain_mixer: bool = False
-    """Whether the mixer clips each rotor by itself, instead of attitude before thrust."""
+    """Whether the mixer clips each rotor by itself, and does not give attitude priority over thrust."""
     air: Air | None = None
-    """None: still air, full thrust, and the truth to see."""
+    """None: still air, full thrust, and a state without errors."""
 
 
 def altered(body: Vehicle, believed: Vehicle) -> frozenset[str]:
-    """The fields in which a body is not what the flight controller takes it for."""
+    """The fields in which a body differs from the vehicle for which the flight controller is tuned."""
     return frozenset(
         f.name
         for f in (*quantities(), *terms())
@@ -67,10 +70,10 @@ def altered(body: Vehicle, believed: Vehicle) -> frozenset[str]:
 
 
 def check_realities(plant: type[Plant], believed: Vehicle, realities: Sequence[Reality]) -> None:
-    """Refuse what a plant cannot change without its flight controller's knowledge.
+    """Refuse changes that a plant cannot make without the knowledge of its flight controller.
 
     Raises:
-        ValueError: naming the plant, what it would have to change, and what is accepted.
+        ValueError: naming the plant, the required change, and what is accepted.
     """
     wanted = set().union(*(altered(reality.body, believed) for reality in realities))
     wanted |= {"plain_mixer"} if any(reality.plain_mixer for reality in realities) else set()

@@ -23,51 +23,54 @@ from e2efly.validation.session import Flown, Session, rehearsal_settings
 from e2efly.vehicles.vehicle import Vehicle
 
 PARKED = 0.3
-"""The vehicle stands within this of where the policy's course begins, m per axis."""
+"""Largest distance of the parked vehicle from the start of the policy's course, m per axis."""
 ASKEW = 0.05
-"""How far a race's heading at the start is off, rad."""
+"""Largest error of the heading at the start of a race, rad."""
 REACH_IN_SIGHT = 100.0
-"""Of the fence about the origin, for the long worlds of policies that see, m."""
+"""Size of the fence about the origin, m, for the long worlds of policies that see."""
 LAST_S = 0.25
-"""What counts as the end of a policy's flight, s: the poses tell of a touch so much later."""
+"""Last part of a policy's flight that is used for its final speed, s. The poses show a touch this much later."""
 LINK_S = 0.01
-"""What link and firmware take from a pose to the rate loop's setpoint on the rig, s; the poses are late by the rest."""
+"""Time that link and firmware on the rig take from a pose to the rate loop's setpoint, s. The delay of the poses is the
+rest of the latency."""
 
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """A whole flight."""
+    """The result of a whole flight."""
 
     modes: tuple[str, ...]
     """The modes in order."""
     reasons: tuple[str, ...]
-    """Why each began."""
+    """The reason for each mode."""
     complete: bool
-    """Took off, hovered, gave the policy its whole time, landed and was disarmed, without anybody's help."""
+    """Whether it took off, hovered, gave the policy its whole time, landed and was disarmed, without intervention."""
     hover_error: float
-    """Mean distance of the hover before the policy to its target, m."""
+    """Mean distance to the target in the hover before the policy, m."""
     done: bool
-    """The policy did its task, or was still at it when its time was over."""
+    """Whether the policy completed its task, or was still flying it when its time was over."""
     success: bool
-    """The task's verdict at the end of the policy's flight: for a task without an end, that of an episode so long."""
+    """The task's verdict at the end of the policy's flight. For a task without an end, the verdict on an episode of
+    this length."""
     mean_error: float
-    """The task's error over the second half of the policy's flight, m; NaN."""
+    """The task's error over the second half of the policy's flight, m, or NaN."""
     final_error: float
-    """The task's error at its end, m; NaN."""
+    """The task's error at the end of the policy's flight, m, or NaN."""
     final_speed: float
-    """Largest true speed over its last `LAST_S`, m/s; of a landing, that of the touch; NaN."""
+    """Largest true speed over the last `LAST_S` of the policy's flight, m/s. For a landing: the speed of the touch. Or
+    NaN."""
     top_speed: float
-    """Of the policy, m/s."""
+    """Largest speed of the policy, m/s."""
     arrivals: tuple[float, ...]
-    """When it reached a goal, such as a gate, s from its start."""
+    """Times at which it reached a goal, such as a gate, s from its start."""
     told: str
-    """How the policy did, in words."""
+    """How the policy did, as text."""
     flown: Flown
-    """The flight."""
+    """The record of the flight."""
 
 
 def whole_course(policy: Acting, vehicle: Vehicle) -> Course:
-    """What a policy flies in a rehearsal."""
+    """The course of a policy in a rehearsal."""
     kind = route_of(policy.contract)
     return course_for(policy.contract, vehicle, kind(**kind.whole))
 
@@ -84,18 +87,18 @@ def rehearse(
     scenery: Scenery | None = None,
     wrap: Callable[[ImageSource], ImageSource] = lambda camera: camera,
 ) -> Rehearsal:
-    """One whole flight.
+    """Fly one whole flight.
 
     Args:
         firmware: the built firmware.
         policy: as loaded.
-        vehicle: of the world and of the bridge.
-        course: where it flies; left out: where the training was.
-        seed: of where it stands and of the poses' noise.
+        vehicle: the vehicle of the world and of the bridge.
+        course: where it flies. If left out: where the training was.
+        seed: seed of the place where the vehicle stands and of the poses' noise.
         log: keeps the flight's record.
-        folder: of the firmware's files; left out: a temporary one.
-        scenery: the world that a policy sees; None: it sees nothing.
-        wrap: what to put between each camera and the bridge.
+        folder: folder of the firmware's files. If left out: a temporary one.
+        scenery: the world that a policy sees. None: the policy sees nothing.
+        wrap: a wrapper around each camera, between the camera and the bridge.
     """
     course = whole_course(policy, vehicle) if course is None else course
     course = course if scenery is None else scenery.on(course)
@@ -108,7 +111,7 @@ def rehearse(
 
 
 def _unhurt(flight: Rehearsal, scenery: Scenery, course: Course, radius: float) -> Rehearsal:
-    """The flight, which has no success where it came too near to what stands in its world."""
+    """The flight, without success if it came too near to the obstacles of its world."""
     flown = flight.flown
     where = flown.where(Mode.POLICY)
     near = scenery.nearest([flown.position[i] for i in where], [flown.time[i] for i in where], course.origin)
@@ -188,7 +191,7 @@ def _report(
 
 
 def _success(course: Course, ended: RuntimeState) -> bool:
-    """The verdict at the end; a task without an end is asked as if its time were out now."""
+    """The verdict at the end. For a task without an end, the verdict as if its time were over now."""
     if ended.outcome is None or ended.outcome.terminated[0]:
         return ended.outcome is not None and bool(ended.outcome.success[0])
     now, body = np.array([ended.judged]), ended.odometry.batch
@@ -197,7 +200,7 @@ def _success(course: Course, ended: RuntimeState) -> bool:
 
 
 def _heading(course: Course, random: np.random.Generator) -> float:
-    """In which the vehicle is put down, rad: any, unless the course has one."""
+    """Heading in which the vehicle is put down, rad: random, unless the course has one."""
     if course.heading is None:
         return random.uniform(-np.pi, np.pi)
     return course.heading + course.origin.yaw + random.uniform(-ASKEW, ASKEW)

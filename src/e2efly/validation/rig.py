@@ -1,6 +1,6 @@
 """The firmware on a test rig: its world, a pilot with a transmitter, and a pose source.
 
-With virtual time the rig is a clock: sleeping on it lets world and firmware run.
+With virtual time the rig is a clock: sleeping on it lets the world and the firmware run.
 """
 
 import dataclasses
@@ -24,49 +24,49 @@ from e2efly.validation.world import Body, World
 from e2efly.vehicles.vehicle import Vehicle
 
 STEP_S = 0.002
-"""How often the firmware's sensors are told a new state, s."""
+"""Interval at which the firmware's sensors get a new state, s."""
 LONGEST_LAG_S = 0.2
-"""In real time, the longest by which a busy machine may hold up world and firmware and that they make up for, s."""
+"""In real time: the longest delay of world and firmware on a busy machine that is made up for, s."""
 RC_PERIOD_S = 0.02
-"""How often the pilot's receiver speaks, s."""
+"""Interval between frames of the pilot's receiver, s."""
 CALIBRATION_S = 6.0
-"""The firmware stands still for so long before it can be armed, s."""
+"""Time for which the firmware stands still before it can be armed, s."""
 POSE_NOISE = (0.0005, 0.01, 0.02, 0.001)
-"""Of position, m; velocity, m/s; body rate, rad/s; attitude, rad: a motion capture system's, standard deviations."""
+"""Standard deviations of a motion capture system: position, m; velocity, m/s; body rate, rad/s; attitude, rad."""
 VIBRATION = 0.3
-"""Of the force that the accelerometer feels while the rotors turn, before the firmware's own filter, m/s^2: a standard
-deviation as of a small quadrotor with good propellers."""
+"""Standard deviation of the accelerometer's force while the rotors turn, before the firmware's own filter, m/s^2. The
+value is that of a small quadrotor with good propellers."""
 BLACKBOX = (
     "set blackbox_device=VIRTUAL",
     "set blackbox_sample_rate=1/8",
     "set blackbox_high_resolution=ON",
 )
-"""Settings with which the firmware writes its blackbox, a thousand frames a second, into its folder."""
+"""Settings with which the firmware writes its blackbox into its folder, with a thousand frames per second."""
 LOST_CHANNEL = 13
-"""AUX9: the receiver's own, by which firmware that does not hear its silence is told of it."""
+"""AUX9, a channel of the receiver itself. It tells of a lost signal to firmware that does not detect it."""
 LANDING_S = 10
-"""After so long a failsafe landing stops the motors, s."""
+"""Time after which a failsafe landing stops the motors, s."""
 SETTINGS = (
     "aux 0 0 0 1700 2100 0 0",  # arm: AUX1
     "aux 1 50 1 1700 2100 0 0",  # MSP override: AUX2
-    "aux 2 1 2 925 2100 0 0",  # angle: AUX3, wherever the pilot leaves it; the bridge sends 900 there
+    "aux 2 1 2 925 2100 0 0",  # angle: AUX3, at any position of the pilot's switch; the bridge sends 900 there
     "set msp_override_channels_mask=79",
-    "rxfail 3 s 1575",  # without the receiver: a throttle that just sinks ...
+    "rxfail 3 s 1575",  # without the receiver: a throttle that sinks slowly ...
     "rxfail 6 s 2000",  # ... and angle
-    "aux 3 27 8 1700 2100 0 0",  # FAILSAFE: AUX9, where the firmware takes silence for the last frame
+    "aux 3 27 8 1700 2100 0 0",  # FAILSAFE: AUX9, for firmware that takes a lost signal for the last frame
     "set failsafe_procedure=AUTO-LAND",
     "set failsafe_throttle=1575",
     "set failsafe_delay=5",
-    "set max_aux_channels=14",  # or the copies of throttle and yaw on channels 11 and 12 are not read
+    "set max_aux_channels=14",  # otherwise the copies of throttle and yaw on channels 11 and 12 are not read
     "set rates_type=ACTUAL",
     *(f"set {axis}_rc_rate=67" for axis in ("roll", "pitch", "yaw")),
     *(f"set {axis}_srate=67" for axis in ("roll", "pitch", "yaw")),
     *(f"set {axis}_expo=0" for axis in ("roll", "pitch", "yaw")),
     "set rc_smoothing=OFF",
     "set feedforward_transition=0",
-    *(f"set f_{axis}=0" for axis in ("roll", "pitch", "yaw")),  # noise of the setpoint is not to be amplified
+    *(f"set f_{axis}=0" for axis in ("roll", "pitch", "yaw")),  # noise of the setpoint must not be amplified
     *(f"set p_{axis}={p}" for axis, p in (("roll", 40), ("pitch", 42), ("yaw", 120))),  # tuned: 63 % of a step in
-    *(f"set i_{axis}={i}" for axis, i in (("roll", 40), ("pitch", 40), ("yaw", 20))),  # 45 ms, a fifth too far
+    *(f"set i_{axis}={i}" for axis, i in (("roll", 40), ("pitch", 40), ("yaw", 20))),  # 45 ms, with 20 % overshoot
     *(f"set d_{axis}={d}" for axis, d in (("roll", 50), ("pitch", 55), ("yaw", 100))),
     "set iterm_relax=RPY",
     "set small_angle=180",
@@ -75,12 +75,12 @@ SETTINGS = (
     "set deadband=0",
     "set yaw_deadband=0",
 )
-"""What the firmware is set to, as lines of its own command line: what docs/hardware asks of a real controller."""
+"""Settings of the firmware, as lines of its own command line. docs/hardware requires the same of a real controller."""
 
 
 @dataclass(frozen=True)
 class Transmitter:
-    """The pilot's hands. Sticks -1 to 1."""
+    """The pilot's sticks and switches. Sticks range from -1 to 1."""
 
     armed: bool = False
     override: bool = False
@@ -89,7 +89,8 @@ class Transmitter:
     roll: float = 0.0
     pitch: float = 0.0
     throttle: float = -1.0
-    """What the controller gets without override: it rests in the middle in flight. Its copy to the bridge is `lift`."""
+    """Throttle of the controller without override. In flight it rests in the middle. Its copy for the bridge is
+    `lift`."""
     yaw: float = 0.0
     lift: float = 0.0
     """The copy of the throttle stick."""
@@ -106,9 +107,9 @@ class Transmitter:
 class Rig:
     """One firmware in its world. Use it as a context manager: inside, the thread and the firmware share one core.
 
-    Time is virtual; with `real_time` it keeps pace with the machine's clock, as for a bridge in another process. `step`
-    is how often sensors are told and motors heard, s, a whole number of ms; `settings` are added to `SETTINGS`;
-    `pose_noise` is in place of `POSE_NOISE`.
+    Time is virtual. With `real_time` it follows the machine's clock, as for a bridge in another process. `step` is the
+    interval at which sensors are updated and motors are read, s, a whole number of ms. `settings` are added to
+    `SETTINGS`. `pose_noise` replaces `POSE_NOISE`.
     """
 
     def __init__(
@@ -129,7 +130,7 @@ class Rig:
         self._step, self._settings = step, (*SETTINGS, *settings)
         self.sitl = Sitl(firmware, folder)
         self.thrust_shares = np.ones(4)
-        """Thrust of each rotor over that of the vehicle's thrust map."""
+        """Thrust of each rotor divided by the thrust from the vehicle's thrust map."""
         self.carry(vehicle)
         self.state: Body = self.world.at_rest()
         self.transmitter = Transmitter()
@@ -137,13 +138,13 @@ class Rig:
         """Age of the poses when they are delivered, s."""
         self.wind = np.zeros(3)
         self.held = False
-        """The body is held where it is; the rotors turn nothing."""
+        """Whether the body is held in place, so that the rotors do not move it."""
         self.shares = np.ones(4)
-        """Share of each motor's output that its rotor follows: below 1 for a flat battery or a weak motor."""
+        """Share of each motor's output that its rotor follows. It is below 1 for a flat battery or a weak motor."""
         self.felt: Callable[[FirmwareState], FirmwareState] | None = None
-        """What the firmware's sensors make of the truth; None: the truth."""
+        """Function from the true state to the readings of the firmware's sensors. None: the sensors are exact."""
         self.heard = True
-        """Whether the pilot's receiver hears the transmitter."""
+        """Whether the pilot's receiver receives the transmitter."""
         self._pose_period, self._pose_noise = 1 / pose_rate, pose_noise
         self._poses: deque[Sample] = deque()
         self._next_pose = self._next_rc = 0.0
@@ -155,9 +156,9 @@ class Rig:
         self._open = ExitStack()
 
     def carry(self, vehicle: Vehicle) -> None:
-        """Put a vehicle under the firmware; its state stays."""
+        """Put a vehicle under the firmware. The state stays the same."""
         self.world = World(vehicle)
-        self.world.advance(self.world.at_rest(), np.ones(4), STEP_S)  # compiled while it has all cores
+        self.world.advance(self.world.at_rest(), np.ones(4), STEP_S)  # compile while it has all cores
 
     def __enter__(self) -> "Rig":
         self.start()
@@ -167,7 +168,7 @@ class Rig:
         self.close()
 
     def start(self) -> None:
-        """Start the firmware with `SETTINGS` and wait until it can be armed; `close`, in the same thread, ends it."""
+        """Start the firmware with `SETTINGS` and wait until it can be armed. `close`, in the same thread, ends it."""
         with ExitStack() as opened:
             opened.callback(self.sitl.close)
             opened.enter_context(one_core())
@@ -183,16 +184,16 @@ class Rig:
         prepare(self.sitl, self._settings)
         self.sitl.start()
         self._next_pose = self._next_rc = self.now()
-        self._run(CALIBRATION_S)  # nobody is there yet for whom it would have to be in real time
+        self._run(CALIBRATION_S)  # nobody needs this part in real time
         self._poses.clear()
         self._epoch = time.monotonic() - self.now()
 
     def now(self) -> float:
-        """Seconds of the firmware's time."""
+        """The firmware's time, s."""
         return self.sitl.now
 
     def machine_time(self, moment: float) -> float:
-        """When a moment of the firmware's time, s, was on the machine's monotonic clock; with `real_time` only."""
+        """Convert the firmware's time, s, to the machine's monotonic clock. Only with `real_time`."""
         return self._epoch + moment
 
     def sleep(self, seconds: float) -> None:
@@ -208,7 +209,7 @@ class Rig:
             self._run(seconds)
 
     def _run(self, seconds: float) -> None:
-        """Steps for so long, as fast as they go."""
+        """Run steps for `seconds`, as fast as possible."""
         self.sitl.exchange()
         self._left += seconds
         while self._left > self._step / 2:
@@ -217,7 +218,7 @@ class Rig:
         self.sitl.exchange()
 
     def step(self, dt: float) -> None:
-        """One step of the world and of the firmware."""
+        """Run one step of the world and of the firmware."""
         motors = self.sitl.motors() if self._on else np.zeros(4)
         after = self.state if self.held else self._moved(motors, dt)
         if self._on:
@@ -243,7 +244,7 @@ class Rig:
         return dataclasses.replace(sensed, specific_force=sensed.specific_force + noise)
 
     def _receive(self) -> None:
-        """A frame of the pilot's receiver; one that hears nothing sends none, or the switch that stands for it."""
+        """Send a frame of the pilot's receiver. Without a signal it sends none, or the switch that reports the loss."""
         channels = self.transmitter.channels()
         if not self.heard:
             if self.sitl.firmware.layout.hears_silence:
@@ -252,7 +253,7 @@ class Rig:
         self.sitl.send_rc(channels)
 
     def poses(self, now: float) -> list[Sample]:
-        """The poses that have come since the last call, `latency` s old."""
+        """The poses that have arrived since the last call, `latency` s old."""
         ready = []
         while self._poses and self._poses[0].received + self.latency <= now:
             sample = self._poses.popleft()
@@ -264,7 +265,7 @@ class Rig:
         self.transmitter = dataclasses.replace(self.transmitter, **changes)  # type: ignore[arg-type]
 
     def power(self, on: bool) -> None:
-        """Cut the controller's power, at which the motors stop, or give it back, at which it boots."""
+        """Cut the controller's power, which stops the motors, or restore it, which boots the controller."""
         if on and not self._on:
             self.sitl.start()
             self._epoch = time.monotonic() - self.now()
@@ -283,7 +284,10 @@ class Rig:
 
 
 def prepare(sitl: Sitl, settings: tuple[str, ...] = SETTINGS) -> None:
-    """Put settings into the folder of a firmware that is not running; they are kept, as typing them takes a while."""
+    """Put settings into the folder of a firmware that is not running.
+
+    They are cached, because typing them takes a while.
+    """
     firmware = sitl.firmware
     stops, steps = firmware.release.landing_time
     settings = (*settings, f"set {stops}={LANDING_S * steps}", *firmware.layout.settings)
@@ -305,10 +309,10 @@ def prepare(sitl: Sitl, settings: tuple[str, ...] = SETTINGS) -> None:
 
 
 def _type(sitl: Sitl, settings: tuple[str, ...]) -> None:
-    """Type lines into the firmware's command line, then `save`, at which it ends.
+    """Type lines into the firmware's command line, then `save`, which ends the firmware.
 
     Raises:
-        ValueError: when it refuses a line, with its words.
+        ValueError: when it refuses a line, with its message.
     """
     sitl.idle(1.0)
     with socket.create_connection(("127.0.0.1", sitl.base + 4), timeout=5.0) as line:

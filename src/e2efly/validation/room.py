@@ -1,4 +1,4 @@
-"""Programs that fly together in real time, each a process: a room with a vehicle, a bridge, and the pilot's hands."""
+"""Programs that fly together in real time, each a process: a room with a vehicle, a bridge, and a pilot."""
 
 import dataclasses
 import json
@@ -18,22 +18,22 @@ from pathlib import Path
 from typing import Any, Literal
 
 START_S = 60.0
-"""How long a process may take to be ready on a busy machine, s."""
+"""Longest time for a process to be ready on a busy machine, s."""
 FLIGHT_S = 40.0
-"""How long each part of a flight may take on a busy machine, s."""
+"""Longest time for each part of a flight on a busy machine, s."""
 LAST_LINES = 6
-"""So many different ones are told of a program that fails: those that differ in numbers alone are one."""
+"""Number of different lines that are shown of a program that fails. Lines that differ only in numbers count as one."""
 _TIME = re.compile(r"^ *[0-9.]+ +")
 _NUMBER = re.compile(r"-?[0-9]+[.]?[0-9]*")
 URGENT = -15
 """Niceness of an urgent program."""
 TAKEN = "the watchdog has taken over"
-"""The bridge's word on that."""
+"""The bridge's message that the watchdog has taken over."""
 SINK = 0.5
-"""Speed at which a pilot without a bridge comes down, m/s."""
+"""Speed at which a pilot without a bridge descends, m/s."""
 _LIFT, _CLIMB_GAIN, _LIFT_GAIN, _BRAKE = 0.1, 0.25, 0.2, 0.12
-"""Of his throttle stick: where it is at first; per m/s; per metre, by which he finds where the vehicle hovers; of the
-others per m/s."""
+"""The pilot's throttle stick: its first position; its gain per m/s; its gain per metre, which finds the hover position.
+For the other sticks: the gain per m/s."""
 
 
 Victim = Literal["mocap", "hil", "bridge", "watchdog"]
@@ -41,19 +41,19 @@ Victim = Literal["mocap", "hil", "bridge", "watchdog"]
 
 
 def free_port() -> int:
-    """A UDP port of the loopback interface that nobody listens to now."""
+    """A free UDP port of the loopback interface."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
 
 
 def flags(prefix: str, options: Any, default: Any = None) -> list[str]:
-    """A configuration as options of a command: those fields that are not the default's.
+    """A configuration as options of a command: the fields that differ from the default.
 
     Args:
-        prefix: of their names, such as `goal`.
+        prefix: beginning of the options' names, such as `goal`.
         options: a frozen dataclass of numbers, texts, flags, tuples of them, and such dataclasses.
-        default: another one; None: that of the class.
+        default: the configuration to compare with. None: the defaults of the class.
     """
     default, found = type(options)() if default is None else default, list[str]()
     for field in dataclasses.fields(options):
@@ -75,16 +75,19 @@ def _text(value: Any) -> str:
 
 
 class Program:
-    """A program as a process, and what it says. Use it as a context manager: it is killed at the end, if it runs on."""
+    """A program as a process, with its output.
+
+    Use it as a context manager: a program that still runs at the end is killed.
+    """
 
     def __init__(self, name: str, command: Sequence[str], core: int | None = None, *, urgent: bool = False) -> None:
-        """Start it.
+        """Start the program.
 
         Args:
-            name: for errors.
-            command: what follows `python`.
-            core: the only one that it may use; None: any.
-            urgent: whether it goes before usual programs, where that is allowed, with all its threads.
+            name: name for error texts.
+            command: the arguments after `python`.
+            core: the only core that it may use. None: any core.
+            urgent: whether it has priority over ordinary programs, where this is allowed, with all its threads.
         """
         self.name = name
         self.process = subprocess.Popen(
@@ -92,15 +95,15 @@ class Program:
             text=True, errors="replace", env={**os.environ, "COLUMNS": "400", "PYTHONUNBUFFERED": "1"},
         )  # fmt: skip
         if core is not None and hasattr(os, "sched_setaffinity"):
-            with suppress(OSError):  # it has ended already, which is found out soon
+            with suppress(OSError):  # it has already ended, which is noticed soon
                 os.sched_setaffinity(self.process.pid, {core})
         if urgent:
             with suppress(OSError):
                 os.setpriority(os.PRIO_PROCESS, self.process.pid, URGENT)
         self.said: list[str] = []
-        """The lines that were listened to."""
+        """The lines that were read by `heard`."""
         self.told: list[tuple[float, str]] = []
-        """All lines, and when each came, s on the monotonic clock."""
+        """All lines, each with its time on the monotonic clock, s."""
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -112,7 +115,7 @@ class Program:
         self.close()
 
     def heard(self, text: str | tuple[str, ...], seconds: float) -> bool:
-        """Whether it says something, from now on, within so long; of several texts, one of them."""
+        """Whether it prints a text within `seconds` from now. Of several texts, one is enough."""
         texts = (text,) if isinstance(text, str) else text
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
@@ -129,24 +132,24 @@ class Program:
         return False
 
     def wait_for(self, text: str | tuple[str, ...], seconds: float) -> str:
-        """Wait until it says something; the line.
+        """Wait until it prints a text. Returns the line.
 
         Raises:
-            RuntimeError: when it does not, with its last words.
+            RuntimeError: when it does not, with its last lines.
         """
         if not self.heard(text, seconds):
             raise RuntimeError(f"{self.name} did not come to {text!r}{self.end_told()}")
         return self.said[-1]
 
     def end_told(self) -> str:
-        """How it has ended, if it has, and its last words."""
+        """How it has ended, if it has ended, and its last lines."""
         status = self.process.poll()
         ended = "" if status is None else f" and ended with status {status}"
         lines = {_NUMBER.sub("", line): line for line in (_TIME.sub("", line) for _, line in self.told)}
         return f"{ended}; it said: {list(lines.values())[-LAST_LINES:]}"
 
     def end(self, seconds: float, by: int = signal.SIGINT) -> int | None:
-        """Ask it to end, as Ctrl-C does; its exit status, or None where it had to be killed."""
+        """Ask it to end, as Ctrl-C does. Returns its exit status, or None if it had to be killed."""
         self.process.send_signal(by)
         try:
             return self.process.wait(seconds)
@@ -156,7 +159,10 @@ class Program:
             self.close()
 
     def leave(self, seconds: float = 10.0) -> int | None:
-        """Close its standard input, at which the programs of a room end; its exit status, or None as with `end`."""
+        """Close its standard input, which ends the programs of a room.
+
+        Returns its exit status, or None as for `end`.
+        """
         assert self.process.stdin is not None
         with suppress(OSError):
             self.process.stdin.close()
@@ -168,7 +174,7 @@ class Program:
             self.close()
 
     def close(self) -> None:
-        """Kill it, where it still runs, and read the last it has said."""
+        """Kill it if it still runs, and read its last output."""
         self.process.kill()
         self.process.wait()
         self._reader.join(1.0)
@@ -190,7 +196,7 @@ class Program:
 
 
 class Room:
-    """A room with a vehicle and its firmware, and the pilot's hands on it. Use it as a context manager."""
+    """A room with a vehicle and its firmware, and a pilot for it. Use it as a context manager."""
 
     def __init__(
         self, vehicle: str = "vis_r", seed: int = 0, options: Sequence[str] = (), core: int | None = None,
@@ -200,22 +206,22 @@ class Room:
 
         Args:
             vehicle: a name or a .toml file.
-            seed: of the poses' noise.
-            options: more of `room_process`.
-            core: the only one that it and the firmware may use; None: one of any.
-            pose_port: UDP port that is to take its poses; None: a free one.
+            seed: seed of the poses' noise.
+            options: further options of `room_process`.
+            core: the only core that the room and the firmware may use. None: any one core.
+            pose_port: UDP port to which it sends poses. None: a free one.
 
         Raises:
-            RuntimeError: when it does not start, with its last words.
+            RuntimeError: when it does not start, with its last lines.
         """
         self.pose_port = free_port() if pose_port is None else pose_port
-        """Where its poses go."""
+        """Port to which its poses go."""
         command = ["-m", "e2efly.validation.room_process", "--pose-port", str(self.pose_port)]
         self.program = Program("the room", [*command, "--vehicle", vehicle, "--seed", str(seed), *options], core)
         try:
             told = json.loads(self.program.wait_for('"link"', START_S))
             self.link: str = told["link"]
-            """The firmware's."""
+            """Address of the firmware."""
             self._control = socket.create_connection(("127.0.0.1", told["control"]), timeout=30.0)
         except BaseException:
             self.program.close()
@@ -231,10 +237,12 @@ class Room:
         self.program.leave()
 
     def set(self, **changes: object) -> dict[str, Any]:
-        """Move the pilot's sticks and switches, fields of `rig.Transmitter`; the fields of `room_process.State`.
+        """Move the pilot's sticks and switches.
+
+        They are fields of `rig.Transmitter`. Returns the fields of `room_process.State`.
 
         Raises:
-            RuntimeError: when the room has ended, with its last words.
+            RuntimeError: when the room has ended, with its last lines.
         """
         try:
             self._control.sendall(json.dumps(changes).encode() + b"\n")
@@ -243,7 +251,7 @@ class Room:
             raise RuntimeError(f"the room does not answer{self.program.end_told()}") from None
 
     def until(self, seconds: float, good: Callable[[dict[str, Any]], bool]) -> bool:
-        """Whether the true state becomes so within so long."""
+        """Whether the true state satisfies a condition within `seconds`."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             if good(self.set()):
@@ -252,11 +260,11 @@ class Room:
         return False
 
     def down(self, seconds: float) -> bool:
-        """Whether it comes to stand, its throttle closed, within so long."""
+        """Whether the vehicle comes to stand, with its throttle closed, within `seconds`."""
         return self.until(seconds, lambda state: state["standing"] and max(state["motors"]) < 0.12)
 
     def land_by_hand(self, seconds: float) -> bool:
-        """Take the vehicle over and land it, as a pilot who looks at it; whether it stands within so long."""
+        """Take over the vehicle and land it like a pilot who sees it. Returns whether it stands within `seconds`."""
         last, lift = time.monotonic(), _LIFT
         end = last + seconds
         self.set(override=False, mission="land")
@@ -294,13 +302,13 @@ def bridge(
     """`e2efly fly` as a process.
 
     Args:
-        policy: a policy.onnx, or what else the command takes.
-        room: the world.
-        log: of the flight.
-        options: more of the command's; they come last.
-        link: to the firmware; None: straight.
-        pose: its source; None: the room itself.
-        urgent: as `Program` takes it.
+        policy: a policy.onnx, or another text that the command accepts.
+        room: the room in which to fly.
+        log: log of the flight.
+        options: further options of the command. They come last.
+        link: address of the link to the firmware. None: the room's own.
+        pose: source of the poses. None: the room itself.
+        urgent: as for `Program`.
     """
     command = ["-m", "e2efly", "fly", str(policy), "--link", link or room.link, "--log", str(log)]
     command += ["--pose", pose or f"udp:{room.pose_port}", "--flight.battery-unknown"]
@@ -308,10 +316,10 @@ def bridge(
 
 
 def take_off(room: Room, flies: Program) -> None:
-    """Hand over, arm, and hover; what a busy machine makes fail, the pilot tries again.
+    """Hand over control, arm, and hover. The pilot repeats steps that fail on a busy machine.
 
     Raises:
-        RuntimeError: when the bridge does not take off, with its last words.
+        RuntimeError: when the bridge does not take off, with its last lines.
     """
     flies.wait_for("INIT", START_S)
     room.set(override=True, throttle=0.0)

@@ -1,12 +1,13 @@
-"""A room with a vehicle in it, as a process of its own, in real time: the rig, which other processes fly.
+"""A room with a vehicle, as a process of its own, in real time: the rig, in which other processes fly the vehicle.
 
     python -m e2efly.validation.room_process --pose-port PORT [--vehicle NAME] [--folder FOLDER] [--seed N]
         [--at X Y YAW] [--exact] [--record FILE]
 
 It prints one line of JSON: `{"link": "tcp:127.0.0.1:PORT", "control": PORT}`, the firmware's MSP address and the port
-of the room's control on the loopback interface. Poses go to UDP 127.0.0.1:POSE_PORT as docs/pose-sources.md has them.
-A control connection takes lines of JSON, objects whose keys are fields of `rig.Transmitter`, and answers each with a
-line that tells the true state: see `State`. The process ends with that connection, or with its standard input.
+of the room's control on the loopback interface. Poses go to UDP 127.0.0.1:POSE_PORT; their form is in
+docs/pose-sources.md. A control connection accepts lines of JSON, objects whose keys are fields of `rig.Transmitter`. It
+answers each line with a line that gives the true state: see `State`. The process ends when that connection or its
+standard input ends.
 """
 
 import argparse
@@ -30,42 +31,42 @@ from e2efly.validation.rig import POSE_NOISE, Rig, Transmitter
 from e2efly.vehicles import load_vehicle
 
 ROUND_S = 0.004
-"""Between two looks at the control connection, s."""
+"""Interval between two checks of the control connection, s."""
 PRIORITY = 5
-"""Real-time priority: below that of all that flies in it."""
+"""Real-time priority, below that of everything that flies in the room."""
 RECORDED = (
     "machine_time", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "motor", "behind",
 )  # fmt: skip
 """Columns of `--record`: monotonic clock, s; position, m; velocity, m/s; attitude, wxyz; largest output of a motor, 0
-to 1; by how much the room lags behind the machine's clock, s."""
+to 1; lag of the room behind the machine's clock, s."""
 
 
 @dataclass(frozen=True)
 class State:
-    """The true state, and what has happened since the process began."""
+    """The true state, and the events since the process began."""
 
     time: float
-    """Of the firmware, s."""
+    """The firmware's time, s."""
     position: tuple[float, float, float]
     """World, m."""
     velocity: tuple[float, float, float]
     """World, m/s."""
     tilt: float
-    """rad."""
+    """Tilt, rad."""
     yaw: float
     """Heading, rad."""
     motors: tuple[float, ...]
     """(4,) the firmware's outputs, 0 to 1."""
     standing: bool
-    """On the ground."""
+    """Whether the vehicle stands on the ground."""
     largest_tilt: float
-    """rad."""
+    """Largest tilt so far, rad."""
     touches: tuple[tuple[float, float, float], ...]
-    """Speed, m/s, tilt, rad, and the part of the speed that points down, m/s, just before each touch of the ground."""
+    """For each touch of the ground: speed, m/s, tilt, rad, and downward part of the speed, m/s, just before it."""
 
 
 class _Watch:
-    """What has happened so far."""
+    """The events so far."""
 
     def __init__(self, rig: Rig) -> None:
         self.rig, self.largest_tilt, self.touches = rig, 0.0, []
@@ -96,10 +97,10 @@ class _Watch:
 
 
 def changes_of(line: bytes) -> dict[str, Any]:
-    """The changes of the transmitter that a line asks for.
+    """The changes of the transmitter that a line requests.
 
     Raises:
-        ValueError: naming what is no field of `Transmitter`.
+        ValueError: naming a key that is not a field of `Transmitter`.
     """
     known = {field.name for field in fields(Transmitter)}
     content = json.loads(line)
@@ -113,10 +114,10 @@ def serve(rig: Rig, poses: int, listener: socket.socket, record: Path | None = N
     """Run the rig until the control connection or standard input ends.
 
     Args:
-        rig: started, in real time.
+        rig: a started rig, in real time.
         poses: UDP port of the loopback interface.
-        listener: where the control connection comes.
-        record: CSV file to write at the end, with the columns `RECORDED`; None: none.
+        listener: socket on which the control connection arrives.
+        record: CSV file that is written at the end, with the columns `RECORDED`. None: no file.
     """
     watch, sender = _Watch(rig), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
@@ -168,7 +169,7 @@ def main() -> None:
     parser.add_argument("--exact", action="store_true", help="poses without noise")
     parser.add_argument("--record", type=Path, default=None, help="CSV file of the true motion, written at the end")
     options = parser.parse_args()
-    be_punctual(PRIORITY)  # the world does not wait: with all that this thread starts, the firmware among it
+    be_punctual(PRIORITY)  # the world must not wait; this covers all that this thread starts, including the firmware
     noise = (0.0,) * len(POSE_NOISE) if options.exact else POSE_NOISE
     with (
         tempfile.TemporaryDirectory(prefix="e2efly-") as temporary,

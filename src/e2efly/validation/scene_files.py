@@ -1,4 +1,4 @@
-"""Scenes from files in place of a task's world: what can be flown in, and what is refused. Imports JAX."""
+"""Scenes from files in place of a task's world: which ones can be flown in, and which are refused. Imports JAX."""
 
 import dataclasses
 import math
@@ -22,11 +22,11 @@ from e2efly.scenes.shapes import FAR
 from e2efly.validation.scenery import Scenery
 
 LEAST, MOST = 0.5, 1000.0
-"""How large a scene of triangles may be, m: the longest side of the box about it."""
+"""Smallest and largest size of a scene of triangles, m: the longest side of the box about it."""
 DEEP = 50.0
-"""The ground is looked for so far below the start, m."""
+"""Distance below the start within which the ground is looked for, m."""
 _STEP = 0.5
-"""How close together the ground is looked for along the way, m."""
+"""Distance between the points along the way at which the ground is looked for, m."""
 _DOWN = CameraConfig(width=1, height=1, fov=(1e-3, 1e-3), pitch=math.pi / 2, reach=(0.0, DEEP))
 """One ray straight down."""
 
@@ -45,10 +45,10 @@ class SceneFile:
     up: Literal["y", "z"] | None = None
     """See `load_world`."""
     beside: bool = False
-    """Whether what stands in the task's world is shown beside it."""
+    """Whether the objects of the task's world are shown in addition."""
 
     def put(self, scenery: Scenery) -> Scenery:
-        """A task's scenery in this scene.
+        """Replace the world of a task's scenery by this scene.
 
         Raises:
             ValueError: naming the scene, what is wrong and what is accepted.
@@ -61,19 +61,19 @@ class SceneFile:
 
     @property
     def options(self) -> list[str]:
-        """Those of `e2efly hil` that name it."""
+        """The options of `e2efly hil` that select this scene."""
         more = [("--scene-unit", self.unit), ("--scene-up", self.up)]
         given = [word for option, value in more if value is not None for word in (option, str(value))]
         return ["--scene", self.name, *given, *(["--beside"] if self.beside else [])]
 
 
 def load_world(name: str, unit: float | None = None, up: Literal["y", "z"] | None = None) -> World:
-    """A scene by the path of its file, or one of the package's mesh scenes by name.
+    """Load a scene by the path of its file, or one of the package's mesh scenes by name.
 
     Args:
-        name: a .toml of docs/vision.md, a mesh of one of `FORMATS`, or a name.
-        unit: length of a mesh file's unit, m; None: 1.
-        up: axis of a mesh file that points up; None: as its format has it.
+        name: a .toml as in docs/vision.md, a mesh of one of `FORMATS`, or a name.
+        unit: length of a mesh file's unit, m. None: 1.
+        up: axis of a mesh file that points up. None: the axis that its format defines.
 
     Raises:
         ValueError: naming the scene, what is wrong and what is accepted.
@@ -99,10 +99,10 @@ def load_world(name: str, unit: float | None = None, up: Literal["y", "z"] | Non
 
 
 def beside(world: World, task: Scene) -> World:
-    """What stands in a task's world, but not its ground, put into a scene.
+    """Put the objects of a task's world, without its ground, into a scene.
 
     Raises:
-        ValueError: where something of the task's world moves and the scene is of triangles, which do not.
+        ValueError: if an object of the task's world moves and the scene is of triangles, which cannot move.
     """
     if isinstance(world, Scene):
         both = {
@@ -124,12 +124,12 @@ def _kinds(*scenes: Scene) -> list[str]:
 
 @dataclass(frozen=True)
 class Ground:
-    """What lies below a course."""
+    """The ground below a course."""
 
     depth: float
-    """How far it is below the start, m."""
+    """Distance of the ground below the start, m."""
     ends: float
-    """How far along the straight way to the first goal it is there, m; infinite: all along."""
+    """Distance along the straight way to the first goal up to which there is ground, m. Infinite: all along."""
 
 
 def ground_of(scenery: Scenery, name: str, radius: float) -> Ground:
@@ -137,11 +137,11 @@ def ground_of(scenery: Scenery, name: str, radius: float) -> Ground:
 
     Args:
         scenery: the world and the course.
-        name: of the world, for the error.
+        name: name of the world, for the error text.
         radius: of the vehicle, m.
 
     Raises:
-        ValueError: where there is none below the start, or something is nearer to the start than the radius.
+        ValueError: if there is no ground below the start, or if something is nearer to the start than the radius.
     """
     course = scenery.course
     start = np.asarray(course.start, np.float64)
@@ -168,7 +168,7 @@ def ground_of(scenery: Scenery, name: str, radius: float) -> Ground:
 
 
 def _depths(world: World, points: np.ndarray) -> np.ndarray:
-    """Of what is met straight below each of n points, m; `DEEP`: nothing."""
+    """Depth of the first object straight below each of n points, m. `DEEP`: there is none."""
     n = len(points)
     if isinstance(world, Scene):
         ground = float(world.ground[0])

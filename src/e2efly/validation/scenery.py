@@ -1,4 +1,4 @@
-"""The world that a whole flight sees, and cameras in it: what a policy by sight needs beside the rig."""
+"""The world that a whole flight sees, and cameras in it, which a policy with cameras needs beside the rig."""
 
 import dataclasses
 import math
@@ -35,19 +35,19 @@ class Scenery:
     cameras: tuple[CameraConfig, ...]
     """In the order of the contract's images."""
     eyes: tuple[Eye, ...]
-    """How each sits on the vehicle: leaves (1, ...)."""
+    """How each camera is mounted on the vehicle: leaves (1, ...)."""
     scene: Scene | MeshScene
     """One world."""
     course: Course
-    """What the task drew to be flown in it."""
+    """The course that the task drew in this world."""
     outlook: Outlook
-    """The same world as the environment's own program shows it."""
+    """The same world as the environment's own program renders it."""
     near: Near | None = None
-    """Its triangles, where it has some."""
+    """Its triangles, if it has any."""
 
     @staticmethod
     def draw(env: Env, seed: int) -> "Scenery | None":
-        """A world of the training's environment; None where its policies see nothing."""
+        """Draw a world of the training environment. None if its policies see nothing."""
         starts = draw_starts(env, 1, seed)
         (sight,) = starts.sights(env, seed)
         if sight is None:
@@ -61,45 +61,46 @@ class Scenery:
         return dataclasses.replace(self, scene=world, outlook=self.outlook.seeing(world), near=near)
 
     def on(self, course: Course) -> Course:
-        """A course of the same task, as its policy is to fly it in this world."""
+        """A course of the same task, in the form in which its policy is to fly it in this world."""
         return dataclasses.replace(course, goal=self.course.goal, memory=self.course.memory)
 
     def sources(self, state: Callable[[], RigidState], origin: Origin) -> list["SceneCamera"]:
-        """Its cameras on a vehicle.
+        """The cameras of this scenery on a vehicle.
 
         Args:
             state: the vehicle's true state now, in the room.
-            origin: of the task's world in the room.
+            origin: origin of the task's world in the room.
         """
         return [SceneCamera(self, i, state, origin) for i in range(len(self.cameras))]
 
     def image(self, which: int, state: RigidState, time: float, count: int) -> np.ndarray:
-        """What a camera shows at once, whatever the age of its images when they are delivered: `Env.look`'s bits.
+        """A camera's image without latency. It is bit for bit that of `Env.look`.
 
         Args:
-            which: of the cameras.
-            state: of the vehicle, in this world.
-            time: of the world, s.
-            count: of the images so far: the noise of each is another.
+            which: number of the camera.
+            state: state of the vehicle, in this world.
+            time: time of the world, s.
+            count: number of images so far. Each image has other noise.
         """
         return self.outlook.images(state, time, count, (which,))[0]
 
     def images(self, state: RigidState, time: float, count: int) -> list[np.ndarray]:
-        """The same of all cameras, at the price of one call."""
+        """The same for all cameras, at the cost of one call."""
         return self.outlook.images(state, time, count, tuple(range(len(self.cameras))))
 
     def nearest(
         self, position: Sequence[np.ndarray], time: Sequence[float], origin: Origin, within: float = math.inf
     ) -> float:
-        """How near a path comes to what stands in this world and is not to be landed on, m; infinite: to nothing.
+        """Smallest distance of a path to the obstacles of this world, m.
 
-        In a world of triangles a path that goes through one comes as near as 0 m.
+        Solids to land on do not count. Infinite: there are no obstacles. In a world of triangles, a path that goes
+        through a triangle has the distance 0.
 
         Args:
-            position: of the path, each (3,), in the room, m.
-            time: of the same, s.
-            origin: of the task's world in the room.
-            within: what is farther away may count as nothing, m.
+            position: positions of the path, each (3,), in the room, m.
+            time: times of these positions, s.
+            origin: origin of the task's world in the room.
+            within: distance beyond which obstacles may be ignored, m.
         """
         if self.near is not None:
             return self.near.distance(origin.seen(np.stack(position)), within) if len(position) else math.inf
@@ -114,21 +115,21 @@ class Scenery:
 
 @jax.jit
 def _nearest(scene: Scene, points: Array, times: Array) -> Array:
-    """The smallest distance of any of the points (n, 3), each at its time, to a solid of one world, m."""
+    """The smallest distance of the points (n, 3), each at its time, to a solid of one world, m."""
     return jnp.min(jax.vmap(lambda point, at: gaps(scene, point[None], at[None])[0, 1:])(points, times))
 
 
 class SceneCamera:
-    """A camera in a rendered world, as an image source: exposes at its rate, and delivers a latency later."""
+    """A camera in a rendered world as an image source. It exposes at its rate, and delivers images a latency later."""
 
     def __init__(self, scenery: Scenery, which: int, state: Callable[[], RigidState], origin: Origin) -> None:
-        """Mount it.
+        """Mount the camera.
 
         Args:
-            scenery: what it sees.
-            which: of the scenery's cameras.
+            scenery: the world that it sees.
+            which: number of the scenery's camera.
             state: the vehicle's true state now, in the room.
-            origin: of the scenery's world in the room.
+            origin: origin of the scenery's world in the room.
         """
         self.problem: str | None = None
         self._scenery, self._which, self._state, self._origin = scenery, which, state, origin
@@ -139,7 +140,7 @@ class SceneCamera:
         self._waiting: deque[Frame] = deque()
 
     def read(self, now: float) -> list[Frame]:
-        """Expose where it is time to, and deliver what is old enough."""
+        """Expose if an image is due, and deliver images that are old enough."""
         if now >= self._next - 1e-9:
             self._next = now + self._period if self._next == -np.inf else max(self._next + self._period, now)
             self._waiting.append(Frame(now, self._image(now)))
@@ -149,10 +150,10 @@ class SceneCamera:
         return ready
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Nothing to release."""
 
     def describe(self) -> str:
-        """What it shows."""
+        """A description of the camera, as text."""
         return f"rendered {self._camera.sees}, {self._camera.height} rows, {self._camera.width} columns"
 
     def _image(self, now: float) -> np.ndarray:

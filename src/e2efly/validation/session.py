@@ -27,9 +27,9 @@ from e2efly.goal import Course
 from e2efly.validation.rig import Rig
 
 CONTROL_HZ = 100.0
-"""The bridge runs at least so often, Hz."""
+"""Lowest rate of the bridge, Hz."""
 PATIENCE_S = 60.0
-"""How long a step waits for the policy, s: with virtual time, how busy the machine is must not matter."""
+"""Longest time that a step waits for the policy, s. With virtual time, the load of the machine must not matter."""
 
 
 def loop_rate(control_rate: float) -> float:
@@ -39,7 +39,7 @@ def loop_rate(control_rate: float) -> float:
 
 @dataclass
 class Flown:
-    """What the world saw of a flight, sampled at every control step."""
+    """The true record of a flight, sampled at every control step."""
 
     time: list[float] = field(default_factory=list)
     mode: list[str] = field(default_factory=list)
@@ -47,16 +47,16 @@ class Flown:
     velocity: list[np.ndarray] = field(default_factory=list)
     tilt_cosine: list[float] = field(default_factory=list)
     goal: list[np.ndarray | None] = field(default_factory=list)
-    """Where the policy was to be, or the hover controller's target."""
+    """The position to be at for the policy, or the hover controller's target."""
     changes: list[tuple[float, str, tuple[str, ...]]] = field(default_factory=list)
-    """Each mode with its reasons."""
+    """Each mode with its time and its reasons."""
 
     def where(self, mode: str) -> np.ndarray:
-        """Steps of a mode."""
+        """The steps in a mode."""
         return np.flatnonzero(np.array(self.mode) == mode)
 
     def errors(self, mode: str, settle: float = 0.0, last: float | None = None) -> np.ndarray:
-        """Distance to the goal in a mode, m, without its first `settle` s, or over its `last` s alone."""
+        """Distance to the goal in a mode, m, without its first `settle` s, or only over its `last` s."""
         steps = self.where(mode)
         if not len(steps):
             return np.array([])
@@ -69,7 +69,7 @@ class Flown:
 
 
 class Session:
-    """A bridge on a rig that has been started."""
+    """A bridge on a started rig."""
 
     def __init__(
         self,
@@ -101,7 +101,7 @@ class Session:
             self.worker = PolicyWorker(runtime, PATIENCE_S)
         late = rig.latency + 0.01
         self.commander = None if commands is None else Commander(commands, vehicle, settings, latency=late)
-        """Flies in place of a policy."""
+        """The source of commands that flies in place of a policy."""
         self.period = 1 / rate
         self.source = source or PlantSource(rig.poses, "rig")
         self.bridge = Bridge(
@@ -111,7 +111,7 @@ class Session:
         )  # fmt: skip
         self.flown = Flown()
         self.lateness = 0.0
-        """Told to the bridge at the next step, s."""
+        """Lateness that is reported to the bridge at the next step, s."""
 
     def close(self) -> None:
         """End the policy's thread and the link."""
@@ -120,7 +120,7 @@ class Session:
         self.client.link.close()
 
     def step(self) -> None:
-        """One control period."""
+        """Run one control period."""
         self.rig.sleep(self.period)
         self.bridge.tick(self.rig.now(), self.lateness)
         self.lateness = 0.0
@@ -137,15 +137,15 @@ class Session:
         flown.goal.append(self._goal())
 
     def fly(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
-        """Control steps for so long, or until something holds; whether it did."""
+        """Run control steps for `seconds`, or until a condition holds. Returns whether it holds."""
         return run(self.rig, self.step, seconds, until)
 
     def in_mode(self, *modes: Mode) -> Callable[[], bool]:
-        """Whether the bridge is in one of these modes."""
+        """A condition: the bridge is in one of these modes."""
         return lambda: self.bridge.flight.mode in modes
 
     def take_off(self, settle: float = 2.0) -> bool:
-        """The pilot hands over, arms, and asks for a hover; whether it is reached."""
+        """The pilot hands over control, arms, and requests a hover. Returns whether it is reached."""
         self.fly(0.3)
         self.rig.set(override=True, throttle=0.0)
         self.fly(0.3)
@@ -156,7 +156,7 @@ class Session:
         return self.fly(height + 8.0, self.in_mode(Mode.HOVER)) and not self.fly(settle, self.in_mode(Mode.LAND))
 
     def land(self, patience: float = 30.0) -> bool:
-        """The pilot asks for a landing, and disarms after it; whether it ends landed and disarmed."""
+        """The pilot requests a landing, and disarms after it. Returns whether the vehicle is landed and disarmed."""
         self.rig.set(mission="land")
         landed = self.fly(patience, self.in_mode(Mode.DONE))
         self.rig.set(armed=False)
@@ -169,7 +169,7 @@ class Session:
 
 
 def run(rig: Rig, step: Callable[[], None], seconds: float, until: Callable[[], bool]) -> bool:
-    """Steps for so long of the rig's time, or until something holds; whether it did."""
+    """Run steps for `seconds` of the rig's time, or until a condition holds. Returns whether it holds."""
     end = rig.now() + seconds
     while rig.now() < end:
         step()
@@ -179,11 +179,11 @@ def run(rig: Rig, step: Callable[[], None], seconds: float, until: Callable[[], 
 
 
 def rehearsal_settings(height: float, reach: float = 20.0) -> FlightSettings:
-    """What whole flights on the rig are flown with: the firmware on the rig has no battery.
+    """Settings of whole flights on the rig. The firmware on the rig has no battery.
 
     Args:
-        height: of the hover over the ground, m.
-        reach: of the fence about the origin, m.
+        height: height of the hover above the ground, m.
+        reach: radius of the fence about the origin, m.
     """
     fence = Fence(low=(-reach, -reach, 0.1), high=(reach, reach, 8.0), speed=20.0, tilt=3.1, braking=12.0)
     return dataclasses.replace(
@@ -192,7 +192,7 @@ def rehearsal_settings(height: float, reach: float = 20.0) -> FlightSettings:
 
 
 def flight_folder(base: Path, name: str) -> Path:
-    """A folder of its own for a firmware, made."""
+    """Make a folder for one firmware."""
     folder = base / name
     folder.mkdir(parents=True, exist_ok=True)
     return folder

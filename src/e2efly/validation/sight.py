@@ -1,6 +1,6 @@
 """What a vehicle on a plant sees: the world of its task, rendered at the plant's true pose. Imports JAX.
 
-Rate, age, mounting and noise of the images are those of the training's environment, whose cameras draw them.
+Rate, age, mounting and noise of the images are those of the training environment. Its cameras draw them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,36 +21,39 @@ from e2efly.validation.plant import RigidState, Shutter
 
 @dataclass(frozen=True)
 class Sight:
-    """The cameras of one flight and the world that they look at. All numbers are NumPy's: processes hand it on."""
+    """The cameras of one flight and the world that they look at.
+
+    All numbers are NumPy numbers, to be passed to processes.
+    """
 
     cameras: tuple[CameraConfig, ...]
     """In the order of the contract's images."""
     eyes: tuple[Eye, ...]
-    """How each sits on this vehicle: leaves (1, ...)."""
+    """How each camera is mounted on this vehicle: leaves (1, ...)."""
     scene: Scene
-    """One world; it moves with the time since the start."""
+    """One world. It moves with the time since the start."""
     period: float
     """Control period, s."""
     oldest: float
-    """Largest age of an image of all flights, s: it sets shapes."""
+    """Largest age of an image over all flights, s. It sets shapes."""
     seed: int
-    """Of the noise."""
+    """Seed of the noise."""
 
     def begin(self, taken: Mapping[int, Callable[[float], np.ndarray]] | None = None) -> "Watch":
-        """For a flight that begins.
+        """The watch for a flight that begins.
 
         Args:
-            taken: by a camera's number, what gives its newest image at a time since the start, s, for cameras of the
-                plant's own; None: all are rendered.
+            taken: for the plant's own cameras: by the camera's number, a function from the time since the start, s, to
+                the newest image. None: all images are rendered.
         """
         return Watch(self, taken or {})
 
     def shutter(self, i: int) -> Shutter:
-        """When camera `i` is to expose."""
+        """The exposure times of camera `i`."""
         return Shutter(self.period * self.steps_between(i), float(self.eyes[i].latency[0]))
 
     def steps_between(self, i: int) -> int:
-        """Control steps from an image of camera `i` to the next."""
+        """Control steps from one image of camera `i` to the next."""
         every = self.eyes[i].every
         return steps_between(self.cameras[i], self.period) if every is None else int(every[0])
 
@@ -60,18 +63,18 @@ class Watch:
     """The images of a flight, from control step to control step."""
 
     sight: Sight
-    """What is seen."""
+    """The cameras and the world."""
     taken: Mapping[int, Callable[[float], np.ndarray]] = field(default_factory=dict)
-    """What gives the newest image of cameras of the plant's own."""
+    """Functions that give the newest image of each of the plant's own cameras."""
     shown: list[np.ndarray] = field(default_factory=list)
     """The last image of each camera."""
 
     def images(self, k: int, states: Sequence[RigidState]) -> list[np.ndarray]:
-        """What the policy is shown in control step `k`: of each camera the newest image, (h, w) or (h, w, 3).
+        """The policy's images in control step `k`: for each camera the newest image, (h, w) or (h, w, 3).
 
         Args:
-            k: the step; they are asked for in order.
-            states: of the vehicle, one per control step until now; the last is that of now.
+            k: the step. Steps must be requested in order.
+            states: states of the vehicle, one per control step until now. The last one is the present state.
         """
         sight = self.sight
         for i, (camera, eye) in enumerate(zip(sight.cameras, sight.eyes, strict=True)):
@@ -96,22 +99,22 @@ def rendered(
     period: float,
     key: PRNGKeyArray,
 ) -> np.ndarray:
-    """The image of a camera, as the environment renders it: of the pose and the world that were there a latency ago.
+    """A camera's image as the environment renders it, from the pose and the world of a latency ago.
 
     Args:
         camera: the camera.
-        eye: how it sits on the vehicle: leaves (1, ...).
+        eye: how it is mounted on the vehicle: leaves (1, ...).
         scene: one world.
-        states: of the vehicle, a period apart, the newest first, until the eye's latency ago.
-        now: time of the newest, s.
-        period: s.
-        key: of the noise.
+        states: states of the vehicle, a period apart, newest first, back to the eye's latency ago.
+        now: time of the newest state, s.
+        period: time between the states, s.
+        key: key of the noise.
     """
 
     def column(name: str) -> Array:
         return jnp.asarray([[getattr(state, name) for state in states]], jnp.float32)
 
-    rotors = jnp.zeros((1, len(states), 4), jnp.float32)  # no camera looks at them
+    rotors = jnp.zeros((1, len(states), 4), jnp.float32)  # no camera depends on the rotor speeds
     past = State(column("position"), column("velocity"), column("quaternion"), column("body_rate"), rotors)
     return np.asarray(_see(camera, eye, scene, past, now, period, key))[0]
 

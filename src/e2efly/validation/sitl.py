@@ -21,23 +21,26 @@ _STATE = struct.Struct("<18d")
 _RC = struct.Struct("<d16H")
 _MOTORS = struct.Struct("<4f")
 _TRIES = 5
-"""Starts with other ports, before it is given up."""
+"""Number of starts with other ports before giving up."""
 _PORTS = 12
-"""UDP 9001 to 9004 and TCP 5761 to 5768, moved."""
+"""Number of ports: UDP 9001 to 9004 and TCP 5761 to 5768, shifted."""
 _CLOCK = struct.Struct("<6Q")
 _NOW, _WAITING, _STATES, _FRAMES, _ROUNDS = range(1, 6)
-"""What stands there, after the horizon; see `sitl_shim.c`."""
+"""Positions of these values in the shared memory, after the horizon; see `sitl_shim.c`."""
 IDLE_S = 0.002
-"""Between two states while nothing moves, s."""
+"""Time between two states while nothing moves, s."""
 _TAKEN = re.compile(rb"bind port .* failed|UDP server .*\.\.\.-")
-"""What the firmware says where somebody else has one of its ports."""
+"""Messages of the firmware when another program has one of its ports."""
 _RANDOM = random.SystemRandom()
 BOOT_S = 20.0
-"""Real time that the firmware may take to open its ports, or to answer, s."""
+"""Longest real time for the firmware to open its ports, or to answer, s."""
 
 
 def free_ports() -> int:
-    """The first of `_PORTS` ports in a row that are free on loopback, below those that systems give to anybody."""
+    """The first of `_PORTS` consecutive ports that are free on loopback.
+
+    They are below the range that systems assign automatically.
+    """
     for _ in range(100):
         base = _RANDOM.randrange(10_000, 32_000)
         if all(_free(base + i) for i in range(_PORTS)):
@@ -57,12 +60,12 @@ def _free(port: int) -> bool:
 
 @dataclass(frozen=True)
 class FirmwareState:
-    """What the firmware's sensors are told, body FLU, SI units."""
+    """The input of the firmware's sensors, body FLU, SI units."""
 
     body_rate: np.ndarray
     """(3,) rad/s."""
     specific_force: np.ndarray
-    """(3,) m/s^2; level at rest: 0, 0, 9.81."""
+    """(3,) m/s^2. Level and at rest: 0, 0, 9.81."""
     quaternion: np.ndarray
     """(4,) wxyz, body to world ENU."""
     velocity: np.ndarray
@@ -72,11 +75,11 @@ class FirmwareState:
 
 
 RESTING = FirmwareState(np.zeros(3), np.array([0, 0, 9.81]), np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3))
-"""Level and still."""
+"""The state of a level vehicle at rest."""
 
 
 class Sitl:
-    """One firmware process, in a folder of its own that holds its settings.
+    """One firmware process, in its own folder with its settings.
 
     Its time is virtual: it runs only inside `advance`. Use it as a context manager.
     """
@@ -86,7 +89,7 @@ class Sitl:
         self._layout = firmware.layout
         self.base = free_ports()
         self.now = 0.0
-        """The firmware's time: seconds since its first start; it goes on while the firmware is off."""
+        """The firmware's time: seconds since its first start. It goes on while the firmware is off."""
         self._booted = 0.0
         self._process: subprocess.Popen | None = None
         self._motors = np.zeros(4)
@@ -97,7 +100,7 @@ class Sitl:
         self._in = self._listening()
 
     def _listening(self) -> socket.socket:
-        """Where the firmware sends what its motors get."""
+        """Socket to which the firmware sends its motor outputs."""
         found = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         found.bind(("127.0.0.1", self.base + 1))
         found.setblocking(False)
@@ -105,7 +108,7 @@ class Sitl:
 
     @property
     def msp(self) -> str:
-        """Where the firmware speaks MSP, as a link's address."""
+        """Address of the firmware's MSP port, for a link."""
         return f"tcp:127.0.0.1:{self.base + 4}"
 
     def __enter__(self) -> "Sitl":
@@ -125,10 +128,11 @@ class Sitl:
         return self._process is not None and self._process.poll() is None
 
     def start(self) -> None:
-        """Start the process and wait for its MSP port. At its first start it takes other ports where one is not free.
+        """Start the process and wait for its MSP port. At its first start it uses other ports if one is not free.
 
         Raises:
-            OSError: when it ends or does not listen within `BOOT_S`; later, when somebody has taken one of its ports.
+            OSError: when it ends or does not listen within `BOOT_S`; after the first start, when another program has
+                taken one of its ports.
         """
         for _ in range(_TRIES if self.now == 0.0 else 1):
             if self._launch():
@@ -141,7 +145,7 @@ class Sitl:
         raise OSError(f"the Betaflight SITL in {self.folder} does not start: its ports are taken by others")
 
     def _launch(self) -> bool:
-        """Start the process and wait for its ports; False where one of them is not free."""
+        """Start the process and wait for its ports. False if one of them is not free."""
         clock = self.folder / "clock"
         clock.write_bytes(bytes(4096))
         with clock.open("r+b") as file:
@@ -168,7 +172,7 @@ class Sitl:
             for end in (go, poke, done):
                 os.close(end)
         latest = time.monotonic() + BOOT_S
-        while b"bind port" not in (text := output.read_bytes()):  # looking by a connection would take its only place
+        while b"bind port" not in (text := output.read_bytes()):  # a test by connecting would take its only place
             if not self.alive or time.monotonic() > latest:
                 raise OSError(
                     f"the Betaflight SITL in {self.folder} does not start:\n{text[-500:].decode(errors='replace')}"
@@ -177,7 +181,7 @@ class Sitl:
         return not _TAKEN.search(text)
 
     def stop(self) -> None:
-        """Kill the process, as a cut battery would."""
+        """Kill the process, like a loss of battery power."""
         if self._process is not None:
             self._process.kill()
             self._process.wait()
@@ -198,10 +202,11 @@ class Sitl:
             self._clock = None
 
     def send_state(self, state: FirmwareState) -> None:
-        """Hand the sensors a new state, and wait until the firmware has taken it in."""
+        """Send the sensors a new state, and wait until the firmware has read it."""
         packet = _STATE.pack(
             self.now - self._booted,
-            # the firmware turns signs itself: it expects rates of a y-right body, and the pull, not the push
+            # the firmware itself changes signs: it expects the rates of a y-right body, and the specific force with the
+            # opposite sign
             *(state.body_rate * (1, -1, self._layout.yaw_sign)),
             *(-state.specific_force),
             *(state.quaternion * (1, 1, -1, -1)),
@@ -212,7 +217,7 @@ class Sitl:
         self._hand(packet, 2, _STATES)
 
     def send_rc(self, channels: np.ndarray) -> None:
-        """What the pilot's receiver says, 16 channels in us; wait until the firmware has taken it in."""
+        """Send a frame of the pilot's receiver, 16 channels in us, and wait until the firmware has read it."""
         if self._process is not None:
             self._hand(_RC.pack(self.now - self._booted, *np.asarray(channels, int)), 3, _FRAMES)
 
@@ -223,14 +228,14 @@ class Sitl:
             pass
 
     def idle(self, seconds: float, state: FirmwareState = RESTING) -> None:
-        """Let it run for so long in one state."""
+        """Run for `seconds` in one constant state."""
         for _ in range(round(seconds / IDLE_S)):
             self.send_state(state)
             self.advance(IDLE_S)
         self.exchange()
 
     def advance(self, dt: float) -> None:
-        """Let the firmware run for `dt` s of its time; where it is off, time alone passes."""
+        """Let the firmware run for `dt` s of its time. If it is off, only the time advances."""
         self.now += dt
         if self._process is None:
             return
@@ -246,17 +251,17 @@ class Sitl:
             os.write(pipe, b"\0")
 
     def _told(self) -> bool:
-        """Wait until the firmware has something to tell; False: it has ended.
+        """Wait until the firmware has a message. False: it has ended.
 
         Raises:
-            OSError: when it says nothing for `BOOT_S`.
+            OSError: when it sends nothing for `BOOT_S`.
         """
         if not select.select([self._done], [], [], BOOT_S)[0]:
             raise OSError(f"the Betaflight SITL in {self.folder} hangs: it said nothing for {BOOT_S:g} s")
         return bool(os.read(self._done, 64))
 
     def exchange(self) -> None:
-        """Wait until the firmware has read what was sent to it, and sent what it has to say."""
+        """Wait until the firmware has read what was sent to it, and has sent its outputs."""
         if self._process is None:
             return
         for _ in range(2):  # it reads in the first round and writes in the second

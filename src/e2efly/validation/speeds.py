@@ -1,4 +1,4 @@
-"""The speeds of the rotors over MSP on the rig: the SITL measures none, and a controller with such ESCs would."""
+"""Rotor speeds over MSP on the rig. The SITL measures none; a controller with such ESCs would report them."""
 
 import math
 import struct
@@ -12,12 +12,12 @@ from e2efly.validation.rig import Rig
 
 @dataclass
 class SpeedLink:
-    """A link on which the firmware's answers about its motors tell how fast the rig's rotors turn."""
+    """A link whose motor messages from the firmware contain the rotor speeds of the rig."""
 
     link: Link
-    """To the firmware."""
+    """The link to the firmware."""
     rig: Rig
-    """Whose rotors they are."""
+    """The rig with the rotors."""
     _decoder: Decoder = field(default_factory=Decoder)
 
     @property
@@ -44,7 +44,7 @@ class SpeedLink:
         self.link.send(data)
 
     def receive(self) -> bytes:
-        """What the firmware answers, with the speeds where it tells of its motors."""
+        """The firmware's answers, with rotor speeds added to those about its motors."""
         frames = self._decoder.feed(self.link.receive())
         told = (replace(f, payload=self._speeds()) if f.code == MotorTelemetry.CODE else f for f in frames)
         return b"".join(map(encode, told))

@@ -22,7 +22,7 @@ from e2efly.validation.plant import RigidState
 from e2efly.validation.sight import Sight
 
 BATCH = 250
-"""Starts that are drawn at once: as `e2efly eval` does, so that they are the same."""
+"""Number of starts that are drawn at once. It is the same as in `e2efly eval`, so that the starts are the same."""
 
 
 @dataclass(frozen=True)
@@ -30,32 +30,32 @@ class Starts:
     """`n` starts of a task."""
 
     states: tuple[RigidState, ...]
-    """Where each begins."""
+    """The state at each start."""
     courses: tuple[Course, ...]
-    """What each is to fly, for the runtime."""
+    """The course of each start, for the runtime."""
     memory: Any
-    """The task's own state, each leaf (n, ...), for the judge: the references drawn, for instance."""
+    """The task's own state, each leaf (n, ...), for the judge. It contains, for instance, the references drawn."""
     eyes: tuple[Eye, ...] = ()
-    """How the cameras of each sit on the vehicle, each leaf (n, ...)."""
+    """How the cameras of each vehicle are mounted, each leaf (n, ...)."""
     drawn: dict[str, np.ndarray] = field(default_factory=dict)
-    """What the episodes have of their own beside where they begin, for reports: columns (n, ...)."""
+    """Other values that the episodes have drawn, for reports: columns (n, ...)."""
 
     def __len__(self) -> int:
         return len(self.states)
 
     def of(self, rows: list[int]) -> "Starts":
-        """Some of them, in the order named."""
+        """A selection of the starts, in the given order."""
         memory, eyes = jax.tree.map(lambda x: x[np.array(rows)], (self.memory, self.eyes))
         courses = tuple(self.courses[i] for i in rows if self.courses)
         return Starts(tuple(self.states[i] for i in rows), courses, memory, eyes)
 
     def sights(self, env: Env, seed: int, changed: CameraDraw | None = None) -> list[Sight | None]:
-        """What each of them sees in an environment; None for a policy that sees nothing.
+        """The cameras and world of each start in an environment. None for a policy that sees nothing.
 
         Args:
-            env: from which they were drawn.
-            seed: of the images' noise.
-            changed: what a row of the stress draws of their cameras; None: they are those that the starts have drawn.
+            env: the environment from which they were drawn.
+            seed: seed of the images' noise.
+            changed: the cameras that a row of the stress test draws. None: the cameras that the starts have drawn.
         """
         if not env.cameras:
             return [None] * len(self)
@@ -72,7 +72,7 @@ class Starts:
 
 
 def draw_starts(env: Env, n: int, seed: int) -> Starts:
-    """The first `n` starts of a seed: those of `e2efly eval`."""
+    """The first `n` starts of a seed. They are those of `e2efly eval`."""
     drawn = [_draw(env, random_key(seed, UNSEEN, i)) for i in range(-(-n // BATCH))]
     vehicle, memory, eyes = jax.tree.map(lambda *x: np.concatenate(x)[:n], *drawn)
     fields = (vehicle.position, vehicle.velocity, vehicle.quaternion, vehicle.body_rate)
@@ -95,12 +95,12 @@ def _scene(task: Task, memory: Any) -> Scene:
 
 
 def course_of(task: Task, memory: Any, start: np.ndarray) -> Course:
-    """The course of one episode of a task, for the runtime: its goal without the part that trains, in NumPy.
+    """The course of one episode of a task, for the runtime: its goal in NumPy, without the part that trains.
 
     Args:
-        task: of the environment.
+        task: the task of the environment.
         memory: its state at the start of that episode, NumPy leaves (1, ...).
-        start: (3,) where it begins, m.
+        start: (3,) position at the start, m.
     """
     options = getattr(task, "config", None)
     lean: Any = goal_of(type(options)) if isinstance(options, TaskConfig) else type(task)

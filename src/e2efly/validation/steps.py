@@ -1,4 +1,4 @@
-"""Steps of body rate and of thrust, flown through the real firmware, and the log of its sensors."""
+"""Steps of body rate and thrust, flown through the real firmware, and the log of its sensors."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -21,17 +21,17 @@ from e2efly.validation.sitl import FirmwareState
 from e2efly.vehicles.vehicle import GRAVITY
 
 LINK_RATE_HZ = 100.0
-"""Commands are sent so often, Hz."""
+"""Rate of the commands, Hz."""
 SIZES = (4.0, 3.0, 3.0, 2.0)
-"""Of the steps of thrust over mass, m/s^2, and of the body rates, rad/s."""
+"""Sizes of the steps of thrust over mass, m/s^2, and of the body rates, rad/s."""
 HOLD_S = 0.3
-"""A step is held for so long, and then the one the other way."""
+"""Duration of a step, s. The opposite step of the same duration follows."""
 REST_S = 0.2
-"""Before and after both, the rates are zero for so long; in between the pilot corrects ..."""
+"""Time with zero rates before and after each pair of steps, s."""
 CALM_S = 1.0
-"""... for so long."""
+"""Time between pairs of steps in which the pilot corrects, s."""
 HEIGHT = 10.0
-"""m."""
+"""Height of the flight, m."""
 CLIMB_S = 6.0
 """Time for take-off and climb, s."""
 
@@ -41,15 +41,15 @@ class Step:
     """A change of one of the four commands, from rest."""
 
     time: float
-    """When it was sent, s of the record's clock."""
+    """Time at which it was sent, s of the record's clock."""
     channel: int
     """0: thrust over mass; 1 to 3: body rate about x, y, z."""
     size: float
-    """m/s^2 or rad/s."""
+    """Size of the change, m/s^2 or rad/s."""
 
 
 class _Hand:
-    """Sends commands to the firmware, and keeps what its sensors are told and what was sent."""
+    """Sends commands to the firmware, and records the input of its sensors and the commands."""
 
     def __init__(self, rig: Rig) -> None:
         vehicle = rig.world.vehicle
@@ -71,7 +71,7 @@ class _Hand:
         return state
 
     def fly(self, seconds: float, command: np.ndarray | None = None) -> None:
-        """Hold a command for so long; without one, hover where it is to be."""
+        """Hold a command for `seconds`. Without a command, hover at the target."""
         for _ in range(round(seconds * LINK_RATE_HZ)):
             given = self._hover() if command is None else command
             throttle = min(self.map.throttle(float(given[0])), self.sticks.throttle.largest)
@@ -80,7 +80,7 @@ class _Hand:
                 self.sent.append(np.concatenate([[self.rig.now()], given]))
 
     def arm(self) -> None:
-        """Hand over, arm, throttle closed."""
+        """Hand over control, and arm with closed throttle."""
         middle = self.sticks.centre
         closed = self.sticks.arrange((middle, middle, middle, 1000), ())
         for change in ({"override": True}, {"armed": True}):
@@ -102,15 +102,15 @@ class _Hand:
 
 
 def fly_steps(rig: Rig, shares: tuple[float, ...] = (1.0, -1.0, 0.6, -0.6)) -> tuple[Record, list[Step]]:
-    """Take off, and fly steps of roll, pitch and yaw rate and of thrust there and back, with calm between them.
+    """Take off, and fly steps of roll, pitch and yaw rate and of thrust in both directions, with pauses between them.
 
     Args:
-        rig: started; its body is the vehicle that it carries.
-        shares: of `SIZES`, one step of each command for each.
+        rig: a started rig. Its body is the vehicle that it carries.
+        shares: factors on `SIZES`. Each gives one step of each command.
 
     Returns:
-        What gyroscope, accelerometer, poses and motor outputs say every step of the rig, and the commands as they were
-        sent; and the steps.
+        The values of gyroscope, accelerometer, poses and motor outputs at every step of the rig, with the commands as
+        they were sent; and the steps.
     """
     hand, steps = _Hand(rig), []
     try:

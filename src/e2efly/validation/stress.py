@@ -1,4 +1,4 @@
-"""The rows of `e2efly.stress` flown on another plant: what `e2efly validate --stress` does."""
+"""Fly the rows of `e2efly.stress` on another plant. `e2efly validate --stress` does this."""
 
 import os
 from collections.abc import Callable
@@ -24,9 +24,9 @@ from e2efly.validation.validate import SAMPLE, flyable, plant_name
 from e2efly.vehicles import Controller, Vehicle
 
 FLIGHTS = 10
-"""Starts per row and criterion unless told: each takes a second on MuJoCo or through the firmware."""
+"""Default number of starts per row and criterion. Each takes a second on MuJoCo or through the firmware."""
 AIR = 19 * 8
-"""Bytes that a control step's air takes."""
+"""Memory of the air of one control step, bytes."""
 
 
 def stress(
@@ -41,30 +41,31 @@ def stress(
     progress: Callable[[str, int, int], None] = lambda criterion, done, total: None,
     baseline: str | None = None,
 ) -> Report:
-    """Fly a policy by the bridge's runtime on a plant, in every row that the plant can be given.
+    """Fly a policy with the bridge's runtime on a plant, in every row that the plant can simulate.
 
-    Starts, and what a row draws, are those of `e2efly.stress.stress`; gusts, drift and noise then go on by themselves.
+    The starts, and the draws of a row, are those of `e2efly.stress.stress`. The random sequences of gusts, drift and
+    noise in flight are different ones.
 
     Args:
-        policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
+        policy: a run directory, a policy.onnx, or the name of a task, which means the policy of the zoo for that task.
         plant: its name, its reference `path/to/file.py:Name` or `module:Name`, or a registered class.
         episodes: starts per row and criterion.
-        rows: names of rows; empty: all that the plant can be given. The report names the others.
-        vehicle: what flies in the nominal row, and what the other rows change; left out: the policy's own vehicle.
-        controller: the vehicle that the flight controller believes in, in every row: policy or plant.
-        seed: of the starts and of the rows' draws.
-        progress: (criterion, flights that are over, of how many).
+        rows: names of rows. If empty: all rows that the plant can simulate. The report names the others.
+        vehicle: the vehicle of the nominal row, which the other rows change. If left out: the policy's own vehicle.
+        controller: the vehicle to which the flight controller is tuned, in every row: policy or plant.
+        seed: seed of the starts and of the rows' draws.
+        progress: called as progress(criterion, number of finished flights, number of all flights).
         baseline: the hover controller that flies in place of the policy; see `e2efly.evaluate`.
 
     Raises:
-        ValueError: naming the option, its value and what is accepted; for a row that the plant cannot be given.
+        ValueError: naming the option, its value and what is accepted; or for a row that the plant cannot simulate.
         OSError: when the plant cannot be started.
     """
     if episodes <= 0:
         raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
     check_rows(rows)
     compute_at_once()
-    prepare("cpu")  # the plants compute there, one vehicle at a time
+    prepare("cpu")  # the plants compute on the CPU, one vehicle at a time
     found, kind, own = flyable(policy, plant, vehicle, controller, baseline=baseline)
     check_seen(rows, found.env.cameras)
     known = rows_for(found.env.cameras)
@@ -101,19 +102,19 @@ def stress(
 
 
 def lacking(kind: type[Plant], row: Row) -> str:
-    """What a plant would have to change for a row and cannot; empty: nothing."""
+    """The changes that a row requires and a plant cannot make. Empty: there are none."""
     return ", ".join(sorted(row.alters - kind.alters))
 
 
 def realities(drawn: Draw, vehicle: Vehicle, seed: int, steps: int, period: float) -> list[Reality]:
-    """What the flights of a row meet.
+    """The conditions of a row's flights.
 
     Args:
-        drawn: what the row draws.
-        vehicle: of the nominal row.
-        seed: of the starts.
+        drawn: the draws of the row.
+        vehicle: the vehicle of the nominal row.
+        seed: seed of the starts.
         steps: control steps of the longest flight.
-        period: of control, s.
+        period: control period, s.
     """
     key, n = random_key(seed, UNSEEN, 0), len(drawn.latency)
     gust, drift, share = (np.asarray(x, np.float64) for x in _tracks(drawn.disturbance, key, steps, period))

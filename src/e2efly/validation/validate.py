@@ -1,4 +1,4 @@
-"""Fly a policy by the bridge's runtime on another plant: what `e2efly.validate` and `e2efly validate` do."""
+"""Fly a policy with the bridge's runtime on another plant. `e2efly.validate` and `e2efly validate` do this."""
 
 import dataclasses
 import math
@@ -30,29 +30,29 @@ from e2efly.validation.starts import Starts, draw_starts
 from e2efly.vehicles import Controller, Vehicle
 
 KEPT = 136
-"""Bytes of a control step of a flight on a plant, of which all are kept."""
+"""Memory of one control step of a flight on a plant, bytes. All steps of all flights are kept."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """How a policy did on one criterion, in two places from the same starts."""
+    """Results of a policy on one criterion, in the training simulator and on the plant, from the same starts."""
 
     trained: Episodes
-    """In the training simulator, as `evaluate` flies them; NumPy arrays."""
+    """Results in the training simulator, as `evaluate` flies them; NumPy arrays."""
     flown: Verdicts
-    """On the plant."""
+    """Results on the plant."""
     starts: Starts
-    """What both began from."""
+    """The starts of both."""
     flights: list[Trajectory]
     """The flight of each start on the plant."""
 
     @property
     def drop(self) -> float:
-        """Points of success that the plant costs."""
+        """Loss of success on the plant, percentage points."""
         return 100 * float(np.mean(self.trained.success) - np.mean(self.flown.success))
 
     def as_json(self, plant: str, suite: TaskConfig) -> dict[str, Any]:
-        """A summary of either place, and a row for every start on the plant."""
+        """A summary for both places, and a row for every start on the plant."""
         faults = sum(bool(flight.fault) for flight in self.flights)
         courses = course_rows(suite, self.starts.drawn, len(self.starts))
         places = zip(self.trained.success, rows(self.flown), self.flights, self.starts.states, courses, strict=True)
@@ -68,33 +68,33 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Validation:
-    """How a policy did on a plant, beside the training simulator."""
+    """Results of a policy on a plant, compared with the training simulator."""
 
     candidate: Candidate
-    """What flew."""
+    """The policy that flew."""
     plant: type[Plant]
-    """Where."""
+    """The plant on which it flew."""
     seed: int
-    """Of the starts."""
+    """Seed of the starts."""
     max_drop: float
-    """Points of success by which the plant may lie under the training simulator."""
+    """Largest accepted loss of success on the plant, percentage points."""
     criteria: dict[str, Comparison]
-    """By name."""
+    """Results by the name of the criterion."""
     differences: tuple[str, ...] = ()
-    """In what the plant's vehicle is not the policy's, as the plant says."""
+    """Differences between the plant's vehicle and the policy's, as the plant reports them."""
 
     @property
     def worst(self) -> str:
-        """The criterion whose success drops most."""
+        """The criterion with the largest loss of success."""
         return max(self.criteria, key=lambda name: self.criteria[name].drop)
 
     @property
     def passed(self) -> bool:
-        """Whether success drops by no more than `max_drop` in any criterion."""
+        """Whether the loss of success is at most `max_drop` in every criterion."""
         return self.criteria[self.worst].drop <= self.max_drop + 1e-9
 
     def notes(self) -> list[str]:
-        """What the training simulator has and the plant does not, and the other way round."""
+        """Features that the training simulator has and the plant does not, and the reverse."""
         policy, env, notes = self.candidate.policy.contract, self.candidate.env, []
         random = {
             "randomised vehicles": bool(env.randomize),
@@ -149,32 +149,32 @@ def validate(
     progress: Callable[[str, int, int], None] = lambda criterion, done, total: None,
     baseline: str | None = None,
 ) -> Validation:
-    """Fly a policy by the bridge's runtime on another plant, from the starts of `evaluate`.
+    """Fly a policy with the bridge's runtime on another plant, from the starts of `evaluate`.
 
-    Many flights share the cores in processes of their own: a script calls this behind `if __name__ == "__main__":`.
+    Many flights share the cores in several processes, so a script must call this under `if __name__ == "__main__":`.
 
     Args:
-        policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
+        policy: a run directory, a policy.onnx, or the name of a task, which means the policy of the zoo for that task.
         plant: its name, with its address where it has one (`airsim:HOST:PORT`), its reference `path/to/file.py:Name` or
             `module:Name`, or a registered class.
-        episodes: starts of each criterion; left out: the plant's `episodes`.
-        vehicle: what the plant flies, a name or a .toml file; left out: the policy's own vehicle.
-        controller: policy: the plant's flight controller believes in the policy's own vehicle, whatever flies; plant:
-            it is tuned to the vehicle that flies. Neither changes the policy.
-        task: options of its task by dotted name, in place of what the policy's run or contract says:
-            {"track": "four_gates"}.
-        seed: of the starts.
-        max_drop: points of success by which the plant may lie under the training simulator.
-        log: folder for a CSV log of each flight, CRITERION_NUMBER.csv, which `e2efly identify flight` reads; None:
-            none are written.
-        image: IMAGE=plant:CAMERA of each image of the contract that the plant's own camera is to give; of a mask
-            IMAGE=plant:CAMERA:RED,GREEN,BLUE, its colour in the plant's segmentation. The others are rendered of the
-            task's world.
-        progress: (criterion, flights that are over, of how many).
+        episodes: starts of each criterion. If left out: the plant's `episodes`.
+        vehicle: the vehicle that the plant flies, a name or a .toml file. If left out: the policy's own vehicle.
+        controller: `policy`: the plant's flight controller stays tuned to the policy's own vehicle, whatever vehicle
+            flies. `plant`: it is tuned to the vehicle that flies. Neither changes the policy.
+        task: options of its task by dotted name, which replace those of the policy's run or contract: {"track":
+            "four_gates"}.
+        seed: seed of the starts.
+        max_drop: largest accepted loss of success on the plant, percentage points.
+        log: folder for a CSV log of each flight, CRITERION_NUMBER.csv, which `e2efly identify flight` reads. None: no
+            logs are written.
+        image: IMAGE=plant:CAMERA for each image of the contract that the plant's own camera provides. For a mask it is
+            IMAGE=plant:CAMERA:RED,GREEN,BLUE with the colour of its class in the plant's segmentation. The other images
+            are rendered from the task's world.
+        progress: called as progress(criterion, number of finished flights, number of all flights).
         baseline: the hover controller that flies in place of the policy; see `e2efly.evaluate`.
 
     Raises:
-        ValueError: naming the option or the field, what it is and what is accepted.
+        ValueError: naming the option or the field, its value and what is accepted.
         OSError: when the plant cannot be started, or the folder cannot be written to.
     """
     name = plant_name(plant)
@@ -185,7 +185,7 @@ def validate(
     if not (math.isfinite(max_drop) and max_drop >= 0):
         raise ValueError(f"--max-drop is {max_drop}; accepted: 0 or more points of success")
     compute_at_once()
-    prepare("cpu")  # the plants compute there, one vehicle at a time
+    prepare("cpu")  # the plants compute on the CPU, one vehicle at a time
     found, kind, own = flyable(policy, plant, vehicle, controller, task, baseline)
     cameras = plant_cameras(image, found.policy.contract)
     kind = kind.seeing(cameras) if cameras else kind
@@ -223,10 +223,10 @@ def _write_logs(folder: Path, criterion: str, flights: list[Trajectory], mode: s
 
 
 def plant_cameras(texts: Sequence[str], contract: Contract) -> dict[str, str]:
-    """IMAGE=plant:CAMERA of each text as CAMERA by image.
+    """The plant's camera for each image, from texts IMAGE=plant:CAMERA.
 
     Raises:
-        ValueError: naming the text and what is accepted: no such image, one twice, or another source.
+        ValueError: naming the text and what is accepted: for an unknown image, an image given twice, or another source.
     """
     chosen = by_image(texts, contract)
     for name, uri in chosen.items():
@@ -236,7 +236,7 @@ def plant_cameras(texts: Sequence[str], contract: Contract) -> dict[str, str]:
 
 
 def plant_name(plant: str | type[Plant]) -> str:
-    """The name or reference of a plant, by which other processes find it.
+    """The name or reference with which other processes find a plant.
 
     Raises:
         ValueError: for a class that is not registered.
@@ -252,8 +252,9 @@ def flyable(
     task: Mapping[str, Any] | None = None,
     baseline: str | None = None,
 ) -> tuple[Candidate, type[Plant], Vehicle]:
-    """A policy that the runtime can fly, the plant, and the vehicle that the policy was trained on; of a family's
-    policy, the one that it flies.
+    """A policy that the runtime can fly, the plant, and the vehicle that the policy was trained on.
+
+    For a policy of a family, the vehicle is the one that it flies.
 
     Raises:
         ValueError: naming what does not fit.

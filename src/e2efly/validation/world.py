@@ -1,6 +1,6 @@
 """The world of a flight controller under test: our rigid body, the ground, and an IMU.
 
-The firmware's motor outputs turn the rotors; the body's motion is what its sensors are told.
+The firmware's motor outputs turn the rotors. The firmware's sensors get the motion of the body.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,8 @@ from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 STEP_S = 0.001
 """Length of a step of the rigid body, s."""
 _PROGRAMS: dict[str, Any] = {}
-"""By the vehicle's hash: compiling takes a second, which the next world of the same vehicle need not wait for."""
+"""Compiled programs by the vehicle's hash. Compiling takes a second, which is saved for the next world of the same
+vehicle."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Body:
 
 @dataclass(frozen=True)
 class World:
-    """The rigid body of a vehicle over flat ground; pure: `advance` returns what comes next."""
+    """The rigid body of a vehicle over flat ground. Pure: `advance` returns the next state."""
 
     vehicle: Vehicle
     """The plant; loaded."""
@@ -51,7 +52,7 @@ class World:
         return self.vehicle.full_rotor_speed
 
     def at_rest(self, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Body:
-        """On the ground, rotors still."""
+        """The state on the ground with stopped rotors."""
         zero = np.zeros(3)
         position = np.array([x, y, self.vehicle.feet_height])
         return Body(position, zero, np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), zero, np.zeros(4))
@@ -67,20 +68,20 @@ class World:
         """The state after `dt` s under constant motor outputs.
 
         Args:
-            state: before.
+            state: the state before.
             motors: (4,) in [0, 1], Betaflight's order; rotor speed is proportional to it.
-            dt: a whole number of `STEP_S`.
+            dt: duration, s, a whole number of `STEP_S`.
             wind: (3,) world, m/s.
-            rotor_share: (4,) thrust of each rotor over that of the vehicle's thrust map.
+            rotor_share: (4,) thrust of each rotor divided by the thrust from the vehicle's thrust map.
         """
         standing = state.position[2] <= self.vehicle.feet_height and not (state.velocity.any() or state.body_rate.any())
         if standing and not (motors.any() or state.rotor_speed.any()):
-            return state  # as it is for seconds after each boot
+            return state  # nothing changes for seconds after each boot
         steps = max(round(dt / STEP_S), 1)
         air, share = np.zeros(3) if wind is None else wind, np.ones(4) if rotor_share is None else rotor_share
         parts = (getattr(state, f.name) for f in fields_of(Body))
         row = np.concatenate([*parts, np.asarray(motors) * self.full_speed, air, share]).astype(np.float32)
-        after = np.asarray(self._steps(row, steps), np.float64)  # one array in, one out: handing over costs most
+        after = np.asarray(self._steps(row, steps), np.float64)  # one array in and out: the transfer costs most
         return Body(after[:3], after[3:6], after[6:10], after[10:13], after[13:])
 
     @cached_property
@@ -105,7 +106,7 @@ class World:
         return _PROGRAMS.setdefault(vehicle.hash, jax.jit(run, static_argnums=1))
 
     def sensed(self, before: Body, after: Body, dt: float) -> FirmwareState:
-        """What gyroscope and accelerometer say after a step of `dt` s."""
+        """The readings of gyroscope and accelerometer after a step of `dt` s."""
         felt = (after.velocity - before.velocity) / dt + np.array([0, 0, GRAVITY])
         attitude = Quat(*after.quaternion)
         force = attitude.unrotate(Vec3(*felt))
@@ -114,7 +115,7 @@ class World:
 
 
 def _stand(vehicle: Vehicle, free: Parts) -> Parts:
-    """Hold what touches the ground: it does not sink, slide or turn, and stands upright on its feet."""
+    """Hold a vehicle that touches the ground: it does not sink, slide or turn, and stands upright on its feet."""
     down = free.position.z <= vehicle.feet_height
     keep = jnp.where(down, 0.0, 1.0)
     q = free.attitude

@@ -1,4 +1,4 @@
-"""Vehicles: what they weigh, push and drag, each value with its unit and source. Imports no JAX."""
+"""Vehicles: mass, thrust, drag and the other parameters, each value with its unit and source. Imports no JAX."""
 
 from e2efly.vehicles.family import Family, Ranges, family_names, load_family, nominal_vehicle
 from e2efly.vehicles.names import nearest, unknown

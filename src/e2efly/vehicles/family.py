@@ -1,7 +1,8 @@
-"""Many vehicles: ranges, read from a TOML file, and the laws by which vehicles are drawn within them. Imports no JAX.
+"""Families of vehicles: ranges from a TOML file, and the laws that draw vehicles within them. Imports no JAX.
 
-The laws are one function from uniform numbers to a `Vehicle`, in the library of the numbers: of NumPy one vehicle for
-a file or a test, of JAX a batch for the episodes of a training. Their formulae and sources: docs/any-vehicle.md.
+The laws are one function from uniform numbers to a `Vehicle`. It computes in the library of these numbers: NumPy
+numbers give one vehicle for a file or a test, JAX numbers give a batch for the episodes of a training. The formulae and
+their sources are in docs/any-vehicle.md.
 """
 
 import dataclasses
@@ -28,61 +29,62 @@ from e2efly.vehicles.vehicle import (
 )
 
 DRAWN = 20
-"""Uniform numbers that make a vehicle."""
+"""Number of uniform random numbers that define a vehicle."""
 Range = tuple[float, float]
 
 _ARM_OF_KILOGRAM = 0.12
-"""Arm of a quadrotor of 1 kg in the middle, m: the cube root of the mass through Crazyflie and 5-inch racers."""
+"""Arm of a typical quadrotor of 1 kg, m. The arm grows with the cube root of the mass, from the Crazyflie to 5-inch
+racers."""
 _ARM_SPREAD = 1.7
-"""Largest factor on it, and one over the smallest."""
+"""Largest factor on this arm. The smallest factor is one divided by it."""
 _RINGING = 4.0
-"""Largest rate gain times motor lag that is drawn: a damping ratio of 1 / (2 sqrt(4)) = 0.25."""
+"""Largest product of rate gain and motor lag that is drawn. It gives a damping ratio of 1 / (2 sqrt(4)) = 0.25."""
 _AIR = 1.225
-"""Density, kg/m^3: the standard atmosphere at sea level."""
+"""Density of air, kg/m^3: the standard atmosphere at sea level."""
 _SPIN = (1.0, -1.0, -1.0, 1.0)
 _BESIDE = 1e-6
-"""Relative rounding within which a number is still in its range."""
+"""Relative rounding error within which a number still counts as inside its range."""
 
 
 def _range(unit: str, at_least: float | None = None, above: float | None = None, high: float = math.inf) -> Any:
-    """Smallest and largest of a quantity, with the rule that both keep."""
+    """Smallest and largest value of a quantity, with the bounds that both must satisfy."""
     entry = {"unit": unit, "shape": (2,), "at_least": None, "above": None}
     return dataclasses.field(metadata=entry | {"from": at_least, "beyond": above, "high": high})
 
 
 @dataclass(frozen=True)
 class Ranges:
-    """Between which numbers the vehicles of a family lie: smallest and largest of each."""
+    """The ranges of a family's vehicles: the smallest and largest value of each quantity."""
 
     mass: Range = _range("kg", above=0.0)
     """Mass."""
     arm: Range = _range("m", above=0.0)
     """Largest distance of a rotor from the centre of mass."""
     thrust_to_weight: Range = _range("1", above=1.05, high=20.0)
-    """Largest collective thrust over weight; with less nothing hovers."""
+    """Largest collective thrust divided by weight. A vehicle with less than the lower bound cannot hover."""
     motor_time_constant: Range = _range("s", above=0.0)
     """Time constant of the rotors."""
     rate_gain: Range = _range("1/s", above=0.0)
-    """Rate loop of roll and pitch."""
+    """Gain of the rate loop for roll and pitch."""
     yaw_gain: Range = _range("1/s", above=0.0)
-    """Rate loop of yaw."""
+    """Gain of the rate loop for yaw."""
     roll_rate_max: Range = _range("rad/s", above=0.0)
-    """Largest roll and pitch rate that the flight controller takes. A policy commands no more than the second number,
-    whoever takes more."""
+    """Largest roll and pitch rate that the flight controller accepts. A policy commands no more than the upper end of
+    this range, even if a vehicle accepts more."""
     yaw_rate_max: Range = _range("rad/s", above=0.0)
-    """The same of yaw."""
+    """The same for yaw."""
     latency: Range = _range("s", at_least=0.0, high=1.0)
-    """From the observation to the rate loop."""
+    """Time from the observation to the arrival of the command at the rate loop."""
     inertia_ratio: Range = _range("1", above=0.0)
-    """Roll and pitch inertia over mass times squared arm."""
+    """Roll and pitch inertia divided by mass times squared arm."""
     torque_ratio: Range = _range("1", above=0.0)
-    """Yaw torque of a rotor over its thrust and the arm."""
+    """Yaw torque of a rotor divided by its thrust and by the arm."""
     drag_linear: Range = _range("1/s", at_least=0.0)
-    """Linear drag over mass, each axis."""
+    """Linear drag divided by mass, for each axis."""
     drag_quadratic: Range = _range("1/m", at_least=0.0)
-    """Quadratic drag over mass, each axis."""
+    """Quadratic drag divided by mass, for each axis."""
     control_rate: Range = _range("Hz", at_least=0.1, high=10_000.0)
-    """At which the policy is asked: one number, twice."""
+    """Rate at which the policy is called. Both ends of the range are the same number."""
 
     @property
     def hash(self) -> str:
@@ -98,7 +100,7 @@ class Ranges:
         for known in dataclasses.fields(self):
             low, high = getattr(self, known.name)
             least, above, most = (known.metadata[key] for key in ("from", "beyond", "high"))
-            if not ((low >= least if above is None else low > above) and low <= high <= most):  # also of NaN
+            if not ((low >= least if above is None else low > above) and low <= high <= most):  # also false for NaN
                 bottom = f"of at least {least:g}" if above is None else f"above {above:g}"
                 top = f", at most {most:g}" if math.isfinite(most) else ""
                 hovers = ": no other vehicle can hover" if known.name == OF_FAMILIES else ""
@@ -116,7 +118,7 @@ class Ranges:
             )
 
     def outside(self, vehicle: Vehicle) -> tuple[str, ...]:
-        """In which quantities a vehicle lies outside, in words: the quantity, its value and what is accepted."""
+        """The quantities in which a vehicle lies outside the ranges, as text: quantity, value and what is accepted."""
         found = []
         for known in dataclasses.fields(self):
             low, high = getattr(self, known.name)
@@ -130,7 +132,7 @@ class Ranges:
 
 
 def measured(vehicle: Vehicle) -> dict[str, tuple[float, ...]]:
-    """The quantities of `Ranges` of a loaded vehicle, but for the control rate, which is the policy's."""
+    """The quantities of `Ranges` for a loaded vehicle, except the control rate, which belongs to the policy."""
     v = vehicle
     arm = float(np.linalg.norm(v.rotor_position, axis=1).max())
     return {
@@ -155,33 +157,33 @@ class Family:
     """Vehicles that a policy is trained for together."""
 
     name: str
-    """The stem of its file."""
+    """The stem of its file name."""
     ranges: Ranges
 
     @property
     def hash(self) -> str:
-        """That of its ranges: the laws are the same for all families."""
+        """The hash of its ranges. The laws are the same for all families."""
         return self.ranges.hash
 
     @cached_property
     def middle(self) -> Vehicle:
-        """The vehicle in the middle of all draws, float64, as if loaded. Its latency is the middle of the range."""
+        """The vehicle in the middle of all draws, float64, as if loaded. Its latency is the middle of its range."""
         return _loaded(self.draw(np.full(DRAWN, 0.5)), self.name)
 
     def sample(self, count: int, seed: int) -> list[Vehicle]:
-        """So many vehicles, each as if loaded from a file of its own, float64."""
+        """Draw `count` vehicles, each as if loaded from a file of its own, float64."""
         drawn = np.random.default_rng(seed).random((count, DRAWN))
         return [_loaded(self.draw(u), f"{self.name}_{i}") for i, u in enumerate(drawn)]
 
     def draw(self, u: Any) -> Vehicle:
-        """A vehicle of uniform numbers.
+        """The vehicle that belongs to given uniform numbers.
 
         Args:
-            u: (*n, `DRAWN`) uniform in [0, 1), of NumPy or JAX.
+            u: (*n, `DRAWN`) uniform in [0, 1), from NumPy or JAX.
 
         Returns:
-            The vehicle, each field with the leading axes *n. Largest rates that a vehicle is commanded are within the
-            ranges; its gains above the rate loop, which a policy by rates does not use, follow from that loop.
+            The vehicle. Each field has the leading axes *n. Its largest commanded rates are within the ranges. Its
+            gains above the rate loop follow from the gain of that loop; a policy that commands rates does not use them.
         """
         r, xp = self.ranges, u.__array_namespace__() if hasattr(u, "__array_namespace__") else np
         (
@@ -189,7 +191,7 @@ class Family:
             tip, curve, linear, quadratic, upright,
         ) = (u[..., i] for i in range(DRAWN))  # fmt: skip
         m = _log(xp, mass, r.mass)
-        # mass goes with the cube of the size: V. Kumar and N. Michael, Opportunities and challenges with autonomous
+        # mass grows with the cube of the size: V. Kumar and N. Michael, Opportunities and challenges with autonomous
         # micro aerial vehicles, 2012
         arm = _ARM_OF_KILOGRAM * xp.cbrt(m) * _log(xp, spread, (1 / _ARM_SPREAD, _ARM_SPREAD))
         arm = xp.clip(arm, *r.arm)
@@ -198,24 +200,25 @@ class Family:
         places = xp.stack(
             [xp.stack([x * forward, y * left], axis=-1) for x, y in ((-1, -1), (1, -1), (-1, 1), (1, 1))], axis=-2
         )
-        # a propeller's radius: neighbours sit at most 1.41 arms apart; its tip moves at Mach 0.2 to 0.5
+        # the radius of a propeller: neighbouring rotors are at most 1.41 arms apart, and the tip moves at Mach 0.2 to
+        # 0.5
         radius = arm * _between(size, (0.35, 0.68))
         full = _between(tip, (60.0, 180.0)) / radius
         top = _between(strong, r.thrust_to_weight) * m * GRAVITY / 4
-        share = _between(curve, (0.1, 0.3))  # of the thrust at full speed that grows linearly
+        share = _between(curve, (0.1, 0.3))  # share of the thrust at full speed that grows linearly
         thrust_map = xp.stack([(1 - share) * top / full**2, share * top / full, 0 * top], axis=-1)
         time = _log(xp, lag, r.motor_time_constant)
         fastest = xp.clip(_RINGING / time, r.rate_gain[0], r.rate_gain[1])
         gain = r.rate_gain[0] * (fastest / r.rate_gain[0]) ** quick
         yaw_gain = xp.clip(gain * _between(yaw_quick, (0.25, 1.0)), *r.yaw_gain)
         rate, yaw_rate = _between(turn, r.roll_rate_max), _between(yaw_turn, r.yaw_rate_max)
-        # all mass at the rotors would have 0.5, a body alone in the middle has next to nothing
+        # the ratio would be 0.5 with all mass at the rotors, and almost 0 with all mass in the middle
         roll = _log(xp, heavy, r.inertia_ratio)
         pitch = xp.clip(roll * _log(xp, slim, (0.8, 1.25)), *r.inertia_ratio)
         inertia = xp.stack([roll, pitch, (roll + pitch) * _between(flat, (0.6, 0.98))], axis=-1)
         inertia = inertia * (m * arm**2)[..., None]
         # blade flapping and induced drag: M. Faessler et al., Differential flatness of quadrotor dynamics subject to
-        # rotor drag, 2018; form drag of 0 to 1.5 squared arms
+        # rotor drag, 2018; form drag of an area of 0 to 1.5 squared arms
         one = xp.ones_like(m)
         level = xp.stack([one, one, _between(upright, (1.0, 3.0))], axis=-1)
         form = xp.clip((0.75 * _AIR * quadratic * arm**2 / m)[..., None] * level, *r.drag_quadratic)
@@ -252,10 +255,12 @@ class Family:
         )
 
     def limits(self, command_mode: str) -> tuple[list[float], list[float]]:
-        """Smallest and largest command, the same for every vehicle of the family; a vehicle does what it can of it.
+        """Smallest and largest command, the same for every vehicle of the family.
+
+        A vehicle follows a command as far as it can.
 
         Raises:
-            ValueError: for a command mode whose commands are not the same to different vehicles.
+            ValueError: for a command mode in which the same command has different meanings for different vehicles.
         """
         r = self.ranges
         if command_mode == "ctbr":
@@ -269,32 +274,32 @@ class Family:
 
 
 def _between(u: Any, bounds: Range) -> Any:
-    """Uniform."""
+    """Map u in [0, 1) to a uniform value between the bounds."""
     return bounds[0] + (bounds[1] - bounds[0]) * u
 
 
 def _log(xp: Any, u: Any, bounds: Range) -> Any:
-    """Uniform in the logarithm."""
+    """Map u in [0, 1) to a value between the bounds that is uniform in the logarithm."""
     low, high = math.log(bounds[0]), math.log(bounds[1])
     return xp.exp(low + (high - low) * u)
 
 
 def _loaded(vehicle: Vehicle, name: str) -> Vehicle:
-    """A vehicle without leading axes as one that was read from a file: numbers, not arrays without axes."""
+    """A vehicle without leading axes, as if read from a file: plain numbers in place of arrays without axes."""
     values = {f.name: getattr(vehicle, f.name) for f in quantities(vehicle)}
     return Vehicle(name=name, **{key: value if np.ndim(value) else float(value) for key, value in values.items()})
 
 
 def family_names() -> list[str]:
-    """The families that the package ships."""
+    """Names of the families that the package ships."""
     return sorted(path.stem for path in FAMILIES.glob("*.toml"))
 
 
 def load_family(name_or_path: str | Path) -> Family | None:
-    """The family of a shipped name, or of the path of its TOML file; None where that is one vehicle's.
+    """The family with this shipped name or TOML file. None if the file describes a single vehicle.
 
     Raises:
-        ValueError: naming the file, the range, its value and what is accepted; when there is no such file.
+        ValueError: naming the file, the range, its value and what is accepted; or if there is no such file.
     """
     path = vehicle_file(name_or_path)
     table, where = read_table(path), str(path)
@@ -307,10 +312,10 @@ def load_family(name_or_path: str | Path) -> Family | None:
 
 
 def nominal_vehicle(name_or_path: str | Path) -> Vehicle:
-    """The vehicle of a name or a file; of a family, the one in the middle of all draws.
+    """The vehicle with this name or file. For a family: the vehicle in the middle of all draws.
 
     Raises:
-        ValueError: as `load_family` and `load_vehicle`.
+        ValueError: as for `load_family` and `load_vehicle`.
     """
     family = load_family(name_or_path)
     return load_vehicle(name_or_path) if family is None else family.middle

@@ -1,7 +1,7 @@
-"""What a vehicle's file says of its own uncertainty: standard deviations and correlations. Imports no JAX.
+"""Uncertainty given by a vehicle file: standard deviations and correlations. Imports no JAX.
 
-A file may have, beside its entries with `sigma`, a table `[correlation]`: `of` names parameters, as "mass" or
-"inertia[0]", and `value` is their matrix. `e2efly identify` writes it.
+Beside its entries with `sigma`, a file may have a table `[correlation]`. There `of` names parameters, such as "mass" or
+"inertia[0]", and `value` is their correlation matrix. `e2efly identify` writes this table.
 """
 
 import dataclasses
@@ -16,15 +16,16 @@ from e2efly.vehicles.tables import read_table, shown
 from e2efly.vehicles.vehicle import CORRELATION, Vehicle, load_vehicle, quantities, sigmas_of, terms, vehicle_file
 
 IDENTIFIED = "identified"
-"""What `randomize` calls this distribution."""
+"""The name of this distribution in `randomize`."""
 WIDEST = 2.5
-"""Largest of the standard normal numbers that are drawn: 1.2 % of them lie beyond, and are drawn in."""
+"""Limit of the standard normal numbers that are drawn. The 1.2 % of them that lie beyond it are clipped to it."""
 LARGEST = 0.7
-"""Relative standard deviation above which a value is too vague to be drawn from."""
+"""Relative standard deviation above which a value is too uncertain to be drawn."""
 TOGETHER = {"thrust_map": ("rotor_thrust_max",)}
-"""Fields that are drawn by one factor on all of their entries, and what that factor moves besides."""
+"""Fields whose entries are all multiplied by one common factor, and the other fields that this factor multiplies."""
 ADDED = ("latency",)
-"""Fields whose deviation is added, in their own unit; on all others it is the logarithm of a factor."""
+"""Fields whose deviation is added, in their own unit. For all other fields the deviation is the logarithm of a
+factor."""
 
 
 @dataclass(frozen=True)
@@ -32,21 +33,21 @@ class Entry:
     """One number that is uncertain: a field of the vehicle, or one of its entries."""
 
     field: str
-    """Of `Vehicle`."""
+    """Name of a field of `Vehicle`."""
     index: int | None = None
-    """Of the entry; None: the whole field."""
+    """Index of the entry. None: the whole field."""
 
     @property
     def name(self) -> str:
-        """As files call it."""
+        """Its name in files."""
         return self.field if self.index is None else f"{self.field}[{self.index}]"
 
     @staticmethod
     def of(name: str) -> "Entry":
-        """The entry that a file calls so.
+        """The entry with this name in files.
 
         Raises:
-            ValueError: for a name of another form, or of no parameter.
+            ValueError: for a name of another form, or for a name of no parameter.
         """
         found, shapes = (
             re.fullmatch(r"(\w+)(?:\[(\d+)\])?", name),
@@ -62,57 +63,60 @@ class Entry:
 
 @dataclass(frozen=True)
 class Posterior:
-    """The distribution of a vehicle about its file: normal in the logarithms, and in seconds of the delay."""
+    """The distribution of a vehicle about the values of its file.
+
+    It is normal in the logarithms of the values, and for the latency in seconds.
+    """
 
     entries: tuple[Entry, ...]
-    """What is uncertain."""
+    """The uncertain entries."""
     root: np.ndarray
-    """(d, m) times a vector of m standard normal numbers it gives the deviations."""
+    """(d, m). Multiplied by a vector of m standard normal numbers, it gives the deviations."""
 
     @property
     def latency(self) -> int | None:
-        """Which entry the delay is; None: the file does not say."""
+        """Index of the entry of the latency. None: the file does not give its uncertainty."""
         return next((i for i, entry in enumerate(self.entries) if entry.field in ADDED), None)
 
     @property
     def latency_sigma(self) -> Any:
-        """Standard deviation of the delay, s; 0 where the file does not say."""
+        """Standard deviation of the latency, s. 0 if the file does not give it."""
         return 0.0 if self.latency is None else (self.root[self.latency] ** 2).sum() ** 0.5
 
     def without_latency(self) -> "Posterior":
-        """The distribution of all else."""
+        """The distribution of all other entries."""
         kept = [i for i, entry in enumerate(self.entries) if entry.field not in ADDED]
         return Posterior(tuple(self.entries[i] for i in kept), self.root[kept])
 
     @property
     def thrust_sigma(self) -> float:
-        """Standard deviation of the thrust over the mass, relative."""
+        """Relative standard deviation of the ratio of thrust to mass."""
         names = [entry.field for entry in self.entries]
         rows = {name: self.root[names.index(name)] for name in ("thrust_map", "mass") if name in names}
         return float(np.linalg.norm(rows.get("thrust_map", 0.0 * self.root[0]) - rows.get("mass", 0.0)))
 
     def times(self, width: float) -> "Posterior":
-        """The distribution with so many times its standard deviations."""
+        """The distribution with its standard deviations multiplied by `width`."""
         return dataclasses.replace(self, root=self.root * width)
 
     @property
     def sigma(self) -> dict[str, float]:
-        """Standard deviations, by the name of the entry: relative, of the delay s."""
+        """Standard deviations by the name of the entry: relative, but for the latency in s."""
         return {e.name: float(np.linalg.norm(row)) for e, row in zip(self.entries, self.root, strict=True)}
 
     def deviation(self, normal: Any) -> Any:
-        """Deviations of the entries, (n, d), of standard normal numbers, (n, m), NumPy's or JAX's.
+        """Deviations of the entries, (n, d), from standard normal numbers, (n, m), of NumPy or JAX.
 
-        Each number counts up to `WIDEST`, so that no episode has an absurd vehicle.
+        Each number is clipped to `WIDEST`, so that no episode has an absurd vehicle.
         """
         return normal.clip(-WIDEST, WIDEST) @ self.root.T
 
     def values(self, vehicle: Vehicle, deviation: Any) -> dict[str, Any]:
-        """Fields of the vehicles that have these deviations, each (n, ...); the delay is none of them.
+        """Fields of the vehicles that have these deviations, each (n, ...), without the latency.
 
         Args:
-            vehicle: at whose values the deviations are zero.
-            deviation: (n, d), of `deviation`.
+            vehicle: the vehicle with deviations of zero.
+            deviation: (n, d), from `deviation`.
         """
         drawn: dict[str, list[Any]] = {}
         for i, entry in enumerate(self.entries):
@@ -134,10 +138,10 @@ class Posterior:
 
 
 def load_posterior(name_or_path: str | Path) -> Posterior:
-    """What a vehicle's file says of its uncertainty.
+    """The uncertainty that a vehicle file gives.
 
     Raises:
-        ValueError: naming the file and what is wrong with it; for a file without a single standard deviation.
+        ValueError: naming the file and what is wrong with it; or if the file has no standard deviation at all.
     """
     path = vehicle_file(name_or_path)
     vehicle, table = load_vehicle(path), read_table(path)
@@ -158,7 +162,7 @@ def load_posterior(name_or_path: str | Path) -> Posterior:
 
 
 def _relative(vehicle: Vehicle, sigmas: dict[str, np.ndarray], where: str) -> dict[str, float]:
-    """Standard deviations by entry: relative, of what is added in its unit."""
+    """Standard deviations by entry: relative, but in its own unit for a deviation that is added."""
     moved_along = {name for names in TOGETHER.values() for name in names}
     found: dict[str, float] = {}
     for field, sigma in sigmas.items():
@@ -183,7 +187,7 @@ def _relative(vehicle: Vehicle, sigmas: dict[str, np.ndarray], where: str) -> di
 
 
 def read_correlation(file: dict[str, Any], where: str) -> tuple[list[str], np.ndarray]:
-    """Names and matrix of a vehicle file's table `[correlation]`; empty where there is none.
+    """Names and matrix of the table `[correlation]` of a vehicle file. Both are empty if the file has none.
 
     Raises:
         ValueError: naming the file and what is wrong with the table.

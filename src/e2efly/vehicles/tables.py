@@ -1,4 +1,4 @@
-"""TOML files that people write, read with errors that name the place, the value and what is accepted."""
+"""Read TOML files that users write. Errors name the place, the value and what is accepted."""
 
 import tomllib
 from pathlib import Path
@@ -7,32 +7,33 @@ from typing import Any
 import numpy as np
 
 LARGEST = 1e4
-"""Largest size of a number in a course or a scene, in whatever unit: there float32 has a millimetre of a metre left."""
+"""Largest absolute value of a number in a course or a scene, in any unit. Up to it, float32 resolves about a
+millimetre."""
 _SHOWN = 200
-"""Characters of a value in an error."""
+"""Largest number of characters of a value in an error text."""
 
 
 def read_table(path: Path) -> dict[str, Any]:
-    """All of a TOML file.
+    """Read a whole TOML file.
 
     Raises:
         ValueError: naming the file, and what is wrong with it.
     """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:  # no text, no TOML, too many digits, or nested too deep
+    except (ValueError, RecursionError) as error:  # not text, not TOML, too many digits, or nested too deep
         raise ValueError(f"{path}: not a TOML file: {error}") from None
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}; accepted: the path of a .toml file") from None
 
 
 def number(where: str, value: Any, what: str = "") -> float:
-    """A finite number.
+    """Check for a finite number.
 
     Args:
-        where: file and key, for the error.
-        value: as read.
-        what: follows the word number in the error: ` of metres`.
+        where: file and key, for the error text.
+        value: the value as read.
+        what: text that follows the word "number" in the error text, such as ` of metres`.
 
     Raises:
         ValueError: naming all three.
@@ -43,7 +44,7 @@ def number(where: str, value: Any, what: str = "") -> float:
 
 
 def numbers(where: str, value: Any, count: int, what: str = "") -> np.ndarray:
-    """A list of so many finite numbers, (count,) float64; arguments and errors as of `number`."""
+    """Check for a list of `count` finite numbers, (count,) float64. Arguments and errors are as for `number`."""
     if not isinstance(value, list) or len(value) != count or not all(map(_finite, value)):
         raise ValueError(
             f"{where} is {shown(value)}; accepted: {count} finite numbers{what}, at most {LARGEST:g} in size"
@@ -52,17 +53,17 @@ def numbers(where: str, value: Any, count: int, what: str = "") -> np.ndarray:
 
 
 def text(where: str, value: Any) -> str:
-    """A text; arguments and errors as of `number`."""
+    """Check for a text. Arguments and errors are as for `number`."""
     if not isinstance(value, str):
         raise ValueError(f"{where} is {shown(value)}; accepted: a text")
     return value
 
 
 def shown(value: Any) -> str:
-    """A value for an error, cut where it is long."""
+    """A value as shown in an error text, shortened if it is long."""
     try:
         said = repr(value)
-    except (ValueError, RecursionError):  # Python writes no whole number of thousands of digits
+    except (ValueError, RecursionError):  # Python does not print integers with thousands of digits
         return "a number too large to be shown"
     return said if len(said) <= _SHOWN else f"{said[:_SHOWN]}..."
 

@@ -1,4 +1,4 @@
-"""What the terms of the physics that a vehicle's file may leave out have to keep."""
+"""Checks of the optional terms of the physics that a vehicle file may contain."""
 
 from typing import TYPE_CHECKING
 
@@ -9,20 +9,20 @@ if TYPE_CHECKING:
 
 
 BATTERY = ("nominal_voltage", "battery_voltage", "voltage_sag", "speed_per_volt")
-"""The entries of the battery; the first two go together, and the others need them."""
+"""The entries of the battery. The first two must be given together, and the others require them."""
 LEAST_VOLTAGE = 0.1
-"""Share of the nominal voltage below which no battery falls, so that a rotor's speed has a gradient."""
+"""Lower limit of the battery voltage, as a share of the nominal voltage. It keeps a gradient for the rotor speed."""
 
 
 def battery_share(vehicle: "Vehicle") -> float:
-    """Largest steady thrust of all rotors with the vehicle's battery, over that at its nominal voltage."""
+    """Largest steady thrust of all rotors with the vehicle's battery, divided by that at the nominal voltage."""
     if vehicle.battery_voltage is None:
         return 1.0
     full, most = vehicle.full_rotor_speed, 4 * vehicle.thrust_range[1]
     sag = 0.0 if vehicle.voltage_sag is None else vehicle.voltage_sag
     exponent = 1.0 if vehicle.speed_per_volt is None else vehicle.speed_per_volt
     low, high = 0.0, 1e6
-    for _ in range(100):  # more thrust takes more of the voltage, and less voltage gives less thrust
+    for _ in range(100):  # more thrust lowers the voltage, and a lower voltage gives less thrust
         middle = (low + high) / 2
         volts = max((vehicle.battery_voltage - sag * middle) / vehicle.nominal_voltage, LEAST_VOLTAGE)
         gives = 4 * vehicle.rotor_thrust(full * volts**exponent)
@@ -31,13 +31,13 @@ def battery_share(vehicle: "Vehicle") -> float:
 
 
 def check_terms(vehicle: "Vehicle", allocation: np.ndarray, weight: float, where: str) -> None:
-    """Check the terms that a vehicle has.
+    """Check the optional terms of the physics that a vehicle has.
 
     Args:
-        vehicle: as read.
-        allocation: from the rotors' thrusts to collective thrust and torques, (4, 4).
-        weight: N.
-        where: of the vehicle, for the error.
+        vehicle: the vehicle as read.
+        allocation: matrix from rotor thrusts to collective thrust and torques, (4, 4).
+        weight: weight of the vehicle, N.
+        where: name of the vehicle's file, for the error text.
 
     Raises:
         ValueError: naming the entry, its value and what is accepted.

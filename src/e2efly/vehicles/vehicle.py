@@ -18,31 +18,31 @@ from e2efly.vehicles.tables import read_table, shown
 from e2efly.vehicles.terms import check_terms
 
 _LARGEST = 1e6
-"""Largest size of a value, in its unit."""
+"""Largest absolute value of a number, in its unit."""
 GRAVITY = 9.81
-"""Standard gravity of the paper, m/s^2."""
+"""Standard gravity as in the paper, m/s^2."""
 
 _HERE = Path(__file__).parent
 FAMILIES = _HERE / "families"
-"""The files of the families that the package ships."""
+"""Folder of the files of the families that the package ships."""
 OF_FAMILIES = "thrust_to_weight"
-"""A key that files of families alone have."""
+"""A key that only files of families have."""
 
 CORRELATION = "correlation"
-"""The table of a vehicle's file that no single value has: how the errors of its values hang together
-(`e2efly.vehicles.posterior`)."""
+"""The table of a vehicle file that describes no single value. It holds the correlations between the errors of the
+values (`e2efly.vehicles.posterior`)."""
 
 Controller = Literal["policy", "plant"]
-"""The vehicle that the flight controller believes in: the policy's own, or the one that flies."""
+"""The vehicle for which the flight controller is tuned: the policy's own vehicle, or the vehicle that flies."""
 
 
 def _quantity(unit: str, shape: tuple[int, ...] = (), at_least: float | None = None, above: float | None = None) -> Any:
-    """A vehicle value: its unit, its shape, and the bound that every entry keeps."""
+    """A value of a vehicle: its unit, its shape, and the bound that every entry must satisfy."""
     return field(metadata={"unit": unit, "shape": shape, "at_least": at_least, "above": above})
 
 
 def _term(unit: str, shape: tuple[int, ...] = (), at_least: float | None = None, above: float | None = None) -> Any:
-    """A vehicle value that a file may leave out: the physics is then without what it describes."""
+    """A value that a vehicle file may leave out. The physics then does not have the effect that it describes."""
     return field(default=None, metadata=_quantity(unit, shape, at_least, above).metadata)
 
 
@@ -50,25 +50,25 @@ def _term(unit: str, shape: tuple[int, ...] = (), at_least: float | None = None,
 class Vehicle:
     """Physical parameters of a quadrotor, float64 as loaded.
 
-    In a simulation any field may carry leading batch axes (one value a vehicle): mass `(*n,)`, inertia `(*n, 3)`.
+    In a simulation any field may have leading batch axes (one value per vehicle): mass `(*n,)`, inertia `(*n, 3)`.
     """
 
     name: str = field(metadata={"static": True})
-    """The name of the vehicle: its file's stem."""
+    """The name of the vehicle: the stem of its file name."""
     mass: Any = _quantity("kg", above=0.0)
     """Mass."""
     inertia: Any = _quantity("kg*m^2", (3,), above=0.0)
-    """Moments of inertia about the body axes: all of the inertia tensor where `inertia_products` is left out."""
+    """Moments of inertia about the body axes. They are the whole inertia tensor if `inertia_products` is left out."""
     rotor_position: Any = _quantity("m", (4, 2))
     """Rotor positions in the body's x-y plane."""
     rotor_spin: Any = _quantity("1", (4,))
     """Sign of each rotor's reaction torque about body z."""
     thrust_map: Any = _quantity("N*s^2/rad^2, N*s/rad, N", (3,))
-    """Thrust of a rotor = k2 W^2 + k1 W + k0 at rotor speed W, never below zero: [k2, k1, k0]."""
+    """Thrust of a rotor = k2 W^2 + k1 W + k0 at rotor speed W, never below zero. Order: [k2, k1, k0]."""
     torque_ratio: Any = _quantity("m", at_least=0.0)
-    """Reaction torque of a rotor over its thrust."""
+    """Reaction torque of a rotor divided by its thrust."""
     rotor_thrust_max: Any = _quantity("N", above=0.0)
-    """Largest thrust of one rotor; the tighter of this and `rotor_speed_max` binds."""
+    """Largest thrust of one rotor. The tighter one of this limit and `rotor_speed_max` applies."""
     rotor_speed_max: Any = _quantity("rad/s", above=0.0)
     """Largest rotor speed."""
     rotor_speed_min: Any = _quantity("rad/s", at_least=0.0)
@@ -76,59 +76,64 @@ class Vehicle:
     motor_time_constant: Any = _quantity("s", above=0.0)
     """Time constant of the first-order motor lag."""
     drag_linear: Any = _quantity("N*s/m", (3,), at_least=0.0)
-    """Drag per axis of the body over air-relative speed."""
+    """Drag divided by air-relative speed, per body axis."""
     drag_quadratic: Any = _quantity("N*s^2/m^2", (3,), at_least=0.0)
-    """Drag per axis of the body over air-relative speed squared, signed."""
+    """Drag divided by the signed square of the air-relative speed, per body axis."""
     body_rate_max: Any = _quantity("rad/s", (3,), above=0.0)
-    """Largest body rates that are commanded."""
+    """Largest commanded body rates."""
     rate_gain: Any = _quantity("1/s", (3,), above=0.0)
-    """Angular acceleration commanded per body-rate error."""
+    """Commanded angular acceleration divided by the body-rate error."""
     attitude_gain: Any = _quantity("1/s", (2,), above=0.0)
-    """Body rate commanded per attitude error: [tilt, yaw]."""
+    """Commanded body rate divided by the attitude error: [tilt, yaw]."""
     velocity_gain: Any = _quantity("1/s", (3,), above=0.0)
-    """Acceleration commanded per velocity error, world axes."""
+    """Commanded acceleration divided by the velocity error, world axes."""
     position_gain: Any = _quantity("1/s", (3,), above=0.0)
-    """Velocity commanded per position error, world axes."""
+    """Commanded velocity divided by the position error, world axes."""
     tilt_max: Any = _quantity("rad", above=0.0)
-    """Largest tilt that the controllers command; below pi/2."""
+    """Largest tilt that the controllers command. It must be below pi/2."""
     acceleration_max: Any = _quantity("m/s^2", (3,), above=0.0)
-    """Largest acceleration commanded, world axes."""
+    """Largest commanded acceleration, world axes."""
     speed_max: Any = _quantity("m/s", (3,), above=0.0)
-    """Largest velocity commanded, world axes."""
+    """Largest commanded velocity, world axes."""
     control_rate: Any = _quantity("Hz", at_least=0.1)
-    """Rate at which the policy is asked."""
+    """Rate at which the policy is called."""
     latency: Any = _quantity("s", at_least=0.0)
-    """Time from the policy's observation to its command reaching the rate loop."""
+    """Time from the policy's observation to the arrival of its command at the rate loop."""
     feet_height: Any = _quantity("m", above=0.0)
-    """Height of the centre of mass over the feet."""
+    """Height of the centre of mass above the feet."""
     radius: Any = _quantity("m", above=0.0)
-    """Radius of the sphere that holds the vehicle, for collisions."""
+    """Radius of the sphere that encloses the vehicle, for collisions."""
     rotor_inertia: Any = _term("kg*m^2", at_least=0.0)
-    """Moment of inertia of a rotor, with all that turns with it, about its axis."""
+    """Moment of inertia about the rotor axis of one rotor, including everything that turns with it."""
     motor_time_constant_down: Any = _term("s", above=0.0)
-    """Time constant of a rotor that slows down; `motor_time_constant` is that of one that speeds up."""
+    """Time constant of a rotor that slows down. `motor_time_constant` is then that of a rotor that speeds up."""
     centre_of_mass: Any = _term("m", (3,))
-    """Centre of mass in the axes in which `rotor_position` stands; the drag acts at their origin."""
+    """Centre of mass, in the same axes as `rotor_position`. The drag acts at the origin of these axes."""
     inertia_products: Any = _term("kg*m^2", (3,))
-    """Entries xy, xz and yz of the inertia tensor, whose diagonal is `inertia`: xy is minus the integral of x y dm."""
+    """Entries xy, xz and yz of the inertia tensor, whose diagonal is `inertia`. Entry xy is minus the integral of x y
+    dm."""
     drag_torque: Any = _term("N*m*s", (3,), at_least=0.0)
-    """Torque of the air against the body's turning, per axis, over body rate."""
+    """Torque with which the air resists rotation of the body, divided by body rate, per axis."""
     rate_integral_gain: Any = _term("1/s^2", (3,), at_least=0.0)
-    """Angular acceleration commanded per integral of the body-rate error."""
+    """Commanded angular acceleration divided by the integral of the body-rate error."""
     gyro_time_constant: Any = _term("s", above=0.0)
-    """Time constant of the first-order filter through which the rate loop sees the body rates."""
+    """Time constant of the first-order filter through which the rate loop reads the body rates."""
     nominal_voltage: Any = _term("V", above=0.0)
-    """Voltage of the battery, under load, at which rotors turn as they are told: at which the thrust's limits hold."""
+    """Voltage of the battery, under load, at which the rotors turn at their commanded speeds. The thrust limits hold at
+    this voltage."""
     battery_voltage: Any = _term("V", above=0.0)
     """Voltage of the battery without load, in flight."""
     voltage_sag: Any = _term("V/N", at_least=0.0)
-    """Voltage that the battery loses under load, over the thrust of all rotors; left out: none."""
+    """Voltage that the battery loses under load, divided by the thrust of all rotors. If left out: no loss."""
     speed_per_volt: Any = _term("1", at_least=0.0)
-    """Relative change of the rotors' speed over relative change of the voltage, of a given command; left out: 1."""
+    """Relative change of rotor speed divided by relative change of voltage, at a given command. If left out: 1."""
 
     @property
     def hash(self) -> str:
-        """First 16 hex digits of the SHA-256 of all values: two vehicles fly alike if and only if it is equal."""
+        """First 16 hex digits of the SHA-256 of all values.
+
+        Two vehicles fly alike if and only if their hashes are equal.
+        """
         values = {f.name: np.asarray(getattr(self, f.name), np.float64).tolist() for f in quantities(self)}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
@@ -136,25 +141,25 @@ class Vehicle:
         """This body with the flight controller of another vehicle.
 
         Args:
-            other: whose values to take.
-            names: the fields; none: all of `CONTROLLED`.
+            other: the vehicle whose values are used.
+            names: the fields to take. If none are named: all of `CONTROLLED`.
         """
         return dataclasses.replace(self, **{name: getattr(other, name) for name in names or CONTROLLED})
 
     @property
     def thrust_range(self) -> tuple[float, float]:
-        """Smallest and largest thrust of one rotor, N: at idle, and at the tighter of the two maxima."""
+        """Smallest and largest thrust of one rotor, N: at idle speed, and at the tighter one of the two maxima."""
         low, high = (self.rotor_thrust(speed) for speed in (self.rotor_speed_min, self.rotor_speed_max))
         return float(low), float(min(high, self.rotor_thrust_max))
 
     @property
     def thrust_to_weight(self) -> float:
-        """Largest collective thrust over weight."""
+        """Largest collective thrust divided by weight."""
         return float(4 * self.thrust_range[1] / (self.mass * GRAVITY))
 
     @property
     def full_rotor_speed(self) -> float:
-        """Largest speed of a rotor, rad/s: where the tighter of its two maxima binds."""
+        """Largest speed of a rotor, rad/s, at which the tighter one of its two maxima applies."""
         k2, k1, k0 = self.thrust_map
         top = self.thrust_range[1]
         return float((-k1 + np.sqrt(k1**2 + 4 * k2 * (top - k0))) / (2 * k2))
@@ -172,34 +177,35 @@ class Vehicle:
 
 
 TIMED = ("control_rate", "latency")
-"""What a vehicle's file says of the policy's computer and its link."""
+"""Values of a vehicle file that describe the policy's computer and its link."""
 RATE_LOOP = ("rate_gain", "rate_integral_gain", "gyro_time_constant")
-"""What a vehicle's file says of the rate loop."""
+"""Values of a vehicle file that describe the rate loop."""
 CONTROLLED = (
     "body_rate_max", *RATE_LOOP, "attitude_gain", "velocity_gain", "position_gain", "tilt_max", "acceleration_max",
     "speed_max", *TIMED,
 )  # fmt: skip
-"""What a vehicle's file says of the flight controller and what asks it; all else is the body."""
+"""Values of a vehicle file that describe the flight controller, and the computer and link that send it commands. All
+other values describe the body."""
 
 
 @dataclass(frozen=True)
 class Flown:
-    """What flies, and what its flight controller takes it for."""
+    """The vehicle that flies, and the vehicle for which its flight controller is tuned."""
 
     body: Vehicle
-    """Which moves; of the flight controller's numbers the rate loop's gain counts."""
+    """The vehicle that moves. Of its flight-controller values only those of the rate loop are used."""
     believed: Vehicle
-    """In which the flight controller believes: thrust per mass, inertia, mixer, gains, limits."""
+    """The vehicle for which the flight controller is tuned: thrust per mass, inertia, mixer, gains, limits."""
 
     @staticmethod
     def of(own: Vehicle, flown: Vehicle, controller: str = "policy") -> "Flown":
-        """A policy's vehicle gives way to another one.
+        """Let another vehicle fly in place of the policy's own vehicle.
 
         Args:
             own: the vehicle that the policy was trained on. Control rate and latency stay its own.
             flown: the vehicle that flies.
-            controller: policy: the flight controller stays that of `own`, nobody has told it of the body; plant: it is
-                tuned to the vehicle that flies.
+            controller: `policy`: the flight controller stays that of `own`, and does not know the body that flies.
+                `plant`: it is tuned to the vehicle that flies.
 
         Raises:
             ValueError: for another controller.
@@ -218,7 +224,7 @@ class Flown:
 
 
 def quantities(vehicle: Vehicle | None = None) -> tuple[dataclasses.Field, ...]:
-    """The fields with a unit that every vehicle has; of a vehicle, those and the terms of physics that it has."""
+    """The fields with a unit that every vehicle has. If a vehicle is given: also its optional terms of the physics."""
     return tuple(
         f
         for f in dataclasses.fields(Vehicle)
@@ -227,17 +233,20 @@ def quantities(vehicle: Vehicle | None = None) -> tuple[dataclasses.Field, ...]:
 
 
 def terms() -> tuple[dataclasses.Field, ...]:
-    """The fields that a vehicle's file may leave out, each a term of the physics: None where there is none."""
+    """The fields that a vehicle file may leave out.
+
+    Each is a term of the physics, and None means that the term is absent.
+    """
     return tuple(f for f in dataclasses.fields(Vehicle) if f.default is None)
 
 
 def vehicle_names() -> list[str]:
-    """The vehicles that the package ships."""
+    """Names of the vehicles that the package ships."""
     return sorted(path.stem for path in _HERE.glob("*.toml"))
 
 
 def vehicle_file(name_or_path: str | Path) -> Path:
-    """The TOML file of a shipped vehicle or family, by its name, or of any other, by its path.
+    """The TOML file of a shipped vehicle or family, by its name, or of any other vehicle or family, by its path.
 
     Raises:
         ValueError: when there is none.
@@ -274,9 +283,9 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
 
 
 def read_values(table: dict[str, Any], fields: Sequence[dataclasses.Field], where: str) -> dict[str, Any]:
-    """The values of a file that has an entry for each of these fields, made as those of `Vehicle`, and no others.
+    """The values of a file that has an entry for each of these fields, and no others.
 
-    A field that has a default may be left out.
+    The fields are made like those of `Vehicle`. A field that has a default may be left out.
 
     Raises:
         ValueError: naming the file, the key, the value and what is accepted.
@@ -293,7 +302,7 @@ def read_values(table: dict[str, Any], fields: Sequence[dataclasses.Field], wher
 
 
 def _read(where: str, f: dataclasses.Field, entry: Any) -> Any:
-    """One value of the file, with its unit, shape and bounds checked."""
+    """One value of the file, after a check of its unit, shape and bounds."""
     key, unit, shape = f.name, f.metadata["unit"], f.metadata["shape"]
     if not isinstance(entry, dict) or set(entry) - {"sigma"} != {"value", "unit", "source"}:
         raise ValueError(
@@ -330,7 +339,7 @@ def _read(where: str, f: dataclasses.Field, entry: Any) -> Any:
 
 
 def _read_sigma(where: str, f: dataclasses.Field, entry: dict[str, Any]) -> np.ndarray:
-    """Standard deviations of an entry of the file, of the value's shape; NaN where they are not known."""
+    """Standard deviations of an entry of the file, in the shape of the value. NaN where they are not known."""
     shape, given = f.metadata["shape"], entry.get("sigma")
     if given is None:
         return np.full(shape, np.nan)
@@ -347,22 +356,22 @@ def _read_sigma(where: str, f: dataclasses.Field, entry: dict[str, Any]) -> np.n
 
 
 def read_sigmas(name_or_path: str | Path) -> dict[str, np.ndarray]:
-    """Standard deviations of a vehicle's values, by field, in their units; NaN where the file does not say.
+    """Standard deviations of a vehicle's values, by field, in their units. NaN where the file does not give them.
 
     Raises:
-        ValueError: as of `load_vehicle`.
+        ValueError: as for `load_vehicle`.
     """
     path = vehicle_file(name_or_path)
     return sigmas_of(load_vehicle(path), read_table(path), str(path))
 
 
 def sigmas_of(vehicle: Vehicle, table: dict[str, Any], where: str) -> dict[str, np.ndarray]:
-    """As `read_sigmas`, of a file that was read."""
+    """The same as `read_sigmas`, for a file that was already read."""
     return {f.name: _read_sigma(where, f, table[f.name]) for f in quantities(vehicle)}
 
 
 def check(vehicle: Vehicle, where: str = "vehicle") -> None:
-    """Check what no single value shows.
+    """Check the rules that involve several values.
 
     Raises:
         ValueError: naming the values and what is accepted.
@@ -418,7 +427,7 @@ def check(vehicle: Vehicle, where: str = "vehicle") -> None:
 
 
 def rotor_arms(vehicle: Vehicle) -> np.ndarray:
-    """Places of the rotors from the centre of mass in the body's x-y plane, (4, 2), m."""
+    """Positions of the rotors relative to the centre of mass, in the body's x-y plane, (4, 2), m."""
     arms = np.asarray(vehicle.rotor_position, np.float64)
     return arms if vehicle.centre_of_mass is None else arms - np.asarray(vehicle.centre_of_mass)[:2]
 
@@ -432,7 +441,7 @@ def inertia_tensor(vehicle: Vehicle) -> np.ndarray:
 
 
 def principal_moments(vehicle: Vehicle) -> np.ndarray:
-    """Principal moments of inertia, rising, (3,), kg*m^2."""
+    """Principal moments of inertia in ascending order, (3,), kg*m^2."""
     if vehicle.inertia_products is None:
         return np.sort(vehicle.inertia)
     return np.linalg.eigvalsh(inertia_tensor(vehicle))

@@ -22,27 +22,27 @@ class RaceTrack:
     closed: bool
     """Whether the first gate follows the last."""
     start: np.ndarray
-    """(3,) where a race begins."""
+    """(3,) start of a race."""
     start_yaw: float
-    """Heading there."""
+    """Heading at the start."""
     position: np.ndarray
     """(gates, 3) centres of the openings."""
     yaw: np.ndarray
-    """(gates,) the direction in which a gate is flown through, about world z."""
+    """(gates,) the direction of flight through each gate, about world z."""
     opening: np.ndarray
     """(gates, 2) inner width and height."""
 
 
 def track_names() -> list[str]:
-    """The tracks that the package ships."""
+    """Names of the tracks that the package ships."""
     return sorted(path.stem for path in _HERE.glob("*.toml"))
 
 
 def track_file(name_or_path: str) -> Path:
-    """The file of a shipped track, by its name, or of any track, by its path.
+    """The file of a shipped track, by its name, or of any other track, by its path.
 
     Raises:
-        ValueError: when there is none.
+        ValueError: when there is no such file.
     """
     path = Path(name_or_path) if name_or_path.endswith(".toml") else _HERE / f"{name_or_path}.toml"
     if not path.is_file():
@@ -51,7 +51,7 @@ def track_file(name_or_path: str) -> Path:
 
 
 def load_track(name_or_path: str) -> RaceTrack:
-    """Load a shipped track by name, or any by the path of its .toml file.
+    """Load a shipped track by name, or any other track by the path of its .toml file.
 
     Raises:
         ValueError: naming the file, the key, the value and what is accepted.
@@ -86,7 +86,10 @@ def load_track(name_or_path: str) -> RaceTrack:
 
 
 def track_text(track: RaceTrack) -> str:
-    """A track as the text of a .toml file for `load_track`; angles to a microradian, lengths to a micrometre."""
+    """A track as the text of a .toml file for `load_track`.
+
+    Angles are exact to a microradian, lengths to a micrometre.
+    """
 
     def row(values: np.ndarray) -> str:
         return "[" + ", ".join(f"{float(x):.6f}" for x in values) + "]"

@@ -1,1 +1,1 @@
-"""Worlds of triangles: scans and models from files, and halls made in code, seen through the same cameras."""
+"""Worlds of triangles, seen through the same cameras: scans and models from files, and worlds made in code."""

@@ -1,7 +1,7 @@
-"""Rays of cameras against one world of triangles: the call of `e2efly.scenes.cast.cast`, answered by an engine.
+"""Camera rays against one world of triangles. The call is that of `e2efly.scenes.cast.cast`, computed by an engine.
 
-Triangles are surfaces: seen from both sides, with nothing inside. A camera in an object sees the object's inner side,
-unlike in a solid of `e2efly.scenes.scene`, where all depth is 0.
+Triangles are surfaces. They are visible from both sides, and nothing is inside them. A camera inside an object sees the
+object's inner side. This differs from a solid of `e2efly.scenes.scene`, where all depth is 0.
 """
 
 import functools
@@ -20,7 +20,7 @@ from e2efly.scenes.meshes.scene import MeshScene
 from e2efly.scenes.scene import COLOURS, SKY
 
 _BIAS = 1e-3
-"""A shadow is looked for from this far over the surface, m."""
+"""Distance above the surface from which a shadow is looked for, m."""
 _KINDS = {"depth": np.float32, "label": np.int32, "instance": np.int32, "normal": np.float32, "rgb": np.float32}
 
 
@@ -32,19 +32,20 @@ def cast(
     channels: tuple[str, ...] = ("depth",),
     light: Light | None = None,
 ) -> dict[str, Array]:
-    """What n sensors in the one world see; also inside compiled programs. Images have no gradient.
+    """The images of n sensors in the one world, also inside compiled programs. Images have no gradient.
 
     Args:
         scene: the world.
-        origin: where the rays start, world, m.
-        matrix: sensor's frame to world; its columns may have any length, so that it also sets the field of view.
+        origin: start of the rays, world, m.
+        matrix: map from the sensor's frame to the world. Its columns may have any length, so that it also sets the
+            field of view.
         pattern: directions of the rays.
-        channels: of `CHANNELS`.
-        light: for rgb; its squares are not drawn, the ground's colour being the file's.
+        channels: names from `CHANNELS`.
+        light: light for rgb. Its squares are not drawn, because the file gives the ground's colour.
 
     Returns:
-        Images (n, h, w): `depth` along the ray's direction, `FAR` where nothing is met; `label`; `instance`; and
-        (n, h, w, 3): `normal`, towards the sensor, world, zero in the sky; `rgb` in [0, 1].
+        Images (n, h, w): `depth` along the ray's direction, `FAR` without a hit; `label`; `instance`; and (n, h, w, 3):
+        `normal`, towards the sensor, world, zero in the sky; `rgb` in [0, 1].
 
     Raises:
         ValueError: naming the channel and those accepted, or the package that is missing.
@@ -66,7 +67,7 @@ def _more(name: str) -> tuple[int, ...]:
 
 
 def _rays(pattern: Pattern) -> Float[np.ndarray, "3 r"]:
-    """Directions in the order of the image's pixels."""
+    """Directions of the rays in the order of the image's pixels."""
     rows, columns, th, tw = pattern.layout
     cut = pattern.tiles.reshape(rows, columns, 3, th, tw).transpose(2, 0, 3, 1, 4)
     return np.ascontiguousarray(cut.reshape(3, -1), np.float32)
@@ -80,7 +81,7 @@ def _pool() -> ThreadPoolExecutor:
 def _images(
     scene: MeshScene, engine: Engine, rays: np.ndarray, channels: tuple[str, ...], *given: Array
 ) -> dict[str, np.ndarray]:
-    """The callback: cameras, with any axes before theirs, shared among threads."""
+    """The callback: images of cameras, which may have more leading axes, with the work shared among threads."""
     batch = given[0].shape[:-1]
     flat = [np.asarray(x).reshape(-1, *x.shape[len(batch) :]) for x in given]
     count = len(flat[0])
@@ -130,7 +131,7 @@ def _seen(
 def _brightness(
     engine: Engine, point: np.ndarray, normal: np.ndarray, met: np.ndarray, sun: np.ndarray, strength: np.ndarray
 ) -> Float[np.ndarray, " m"]:
-    """Of the points that are met: under the sun, or in the shadow of what stands before it."""
+    """Brightness of the points that are hit: in the sun, or in the shadow of an obstacle."""
     towards = np.broadcast_to(sun[:, None], point.shape)[met]
     shade = np.maximum(np.einsum("mj,mj->m", normal[met], towards), 0)
     bright = shade > 0

@@ -1,12 +1,14 @@
-"""How far points are from a world of triangles: a grid of signed distances, made once, read with gradients.
+"""Distances of points to a world of triangles: a grid of signed distances, computed once, read with gradients.
 
-Lengths are exact distances to a few triangles, those in the cell of the surface that is nearest to the point.
-Signs come from rays: from every point of the grid they go out in 6 directions, and in 8 more where these disagree.
-Where a ray has come out through backs of triangles more often than it has gone in through fronts, it began in something
-solid; a point is solid if more than two thirds of the rays that meet anything say so. Holes do no harm: a ray that
-leaves through one meets nothing or is outvoted. It needs triangles that face where one can fly: an object's outside, a
-room's inside.
-A single sheet that stands free in the air has no inside: the distance to it is positive on both sides.
+Lengths are exact distances to a few triangles: those in the surface cell nearest to the point.
+
+Signs come from rays. From every point of the grid, rays go out in 6 directions, and in 8 more if these disagree. A ray
+began inside a solid if it has crossed the backs of triangles more often than the fronts. A point is solid if more than
+two thirds of the rays that meet anything began inside a solid. Holes do no harm: a ray that leaves through a hole meets
+nothing, or is outvoted. The method needs triangles that face the free space: the outside of an object, the inside of a
+room.
+
+A single sheet that stands free in the air has no inside. The distance to it is positive on both sides.
 """
 
 import itertools
@@ -29,21 +31,22 @@ from e2efly.scenes.meshes.engine import needed
 from e2efly.scenes.meshes.scene import MeshScene
 
 MOST = 50_000_000
-"""Values of a grid."""
+"""Largest number of values in a grid."""
 _TRIED = 4
-"""Triangles that are tried for a point: the nearest to the middle of the cell."""
+"""Number of triangles that are tested for a point: those nearest to the middle of the cell."""
 _CROSSINGS = 12
-"""Triangles that a ray is followed through."""
+"""Largest number of triangles through which a ray is followed."""
 _STEP = 1e-4
-"""How far behind one triangle the next is looked for, m."""
+"""Distance behind one triangle at which the search for the next begins, m."""
 _SHARE = 2 / 3
 _BATCH = 50_000
 _AXES = np.array([axis for k in (1, 3) for axis in itertools.product((-1, 0, 1), repeat=3) if np.abs(axis).sum() == k])
 _TURN = Rotation.from_rotvec([0.5, 0.3, 0.7]).as_matrix()
 _DIRECTIONS = (_AXES / np.linalg.norm(_AXES, axis=1, keepdims=True) @ _TURN).astype(np.float32)
-"""Through the 6 faces and the 8 corners of a cube, turned so that none lies along usual walls or meets their edges."""
+"""Directions through the 6 faces and the 8 corners of a cube, rotated so that none is parallel to usual walls or meets
+their edges."""
 _BEFORE, _LEAST = 6, 2
-"""If of the first so many rays at least so many meet something and agree, they suffice."""
+"""The first number of rays suffices if at least the second number of them meet something, and they agree."""
 
 
 @jax.tree_util.register_dataclass
@@ -52,11 +55,11 @@ class DistanceGrid:
     """Signed distances at the points of a grid; leaves."""
 
     values: Float[Array, "x y z"]
-    """m, negative in what is solid."""
+    """Distances, m, negative inside solids."""
     origin: Float[Array, "3"]
-    """Its first point, world, m."""
+    """First point of the grid, world, m."""
     cell: Float[Array, ""]
-    """From point to point, m."""
+    """Distance between neighbouring points, m."""
 
     @staticmethod
     def of(
@@ -66,10 +69,10 @@ class DistanceGrid:
 
         Args:
             scene: the world.
-            cell: from point to point, m. Interpolated distances are wrong by less than half of it, least where
-                surfaces are smooth.
-            margin: how far the grid reaches beyond the box, m. What lies outside of it is unknown to the grid.
-            box: lowest and highest corner, m; `scene.bounds` when left out.
+            cell: distance between neighbouring points, m. The error of interpolated distances is below half of it, and
+                smallest where surfaces are smooth.
+            margin: distance by which the grid extends beyond the box, m. The grid does not contain anything outside it.
+            box: lowest and highest corner, m. If left out: `scene.bounds`.
 
         Raises:
             ValueError: naming what is wrong and what is accepted, or the package that is missing.
@@ -100,15 +103,15 @@ class DistanceGrid:
 def clearance(
     grid: DistanceGrid, position: Float[Array, "n 3"], time: Float[Array, " n"] | None = None
 ) -> Float[Array, " n"]:
-    """Signed distance of points to what is nearest, m; negative inside: `e2efly.scenes.scene.clearance` of a grid.
+    """Signed distance of points to the nearest surface, m, negative inside: `e2efly.scenes.scene.clearance` for a grid.
 
-    Trilinear between the grid's points; differentiable. Outside of the grid, the distance to it is added to what its
-    border says, which may be too far, never too near.
+    It is trilinear between the points of the grid, and differentiable. Outside the grid, the distance to the grid is
+    added to the value at its border. The result may be too large there, but never too small.
 
     Args:
-        grid: of the one world.
+        grid: the grid of the one world.
         position: world, m.
-        time: not looked at; nothing moves.
+        time: not used, because nothing moves.
     """
     del time
     most = jnp.asarray(grid.values.shape) - 1
@@ -165,9 +168,9 @@ def _away(
 def _samples(
     triangles: Float[np.ndarray, "f 3 3"], spacing: float, box: tuple[Any, Any]
 ) -> tuple[Float[np.ndarray, "s 3"], Int[np.ndarray, " s"]]:
-    """Points all over the triangles that reach into the box, and the triangle of each.
+    """Points distributed over the triangles that reach into the box, and the triangle of each point.
 
-    Triangles are halved until their sides are two spacings long at most; their corners and the middles of their sides
+    Triangles are halved until their sides are at most two spacings long. Their corners and the middles of their sides
     are the points.
     """
     pieces, owner, done = triangles.astype(np.float32), np.arange(len(triangles)), []
@@ -189,7 +192,10 @@ def _samples(
 
 
 def to_triangles(p: Float[np.ndarray, "n 3"], triangles: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, " n"]:
-    """Distance of each point to its triangle: to the plane over it, else to the nearest side."""
+    """Distance of each point to its triangle.
+
+    It is the distance to the plane if the point is above the triangle, otherwise to the nearest side.
+    """
     corners = [triangles[:, i] for i in range(3)]
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     plane = np.abs(_dot(p - corners[0], normal)) / np.sqrt(_dot(normal, normal))
@@ -208,20 +214,20 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _solid(scene: MeshScene, points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
-    """Whether points are in something."""
+    """Whether points are inside a solid."""
     with needed("mesh"):
         from e2efly.scenes.meshes.embree import Embree
 
     embree = Embree(scene.triangles, watertight=True)
 
     def crossed(start: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of rays: 1 where they come out first, -1 where they go in, 0 for nothing; and how far that is."""
+        """For rays: 1 if they first leave a solid, -1 if they first enter one, 0 without a hit; and its distance."""
         depth, face = embree.first(start, way)
         out = np.sign(_dot(scene.normal[face], way))
         return np.where(face >= 0, np.where(out == 0, -1, out), 0), depth
 
     def begins_in(start: np.ndarray, way: np.ndarray, sign: np.ndarray, depth: np.ndarray) -> np.ndarray:
-        """Of rays that go in first: whether they come out more often anywhere on their way."""
+        """For rays that first enter a solid: whether, at any place, they have left solids more often than entered."""
         balance, result, left = np.full(len(start), -1), np.zeros(len(start), bool), np.arange(len(start))
         for _ in range(_CROSSINGS):
             start = start + (depth + _STEP)[:, None] * way
@@ -233,7 +239,7 @@ def _solid(scene: MeshScene, points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarra
         return result
 
     def voted(part: np.ndarray, ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How many of the rays meet something, and how many of these began in something."""
+        """Number of rays that meet something, and number of these that began inside a solid."""
         spread = [np.broadcast_to(way, part.shape) for way in ways]
         first, depth = (np.stack(each) for each in zip(*(crossed(part, way) for way in spread), strict=True))
         out = first > 0
@@ -249,6 +255,6 @@ def _solid(scene: MeshScene, points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarra
         more, more_inside = voted(part[unsure], _DIRECTIONS[_BEFORE:])
         met[unsure] += more
         inside[unsure] += more_inside
-        return (inside > 1) & (inside > _SHARE * met)  # one alone may have met a silhouette
+        return (inside > 1) & (inside > _SHARE * met)  # a single ray may have met a silhouette
 
     return _in_threads(some, points)

@@ -1,4 +1,4 @@
-"""Rays through triangles by Embree, on CPUs. It lets other threads run meanwhile."""
+"""Rays through triangles by Embree, on CPUs. Other threads can run meanwhile."""
 
 from collections.abc import Iterator
 
@@ -12,14 +12,14 @@ from e2efly.scenes.meshes.engine import Hits
 from e2efly.scenes.shapes import FAR
 
 _AT_ONCE = 4096
-"""Rays that fit into the caches; images smaller than that are followed together."""
+"""Number of rays that fit into the caches. Images smaller than this are computed together."""
 
 
 class Embree:
-    """Triangles in Embree's tree."""
+    """Triangles in the tree of Embree."""
 
     def __init__(self, triangles: Float[np.ndarray, "f 3 3"], watertight: bool = False) -> None:
-        """Build the tree; `watertight`: no ray slips through between triangles, a fifth slower."""
+        """Build the tree. With `watertight` no ray passes between triangles, and it is a fifth slower."""
         self.threads = cores()
         self._scene = EmbreeScene(robust=watertight)
         self._mesh = TriangleMesh(self._scene, np.ascontiguousarray(triangles, np.float32))
@@ -50,7 +50,7 @@ class Embree:
     def first(
         self, origin: Float[np.ndarray, "m 3"], direction: Float[np.ndarray, "m 3"]
     ) -> tuple[Float[np.ndarray, " m"], Int[np.ndarray, " m"]]:
-        """Depth and triangle (-1: none) that single rays meet first."""
+        """Depth and triangle (-1: none) of the first hit of single rays."""
         met = self._scene.run(origin, direction, dists=FAR, output=1)
         return met["tfar"], met["primID"]
 
@@ -62,7 +62,7 @@ class Embree:
 def _rays(
     origin: np.ndarray, matrix: np.ndarray, rays: np.ndarray
 ) -> Iterator[tuple[slice, Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]]:
-    """Origins and directions of some cameras at a time, without a copy where it is one."""
+    """Origins and directions of some cameras at a time. For a single camera they are not copied."""
     r = rays.shape[1]
     size = max(1, _AT_ONCE // r)
     for i in range(0, len(origin), size):

@@ -1,4 +1,4 @@
-"""What an engine that follows rays through triangles offers."""
+"""The interface of an engine that follows rays through triangles."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,44 +9,44 @@ from jaxtyping import Bool, Float, Int
 
 
 class Hits(NamedTuple):
-    """What each of c cameras' r rays meets first."""
+    """The first hits of the r rays of each of c cameras."""
 
     depth: Float[np.ndarray, "c r"]
-    """Parameter of the ray; `FAR` where it meets nothing."""
+    """Parameter of the ray at the hit; `FAR` without a hit."""
     face: Int[np.ndarray, "c r"]
-    """Triangle; -1 for none."""
+    """Index of the triangle; -1 without a hit."""
     u: Float[np.ndarray, "c r"]
-    """Weight of its second corner."""
+    """Weight of the triangle's second corner."""
     v: Float[np.ndarray, "c r"]
-    """Weight of its third."""
+    """Weight of the triangle's third corner."""
 
 
 class Engine(Protocol):
-    """One scene, ready."""
+    """One scene, ready for rays."""
 
     threads: int
-    """How many parts of a batch it works on at a time."""
+    """Number of parts of a batch on which it works at a time."""
 
     def depth(
         self, origin: Float[np.ndarray, "c 3"], matrix: Float[np.ndarray, "c 3 3"], rays: Float[np.ndarray, "3 r"]
     ) -> Float[np.ndarray, "c r"]:
-        """Depth of what cameras' rays `origin + t matrix ray` meet first; `FAR` for nothing."""
+        """Depth of the first hits of cameras' rays `origin + t matrix ray`; `FAR` without a hit."""
         ...
 
     def hits(
         self, origin: Float[np.ndarray, "c 3"], matrix: Float[np.ndarray, "c 3 3"], rays: Float[np.ndarray, "3 r"]
     ) -> Hits:
-        """All about what they meet first."""
+        """All data of the first hits."""
         ...
 
     def blocked(self, origin: Float[np.ndarray, "m 3"], direction: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
-        """Whether single rays meet anything."""
+        """Whether single rays hit anything."""
         ...
 
 
 @contextmanager
 def needed(extra: str) -> Iterator[None]:
-    """Around the imports of what an extra installs.
+    """Context manager for the imports of packages that an extra installs.
 
     Raises:
         ValueError: naming the package that is missing, and how to install it.

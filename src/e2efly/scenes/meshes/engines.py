@@ -11,7 +11,7 @@ _READY: WeakKeyDictionary[MeshScene, Engine] = WeakKeyDictionary()
 
 
 def engine(scene: MeshScene) -> Engine:
-    """The engine of where JAX computes; made once for a scene.
+    """The engine for the device on which JAX computes. It is made once per scene.
 
     Raises:
         ValueError: naming the package that is missing, and how to install it.

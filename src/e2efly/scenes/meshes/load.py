@@ -1,4 +1,4 @@
-"""Mesh scenes by name or from files. docs/meshes.md describes what is read of each format."""
+"""Load mesh scenes by name or from files. docs/meshes.md describes what is read from each format."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,29 +13,29 @@ from e2efly.scenes.meshes.scene import MeshScene, Part
 from e2efly.vehicles.names import unknown
 
 FORMATS = (".glb", ".gltf", ".obj", ".ply", ".stl")
-"""Endings of files that are read."""
+"""Extensions of the files that can be read."""
 _UP = {".glb": "y", ".gltf": "y", ".obj": "z", ".ply": "z", ".stl": "z"}
 _NAMELESS = (".ply", ".stl")
-"""Formats whose files are one object without a name."""
+"""Formats whose files contain one object without a name."""
 _TURN = {"y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]), "z": np.eye(3)}
 
 
 def mesh_scene_names() -> list[str]:
-    """The scenes that the package makes."""
+    """Names of the scenes that the package makes."""
     return sorted(SCENES)
 
 
 def load_mesh_scene(name_or_path: str | Path, up: Literal["y", "z"] | None = None, unit: float = 1.0) -> MeshScene:
-    """One of the package's mesh scenes by name, or any by the path of its file.
+    """Load one of the package's mesh scenes by name, or any scene by the path of its file.
 
     Args:
         name_or_path: one of `mesh_scene_names`, or a file of one of `FORMATS`.
-        up: axis of the file that points up; y (the file's -z is north) is glTF's rule and taken for its files, z for
-            the others, when left out.
+        up: axis of the file that points up. If left out: y for glTF files, by their rule (the file's -z is north), and
+            z for all other files.
         unit: length of the file's unit, m.
 
     Raises:
-        ValueError: naming the file, the object or what it names, what is wrong and what is accepted; or the package
+        ValueError: naming the file, the object or what it refers to, what is wrong and what is accepted; or the package
             that is missing.
     """
     path = Path(name_or_path)
@@ -86,7 +86,7 @@ def _opened(path: Path) -> Any:
     options: dict[str, Any] = {"split_objects": True} if path.suffix.lower() == ".obj" else {}
     try:
         return trimesh.load_scene(path, process=False, **options)
-    except Exception as error:  # whatever a parser meets in a broken file
+    except Exception as error:  # any error of a parser in a broken file
         raise ValueError(f"not a readable {path.suffix} file: {type(error).__name__}: {error}") from None
 
 
@@ -99,14 +99,14 @@ def _objects(path: Path) -> list[str]:
 
 
 def _object(scene: Any, node: str, name: str, mesh: Any, objects: list[str]) -> str:
-    """Name of the object that a piece of it belongs to: there is one for each of its materials."""
+    """Name of the object to which a piece belongs. An object has one piece for each of its materials."""
     if mesh.metadata.get("from_gltf_primitive"):
         return scene.graph.transforms.parents[node]
     return next((known for known in objects if name == known or name.startswith(f"{known}_")), node)
 
 
 def _look(mesh: Any, textured: set[str]) -> dict[str, Any]:
-    """Colours, texture and its coordinates, as a `Part` takes them."""
+    """Colours, texture and texture coordinates, in the form that a `Part` takes."""
     visual = mesh.visual
     if visual.kind != "texture":
         if not visual.defined:
@@ -134,7 +134,7 @@ def _look(mesh: Any, textured: set[str]) -> dict[str, Any]:
 
 
 def _tint(visual: Any) -> Any:
-    """Colours of vertices beside a material."""
+    """Vertex colours that exist in addition to a material."""
     colour = visual.vertex_attributes.get("color")
     if colour is None:
         return 1.0

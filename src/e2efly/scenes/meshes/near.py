@@ -1,4 +1,4 @@
-"""How near a path through a world of triangles comes to them: exact, without a grid, for a few points at a time."""
+"""The smallest distance of a path to a world of triangles: exact, without a grid, for a few points at a time."""
 
 import math
 from dataclasses import dataclass
@@ -12,35 +12,35 @@ from e2efly.scenes.meshes.scene import MeshScene
 from e2efly.scenes.scene import GROUND, PAD
 
 LEVEL = math.cos(math.radians(30))
-"""A triangle that is tilted by less than 30 degrees is level: vertical part of its normal, at least."""
+"""Smallest vertical part of the normal of a level triangle: it is tilted by less than 30 degrees."""
 _TOGETHER = 8
-"""Points of a path that are asked for together."""
+"""Number of points of a path that are processed together."""
 _FIRST = 0.5
-"""How far away triangles are looked for first, m; then twice as far, and so on."""
+"""First distance within which triangles are searched, m. It is then doubled again and again."""
 
 
 @dataclass(frozen=True, eq=False)
 class Near:
-    """The triangles of a world, ready to be asked.
+    """The triangles of a world, prepared for distance queries.
 
-    A vehicle may stand on the ground and on pads: coming near to them is no collision, going through them is one. Where
-    no triangle of a world is of class ground, as in a scan of one piece, level triangles below the vehicle are taken
-    for ground.
+    A vehicle may stand on the ground and on pads: coming near to them is no collision, but going through them is one.
+    If no triangle of a world is of class ground, as in a scan of one piece, level triangles below the vehicle count as
+    ground.
     """
 
     scene: MeshScene
     low: Float[np.ndarray, "3 f"]
     """Lowest corner of the box about each triangle, m."""
     high: Float[np.ndarray, "3 f"]
-    """Highest corner."""
+    """Highest corner of this box, m."""
     bears: Bool[np.ndarray, " f"]
-    """Whether a vehicle may stand on it."""
+    """Whether a vehicle may stand on the triangle."""
     level: Bool[np.ndarray, " f"]
-    """Whether it may where the vehicle is above it."""
+    """Whether a vehicle that is above the triangle may stand on it."""
 
     @staticmethod
     def of(scene: MeshScene) -> "Near":
-        """Of a world."""
+        """Prepare the triangles of a world."""
         bears = np.isin(scene.label, (GROUND, PAD))
         level = np.abs(scene.normal[:, 2]) >= LEVEL
         if np.any(scene.label == GROUND):
@@ -49,12 +49,13 @@ class Near:
         return Near(scene, low, high, bears, level)
 
     def distance(self, path: Float[np.ndarray, "n 3"], within: float = math.inf) -> float:
-        """The smallest distance of the points of a path to what may not be touched, m; 0 where it goes through any
-        triangle between two points; infinite where there is nothing.
+        """The smallest distance of the points of a path to triangles that must not be touched, m.
+
+        It is 0 if the path goes through any triangle between two points, and infinite if there are no such triangles.
 
         Args:
-            path: points that follow each other, world, m.
-            within: what is farther away than this may count as infinitely far, m.
+            path: consecutive points, world, m.
+            within: distance beyond which triangles may count as infinitely far, m.
         """
         points = np.asarray(path, np.float32)
         if self._crossed(points):
@@ -74,7 +75,7 @@ class Near:
         return bool(np.any(engine(self.scene).depth(start, matrix, ahead) <= 1))
 
     def _to(self, points: np.ndarray, within: float) -> float:
-        """The smallest distance of points that lie close together, m."""
+        """The smallest distance for points that lie close together, m."""
         first, last, reach = points.min(axis=0), points.max(axis=0), min(_FIRST, within)
         while True:
             near = np.ones(len(self.bears), bool)

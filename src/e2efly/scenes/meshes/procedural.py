@@ -1,4 +1,4 @@
-"""Worlds of triangles made in code, each always the same. Their floors are at z = 0, their middles at x = y = 0."""
+"""Worlds of triangles made in code, each always the same. The floor is at z = 0, and the middle at x = y = 0."""
 
 from collections.abc import Callable
 from typing import Any
@@ -15,12 +15,12 @@ _CONCRETE, _STEEL, _CARDBOARD = (0.58, 0.58, 0.56), (0.25, 0.33, 0.55), (0.66, 0
 def _part(
     name: str, surface: Surface, texture: UInt8[np.ndarray, "h w 3"], metres: float = 1.0, colour: Any = None
 ) -> Part:
-    """An object whose texture is so many metres wide."""
+    """An object whose texture is `metres` wide."""
     return Part(name, surface.vertices, surface.faces, colour, surface.uv / metres, texture)
 
 
 def warehouse() -> list[Part]:
-    """A hall of 40 x 24 x 8 m with strips of light in the roof, and six rows of racks full of boxes, 3.4 m apart."""
+    """A hall of 40 x 24 x 8 m with strip lights in the roof, and six rows of racks full of boxes, 3.4 m apart."""
     rng = np.random.default_rng(1)
     wall, floor = striped(rng, (0.72, 0.72, 0.68), 4), speckled(rng, _CONCRETE, 0.06)
     card, steel, wood = speckled(rng, _CARDBOARD, 0.05), speckled(rng, _STEEL, 0.03), striped(rng, (0.6, 0.45, 0.28), 8)
@@ -75,7 +75,7 @@ def garage() -> list[Part]:
 
 
 def terrain() -> list[Part]:
-    """Hills of 64 x 64 m under grass, level in the middle, with 40 firs and 30 rocks."""
+    """Grassy hills of 64 x 64 m, level in the middle, with 40 firs and 30 rocks."""
     rng = np.random.default_rng(3)
     grass, bark = speckled(rng, (0.33, 0.42, 0.2), 0.18), striped(rng, (0.4, 0.3, 0.2), 6)
     needles, stone = speckled(rng, (0.16, 0.32, 0.18), 0.25), speckled(rng, (0.5, 0.49, 0.47), 0.12)
@@ -111,7 +111,7 @@ def terrain() -> list[Part]:
 
 
 def _shell(half_x: float, half_y: float, high: float, wall: np.ndarray, floor: np.ndarray) -> list[Part]:
-    """A floor and four walls about it, 0.2 m thick."""
+    """A floor and four walls around it, 0.2 m thick."""
     x, y, thick = half_x, half_y, 0.2
     sides = {
         "west": ((-x - thick, -y - thick, 0.0), (-x, y + thick, high)),
@@ -141,4 +141,4 @@ def _car() -> tuple[Surface, Surface]:
 
 
 SCENES: dict[str, Callable[[], list[Part]]] = {"garage": garage, "terrain": terrain, "warehouse": warehouse}
-"""By name."""
+"""The scenes by name."""

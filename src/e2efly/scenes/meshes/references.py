@@ -1,4 +1,7 @@
-"""What mesh files name beside themselves: `trimesh` passes over what is missing, these checks do not."""
+"""Checks of the other files and objects that mesh files refer to.
+
+`trimesh` ignores missing ones, these checks do not.
+"""
 
 import json
 import struct
@@ -10,17 +13,17 @@ from urllib.parse import unquote
 from e2efly.vehicles.tables import shown
 
 _PLAIN = ("KHR_materials_", "KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "EXT_texture_webp")
-"""Beginnings of the glTF extensions that a file may require: triangles are right without them."""
+"""Beginnings of the names of glTF extensions that a file may require. The triangles are correct without them."""
 
 _KINDS = {dict: "an object", list: "a list", str: "a text", int: "a whole number"}
-"""What JSON calls them."""
+"""Names of these types in JSON."""
 
 
 def textured_materials(path: Path) -> set[str]:
-    """Names of the materials of a file that have a texture, after a check that all it names is there.
+    """Names of the materials of a file that have a texture, after a check that everything the file refers to exists.
 
     Raises:
-        ValueError: naming the file, what it names, and what is accepted.
+        ValueError: naming the file, the missing item, and what is accepted.
     """
     match path.suffix.lower():
         case ".obj":
@@ -28,7 +31,7 @@ def textured_materials(path: Path) -> set[str]:
         case ".ply":
             return _ply(path)
         case ".stl":
-            return set()  # it has no materials
+            return set()  # the file has no materials
         case _:
             return _gltf(path)
 
@@ -114,7 +117,7 @@ def _gltf(path: Path) -> set[str]:
 
 
 def _listed(path: Path, table: dict[str, Any], key: str, kind: type = dict, at: str = "") -> list[Any]:
-    """The entries of a list of the JSON, all of one kind; empty where there is none."""
+    """The entries of a list in the JSON, all of one type. Empty if the list does not exist."""
     entries = _of_kind(path, at + key, table.get(key, []), list)
     return [_of_kind(path, f"{at}{key}[{i}]", entry, kind) for i, entry in enumerate(entries)]
 

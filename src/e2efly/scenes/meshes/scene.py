@@ -1,4 +1,4 @@
-"""A world of triangles, one for all environments. World frame: x, y level, z up, m."""
+"""A world of triangles, the same for all environments. World frame: x, y horizontal, z up, m."""
 
 import dataclasses
 import re
@@ -16,31 +16,31 @@ from e2efly.solids import CLASSES
 from e2efly.vehicles.tables import LARGEST
 
 _FLAT = 1e-7
-"""A triangle is degenerate whose height is at most this share of its longest side."""
+"""A triangle is degenerate if its height is at most this share of its longest side."""
 _WHITE = np.full((1, 1, 3), 255, np.uint8)
 
 
 @dataclass(frozen=True)
 class Part:
-    """A surface with one texture at most; parts of one name are one object."""
+    """A surface with at most one texture. Parts with the same name are one object."""
 
     name: str
     vertices: Float[np.ndarray, "v 3"]
-    """World, m."""
+    """Corners, world, m."""
     faces: Int[np.ndarray, "f 3"]
-    """Counter-clockwise as seen from where one can fly."""
+    """Corners counter-clockwise, as seen from the free space."""
     colour: Any = None
-    """RGB in [0, 1]: (3,), (v, 3) or (f, 1, 3); multiplies the texture. Usual for the class, or white beneath a
-    texture, when left out."""
+    """RGB in [0, 1]: (3,), (v, 3) or (f, 1, 3). It multiplies the texture. If left out: the default colour of the
+    class, or white under a texture."""
     uv: Float[np.ndarray, "v 2"] | None = None
-    """Place in the texture, from its lower left corner; it repeats."""
+    """Texture coordinates, from the lower left corner. The texture repeats."""
     texture: UInt8[np.ndarray, "h w 3"] | None = None
     label: int | None = None
-    """Semantic class; `class_of` the name when left out."""
+    """Semantic class. If left out: `class_of` the name."""
 
 
 def class_of(name: str) -> int:
-    """Semantic class by an object's name: its first word if that is one of `CLASSES`, else obstacle.
+    """Semantic class from an object's name: its first word if that is one of `CLASSES`, otherwise obstacle.
 
     A word ends before a `.`, `_`, `-`, space or digit: `gate.001`, `Wall_north`, `pad 2`.
     """
@@ -51,29 +51,29 @@ def class_of(name: str) -> int:
 @jax.tree_util.register_static
 @dataclass(frozen=True, eq=False)
 class MeshScene:
-    """Triangles with what is known of each; compared by identity, constant in compiled programs."""
+    """Triangles with their properties. Scenes are compared by identity, and are constants in compiled programs."""
 
     triangles: Float[np.ndarray, "f 3 3"]
     """Corners, world, m."""
     label: Int[np.ndarray, " f"]
     """Semantic class."""
     instance: Int[np.ndarray, " f"]
-    """Number of the object: the ground is 1, whatever is of that class; the others follow in the order of the file."""
+    """Number of the object. Everything of class ground has 1. The other objects follow in the order of the file."""
     names: tuple[str, ...]
-    """Of objects, by instance number; 0 is the sky."""
+    """Names of the objects by instance number. 0 is the sky."""
     colour: Float[np.ndarray, "f 3 3"]
-    """RGB in [0, 1] of each corner; multiplies the texture."""
+    """RGB in [0, 1] of each corner. It multiplies the texture."""
     uv: Float[np.ndarray, "f 3 2"]
-    """Place of each corner in its texture."""
+    """Texture coordinates of each corner."""
     texture: Int[np.ndarray, " f"]
-    """Number of the texture; 0 is white."""
+    """Number of the texture. 0 is white."""
     textures: tuple[UInt8[np.ndarray, "h w 3"], ...]
     dropped: int
-    """Degenerate triangles that the parts had beside those here."""
+    """Number of degenerate triangles of the parts that were left out."""
 
     @staticmethod
     def of(parts: Sequence[Part]) -> "MeshScene":
-        """One world of parts, without their degenerate triangles, which are counted.
+        """One world from parts, without their degenerate triangles, which are counted.
 
         Raises:
             ValueError: naming the object, what is wrong with it and what is accepted.
@@ -106,12 +106,12 @@ class MeshScene:
         return MeshScene(**whole, names=tuple(names), textures=tuple(textures), dropped=dropped)
 
     def at(self, time: Float[Array, " n"]) -> "MeshScene":
-        """The world as it is at any time: nothing in it moves."""
+        """The world at any time. Nothing in it moves."""
         del time
         return self
 
     def beside(self, other: "MeshScene") -> "MeshScene":
-        """Both in one world; instance numbers of the other's objects follow those of this one's."""
+        """Both worlds in one. The instance numbers of the other's objects follow those of this one's."""
         objects, textures = len(self.names) - 2, len(self.textures) - 1
 
         def later(numbers: np.ndarray, by: int, least: int) -> np.ndarray:
@@ -136,14 +136,14 @@ class MeshScene:
 
     @cached_property
     def normal(self) -> Float[np.ndarray, "f 3"]:
-        """Unit vectors to the side from which the corners run counter-clockwise."""
+        """Unit vectors on the side from which the corners run counter-clockwise."""
         a, b, c = np.moveaxis(self.triangles.astype(np.float64), 1, 0)
         cross = np.cross(b - a, c - a)
         return (cross / np.linalg.norm(cross, axis=1, keepdims=True)).astype(np.float32)
 
     @cached_property
     def _texels(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """All textures one after the other, where each begins, and their heights and widths."""
+        """All textures one after the other, the start index of each, and their heights and widths."""
         sizes = np.array([image.shape[:2] for image in self.textures])
         begins = np.concatenate([[0], np.cumsum(np.prod(sizes, axis=1))[:-1]])
         return np.concatenate([image.reshape(-1, 3) for image in self.textures]), begins, sizes
@@ -151,12 +151,12 @@ class MeshScene:
     def colours(
         self, face: Int[np.ndarray, " r"], u: Float[np.ndarray, " r"], v: Float[np.ndarray, " r"]
     ) -> Float[np.ndarray, "r 3"]:
-        """RGB at points of triangles, the nearest texel of the texture.
+        """RGB at points of triangles, from the nearest texel of the texture.
 
         Args:
-            face: triangle that each is in.
-            u: weight of the second corner.
-            v: weight of the third.
+            face: triangle of each point.
+            u: weight of the triangle's second corner.
+            v: weight of the triangle's third corner.
         """
         weight = np.stack([1 - u - v, u, v], axis=1)[:, None]
         texels, begins, sizes = self._texels
@@ -201,7 +201,7 @@ def _check(part: Part) -> None:
 
 
 def _usual(numbers: Any) -> bool:
-    """Whether all are finite, and no larger than what float32 holds well."""
+    """Whether all numbers are finite, and not larger than float32 represents precisely."""
     return bool(np.all(np.abs(numbers) <= LARGEST))  # false for NaN
 
 

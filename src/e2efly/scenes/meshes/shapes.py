@@ -7,26 +7,26 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 TEXELS = 64
-"""Side of a texture."""
+"""Width and height of a texture, in texels."""
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles with places in a texture that repeats every metre."""
+    """Triangles with coordinates in a texture that repeats every metre."""
 
     vertices: Float[np.ndarray, "v 3"]
     faces: Int[np.ndarray, "f 3"]
     uv: Float[np.ndarray, "v 2"]
 
     def turned(self, yaw: float, offset: Any) -> "Surface":
-        """Turned about z, rad, then moved, m."""
+        """Rotated about z, rad, then moved, m."""
         c, s = np.cos(yaw), np.sin(yaw)
         matrix = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return Surface(self.vertices @ matrix.T + offset, self.faces, self.uv)
 
 
 def join(*surfaces: Surface) -> Surface:
-    """Surfaces side by side."""
+    """Several surfaces as one."""
     before = np.cumsum([0] + [len(s.vertices) for s in surfaces[:-1]])
     return Surface(
         np.concatenate([s.vertices for s in surfaces]),
@@ -36,7 +36,7 @@ def join(*surfaces: Surface) -> Surface:
 
 
 def sheet(points: Float[np.ndarray, "a b 3"], uv: Float[np.ndarray, "a b 2"]) -> Surface:
-    """A net of points; its front is where the first axis, then the second, turn counter-clockwise."""
+    """A grid of points. Its front is the side from which the first axis turns counter-clockwise to the second."""
     a, b, _ = points.shape
     i = (np.arange(a - 1)[:, None] * b + np.arange(b - 1)).ravel()
     faces = np.concatenate([np.stack([i, i + b, i + b + 1], axis=1), np.stack([i, i + b + 1, i + 1], axis=1)])
@@ -54,7 +54,7 @@ def box(low: Any, high: Any) -> Surface:
             points[..., axis] = end[axis]
             points[..., across] = np.array([[low[across]], [high[across]]])
             points[..., up] = np.array([[low[up], high[up]]])
-            # upright sides are drawn with the texture's v along z
+            # on upright sides the texture's v is along z
             uv = points[..., [across, up] if up == 2 or axis == 2 else [up, across]]
             swap = end is low
             sides.append(sheet(points.swapaxes(0, 1) if swap else points, uv.swapaxes(0, 1) if swap else uv))
@@ -62,7 +62,7 @@ def box(low: Any, high: Any) -> Surface:
 
 
 def turned_profile(radius: Any, height: Any, segments: int) -> Surface:
-    """A profile (radius, height) from below to above, m, turned about z."""
+    """A body of revolution about z, from a profile (radius, height) from bottom to top, m."""
     radius, height = np.asarray(radius, float), np.asarray(height, float)
     angle = np.linspace(0.0, 2 * np.pi, segments + 1)
     points = np.stack(
@@ -87,7 +87,10 @@ def cylinder(radius: float, low: float, high: float, segments: int = 16) -> Surf
 
 
 def noise(rng: np.random.Generator, roughness: float, size: int = TEXELS) -> Float[np.ndarray, "size size"]:
-    """Random, repeats, mean 0, deviation 1; spectrum falls with the frequency to the power of `-roughness`."""
+    """Random values that repeat at the borders, with mean 0 and deviation 1.
+
+    The spectrum falls with the frequency to the power of `-roughness`.
+    """
     k = np.fft.fftfreq(size) * size
     amplitude = np.maximum(np.hypot(k[:, None], k[None]), 1.0) ** -roughness
     amplitude[0, 0] = 0.0
@@ -98,14 +101,14 @@ def noise(rng: np.random.Generator, roughness: float, size: int = TEXELS) -> Flo
 def speckled(
     rng: np.random.Generator, colour: Any, contrast: float, roughness: float = 0.8
 ) -> UInt8[np.ndarray, "h w 3"]:
-    """One colour, RGB in [0, 1], lighter and darker by chance."""
+    """One colour, RGB in [0, 1], with random variations of brightness."""
     return _image(np.asarray(colour) * (1 + contrast * noise(rng, roughness)[..., None]))
 
 
 def striped(
     rng: np.random.Generator, colour: Any, lines: int, courses: int = 0, contrast: float = 0.06
 ) -> UInt8[np.ndarray, "h w 3"]:
-    """Upright joints, so many a metre; with courses (an even number) laid in bond, like blocks."""
+    """Vertical joints, `lines` per metre. With `courses` (an even number) they are laid in bond, like blocks."""
     image = np.asarray(colour) * (1 + contrast * noise(rng, 0.8)[..., None])
     row, column = np.indices((TEXELS, TEXELS))
     shift = 0

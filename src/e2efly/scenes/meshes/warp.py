@@ -1,4 +1,4 @@
-"""Rays through triangles by Warp, on CUDA: one thread a ray. The same kernels run on its CPU device, for tests."""
+"""Rays through triangles by Warp, on CUDA: one thread per ray. Tests run the same kernels on its CPU device."""
 
 # kernels are a language of their own, whose types look like calls
 # pyright: reportInvalidTypeForm=false, reportAttributeAccessIssue=false
@@ -49,12 +49,12 @@ def _any(
 
 
 class Warp:
-    """Triangles in Warp's tree."""
+    """Triangles in the tree of Warp."""
 
     threads = 1
 
     def __init__(self, triangles: Float[np.ndarray, "f 3 3"], device: str = "cuda") -> None:
-        """Build the tree on a device that Warp knows."""
+        """Build the tree on a device of Warp."""
         self._device = device
         points = self._given(triangles.reshape(-1, 3), wp.vec3)
         self._mesh = wp.Mesh(points, self._given(np.arange(len(points), dtype=np.int32), wp.int32))

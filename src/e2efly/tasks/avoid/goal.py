@@ -1,4 +1,4 @@
-"""High-speed obstacle avoidance: the goal, and where it is flown. Imports no JAX."""
+"""High-speed obstacle avoidance: the goal, and the route of a flight. Imports no JAX."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -16,48 +16,48 @@ from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.route import Route
 
 BEYOND = 10.0
-"""The vehicle is sent to a point this far behind the end of the forest, m."""
+"""Distance of the goal point behind the end of the forest, m."""
 CLIMB = 1.0
 """Largest commanded vertical speed, m/s."""
 
 
 @dataclass(frozen=True)
 class Memory:
-    """How fast to fly."""
+    """The commanded speed."""
 
     speed: Array
-    """(n,) m/s."""
+    """(n,) commanded speed, m/s."""
 
 
 @dataclass(frozen=True)
 class AvoidGoal(Goal):
-    """Through a lane from the origin along world x."""
+    """Fly through a lane that begins at the origin and follows world x."""
 
     config: AvoidConfig
     shape: Shape
     control_period: float
     checks: int
-    """How often a control step is checked for collisions."""
+    """Number of collision checks per control step."""
 
     @classmethod
     def state(cls, memory: Any) -> Memory:
-        """Without what only cameras see."""
+        """The state without what only cameras see."""
         return Memory(**{part.name: getattr(memory, part.name) for part in dataclasses.fields(Memory)})
 
     def goal(self, memory: Memory, time: Array) -> Array:
-        """Behind the end of the forest."""
+        """A point behind the end of the forest."""
         del time
         c, zero = self.config, 0.0 * memory.speed
         return namespace(zero).stack([zero + c.forest.length + BEYOND, zero, zero + c.altitude], axis=-1)
 
     def desired_velocity(self, memory: Memory, time: Array, body: Any) -> Array:
-        """(n, 3) level towards the goal at the commanded speed, and to the altitude, m/s."""
+        """(n, 3) velocity, m/s: horizontal to the goal at the commanded speed, vertical to the altitude."""
         xp, away = namespace(body.position), self.goal(memory, time) - body.position
         level = away[:, :2] / xp.linalg.norm(away[:, :2], axis=-1, keepdims=True)
         return xp.concatenate([memory.speed[:, None] * level, xp.clip(away[:, 2:], -CLIMB, CLIMB)], axis=-1)
 
     def height(self, memory: Memory, time: Array, body: Any) -> Array:
-        """Of the centre of mass over the ground."""
+        """Height of the centre of mass above the ground."""
         del memory, time
         return body.position[:, 2:]
 
@@ -70,12 +70,15 @@ class AvoidGoal(Goal):
     )
 
     def advance(self, memory: Any, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Any, Outcome]:
-        """The verdict of one that cannot know what stands in the way."""
+        """The verdict without knowledge of the obstacles."""
         del timed_out
         return self.verdict(memory, before, after, time, False)
 
     def verdict(self, memory: Any, before: Any, after: Any, time: Array, hit: Array | bool) -> tuple[Any, Outcome]:
-        """Success: past the end of the forest, without touching anything or leaving the lane; `hit`: a tree."""
+        """Success: past the end of the forest, without touching anything or leaving the lane.
+
+        `hit`: a tree was touched.
+        """
         del before, time
         c, position = self.config, after.position
         x, y, z = position[:, 0], position[:, 1], position[:, 2]
@@ -87,7 +90,7 @@ class AvoidGoal(Goal):
         return memory, Outcome(terminated=ends, success=success, arrived=success, crashed=crashed, error=error)
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
-        """When it was through, or how far it came."""
+        """The time at the end of the forest, or the distance flown, as text."""
         del mean_error, speed
         length = float(self.config.forest.length)
         if arrivals:
@@ -97,7 +100,7 @@ class AvoidGoal(Goal):
 
 @dataclass(frozen=True)
 class AvoidRoute(Route):
-    """How fast to fly through the lane; it begins at the origin."""
+    """How fast to fly through the lane, which begins at the origin."""
 
     longest_s: ClassVar = 20.0
 
@@ -106,12 +109,12 @@ class AvoidRoute(Route):
 
     @classmethod
     def drawn(cls, course: Course, file: Path) -> "AvoidRoute":
-        """As fast as was drawn."""
+        """The route with the speed that was drawn."""
         del file
         return cls(speed=float(course.memory.speed[0]))
 
     def course(self, shape: Shape, control_period: float) -> Course:
-        """The lane, in its direction."""
+        """The course along the lane, with the heading of the lane."""
         config = AvoidConfig()
         goal, start = AvoidGoal(config, shape, control_period, 1), np.array([0.0, 0.0, config.altitude])
         return Course(goal, Memory(np.array([self.speed])), start, heading=0.0, lowest=config.altitude)

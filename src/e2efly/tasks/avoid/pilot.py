@@ -1,4 +1,4 @@
-"""How one who knows every tree would fly: headings compared by where they lead a vehicle that follows late."""
+"""The expert pilot, which knows every tree: it compares headings by simulating a vehicle that follows with a lag."""
 
 import jax
 import jax.numpy as jnp
@@ -7,16 +7,17 @@ from jaxtyping import Array, Float
 from e2efly.scenes.scene import Solids
 
 FAN, HEADINGS = 1.1, 15
-"""Headings that are compared reach this far to each side, rad; how many there are."""
+"""Largest angle of a compared heading to each side, rad, and the number of headings."""
 STEPS, STEP = 15, 0.08
-"""Each is followed for so many steps of so many seconds."""
+"""Number of simulation steps along each heading, and the duration of a step, s."""
 LAG, FASTEST = 0.35, 14.0
-"""The velocity follows the commanded one with this lag, s, and accelerates by this at most, m/s^2."""
+"""Lag with which the velocity follows the commanded velocity, s, and its largest acceleration, m/s^2."""
 MARGIN, TOUCH = 0.5, 0.03
-"""What is nearer to the vehicle than the first costs, m; nearer than the second it counts as struck."""
+"""Distance from the vehicle within which an object adds cost, m, and distance within which it counts as a collision,
+m."""
 NEARNESS, COLLISION, TURN = 8.0, 6.0, 0.05
-"""What a step within the margin costs, a m^2; what a collision, a second that it is earlier than the end; what a turn,
-a rad: in seconds of the way at the commanded speed."""
+"""Weights of the cost: of a step within the margin, per m^2; of a collision, per second before the end; of a turn, per
+rad. The cost is in seconds of flight at the commanded speed."""
 
 
 def best_heading(
@@ -28,19 +29,19 @@ def best_heading(
     radius: float | Array,
     side: float | Array,
 ) -> Float[Array, " n"]:
-    """The heading that leads farthest towards a bearing, and not too near to trunks and to the sides of the lane.
+    """The heading that makes most progress towards a bearing, with distance to trunks and to the sides of the lane.
 
     Args:
-        trees: cylinders.
-        position: where from, world, m.
-        velocity: that it has there, m/s.
-        bearing: where to, rad from world x.
-        speed: that is commanded, m/s.
-        radius: of the vehicle, m.
-        side: |y| that it must not pass, m.
+        trees: cylinders, the trees.
+        position: the start position, world, m.
+        velocity: the velocity there, m/s.
+        bearing: the direction to make progress in, rad from world x.
+        speed: the commanded speed, m/s.
+        radius: radius of the vehicle, m.
+        side: largest |y| of the lane, which must not be passed, m.
 
     Returns:
-        rad from world x; no gradient.
+        The heading, rad from world x. It has no gradient.
     """
     turns = jnp.linspace(-FAN, FAN, HEADINGS)
     heading = bearing[:, None] + turns

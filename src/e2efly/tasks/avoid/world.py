@@ -1,4 +1,4 @@
-"""High-speed obstacle avoidance: through a random forest at a commanded speed, seeing it alone."""
+"""High-speed obstacle avoidance: fly through a random forest at a commanded speed, by camera images alone."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from e2efly.tasks.avoid.pilot import best_heading
 from e2efly.tasks.task import at_rest, struck, uniform
 
 STRICT = 1.5
-"""Vertical speed of the expert over the error of its height, 1/s."""
+"""Vertical speed of the expert divided by its height error, 1/s."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class World(Memory):
-    """The forest, and how fast to fly through it."""
+    """The forest, and the commanded speed."""
 
     trees: Solids
 
@@ -33,7 +33,7 @@ class World(Memory):
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape"], meta_fields=["control_period", "checks"])
 @dataclass(frozen=True)
 class Avoid(AvoidGoal):
-    """Starts before a random forest."""
+    """Starts in front of a random forest."""
 
     @classmethod
     def of(cls, config: AvoidConfig, shape: Shape, control_period: float, substeps: int = 1) -> "Avoid":
@@ -41,7 +41,7 @@ class Avoid(AvoidGoal):
         return cls(config, shape, control_period, substeps)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, World]:
-        """At rest before the forest, facing it."""
+        """At rest in front of the forest, facing it."""
         trees_key, state_key = jax.random.split(key)
         c, u, zero = self.config, uniform(state_key, n, 5), jnp.zeros(n)
         state = at_rest(jnp.stack([zero, c.sideways * u[:, 0], c.altitude + 0.3 * u[:, 1]], axis=-1))
@@ -54,7 +54,10 @@ class Avoid(AvoidGoal):
     def expert(
         self, memory: World, position: Float[Array, "n 3"], velocity: Float[Array, "n 3"]
     ) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
-        """What one who knows every tree would fly at: a velocity, m/s, and a yaw half-way to it, rad."""
+        """Velocity, m/s, and yaw, rad, of an expert that knows every tree.
+
+        The yaw is half-way between the bearing of the goal and the heading of the velocity.
+        """
         away = self.goal(memory, memory.speed) - position
         bearing = jnp.arctan2(away[:, 1], away[:, 0])
         side = self.config.forest.width / 2

@@ -1,6 +1,7 @@
-"""Narrow gap: the goal, and where it is flown. Imports no JAX.
+"""Narrow gap: the goal, and the route of a flight. Imports no JAX.
 
-The slit's frame: origin in the middle of the opening, x the way through, y along the long side, z across the short one.
+Frame of the slit: origin in the middle of the opening, x in the direction of flight, y along the long side, z along the
+short side.
 """
 
 import dataclasses
@@ -21,32 +22,35 @@ from e2efly.tasks.route import Route, place, turned
 from e2efly.tasks.verdicts import distance, offsets, rotate, unrotate
 
 WALL_WIDTH = 3.0
-"""The wall reaches this far around the opening, m."""
+"""Distance to which the wall extends around the opening, m."""
 RIM = 8
-"""Points on each of the two rims of the vehicle's body that must not touch the wall."""
+"""Number of points on each of the two rims of the vehicle's body that are checked against the wall."""
 
 
 @dataclass(frozen=True)
 class Memory:
-    """The slit of each vehicle, and whether it is through."""
+    """The slit of each vehicle, and whether the vehicle has passed it."""
 
     centre: Array
-    """(n, 3) world, m."""
+    """(n, 3) middle of the slit, world, m."""
     quaternion: Array
-    """(n, 4) slit's frame to world."""
+    """(n, 4) rotation from the slit's frame to the world."""
     passed: Array
-    """(n,) bool."""
+    """(n,) whether the vehicle has passed the slit, bool."""
 
 
 @dataclass(frozen=True)
 class GapGoal(Goal):
-    """Through the slit. The vehicle counts as a flat cylinder: `radius`, and `feet_height` up and down."""
+    """Fly through the slit.
+
+    The vehicle counts as a flat cylinder of `radius` that extends `feet_height` up and down.
+    """
 
     config: GapConfig
     shape: Shape
     control_period: float
     checks: int
-    """How often a control step is checked for collisions."""
+    """Number of collision checks per control step."""
 
     def targets(self, memory: Memory) -> Array:
         """(n, 2, 3) the middle of the slit and the point behind it, world, m."""
@@ -54,12 +58,12 @@ class GapGoal(Goal):
         return namespace(through).stack([memory.centre, memory.centre + self.config.beyond * through], axis=1)
 
     def axes(self, memory: Memory) -> Array:
-        """(n, 2, 3) unit vectors in the world: the way through, and across the short side."""
+        """(n, 2, 3) unit vectors, world: the direction of flight through the slit, and that of its short side."""
         xp = namespace(memory.centre)
         return rotate(memory.quaternion[:, None], xp.asarray(np.eye(3, dtype=np.float32)[[0, 2]]))
 
     def goal(self, memory: Memory, time: Array) -> Array:
-        """The slit; once through, the point behind it."""
+        """The middle of the slit; once it is passed, the point behind it."""
         del time
         both = self.targets(memory)
         return namespace(both).where(memory.passed[:, None], both[:, 1], both[:, 0])
@@ -70,7 +74,7 @@ class GapGoal(Goal):
         return offsets(self.targets(memory), body)
 
     def flat_axes(self, memory: Memory, time: Array, body: Any) -> Array:
-        """Both axes."""
+        """Both axes as one vector."""
         del time
         return self.axes(memory).reshape(body.position.shape[0], 6)
 
@@ -88,7 +92,8 @@ class GapGoal(Goal):
     def touched(self, memory: Memory, before: Any, after: Any) -> Array:
         """(n,) whether one of the points on the body's two rims was in the wall or the ground during the step.
 
-        Each is checked `checks` times, on the cubic through its positions and velocities at both ends.
+        Each point is checked `checks` times, on the cubic through its positions and velocities at both ends of the
+        step.
         """
         xp = namespace(before.position)
         points = xp.asarray(rims(self.shape))
@@ -110,10 +115,10 @@ class GapGoal(Goal):
         return (inside | (path[..., 2] < 0)).any((0, 2))
 
     def advance(self, memory: Memory, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Memory, Outcome]:
-        """Success: through the slit to the point behind it, without touching anything.
+        """Judge a step. Success: through the slit to the point behind it, without touching anything.
 
-        The centre of mass goes through where the straight line of the step crosses the wall's middle forward inside
-        the opening; crossing it forward elsewhere is a failure, round the wall, too.
+        The slit is passed in a step whose straight line crosses the wall's middle plane forward inside the opening.
+        Crossing this plane forward anywhere else fails, also beside the wall.
         """
         del timed_out
         c, xp = self.config, namespace(after.position)
@@ -140,12 +145,12 @@ class GapGoal(Goal):
         )  # fmt: skip
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
-        """When it was through the slit."""
+        """The time of passing the slit, as text."""
         del mean_error, final_error
         return f"through after {arrivals[0]:.2f} s, then {speed:.1f} m/s" if arrivals else "not through"
 
     def failure(self, memory: Memory, outcome: Outcome) -> str:
-        """Whether the slit was missed or the wall struck."""
+        """Whether the slit was missed or the wall was touched, as text."""
         if outcome.signals["missed"][0]:
             return "the slit was missed"
         return "wall or ground struck" if outcome.signals["struck"][0] else super().failure(memory, outcome)
@@ -169,14 +174,14 @@ class GapRoute(Route):
     slit: tuple[float, float, float] = place((0.0, 0.0, 2.0))
     """Middle of the slit, m."""
     slit_yaw: float = place(0.0)
-    """Heading of the way through, rad."""
+    """Heading of the flight through the slit, rad."""
     slit_roll: float = place(0.6)
-    """Tilt of the slit about the way through, rad; positive: its left end is up."""
+    """Roll of the slit about the direction of flight, rad. Positive: its left end is up."""
     before: float = number(3.0, above=0)
-    """From where the policy takes over to the slit, m."""
+    """Distance from the point where the policy takes over to the slit, m."""
 
     def course(self, shape: Shape, control_period: float) -> Course:
-        """From a point straight before the slit to the one behind it, once."""
+        """The course from a point straight in front of the slit to the point behind it, flown once."""
         goal = GapGoal(GapConfig(), shape, control_period, checks=4)
         turn = Quat.of_euler(np.array([self.slit_roll]), np.zeros(1), np.array([self.slit_yaw])).stack()
         memory = Memory(np.array([self.slit]), turn, np.zeros(1, bool))

@@ -1,4 +1,4 @@
-"""Narrow gap: through a slit in a wall, tilted so that only a vehicle that banks with it fits."""
+"""Narrow gap: fly through a slit in a wall. The slit is tilted, and only a vehicle that banks with it fits through."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ from e2efly.tasks.gap.goal import WALL_WIDTH, GapGoal, Memory, rims
 from e2efly.tasks.task import at_rest, uniform
 
 START_YAW = 0.3
-"""Half-width of the heading at the start, rad."""
+"""Largest heading angle at the start, to either side, rad."""
 PASSING = 0.2
-"""What is nearer to the middle of the wall than this is to be inside the opening already, or still, m."""
+"""Distance from the wall's middle plane within which a vehicle must be inside the opening, m."""
 jax.tree_util.register_dataclass(Memory)
 
 
@@ -31,14 +31,15 @@ class Gap(GapGoal):
     """Make it with `Gap.of`."""
 
     page: ClassVar = "gap"
-    """What the page of `e2efly export --web` calls this world, which it simulates."""
+    """Name of this world on the page of `e2efly export --web`, which simulates it."""
 
     @staticmethod
     def of(config: GapConfig, shape: Shape, control_period: float, checks: int) -> "Gap":
         """Check that the vehicle fits.
 
         Raises:
-            ValueError: for an opening that a well banked vehicle does not fit through, or a slit too low.
+            ValueError: for an opening through which even a well banked vehicle does not fit, or for a slit that is too
+                low.
         """
         least = (2 * float(shape.radius), 2 * float(shape.feet_height))
         if not (config.opening[0] > least[0] and config.opening[1] > least[1]):
@@ -54,7 +55,7 @@ class Gap(GapGoal):
         return Gap(config, shape, control_period, checks)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Memory]:
-        """At rest before the wall, roughly facing it; the slit anywhere ahead, tilted to the left or right."""
+        """At rest in front of the wall, roughly facing it. The slit is anywhere ahead, tilted to the left or right."""
         c, u, zero = self.config, uniform(key, n, 7), jnp.zeros(n)
         state = at_rest(jnp.stack([zero, zero, zero + c.altitude], axis=-1))
         ahead = _within(c.distance, u[:, 0])
@@ -64,27 +65,33 @@ class Gap(GapGoal):
         return dataclasses.replace(state, quaternion=from_euler(zero, zero, START_YAW * u[:, 6])), memory
 
     def scene(self, memory: Memory) -> Scene:
-        """The wall over level ground: a gate with bars so wide that they are one."""
+        """The wall over level ground: a gate with bars so wide that they form a wall."""
         c, n = self.config, memory.centre.shape[0]
         size = jnp.stack([jnp.asarray(x) for x in (c.opening[0] / 2, c.opening[1] / 2, WALL_WIDTH, c.thickness / 2)])
         wall = Solids.of("gate", memory.centre[:, None], size, label=WALL)
         return Scene.of({"gate": dataclasses.replace(wall, quaternion=memory.quaternion[:, None])}, n)
 
     def desired_yaw(self, memory: Memory, state: State) -> Float[Array, " n"]:
-        """Straight through the wall."""
+        """The heading straight through the wall."""
         del state
         through = self.axes(memory)[:, 0]
         return jnp.arctan2(through[:, 1], through[:, 0])
 
     def roll_error(self, memory: Memory, state: State) -> Float[Array, " n"]:
-        """The turn about the way through that would lay the vehicle along the slit, rad; 0 where it points along it."""
+        """Rotation about the direction of flight that would align the vehicle with the slit, rad.
+
+        It is 0 if the vehicle's z axis lies along this direction.
+        """
         zero = jnp.zeros_like(state.position)
         up = unrotate(memory.quaternion, rotate(state.quaternion, zero.at[:, 2].set(1.0)))
         defined = up[:, 1] ** 2 + up[:, 2] ** 2 > 1e-12
         return jnp.arctan2(jnp.where(defined, -up[:, 1], 0.0), jnp.where(defined, up[:, 2], 1.0))
 
     def overhang(self, memory: Memory, state: State) -> Float[Array, "n p"]:
-        """How far each of the body's points stands out of the opening, m; negative inside, `-FAR` off the wall."""
+        """Distance by which each point of the body lies outside the opening, m.
+
+        It is negative inside the opening, and `-FAR` away from the wall.
+        """
         half = jnp.asarray(self.config.opening) / 2
         points = rims(self.shape)
         place = state.position[:, None] + rotate(state.quaternion[:, None], points) - memory.centre[:, None]
@@ -102,6 +109,6 @@ class Gap(GapGoal):
 
 
 def _within(bounds: tuple[float, float], u: Float[Array, " n"]) -> Float[Array, " n"]:
-    """From u in [-1, 1] to between the bounds."""
+    """Map u in [-1, 1] to a value between the bounds."""
     low, high = bounds
     return (low + high) / 2 + (high - low) / 2 * u

@@ -1,4 +1,4 @@
-"""Hovering: the goal, and where it is flown. Imports no JAX."""
+"""Hovering: the goal, and the route of a flight. Imports no JAX."""
 
 import dataclasses
 import math
@@ -20,7 +20,10 @@ from e2efly.tasks.verdicts import distance, held_longer, touches_ground
 
 @dataclass(frozen=True)
 class HoverGoal(Goal):
-    """A point to fly to and stay at. The task's state is how long the vehicle has been within the radius, (n,) s."""
+    """Fly to a point and stay there.
+
+    The task's state is the time that the vehicle has been within the radius, (n,) s.
+    """
 
     config: HoverConfig
     shape: Shape
@@ -45,7 +48,10 @@ class HoverGoal(Goal):
         return Place(Vec3.of(shown["position_error"]))
 
     def advance(self, memory: Array, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Array, Outcome]:
-        """Success: within the radius for the last `hold_s` of the episode, never outside the fence or on the ground."""
+        """Judge a step. Success: within the radius for the last `hold_s` of the episode.
+
+        Leaving the fence, touching the ground or tumbling fails.
+        """
         del before
         c = self.config
         error = distance(after.position, self.goal(memory, time))
@@ -65,10 +71,10 @@ class HoverRoute(Route):
     longest_s: ClassVar = 8.0
 
     target: tuple[float, float, float] = place(defaults.TARGET)
-    """Where to, m."""
+    """Point to hover at, m."""
 
     def course(self, shape: Shape, control_period: float) -> Course:
-        """The target; it has no end."""
+        """The course to the target. It has no end."""
         goal = HoverGoal(dataclasses.replace(HoverConfig(), target=self.target), shape, control_period)
         start = beside(self.target, (1.0, -0.5, -1.0))
         return Course(goal, np.zeros(1), start, duration=math.inf, lowest=self.target[2])

@@ -1,4 +1,4 @@
-"""Hovering: fly to a point from anywhere near and stay there."""
+"""Hovering: fly to a point from anywhere near it, and stay there."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ from e2efly.tasks.task import at_rest, uniform
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Hover(HoverGoal):
-    """Starts about the target, over level ground."""
+    """Starts around the target, over level ground."""
 
     page: ClassVar = "hover"
-    """What the page of `e2efly export --web` calls this world, which it simulates."""
+    """Name of this world on the page of `e2efly export --web`, which simulates it."""
 
     @classmethod
     def of(cls, config: HoverConfig, shape: Shape, control_period: float, substeps: int = 1) -> "Hover":
@@ -32,7 +32,7 @@ class Hover(HoverGoal):
         return cls(config, shape, control_period)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Float[Array, " n"]]:
-        """Uniform about the target: position, velocity, roll, pitch, any yaw, body rates."""
+        """Uniform around the target: position, velocity, roll, pitch, any yaw, body rates."""
         c, u = self.config, uniform(key, n, 12)
         state = at_rest(jnp.asarray(c.target) + c.position * u[:, :3])
         quaternion = from_euler(c.tilt * u[:, 6], c.tilt * u[:, 7], jnp.pi * u[:, 8])

@@ -1,4 +1,4 @@
-"""Perception-aware hovering: the goal, and where it is flown. Imports no JAX."""
+"""Perception-aware hovering: the goal, and the route of a flight. Imports no JAX."""
 
 import dataclasses
 import math
@@ -19,55 +19,59 @@ from e2efly.tasks.route import Route, beside, place
 from e2efly.tasks.verdicts import distance, held_longer, touches_ground, unrotate
 
 OUTSIDE = 10.0
-"""Pixels end here, in halves of the image; what is behind the camera is here, too."""
+"""Limit of pixel coordinates, in halves of the image. Points behind the camera also get this value."""
 NEAREST = 1e-3
-"""What is nearer along the optical axis than this counts as behind the camera, m."""
+"""A point nearer to the camera than this along the optical axis counts as behind it, m."""
 
 
 @dataclass(frozen=True)
 class Memory:
-    """What to look at, a ball on a circle, and for how long all has been well."""
+    """The object to look at, a ball on a circle, and the time for which both conditions of success have held."""
 
     centre: Array
-    """(n, 3) of the circle, world, m."""
+    """(n, 3) centre of the circle, world, m."""
     away: Array
-    """(n,) its radius, m."""
+    """(n,) radius of the circle, m."""
     angle: Array
-    """(n,) where the ball was at the start, rad."""
+    """(n,) angle of the ball on the circle at the start, rad."""
     rate: Array
-    """(n,) of its angle, rad/s."""
+    """(n,) rate of that angle, rad/s."""
     time: Array
-    """(n,) of the last step's end, s."""
+    """(n,) time at the end of the last step, s."""
     held: Array
-    """(n,) s."""
+    """(n,) time for which the conditions have held, s."""
 
 
 @dataclass(frozen=True)
 class HoverAwareGoal(Goal):
-    """The camera is the task's own, which nobody has to render; its pixels are in halves of the image."""
+    """Hover and look at an object.
+
+    The camera belongs to the task, and its images need not be rendered. Its pixel coordinates are in halves of the
+    image.
+    """
 
     config: HoverAwareConfig
     shape: Shape
     control_period: float | Array
 
     def goal(self, memory: Memory, time: Array) -> Array:
-        """Where to hover."""
+        """The point to hover at."""
         del time
         xp = namespace(memory.held)
         return xp.broadcast_to(xp.asarray(self.config.target), (*memory.held.shape, 3))
 
     def look_at(self, memory: Memory, time: Array) -> Array:
-        """(n, 3) where what to look at is, world, m."""
+        """(n, 3) position of the object to look at, world, m."""
         xp, angle = namespace(memory.away), memory.angle + memory.rate * time
         circle = xp.stack([memory.away * xp.cos(angle), memory.away * xp.sin(angle), 0.0 * angle], axis=-1)
         return memory.centre + circle
 
     def position_error(self, memory: Memory, time: Array, body: Any) -> Array:
-        """Where to hover, minus position."""
+        """The point to hover at minus position."""
         return self.goal(memory, time) - body.position
 
     def look_at_offset(self, memory: Memory, time: Array, body: Any) -> Array:
-        """What to look at, minus position."""
+        """Position of the object to look at minus position."""
         return self.look_at(memory, time) - body.position
 
     observation = (
@@ -77,15 +81,16 @@ class HoverAwareGoal(Goal):
 
     @classmethod
     def aim(cls, shown: Mapping[str, Array]) -> Place:
-        """The target, in the heading of what to look at."""
+        """The target, with the heading towards the object to look at."""
         there = shown["look_at"]
         yaw = namespace(there).arctan2(there[..., 1], there[..., 0])
         return Place(Vec3.of(shown["position_error"]), yaw=yaw)
 
     def pixel(self, position: Array, quaternion: Array, point: Array) -> Array:
-        """(n, 2) where the camera of a vehicle sees a point: right and down from the middle, in halves of the image.
+        """(n, 2) pixel of a point in the vehicle's camera.
 
-        Up to `OUTSIDE` either way; a point behind the camera is there, too.
+        Coordinates are right and down from the image centre, in halves of the image. They are limited to `OUTSIDE` in
+        both directions, and a point behind the camera is put there, too.
         """
         c, xp = self.config, namespace(position)
         mounted = unrotate(quaternion, point - position) - xp.asarray(c.camera_position)
@@ -97,9 +102,9 @@ class HoverAwareGoal(Goal):
         return xp.where(front, inside, OUTSIDE)
 
     def advance(self, memory: Memory, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Memory, Outcome]:
-        """Success: for the last `hold_s` of the episode within the radius, and what to look at in the image's middle.
+        """Judge a step. Success: within the radius and with the object centred for the last `hold_s` of the episode.
 
-        Leaving the fence, touching the ground or what to look at fails.
+        Leaving the fence, or touching the ground or the object, fails.
         """
         del before
         c, ball = self.config, self.look_at(memory, time)
@@ -123,16 +128,16 @@ class HoverAwareRoute(Route):
     longest_s: ClassVar = 8.0
 
     target: tuple[float, float, float] = place(defaults.TARGET)
-    """Where to hover, m."""
+    """Point to hover at, m."""
     look_at: tuple[float, float, float] = place((5.0, 0.0, 3.0))
-    """What to look at, when the policy takes over, m."""
+    """Position of the object to look at when the policy takes over, m."""
     turn_rate: float = place(0.0)
-    """It circles around the target at this rate, rad/s."""
+    """Rate at which the object circles around the target, rad/s."""
     size: float = number(0.2, above=0)
-    """Radius of what to look at, m."""
+    """Radius of the object to look at, m."""
 
     def course(self, shape: Shape, control_period: float) -> Course:
-        """The target; it has no end."""
+        """The course to the target. It has no end."""
         x, y, z = np.subtract(self.look_at, self.target)
         config = dataclasses.replace(HoverAwareConfig(), target=self.target, size=self.size)
         memory = Memory(

@@ -1,4 +1,4 @@
-"""Perception-aware hovering: stay at a point, and keep what moves around it in the middle of the camera's image."""
+"""Perception-aware hovering: stay at a point, and keep a moving object in the middle of the camera's image."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -23,10 +23,10 @@ jax.tree_util.register_dataclass(Memory)
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class HoverAware(HoverAwareGoal):
-    """Starts about the target, with a ball on a circle around it."""
+    """Starts around the target, with a ball on a circle around it."""
 
     page: ClassVar = "hover_aware"
-    """What the page of `e2efly export --web` calls this world, which it simulates."""
+    """Name of this world on the page of `e2efly export --web`, which simulates it."""
 
     @classmethod
     def of(cls, config: HoverAwareConfig, shape: Shape, control_period: float, substeps: int = 1) -> "HoverAware":
@@ -35,7 +35,10 @@ class HoverAware(HoverAwareGoal):
         return cls(config, shape, control_period)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Memory]:
-        """Uniform about the target: position, velocity, roll, pitch, any yaw; what to look at somewhere around it."""
+        """Uniform around the target: position, velocity, roll, pitch, any yaw.
+
+        The object is somewhere around the target.
+        """
         c, u, zero = self.config, uniform(key, n, 13), jnp.zeros(n)
         target = jnp.asarray(c.target)
         state = at_rest(target + c.position * u[:, :3])
@@ -58,14 +61,14 @@ class HoverAware(HoverAwareGoal):
         return Scene.of({"sphere": ball}, memory.held.shape[0])
 
     def desired_yaw(self, memory: Memory, state: State) -> Float[Array, " n"]:
-        """Towards where what to look at was at the end of the last step."""
+        """Towards the position of the object at the end of the last step."""
         away = self.look_at(memory, memory.time) - state.position
         return jnp.arctan2(away[:, 1], away[:, 0] + 1e-6)
 
     def projection(
         self, memory: Memory, state: State, time: Float[Array, " n"]
     ) -> tuple[Float[Array, "n 2"], Float[Array, "n 2"]]:
-        """The pixel of what to look at, and its velocity, 1/s: by the vehicle's motion, its turning and what moves."""
+        """Pixel of the object, and its velocity, 1/s, from the motion of the vehicle and of the object."""
 
         def seen(position: Array, quaternion: Array, time: Array) -> Array:
             return self.pixel(position, quaternion, self.look_at(memory, time))

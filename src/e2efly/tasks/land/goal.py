@@ -1,4 +1,4 @@
-"""Landing: the goal, and where it is flown. Imports no JAX."""
+"""Landing: the goal, and the route of a flight. Imports no JAX."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,9 +17,9 @@ from e2efly.tasks.route import Route, place
 from e2efly.tasks.verdicts import touches_ground, upright
 
 OVER = 0.3
-"""A controller that is no policy sinks from within this of the pad's centre, m ..."""
+"""Horizontal distance from the pad's centre within which a controller that is not a policy descends, m."""
 SINK_RATE, SLOWEST, FASTEST = 0.7, 0.35, 1.2
-"""... at this speed over its height, 1/s, within these bounds, m/s."""
+"""Speed of this descent divided by height, 1/s, and the smallest and largest speed, m/s."""
 
 
 class Landing(Goal):
@@ -28,24 +28,24 @@ class Landing(Goal):
     lands: ClassVar = True
 
     def done(self, outcome: Outcome) -> bool:
-        """At the first touch, well or badly: what has touched the ground must not climb again."""
+        """Done at the first touch, good or bad. A vehicle that has touched the ground must not climb again."""
         return bool(outcome.signals["touched"][0])
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
-        """Where it touched, and how fast."""
+        """The place and speed of the touch, as text."""
         del arrivals, mean_error
         return f"touched {100 * final_error:.1f} cm off at {speed:.2f} m/s"
 
 
 @dataclass(frozen=True)
 class LandGoal(Landing):
-    """A pad at the world's origin to stand on. The task's state is empty: an array of shape (n, 0)."""
+    """Land on a pad at the world's origin. The task's state is empty: an array of shape (n, 0)."""
 
     config: LandConfig
     shape: Shape
 
     def goal(self, memory: Array, time: Array) -> Array:
-        """The centre of mass of a vehicle that stands on the pad."""
+        """The position of the centre of mass when the vehicle stands on the pad."""
         del memory
         zero = 0.0 * time
         return namespace(time).stack([zero, zero, zero + self.shape.feet_height], axis=-1)
@@ -65,14 +65,17 @@ class LandGoal(Landing):
 
     @classmethod
     def aim(cls, shown: Mapping[str, Array]) -> Place:
-        """Over the pad, and down once it is there, slower near the ground."""
+        """A place over the pad. Once the vehicle is there, a descent that is slower near the ground."""
         x, y, z = (shown["position_error"][..., axis] for axis in range(3))
         xp = namespace(z)
         down = xp.where(x**2 + y**2 < OVER**2, xp.clip(SINK_RATE * z, -FASTEST, -SLOWEST), 0.0)
         return Place(Vec3(x, y, 0.0 * z), Vec3(0.0 * z, 0.0 * z, down))
 
     def advance(self, memory: Array, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Array, Outcome]:
-        """The episode ends at the first touch; success: near the centre, slow, upright. Judged at the step's end."""
+        """Judge a step. Success: a touch near the centre, slow and upright.
+
+        The episode ends at the first touch. It is judged at the end of the step.
+        """
         del before, timed_out
         return memory, touchdown(self.config, after, self.goal(memory, time), touches_ground(self.shape, after))
 
@@ -81,10 +84,10 @@ def touchdown(config: Any, body: Any, goal: Array, touched: Array) -> Outcome:
     """The verdict on a landing.
 
     Args:
-        config: with `radius`, `height_error`, `speed` and `tilt` at touch, and the `fence`.
-        body: of the vehicles at the end of the step.
-        goal: (n, 3) their place when they have landed.
-        touched: (n,) whether they touch pad or ground.
+        config: options with `radius`, `height_error`, `speed` and `tilt` at the touch, and the `fence`.
+        body: the vehicles at the end of the step.
+        goal: (n, 3) their position after landing.
+        touched: (n,) whether they touch the pad or the ground.
     """
     xp = namespace(body.position)
     offset = body.position - goal
@@ -110,10 +113,10 @@ class LandRoute(Route):
     longest_s: ClassVar = 15.0
 
     pad: tuple[float, float, float] = place((0.0, 0.0, 0.0))
-    """The point of the ground to land on, m."""
+    """Point on the ground to land on, m."""
 
     def course(self, shape: Shape, control_period: float) -> Course:
-        """The pad, which is the origin of the task's world."""
+        """The course to the pad, which is the origin of the task's world."""
         del control_period
         start = np.array([1.0, 0.5, 2.0])
         goal, pad = LandGoal(LandConfig(), shape), Origin(self.pad)

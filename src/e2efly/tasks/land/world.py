@@ -21,10 +21,10 @@ from e2efly.tasks.task import at_rest, uniform
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Land(LandGoal):
-    """Starts over and beside a flat pad."""
+    """Starts above and beside a flat pad."""
 
     page: ClassVar = "land"
-    """What the page of `e2efly export --web` calls this world, which it simulates."""
+    """Name of this world on the page of `e2efly export --web`, which simulates it."""
 
     @classmethod
     def of(cls, config: LandConfig, shape: Shape, control_period: float, substeps: int = 1) -> "Land":
@@ -33,7 +33,7 @@ class Land(LandGoal):
         return cls(config, shape)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Float[Array, "n 0"]]:
-        """Level, any heading, over and beside the pad."""
+        """Level, any heading, above and beside the pad."""
         c, u = self.config, uniform(key, n, 7)
         low, high = c.height
         height = self.shape.feet_height + (low + high) / 2 + (high - low) / 2 * u[:, 2]

@@ -1,4 +1,4 @@
-"""Visual landing: touch down gently on a pad that is only seen, of random size and shape."""
+"""Visual landing: touch down gently on a pad of random size and shape that is known only from camera images."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from e2efly.tasks.task import at_rest, uniform
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class LandVisual(LandVisualGoal):
-    """Starts over and beside the pad, which is the task's state."""
+    """Starts above and beside the pad. The pad is the task's state."""
 
     @classmethod
     def of(cls, config: LandVisualConfig, shape: Shape, control_period: float, substeps: int = 1) -> "LandVisual":
@@ -29,7 +29,7 @@ class LandVisual(LandVisualGoal):
         return cls(config, shape)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Solids]:
-        """Level, any heading, over and beside the pad."""
+        """Level, any heading, above and beside the pad."""
         state_key, outline_key = jax.random.split(key)
         c, u = self.config, uniform(state_key, n, 9)
         low, high = c.height
@@ -50,7 +50,7 @@ class LandVisual(LandVisualGoal):
         return Scene.of({"pad": memory}, memory.active.shape[0])
 
     def drawn(self, memory: Solids) -> dict[str, Array]:
-        """The pad: its outline (0 a disc, 1 a square, 2 a triangle) and its width, m."""
+        """The pad: its outline (0: disc, 1: square, 2: triangle) and its width, m."""
         return {"pad_outline": memory.size[:, 0, 2].astype(int), "pad_width_m": 2 * memory.size[:, 0, 0]}
 
     def desired_yaw(self, memory: Solids, state: State) -> Float[Array, " n"]:
@@ -61,7 +61,7 @@ class LandVisual(LandVisualGoal):
     def advance(
         self, memory: Solids, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
     ) -> tuple[Solids, Outcome]:
-        """The goal's verdict; what touches is told by the pad's outline."""
+        """The goal's verdict. The pad's outline decides whether the vehicle touches the pad."""
         del before, timed_out
         feet = after.position - jnp.array([0.0, 0.0, 1.0]) * self.shape.feet_height
         touched = (feet[:, 2] <= 0) | (distances("pad", memory, feet, time)[:, 0] <= 0)

@@ -1,4 +1,4 @@
-"""Racing on any track: the goal of policies that are shown enough of it. Imports no JAX."""
+"""Racing on any track: the goal of policies whose observation describes the gates fully. Imports no JAX."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -14,18 +14,18 @@ from e2efly.tasks.race.goal import Racing
 from e2efly.tasks.verdicts import distance, offsets
 
 SHOWN = 3
-"""Gates that the policy is shown."""
+"""Number of gates that the policy observes."""
 HIGHEST = 3.0
-"""Higher over the ground than this the policy is told this, m."""
+"""Limit of the observed height above the ground, m."""
 
 
 @dataclass(frozen=True)
 class Memory:
-    """The track of each vehicle, and how far it is."""
+    """The track of each vehicle, and the number of gates that it has passed."""
 
     tracks: Tracks
     passed: Array
-    """(n,) gates."""
+    """(n,) gates passed."""
 
     @property
     def index(self) -> Array:
@@ -35,18 +35,21 @@ class Memory:
 
 @dataclass(frozen=True)
 class Ahead:
-    """The next `SHOWN` gates of n vehicles. Behind the last gate of an open track others follow straight on."""
+    """The next `SHOWN` gates of n vehicles.
+
+    After the last gate of an open track, further gates follow straight on.
+    """
 
     centre: Array
-    """(n, s, 3) world, m."""
+    """(n, s, 3) centres, world, m."""
     axis: Array
-    """(n, s, 3) unit vectors along which they are flown through, world."""
+    """(n, s, 3) unit vectors in the direction of flight through the gates, world."""
     half: Array
-    """(n, s, 2) half of the openings' width and height, m."""
+    """(n, s, 2) half of the width and height of the openings, m."""
 
     @staticmethod
     def of(memory: Memory) -> "Ahead":
-        """Those that follow the gates passed."""
+        """The gates that follow the gates passed."""
         tracks, index = memory.tracks, memory.index
         g, xp = tracks.gates, namespace(memory.passed)
         count, closed = tracks.count[:, None], tracks.closed[:, None]
@@ -61,7 +64,7 @@ class Ahead:
 
 @dataclass(frozen=True)
 class AnyRaceGoal(Racing):
-    """Gates to fly through in order, on a track of each vehicle's own."""
+    """Fly through gates in order, on a separate track for each vehicle."""
 
     config: RaceConfig
     shape: Shape
@@ -91,7 +94,7 @@ class AnyRaceGoal(Racing):
         return 2 * Ahead.of(memory).half.reshape(body.position.shape[0], -1)
 
     def height(self, memory: Memory, time: Array, body: Any) -> Array:
-        """Over the ground."""
+        """Height above the ground, limited to `HIGHEST`."""
         del memory, time
         return namespace(body.position).clip(body.position[:, 2:], 0.0, HIGHEST)
 
@@ -115,7 +118,10 @@ class AnyRaceGoal(Racing):
     )  # fmt: skip
 
     def fence(self, memory: Memory) -> Array:
-        """(n,) farther than this from the next gate is too far, m: the fence beside the way from the last one."""
+        """(n,) largest allowed distance from the next gate, m.
+
+        It is the fence plus the distance between the last gate, or the start, and the next gate.
+        """
         g, index, xp = memory.tracks.gates, memory.index, namespace(memory.passed)
         before = (index - 1) % memory.tracks.count
         here, there = (xp.take_along_axis(g.position, i[:, None, None], axis=1)[:, 0] for i in (before, index))
@@ -123,7 +129,10 @@ class AnyRaceGoal(Racing):
         return self.config.fence + distance(here, there)
 
     def advance(self, memory: Memory, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Memory, Outcome]:
-        """Success: the last gate of the last lap passed. Crossings are judged on the straight line of the step."""
+        """Judge a step. Success: the last gate of the last lap is passed.
+
+        Crossings are judged on the straight line of the step.
+        """
         del time, timed_out
         tracks, xp = memory.tracks, namespace(memory.passed)
         laps = xp.where(tracks.closed, self.config.laps, 1)
@@ -132,7 +141,7 @@ class AnyRaceGoal(Racing):
         return dataclasses.replace(memory, passed=memory.passed + passed), outcome
 
     def drawn(self, memory: Memory) -> dict[str, Array]:
-        """The track: where it begins, its gates (rows beyond `count` are none), and whether it is closed."""
+        """The track: its start, its gates (rows beyond `count` are unused), and whether it is closed."""
         t = memory.tracks
         yaw = namespace(memory.passed).arctan2(t.gates.sin, t.gates.cos)
         return {
@@ -141,6 +150,6 @@ class AnyRaceGoal(Racing):
         }  # fmt: skip
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
-        """Gates, and when the last was passed."""
+        """The number of gates passed and the time of the last one, as text."""
         del mean_error, final_error, speed
         return f"{len(arrivals)} gates" + (f" in {arrivals[-1]:.2f} s" if arrivals else "")

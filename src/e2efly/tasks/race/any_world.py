@@ -1,4 +1,4 @@
-"""Racing on any track: every episode another one, at random (`courses/random_tracks.py`), or a given one."""
+"""Racing on any track: a random track for each episode (`courses/random_tracks.py`), or a given track for all."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from e2efly.tasks.race.way import NextGates
 from e2efly.tasks.task import at_rest, into_ball, uniform
 
 LOWEST_START = 0.3
-"""Starts are drawn at least this high over the feet, m."""
+"""Smallest height of the feet above the ground in a start, m."""
 
 jax.tree_util.register_dataclass(Memory, data_fields=["tracks", "passed"], meta_fields=[])
 
@@ -34,13 +34,13 @@ class AnyRace(AnyRaceGoal):
     """Make it with `AnyRace.of`."""
 
     page: ClassVar = "any_race"
-    """What the page of `e2efly export --web` calls this world, which it simulates."""
+    """Name of this world on the page of `e2efly export --web`, which simulates it."""
     given: Tracks | None
-    """The track of every episode (n = 1); None: another one in each."""
+    """The track of every episode (n = 1). None: each episode has another track."""
 
     @staticmethod
     def of(config: RaceConfig, shape: Shape) -> "AnyRace":
-        """Load the track, where one is named.
+        """Load the track, if one is named.
 
         Raises:
             ValueError: for an unknown or broken track.
@@ -52,7 +52,7 @@ class AnyRace(AnyRaceGoal):
         return AnyRace(numbers, shape, None if given is None else Tracks.of(given, MOST))
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Memory]:
-        """At rest and level in a ball about the start of each one's track, heading as it says."""
+        """At rest and level in a ball around the start of each vehicle's track, with the heading of the track."""
         track_key, state_key = jax.random.split(key)
         if self.given is None:
             size = CANDIDATES * NUMBERS
@@ -88,7 +88,10 @@ class AnyRace(AnyRaceGoal):
 
 
 def begun(key: PRNGKeyArray, n: int, radius: Any, shape: Shape, place: Any, heading: Any) -> State:
-    """At rest and level in a ball about a place (3,) or (n, 3), with a heading, rad, a number or (n,)."""
+    """At rest and level in a ball around a place.
+
+    The place is (3,) or (n, 3). The heading, rad, is a number or (n,).
+    """
     position = jnp.asarray(place) + radius * into_ball(uniform(key, n, 3))
     position = position.at[:, 2].max(shape.feet_height + LOWEST_START)
     zero = jnp.zeros(n)

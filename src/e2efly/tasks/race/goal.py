@@ -1,4 +1,4 @@
-"""Racing: the goal, and where it is flown. What passing a gate is: `courses/gates.py`. Imports no JAX."""
+"""Racing: the goal, and the route of a flight. `courses/gates.py` defines what passing a gate is. Imports no JAX."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -22,32 +22,32 @@ from e2efly.tasks.verdicts import distance, offsets, touches_ground
 from e2efly.vehicles.tables import LARGEST
 
 CRUISE = 3.0
-"""Speed of a controller that is no policy, m/s."""
+"""Speed of a controller that is not a policy, m/s."""
 
 
 class Racing(Goal):
-    """Gates to fly through in order."""
+    """Fly through gates in order."""
 
     config: RaceConfig
     shape: Shape
 
     def place(self, memory: Any) -> tuple[int, int]:
-        """Of a single flight (n = 1): the next gate and the lap, both counted from 1."""
+        """For a single flight (n = 1): the next gate and the lap, both counted from 1."""
         raise NotImplementedError
 
     def verdict(
         self, memory: Any, before: Any, after: Any, gates: Gates, index: Array, end: Array, fence: Array
     ) -> tuple[Array, Outcome]:
-        """What a step came to, and which vehicles have passed a gate in it.
+        """The outcome of a step, and which vehicles have passed a gate in it.
 
         Args:
             memory: the task's state before the step.
             before: the vehicles at the start of the step.
             after: the vehicles at its end.
-            gates: the track, or each world's.
+            gates: the gates of the track, or of each world's track.
             index: (n,) the next gate, counted from 0 within a lap.
-            end: (n,) whether a vehicle is done that passes it.
-            fence: farther than this from it is too far, m.
+            end: (n,) whether a vehicle that passes this gate has finished.
+            fence: largest allowed distance from this gate, m.
         """
         passed, missed, struck = gates.judge(index, before.position, after.position, self.shape.radius)
         error = distance(after.position, self.goal(memory, index))
@@ -60,7 +60,7 @@ class Racing(Goal):
         )  # fmt: skip
 
     def failure(self, memory: Any, outcome: Outcome) -> str:
-        """Which gate was missed or struck, if that is why."""
+        """The gate that was missed or touched, if this is the reason."""
         where = "gate {} of lap {}".format(*self.place(memory))
         if outcome.signals["missed"][0]:
             return f"{where} missed"
@@ -71,7 +71,7 @@ class Racing(Goal):
 
 @dataclass(frozen=True)
 class RaceGoal(Racing):
-    """Gates to fly through in order. The task's state is the number of gates passed, (n,)."""
+    """Fly through gates in order. The task's state is the number of gates passed, (n,)."""
 
     config: RaceConfig
     shape: Shape
@@ -81,16 +81,16 @@ class RaceGoal(Racing):
 
     @classmethod
     def showing(cls, names: Sequence[str]) -> type[Goal]:
-        """Another one where the axes of gates are shown."""
+        """`AnyRaceGoal` if the observation contains the axes of gates, otherwise this class."""
         if "gate_axes" not in names:
             return cls
-        from e2efly.tasks.race.any_goal import AnyRaceGoal  # which extends this module's
+        from e2efly.tasks.race.any_goal import AnyRaceGoal  # extends a class of this module
 
         return AnyRaceGoal
 
     @property
     def count(self) -> int:
-        """Gates of the track."""
+        """Number of gates of the track."""
         return self.gates.count
 
     def place(self, memory: Array) -> tuple[int, int]:
@@ -109,12 +109,12 @@ class RaceGoal(Racing):
         return xp.asarray(self.gates.position)[xp.stack([index, index + 1], axis=-1)]
 
     def target_offsets(self, memory: Array, time: Array, body: Any) -> Array:
-        """The same, minus position."""
+        """The same centres minus position."""
         return offsets(self.targets(memory, time), body)
 
     @classmethod
     def aim(cls, shown: Mapping[str, Array]) -> Place:
-        """Straight on to the next gate's centre at `CRUISE`: wherever it is, it moves there."""
+        """Straight to the next gate's centre at `CRUISE`, wherever this centre is."""
         way = shown["gates"][..., :3]
         far = namespace(way).linalg.norm(way, axis=-1, keepdims=True)
         return Place(Vec3.of(0.0 * way), Vec3.of(way / (far + 1e-6)) * CRUISE)
@@ -124,7 +124,10 @@ class RaceGoal(Racing):
     )
 
     def advance(self, memory: Array, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Array, Outcome]:
-        """Success: the last gate of the last lap passed. Crossings are judged on the straight line of the step."""
+        """Judge a step. Success: the last gate of the last lap is passed.
+
+        Crossings are judged on the straight line of the step.
+        """
         del time, timed_out
         laps = self.config.laps if self.closed else 1
         end = (laps > 0) & (memory + 1 >= laps * self.count)
@@ -132,7 +135,7 @@ class RaceGoal(Racing):
         return memory + passed, outcome
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
-        """Laps, and the mean time of one."""
+        """The number of laps and the mean lap time, as text."""
         del mean_error, final_error, speed
         laps = len(arrivals) // self.count
         each = f", {arrivals[laps * self.count - 1] / laps:.2f} s each" if laps else ""
@@ -141,7 +144,7 @@ class RaceGoal(Racing):
 
 @dataclass(frozen=True)
 class RaceRoute(Route):
-    """What to race through."""
+    """The track to race on."""
 
     height: ClassVar = "track"
     longest_s: ClassVar = 40.0
@@ -150,20 +153,20 @@ class RaceRoute(Route):
     track: str = defaults.TRACK
     """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file."""
     laps: int = number(1, high=LARGEST)
-    """Laps to fly; 0: on and on."""
+    """Number of laps to fly. 0: without end."""
 
     def course(self, shape: Shape, control_period: float) -> Course:
-        """The track, from its start in its heading."""
+        """The course along the track, from its start and with its heading."""
         del control_period
         track = self._track()
         gates = Gates.of(track)
         return self._placed(RaceGoal(self._options(), shape, gates, track.closed), np.zeros(1, int), track)
 
     def course_of(self, contract: Contract, shape: Shape) -> Course:
-        """The same, for a policy that is shown what any track needs, too."""
+        """The same course, also for a policy whose observation describes any track."""
         if "gate_axes" not in (field.name for field in contract.observation):
             return super().course_of(contract, shape)
-        from e2efly.tasks.race.any_goal import AnyRaceGoal, Memory  # which extend this module's
+        from e2efly.tasks.race.any_goal import AnyRaceGoal, Memory  # these extend classes of this module
 
         track = self._track()
         return self._placed(AnyRaceGoal(self._options(), shape), Memory(Tracks.of(track), np.zeros(1, int)), track)

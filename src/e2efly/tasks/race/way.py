@@ -1,4 +1,4 @@
-"""Signals for rewards on the way through gates: how far it is, and how well the vehicle fits the opening."""
+"""Signals for rewards in flight through gates: the distance left to fly, and how well the vehicle fits the opening."""
 
 from dataclasses import dataclass
 
@@ -11,35 +11,37 @@ from e2efly.rewards import norm
 from e2efly.scenes.shapes import FAR
 
 AROUND = 1.5
-"""The way to a gate from behind it leads through a point at most so far before it, m ..."""
+"""Largest distance in front of a gate of the point through which the way from behind the gate leads, m."""
 DETOUR = 0.5
-"""... and so far for each metre that the vehicle is behind it."""
+"""Distance of this point in front of the gate per metre that the vehicle is behind it."""
 SHORTEST = 0.01
-"""Keeps the gradient of where a gate's plane is crossed finite, m: a step that crosses it is longer than this."""
+"""Lower limit of the length of a step that crosses a gate's plane, m. It keeps the gradient of the crossing point
+finite."""
 LOW = 0.2
-"""With the feet lower than this over the ground a vehicle stands out of where it should be, m."""
+"""Height of the feet above the ground below which a vehicle counts as too low, m."""
 
 
 @dataclass(frozen=True)
 class NextGates:
-    """The gate that each of n vehicles flies to, and the one after it."""
+    """For each of n vehicles, the next gate and the gate after it."""
 
     centre: tuple[Float[Array, "n 3"], Float[Array, "n 3"]]
-    """World, m."""
+    """Centres, world, m."""
     axis: tuple[Float[Array, "n 3"], Float[Array, "n 3"]]
-    """Along which they are flown through, unit vectors, world."""
+    """Unit vectors in the direction of flight through the gates, world."""
     half: Float[Array, "n 2"]
-    """Half of the first one's width and height, m."""
+    """Half of the width and height of the next gate, m."""
 
     def signals(
         self, shape: Shape, before: State, after: State, arrived: Bool[Array, " n"]
     ) -> dict[str, Float[Array, "..."]]:
         """`way`, `previous_way` and `overhang` of a step, for the terms `progway`, `fit` and `fitlog`.
 
-        What stands out of an opening, sideways and up, is followed by what is too near to the ground.
+        The columns of `overhang` are how far the vehicle extends outside the opening, sideways and upwards, and how far
+        it is below the lowest allowed height.
 
-        The way is that to the next gate. In the step that passes it, it is what was flown of the way from there to the
-        gate after it, negative: so that no step charges for being fast through a gate.
+        The way is the distance left to fly to the next gate. In the step that passes this gate, it is minus the
+        distance already flown from there towards the gate after it. So no step is penalised for passing a gate fast.
         """
         (here, there), (along, onward) = self.centre, self.axis
         was, now = (_local(s.position - here, along) for s in (before, after))
@@ -49,8 +51,9 @@ class NextGates:
         return {"way": jnp.where(arrived, beyond, _way(now)), "previous_way": _way(was), "overhang": out}
 
     def _overhang(self, shape: Shape, was: Float[Array, "n 3"], now: Float[Array, "n 3"]) -> Float[Array, "n 2"]:
-        """How far the vehicle's sphere stands out of the opening, sideways and up, where it crosses its plane forward,
-        m; `-FAR` in steps that do not cross it.
+        """How far the vehicle's sphere extends outside the opening, sideways and upwards, m.
+
+        It is taken where the step crosses the gate's plane forward, and is `-FAR` in steps that do not cross it.
         """
         crossing = (was[:, 0] < 0) & (now[:, 0] >= 0)
         step = jnp.where(crossing, jnp.minimum(was[:, 0] - now[:, 0], -SHORTEST), -1.0)
@@ -60,15 +63,16 @@ class NextGates:
 
 
 def _local(d: Float[Array, "n 3"], axis: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
-    """Offsets from a gate in its frame: along its axis, to the left, up."""
+    """Offsets from a gate in the gate's frame: along its axis, to the left, up."""
     x = d[:, 0] * axis[:, 0] + d[:, 1] * axis[:, 1]
     return jnp.stack([x, d[:, 1] * axis[:, 0] - d[:, 0] * axis[:, 1], d[:, 2]], axis=-1)
 
 
 def _way(local: Float[Array, "n 3"]) -> Float[Array, " n"]:
-    """How far it is to fly to a gate's centre and through it forward, m: before it straight, from behind it around.
+    """Distance left to fly to a gate's centre, to cross it forward, m: straight from the front, and around from behind.
 
-    The way around leads by a point before the gate, the farther before it the farther behind it the vehicle is.
+    The way around leads through a point in front of the gate. The farther the vehicle is behind the gate, the farther
+    this point is in front of it.
     """
     back = jnp.clip(DETOUR * local[:, 0], 0.0, AROUND)
     return norm(local.at[:, 0].add(back)) + back

@@ -1,4 +1,4 @@
-"""Racing: fly through gates in order, as fast as the vehicle allows. What passing is: `courses/gates.py`."""
+"""Racing: fly through gates in order, as fast as the vehicle can. `courses/gates.py` defines what passing a gate is."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -27,11 +27,11 @@ class Race(RaceGoal):
     """Make it with `Race.of`."""
 
     page: ClassVar = "race"
-    """What the page of `e2efly export --web` calls this world, which it simulates."""
+    """Name of this world on the page of `e2efly export --web`, which simulates it."""
 
     @staticmethod
     def of(config: RaceConfig, shape: Shape, control_period: float = 0.0, substeps: int = 1) -> "Race | AnyRace":
-        """Load the track; `AnyRace` where more is shown of it.
+        """Load the track. The result is `AnyRace` if the options ask for a fuller observation of the track.
 
         Raises:
             ValueError: for an unknown or broken track.
@@ -46,7 +46,7 @@ class Race(RaceGoal):
         return Race(numbers, shape, Gates.of(track), track.closed)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Int[Array, " n"]]:
-        """At rest and level in a ball about the start, heading as the track says."""
+        """At rest and level in a ball around the start, with the heading that the track gives."""
         state = begun(key, n, self.config.position, self.shape, self.gates.start, self.gates.start_yaw)
         return state, jnp.zeros(n, jnp.int32)
 
@@ -62,7 +62,7 @@ class Race(RaceGoal):
         moved, outcome = super().advance(memory, before, after, time, timed_out)
         here, beyond = memory % self.count, (memory + 1) % self.count
         axes = jnp.stack([jnp.asarray(self.gates.cos), jnp.asarray(self.gates.sin), jnp.zeros(self.count)], axis=-1)
-        # behind the last gate of an open track the way leads straight on
+        # after the last gate of an open track the way leads straight on
         onward = axes[beyond] if self.closed else axes[jnp.minimum(here + 1, self.count - 1)]
         centre = jnp.asarray(self.gates.position)
         gates = NextGates((centre[here], centre[here + 1]), (axes[here], onward), jnp.asarray(self.gates.half)[here])

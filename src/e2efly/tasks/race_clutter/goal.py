@@ -1,4 +1,4 @@
-"""Racing in clutter: the goal, and where it is flown. Imports no JAX."""
+"""Racing in clutter: the goal, and the route of a flight. Imports no JAX."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -25,25 +25,25 @@ from e2efly.vehicles.tables import LARGEST
 
 @dataclass(frozen=True)
 class Memory(any_goal.Memory):
-    """The track of each vehicle, how far it is, and how fast it is to fly."""
+    """The track of each vehicle, the number of gates that it has passed, and its commanded speed."""
 
     speed: Array
-    """(n,) commanded, m/s."""
+    """(n,) commanded speed, m/s."""
 
 
 @dataclass(frozen=True)
 class RaceClutterGoal(Goal):
-    """Gates to fly through in order, at a commanded speed."""
+    """Fly through gates in order, at a commanded speed."""
 
     config: RaceClutterConfig
     shape: Shape
     control_period: float
     checks: int
-    """How often a control step is checked for collisions."""
+    """Number of collision checks per control step."""
 
     @classmethod
     def state(cls, memory: Any) -> Memory:
-        """Without what only cameras see."""
+        """The state without what only cameras see."""
         return Memory(**{part.name: getattr(memory, part.name) for part in dataclasses.fields(Memory)})
 
     def goal(self, memory: Memory, time: Array) -> Array:
@@ -52,12 +52,12 @@ class RaceClutterGoal(Goal):
         return Ahead.of(memory).centre[:, 0]
 
     def target_offsets(self, memory: Memory, time: Array, body: Any) -> Array:
-        """The next two gates minus position."""
+        """The centres of the next two gates minus position."""
         del time
         return offsets(Ahead.of(memory).centre[:, :2], body)
 
     def flat_axes(self, memory: Memory, time: Array, body: Any) -> Array:
-        """Their directions."""
+        """The directions of flight through the next two gates."""
         del time
         return Ahead.of(memory).axis[:, :2].reshape(body.position.shape[0], 6)
 
@@ -76,12 +76,15 @@ class RaceClutterGoal(Goal):
     )
 
     def advance(self, memory: Any, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Any, Outcome]:
-        """The verdict of one that cannot know what stands in the way."""
+        """The verdict without knowledge of the obstacles."""
         del timed_out
         return self.verdict(memory, before, after, time, False)
 
     def verdict(self, memory: Any, before: Any, after: Any, time: Array, hit: Array | bool) -> tuple[Any, Outcome]:
-        """Success: the last gate of the lap passed without touching anything; `hit`: gate, obstacle or ground."""
+        """Success: the last gate of the lap is passed without touching anything.
+
+        `hit`: a gate, an obstacle or the ground.
+        """
         c = self.config
         tracks, xp = memory.tracks, namespace(memory.passed)
         passed, missed, _ = tracks.gates.judge(memory.index, before.position, after.position, self.shape.radius)
@@ -99,19 +102,19 @@ class RaceClutterGoal(Goal):
         )  # fmt: skip
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
-        """How many gates, and when the last."""
+        """The number of gates passed and the time of the last one, as text."""
         del mean_error, final_error, speed
         return f"{len(arrivals)} gates in {arrivals[-1]:.2f} s" if arrivals else "no gate"
 
     def failure(self, memory: Memory, outcome: Outcome) -> str:
-        """Which gate was missed, if that is why."""
+        """The gate that was missed, if this is the reason."""
         where = f"gate {int(memory.index[0]) + 1} of lap {int(memory.passed[0] // memory.tracks.count[0]) + 1}"
         return f"{where} missed" if outcome.signals["missed"][0] else f"{super().failure(memory, outcome)}, {where}"
 
 
 @dataclass(frozen=True)
 class RaceClutterRoute(Route):
-    """What to race through, and how fast."""
+    """The track to race on, and the speed."""
 
     height: ClassVar = "track"
     longest_s: ClassVar = 40.0
@@ -119,22 +122,22 @@ class RaceClutterRoute(Route):
     track: str = "s_shaped"
     """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file."""
     scale: float = number(2.0, above=0)
-    """The track's ground plan is this many times larger."""
+    """Factor by which the ground plan of the track is enlarged."""
     laps: int = number(1, high=LARGEST)
-    """Laps to fly; 0: on and on."""
+    """Number of laps to fly. 0: without end."""
     speed: float = number(6.0, above=0)
     """Commanded speed, m/s."""
 
     @classmethod
     def drawn(cls, course: Course, file: Path) -> "RaceClutterRoute":
-        """The gates where they were drawn, in a file of their own, and as fast."""
+        """The route with the gates that were drawn, written to a file, and with the speed that was drawn."""
         memory: Memory = course.memory
         file.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(file, track_text(memory.tracks.track(0)).encode())
         return cls(track=str(file), scale=1.0, laps=int(course.goal.config.laps), speed=float(memory.speed[0]))
 
     def course(self, shape: Shape, control_period: float) -> Course:
-        """The track, from its start in its heading."""
+        """The course along the track, from its start and with its heading."""
         config = dataclasses.replace(RaceClutterConfig(), laps=self.laps)
         track = drawn_larger(load_track(self.track), self.scale)
         memory = Memory(Tracks.of(track), np.zeros(1, int), np.array([self.speed]))
@@ -146,6 +149,6 @@ class RaceClutterRoute(Route):
 
 
 def drawn_larger(track: RaceTrack, scale: float) -> RaceTrack:
-    """The track with its ground plan `scale` times as large; heights and openings stay."""
+    """The track with its ground plan enlarged by `scale`. Heights and openings stay the same."""
     size = np.array([scale, scale, 1.0])
     return dataclasses.replace(track, start=track.start * size, position=track.position * size)

@@ -1,4 +1,4 @@
-"""Racing in clutter: through gates that stand a little elsewhere in every world, among obstacles that are only seen."""
+"""Racing in clutter: gates at slightly different places in every world, among obstacles seen only by cameras."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -25,19 +25,19 @@ from e2efly.tasks.race_clutter.goal import Memory, RaceClutterGoal, drawn_larger
 from e2efly.tasks.task import at_rest, into_ball, struck, uniform
 
 APPROACH = 0.7
-"""Obstacles keep clear of the points this far before and behind a gate, too, m."""
+"""Distance of two points in front of and behind each gate that obstacles also keep clear of, m."""
 PASSING = 1.5
-"""Within this of its plane a vehicle should be in line with a gate's opening, m."""
+"""Distance from a gate's plane within which a vehicle should be in line with its opening, m."""
 BEHIND = 0.3
-"""The wanted velocity points to this far behind a gate, m."""
+"""Distance behind a gate of the point to which the wanted velocity is directed, m."""
 LOOKING = 5.0
-"""How far ahead on its way a vehicle should look, m."""
+"""Distance ahead along the way at which a vehicle should look, m."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class World(Memory):
-    """The world of each vehicle, and how far it is."""
+    """The world of each vehicle, and the number of gates that it has passed."""
 
     obstacles: dict[str, Solids]
 
@@ -52,15 +52,15 @@ class RaceClutter(RaceClutterGoal):
     """Make it with `RaceClutter.of`."""
 
     given: Tracks
-    """The tracks that worlds are made from, as they are on average."""
+    """The tracks from which worlds are made, before gates are displaced."""
 
     @staticmethod
     def of(config: RaceClutterConfig, shape: Shape, control_period: float, checks: int) -> "RaceClutter":
         """Load the track.
 
         Raises:
-            ValueError: for an unknown or broken track, for none, for a name in place of several or twice the same, and
-                for one chosen that is not among them.
+            ValueError: for an unknown or broken track, for no track at all, for one name in place of a tuple, for a
+                name given twice, and for a chosen track that is not among them.
         """
         if isinstance(config.track, str) or not config.track:
             raise ValueError(f"task.track is {config.track!r}; accepted: a tuple of one or more tracks")
@@ -74,12 +74,12 @@ class RaceClutter(RaceClutterGoal):
         tracks = [drawn_larger(load_track(name), config.scale) for name in config.track]
         room = max(len(track.yaw) for track in tracks)
         given = jax.tree.map(lambda *x: np.concatenate(x), *(Tracks.of(track, room) for track in tracks))
-        # resolved here: tracks share a compiled program
+        # the tracks are resolved here, so that they share a compiled program
         numbers = dataclasses.replace(config, track=("",) * len(tracks))
         return RaceClutter(numbers, shape, control_period, checks, given)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, World]:
-        """At rest in a ball about the start of a track, every world another."""
+        """At rest in a ball around the start of a track. Every world is different."""
         gate_key, clutter_key, state_key = jax.random.split(key, 3)
         c, u = self.config, uniform(state_key, n, 4)
         tracks = self._drawn(gate_key, n)
@@ -101,7 +101,7 @@ class RaceClutter(RaceClutterGoal):
         return dataclasses.replace(state, quaternion=quaternion), memory
 
     def _drawn(self, key: PRNGKeyArray, n: int) -> Tracks:
-        """A track for each world, every gate a little elsewhere."""
+        """A track for each world, with every gate slightly displaced."""
         c, given = self.config, self.given
         track_key, gate_key = jax.random.split(key)
         which = jax.random.randint(track_key, (n,), 0, len(c.track))
@@ -120,7 +120,10 @@ class RaceClutter(RaceClutterGoal):
         return dataclasses.replace(tracks, gates=moved)
 
     def desired_velocity(self, memory: World, state: State) -> Float[Array, "n 3"]:
-        """At the commanded speed towards a point close behind the next gate: in its middle still straight through."""
+        """Velocity at the commanded speed towards a point close behind the next gate.
+
+        In the middle of the gate it still points straight through.
+        """
         ahead = Ahead.of(memory)
         behind = ahead.centre[:, 0] + BEHIND * ahead.axis[:, 0]
         away = behind - state.position
@@ -133,7 +136,7 @@ class RaceClutter(RaceClutterGoal):
         return Scene.of({**memory.obstacles, "gate": gates}, n)
 
     def overhang(self, memory: World, state: State) -> Float[Array, "n 1"]:
-        """How far the vehicle's sphere stands out of the next gate's opening, m; `-FAR` off its plane."""
+        """How far the vehicle's sphere extends outside the next gate's opening, m. `-FAR` far from the gate's plane."""
         ahead = Ahead.of(memory)
         axis, half = ahead.axis[:, 0], ahead.half[:, 0]
         d = state.position - ahead.centre[:, 0]
@@ -143,7 +146,10 @@ class RaceClutter(RaceClutterGoal):
         return jnp.where(jnp.abs(away) < PASSING, out, -FAR)[:, None]
 
     def desired_yaw(self, memory: World, state: State) -> Float[Array, " n"]:
-        """Towards where the way through the next two gates is `LOOKING` ahead: near a gate, behind its corner."""
+        """Heading towards the point `LOOKING` ahead on the way through the next two gates.
+
+        Near a gate this point lies on the leg behind it.
+        """
         here, there = (Ahead.of(memory).centre[:, i] for i in range(2))
         leg, away = there - here, jnp.linalg.norm(here - state.position, axis=-1, keepdims=True)
         length = jnp.maximum(jnp.linalg.norm(leg, axis=-1, keepdims=True), 1.0)
@@ -166,7 +172,10 @@ class RaceClutter(RaceClutterGoal):
 
 
 def _path(tracks: Tracks, start: Float[Array, "n 3"]) -> tuple[Float[Array, "n p 3"], Int[Array, " n"]]:
-    """The corners of the way from the start from gate to gate, on a closed track back to the first; and its legs."""
+    """The corners of the way from the start through the gates, and the number of its legs.
+
+    On a closed track the way leads back to the first gate.
+    """
     g, count = tracks.gates, tracks.count
     home = jnp.arange(g.count + 1)[None, :, None] == count[:, None, None]
     corners = jnp.where(home, g.position[:, :1], g.position)

@@ -1,4 +1,4 @@
-"""Tracking: the goal, and where it is flown. Imports no JAX."""
+"""Tracking: the goal, and the route of a flight. Imports no JAX."""
 
 import dataclasses
 import math
@@ -36,18 +36,18 @@ _MOTION = [
     np.linalg.inv(np.vander(SPACING * np.arange(5), increasing=True))[order] * math.factorial(order)
     for order in range(4)
 ]
-"""What five points are multiplied by to give position, velocity, acceleration and jerk at the first of them."""
+"""Matrices that map five points to position, velocity, acceleration and jerk at the first of them."""
 
 
 @dataclass(frozen=True)
 class Memory:
-    """The reference, and the error summed since it counts."""
+    """The reference, and the error summed over the counted steps."""
 
     reference: Spline
     error_sum: Array
     """(n,) sum of the distance to the reference over the counted steps, m."""
     steps: Array
-    """(n,) counted steps."""
+    """(n,) number of counted steps."""
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,11 @@ class TrackGoal(Goal):
         return memory.reference.position(time[:, None])[:, 0]
 
     def targets(self, memory: Memory, time: Array) -> Array:
-        """(n, k, 3) the reference points for now and the second ahead, world, m."""
+        """(n, k, 3) the reference points for now and for the next second, world, m."""
         return memory.reference.position(time[:, None] + SPACING * np.arange(POINTS, dtype=np.float32))
 
     def target_offsets(self, memory: Memory, time: Array, body: Any) -> Array:
-        """The same, minus position."""
+        """The same points minus position."""
         return offsets(self.targets(memory, time), body)
 
     observation = (
@@ -81,7 +81,7 @@ class TrackGoal(Goal):
 
     @classmethod
     def aim(cls, shown: Mapping[str, Array]) -> Place:
-        """The reference, its motion by the polynomial through its next five points."""
+        """The reference. Its motion comes from the polynomial through its next five points."""
         points = shown["reference"]
         near = namespace(points).reshape(points, (*points.shape[:-1], POINTS, 3))[..., :5, :]
         moves = (namespace(points).tensordot(_MOTION[order], near, axes=([0], [-2])) for order in range(4))
@@ -89,7 +89,10 @@ class TrackGoal(Goal):
         return Place(position, velocity, acceleration, jerk)
 
     def advance(self, memory: Memory, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Memory, Outcome]:
-        """Success: at the end of the episode the mean error since `settle_s` is small; never outside the fence."""
+        """Judge a step. Success: a small mean error since `settle_s` at the end of the episode.
+
+        Leaving the fence or touching the ground fails.
+        """
         del before
         c = self.config
         error = distance(after.position, self.goal(memory, time))
@@ -108,12 +111,12 @@ _OPTIONS = {
     "circle": ("circle_rate", *_CURVE),
     "lemniscate": ("lemniscate_speed", *_CURVE),
 }
-"""The options of each kind of reference but a file."""
+"""The options of each kind of reference, except a file."""
 
 
 @dataclass(frozen=True)
 class TrackRoute(Route):
-    """What to follow."""
+    """The reference to follow."""
 
     height: ClassVar = "reference"
     longest_s: ClassVar = 12.0
@@ -121,20 +124,20 @@ class TrackRoute(Route):
     reference: str = "circle"
     """circle, lemniscate, or the path of a .csv file with columns t, x, y, z."""
     centre: tuple[float, float, float] = place(defaults.CENTRE)
-    """Centre of circle and lemniscate, m."""
+    """Centre of the circle or lemniscate, m."""
     radius: float = number(defaults.RADIUS, low=SMALLEST)
-    """Radius of the circle, half the length of the lemniscate, m."""
+    """Radius of the circle, or half the length of the lemniscate, m."""
     circle_rate: float = place(defaults.CIRCLE_RATE)
-    """Angular rate of the circle, rad/s; negative: clockwise."""
+    """Angular rate of the circle, rad/s. Negative: clockwise."""
     lemniscate_speed: float = number(defaults.LEMNISCATE_SPEED, low=SMALLEST)
     """Top speed of the lemniscate, m/s."""
     phase: float = place(0.0)
-    """Where on circle or lemniscate to begin, rad."""
+    """Phase at which the circle or lemniscate begins, rad."""
     duration: float = number(20.0, low=SMALLEST, high=LONGEST)
-    """How long circle and lemniscate go on, s; then their end is held."""
+    """Duration of the circle or lemniscate, s. After that its end point is held."""
 
     def course(self, shape: Shape, control_period: float) -> Course:
-        """The reference, from its first point to its end."""
+        """The course along the reference, from its first point to its end."""
         del control_period
         spline = self._spline()
         start = np.array(spline.position(np.zeros((1, 1)))[0, 0], np.float64)

@@ -1,4 +1,4 @@
-"""Tracking: follow a reference that is seen one second ahead."""
+"""Tracking: follow a reference that is known one second ahead."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -27,13 +27,13 @@ jax.tree_util.register_dataclass(Memory)
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "curve"], meta_fields=["knots"])
 @dataclass(frozen=True)
 class Track(TrackGoal):
-    """Follow a reference; make it with `Track.of`."""
+    """Follow a reference. Make it with `Track.of`."""
 
     page: ClassVar = "track"
-    """What the page of `e2efly export --web` calls this world, which it simulates."""
+    """Name of this world on the page of `e2efly export --web`, which simulates it."""
     knots: int
     curve: Lissajous | Spline | None
-    """What to follow: a curve, the spline of the user's file, or None: random polynomials."""
+    """The reference: a curve, the spline of the user's file, or None for random polynomials."""
 
     @staticmethod
     def of(config: TrackConfig, shape: Shape, control_period: float = 0.0, substeps: int = 1) -> "Track":
@@ -64,7 +64,7 @@ class Track(TrackGoal):
         return Track(numbers, shape, m, curves.get(config.reference))
 
     def reference(self, key: PRNGKeyArray, n: int) -> Spline:
-        """Draw a reference a vehicle."""
+        """Draw one reference per vehicle."""
         c = self.config
         if self.curve is None:
             return polynomial(key, c.centre, c.polynomial_reach, c.polynomial_speed, n, self.knots)
@@ -74,7 +74,7 @@ class Track(TrackGoal):
         return dataclasses.replace(self.curve, knots=jnp.broadcast_to(knots, (n, *knots.shape[1:])))
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Memory]:
-        """Level, any heading, near the reference's first point, with a velocity of its own."""
+        """Level, any heading, near the first point of the reference, with a random velocity."""
         c = self.config
         reference_key, state_key = jax.random.split(key)
         reference, u = self.reference(reference_key, n), uniform(state_key, n, 7)

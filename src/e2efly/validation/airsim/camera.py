@@ -1,4 +1,4 @@
-"""A camera of AirSim as a policy's camera: checked against the contract, cut and resampled to it."""
+"""An AirSim camera as a policy's camera: checked against the contract, cropped and resampled to it."""
 
 import math
 from dataclasses import dataclass, replace
@@ -22,31 +22,31 @@ from e2efly.validation.airsim.session import Session
 from e2efly.validation.plant import RigidState
 
 IMAGE_TYPES = {"depth": DEPTH_PLANAR, "range": DEPTH_PERSPECTIVE, "rgb": SCENE, "mask": SEGMENTATION}
-"""AirSim's `ImageType` of what a policy can see. Surface normals are left out: AirSim does not say in which frame."""
+"""AirSim's `ImageType` for each kind of image of a policy. Surface normals are left out, because AirSim does not say in
+which frame they are."""
 OFF_M, OFF_RAD = 0.02, math.radians(1.0)
-"""A camera may sit and look so far from where the contract says."""
+"""Largest accepted difference of a camera's position, m, and direction, rad, from the contract."""
 NEAR_M, NEAR_RAD, LATE_S = 0.003, 0.003, 0.004
-"""In flight a picture may be taken so far from where the camera is now, and may show where it was so long before: a
-physics step.
-"""
+"""Largest accepted errors of a picture in flight: the camera's position, m, and direction, rad, and the age of the
+shown vehicle position, s: one physics step."""
 FOV_DEG = 0.5
-"""By which the field of view in the settings may differ from that of `simGetCameraInfo`."""
+"""Largest accepted difference between the field of view in the settings and that of `simGetCameraInfo`, degrees."""
 _TRIES = 8
-"""Physics steps after which a picture still has to show where the vehicle is."""
+"""Physics steps after which a picture must show the vehicle's present position."""
 FORM = "plant:CAMERA, for a mask plant:CAMERA:RED,GREEN,BLUE"
 
 
 @dataclass(frozen=True)
 class Mount:
-    """How a camera sits on its vehicle."""
+    """How a camera is mounted on its vehicle."""
 
     place: np.ndarray
-    """(3,) forward, left, up, m."""
+    """(3,) position: forward, left, up, m."""
     turn: np.ndarray
-    """(4,) unit, wxyz: from forward, left, up of the camera to those of the vehicle."""
+    """(4,) unit, wxyz: rotation from the camera's axes forward, left, up to those of the vehicle."""
 
     def off(self, other: "Mount") -> tuple[float, float]:
-        """Distance, m, and angle, rad, to another."""
+        """Distance, m, and angle, rad, to another mount."""
         cosine = abs(float(self.turn @ other.turn))
         return float(np.linalg.norm(self.place - other.place)), 2 * math.acos(min(cosine, 1.0))
 
@@ -56,25 +56,25 @@ class Camera:
     """One camera for one image of a contract."""
 
     name: str
-    """In AirSim's settings."""
+    """Name of the camera in AirSim's settings."""
     image: Image
-    """Of the contract."""
+    """Image of the contract."""
     colour: tuple[int, ...] = ()
-    """Red, green and blue, 0 to 255, that AirSim's segmentation gives to what the mask is of; else empty."""
+    """Red, green and blue, 0 to 255, of the mask's class in AirSim's segmentation. Empty for other images."""
     longer: float = 0.0
     """Field of view of the longer side, degrees."""
     size: tuple[int, int] = (0, 0)
     """Columns and rows of its pictures."""
     mount: Mount | None = None
-    """How it was found to sit."""
+    """The measured mount."""
 
     @property
     def kind(self) -> int:
-        """AirSim's `ImageType`."""
+        """AirSim's `ImageType` of the camera."""
         return IMAGE_TYPES[self.image.sees]
 
     def describe(self) -> str:
-        """What this is, for people."""
+        """A description of the camera, as text."""
         across, down = (math.degrees(angle) for angle in fields_of_view(self.longer, *self.size))
         return (
             f"{self.image.name} is what AirSim's camera {self.name!r} shows of AirSim's world ({NAMES[self.kind]}, "
@@ -88,10 +88,10 @@ def camera_of(where: str, image: Image) -> Camera:
 
     Args:
         where: CAMERA, or CAMERA:RED,GREEN,BLUE for a mask.
-        image: of the contract.
+        image: image of the contract.
 
     Raises:
-        ValueError: naming the text and what is accepted; naming an image that AirSim's cameras cannot give.
+        ValueError: naming the text and what is accepted; or naming an image that AirSim's cameras cannot provide.
     """
     given = f"--image {image.name} is 'plant:{where}'"
     if image.sees not in IMAGE_TYPES:
@@ -111,13 +111,14 @@ def camera_of(where: str, image: Image) -> Camera:
 
 
 def opened(session: Session, camera: Camera) -> Camera:
-    """The camera with what AirSim says of it, after one picture of the vehicle that stands there.
+    """The camera with AirSim's data, after one picture of the standing vehicle.
 
     Raises:
-        ValueError: for one that sees less than the contract's, sits otherwise, has too few pixels, or answers nonsense.
+        ValueError: for a camera that sees less than the contract's camera, is mounted differently, has too few pixels,
+            or gives an invalid answer.
         RpcError: when AirSim refuses, as for an unknown camera.
     """
-    session.tick()  # the game draws the vehicle where it stands
+    session.tick()  # the game draws the vehicle at its position
     first, found = _picture(session, camera)
     longer, where = session.field_of_view(camera.name), _where(session, camera)
     told = _told(session.settings, session.vehicle, camera)
@@ -134,13 +135,13 @@ def opened(session: Session, camera: Camera) -> Camera:
 
 
 def taken(session: Session, camera: Camera) -> np.ndarray:
-    """What the policy's camera would show now: (h, w) or (h, w, 3) float32, as `Image.check` accepts it.
+    """The present image of the policy's camera: (h, w) or (h, w, 3) float32, as `Image.check` accepts it.
 
-    AirSim moves what it draws once in a frame of its game, and not at all in a pause. So a picture may be of where the
-    vehicle was before, and says so: then a physics step passes, and another picture is taken.
+    AirSim updates what it draws once per frame of its game, and never during a pause. A picture may therefore show an
+    earlier position of the vehicle, which it reports. Then one physics step passes, and another picture is taken.
 
     Raises:
-        ValueError: for a picture that is not of this camera at the vehicle's place, and for nonsense.
+        ValueError: for a picture that was not taken by this camera at the vehicle's position, or for an invalid answer.
         RpcError: when AirSim refuses.
     """
     return _fitted(_picture(session, camera)[0], camera, _where(session, camera))
@@ -165,7 +166,10 @@ def _fitted(seen: Picture, camera: Camera, where: str) -> np.ndarray:
 
 
 def _picture(session: Session, camera: Camera) -> tuple[Picture, Mount]:
-    """A picture from where the camera is now: where the contract says, until it is known how it sits."""
+    """A picture from the camera's present place.
+
+    Until its mount is known, this is the place that the contract gives.
+    """
     image, half = camera.image, camera.image.pitch_rad / 2
     meant = Mount(np.array(image.position_m), np.array([math.cos(half), 0.0, math.sin(half), 0.0]))
     off = ""
@@ -188,7 +192,7 @@ def _picture(session: Session, camera: Camera) -> tuple[Picture, Mount]:
 
 
 def _mount(seen: Picture, state: RigidState) -> Mount:
-    """How a camera sits by a picture of it, and the vehicle's state."""
+    """The camera's mount, from one of its pictures and the vehicle's state."""
     attitude = Quat.of(state.quaternion)
     away = attitude.unrotate(Vec3.of(seen.position - state.position))
     turn = attitude.conjugate().compose(Quat.of(seen.quaternion))
@@ -200,7 +204,7 @@ def _where(session: Session, camera: Camera) -> str:
 
 
 def _told(settings: dict[str, Any], vehicle: str, camera: Camera) -> float | None:
-    """The field of view that the settings say, degrees; None where they do not."""
+    """The field of view in the settings, degrees. None if they do not give it."""
     vehicles = settings.get("Vehicles")
     if not isinstance(vehicles, dict):
         return None

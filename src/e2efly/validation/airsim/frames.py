@@ -1,7 +1,7 @@
-"""AirSim's frames and ours: world NED and body FRD there, world ENU and body FLU here.
+"""Frames of AirSim and ours: AirSim has world NED and body FRD, we have world ENU and body FLU.
 
-East is our x, north our y. Both changes are half turns: the world's about (1, 1, 0) / sqrt 2, the body's about x. A
-half turn is its own inverse, so each function here goes both ways.
+East is our x, and north is our y. Both conversions are half turns: that of the world about (1, 1, 0) / sqrt 2, that of
+the body about x. A half turn is its own inverse, so each function here works in both directions.
 """
 
 import numpy as np
@@ -14,17 +14,17 @@ _BODY = Quat(0.0, 1.0, 0.0, 0.0)
 
 
 def world(vector: np.ndarray) -> np.ndarray:
-    """A vector of one world, (3,), in the other."""
+    """Convert a vector, (3,), from one world frame to the other."""
     x, y, z = vector
     return np.array([y, x, -z])
 
 
 def body(vector: np.ndarray) -> np.ndarray:
-    """A vector of one body frame, (3,), in the other."""
+    """Convert a vector, (3,), from one body frame to the other."""
     x, y, z = vector
     return np.array([x, -y, -z])
 
 
 def attitude(quaternion: np.ndarray) -> np.ndarray:
-    """A unit quaternion wxyz from body to world, (4,), of the other pair of frames."""
+    """Convert a unit quaternion wxyz from body to world, (4,), from one pair of frames to the other."""
     return np.array(_WORLD.compose(Quat.of(np.asarray(quaternion, float))).compose(_BODY).stack())

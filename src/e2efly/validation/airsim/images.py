@@ -1,5 +1,7 @@
-"""Images on AirSim's wire: requests, answers and what is wrong with them; read in `RpcLibAdaptorsBase.hpp`,
-`ImageCaptureBase.hpp`, `UnrealImageCapture.cpp`, `RenderRequest.cpp` and `PIPCamera.cpp` of its sources. Pure.
+"""Images in AirSim's protocol: requests, answers and errors in them. Pure functions.
+
+The formats were read in `RpcLibAdaptorsBase.hpp`, `ImageCaptureBase.hpp`, `UnrealImageCapture.cpp`,
+`RenderRequest.cpp` and `PIPCamera.cpp` of AirSim's sources.
 """
 
 import math
@@ -13,27 +15,28 @@ from e2efly.validation.airsim import frames
 from e2efly.validation.airsim.protocol import Dialect
 
 SCENE, DEPTH_PLANAR, DEPTH_PERSPECTIVE, SEGMENTATION = 0, 1, 2, 5
-"""Of `ImageCaptureBase::ImageType`: colours, depth along the optical axis, distance, a colour for each object."""
+"""Values of `ImageCaptureBase::ImageType`: colours, depth along the optical axis, distance, a colour for each
+object."""
 NAMES: Mapping[int, str] = {
     SCENE: "Scene", DEPTH_PLANAR: "DepthPlanar", DEPTH_PERSPECTIVE: "DepthPerspective", SEGMENTATION: "Segmentation",
 }  # fmt: skip
-"""What AirSim calls them."""
+"""AirSim's names of these types."""
 FLOATS = (DEPTH_PLANAR, DEPTH_PERSPECTIVE)
-"""Which are asked for as numbers, m."""
+"""The types that are requested as numbers, m."""
 _LARGEST = 4096
-"""Pixels of a side."""
+"""Largest accepted length of a side, pixels."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """What a camera showed, and where it was then."""
+    """A camera's picture, and the camera's pose at that time."""
 
     image: np.ndarray
     """(h, w) float64, m; or (h, w, 3) uint8: red, green, blue."""
     position: np.ndarray
-    """(3,) of the camera, ENU, about the place where AirSim has put the vehicle, m."""
+    """(3,) position of the camera, ENU, relative to the place where AirSim has put the vehicle, m."""
     quaternion: np.ndarray
-    """(4,) unit, wxyz: from forward, left, up of the camera to ENU."""
+    """(4,) unit, wxyz: rotation from the camera's axes forward, left, up to ENU."""
 
 
 def image_request(dialect: Dialect, camera: str, image_type: int) -> dict[str, Any]:
@@ -43,12 +46,12 @@ def image_request(dialect: Dialect, camera: str, image_type: int) -> dict[str, A
 
 
 def picture(answer: Any, request: Mapping[str, Any], dialect: Dialect) -> Picture:
-    """The picture that an answer to `simGetImages` holds.
+    """The picture in an answer to `simGetImages`.
 
     Args:
-        answer: to one request.
-        request: what was asked for.
-        dialect: of the server.
+        answer: the answer to one request.
+        request: the request.
+        dialect: dialect of the server.
 
     Raises:
         ValueError: naming the field, its value and what is accepted.
@@ -57,7 +60,7 @@ def picture(answer: Any, request: Mapping[str, Any], dialect: Dialect) -> Pictur
         raise ValueError(f"the answer is {_short(answer)}; accepted: a list of one ImageResponse")
     response: dict[str, Any] = answer[0]
     width, height = (response.get(name) for name in ("width", "height"))
-    if not width and not height and response.get("message"):  # no picture was taken, and here is why
+    if not width and not height and response.get("message"):  # no picture was taken; the message says why
         raise _refusal("message", response["message"], "none, and a picture")
     for name, size in (("width", width), ("height", height)):
         if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= _LARGEST:
@@ -77,7 +80,7 @@ def picture(answer: Any, request: Mapping[str, Any], dialect: Dialect) -> Pictur
 
 
 def field_of_view(answer: Any) -> float:
-    """Of the longer side of a camera's pictures, degrees, by the answer to `simGetCameraInfo`.
+    """Field of view of the longer side of a camera's pictures, degrees, from the answer to `simGetCameraInfo`.
 
     Raises:
         ValueError: naming the field, its value and what is accepted.
@@ -92,8 +95,8 @@ def fields_of_view(longer: float, width: int, height: int) -> tuple[float, float
     """Horizontal and vertical field of view of a pinhole camera with square pixels, rad.
 
     Args:
-        longer: field of view of the longer side, degrees: what Unreal's `FOVAngle` means, as
-            `APIPCamera::getProjectionMatrix` has it.
+        longer: field of view of the longer side, degrees. This is the meaning of Unreal's `FOVAngle` in
+            `APIPCamera::getProjectionMatrix`.
         width: columns.
         height: rows.
     """

@@ -1,7 +1,7 @@
-"""What AirSim's vehicle does with throttle and rate commands, measured; and in what it is not the policy's vehicle.
+"""Measure what AirSim's vehicle does with throttle and rate commands, and how it differs from the policy's vehicle.
 
-No method of AirSim's RPC tells mass, inertia, rotors or drag: in AirSim they are constants in the source of the frame
-(`MultiRotorParams.hpp`). What they do together is measured instead, in the air, in seconds of the simulator's time.
+No method of AirSim's RPC gives mass, inertia, rotors or drag: in AirSim they are constants in the source of the frame
+(`MultiRotorParams.hpp`). Their combined effects are measured instead, in the air, in seconds of simulated time.
 """
 
 from dataclasses import dataclass
@@ -14,23 +14,24 @@ from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY, allocation_matrix, inertia_tensor
 
 HEIGHT = 30.0
-"""Over the place where AirSim has put the vehicle, m."""
+"""Height above the place where AirSim has put the vehicle, m."""
 THROTTLES = (0.4, 0.7, 1.0)
-"""At which thrust is measured."""
+"""Throttles at which thrust is measured."""
 SPEED = 5.0
-"""At which drag is measured, m/s."""
+"""Speed at which drag is measured, m/s."""
 SPUN_S = 0.3
-"""The rotors have come to a throttle after so long, s."""
+"""Time after which the rotors have reached the speed of a throttle, s."""
 LONG_S = 0.04
-"""Longest time between two commands, s: after 0.06 s without one AirSim hovers by itself (`api_goal_timeout`)."""
+"""Longest time between two commands, s. After 0.06 s without a command AirSim hovers by itself (`api_goal_timeout`)."""
 SMALL_GAIN = 0.002
-"""Of the rate loop while its effect is measured: so small that it is slow beside the lag of the rotors."""
+"""Gain of the rate loop while its effect is measured. It is so small that the loop is slow compared with the rotors'
+lag."""
 _RATE = 1.0
-"""Commanded then, rad/s."""
+"""Rate command in this measurement, rad/s."""
 FREE = 0.03
-"""Relative differences that are not told."""
+"""Relative differences below this are not reported."""
 _SHARE = 0.7
-"""Of the way from hover to full throttle that the step of throttle goes."""
+"""Size of the throttle step, as a share of the range from hover to full throttle."""
 _FOLLOWED = 1 - 1 / np.e
 _LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 _STILL = np.zeros(3)
@@ -38,22 +39,22 @@ _STILL = np.zeros(3)
 
 @dataclass(frozen=True)
 class Model:
-    """What throttle and rate commands do."""
+    """The measured effects of throttle and rate commands."""
 
     thrust: float
-    """Thrust over mass per throttle, m/s^2: slope of a line through `THROTTLES`."""
+    """Thrust over mass per throttle, m/s^2: the slope of a line through `THROTTLES`."""
     offset: float
-    """Thrust over mass at no throttle by the same line, m/s^2."""
+    """Thrust over mass at zero throttle on the same line, m/s^2."""
     lag: float
-    """Time in which thrust follows 63 % of a step of throttle, s."""
+    """Time in which thrust follows 63 % of a throttle step, s."""
     turn: np.ndarray
-    """(3,) angular acceleration about the body's axes per unit of the mixer's input, rad/s^2: a rate gain of 1 gives
-    the rate loop a bandwidth of so many 1/s."""
+    """(3,) angular acceleration about the body axes per unit of the mixer's input, rad/s^2. A rate gain of 1 gives the
+    rate loop this bandwidth in 1/s."""
     drag: np.ndarray
-    """(3,) deceleration at `SPEED` along the body's axes, m/s^2."""
+    """(3,) deceleration at `SPEED` along the body axes, m/s^2."""
 
     def throttle(self, thrust: float) -> float:
-        """The throttle, 0 to 1, for a thrust over mass, m/s^2."""
+        """The throttle, 0 to 1, that gives a thrust over mass, m/s^2."""
         return float(np.clip((thrust - self.offset) / self.thrust, 0.0, 1.0))
 
     def gains(self, rate_gain: np.ndarray) -> np.ndarray:
@@ -62,10 +63,10 @@ class Model:
 
 
 def measure(session: Session) -> Model:
-    """Fly the vehicle through throttles, a step of throttle, turns and three directions.
+    """Measure the vehicle with several throttles, a throttle step, rotations, and flights in three directions.
 
     Raises:
-        ValueError: when the vehicle does not answer as a quadrotor does.
+        ValueError: when the vehicle does not respond like a quadrotor.
     """
     place = session.state().position + np.array([0.0, 0.0, HEIGHT])
     start = RigidState(place, _STILL, _LEVEL, _STILL)
@@ -93,7 +94,7 @@ def measure(session: Session) -> Model:
 
 
 def hold(session: Session, rates: np.ndarray, throttle: float, seconds: float) -> float:
-    """Hold a command for so long; returns the simulator's seconds."""
+    """Hold a command for `seconds`. Returns the simulated time that has passed, s."""
     count = max(int(np.ceil(seconds / LONG_S - 1e-9)), 1)
     passed = 0.0
     for _ in range(count):
@@ -103,10 +104,13 @@ def hold(session: Session, rates: np.ndarray, throttle: float, seconds: float) -
 
 
 def differences(model: Model, vehicle: Vehicle) -> list[str]:
-    """In what AirSim's vehicle is not another one, a sentence each. Its rate loop is told the vehicle's gains."""
+    """Differences between AirSim's vehicle and another one, one sentence each.
+
+    AirSim's rate loop is given the vehicle's gains.
+    """
     low, high = vehicle.thrust_range
     mass, (jx, jy, jz) = float(vehicle.mass), np.diag(inertia_tensor(vehicle)).tolist()
-    arms = np.abs(allocation_matrix(vehicle)[1:]).sum(1)  # of a torque from rotors that all push one way or the other
+    arms = np.abs(allocation_matrix(vehicle)[1:]).sum(1)  # torque of rotors that all push in one sense or the other
     rows = [
         ("full thrust over mass", "m/s^2", 4 * high / mass, model.thrust + model.offset),
         ("lag of thrust behind a step of throttle", "s", _lag_of(vehicle), model.lag),
@@ -126,11 +130,15 @@ def differences(model: Model, vehicle: Vehicle) -> list[str]:
 
 
 _SMALL = {"m/s^2": 0.05, "s": 0.003, "rad/s^2": 1.0}
-"""Differences that are not told whatever their share: a physics step, rounding of a state in single precision."""
+"""Absolute differences below these are not reported, whatever their share. Their causes are the physics step and the
+rounding of a state in single precision."""
 
 
 def _lag_of(vehicle: Vehicle) -> float:
-    """Seconds after which a vehicle's thrust has followed 63 % of the step that `measure` flies: its rotors lag."""
+    """Time after which a vehicle's thrust has followed 63 % of the throttle step of `measure`, s.
+
+    It follows from the lag of the vehicle's rotors.
+    """
     (k2, k1, k0), high = vehicle.thrust_map, vehicle.thrust_range[1]
     begin = float(vehicle.mass) * GRAVITY / 4
     end = _SHARE * high + (1 - _SHARE) * begin
@@ -140,7 +148,7 @@ def _lag_of(vehicle: Vehicle) -> float:
 
 
 def _spin(session: Session, start: RigidState, throttle: float) -> None:
-    """Bring the rotors to a throttle, and the vehicle to rest at a place."""
+    """Bring the rotors to the speed of a throttle, and put the vehicle at rest at a place."""
     session.place(start)
     hold(session, _STILL, throttle, SPUN_S)
     session.place(start)
@@ -149,8 +157,8 @@ def _spin(session: Session, start: RigidState, throttle: float) -> None:
 def _acceleration(session: Session, rates: np.ndarray, throttle: float) -> np.ndarray:
     """Mean acceleration over a few physics steps, world, m/s^2.
 
-    The first steps do not count: in the first one AirSim takes the mean of the acceleration and of the one before,
-    which is none where a vehicle has just been placed.
+    The first steps do not count. In its first step AirSim averages the acceleration with the previous one, which does
+    not exist for a vehicle that has just been placed.
     """
     hold(session, rates, throttle, LONG_S / 4)
     before = session.state().velocity
@@ -159,14 +167,14 @@ def _acceleration(session: Session, rates: np.ndarray, throttle: float) -> np.nd
 
 
 def _lag(session: Session, start: RigidState, hover: float) -> float:
-    """Seconds after which thrust has followed 63 % of a step from hover."""
+    """Time after which thrust has followed 63 % of a step from hover, s."""
     _spin(session, start, hover)
     more, times, thrusts, passed = _SHARE + (1 - _SHARE) * hover, [0.0], [0.0], 0.0
     speed = session.state().velocity[2]
     while passed < SPUN_S:
         session.command(_STILL, more)
         if not (seconds := session.advance(session.step)):
-            continue  # AirSim has gone a step too far before
+            continue  # AirSim has gone one step too far
         now = session.state().velocity[2]
         times.append(passed + seconds / 2)
         thrusts.append((now - speed) / seconds)
@@ -178,9 +186,9 @@ def _lag(session: Session, start: RigidState, hover: float) -> float:
 
 
 def _bandwidth(session: Session, axis: np.ndarray, hover: float, lag: float) -> float:
-    """Bandwidth K of the rate loop about an axis, 1/s, from how fast what is left of a commanded rate shrinks.
+    """Bandwidth K of the rate loop about an axis, 1/s, from the decay of the rate error after a rate command.
 
-    With a first-order lag T of the rotors that is at the slower root p of T p^2 - p + K = 0.
+    With a first-order lag T of the rotors, the decay rate is the slower root p of T p^2 - p + K = 0.
     """
     hold(session, _RATE * axis, hover, 0.2)
     early = _RATE - float(axis @ session.state().body_rate)

@@ -1,5 +1,7 @@
-"""What AirSim's server calls its methods and structures; read in `RpcLibServerBase.cpp`, `MultirotorRpcLibServer.cpp`
-and `RpcLibAdaptorsBase.hpp` of its AirLib. rpclib refuses a call with more or fewer parameters than are named there.
+"""Names of the methods and structures of AirSim's server.
+
+They were read in `RpcLibServerBase.cpp`, `MultirotorRpcLibServer.cpp` and `RpcLibAdaptorsBase.hpp` of its AirLib.
+rpclib refuses a call with more or fewer parameters than are named there.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,27 +31,27 @@ METHODS: Mapping[str, tuple[str, ...]] = {
     "setAngleRateControllerGains": ("kp", "ki", "kd", "vehicle_name"),
     "cancelLastTask": ("vehicle_name",),
 }
-"""The methods that are used, with their parameters: the same in every dialect of `DIALECTS`."""
+"""The methods that are used, with their parameters. They are the same in every dialect of `DIALECTS`."""
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """A family of servers, told apart by `getServerVersion`."""
+    """A family of servers, distinguished by `getServerVersion`."""
 
     name: str
-    """Of the simulator."""
+    """Name of the simulator."""
     image_parameters: tuple[str, ...]
-    """Of `simGetImages`."""
+    """Parameters of `simGetImages`."""
     image_request: tuple[str, ...]
     """Fields of an `ImageRequest`."""
     camera_parameters: tuple[str, ...]
-    """Of `simGetCameraInfo`."""
+    """Parameters of `simGetCameraInfo`."""
     colours: str
-    """In which order an uncompressed image has them (`RenderRequest::getScreenshot`)."""
+    """Order of the colours in an uncompressed image (`RenderRequest::getScreenshot`)."""
 
     @property
     def image_methods(self) -> Mapping[str, tuple[str, ...]]:
-        """The methods beside `METHODS`, with their parameters."""
+        """The methods in addition to `METHODS`, with their parameters."""
         return {"simGetImages": self.image_parameters, "simGetCameraInfo": self.camera_parameters}
 
 
@@ -69,7 +71,7 @@ DIALECTS: Mapping[int, Dialect] = {
         "RGB",
     ),
 }
-"""By what `getServerVersion` answers. For flights by state they are one: what differs are images."""
+"""Dialects by the answer of `getServerVersion`. They differ only in images, not for flights by state."""
 
 
 def vector(values: Sequence[float] | np.ndarray) -> dict[str, float]:
@@ -92,10 +94,10 @@ def kinematics(state: RigidState) -> dict[str, Any]:
 
 
 def rigid_state(answer: Any) -> RigidState:
-    """The state that a `KinematicsState` tells, ENU and FLU.
+    """The state in a `KinematicsState`, ENU and FLU.
 
     Raises:
-        ValueError: naming the field that is missing or no finite number.
+        ValueError: naming the field that is missing or is not a finite number.
     """
     q = np.array([_number(answer, "orientation", name) for name in ("w_val", "x_val", "y_val", "z_val")])
     position, velocity, rate = (

@@ -1,8 +1,8 @@
-"""A client of MessagePack-RPC over TCP, as AirSim's server (rpclib) speaks it.
+"""A client of MessagePack-RPC over TCP, for AirSim's server (rpclib).
 
-A request is [0, id, method, [parameters]], an answer [1, id, error, result] (the MessagePack-RPC specification). rpclib
-hands the requests of one connection to several threads: answers come in any order, and a method that blocks does not
-hold up the next one.
+A request is [0, id, method, [parameters]], an answer is [1, id, error, result] (the MessagePack-RPC specification).
+rpclib passes the requests of one connection to several threads. Answers therefore come in any order, and a method that
+blocks does not delay the next one.
 """
 
 import importlib
@@ -11,17 +11,17 @@ import time
 from typing import Any
 
 PORT = 41451
-"""On which AirSim listens unless its settings say otherwise."""
+"""Port of AirSim, unless its settings give another one."""
 TIMEOUT_S = 10.0
-"""Time for an answer, s."""
+"""Longest time to wait for an answer, s."""
 _REQUEST, _ANSWER = 0, 1
 _QUICK = getattr(socket, "TCP_QUICKACK", None)
 _LARGEST = 1 << 28
-"""Bytes of one answer."""
+"""Largest accepted answer, bytes."""
 
 
 class RpcError(OSError):
-    """A server that refuses, talks nonsense or does not answer; names its address."""
+    """A server that refuses, gives an invalid answer or does not answer. The error names its address."""
 
 
 class Rpc:
@@ -32,11 +32,11 @@ class Rpc:
 
         Args:
             host: name or address.
-            port: of the server.
-            timeout: for the connection and for each answer, s.
+            port: port of the server.
+            timeout: longest time for the connection and for each answer, s.
 
         Raises:
-            RpcError: when nobody answers there.
+            RpcError: when no server answers there.
         """
         self.where, self._timeout = f"airsim:{host}:{port}", timeout
         self._msgpack: Any = importlib.import_module("msgpack")
@@ -56,7 +56,8 @@ class Rpc:
         """Call a method and wait for its result.
 
         Raises:
-            RpcError: naming the method, for an error of the server, nonsense, silence or a connection that is closed.
+            RpcError: naming the method, for an error of the server, an invalid answer, no answer, or a connection that
+                is closed.
         """
         number = self.send(method, *parameters)
         wait = self._timeout if timeout is None else timeout
@@ -65,7 +66,7 @@ class Rpc:
         return self.result(number)
 
     def send(self, method: str, *parameters: Any) -> int:
-        """Send a request without waiting; returns its number.
+        """Send a request without waiting. Returns its number.
 
         Raises:
             RpcError: when the connection is closed.
@@ -81,10 +82,10 @@ class Rpc:
         return number
 
     def arrived(self, number: int, seconds: float) -> bool:
-        """Whether the answer to a request is there, after waiting for it for so long at most.
+        """Wait for the answer to a request, up to `seconds`. Returns whether it has come.
 
         Raises:
-            RpcError: for nonsense, an answer that nobody asked for, or a connection that is closed.
+            RpcError: for an invalid answer, an answer without a request, or a connection that is closed.
         """
         until = time.monotonic() + seconds
         while number not in self._answers:
@@ -93,7 +94,7 @@ class Rpc:
                 return False
             self._socket.settimeout(left)
             try:
-                if _QUICK is not None:  # the server sends its second answer when the first one is acknowledged
+                if _QUICK is not None:  # the server sends its second answer only when the first one is acknowledged
                     self._socket.setsockopt(socket.IPPROTO_TCP, _QUICK, 1)
                 data = self._socket.recv(1 << 16)
             except TimeoutError:
@@ -106,7 +107,7 @@ class Rpc:
         return True
 
     def result(self, number: int) -> Any:
-        """The result of a request whose answer is there.
+        """The result of a request whose answer has come.
 
         Raises:
             RpcError: for an error of the server.

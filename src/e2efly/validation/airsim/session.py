@@ -1,9 +1,9 @@
-"""AirSim in lockstep: it stands still but while it is told to go on, and each command is known to be set before that.
+"""AirSim in lockstep: it runs only for the time that it is given, and each command is confirmed before that.
 
-AirSim's clock (SteppableClock) moves by one physics step at a time, but `simContinueForTime` counts seconds of the wall
-clock (`ScheduledExecutor::executorLoop`), so that a time that is asked for may end a step early or late. The session
-reads the simulator's clock after each stretch, asks for what is missing, and carries what is less than half a step over
-into the next one.
+AirSim's clock (SteppableClock) advances one physics step at a time, but `simContinueForTime` counts seconds of the wall
+clock (`ScheduledExecutor::executorLoop`). A requested time may therefore end a step early or late. The session reads
+the simulator's clock after each run and requests the missing time. It carries a remainder of less than half a step over
+into the next run.
 """
 
 import contextlib
@@ -19,36 +19,37 @@ from e2efly.validation.airsim.rpc import Rpc, RpcError
 from e2efly.validation.plant import RigidState
 
 HELD_S = 1.0
-"""A rate command is sent for so long; it is cut short once it is known to be set."""
+"""Duration of a rate command that is sent, s. The command is cancelled once it is known to be set."""
 _CUT_S = 0.002
-"""Wait for a command that was cut short, before it is cut again, s."""
+"""Time to wait for a cancelled command before it is cancelled again, s."""
 _SHY = 0.1
-"""Of a physics step by which less is asked for than is wanted: AirSim takes the step in which the time ends, too."""
+"""Share of a physics step that is subtracted from a requested time. AirSim also takes the step in which the time
+ends."""
 _LONGER = 1.5
-"""The next time is longer by this factor where none passed: a computer that is busy comes too late to take a step."""
+"""Factor by which the next requested time is longer if no time passed. A busy computer is too late to take a step."""
 _TRIES = 30
-"""Of letting the simulator go on in vain, before its clock is said to stand."""
+"""Number of requests without effect after which the clock counts as stopped."""
 _STEP_ENDS_S = 0.02
-"""After which a physics step that was under way is over, s."""
+"""Time after which a physics step in progress has ended, s."""
 _SAMPLES = 6
-"""Of the clock, of which the smallest change is the physics step."""
+"""Number of clock readings. Their smallest change is the physics step."""
 _REST_S, _REST_SPEED = 3.0, 0.02
-"""A vehicle stands that was slower than so many m/s at the end of so many seconds at most."""
+"""A vehicle is at rest if its speed falls below the second number, m/s, within the first number, s."""
 
 
 class Session:
-    """One vehicle of one AirSim, under control, armed, paused."""
+    """One vehicle of one AirSim that is controlled, armed and paused."""
 
     def __init__(self, rpc: Rpc, vehicle: str = "") -> None:
-        """Take over.
+        """Take control of the vehicle.
 
         Args:
-            rpc: connected.
-            vehicle: its name in the settings; empty: the only one.
+            rpc: a connected client.
+            vehicle: its name in the settings. Empty: the only vehicle.
 
         Raises:
-            RpcError: naming what the server refuses, or that its clock cannot be stepped.
-            ValueError: for a server of a dialect that is not known.
+            RpcError: naming what the server refuses, or saying that its clock cannot be stepped.
+            ValueError: for a server of an unknown dialect.
         """
         self.rpc, self.vehicle = rpc, vehicle
         self._call("ping")
@@ -64,12 +65,12 @@ class Session:
         self._due = self._now()
 
     def take_over(self) -> None:
-        """Put the simulation back to its beginning, take control, arm, pause.
+        """Reset the simulation, take control, arm, and pause.
 
         Raises:
             RpcError: naming what the server refuses.
         """
-        self._call("simPause", False)  # AirSim resets within a frame of the game, of which there are none in a pause
+        self._call("simPause", False)  # AirSim resets in a frame of the game, and a pause has none
         self._call("reset")
         self._call("enableApiControl", True, self.vehicle)
         if not self._call("isApiControlEnabled", self.vehicle):
@@ -80,13 +81,13 @@ class Session:
         if not self._call("simIsPaused"):
             raise RpcError(f"{self.rpc.where}: does not pause")
         time.sleep(_STEP_ENDS_S)
-        self._due = self._now()  # to which the vehicle is to be brought, by the simulator's clock, ns
+        self._due = self._now()  # time to which the vehicle must be brought, on the simulator's clock, ns
 
     def state(self) -> RigidState:
-        """The vehicle now, ENU and FLU, about the place where AirSim has put it.
+        """The vehicle now, ENU and FLU, relative to the place where AirSim has put it.
 
         Raises:
-            ValueError: for an answer that is no state.
+            ValueError: for an answer that is not a state.
         """
         try:
             return protocol.rigid_state(self._call("simGetGroundTruthKinematics", self.vehicle))
@@ -94,20 +95,23 @@ class Session:
             raise ValueError(f"{self.rpc.where}: simGetGroundTruthKinematics: {error}") from None
 
     def place(self, state: RigidState) -> None:
-        """Put the vehicle there with its velocities; the rotors turn as they did."""
+        """Put the vehicle into a state. The rotor speeds do not change."""
         self._call("simSetKinematics", protocol.kinematics(state), True, self.vehicle)
 
     def set_gains(self, gains: np.ndarray) -> None:
-        """Proportional gains of the rate loop about x, y and z, throttle per rad/s; no integral, no derivative part."""
+        """Set proportional gains of the rate loop about x, y and z, throttle per rad/s.
+
+        Integral and derivative gains are zero.
+        """
         none = [0.0, 0.0, 0.0]
         self._call("setAngleRateControllerGains", [float(gain) for gain in gains], none, none, self.vehicle)
 
     def command(self, rates: np.ndarray, throttle: float) -> None:
         """Set body rates, FLU, rad/s, and throttle, 0 to 1, from now until the next command.
 
-        The server's method sets them when it begins, and then waits for its duration, which does not pass in a pause.
-        So it is sent, cut short by `cancelLastTask`, and its answer is the proof that it had begun. What it has set
-        stays.
+        The server's method sets them when it begins. Then it waits for its duration, which does not pass during a
+        pause. The method is therefore cancelled by `cancelLastTask`, and its answer proves that it had begun. The
+        values that it has set stay.
         """
         p, q, r = frames.body(rates).tolist()
         number = self.rpc.send("moveByAngleRatesThrottle", p, q, r, float(throttle), HELD_S, self.vehicle)
@@ -121,13 +125,13 @@ class Session:
                 raise RpcError(f"{self.rpc.where}: moveByAngleRatesThrottle does not end when it is cancelled")
 
     def advance(self, seconds: float) -> float:
-        """Let so many seconds pass; returns how many did.
+        """Let `seconds` pass. Returns the time that has passed, s.
 
-        All that were ever asked for have passed to within half a physics step, and one more where the simulator's
-        computer was too busy to take a step in time.
+        All the time that was ever requested has passed to within half a physics step. One more step may have passed if
+        the simulator's computer was too busy to take a step in time.
 
         Raises:
-            RpcError: when the simulator's clock does not go on.
+            RpcError: when the simulator's clock does not advance.
         """
         began, self._due = self._now(), self._due + round(seconds * 1e9)
         now = began
@@ -136,27 +140,27 @@ class Session:
         return (now - began) / 1e9
 
     def tick(self) -> None:
-        """Let one physics step pass; later stretches make up for it.
+        """Let one physics step pass. Later runs compensate for it.
 
         Raises:
-            RpcError: when the simulator's clock does not go on.
+            RpcError: when the simulator's clock does not advance.
         """
         self._later(self._now(), (1 - _SHY) * self.step)
 
     def begin(self, state: RigidState) -> None:
-        """Put the vehicle there, and count time from now."""
+        """Put the vehicle into a state, and count time from now."""
         self.place(state)
         self._due = self._now()
 
     def picture(self, camera: str, image_type: int) -> Picture:
-        """What a camera of the vehicle shows now, uncompressed: depth as numbers, all else as colours.
+        """The present picture of a camera of the vehicle, uncompressed: depth as numbers, all other types as colours.
 
         Raises:
             RpcError: when the server refuses, as for an unknown camera.
-            ValueError: for an answer that is no such picture.
+            ValueError: for an answer that is not such a picture.
         """
         request = image_request(self.dialect, camera, image_type)
-        more = (False,) * (len(self.dialect.image_parameters) - 2)  # no camera beside the vehicle
+        more = (False,) * (len(self.dialect.image_parameters) - 2)  # no camera apart from those of the vehicle
         try:
             answer = self._call("simGetImages", [request], self.vehicle, *more)
         except RpcError as error:
@@ -168,11 +172,12 @@ class Session:
             raise ValueError(f"{self.rpc.where}: simGetImages of camera {camera!r}: {error}") from None
 
     def field_of_view(self, camera: str) -> float:
-        """Of the longer side of a camera's pictures, degrees. AirSim follows a null pointer where there is no such
-        camera: ask for a picture before.
+        """Field of view of the longer side of a camera's pictures, degrees.
+
+        AirSim dereferences a null pointer if there is no such camera, so request a picture first.
 
         Raises:
-            ValueError: for an answer that is no angle.
+            ValueError: for an answer that is not an angle.
         """
         more = (False,) * (len(self.dialect.camera_parameters) - 2)
         try:
@@ -181,9 +186,9 @@ class Session:
             raise ValueError(f"{self.rpc.where}: simGetCameraInfo of camera {camera!r}: {error}") from None
 
     def settle(self) -> RigidState | None:
-        """Let the vehicle come to rest with its rotors off; None: it falls, as there is no ground.
+        """Let the vehicle come to rest with its rotors off. None: it falls, because there is no ground.
 
-        The command is that of an armed vehicle that was told nothing.
+        The command is that of an armed vehicle without a command.
         """
         for _ in range(round(_REST_S / 0.3)):
             self.advance(0.3)
@@ -193,7 +198,7 @@ class Session:
         return None
 
     def close(self) -> None:
-        """Give back control, and let the simulation run on."""
+        """Release control, and let the simulation run on."""
         with contextlib.suppress(OSError):
             self._call("enableApiControl", False, self.vehicle)
             self._call("simPause", False)
@@ -212,16 +217,16 @@ class Session:
         return stamp
 
     def _go_on(self, seconds: float) -> None:
-        """Let the simulator run for about so many of its seconds."""
+        """Let the simulator run for about `seconds` of its time."""
         wall = seconds * self._wall
         self._call("simContinueForTime", wall, timeout=wall + 10.0)
         until = time.monotonic() + wall + 10.0
-        while not self._call("simIsPaused"):  # AirSim answers when it is over; other servers need not
+        while not self._call("simIsPaused"):  # AirSim answers when the time is over; others may not
             if time.monotonic() > until:
                 raise RpcError(f"{self.rpc.where}: does not pause again after simContinueForTime({wall:g})")
 
     def _physics_step(self) -> float:
-        """Seconds by which the simulator's clock moves at once.
+        """Smallest change of the simulator's clock, s.
 
         Raises:
             RpcError: when the clock runs while the simulator is paused, or never.
@@ -240,11 +245,12 @@ class Session:
         return min(changes) / 1e9
 
     def _later(self, now: int, seconds: float) -> int:
-        """Let the simulator run for about so many of its seconds, longer where its clock then stands as it did; returns
-        the clock, ns.
+        """Let the simulator run for about `seconds` of its time, and longer if its clock does not change.
+
+        Returns the clock, ns.
 
         Raises:
-            RpcError: when it does not go on.
+            RpcError: when the clock does not advance.
         """
         for _ in range(_TRIES):
             self._go_on(seconds)
@@ -255,7 +261,7 @@ class Session:
 
 
 def _settings(text: Any) -> dict[str, Any]:
-    """What the text of the settings says; nothing where it is no JSON object."""
+    """The content of the settings text. Empty if it is not a JSON object."""
     with contextlib.suppress(ValueError, TypeError):
         read = json.loads(text)
         return read if isinstance(read, dict) else {}
@@ -263,7 +269,7 @@ def _settings(text: Any) -> dict[str, Any]:
 
 
 def _clock_speed(settings: dict[str, Any]) -> float:
-    """The simulator's seconds in a second of the wall clock; 1 where its settings do not say."""
+    """Simulated seconds per second of the wall clock. 1 if the settings do not give it."""
     speed = settings.get("ClockSpeed")
     if isinstance(speed, int | float) and not isinstance(speed, bool) and 1e-3 <= speed <= 1e3:
         return float(speed)

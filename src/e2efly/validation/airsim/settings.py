@@ -1,7 +1,7 @@
-"""AirSim's settings.json for a vehicle and a policy's cameras, and what it cannot say of them.
+"""AirSim's settings.json for a vehicle and a policy's cameras, and the values that it cannot contain.
 
-Keys: `AirSimSettings.hpp` of AirSim's AirLib. Mass, inertia, rotors and drag have none: they are set in the source, in
-`MultiRotorParams::setupFrameGenericQuad`, `RotorParams` and `MultiRotorPhysicsBody::createDragVertices`.
+The keys come from `AirSimSettings.hpp` of AirSim's AirLib. Mass, inertia, rotors and drag have no keys. They are set in
+the source, in `MultiRotorParams::setupFrameGenericQuad`, `RotorParams` and `MultiRotorPhysicsBody::createDragVertices`.
 """
 
 import math
@@ -17,16 +17,17 @@ from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import inertia_tensor, terms
 
 CELL = 4
-"""Pixels that a row and a column of the policy's image have at least, where theirs are not square: AirSim's are."""
+"""Smallest number of AirSim pixels per row and column of the policy's image, if its pixels are not square. AirSim's
+pixels are square."""
 
 
 def settings(vehicle: Vehicle, images: Sequence[Image] = (), port: int = PORT) -> dict[str, Any]:
     """The content of settings.json.
 
     Args:
-        vehicle: after which AirSim's vehicle is called.
-        images: of the policy's contract.
-        port: on which AirSim listens, on this machine only.
+        vehicle: the vehicle after which AirSim's vehicle is named.
+        images: images of the policy's contract.
+        port: port on which AirSim listens, on this machine only.
     """
     own: dict[str, Any] = {
         "VehicleType": "SimpleFlight",
@@ -49,7 +50,7 @@ def settings(vehicle: Vehicle, images: Sequence[Image] = (), port: int = PORT) -
 
 
 def unsaid(vehicle: Vehicle, images: Sequence[Image] = ()) -> list[tuple[str, str, str]]:
-    """What settings.json has no key for: (field, its value, where AirSim has it)."""
+    """Values for which settings.json has no key: (field, its value, its place in AirSim)."""
     tensor, high = inertia_tensor(vehicle), vehicle.thrust_range[1]
     front_right = np.abs(np.asarray(vehicle.rotor_position, float)).max(0)
     rows = [
@@ -84,7 +85,7 @@ def unsaid(vehicle: Vehicle, images: Sequence[Image] = ()) -> list[tuple[str, st
 
 
 def named(images: Sequence[Image]) -> list[str]:
-    """What `e2efly validate` is told to see by the cameras of the file, an option each."""
+    """Options with which `e2efly validate` uses the cameras of the file, one per image."""
     colour = {"mask": ":RED,GREEN,BLUE"}
     return [
         f"--image {image.name}=plant:{image.name}{colour.get(image.sees, '')}" for image in images if not _beyond(image)
@@ -92,7 +93,7 @@ def named(images: Sequence[Image]) -> list[str]:
 
 
 def _beyond(image: Image) -> str | None:
-    """What of an image AirSim's cameras cannot give; None: they can give it."""
+    """The part of an image that AirSim's cameras cannot provide. None: they can provide all of it."""
     if image.sees not in IMAGE_TYPES:
         return f"sees {image.sees}"
     return None if image.projection == "pinhole" else f"is {image.projection}"
@@ -101,7 +102,7 @@ def _beyond(image: Image) -> str | None:
 def _camera(image: Image) -> dict[str, Any]:
     """A camera in the vehicle's frame: forward, right, down, m; pitch upwards, degrees.
 
-    `simGetCameraInfo` tells the field of view of ImageType -1, the camera itself, so that both have the same.
+    `simGetCameraInfo` gives the field of view of ImageType -1, the camera itself. Both therefore get the same value.
     """
     x, y, z = image.position_m
     width, height = _size(image)
@@ -115,8 +116,10 @@ def _camera(image: Image) -> dict[str, Any]:
 
 
 def _size(image: Image) -> tuple[int, int]:
-    """Columns and rows of square pixels: those of the policy where its own are square, else `CELL` times as many or
-    more, from which its own are made.
+    """Columns and rows of square pixels.
+
+    If the policy's pixels are square, these are its own numbers. Otherwise there are at least `CELL` times as many, and
+    the policy's pixels are made from them.
     """
     wide, high = (math.tan(angle / 2) for angle in image.fov_rad)
     rows = image.width * high / wide

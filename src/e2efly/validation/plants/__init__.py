@@ -1,4 +1,4 @@
-"""The plants that come with the package. Each has a file, which registers it. Imports no JAX and no simulator."""
+"""The plants of the package. Each has a file, which registers it. Imports no JAX and no simulator."""
 
 import importlib
 import importlib.util
@@ -12,12 +12,14 @@ for _file in pkgutil.iter_modules(__path__, f"{__name__}."):
 
 
 def find_plant(name: str) -> type[Plant]:
-    """A class of plants by its name, its name and address, `NAME:ADDRESS`, or its reference, `path/to/file.py:Name` or
+    """The class of a plant.
+
+    It is found by its name, its name and address, `NAME:ADDRESS`, or its reference, `path/to/file.py:Name` or
     `module:Name`.
 
     Raises:
-        ValueError: for an unknown name, with all there are; for an address that the plant does not take; for a plant
-            that needs a package that is not installed.
+        ValueError: for an unknown name, with all names; for an address that the plant does not accept; for a plant that
+            needs a package that is not installed.
     """
     known, colon, address = name.partition(":")
     if colon and known in PLANTS and PLANTS[known].takes_address:

@@ -18,15 +18,15 @@ from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
 FLOOR_M = 0.02
-"""AirSim's floor lies so far below ours, m: its collisions end a descent a bit above the place where the vehicle had
-come to rest, and that touch is to count."""
+"""Distance of AirSim's floor below the floor of our world, m. AirSim's collisions end a descent slightly above the
+place where the vehicle had come to rest, and such a touch must count."""
 OUTER_S = 0.01
-"""Longest time between two commands of a mode above body rates, s: its controller runs here."""
+"""Longest time between two commands of a mode above body rates, s. The controller of the mode runs at this interval."""
 
 
 @register("airsim")
 class AirsimPlant(Plant):
-    """One vehicle of a running AirSim. Thrust over mass becomes throttle, by a measured line; body rates stay.
+    """One vehicle of a running AirSim. A measured line maps thrust over mass to throttle; body rates stay as they are.
 
     The proportional gains of SimpleFlight's rate loop are set so that its bandwidth is the vehicle's `rate_gain`.
     """
@@ -37,12 +37,13 @@ class AirsimPlant(Plant):
     port: ClassVar[int] = PORT
     named: ClassVar[str] = ""
     cameras: ClassVar[Mapping[str, str]] = {}
-    """By an image of the contract, the camera of AirSim that gives it."""
+    """By an image of the contract, the AirSim camera that provides it."""
 
     @classmethod
     def at(cls, address: str) -> type[Self]:
-        """AirSim at HOST, HOST:PORT or HOST:PORT:VEHICLE, the name of a vehicle in its settings; an empty host is this
-        machine.
+        """AirSim at HOST, HOST:PORT or HOST:PORT:VEHICLE.
+
+        VEHICLE is the name of a vehicle in its settings. An empty host is this machine.
 
         Raises:
             ValueError: naming the address and what is accepted.
@@ -56,7 +57,7 @@ class AirsimPlant(Plant):
 
     @classmethod
     def seeing(cls, cameras: Mapping[str, str]) -> type[Self]:
-        """The plant by whose `simGetImages` a policy sees."""
+        """The plant that provides a policy's images by `simGetImages`."""
         return cls._with(cameras=dict(cameras))
 
     @classmethod
@@ -66,10 +67,10 @@ class AirsimPlant(Plant):
 
     @classmethod
     def of(cls, vehicle: Vehicle, contract: Contract) -> Self:
-        """The plant, with its cameras looked through once.
+        """Make the plant, and check one image of each of its cameras.
 
         Raises:
-            ValueError: for a command mode that is no body rates and thrust in the end, a camera that is not the
+            ValueError: for a command mode that does not lead to body rates and thrust, a camera that is not the
                 contract's, or answers that make no sense.
             OSError: naming the address, when AirSim does not answer or refuses.
         """
@@ -85,10 +86,11 @@ class AirsimPlant(Plant):
 
     @classmethod
     def differences(cls, vehicle: Vehicle, contract: Contract) -> list[str]:
-        """In what AirSim's vehicle is not the one that its flight controller is to believe in: what was measured.
+        """Measured differences between AirSim's vehicle and the vehicle to which its flight controller is to be tuned.
 
         Raises:
-            ValueError: for a command mode that is no body rates and thrust in the end, or answers that make no sense.
+            ValueError: for a command mode that does not lead to body rates and thrust, or for answers that make no
+                sense.
             OSError: naming the address, when AirSim does not answer or refuses.
         """
         plant = cls.of(vehicle, contract)
@@ -102,10 +104,11 @@ class AirsimPlant(Plant):
             plant.close()
 
     def __init__(self, vehicle: Vehicle, mode: str) -> None:
-        """Connect, put AirSim back to its beginning, look where the vehicle stands, and measure it.
+        """Connect, reset AirSim, find the place where the vehicle stands, and measure the vehicle.
 
         Raises:
-            ValueError: for a command mode that is no body rates and thrust in the end, or answers that make no sense.
+            ValueError: for a command mode that does not lead to body rates and thrust, or for answers that make no
+                sense.
             OSError: naming the address, when AirSim does not answer or refuses.
         """
         check_mode(mode, self.name)
@@ -115,7 +118,7 @@ class AirsimPlant(Plant):
         self._cameras: list[Camera] = []
         self._shutters: Mapping[str, Shutter] = {}
         self._films: dict[str, list[np.ndarray]] = {}
-        self._time = 0.0  # since the last reset, s
+        self._time = 0.0  # time since the last reset, s
         rpc = Rpc(self.host, self.port)
         try:
             self._session = Session(rpc, self.named)
@@ -138,11 +141,11 @@ class AirsimPlant(Plant):
 
     @property
     def state(self) -> RigidState:
-        """The vehicle now; its first place is over the world's origin, and AirSim's floor `FLOOR_M` below ours."""
+        """The vehicle now. Its first place is over the world's origin, and AirSim's floor lies `FLOOR_M` below ours."""
         return self._state
 
     def reset(self, state: RigidState) -> None:
-        """Bring the rotors to hover in level flight a metre above, and put the vehicle there."""
+        """Bring the rotors to hover speed in level flight one metre higher, and put the vehicle into the state."""
         above = RigidState(state.position + np.array([0.0, 0.0, 1.0]), np.zeros(3), np.eye(4)[0], np.zeros(3))
         self._session.place(self._there(above))
         hold(self._session, np.zeros(3), self.model.throttle(GRAVITY), SPUN_S)
@@ -155,7 +158,7 @@ class AirsimPlant(Plant):
             self._look()
 
     def step(self, command: np.ndarray, dt: float) -> None:
-        """Hold a command for `dt` s, to within half of AirSim's physics step, which later steps make up for."""
+        """Hold a command for `dt` s, to within half of AirSim's physics step. Later steps compensate the difference."""
         end = self._time + dt
         while self._time < end - MOMENT:
             until = min([end, *(due for due in self._due() if due > self._time + MOMENT)])
@@ -164,11 +167,11 @@ class AirsimPlant(Plant):
             self._develop()
 
     def expose(self, shutters: Mapping[str, Shutter]) -> None:
-        """Take pictures in flight, at the moments of AirSim's clock that the shutters say."""
+        """Take pictures in flight, at the times of AirSim's clock that the shutters give."""
         self._shutters = dict(shutters)
 
     def shown(self, name: str, now: float) -> np.ndarray:
-        """The newest image of a camera that a policy sees at `now`, s since `reset`."""
+        """The newest image of a camera that a policy has at `now`, s since `reset`."""
         return self._films[name][self._shutters[name].newest(now)]
 
     def _hold(self, command: np.ndarray, dt: float) -> None:
@@ -183,7 +186,7 @@ class AirsimPlant(Plant):
             self._look()
 
     def _due(self) -> list[float]:
-        """When the next image of each camera is to be exposed, s since the last reset."""
+        """Next exposure time of each camera, s since the last reset."""
         return [shutter.exposed(len(self._films[name])) for name, shutter in self._shutters.items()]
 
     def _develop(self) -> None:
@@ -196,11 +199,11 @@ class AirsimPlant(Plant):
                 film.append(image)
 
     def close(self) -> None:
-        """Give AirSim back its vehicle, and let it run on."""
+        """Give AirSim control of its vehicle again, and let it run on."""
         self._session.close()
 
     def _there(self, state: RigidState) -> RigidState:
-        """A state of our world in AirSim's."""
+        """Convert a state of our world to AirSim's world."""
         return RigidState(state.position + self._origin, state.velocity, state.quaternion, state.body_rate)
 
     def _look(self) -> None:

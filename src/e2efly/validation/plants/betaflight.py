@@ -1,4 +1,4 @@
-"""The real firmware over our rigid body as a plant: commands go to it as sticks, through its own rate profile."""
+"""The real firmware with our rigid body as a plant: commands reach it as sticks, through its own rate profile."""
 
 import tempfile
 from pathlib import Path
@@ -19,27 +19,29 @@ if TYPE_CHECKING:
     from e2efly.deploy.bridge import Bridge
 
 LATENCY_S = 0.004
-"""From a stick frame to the firmware's rate loop, s: half of the bridge's period on the rig, and a round of its own."""
+"""Latency from a stick frame to the firmware's rate loop, s: half of the bridge's period on the rig, and one round of
+the firmware."""
 FRAME_S = 0.008
 """Longest time between two stick frames, s."""
 HEIGHT_M = 2.0
-"""At which the throttle map is learned, m."""
+"""Height at which the throttle map is learned, m."""
 DISARMED_S, ARMED_S, SPINNING_S = 0.2, 0.4, 0.25
-"""Before a flight the firmware is disarmed (it forgets its integrals), armed, and held with rotors at hover, s."""
+"""Durations before a flight, s: the firmware is disarmed (it resets its integrals), armed, and held with the rotors at
+hover speed."""
 
 
 @register("betaflight")
 class BetaflightPlant(Plant):
-    """Starts the firmware, takes off once to learn the throttle map, and then flies from wherever it is put."""
+    """Starts the firmware, takes off once to learn the throttle map, and then flies from any given state."""
 
     parallel, latency, episodes, whole_flights = False, LATENCY_S, 20, True
     alters = EVERYTHING - {*RATE_LOOP, "plain_mixer"}
 
     def __init__(self, vehicle: Vehicle, mode: str) -> None:
-        """Build the firmware where need be, start it and take off.
+        """Build the firmware if needed, start it and take off.
 
         Raises:
-            ValueError: for a command mode that is no body rates and thrust in the end.
+            ValueError: for a command mode that does not lead to body rates and thrust.
             OSError: when the firmware cannot be built or started, or does not take off.
         """
         check_mode(mode, self.name)
@@ -70,10 +72,10 @@ class BetaflightPlant(Plant):
         return self._bridge.sticks
 
     def meet(self, body: Vehicle, plain_mixer: bool = False) -> None:
-        """Put another body under the firmware; throttle map and settings stay those of the vehicle that took off.
+        """Put another body under the firmware. Throttle map and settings stay those of the vehicle that took off.
 
         Raises:
-            ValueError: for a plain mixer: the firmware has its own.
+            ValueError: for a plain mixer, because the firmware has its own mixer.
         """
         if plain_mixer:
             raise ValueError("plant 'betaflight' has the firmware's own mixer; accepted: plain_mixer False")
@@ -81,7 +83,7 @@ class BetaflightPlant(Plant):
         self._rig.carry(body)
 
     def disturb(self, wind: np.ndarray, rotor_share: np.ndarray) -> None:
-        """Wind and shares of thrust from now on."""
+        """Set wind and shares of thrust from now on."""
         self._rig.wind, self._rig.thrust_shares = wind, rotor_share
 
     @property
@@ -90,7 +92,7 @@ class BetaflightPlant(Plant):
         return RigidState.of(self._rig.state)
 
     def reset(self, state: RigidState) -> None:
-        """Disarm, arm, bring the rotors to hover speed with the body held at the place, and let go."""
+        """Disarm, arm, bring the rotors to hover speed while the body is held in place, and release it."""
         from e2efly.validation.world import Body
 
         rig, mid = self._rig, self._sticks.centre
@@ -111,7 +113,7 @@ class BetaflightPlant(Plant):
         rig.state = Body(state.position, state.velocity, state.quaternion, state.body_rate, speed)
 
     def step(self, command: np.ndarray, dt: float) -> None:
-        """Hold a command for `dt` s, sending it again at least every `FRAME_S`."""
+        """Hold a command for `dt` s, and send it again at least every `FRAME_S`."""
         frames = max(int(np.ceil(dt / FRAME_S - 1e-9)), 1)
         for _ in range(frames):
             wanted = controlled(self.vehicle, self.mode, self.state.odometry(0.0), command)

@@ -1,17 +1,20 @@
-"""The same vehicle in MuJoCo: another engine, another integrator, a ground to stand on; nothing of our own physics.
+"""The same vehicle in MuJoCo, with another engine, another integrator and a ground. It uses nothing of our own physics.
 
-MuJoCo integrates everything that moves together, by RK4: the rigid body and its gyroscopic torque, the lag of the
-rotors, where they push and twist, the drag, the contact of the feet with the ground. The flight controller (rate loop
-and mixer, float64) runs before every step of at most 1 ms. Two things need a word:
+MuJoCo integrates all parts of the motion together, by RK4: the rigid body and its gyroscopic torque, the lag of the
+rotors, the points at which their thrust and torque act, the drag, and the contact of the feet with the ground. The
+flight controller (rate loop and mixer, float64) runs before every step of at most 1 ms. Three parts need an
+explanation:
 
-- The activation of a motor is its rotor's *speed* (`dyntype` filter, driven by the commanded speed), as the lag is one
-  of speed. MuJoCo's actuators push in proportion to their activation, so each step is given the tangent of the thrust
-  map at the speed that it starts from: within it the error is k2 (change of speed)^2, 0.005 N in the hardest spin-up.
-- MuJoCo's fluid models take their drag from a body's box or ellipsoid and have no coefficients per axis. So each axis
-  has an actuator without an input that pushes back by its own velocity, -(k1 + k2 |v|) v, with |v| as of the last step;
-  wind is taken off that velocity, turned into the body's frame as of the last step.
-- The angular momentum of the rotors, where the vehicle has rotor inertia: over a step they give the body the momentum
-  that they lose, and the torque w x h of the body rate w in the middle of the step, by its last change.
+- The activation of a motor is its rotor's *speed* (`dyntype` filter, driven by the commanded speed), because the lag
+  is a lag of speed. The force of MuJoCo's actuators is proportional to their activation. Each step therefore uses the
+  tangent of the thrust map at its first speed. The error in a step is k2 (change of speed)^2, 0.005 N in the fastest
+  spin-up.
+- MuJoCo's fluid models derive the drag from a body's box or ellipsoid, and have no coefficients per axis. Each axis
+  therefore has an actuator without input whose force depends on its own velocity, -(k1 + k2 |v|) v, with |v| from the
+  last step. Wind is subtracted from that velocity, in the body frame of the last step.
+- The angular momentum of the rotors is included if the vehicle has rotor inertia. Over a step the rotors give the body
+  the momentum that they lose, and the torque w x h. The body rate w is that in the middle of the step, extrapolated
+  from its last change.
 """
 
 import importlib
@@ -38,12 +41,12 @@ _CALM = Vec3(0.0, 0.0, 0.0)
 def vehicle_xml(vehicle: Vehicle) -> str:
     """The vehicle over a ground plane as MJCF: a free body, four rotors, four feet, the drag.
 
-    Thrust map and drag are those of hovering; `MujocoPlant` moves them along.
+    Thrust map and drag are those at hover. `MujocoPlant` updates them in flight.
     """
     k2, k1, k0 = vehicle.thrust_map
     hover, lag, ratio = vehicle.hover_rotor_speed, vehicle.motor_time_constant, vehicle.torque_ratio
     centre = np.zeros(3) if vehicle.centre_of_mass is None else vehicle.centre_of_mass
-    dx, dy, dz = (-centre).tolist()  # the body's frame is that of its centre of mass, the state of the plant
+    dx, dy, dz = (-centre).tolist()  # the body's frame has its origin in the centre of mass
     sites, feet, actuators = [f'<site name="centre" pos="{dx} {dy} {dz}"/>'], [], []
     for i, ((x, y), spin) in enumerate(zip(rotor_arms(vehicle), vehicle.rotor_spin, strict=True)):
         sites.append(f'<site name="rotor_{i}" pos="{x} {y} {dz}"/>')
@@ -98,13 +101,13 @@ class MujocoPlant(Plant):
     alters = EVERYTHING
 
     def __init__(self, vehicle: Vehicle, command_mode: str = "ctbr", largest_step: float = STEP) -> None:
-        """Make the plant, standing on the ground.
+        """Make the plant, with the vehicle standing on the ground.
 
         Args:
-            vehicle: as loaded; the flight controller believes in it.
-            command_mode: what `step` is given: a name of `COMMAND_MODES`. Modes above `ctbr` go through the bridge's
-                own controllers before each step.
-            largest_step: of MuJoCo and the rate loop, s.
+            vehicle: as loaded. The flight controller is tuned to it.
+            command_mode: the mode of the commands of `step`: a name of `COMMAND_MODES`. Modes above `ctbr` go through
+                the bridge's own controllers before each step.
+            largest_step: longest step of MuJoCo and the rate loop, s.
 
         Raises:
             ValueError: for an unknown command mode, or a step that is not positive.
@@ -112,13 +115,13 @@ class MujocoPlant(Plant):
         check_mode(command_mode, self.name)
         if not (math.isfinite(largest_step) and largest_step > 0):
             raise ValueError(f"largest_step is {largest_step}; accepted: a positive number of seconds")
-        self._mujoco: Any = importlib.import_module("mujoco")  # here: the plant is known where it is not installed
+        self._mujoco: Any = importlib.import_module("mujoco")  # here: the plant is known without MuJoCo
         self._believed, self._mode, self._largest_step = vehicle, command_mode, largest_step
         self.meet(vehicle)
         self.reset(RigidState(np.array([0.0, 0.0, vehicle.feet_height]), np.zeros(3), np.eye(4)[0], np.zeros(3)))
 
     def meet(self, body: Vehicle, plain_mixer: bool = False) -> None:
-        """Fly another body from the next `reset` on, of which the flight controller is not told."""
+        """Fly another body from the next `reset` on, which the flight controller does not know."""
         self.model = self._mujoco.MjModel.from_xml_string(vehicle_xml(body))
         self.data = self._mujoco.MjData(self.model)
         self._body = body
@@ -126,29 +129,29 @@ class MujocoPlant(Plant):
         self._full_speed = body.full_rotor_speed
 
     def disturb(self, wind: np.ndarray, rotor_share: np.ndarray) -> None:
-        """Wind and shares of thrust from now on."""
+        """Set wind and shares of thrust from now on."""
         self._wind, self._share = Vec3(*wind.tolist()), rotor_share
 
     @property
     def state(self) -> RigidState:
         """The vehicle now."""
-        pose, motion = self.data.qpos.copy(), self.data.qvel.copy()  # a free joint turns in the body's own frame
+        pose, motion = self.data.qpos.copy(), self.data.qvel.copy()  # its rotation is in the body frame
         return RigidState(pose[:3], motion[:3], pose[3:] / np.linalg.norm(pose[3:]), motion[3:])
 
     @property
     def rotor_speed(self) -> np.ndarray:
-        """(4,) rear right, front right, rear left, front left, rad/s."""
+        """(4,) rotor speeds: rear right, front right, rear left, front left, rad/s."""
         return self.data.act.copy()
 
     def reset(self, state: RigidState) -> None:
-        """Put the vehicle there, the rotors at hover speed."""
+        """Put the vehicle into a state, with the rotors at hover speed."""
         self._mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:] = np.concatenate([state.position, state.quaternion])
         self.data.qvel[:] = np.concatenate([state.velocity, state.body_rate])
         self.data.act[:] = self._body.hover_rotor_speed
         self._wind, self._share, self._last_rate = _CALM, np.ones(4), state.body_rate
         self._controller.start(state.body_rate.tolist())
-        self._mujoco.mj_forward(self.model, self.data)  # the velocities that the drag starts from
+        self._mujoco.mj_forward(self.model, self.data)  # computes the velocities from which the drag starts
 
     def step(self, command: np.ndarray, dt: float) -> None:
         """Hold a command, (4,), for `dt` s, in equal steps."""
@@ -174,7 +177,7 @@ class MujocoPlant(Plant):
             self._mujoco.mj_step(model, data)
 
     def _powered(self, speed: np.ndarray) -> float:
-        """Speed to which the battery brings a rotor, over the one that it is told."""
+        """Speed to which the battery brings a rotor, divided by its commanded speed."""
         body, (k2, k1, k0) = self._body, self._body.thrust_map
         if body.battery_voltage is None:
             return 1.0
@@ -184,7 +187,10 @@ class MujocoPlant(Plant):
         return max(float(voltage / body.nominal_voltage), LEAST_VOLTAGE) ** exponent
 
     def _lags(self) -> np.ndarray:
-        """Time constant of each rotor's lag on the way to what it is told now, s; it keeps to its side of that."""
+        """Time constant of each rotor's lag towards its present command, s.
+
+        It does not change on the way, because a rotor does not pass its command.
+        """
         up, down = self._body.motor_time_constant, self._body.motor_time_constant_down
         return np.where(self.data.ctrl[:4] < self.data.act, up if down is None else down, up)
 

@@ -13,11 +13,11 @@ P = TypeVar("P", bound=type[Plant])
 
 
 def register(name: str) -> Callable[[P], P]:
-    """Register a plant under a name, by which `validate` knows it.
+    """Register a plant under the name by which `validate` knows it.
 
     Raises:
-        ValueError: for a name that is taken, or a class that is no whole `Plant`, naming where it is from and what it
-            lacks.
+        ValueError: for a name that is taken, or for a class that is not a complete `Plant`, naming its origin and what
+            it lacks.
     """
 
     def registered(plant: P) -> P:

@@ -1,4 +1,4 @@
-"""The simulator that policies are trained in, as a plant."""
+"""The simulator in which policies are trained, as a plant."""
 
 import dataclasses
 from typing import Any
@@ -11,15 +11,15 @@ from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle
 
 _STILL = None, None
-"""No wind, and all of the thrust."""
+"""No wind, and full thrust."""
 
 
 @register("simulator")
 class SimulatorPlant(Plant):
-    """Physics steps of the same length as in training; it moves on when one of them is full.
+    """Physics steps of the same length as in training. The state advances when a whole step has been commanded.
 
-    A command that takes over inside a physics step acts in proportion, as in training: the step is taken under the
-    mean of what was commanded over it. At the ends of control periods no step is half full.
+    A command that begins inside a physics step acts in proportion, as in training: the step uses the mean of the
+    commands over it. A control period ends at the end of a physics step.
     """
 
     alters = EVERYTHING
@@ -28,9 +28,9 @@ class SimulatorPlant(Plant):
         """Make the plant.
 
         Args:
-            vehicle: as loaded; the flight controller believes in it.
-            command_mode: what `step` is given.
-            control_rate: Hz, which physics steps divide evenly; the vehicle's own when left out.
+            vehicle: as loaded. The flight controller is tuned to it.
+            command_mode: the mode of the commands of `step`.
+            control_rate: Hz. A whole number of physics steps fits into its period. If left out: the vehicle's own rate.
 
         Raises:
             ValueError: for an unknown command mode, or a rate that is not positive.
@@ -49,17 +49,17 @@ class SimulatorPlant(Plant):
 
     @classmethod
     def of(cls, vehicle: Vehicle, contract: Contract) -> "SimulatorPlant":
-        """The plant with the control rate of a contract, too."""
+        """The plant, with the control rate of a contract."""
         return cls(vehicle, contract.action.mode, contract.control_rate_hz)
 
     def meet(self, body: Vehicle, plain_mixer: bool = False) -> None:
-        """Fly another body from the next `reset` on, of which the flight controller is not told."""
+        """Fly another body from the next `reset` on, which the flight controller does not know."""
         mixer = dataclasses.replace(self._made.mixer, plain=np.float32(plain_mixer))
         self._physics = dataclasses.replace(self._made, mixer=mixer).flying(body)
         self._hover = body.hover_rotor_speed
 
     def disturb(self, wind: np.ndarray, rotor_share: np.ndarray) -> None:
-        """Wind and shares of thrust from now on."""
+        """Set wind and shares of thrust from now on."""
         self._air = wind.astype(np.float32), rotor_share.astype(np.float32)
 
     @property
@@ -68,7 +68,7 @@ class SimulatorPlant(Plant):
         return RigidState.of(self._state)
 
     def reset(self, state: RigidState) -> None:
-        """Put the vehicle there, the rotors at hover speed."""
+        """Put the vehicle into a state, with the rotors at hover speed."""
         import jax.numpy as jnp
 
         from e2efly.physics import State, started
