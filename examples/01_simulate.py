@@ -1,4 +1,4 @@
-"""Fly VIS-R open loop and by position commands: the physics alone, no learning."""
+"""Fly VIS-R open loop and with position commands: only the physics, no learning."""
 
 import jax
 import jax.numpy as jnp

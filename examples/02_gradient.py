@@ -1,4 +1,4 @@
-"""The gradient of where a vehicle ends with respect to what it was commanded, and to its mass."""
+"""The gradient of a vehicle's final position with respect to its commands and its mass."""
 
 import dataclasses
 

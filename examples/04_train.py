@@ -1,4 +1,4 @@
-"""Train a hover policy from Python, with a reward of one's own; judge it and ask the exported file."""
+"""Train a hover policy from Python with your own reward. Judge it, and call the exported policy."""
 
 import sys
 import tempfile

@@ -1,4 +1,4 @@
-"""A vehicle of one's own: copy a TOML file, change what differs; mistakes are named."""
+"""Your own vehicle: copy a TOML file and change the values that differ. Mistakes are reported by name."""
 
 import tempfile
 from importlib import resources

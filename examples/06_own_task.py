@@ -1,4 +1,4 @@
-"""A task of one's own: circle around a point. `e2efly train examples/06_own_task.py:OrbitConfig`, or run this file."""
+"""Your own task: circle around a point. `e2efly train examples/06_own_task.py:OrbitConfig`, or run this file."""
 
 import sys
 import tempfile
@@ -21,7 +21,7 @@ from e2efly.tasks.verdicts import distance, touches_ground
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Orbit(Hover):
-    """Hover's starts, scene and observation; its target moves. The task's memory is the mean error so far, m.
+    """The starts, scene and observation of hover, with a moving target. The task's memory is the mean error so far, m.
 
     `goal` and `advance` take the arrays of JAX in training and of NumPy in flight.
     """
@@ -33,7 +33,7 @@ class Orbit(Hover):
         return xp.asarray(c.target) + c.circle * xp.stack([xp.cos(angle), xp.sin(angle), 0 * angle], axis=-1)
 
     def advance(self, memory: Any, before: Any, after: Any, time: Any, timed_out: Any) -> tuple[Any, Outcome]:
-        """Success: near the moving target on average, never outside the fence or on the ground."""
+        """Success: near the moving target on average, and never outside the fence or on the ground."""
         c, error = self.config, distance(after.position, self.goal(memory, time))
         mean = memory + (error - memory) * self.control_period / time.clip(self.control_period)
         crashed = (error > c.fence) | touches_ground(self.shape, after)
@@ -43,7 +43,7 @@ class Orbit(Hover):
 
 @dataclass(frozen=True)
 class OrbitRoute(Route):
-    """`e2efly fly` moves the circle by `--goal.origin`."""
+    """The route for `e2efly fly`. `--goal.origin` moves the circle."""
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The circle, endlessly."""
@@ -54,7 +54,7 @@ class OrbitRoute(Route):
 @e2efly.register_task("orbit")
 @dataclass(frozen=True)
 class OrbitConfig(HoverConfig):
-    """Fly circles around a point. It has hover's options, recipes and hints for plots, and options of its own."""
+    """Fly circles around a point. It has the options, recipes and plot settings of hover, and its own options."""
 
     world: ClassVar = Orbit
     route: ClassVar = OrbitRoute
@@ -62,7 +62,7 @@ class OrbitConfig(HoverConfig):
     circle: float = number(1.0, above=0)
     """Radius of the circle, m."""
     speed: float = 1.0
-    """Along it, m/s."""
+    """Speed along the circle, m/s."""
     position: float = 1.0
     """Start within this of the centre, m per axis."""
     velocity: float = 0.5

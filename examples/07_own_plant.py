@@ -1,4 +1,4 @@
-"""A plant of one's own: a point mass whose rates obey at once. `e2efly validate hover --plant FILE:PointMass`."""
+"""Your own plant: a point mass that follows commanded rates at once. `e2efly validate hover --plant FILE:PointMass`."""
 
 import numpy as np
 
@@ -8,25 +8,27 @@ from e2efly.control import Quat, Vec3
 
 @e2efly.register_plant("point_mass")
 class PointMass(e2efly.Plant):
-    """Thrust and body rates are what is commanded; there is neither lag nor drag."""
+    """Thrust and body rates equal the commands. There is neither lag nor drag."""
 
     def __init__(self, vehicle: object, command_mode: str) -> None:
-        """Make the plant; any vehicle is the same to it."""
+        """Create the plant. It ignores the vehicle."""
         if command_mode != "ctbr":
             raise ValueError(f"command_mode is {command_mode}; accepted: ctbr")
         self._state = e2efly.RigidState(np.zeros(3), np.zeros(3), np.eye(4)[0], np.zeros(3))
 
     @property
     def state(self) -> e2efly.RigidState:
-        """The vehicle now."""
+        """The current state of the vehicle."""
         return self._state
 
     def reset(self, state: e2efly.RigidState) -> None:
-        """Put the vehicle there."""
+        """Set the state of the vehicle."""
         self._state = state
 
     def step(self, command: np.ndarray, dt: float) -> None:
-        """Hold a command for `dt` s: turn about a fixed axis, exactly, with the thrust of the middle of the step."""
+        """Hold a command for `dt` s: an exact rotation about a fixed axis, with the thrust direction in the middle of
+        the step.
+        """
         s, thrust, rate = self._state, command[0], command[1:]
         middle, end = (_turned(s.quaternion, rate, part * dt) for part in (0.5, 1.0))
         push = thrust * np.array(Quat.of(middle).z_axis().stack()) - np.array([0.0, 0.0, 9.81])

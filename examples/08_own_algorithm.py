@@ -25,14 +25,14 @@ class Parameters:
 
 
 class ES(Algorithm):
-    """Evolution strategy (Salimans et al. 2017): each vehicle flies with weights of its own; better ones count more."""
+    """Evolution strategy (Salimans et al. 2017): each vehicle flies with its own weights. Better ones count more."""
 
     def init(self, env: Any, config: Any, seed: int) -> Parameters:
         """A fresh network."""
         return Parameters(self.actor.init(np.random.default_rng(seed), np.asarray(env.hover)))
 
     def update(self, env: Any, config: Any, state: TrainState, progress: Any) -> tuple[TrainState, dict[str, Any]]:
-        """A flight of `horizon` steps from new starts; two vehicles with opposite weights share each start."""
+        """A flight of `horizon` steps from new starts. Two vehicles with opposite weight changes share each start."""
         key, start_key, noise_key = jax.random.split(state.key, 3)
         n, (flat, shaped) = state.observation.shape[0], ravel_pytree(state.parameters.policy)
         noise = jax.random.normal(noise_key, (n // 2, flat.size))

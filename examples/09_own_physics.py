@@ -1,4 +1,4 @@
-"""A plant of one's own with all of the physics, and a flight loop, in NumPy, from docs/own-plant.md alone.
+"""Your own plant with the complete physics, and a flight loop, in NumPy, written only from docs/own-plant.md.
 
 `python examples/09_own_physics.py` flies the zoo's hover here and in the training simulator;
 `e2efly validate hover --plant examples/09_own_physics.py:Quadrotor` flies it here from the starts of `e2efly eval`.
@@ -27,7 +27,7 @@ class Motion:
     rotor_speed: np.ndarray
 
     def plus(self, rate: "Motion", dt: float) -> "Motion":
-        """After `dt` s at this rate of change; the rotors stay."""
+        """The state after `dt` s at this rate of change. The rotor speeds do not change."""
         return Motion(
             self.position + dt * rate.position, self.velocity + dt * rate.velocity,
             self.quaternion + dt * rate.quaternion, self.body_rate + dt * rate.body_rate, self.rotor_speed,
@@ -38,7 +38,7 @@ class Physics:
     """Rate loop, mixer, motors and rigid body of a vehicle."""
 
     def __init__(self, vehicle: Vehicle) -> None:
-        """Take what is needed of a vehicle's file."""
+        """Read the needed values from a vehicle."""
         self.v = v = vehicle
         x, y = v.rotor_position.T
         self.allocation = np.stack([np.ones(4), y, -x, v.torque_ratio * v.rotor_spin])
@@ -58,7 +58,7 @@ class Physics:
         return (np.sqrt(k1**2 + 4 * k2 * (thrust - k0)) - k1) / (2 * k2)
 
     def wanted(self, m: Motion, command: np.ndarray) -> np.ndarray:
-        """Rate loop and mixer: (..., 4) commanded rotor speeds."""
+        """Rate loop and mixer. Returns the commanded rotor speeds, (..., 4)."""
         v, w = self.v, m.body_rate
         torque = v.inertia * v.rate_gain * (command[..., 1:] - w) + np.cross(w, v.inertia * w)
         spread = torque @ self.mixing[:, 1:].T
@@ -69,7 +69,7 @@ class Physics:
         return self.speed(np.clip(asked, self.low, self.high))
 
     def rate(self, m: Motion, rotor_speed: np.ndarray) -> Motion:
-        """Newton and Euler: the rate of change at these rotor speeds."""
+        """The Newton-Euler equations: the rate of change at these rotor speeds."""
         v, w = self.v, m.body_rate
         wrench = self.thrust(rotor_speed) @ self.allocation.T
         air = _turn(m.quaternion * [1, -1, -1, -1], m.velocity)
@@ -79,7 +79,7 @@ class Physics:
         return Motion(m.velocity, _turn(m.quaternion, force) / v.mass + GRAVITY, spin, turning, 0 * rotor_speed)
 
     def substep(self, m: Motion, command: np.ndarray, dt: float) -> Motion:
-        """Kutta's third order, the rotors' lag exact."""
+        """One step of Kutta's third-order method, with the exact solution for the rotors' lag."""
         goal, left = self.wanted(m, command), np.exp(-dt / 2 / self.v.motor_time_constant)
         middle = goal + (m.rotor_speed - goal) * left
         end = goal + (middle - goal) * left
@@ -103,12 +103,12 @@ class Quadrotor(e2efly.Plant):
 
     @property
     def state(self) -> e2efly.RigidState:
-        """The vehicle now."""
+        """The current state of the vehicle."""
         m = self._motion
         return e2efly.RigidState(m.position, m.velocity, m.quaternion, m.body_rate)
 
     def reset(self, state: e2efly.RigidState) -> None:
-        """Put the vehicle there, the rotors at hover speed."""
+        """Set the state of the vehicle, with the rotors at hover speed."""
         rotors = np.full(4, self._physics.hover)
         self._motion = Motion(state.position, state.velocity, state.quaternion, state.body_rate, rotors)
 
@@ -120,7 +120,7 @@ class Quadrotor(e2efly.Plant):
 
 
 def hover(policy: Policy, n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Fly `n` starts of the task hover at once: whether each succeeded, and its error at the end, m."""
+    """Fly `n` starts of the task hover at once. Returns whether each succeeded, and its error at the end, m."""
     contract, random = policy.contract, np.random.default_rng(seed)
     vehicle = e2efly.load_vehicle(contract.vehicle)
     physics, period, target = Physics(vehicle), 1 / contract.control_rate_hz, np.array([0.0, 0.0, 3.0])
@@ -142,7 +142,7 @@ def hover(policy: Policy, n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray
         queue = [action, *queue[:-1]]
         commands = [policy.command(past) for past in queue]
         for i in range(substeps):
-            # the share of this sub-step in which a command, or a newer one, acts
+            # the fraction of this sub-step in which a command, or a newer one, acts
             begun = [np.clip(i + 1 - (latency - age * period) / dt, 0, 1) for age in range(len(commands))]
             command = sum((now - newer) * c for now, newer, c in zip(begun, [0, *begun], commands, strict=False))
             m = physics.substep(m, command, dt)
@@ -159,7 +159,7 @@ def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def _turn(q: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Vectors turned by unit quaternions wxyz."""
+    """Vectors rotated by unit quaternions wxyz."""
     twice = 2 * np.cross(q[..., 1:], vector)
     return vector + q[..., :1] * twice + np.cross(q[..., 1:], twice)
 

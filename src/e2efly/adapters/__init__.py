@@ -1,1 +1,1 @@
-"""The environment in the clothes of other frameworks; each module needs the extra of its name."""
+"""The environment with the interfaces of other frameworks. Each module needs an extra of the package."""

@@ -1,4 +1,4 @@
-"""A policy that Stable-Baselines3 or PyTorch has learned becomes a `policy.onnx` with a contract.
+"""Export a policy that Stable-Baselines3 or PyTorch has learned as a `policy.onnx` with a contract.
 
 `pip install 'e2efly[sb3]'` or `'e2efly[torch]'`.
 """
@@ -27,7 +27,7 @@ OPERATORS = {
     torch.nn.Identity: "Identity", torch.nn.Tanh: "Tanh", torch.nn.ReLU: "Relu", torch.nn.ELU: "Elu",
     torch.nn.Sigmoid: "Sigmoid", torch.nn.Softplus: "Softplus", torch.nn.LeakyReLU: "LeakyRelu",
 }  # fmt: skip
-"""ONNX's operators for activations with their default parameters."""
+"""ONNX operators for activations with their default parameters."""
 WRAPPERS = (
     "DummyVecEnv", "Monitor", "NormalizeReward", "OrderEnforcing", "PassiveEnvChecker", "RecordEpisodeStatistics",
     "RecordVideo", "SB3VecEnv", "SyncVectorEnv", "TimeLimit", "VecCheckNan", "VecMonitor", "VecNormalize",
@@ -35,20 +35,22 @@ WRAPPERS = (
 )  # fmt: skip
 """Wrappers that change neither observations nor actions, and `VecNormalize`, which is exported with the policy."""
 CLOSE = 1e-5
-"""Largest accepted difference between an action of the file and of the policy."""
+"""Largest accepted difference between an action of the exported file and the action of the policy."""
 
 
 def export(policy: Any, path: str | os.PathLike[str], env: Any = None) -> Path:
-    """Write a policy of another framework as `policy.onnx`, which is evaluated, validated and flown like one of ours.
+    """Write a policy of another framework as `policy.onnx`. It can be evaluated, validated and flown like a policy of
+    e2efly.
 
-    The file's actions are compared with the policy's on 1000 random observations before the file is written.
+    Before the file is written, its actions are compared with those of the policy on 1000 random observations.
 
     Args:
-        policy: a model of Stable-Baselines3 (PPO, A2C, SAC, TD3 or DDPG with MlpPolicy; its deterministic action is
-            exported), or a `torch.nn.Sequential` of linear layers and activations. Actions are clipped to [-1, 1].
-        path: where to write it.
-        env: the environment of `e2efly.adapters` in which it was learned, with its wrappers; the normalisation of a
-            `VecNormalize` is exported, too. A model of Stable-Baselines3 knows its own.
+        policy: a model of Stable-Baselines3 (PPO, A2C, SAC, TD3 or DDPG with MlpPolicy), whose deterministic action is
+            exported, or a `torch.nn.Sequential` of linear layers and activations. Actions are clipped to [-1, 1].
+        path: the file to write.
+        env: the environment of `e2efly.adapters` in which the policy was learned, with its wrappers. The normalisation
+            of a `VecNormalize` is exported, too. May be omitted for a model of Stable-Baselines3, which knows its
+            environment.
 
     Returns:
         The path.
@@ -69,7 +71,7 @@ def export(policy: Any, path: str | os.PathLike[str], env: Any = None) -> Path:
     if not all(np.isfinite(x).all() for layer in layers for x in layer):
         raise ValueError("policy has weights that are not finite; accepted: finite numbers (did the training diverge?)")
     graph = perceptron_graph(stepper.features, layers, operators, stepper.raw, _normal(normalize))
-    config = dataclasses.replace(stepper.config, network=NetworkConfig())  # the policy is not of its preset's network
+    config = dataclasses.replace(stepper.config, network=NetworkConfig())  # the preset's network does not apply
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "policy.onnx"
         write_policy(file, graph, contract_of(stepper.env, config))
@@ -79,7 +81,9 @@ def export(policy: Any, path: str | os.PathLike[str], env: Any = None) -> Path:
 
 
 def _stepper(env: Any) -> tuple[Stepper, Any]:
-    """That of the environment of `e2efly.adapters` inside of wrappers, and the `VecNormalize` around it, or None."""
+    """The stepper of the environment of `e2efly.adapters` inside the wrappers, and the `VecNormalize` around it, or
+    None.
+    """
     normalize = None
     while not hasattr(env, "stepper"):
         name = type(env).__name__
@@ -93,7 +97,7 @@ def _stepper(env: Any) -> tuple[Stepper, Any]:
 
 
 def _normal(normalize: Any) -> tuple[np.ndarray, np.ndarray, float] | None:
-    """Mean and standard deviation of a `VecNormalize`, and where it clips; None: observations stay as they are."""
+    """Mean, standard deviation and clipping limit of a `VecNormalize`. None: observations are not normalised."""
     if normalize is None or not normalize.norm_obs:
         return None
     rms = normalize.obs_rms
@@ -101,7 +105,7 @@ def _normal(normalize: Any) -> tuple[np.ndarray, np.ndarray, float] | None:
 
 
 def _layers(policy: Any) -> tuple[Layers, list[str]]:
-    """Weights and biases of each linear layer, and the operator behind it; of the last, Tanh or Identity."""
+    """Weights and biases of each linear layer, and the operator after it (after the last: Tanh or Identity)."""
     network, squashed = _network(policy)
     layers: Layers = []
     operators: list[str] = []
@@ -124,7 +128,7 @@ def _layers(policy: Any) -> tuple[Layers, list[str]]:
 
 
 def _network(policy: Any) -> tuple[torch.nn.Sequential, bool]:
-    """From observation to action, and whether a hyperbolic tangent follows."""
+    """The network from observation to action, and whether a hyperbolic tangent follows it."""
     learned = getattr(policy, "policy", policy)
     actor: Any = getattr(learned, "actor", learned)
     if _is_recurrent(actor):

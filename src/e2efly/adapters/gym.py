@@ -22,11 +22,13 @@ from e2efly.tasks import TASKS
 
 Observation = np.ndarray | dict[str, np.ndarray]
 STATE, IMAGE = "state", "image_{}"
-"""Names of an observation's parts where there are cameras."""
+"""Names of the parts of an observation when there are cameras."""
 
 
 def observation_space(stepper: Stepper) -> Space[Any]:
-    """A vector; with cameras a dictionary of it and the images, in metres or in [0, 1]."""
+    """A vector. With cameras, a dictionary of this vector and the images: depth and range in metres, normals in
+    [-1, 1], others in [0, 1].
+    """
     state = Box(-math.inf, math.inf, (stepper.size,), np.float32)
     if not stepper.env.cameras:
         return state
@@ -50,13 +52,13 @@ class QuadrotorEnv(gymnasium.Env[Any, np.ndarray]):
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 30}
 
     def __init__(self, task: str | TrainConfig = "hover", raw: bool = False, render_mode: str | None = None) -> None:
-        """Make it.
+        """Create the environment.
 
         Args:
-            task: a task's name or reference, with its preset for PPO, or a configuration, of which task, reward and
-                environment count.
-            raw: observations as measured, not as features.
-            render_mode: rgb_array: `render` returns a picture from behind the vehicle; None: it returns None.
+            task: the name of a task or a reference to it, with its preset for PPO. Or a configuration, of which only
+                the task, the reward and the environment are used.
+            raw: return observations as measured, not as features.
+            render_mode: with rgb_array, `render` returns a picture from behind the vehicle. With None, it returns None.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.
@@ -67,7 +69,7 @@ class QuadrotorEnv(gymnasium.Env[Any, np.ndarray]):
         self._chase: Chase | None = None
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
-        """The picture of the vehicle, uint8 (h, w, 3); None without a render mode."""
+        """The picture of the vehicle, uint8 (h, w, 3). None without a render mode."""
         if self.render_mode is None:
             return None
         self._chase = self._chase or Chase(self.stepper.env)
@@ -80,7 +82,7 @@ class QuadrotorEnv(gymnasium.Env[Any, np.ndarray]):
         return self._observation(first), {}
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Make a control step. `info` has `success`, `error` (m) and the weighted reward terms, `reward/NAME`."""
+        """Simulate one control step. `info` has `success`, `error` (m) and the weighted reward terms, `reward/NAME`."""
         out, _, final = self.stepper.step(np.asarray(action)[None], restart=False)
         info = {name: value[0].item() for name, value in _info(out).items()}
         return self._observation(final), float(out.reward[0]), bool(out.terminated[0]), bool(out.truncated[0]), info
@@ -104,7 +106,7 @@ class QuadrotorVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
     def __init__(
         self, task: str | TrainConfig = "hover", num_envs: int = 64, raw: bool = False, render_mode: str | None = None
     ) -> None:
-        """Make it; see `QuadrotorEnv`.
+        """Create the environments. The arguments are those of `QuadrotorEnv`, and `num_envs`, the number of vehicles.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.
@@ -118,7 +120,7 @@ class QuadrotorVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         self.action_space = batch_space(self.single_action_space, num_envs)
 
     def render(self) -> tuple[np.ndarray, ...] | None:  # type: ignore[override]
-        """The picture of each vehicle, uint8 (h, w, 3); None without a render mode."""
+        """The picture of each vehicle, uint8 (h, w, 3). None without a render mode."""
         if self.render_mode is None:
             return None
         chase = self._chase = self._chase or Chase(self.stepper.env)
@@ -131,7 +133,9 @@ class QuadrotorVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         return _observations(self.stepper, first), {}
 
     def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Make a control step of all vehicles. `info` is that of `QuadrotorEnv`, per vehicle, with `final_obs`."""
+        """Simulate one control step of all vehicles. `info` has the entries of `QuadrotorEnv` for each vehicle, and
+        `final_obs`.
+        """
         out: Any
         out, shown, final = self.stepper.step(actions, restart=True)
         info: dict[str, Any] = _info(out)

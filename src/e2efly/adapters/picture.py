@@ -1,4 +1,4 @@
-"""The picture that Gymnasium's `render` returns: a vehicle in its world, drawn by our own renderer without a window."""
+"""The picture that Gymnasium's `render` returns: a vehicle in its world, drawn without a window by our own renderer."""
 
 import dataclasses
 from typing import Any
@@ -49,7 +49,7 @@ class Chase:
         return jnp.clip(255 * image, 0, 255).astype(jnp.uint8)
 
     def _solids(self, vehicle: Any, goal: jax.Array) -> dict[str, Solids]:
-        """The vehicle, a body with four rotors, and a ball at its goal."""
+        """The vehicle (a body with four rotors) and a ball at its goal."""
         arm = float(self._env.task.shape.radius) / 2
         places = jnp.array([[0.0, 0.0, 0.0], *([arm * x, arm * y, THICK] for x in (1, -1) for y in (1, -1))])
         turn = jnp.broadcast_to(vehicle.quaternion[:, None], (1, 5, 4))

@@ -12,13 +12,13 @@ from e2efly.config import TrainConfig
 
 
 class SB3VecEnv(VecEnv):
-    """A task on which the algorithms of Stable-Baselines3 train.
+    """A task for training with the algorithms of Stable-Baselines3.
 
     model = PPO("MlpPolicy", SB3VecEnv("hover", 64))
     """
 
     def __init__(self, task: str | TrainConfig = "hover", num_envs: int = 64, raw: bool = False) -> None:
-        """Make it; see `e2efly.adapters.gym.QuadrotorVectorEnv`.
+        """Create the environments. The arguments are those of `e2efly.adapters.gym.QuadrotorVectorEnv`.
 
         Raises:
             ValueError: naming the field, the value and what is accepted; for a task with cameras.
@@ -49,10 +49,10 @@ class SB3VecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> Any:
-        """Make a control step: observations, rewards, dones and infos.
+        """Simulate one control step and return observations, rewards, dones and infos.
 
-        The info of an ended episode has its last observation, its success and, as that of SB3's `Monitor`, its return,
-        length and time, from which SB3 logs `ep_rew_mean` and `ep_len_mean`.
+        When an episode ends, its info has its last observation and its success. Like the info of SB3's `Monitor`, it
+        also has its return, its length and the time. SB3 logs `ep_rew_mean` and `ep_len_mean` from them.
         """
         assert self._actions is not None
         observations, rewards, terminated, truncated, info = self.envs.step(self._actions)
@@ -72,18 +72,18 @@ class SB3VecEnv(VecEnv):
         return observations, rewards, dones, infos
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: there is nothing to close."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute of the batch, once per vehicle."""
+        """An attribute of the batch, repeated for each vehicle."""
         return [getattr(self.envs, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Refused: the vehicles share their attributes."""
+        """Not supported: the vehicles share their attributes."""
         raise NotImplementedError("the vehicles are one program: make another SB3VecEnv instead of changing this one")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Refused: the vehicles have no methods of their own."""
+        """Not supported: the vehicles have no methods of their own."""
         raise NotImplementedError("the vehicles are one program: none has methods of its own")
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:

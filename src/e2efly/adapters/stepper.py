@@ -1,4 +1,4 @@
-"""The compiled steps of an environment, with NumPy arrays in and out: what all adapters call."""
+"""The compiled steps of an environment, with NumPy arrays as input and output. All adapters use it."""
 
 from dataclasses import dataclass, field
 
@@ -14,10 +14,10 @@ from e2efly.learn.networks import Features, View
 
 
 def configured(task: str | TrainConfig) -> TrainConfig:
-    """The configuration of a task: the PPO preset of a name or a reference, whose rewards know events, too.
+    """The configuration of a task. For a name or a reference it is the PPO preset, whose reward also includes events.
 
     Raises:
-        ValueError: for an unknown name, with the nearest one and all there are.
+        ValueError: for an unknown name, giving the nearest name and all known names.
     """
     return presets.preset(task, "ppo") if isinstance(task, str) else task
 
@@ -27,13 +27,14 @@ class Stepper:
     """An environment and its state."""
 
     config: TrainConfig
-    """Of which task, reward and environment count."""
+    """The configuration. Only its task, its reward and its environment are used."""
     n: int
     """Number of vehicles, 1 or more."""
     raw: bool = False
-    """Observations as measured; else as features: body frame, heading-free, scaled (`learn.networks.Features`)."""
+    """Return observations as measured. Otherwise as features, which are in the body frame, independent of the heading,
+    and scaled (`learn.networks.Features`)."""
     state: EnvState | None = None
-    """None before the first reset."""
+    """State of the environment. None before the first reset."""
     env: Env = field(init=False)
     features: Features = field(init=False)
 
@@ -41,7 +42,7 @@ class Stepper:
         if self.n < 1:
             raise ValueError(f"num_envs is {self.n}; accepted: 1 or more")
         self.env = Env.of(self.config.task, self.config.reward, self.config.env)
-        whole = NetworkConfig(pool=(1 << 30, 1 << 30))  # images come apart from the features
+        whole = NetworkConfig(pool=(1 << 30, 1 << 30))  # images are returned separately from the features
         views = tuple(View.of(camera, whole) for camera in self.env.cameras)
         self.features = Features(self.env.fields, views)
         self.begin = jax.jit(self._begin)
@@ -58,14 +59,15 @@ class Stepper:
         return np.array(observation)
 
     def step(self, action: Float[np.ndarray, "n 4"], restart: bool) -> tuple[Step, np.ndarray, np.ndarray]:
-        """Make a control step.
+        """Simulate one control step.
 
         Args:
-            action: in [-1, 1]; what is beyond is clipped.
-            restart: start anew where an episode ended.
+            action: in [-1, 1]. Values outside are clipped.
+            restart: start a new episode where an episode ended.
 
         Returns:
-            The environment's step, the observations to act on next, and the last ones before any new start.
+            The environment's step, the observations for the next action, and the last observations before any new
+            start.
 
         Raises:
             RuntimeError: before the first reset.
@@ -84,7 +86,7 @@ class Stepper:
         return [np.asarray(image) for image in self.state.images]
 
     def shown(self, observation: Float[Array, "n o"]) -> Float[Array, "n s"]:
-        """Observations as the framework gets them."""
+        """Observations in the form that the framework receives."""
         return observation if self.raw else self.features.of_state(observation)
 
     def _begin(self, key: jax.Array) -> tuple[EnvState, Array]:

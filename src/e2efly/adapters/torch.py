@@ -1,7 +1,7 @@
-"""Back-propagation from PyTorch through the environment's steps; states are shared by DLPack, without a copy.
+"""Back-propagation from PyTorch through the environment's steps. States are shared by DLPack, without a copy.
 
-`pip install 'e2efly[torch]'`. The gradient is that of JAX, by its transposed program. A new start of an
-episode cuts it.
+`pip install 'e2efly[torch]'`. JAX computes the gradient, with its transposed program. The start of a new episode cuts
+the gradient.
 """
 
 from dataclasses import dataclass
@@ -27,41 +27,41 @@ class TorchState:
     """Leaves without a gradient: counters, keys, masks."""
 
     def detach(self) -> "TorchState":
-        """The state without its graph, with which the next window of truncated back-propagation begins."""
+        """The state without its graph. The next window of truncated back-propagation begins with it."""
         return TorchState(tuple(x.detach() for x in self.moving), self.rest)
 
 
 @dataclass(frozen=True)
 class TorchStep:
-    """Result of a step, each tensor (n, ...); the first two have a gradient."""
+    """Result of a step. Each tensor is (n, ...). The first two have a gradient."""
 
     observation: torch.Tensor
-    """Observation to act on next; of a new episode where the last one ended."""
+    """Observation for the next action. If the episode ended, it is the first observation of a new episode."""
     reward: torch.Tensor
     final_observation: torch.Tensor
-    """Observation reached by the step, before any new start."""
+    """Observation after the step, before any new start."""
     terminated: torch.Tensor
     truncated: torch.Tensor
     success: torch.Tensor
     images: tuple[torch.Tensor, ...]
-    """Newest images of each camera."""
+    """Newest image of each camera."""
 
 
 class TorchEnv:
-    """A batch of vehicles whose steps PyTorch differentiates through.
+    """A batch of vehicles. PyTorch can differentiate through their steps.
 
     state, observation = env.reset(seed)
     state, step = env.step(state, policy(observation))
     """
 
     def __init__(self, task: str | TrainConfig = "hover", num_envs: int = 64, raw: bool = False) -> None:
-        """Make it.
+        """Create the environments.
 
         Args:
-            task: a task's name or reference, with its preset for PPO, or a configuration, of which task, reward and
-                environment count.
-            num_envs: vehicles.
-            raw: observations as measured, not as features (`learn.networks.Features`).
+            task: the name of a task or a reference to it, with its preset for PPO. Or a configuration, of which only
+                the task, the reward and the environment are used.
+            num_envs: number of vehicles.
+            raw: return observations as measured, not as features (`learn.networks.Features`).
 
         Raises:
             ValueError: naming the field, the value and what is accepted.
@@ -87,11 +87,11 @@ class TorchEnv:
         return TorchState(tuple(map(torch.from_dlpack, moving)), rest), torch.from_dlpack(observation)
 
     def step(self, state: TorchState, action: torch.Tensor) -> tuple[TorchState, TorchStep]:
-        """Make a control step, with new starts where an episode ended.
+        """Simulate one control step, with a new start where an episode ended.
 
         Args:
             state: returned by `reset` or by the last step.
-            action: (n, 4), in [-1, 1]; what is beyond is clipped.
+            action: (n, 4), in [-1, 1]. Values outside are clipped.
 
         Raises:
             ValueError: for actions of another shape or type.
@@ -116,7 +116,7 @@ class TorchEnv:
         return jax.tree.unflatten(self._structure, [next(one if moves else other) for moves in self._moves])
 
     def _advance(self, moving: tuple, rest: tuple, action: jax.Array) -> tuple[Any, dict[str, Any]]:
-        """What has a gradient (state, observation, reward), and what has none."""
+        """The results that have a gradient (state, observation, reward), and those that have none."""
         state = self._together(moving, rest)
         state, out = self.stepper.env.step(state, action)
         moving, rest = self._apart(state)
@@ -135,7 +135,7 @@ _FLAGS = ("terminated", "truncated", "success")
 
 
 class _Step(torch.autograd.Function):
-    """One step in PyTorch's graph. The backward pass computes the step again instead of keeping residuals."""
+    """One step in PyTorch's graph. The backward pass computes the step again instead of storing residuals."""
 
     @staticmethod
     def forward(ctx: Any, env: TorchEnv, rest: tuple, extra: dict[str, Any], action: torch.Tensor, *moving: Any) -> Any:

@@ -1,1 +1,1 @@
-"""The C of `export --c`: a policy's graph, its contract and its check, for machines without Python. Imports no JAX."""
+"""The C code of `export --c`: a policy's graph, its contract and a check, for use without Python. Imports no JAX."""

@@ -1,4 +1,4 @@
-"""NAME_check.c: a program that runs an exported policy on what is known, and says how near and how fast it is."""
+"""NAME_check.c: a program that runs an exported policy on known inputs and reports how accurate and how fast it is."""
 
 import numpy as np
 
@@ -9,21 +9,21 @@ from e2efly.deploy.policy.contract import ACTION_SIZE, Contract
 from e2efly.deploy.policy.draws import random_images, random_observations
 
 STEPS = 8
-"""That are compared, one after the other from an empty memory."""
+"""Number of steps that are compared, one after the other, from an empty memory."""
 ROUNDS = 2000
-"""That are timed."""
+"""Number of steps that are timed."""
 CLOSE: dict[Precision, float] = {"double": 1e-6, "float": 1e-5}
-"""The largest accepted difference of an action from the exact value of the policy.onnx."""
+"""Largest accepted difference between an action and the exact value of the policy.onnx."""
 
 
 def check_source(contract: Contract, content: bytes, name: str, precision: Precision) -> str:
-    """The program, with observations and images by chance and the actions that follow from them exactly.
+    """The program, with random observations and images and the exact actions for them.
 
     Args:
-        contract: of the policy.
-        content: of its policy.onnx.
-        name: of the files and the symbols.
-        precision: that the network computes in.
+        contract: the contract of the policy.
+        content: the content of its policy.onnx.
+        name: name of the files and prefix of the symbols.
+        precision: the precision in which the network computes.
     """
     rng, exact = np.random.default_rng(0), Exact(contract, content)
     observation = random_observations(rng, contract.observation, STEPS)

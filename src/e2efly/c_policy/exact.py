@@ -1,4 +1,4 @@
-"""A policy's graph in double precision: what it is exactly, to tell the rounding of others by."""
+"""A policy's graph in double precision: its exact values, to measure the rounding errors of other implementations."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,9 @@ from e2efly.deploy.policy.loader import INPUT, MEMORY, NEXT_MEMORY, OUTPUT
 
 
 class Exact:
-    """The graph of a policy.onnx, evaluated by ONNX's reference in double precision, operator by operator."""
+    """The graph of a policy.onnx, evaluated by ONNX's reference implementation in double precision, operator by
+    operator.
+    """
 
     def __init__(self, contract: Contract, content: bytes) -> None:
         model = onnx.load_model_from_string(content)
@@ -26,7 +28,7 @@ class Exact:
     def act(
         self, observation: np.ndarray, images: Sequence[np.ndarray], memory: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Actions (n, 4) and next memories (n, k), float64, of observations (n, o), images and memories (n, k)."""
+        """Actions (n, 4) and next memories (n, k), float64, for observations (n, o), images and memories (n, k)."""
         size = self.contract.memory_size
         fed = {INPUT: observation} | {image.name: x for image, x in zip(self.contract.images, images, strict=True)}
         fed |= {MEMORY: memory} if size else {}

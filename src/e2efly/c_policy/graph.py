@@ -1,4 +1,4 @@
-"""From the graph of a policy.onnx to a program of C."""
+"""Convert the graph of a policy.onnx to a C program."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,19 +17,19 @@ class Network:
 
     program: Program
     outputs: dict[str, Operand]
-    """By name."""
+    """The outputs by name."""
 
 
 def network(content: bytes, inputs: Mapping[str, Operand]) -> Network:
     """The program of a policy's graph, for one observation.
 
     Args:
-        content: of a policy.onnx that `load_policy` accepts.
-        inputs: where each input of the graph lies, by its name.
+        content: the content of a policy.onnx that `load_policy` accepts.
+        inputs: the location of each input of the graph, by its name.
 
     Raises:
-        ValueError: naming the node and its operator, where it is not among `OPERATORS` or does what is not known, and
-            the type of a constant that is none of floats or whole numbers.
+        ValueError: for an operator that is not in `OPERATORS` or is used in an unknown way, naming it and its node; for
+            a constant that contains neither floats nor integers, naming its type.
     """
     graph = onnx.load_model_from_string(content).graph
     program, known = Program(), dict(inputs)

@@ -1,4 +1,6 @@
-"""The header of an exported policy: its contract for people, compilers and the program that fills in what it sees."""
+"""The header of an exported policy: its contract, for people, for compilers and for the program that supplies its
+inputs.
+"""
 
 import re
 from dataclasses import dataclass
@@ -12,7 +14,7 @@ from e2efly.observation import PAST_ACTIONS
 Precision = Literal["double", "float"]
 """The type that the network computes in."""
 BYTES: dict[Precision, int] = {"double": 8, "float": 4}
-"""Of a number in each precision."""
+"""Bytes of a number in each precision."""
 
 
 KEYWORDS = frozenset(
@@ -25,19 +27,19 @@ KEYWORDS = frozenset(
         "typename", "using", "virtual", "and", "or", "not", "xor", "bool", "catch",
     }
 )  # fmt: skip
-"""Words that neither C nor C++ takes as a name."""
+"""Words that C or C++ does not accept as a name."""
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """What a policy needs of a machine."""
+    """The memory that a policy needs."""
 
     scratch: int
-    """Numbers of the network's intermediate results."""
+    """Count of numbers for the network's intermediate results."""
     state: int
     """Bytes of the state that changes from step to step, scratch included."""
     images: int
-    """Bytes of the images that its caller holds."""
+    """Bytes of the images, which the caller holds."""
     constants: int
     """Bytes of weights and tables, which never change."""
 
@@ -48,7 +50,7 @@ class Sizes:
 
 
 def sizes(contract: Contract, scratch: int, constants: int, precision: Precision) -> Sizes:
-    """What a policy needs, of its contract and of so many numbers of scratch and bytes of constants."""
+    """The memory that a policy needs, from its contract, the count of scratch numbers and the bytes of constants."""
     kept = contract.observation_size + contract.memory_size + past_actions(contract)
     images = sum(image_size(image) for image in contract.images)
     width = BYTES[precision]
@@ -57,18 +59,18 @@ def sizes(contract: Contract, scratch: int, constants: int, precision: Precision
 
 
 def past_actions(contract: Contract) -> int:
-    """Numbers of the past actions that the policy sees."""
+    """Count of numbers in the past actions that the policy sees."""
     return sum(field.size for field in contract.observation if field.name == PAST_ACTIONS)
 
 
 def image_size(image: Image) -> int:
-    """Numbers of an image."""
+    """Count of numbers in an image."""
     height, width, *colours = image.shape
     return height * width * (colours[0] if colours else 1)
 
 
 def member(name: str) -> str:
-    """The name of an observation field or an image as C takes it."""
+    """The name of an observation field or an image as a valid C name."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     return plain if re.match(r"[A-Za-z]", plain) and plain not in KEYWORDS else f"field_{plain}"
 
@@ -77,11 +79,11 @@ def header(contract: Contract, name: str, digest: str, needs: Sizes, precision: 
     """The file NAME.h.
 
     Args:
-        contract: of the policy.
-        name: of the file and the symbols.
+        contract: the contract of the policy.
+        name: name of the file and prefix of the symbols.
         digest: the SHA-256 of the policy.onnx.
-        needs: what it takes of the machine.
-        precision: that the network computes in.
+        needs: the memory that the policy needs.
+        precision: the precision in which the network computes.
     """
     big = name.upper()
     parts = [

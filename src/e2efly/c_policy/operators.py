@@ -1,9 +1,9 @@
-"""ONNX's operators as statements of C, for one observation at a time.
+"""ONNX operators as C statements, for one observation at a time.
 
-`real` is the type of what is computed and REAL(f) its function f of <math.h>; weights are float.
+`real` is the type of the computed numbers, and REAL(f) is the function f of <math.h> for that type. Weights are float.
 
-Each function takes the node, its operands and the program, to which it adds constants, buffers and a step, and returns
-its outputs. Arrays lie row by row; the batch axis, 1, is left out of their shapes.
+Each function takes the node, its operands and the program. It adds constants, buffers and a step to the program and
+returns the outputs. Arrays are stored row by row. Their shapes do not include the batch axis, which is 1.
 """
 
 import math
@@ -25,12 +25,12 @@ UNARY = {
     "Log": "REAL(log)({0})",
     "Softplus": "({0} > 0.0f ? {0} : 0.0f) + REAL(log1p)(REAL(exp)(-REAL(fabs)({0})))",
 }
-"""Expressions of a number."""
+"""C expressions of one number."""
 SLOPED = {
     "Elu": ("{0} > 0.0f ? {0} : {alpha} * (REAL(exp)({0}) - 1.0f)", 1.0),
     "LeakyRelu": ("{0} > 0.0f ? {0} : {alpha} * {0}", 0.01),
 }
-"""The same, of `alpha` too, and its default."""
+"""C expressions of one number and `alpha`, and the default of `alpha`."""
 BINARY = {
     "Add": "{} + {}",
     "Sub": "{} - {}",
@@ -39,13 +39,13 @@ BINARY = {
     "Max": "{0} > {1} ? {0} : {1}",
     "Greater": "{} > {} ? 1.0f : 0.0f",
 }
-"""Expressions of two numbers."""
+"""C expressions of two numbers."""
 BLOCK = 4
-"""Rows of a matrix that are added at once: an output is then read and written once in so many rows."""
+"""Number of matrix rows that are added at once. An output is then read and written only once per this many rows."""
 
 
 def _each(node: NodeProto, program: Program, shape: Shape, reads: Given, expression: str) -> list[Operand]:
-    """A step that computes number by number."""
+    """Add a step that computes its output element by element."""
     out = program.buffer(shape)
     whole = {operand.buffer for operand in reads if operand.size == out.size}
     in_place = all(operand.buffer is None or operand.buffer in whole for operand in reads)
@@ -89,7 +89,7 @@ def _clip(node: NodeProto, given: Given, program: Program) -> list[Operand]:
 
 
 def _common(given: Given) -> Shape:
-    """The shape of all, where each has it or is one number."""
+    """The common shape of operands of which each has this shape or is a single number."""
     largest = max(given, key=lambda x: (x.size, len(x.shape))).shape
     for x in given:
         if x.size not in (1, math.prod(largest)) or (x.size > 1 and _tight(x.shape) != _tight(largest)):
@@ -120,7 +120,7 @@ def _gemm(node: NodeProto, given: Given, program: Program) -> list[Operand]:
 
 
 def _linear(node: NodeProto, x: Operand, matrix: np.ndarray, bias: np.ndarray, program: Program) -> Operand:
-    """Row by row of the matrix, so that a compiler's vectors go along the outputs."""
+    """A matrix product, computed row by row of the matrix, so that the compiler can vectorise over the outputs."""
     rows, columns = matrix.shape
     weight, start = program.constant("weight", matrix), program.constant("bias", bias)
     out = program.buffer((columns,))
@@ -194,7 +194,7 @@ def _transpose(node: NodeProto, given: Given, program: Program) -> list[Operand]
     axes = [axis - 1 for axis in order[1:]]
     shape = tuple(x.shape[axis] for axis in axes)
     kept = [axis for axis in axes if x.shape[axis] != 1]
-    if kept == sorted(kept):  # the numbers stay where they are
+    if kept == sorted(kept):  # the numbers keep their order
         return [replace(x, shape=shape)]
     strides = _strides(x.shape)
     out, names = program.buffer(shape), [f"t{axis}" for axis in axes]
@@ -242,6 +242,6 @@ OPERATORS: dict[str, Callable[[NodeProto, Given, Program], list[Operand]]] = (
         "Conv": convolution,
     }
 )  # fmt: skip
-"""By ONNX's name: all that the policies of this package have."""
+"""Functions by the name of the ONNX operator: all operators that the policies of this package use."""
 OF_CONSTANTS = ("Gemm", "Gather", "Reshape", "Conv")
-"""Operators that take their constants in another form than the graph has them."""
+"""Operators that need their constants in another form than in the graph."""

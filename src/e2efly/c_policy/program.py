@@ -1,4 +1,4 @@
-"""A program of C, step by step: its arrays, what each step reads and writes, and where the arrays lie in memory."""
+"""A C program, step by step: its arrays, the arrays that each step reads and writes, and their place in memory."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -11,24 +11,24 @@ Shape = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Operand:
-    """An array of floats as a step reads or writes it."""
+    """An array of floats that a step reads or writes."""
 
     text: str
-    """An expression of C: a pointer to its first number."""
+    """A C expression: a pointer to its first number."""
     shape: Shape
-    """Without the batch axis, which is 1."""
+    """Shape, without the batch axis, which is 1."""
     buffer: int | None = None
-    """Of which buffer it is a part; None: a constant or an input."""
+    """The buffer to which it belongs. None: a constant or an input."""
     value: np.ndarray | None = None
-    """Of a constant, which has no `text` until a step reads it: `Program.held`."""
+    """Value of a constant. A constant has no `text` until a step reads it, see `Program.held`."""
 
     @property
     def size(self) -> int:
-        """Its numbers."""
+        """Count of its numbers."""
         return math.prod(self.shape)
 
     def at(self, index: str) -> str:
-        """The expression of one number; the only one, where there is but one."""
+        """The C expression for the number at an index. If there is only one number, for that one."""
         return f"{self.text}[{'0' if self.size == 1 else index}]"
 
 
@@ -37,30 +37,30 @@ class Step:
     """Statements that fill one buffer."""
 
     about: str
-    """What it does, for a comment."""
+    """Description of the step, for a comment."""
     lines: Sequence[str]
     reads: frozenset[int]
-    """Buffers."""
+    """The buffers that it reads."""
     writes: int
-    """A buffer."""
+    """The buffer that it writes."""
     in_place: bool
-    """Each number is read before the number of the same index is written, and no other."""
+    """Whether it can work in place: to write the number at an index, it reads only the numbers at the same index."""
 
 
 @dataclass
 class Program:
-    """Steps and constants as they come."""
+    """Collects the steps and the constants of a program."""
 
     steps: list[Step] = field(default_factory=list)
     sizes: list[int] = field(default_factory=list)
-    """Numbers of each buffer."""
+    """Count of numbers in each buffer."""
     floats: dict[str, np.ndarray] = field(default_factory=dict)
-    """Constants by name."""
+    """Float constants by name."""
     indices: dict[str, np.ndarray] = field(default_factory=dict)
-    """Tables of places, by name."""
+    """Index tables by name."""
 
     def buffer(self, shape: Shape) -> Operand:
-        """A new one."""
+        """A new buffer."""
         self.sizes.append(math.prod(shape))
         index = len(self.sizes) - 1
         return Operand(f"b{index}", shape, index)
@@ -72,10 +72,10 @@ class Program:
         return Operand(name, self.floats[name].shape, value=self.floats[name])
 
     def held(self, operand: Operand) -> Operand:
-        """The same, as steps may read it.
+        """The same operand in the form in which steps can read it.
 
         Raises:
-            ValueError: for a constant of whole numbers.
+            ValueError: for a constant of integers.
         """
         if operand.value is None or operand.text:
             return operand
@@ -84,7 +84,7 @@ class Program:
         return self.constant("constant", operand.value)
 
     def table(self, value: Iterable[int]) -> str:
-        """The name of a new table of places."""
+        """Add an index table and return its name."""
         name = f"places_{len(self.indices)}"
         self.indices[name] = np.asarray(list(value), np.int64)
         return name
@@ -99,17 +99,17 @@ class Program:
 
 
 def layout(program: Program, kept: Iterable[int]) -> tuple[list[int], int]:
-    """Where each buffer lies, so that those that are needed at the same time do not overlap.
+    """Place the buffers in memory so that buffers that are needed at the same time do not overlap.
 
-    A step that may work in place writes over the buffer of its size that it reads last. Any other takes the first gap
-    that is large enough.
+    A step that can work in place overwrites a buffer of the same size that no later step reads. Every other step uses
+    the first gap that is large enough.
 
     Args:
-        program: its steps, in order.
+        program: the program, with its steps in order.
         kept: buffers that are read after the last step.
 
     Returns:
-        The offset of each buffer, and how many numbers all of them take.
+        The offset of each buffer, and the count of numbers that all of them need together.
     """
     last = {buffer: i for i, step in enumerate(program.steps) for buffer in (*step.reads, step.writes)}
     last |= dict.fromkeys(kept, len(program.steps))
@@ -133,7 +133,7 @@ def layout(program: Program, kept: Iterable[int]) -> tuple[list[int], int]:
 
 
 def _gap(taken: list[tuple[int, int]], size: int) -> int:
-    """The first place for so many numbers, at a multiple of four, beside what is taken."""
+    """The first free offset, a multiple of four, at which `size` numbers fit between the taken ranges."""
     at = 0
     for begin, end in taken:
         if at + size <= begin:

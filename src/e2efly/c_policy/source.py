@@ -1,4 +1,6 @@
-"""The C of a policy: its graph as straight code, and around it what `Policy.act` and the runtime do in Python."""
+"""The C code of a policy: its graph as straight-line code, and around it the work that `Policy.act` and the runtime do
+in Python.
+"""
 
 from dataclasses import dataclass
 from hashlib import sha256
@@ -17,7 +19,7 @@ from e2efly.observation import PAST_ACTIONS
 
 @dataclass(frozen=True)
 class Sources:
-    """What an export as C writes."""
+    """The files that an export to C writes."""
 
     header: str
     source: str
@@ -28,13 +30,13 @@ def sources(contract: Contract, content: bytes, name: str, precision: Precision)
     """Header and source of a policy.
 
     Args:
-        contract: of the policy.
-        content: of its policy.onnx.
-        name: of the files and the symbols.
-        precision: that the network computes in.
+        contract: the contract of the policy.
+        content: the content of its policy.onnx.
+        name: name of the files and prefix of the symbols.
+        precision: the precision in which the network computes.
 
     Raises:
-        ValueError: for a graph that is not known as C.
+        ValueError: for a graph that cannot be converted to C.
     """
     inputs = {INPUT: Operand("observation", (contract.observation_size,))}
     inputs |= {image.name: Operand(member(image.name), image.shape) for image in contract.images}

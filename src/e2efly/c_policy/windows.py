@@ -1,4 +1,4 @@
-"""ONNX's operators on images as statements of C; as in `e2efly.c_policy.operators`."""
+"""ONNX operators on images as C statements, as in `e2efly.c_policy.operators`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,14 +11,14 @@ from e2efly.c_policy.program import Operand, Program, Shape
 from e2efly.c_policy.text import number
 
 Given = Sequence[Operand]
-"""What a node reads."""
+"""The operands that a node reads."""
 
 
 def attributes(node: NodeProto, **known: Any) -> dict[str, Any]:
     """The attributes of a node, with defaults.
 
     Raises:
-        ValueError: for one that is not among `known`.
+        ValueError: for an attribute that is not in `known`.
     """
     found = {entry.name: helper.get_attribute_value(entry) for entry in node.attribute}
     if unknown := sorted(set(found) - set(known)):
@@ -43,7 +43,7 @@ def norm(node: NodeProto, given: Given, program: Program) -> list[Operand]:
 
 
 def _window(node: NodeProto, x: Operand, **more: Any) -> tuple[list[int], list[int], Shape]:
-    """The sides and strides of a window over rows and columns that never reaches beyond them, and its places."""
+    """The sides and strides of a window that never reaches beyond the rows and columns, and its positions."""
     plain = {"auto_pad": b"NOTSET", "ceil_mode": 0, "storage_order": 0, "count_include_pad": 0, "group": 1}
     about = attributes(node, kernel_shape=None, strides=[1, 1], pads=[0] * 4, dilations=[1, 1], **plain, **more)
     sides, strides = about["kernel_shape"], list(about["strides"])
@@ -56,7 +56,7 @@ def _window(node: NodeProto, x: Operand, **more: Any) -> tuple[list[int], list[i
 
 
 def pool(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    """The largest or the mean of each window of an image."""
+    """The maximum or the mean of each window of an image."""
     (x,) = given
     (h, w), (down, right), (rows, columns) = _window(node, x)
     channels, height, width = x.shape
@@ -80,7 +80,7 @@ def pool(node: NodeProto, given: Given, program: Program) -> list[Operand]:
 
 
 def convolution(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    """Sums of windows of an image, weighed by filters."""
+    """Convolution: sums over windows of an image, weighted by filters."""
     x, kernel = given[:2]
     if kernel.value is None or kernel.value.ndim != 4 or (len(given) > 2 and given[2].value is None):
         raise ValueError("is other than with a constant kernel and bias")
@@ -92,7 +92,7 @@ def convolution(node: NodeProto, given: Given, program: Program) -> list[Operand
     weight = program.constant("kernel", np.moveaxis(kernel.value, 0, -1).reshape(-1, filters))
     start = program.constant("bias", np.asarray(bias))
     channels, height, width = x.shape
-    # the sums of all filters lie side by side behind the output, for the compiler's vectors
+    # the sums of all filters are stored side by side after the output, so that the compiler can vectorise
     both = program.buffer((filters * (rows * columns + 1),))
     sums = f"({both.text} + {filters * rows * columns})"
     lines = [

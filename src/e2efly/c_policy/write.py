@@ -1,4 +1,4 @@
-"""Write a policy as C into a folder: what `e2efly export --c` does."""
+"""Write a policy as C code into a folder, for `e2efly export --c`."""
 
 import re
 from pathlib import Path
@@ -19,19 +19,19 @@ def write_c(
     """Write NAME.h, NAME.c and NAME_check.c.
 
     Args:
-        folder: where to; made where it is not there.
+        folder: the folder to write to. It is created if it does not exist.
         file: the policy.onnx.
-        name: of the files and of all symbols.
-        precision: that the network computes in.
-        memory: KiB that the target has for the state and the images; None: enough.
-        flash: KiB that it has for weights and tables; None: enough.
+        name: name of the files and prefix of all symbols.
+        precision: the precision in which the network computes.
+        memory: memory of the target for the state and the images, KiB. None: no limit.
+        flash: memory of the target for weights and tables, KiB. None: no limit.
 
     Returns:
-        What the policy needs.
+        The memory that the policy needs.
 
     Raises:
-        ValueError: for a name that C does not take, a policy that cannot be loaded or is too large for the target, a
-            graph that is not known as C, and a folder that is none.
+        ValueError: for a name that C does not accept, a policy that cannot be loaded or is too large for the target, a
+            graph that cannot be converted to C, and a path that is not a folder.
         OSError: when a file cannot be written.
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]{0,30}", name) or name in KEYWORDS:

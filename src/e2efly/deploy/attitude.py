@@ -1,15 +1,16 @@
-"""An attitude as the flight controller estimates it; apart from odometry because the watchdog starts without NumPy."""
+"""An attitude as the flight controller estimates it. Apart from odometry, because the watchdog starts without NumPy."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Attitude:
-    """An attitude as the flight controller estimates it by itself: R = Rz(yaw) Ry(pitch) Rx(roll), body FLU."""
+    """An attitude as the flight controller itself estimates it: R = Rz(yaw) Ry(pitch) Rx(roll), body FLU."""
 
     roll: float
-    """Right side down is positive, rad."""
+    """Roll, rad. Positive: right side down."""
     pitch: float
-    """Nose down is positive, rad."""
+    """Pitch, rad. Positive: nose down."""
     yaw: float
-    """Left is positive, rad in (-pi, pi], from wherever the controller's heading is 0."""
+    """Yaw, rad in (-pi, pi]. Positive: to the left. It is counted from the direction in which the controller's heading
+    is 0."""

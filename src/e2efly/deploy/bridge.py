@@ -1,4 +1,4 @@
-"""The bridge: at each control step, from poses and the flight controller's answers to the sticks that it is sent."""
+"""The bridge: at each control step, it turns poses and the flight controller's replies into stick commands."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -46,21 +46,23 @@ from e2efly.deploy.sight.watch import Seen as Watched
 from e2efly.vehicles.vehicle import Vehicle
 
 ATTITUDE_S, BLIND_ATTITUDE_S = 0.1, 0.5
-"""The controller's attitude may be so old, s: to reckon heading and velocity by, and to descend by without poses."""
+"""Largest age of the controller's attitude, s: for the estimates of heading and velocity, and for a descent without
+poses."""
 DELAY_STEPS = 50
-"""How often, on the ground, the delay of the poses is measured, control steps."""
+"""On the ground, the delay of the poses is measured every so many control steps."""
 SILENT_S = 0.1
-"""A controller that has said nothing for so long may hold the next command for as long as it is silent, s."""
+"""If the controller has said nothing for this time, it may hold the next command for as long as its silence lasts,
+s."""
 CUT = Ctbr(0.0, Vec3(0.0, 0.0, 0.0))
-"""What a closed throttle is, as a command."""
+"""The command that stands for a closed throttle."""
 HISTORY_S = 30.0
-"""The throttles that were sent are remembered for so long, s: a silence of the link may last long."""
+"""How long the sent throttles are remembered, s. The link may be silent for a long time."""
 
 
 class Bridge:
-    """One flight controller, one pose source, one vehicle, perhaps one policy.
+    """One flight controller, one pose source, one vehicle, and an optional policy.
 
-    `tick` never raises for what comes over link or pose source, nor for what the policy does.
+    `tick` never raises because of data from the link or the pose source, or because of what the policy does.
     """
 
     def __init__(
@@ -80,46 +82,46 @@ class Bridge:
         filter: Filter | None = None,
         hover: HoverController | None = None,
     ) -> None:
-        """Make a bridge on the ground.
+        """Create a bridge for a vehicle on the ground.
 
         Args:
-            client: asks the controller.
-            info: what the controller said of itself.
+            client: sends requests to the controller.
+            info: what the controller reported about itself.
             source: delivers poses.
-            vehicle: as loaded.
+            vehicle: the loaded vehicle.
             settings: what the flight may do.
-            worker: asks the policy, or hears a commander outside; None: hover alone.
-            log: the flight's record; None: none is kept.
-            latency: from the vehicle's motion to its rate loop, s; None: the vehicle file's.
+            worker: calls the policy, or listens to an external commander. None: the vehicle only hovers.
+            log: the record of the flight. None: no record is kept.
+            latency: the time from the vehicle's motion to its rate loop, s. None: the value of the vehicle file.
             settings_problems: why the controller's settings forbid a take-off.
-            throttle_map: learned in earlier flights; None: the vehicle file's.
-            cameras: what the policy sees, in the order of its contract's images.
-            filter: keeps the policy inside of the fence; None: the guard ends its flight there.
-            hover: flies take-off, hover and landing; None: the usual one, for this latency.
+            throttle_map: learned in earlier flights. None: the map of the vehicle file.
+            cameras: what the policy sees, in the order of the images in its contract.
+            filter: keeps the policy inside the fence. None: the guard ends the policy's flight at the fence.
+            hover: the controller for take-off, hover and landing. None: the default controller, for this latency.
         """
         delay: float = vehicle.latency if latency is None else latency
         self.client, self.source, self.vehicle, self.settings = client, source, vehicle, settings
         self.gentle = flight_gains(vehicle, delay)
-        """The vehicle with the gains that the latency allows."""
+        """The vehicle with gains that suit the latency."""
         self.hover = hover or hover_controller(DEFAULT, vehicle, delay)
-        """Flies take-off, hover and landing."""
+        """The controller for take-off, hover and landing."""
         self.latency = delay
-        """From the vehicle's motion to its rate loop, s."""
+        """The time from the vehicle's motion to its rate loop, s."""
         self.worker, self.log, self.land_now = worker, log, False
-        """`land_now`: the operator asks for a landing, as the pilot does by the mission switch."""
+        """`land_now`: the operator asks for a landing, as the pilot does with the mission switch."""
         self.cameras = tuple(cameras)
         images = () if worker is None else worker.images
         self.seen = tuple(Watched(image) for image, _ in zip(images, self.cameras, strict=True))
-        """What is known of each camera."""
+        """What is known about each camera."""
         self.instruments = Instruments(client, settings)
         self.adopt(info, settings_problems)
         self.flight, self.inputs = Flight(home=settings.ground_height), Inputs()
         self.estimate = Estimate(Checks(max_age=settings.odometry_timeout), delay + LATE_S)
         self.map = throttle_map or ThrottleMap.of(vehicle)
         self.trim = 0.0
-        """Thrust that makes up for an error of the throttle map, m/s^2."""
+        """Thrust that compensates for an error of the throttle map, m/s^2."""
         self.imu: Imu | None = None
-        """The newest measurement of the inertial sensors that can be believed."""
+        """The newest credible measurement of the inertial sensors."""
         self.sent = Sent("closed", None, 0.0, self._closed())
         self.keeper = None if filter is None else Keeper(filter)
         self._hovering, self._under_way = self.hover.begin(), UnderWay()
@@ -128,12 +130,14 @@ class Bridge:
         self._ticks, self._last = 0, 0.0
 
     def adopt(self, info: ControllerInfo, settings_problems: tuple[str, ...]) -> None:
-        """Take the controller's settings, as they have been read, and what in them forbids a take-off."""
+        """Take over the controller's settings as they were read, and the reasons why they forbid a take-off."""
         self.info, self.sticks, self.settings_problems = info, sticks_of(info), settings_problems
         self.probe = ChannelProbe()
 
     def tick(self, now: float, lateness: float = 0.0, slack: float = 0.004) -> Sent:
-        """One control step at `now` s, which began `lateness` s after its time; a policy due within `slack` s acts."""
+        """Run one control step at `now` s that began `lateness` s late. A policy that is due within `slack` s acts in
+        it.
+        """
         dt = min(max(now - self._last, 0.0), 0.1) if self._last else 0.0
         self._last, self._ticks = now, self._ticks + 1
         self._under_way = sent(self._under_way, self.sent.command or CUT, dt, self.vehicle, self.latency)
@@ -147,39 +151,39 @@ class Bridge:
         return self.sent
 
     def look(self, now: float) -> list[Sample]:
-        """Take in poses and the controller's answers, decide and send nothing; returns the poses."""
+        """Read poses and the controller's replies, without deciding or sending anything. Returns the poses."""
         return self._perceive(now, sends=False)[0]
 
     @property
     def flying(self) -> bool:
-        """Whether the vehicle may be in the air by this bridge's doing."""
+        """Whether this bridge may have brought the vehicle into the air."""
         return self.flight.mode in AIRBORNE
 
     @property
     def odometry(self) -> Odometry | None:
-        """The newest that passed the checks."""
+        """The newest odometry that passed the checks."""
         return self.estimate.odometry
 
     @property
     def height(self) -> float:
-        """Over the place of take-off, by the last odometry, m."""
+        """Height over the place of take-off, from the last odometry, m."""
         return height_of(self.odometry, self.flight)
 
     @property
     def decision(self) -> Decision | None:
-        """What the policy wants; None: it does not fly."""
+        """What the policy wants. None: the policy is not flying."""
         return self.worker.decision if self.worker is not None and self.flight.mode is Mode.POLICY else None
 
     @property
     def setpoint(self) -> tuple[list[float] | None, float | None]:
-        """Where the vehicle is to be, world, m, and its yaw, rad."""
+        """The position where the vehicle should be, world, m, and its yaw, rad."""
         if (decision := self.decision) is not None:
             return None if decision.position is None else decision.position.tolist(), None
         target = self.flight.target
         return (None, None) if target is None else (list(target.position), target.yaw)
 
     def _perceive(self, now: float, *, sends: bool = True) -> tuple[list[Sample], Reading]:
-        """Poses, answers of the controller and what they tell together."""
+        """Read poses and the controller's replies, and combine them."""
         self.client.poll(now)
         samples, attitude = self.source.read(now), self.client.message(AttitudeReply.CODE, now, ATTITUDE_S)
         self.estimate = estimate.see(self.estimate, samples, self.flight, attitude, now, self.source.problem or "")
@@ -196,7 +200,7 @@ class Bridge:
         return samples, reading
 
     def _judge(self, now: float, reading: Reading, *, sends: bool) -> Inputs:
-        """What the state machine is told."""
+        """The inputs of the state machine."""
         flight, mode = self.flight, self.flight.mode
         probed = self.probe.look(now, reading, self.sticks, grounded=mode is Mode.INIT) if sends else ()
         self.estimate = told = estimate.compare(self.estimate, mode, measure_delay=self._ticks % DELAY_STEPS == 0)
@@ -224,16 +228,16 @@ class Bridge:
         )
 
     def _blindness(self, now: float) -> str | None:
-        """Why a policy that sees must not act on the newest images."""
+        """Why a policy that sees must not act on the newest images. None: it may."""
         return next((problem for seen in self.seen if (problem := seen.problem(now))), None)
 
     @property
     def _unfiltered(self) -> str | None:
-        """Why the filter cannot keep a policy inside."""
+        """Why the filter cannot keep a policy inside the fence. None: it can, or there is no filter."""
         return None if self.keeper is None else self.keeper.problem
 
     def _feel(self, now: float, reading: Reading) -> None:
-        """Take in the inertial sensors: in the air they teach the throttle map, and carry the velocity on."""
+        """Process the inertial sensors. In the air they teach the throttle map and propagate the velocity."""
         flight, inputs = self.flight, self.inputs
         attitude = self.client.message(AttitudeReply.CODE, now, ATTITUDE_S)
         if (reply := reading.fresh.get(RawImu.CODE)) is not None:
@@ -268,7 +272,7 @@ class Bridge:
         self.estimate = dataclasses.replace(self.estimate, inertial=told)
 
     def _decide(self, now: float, slack: float) -> None:
-        """Ask the policy where it flies, let the state machine judge, and let a policy that takes over act at once."""
+        """Call the policy if it flies, step the state machine, and let a policy that takes over act at once."""
         worker, odometry = self.worker, self.inputs.odometry
         good = odometry is not None and not self.inputs.odometry_problem
         if self.flight.mode is Mode.POLICY and worker is not None and good and odometry is not None:
@@ -312,7 +316,7 @@ class Bridge:
                 record_mode(self.log, now, before, self.flight)
 
     def _command(self, now: float, dt: float) -> tuple[str, Ctbr | None]:
-        """Who asks for what; None: the throttle closed."""
+        """The source of the command, and the command. None: the throttle is closed."""
         flight, odometry, decision = self.flight, self.odometry, self.decision
         if flight.mode in GROUNDED:
             return "closed", None
@@ -334,7 +338,7 @@ class Bridge:
         return "hover", command
 
     def _motion(self, now: float, odometry: Odometry) -> Seen:
-        """What the hover controller is told."""
+        """The inputs of the hover controller."""
         inertial, told = self.estimate.inertial, self.client.message(MotorTelemetry.CODE, now, FRESH_S)
         force = inertial.force if now - inertial.time < FRESH_S else None
         return Seen(
@@ -346,7 +350,9 @@ class Bridge:
         )  # fmt: skip
 
     def _kept(self, now: float, source: str, command: Ctbr | None) -> tuple[str, Ctbr | None]:
-        """The command as the filter lets it pass; where that fails, a stop, and the next step ends the flight."""
+        """The command after the filter. If the filter fails, it is a command to stop, and the next step ends the
+        policy's flight.
+        """
         keeper, flight, odometry = self.keeper, self.flight, self.odometry
         if keeper is None:
             return source, command
@@ -372,7 +378,9 @@ class Bridge:
         return sent
 
     def _closed(self) -> tuple[int, ...]:
-        """The channels with the throttle closed; before arming the sticks are apart, for the probe."""
+        """The channels with the throttle closed. Before arming, the other sticks differ slightly from their centre, for
+        the probe.
+        """
         apart = (0, 0, 0) if self.inputs.armed or self.probe.seen else PROBE
         return self.sticks.arrange((*(self.sticks.centre + offset for offset in apart), CLOSED), ())
 

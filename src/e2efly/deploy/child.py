@@ -1,4 +1,4 @@
-"""A script of `process/` that runs in a process of its own and tells what it has in lines of text."""
+"""A script of `process/` that runs in its own process and reports in lines of text."""
 
 import os
 import select
@@ -17,48 +17,48 @@ from e2efly.deploy.terminal import printable
 SCRIPTS = Path(__file__).parent / "process"
 """Where the scripts are."""
 OPENING = 15.0
-"""Longest time until a script is ready, s."""
+"""The longest time until a script is ready, s."""
 READS = 2
-"""Most reads of one look, of 64 KiB each: what a pipe holds, and more."""
+"""The largest number of reads per call, of 64 KiB each. This is more than a pipe holds."""
 SYSTEM_PYTHON = "/usr/bin/python3"
 """The system's interpreter, where Debian and Ubuntu install ROS."""
 ROS_PYTHON = "E2EFLY_ROS_PYTHON"
-"""Environment variable that names the interpreter which has ROS."""
+"""Environment variable that names the Python interpreter that has ROS."""
 
 T = TypeVar("T")
 
 
 class Child:
-    """One script. Listening to it takes neither a thread nor the packages of its peer in this process."""
+    """One script. Reading from it needs no thread, and needs none of the script's packages in this process."""
 
     def __init__(self, python: str, script: str, *arguments: str, seconds: float | None = None) -> None:
-        """Start it and wait until it is ready.
+        """Start the script and wait until it is ready.
 
         Args:
-            python: the interpreter that has the package of the peer.
-            script: of `SCRIPTS`.
-            arguments: of the script.
-            seconds: how long it may take; None: `OPENING`.
+            python: the interpreter that has the package that the script needs.
+            script: file name of a script in `SCRIPTS`.
+            arguments: arguments of the script.
+            seconds: the longest time until it is ready. None: `OPENING`.
 
         Raises:
-            ValueError: what the script says of its failure, or that it does not answer in time.
+            ValueError: with what the script reports about its failure, or because it does not answer in time.
         """
         seconds = OPENING if seconds is None else seconds
         self.detail = ""
-        """What it said when it was ready."""
+        """What the script said when it was ready."""
         self._ended: str | None = None
-        self._waiting = ""  # for what, until it is ready
-        self._silent = False  # it has ended, and has not said why
+        self._waiting = ""  # what the script is waiting for until it is ready
+        self._silent = False  # the script has ended without saying why
         self._lines = Lines()
         self._kept: list[bytes] = []
-        self._said = b""  # the last that it wrote to its standard error
+        self._said = b""  # the last bytes that it wrote to its standard error
         self.process = subprocess.Popen(
             [python, str(SCRIPTS / script), *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             bufsize=0,
-            start_new_session=True,  # Ctrl+C is the bridge's to act on
+            start_new_session=True,  # only the bridge acts on Ctrl+C
         )
         assert self.process.stdout is not None
         assert self.process.stderr is not None
@@ -84,7 +84,7 @@ class Child:
 
     @property
     def ended(self) -> str | None:
-        """Why it has ended; None: it runs."""
+        """Why it has ended. None: it is running."""
         if self._silent and (status := self.process.poll()) is not None:
             self._silent = False
             tail = (self._said + (_available(self._err) or b"")).strip().split(b"\n")[-1]
@@ -93,12 +93,14 @@ class Child:
         return self._ended
 
     def lines(self) -> list[bytes]:
-        """What it has written since the last call, oldest first, but for what this class tells."""
+        """The lines that it has written since the last call, oldest first, without those that this class handles
+        itself.
+        """
         kept, self._kept = self._kept, []
         return kept if self._ended is not None else kept + self._pump()
 
     def close(self) -> None:
-        """End it; takes up to 2 s."""
+        """End it. This takes up to 2 s."""
         self._ended, self._silent = self.ended or "closed", False
         process = self.process
         if process.stdin is None or process.stdin.closed:
@@ -114,7 +116,7 @@ class Child:
                 pipe.close()
 
     def _pump(self) -> list[bytes]:
-        """Take what the script has written."""
+        """Read what the script has written."""
         self._said = (self._said + (_available(self._err) or b""))[-2000:]
         found: list[bytes] = []
         for _ in range(READS):
@@ -141,12 +143,12 @@ class Child:
 
 
 def text_of(said: bytes) -> str:
-    """What another process says, which may have come from farther away."""
+    """The text that another process sent, made printable. It may originally come from another machine."""
     return printable(said.decode(errors="replace"))
 
 
 def _available(descriptor: int) -> bytes | None:
-    """What can be read at once; empty at the end, None when there is nothing yet."""
+    """The bytes that can be read at once. Empty at the end of the stream, None if there is nothing yet."""
     try:
         return os.read(descriptor, 65536)
     except BlockingIOError:
@@ -154,16 +156,19 @@ def _available(descriptor: int) -> bytes | None:
 
 
 def first_opened(pythons: list[str], advice: str, opens: Callable[[str], T], *, always: bool = False) -> T:
-    """What the first interpreter opens that has the package of the peer.
+    """Open something with the first interpreter that has the required package.
 
     Args:
-        pythons: to try.
-        advice: what to do when none of them has it.
-        opens: opens it, given the interpreter; raises ValueError.
-        always: give the advice also where one has it, and does not open it.
+        pythons: interpreters to try, in this order.
+        advice: what to do if none of them has the package.
+        opens: opens it with the given interpreter. It raises ValueError if it fails.
+        always: also give the advice if an interpreter has the package but opening fails.
+
+    Returns:
+        What `opens` returned.
 
     Raises:
-        ValueError: what the one that has the package says; or what all say, and the advice.
+        ValueError: with the message of the interpreter that has the package, or with all messages and the advice.
     """
     problems = []
     for python in dict.fromkeys(pythons):
@@ -183,6 +188,6 @@ def first_opened(pythons: list[str], advice: str, opens: Callable[[str], T], *, 
 
 
 def pythons(variable: str) -> list[str]:
-    """Interpreters to try: the one that an environment variable names, or else this one and the system's."""
+    """Interpreters to try: the one that the environment variable names, or otherwise this one and the system's."""
     chosen = os.environ.get(variable)
     return [chosen] if chosen else [sys.executable, SYSTEM_PYTHON]

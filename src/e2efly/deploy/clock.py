@@ -1,14 +1,14 @@
-"""Time as the bridge sees it: the machine's, or a simulation's."""
+"""The time that the bridge uses: the machine's time, or a simulation's."""
 
 import time
 from typing import Protocol
 
 
 class Clock(Protocol):
-    """A clock that never falls."""
+    """A clock that never goes backwards."""
 
     def now(self) -> float:
-        """Seconds."""
+        """The time, s."""
         ...
 
     def sleep(self, seconds: float) -> None:
@@ -17,10 +17,10 @@ class Clock(Protocol):
 
 
 class MonotonicClock:
-    """The machine's monotonic clock: what happens to the wall clock does not touch it."""
+    """The machine's monotonic clock. Changes of the wall clock do not affect it."""
 
     def now(self) -> float:
-        """Seconds."""
+        """The time, s."""
         return time.monotonic()
 
     def sleep(self, seconds: float) -> None:

@@ -1,6 +1,7 @@
-"""An excitation flight in place of a policy: it sees and commands as a policy does, and the bridge flies it as one.
+"""An excitation flight in place of a policy. It observes and commands as a policy does, and the bridge flies it as one.
 
-A contract, an `act` and a course: modes, fence, guard, watchdog and the pilot's switch are those of every policy.
+It consists of a contract, an `act` and a course. The modes, fence, guard, watchdog and the pilot's switch are the same
+as for every policy.
 """
 
 from collections.abc import Sequence
@@ -24,40 +25,42 @@ from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
 NAME = "excitation"
-"""What the command line and the contract call it."""
+"""The name on the command line and in the contract."""
 CONTROL_RATE = 100.0
-"""How often it acts, Hz."""
+"""The rate at which it acts, Hz."""
 EXCITATION_SCHEDULE = SCHEDULE | {RawImu.CODE: 100.0, Motor.CODE: 100.0}
-"""How often each message is asked for, Hz, at most: inertia and motor lag show in gyroscope and motor outputs alone."""
+"""The highest rate at which each message is requested, Hz. Inertia and motor lag show only in the gyroscope and the
+motor outputs."""
 MARGIN, FLOOR = 0.3, 0.6
-"""It stays so far inside the fence, m, and so high over the ground, m."""
+"""The distance that it keeps to the inside of the fence, m, and its lowest height over the ground, m."""
 SLOWEST, LEAST_HEIGHT = 1.2, 1.0
-"""The fence must have room for lines of this speed, m/s, and be so high inside of the margins, m."""
+"""The fence must have room for lines of this speed, m/s, and this height inside the margins, m."""
 BRAKING, REACTION = 3.5, 0.45
-"""The deceleration that its turns count on, m/s^2, and the time before it acts, s, where the fence's are not worse."""
+"""The deceleration that its turns assume, m/s^2, and the time before it acts, s, unless the fence's values are
+worse."""
 PULSED = 0.45
-"""The tilt that doublets and chirps may add to what steering asks for, rad."""
+"""The tilt that doublets and chirps may add to the tilt for steering, rad."""
 LEAST_TILT = 0.3
-"""The tilt that is left for steering under the fence's, rad."""
+"""The smallest tilt that must remain for steering below the fence's tilt, rad."""
 QUICK = 0.8
-"""Share of the fence's speed that is flown."""
+"""The share of the fence's speed that is flown."""
 _ELAPSED = Field("elapsed", 1, "none", "s", 1.0, "time since the beginning")
 _PLACE = Field("place", 3, "world", "m", 1.0, "position of the centre of mass")
 
 
 @dataclass(frozen=True)
 class ExcitationOptions:
-    """What an excitation flight is."""
+    """Options of an excitation flight."""
 
     seconds: float = number(DURATION, low=10.0, high=300.0)
-    """How long, s."""
+    """Duration, s."""
     speed: float = number(5.0, above=0)
-    """Of the fastest line, m/s; the fence's room and its speed may allow less."""
+    """Speed of the fastest line, m/s. The fence's room and its speed may allow less."""
 
 
 @dataclass(frozen=True)
 class ExcitationGoal(Goal):
-    """Shows the time and the place, and judges nothing: the course's duration ends it."""
+    """Provides the time and the position, and judges nothing. The duration of the course ends it."""
 
     observation: ClassVar[tuple[Observed, ...]] = (
         (_ELAPSED, lambda goal, memory, time, state: time[:, None]),
@@ -65,48 +68,48 @@ class ExcitationGoal(Goal):
     )
     config: ExcitationOptions
     middle: np.ndarray
-    """(3,) of the room, m."""
+    """(3,) middle of the room, m."""
 
     def goal(self, memory: Any, time: Any) -> Any:
         """The middle of the room."""
         return np.broadcast_to(self.middle, (len(time), 3))
 
     def advance(self, memory: Any, before: Any, after: Any, time: Any, timed_out: Any) -> tuple[Any, Outcome]:
-        """Never over by itself."""
+        """Never ends the flight by itself."""
         no, off = np.zeros(len(time), bool), np.linalg.norm(after.position - self.middle, axis=-1)
         return memory, Outcome(terminated=no, success=timed_out, arrived=no, crashed=no, error=off)
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """Acts as a policy does. Make it with `excitation`."""
+    """Acts as a policy does. Create it with `excitation`."""
 
     contract: Contract
-    """What it sees and commands."""
+    """What it observes and commands."""
     vehicle: Vehicle
-    """With the gains that steer."""
+    """The vehicle with the gains for steering."""
     room: Room
-    """Where it stays."""
+    """The room in which it stays."""
     speed: float
-    """Of its fastest line, m/s."""
+    """Speed of its fastest line, m/s."""
     seconds: float
-    """How long it is, s."""
+    """Duration, s."""
 
     def act(
         self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The action of an observation, and what to remember.
+        """The action for an observation, and the memory for the next call.
 
         Args:
-            observation: (o,) as `contract.observation` says.
-            images: none.
-            memory: what the last call returned; None: the flight begins here.
+            observation: (o,) as `contract.observation` defines it.
+            images: not used.
+            memory: what the last call returned. None: the flight begins here.
 
         Returns:
-            The action, float32 (4,) in [-1, 1]; the memory for the next call, float64 (memory_size,).
+            The action, float32 (4,) in [-1, 1], and the memory for the next call, float64 (memory_size,).
 
         Raises:
-            ValueError: for a number that is not finite.
+            ValueError: if the observation has a number that is not finite.
         """
         del images
         if not np.isfinite(observation).all():
@@ -128,10 +131,10 @@ def excitation(
     """An excitation flight inside a fence, and its course, for `Runtime.of`.
 
     Args:
-        vehicle: as loaded; in which the bridge believes.
-        settings: of the flight: its fence, and the height of the ground.
-        options: what is flown.
-        latency: from the vehicle's motion to its rate loop, s; None: the vehicle file's.
+        vehicle: the loaded vehicle that the bridge uses.
+        settings: the flight's settings, for its fence and the height of the ground.
+        options: the options of the excitation flight.
+        latency: the time from the vehicle's motion to its rate loop, s. None: the value of the vehicle file.
 
     Raises:
         ValueError: naming the option, or the part of the fence that is too small, and what is needed.
@@ -147,7 +150,7 @@ def excitation(
 
 
 def room_of(settings: FlightSettings) -> tuple[Room, float]:
-    """Where an excitation flight stays inside a fence, and the tilt, rad, that it steers by.
+    """The room in which an excitation flight stays inside a fence, and the largest tilt for steering, rad.
 
     Raises:
         ValueError: naming the part of the fence that is too small, and what is needed.

@@ -1,4 +1,4 @@
-"""The control loop in real time: an absolute schedule, the watchdog's plan, the log's timing, the operator's word."""
+"""The control loop in real time: an absolute schedule, the watchdog's plan, the log's timing, operator messages."""
 
 import gc
 import math
@@ -25,36 +25,39 @@ from e2efly.deploy.terminal import printable
 from e2efly.process import threads
 
 LOWEST_RATE = 100.0
-"""The loop runs at least so often, Hz."""
+"""The lowest rate of the loop, Hz."""
 PLAN_PERIOD = 0.1
-"""How often the watchdog is told what to do, s."""
+"""The period at which the watchdog is given a new plan, s."""
 PLAN_RATES = tuple(0.5 * i for i in range(-6, 7))
-"""Body rates, rad/s, of the watchdog's tables."""
+"""Body rates of the watchdog's tables, rad/s."""
 SWITCH_S = 1e-4
-"""How long another thread of the process may hold up the loop, s; 5 ms is the interpreter's own."""
+"""The longest time for which another thread of the process may delay the loop, s. Python's default is 5 ms."""
 LOOP_PRIORITY, POLICY_PRIORITY, OTHER_PRIORITY = 10, 9, 8
-"""Real-time priorities; the watchdog stands above them. Every other thread of the process has one, too: each holds the
-interpreter's lock at times, and the loop would wait for it while another process has its core."""
+"""Real-time priorities. The watchdog's is higher. Every other thread of the process also has one. The reason is that
+each thread sometimes holds the interpreter's lock, and the loop would then have to wait while another process uses that
+thread's core."""
 STATUS_PERIOD = 1.0
-"""How often a line of status is told, s."""
+"""The period of the status lines, s."""
 TAKEN = "; it keeps the link until you disarm: then end this by Ctrl-C and start it anew"
-"""Told once the watchdog has taken over, after its reason."""
+"""Said once the watchdog has taken over, after the watchdog's reason."""
 
 
 def loop_rate(control_rate: float) -> float:
-    """The lowest multiple of a policy's rate, Hz, that is at least `LOWEST_RATE`: it acts on the loop's own grid."""
+    """The lowest multiple of a policy's rate, Hz, that is at least `LOWEST_RATE`. The policy then acts on the loop's
+    own grid.
+    """
     return control_rate * max(math.ceil(LOWEST_RATE / control_rate - 1e-9), 1)
 
 
 @dataclass
 class Timing:
-    """How punctual the loop was."""
+    """The timing statistics of the loop."""
 
     rounds: int = 0
     missed: int = 0
-    """Rounds that began after the next was due."""
+    """Rounds that ended after the next round was due."""
     lateness: list[float] = field(default_factory=list)
-    """Of each round, s."""
+    """Lateness of each round, s."""
 
 
 def fly(
@@ -70,19 +73,20 @@ def fly(
     service: Service | None = None,
     clock: Clock = MONOTONIC,
 ) -> Timing:
-    """Run the bridge until `stop` says so and the vehicle is on the ground and disarmed, or the watchdog's for good.
+    """Run the bridge until `stop` is true and the vehicle is on the ground and disarmed, or until the watchdog has
+    taken over for good.
 
     Args:
-        bridge: what to run.
-        rate: control steps a second, Hz.
-        log: the flight's record.
-        live: shows what the policy sees while it flies; its records come by `log`.
-        watchdog: told what to do should this process fall silent.
-        say: takes lines for people; it must not block. What it raises is lost with its line.
-        stop: whether to end; a vehicle in the air is landed first.
-        identify_again: reads the controller's settings anew after it was connected again, on the ground.
-        service: tells the service manager that the loop goes on.
-        clock: the time.
+        bridge: the bridge to run.
+        rate: control steps per second, Hz.
+        log: the record of the flight.
+        live: shows what the policy sees while it flies. It gets its records through `log`.
+        watchdog: receives a plan for the case that this process falls silent.
+        say: takes lines for people. It must not block. If it raises, the exception and its line are dropped.
+        stop: whether to end. A vehicle in the air is landed first.
+        identify_again: reads the controller's settings again after a reconnection on the ground.
+        service: tells the service manager that the loop is running.
+        clock: gives the time.
     """
     timing, period = Timing(), 1 / rate
     due = clock.now() + period
@@ -101,7 +105,7 @@ def fly(
                 ended = bridge.flight.mode in (Mode.INIT, Mode.DONE)  # not while the pilot flies: the sticks would stay
                 if ended and not bridge.inputs.armed:  # or the throttle stick, in its middle, would have the motors
                     return timing
-                if watchdog is not None and watchdog.taken_over:  # it lands on without this process
+                if watchdog is not None and watchdog.taken_over:  # it goes on landing without this process
                     return timing
             if bridge.client.link.connections != connection and bridge.flight.mode in (Mode.INIT, Mode.DONE):
                 if identify_again is not None and identify_again() is not None:
@@ -138,12 +142,12 @@ def fly(
                 })  # fmt: skip
             previous = now
             due += period
-            if done > due:  # what was missed stays missed: no burst to catch up
+            if done > due:  # missed rounds are not made up for: no burst to catch up
                 due += math.ceil((done - due) / period) * period
 
 
 def plan_of(bridge: Bridge) -> Plan:
-    """What the watchdog is to do from here on without the bridge."""
+    """What the watchdog has to do from now on if the bridge falls silent."""
     sticks, voltage = bridge.sticks, bridge.inputs.voltage
 
     def throttle(command: Ctbr) -> int:
@@ -165,12 +169,12 @@ def plan_of(bridge: Bridge) -> Plan:
 
 
 def _say(say: Callable[[str], None], line: str) -> None:
-    with suppress(Exception):  # a terminal that is gone ends no flight
+    with suppress(Exception):  # a lost terminal must not end a flight
         say(line)
 
 
 def _told(bridge: Bridge, *, in_full: bool = False) -> str:
-    """The mode and its reasons, unless in full without their numbers, which change all the time."""
+    """The mode and its reasons. Unless `in_full`, the reasons come without their numbers, which change all the time."""
     flight = bridge.flight
     reasons = [str(reason) if in_full else str(reason).split(": ")[0] for reason in flight.reasons]
     return f"{flight.mode.upper()}: " + "; ".join(map(printable, reasons))
@@ -188,7 +192,7 @@ def _status(bridge: Bridge) -> str:
 
 @contextmanager
 def _no_pauses(bridge: Bridge) -> Iterator[None]:
-    """No garbage collection in flight, threads that give way at once, real-time scheduling where it is allowed."""
+    """No garbage collection in flight, fast switching between threads, and real-time scheduling where it is allowed."""
     priorities: dict[int, int | None] = dict.fromkeys(threads(), OTHER_PRIORITY)
     priorities[threading.get_native_id()] = LOOP_PRIORITY
     if bridge.worker is not None and bridge.worker.native_id is not None:
@@ -209,7 +213,9 @@ def _no_pauses(bridge: Bridge) -> Iterator[None]:
 
 
 def _schedule(priorities: Mapping[int, int | None]) -> None:
-    """Real-time priorities by thread; None: as usual. An ordinary user's process is punctual enough on an idle core."""
+    """Set real-time priorities by thread. None: normal scheduling. Without the permission for real-time priorities, a
+    process is still punctual enough on an idle core.
+    """
     for thread, priority in priorities.items():
         with suppress(OSError, AttributeError):
             policy = os.SCHED_OTHER if priority is None else os.SCHED_FIFO

@@ -1,29 +1,30 @@
-"""A stream of bytes as lines of bounded length."""
+"""Splits a stream of bytes into lines of bounded length."""
 
 LONGEST = 4096
-"""Most bytes of a line."""
+"""The largest length of a line, bytes."""
 
 
 class Lines:
-    """Cuts a stream of bytes into lines of bounded length."""
+    """Splits a stream of bytes into lines of bounded length."""
 
     def __init__(self) -> None:
         self._rest = b""
         self._skip = False
 
     def feed(self, data: bytes, most: int | None = None) -> tuple[list[bytes], int, int]:
-        """The complete lines that are not empty, how many overlong ones were dropped, and how many for their number.
+        """The complete non-empty lines, the number of lines dropped as too long, and the number dropped as too many.
 
         Args:
             data: the next bytes of the stream.
-            most: of more complete lines than this the newest are cut out, and the others only counted; None: any.
+            most: the largest number of complete lines to split off. If there are more, the newest are kept and the
+                others are only counted. None: no limit.
         """
         *lines, rest = (self._rest + data).rsplit(b"\n", -1 if most is None else most + 1)
         dropped = 0
-        if most is not None and len(lines) > most:  # the first may be many that were not cut
+        if most is not None and len(lines) > most:  # the first element may hold many lines that were not split
             older, *lines = lines
             dropped, self._skip = older.count(b"\n") + 1, False
-        if lines and self._skip:  # the end of a line that was dropped already
+        if lines and self._skip:  # the end of a line that was already dropped
             lines, self._skip = lines[1:], False
         overlong = sum(len(line) > LONGEST for line in lines)
         if len(rest) > LONGEST:

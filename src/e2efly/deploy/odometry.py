@@ -1,4 +1,4 @@
-"""Where the vehicle is and how it moves: what pose sources deliver and what the bridge flies by."""
+"""The position and motion of the vehicle: what pose sources deliver, and what the bridge uses to fly."""
 
 import math
 from dataclasses import dataclass
@@ -11,22 +11,22 @@ from e2efly.courses.origin import Origin
 
 @dataclass(frozen=True)
 class Sample:
-    """One message of a pose source, as it came, in the source's own clock."""
+    """One message of a pose source, as it arrived, in the source's own clock."""
 
     received: float
-    """When it arrived, s on this machine's monotonic clock."""
+    """Time of arrival, s on this machine's monotonic clock."""
     position: np.ndarray
     """(3,) centre of mass, world ENU, m."""
     quaternion: np.ndarray
     """(4,) attitude, wxyz, body FLU to world ENU."""
     stamp: float | None = None
-    """When it was true, s on the source's clock; None: the source does not say."""
+    """Time at which the pose was true, s on the source's clock. None: the source does not give it."""
     velocity: np.ndarray | None = None
-    """(3,) world, m/s; None: to be estimated."""
+    """(3,) velocity, world, m/s. None: it has to be estimated."""
     body_rate: np.ndarray | None = None
-    """(3,) about body x, y, z, rad/s; None: to be estimated."""
+    """(3,) about body x, y, z, rad/s. None: it has to be estimated."""
     frame: str = ""
-    """Name of the frame that the source says it speaks of; empty: it does not say."""
+    """Name of the frame that the source uses. Empty: the source does not give it."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,13 @@ class Odometry:
     """The vehicle's motion, checked."""
 
     time: float
-    """When it was true, s on this machine's monotonic clock."""
+    """Time at which the motion was true, s on this machine's monotonic clock."""
     position: np.ndarray
     """(3,) centre of mass, world ENU, m."""
     velocity: np.ndarray
     """(3,) world, m/s."""
     quaternion: np.ndarray
-    """(4,) unit, wxyz, body FLU to world ENU, w >= 0 not enforced: continuous in time."""
+    """(4,) unit, wxyz, body FLU to world ENU. Continuous in time, so w >= 0 is not guaranteed."""
     body_rate: np.ndarray
     """(3,) about body x, y, z, rad/s."""
 
@@ -51,7 +51,7 @@ class Odometry:
         return Odometry(self.time, p[None], v[None], q[None], w[None])
 
     def seen_from(self, origin: Origin) -> "Odometry":
-        """The motion in the axes of a world with this origin."""
+        """The motion in the axes of a world that has this origin."""
         if origin == Origin():
             return self
         half = origin.yaw / 2

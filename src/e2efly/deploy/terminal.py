@@ -1,7 +1,7 @@
 """The operator's terminal: what is shown there, and the signals that ask for a landing.
 
-Nothing that befalls a terminal may end a flight. It stalls, its connection ends, it cannot show a character: lines are
-lost then, and the flight goes on. A text that came from outside shows itself and does nothing else.
+Nothing that happens to a terminal may end a flight. If a terminal stalls, loses its connection or cannot show a
+character, lines are lost and the flight goes on. Text from outside is only shown; it has no other effect.
 """
 
 import queue
@@ -14,21 +14,22 @@ from typing import Any, TextIO
 from e2efly.process import write_nowhere
 
 LANDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
-"""Signals that ask for a landing: Ctrl-C, a polite end, a terminal whose connection has ended, Ctrl-\\, Ctrl-Z."""
+"""Signals that ask for a landing: Ctrl-C, a normal request to end (SIGTERM), a terminal that lost its connection,
+Ctrl-\\, Ctrl-Z."""
 WAITING = 100
-"""Most lines that wait to be printed."""
+"""The largest number of lines that wait to be printed."""
 
 
 def printable(text: str) -> str:
-    """A text on one line, in which line ends, escape sequences and lone surrogates are shown as Python's escapes."""
+    """The text on one line. Line ends, escape sequences and lone surrogates are shown as Python's escapes."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 class Stop:
-    """Whether a landing, and the end on the ground, has been asked for by a signal."""
+    """Whether a signal has asked for a landing and for the end on the ground."""
 
     def __init__(self) -> None:
-        """Take the signals of `LANDING`; a hang-up that is ignored already, as by nohup, stays ignored."""
+        """Handle the signals of `LANDING`. A hang-up signal that is already ignored, as under nohup, stays ignored."""
         self.asked = False
         ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
         taken = (number for number in LANDING if not (ignored and number is signal.SIGHUP))
@@ -38,20 +39,20 @@ class Stop:
         self.asked = True
 
     def __call__(self) -> bool:
-        """Whether it has been asked for."""
+        """Whether a signal has asked for it."""
         return self.asked
 
     def restore(self) -> None:
-        """Give the signals back."""
+        """Restore the previous signal handlers."""
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
 
 class Speaker:
-    """Prints lines from a thread of its own, so that a terminal that stalls does not stall the control loop."""
+    """Prints lines from its own thread, so that a terminal that stalls does not stall the control loop."""
 
     def __init__(self, stream: TextIO) -> None:
-        """Begin; `stream` is the terminal's."""
+        """Start the thread. `stream` is the terminal's stream."""
         self._stream = stream
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._start = time.monotonic()
@@ -60,25 +61,25 @@ class Speaker:
         self._thread.start()
 
     def __call__(self, line: str) -> None:
-        """Have a line printed with the time; where many wait already, it is lost."""
+        """Queue a line to be printed with the time. If too many lines are waiting, the line is lost."""
         if self._lines.qsize() < WAITING:
             self._lines.put(f"{time.monotonic() - self._start:7.2f}  {line}")
 
     def write(self, text: str) -> None:
-        """Print now, in the caller's thread: not for the control loop. Never raises."""
+        """Print now, in the caller's thread. Not for the control loop. Never raises."""
         encoding = getattr(self._stream, "encoding", None) or "utf-8"
         shown = "\n".join(map(printable, text.split("\n")))
         try:
             self._stream.write(shown.encode(encoding, "backslashreplace").decode(encoding) + "\n")
             self._stream.flush()
-        except Exception:  # of whatever kind: the line is lost, and the next is tried
+        except Exception:  # any kind of error: this line is lost, and the next one is tried
             self._gone = True
 
     def close(self) -> None:
-        """Print what waits, for a second at most."""
+        """Print the waiting lines, for at most one second."""
         self._lines.put(None)
         self._thread.join(1.0)
-        if self._gone:  # what the stream still holds would fail again as the interpreter ends
+        if self._gone:  # what the stream still holds would fail again when the interpreter ends
             with suppress(Exception):
                 write_nowhere(self._stream.fileno())
 

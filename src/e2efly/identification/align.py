@@ -1,4 +1,6 @@
-"""The paper's alignment: delay and rate loop with which the simulator answers to commands as the vehicle did."""
+"""The paper's alignment: find the delay and the rate loop with which the simulator responds to commands as the vehicle
+did.
+"""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -16,40 +18,43 @@ from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
 EARLY_S = 0.025
-"""By so much a response may seem to come before its command: a vehicle quicker than the file's motors and rate loop."""
+"""Time by which a response may seem to come before its command, s. This happens when the vehicle is quicker than the
+motors and the rate loop of its file."""
 AXES = {"rate_gain_x": "roll", "rate_gain_y": "pitch", "rate_gain_z": "yaw"}
 FLY = "steps or doublets of {} rate, 2 rad/s and more, 0.2 s and longer each, three of them or more"
 SHOWN_S = 0.8
-"""Length of the stretches that are shown, s ..."""
+"""Length of the sections that are shown, s."""
 LEAD_S = 0.12
-"""... of which so much lies before the step."""
+"""Part of a shown section before the step, s."""
 JUMP_S = 0.06
-"""A command that goes over within this counts as a step, s."""
+"""A command that changes within this time counts as a step, s."""
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """What was found, and what it is worth."""
+    """The result of an alignment, and its accuracy."""
 
     found: Found
-    """The fit, in which the vehicle's latency is the delay alone."""
+    """The fit. In it, the vehicle's latency is only the delay from the command to the rate loop."""
     model: Model
-    """Whose zeros are the file's vehicle."""
+    """The model whose zeros are the vehicle of the file."""
     delay: tuple[float, float, float]
-    """From a command's sending to the rate loop, s: by the file, as found, and its standard deviation; NaN for none."""
+    """Delay from the sending of a command to the rate loop, s: by the file, as found, and its standard deviation. NaN
+    if none was found."""
     early: float
-    """By how much the response seemed to come before the command, s, where the delay is held at none; else 0."""
+    """Time by which the response seemed to come before the command, s, if the delay is fixed at zero. Otherwise 0."""
     pose_delay: float
-    """Of the poses that the commands were made from, s: it is a part of the vehicle's latency."""
+    """Delay of the poses from which the commands were computed, s. It is a part of the vehicle's latency."""
     estimates: list[Estimate]
-    """For the vehicle file."""
+    """Estimates for the vehicle file."""
     refusals: list[Refusal]
     before: dict[str, float]
-    """By signal, root mean square of what the file's vehicle gets wrong in stretches that the fit did not see."""
+    """By signal, root mean square error of the file's vehicle in sections that the fit did not see."""
     after: dict[str, float]
-    """The same of the aligned one."""
+    """The same for the aligned vehicle."""
     thrust: float
-    """Specific force along body z over that of the aligned simulator, in the same stretches; NaN where not known."""
+    """Measured specific force along body z divided by that of the aligned simulator, in the same sections. NaN if not
+    known."""
 
 
 def align(
@@ -58,16 +63,17 @@ def align(
     pose_delay: float = 0.0,
     told: Callable[[int, float], None] = lambda i, cost: None,
 ) -> Alignment:
-    """Fit delay and rate loop to flights, and judge both on what was held out.
+    """Fit the delay and the rate loop to flights, and judge both on held-out windows.
 
     Args:
-        vehicle: of the file; its latency holds the delay of the poses.
-        records: of the flights, checked.
-        pose_delay: of the poses that the commands were made from, s.
-        told: (iteration, cost) after each of the fit's.
+        vehicle: the vehicle of the file. Its latency includes the delay of the poses.
+        records: the flights, checked.
+        pose_delay: delay of the poses from which the commands were computed, s.
+        told: called with (iteration, cost) after each iteration of the fit.
 
     Raises:
-        ValueError: naming the flight and what it lacks; naming all parameters and what to fly, where none can be had.
+        ValueError: naming the flight and what it lacks; when no parameter can be found, naming all parameters and what
+            to fly.
     """
     own = max(float(vehicle.latency) - pose_delay, 0.0)
     base = dataclasses.replace(vehicle, latency=own)
@@ -97,7 +103,7 @@ def align(
 
 
 def refused(refusal: Refusal) -> str:
-    """Why a parameter was not aligned, and what to fly, in words."""
+    """The reason why a parameter was not aligned, and what to fly, in words."""
     name = refusal.unknown.name
     if name in AXES:
         axis = AXES[name]
@@ -106,8 +112,8 @@ def refused(refusal: Refusal) -> str:
 
 
 def _held_out(found: Found, model: Model, records: Sequence[Record], p: np.ndarray) -> tuple[dict[str, float], float]:
-    """By signal, root mean square of the error in windows that the fit did not see, all of their streams used; and the
-    thrust there, measured over simulated.
+    """By signal, the root mean square error in windows that the fit did not see, with all their streams. And the thrust
+    in these windows, measured divided by simulated.
     """
     windows = found.windows.some(found.held_out)
     errors: dict[str, list[np.ndarray]] = {}
@@ -128,7 +134,7 @@ def _held_out(found: Found, model: Model, records: Sequence[Record], p: np.ndarr
 
 
 def clearest(record: Record, channel: int) -> Stretches:
-    """The stretch about the largest sudden change of a command that comes after calm.
+    """The section around the largest sudden change of a command that follows a calm period.
 
     Args:
         record: the flight.

@@ -1,7 +1,8 @@
-"""A flight controller's blackbox, laid into the log of the flight that it is of.
+"""A flight controller's blackbox, merged into the flight log of the same flight.
 
-Our flight log has the commands, the poses and 50 samples of the gyroscope a second; the blackbox has gyroscope, motor
-outputs and the rate loop's setpoint a thousand times a second. Together they show what neither shows alone.
+The flight log of e2efly has the commands, the poses and 50 gyroscope samples per second. The blackbox has the
+gyroscope, the motor outputs and the setpoint of the rate loop a thousand times per second. Together they show more than
+each alone.
 """
 
 from collections.abc import Sequence
@@ -14,22 +15,23 @@ from e2efly.identification.readers import BLACKBOXES
 from e2efly.identification.record import Record, Stream
 
 RATE = 1000.0
-"""Samples a second that are kept of a blackbox, Hz: means of those in between."""
+"""Sampling rate to which a blackbox is reduced by averaging, Hz."""
 UNEVEN = 0.003
-"""A clock that is so far from even, s, is followed piece by piece."""
+"""If a clock deviates from an even one by more than this, s, it is followed piece by piece."""
 TRIED = np.arange(-0.05, 0.2, 5e-4)
-"""Delays from a command to the setpoint that are tried, s; below none, as the clocks are matched by 50 Hz."""
+"""Delays from a command to the setpoint that are tried, s. They include negative ones, because the clocks are matched
+with 50 Hz data."""
 DELAY_SIGMA = 1.5e-3
-"""Standard deviation of a delay that is measured so, s: the clocks' match."""
+"""Standard deviation of a delay that is measured in this way, s. It comes from the matching of the clocks."""
 ALIKE = 0.3
-"""Largest share of the setpoint's variance that its commands may leave unexplained."""
+"""Largest fraction of the setpoint's variance that the commands may leave unexplained."""
 
 
 def with_blackboxes(records: Sequence[Record]) -> list[Record]:
-    """The flights, with the blackboxes of the same flights laid into them; other blackboxes stay flights of their own.
+    """The flights, with the blackboxes of the same flights merged into them. Other blackboxes remain separate flights.
 
     Args:
-        records: as read.
+        records: the records as read.
     """
     found = dict(enumerate(records))
     boxes = [i for i, r in found.items() if r.path.suffix.lower() in BLACKBOXES and r.has("body_rate")]
@@ -46,7 +48,7 @@ def with_blackboxes(records: Sequence[Record]) -> list[Record]:
 
 
 def _laid(flight: Record, box: Record) -> Record | None:
-    """A flight with a blackbox in it; None: it is not of this flight."""
+    """A flight with a blackbox merged into it. None: the blackbox does not belong to this flight."""
     told, gyro = box.streams["body_rate"], flight.streams["body_rate"]
     none = np.full((len(told.time), 4), np.nan)
     try:
@@ -64,16 +66,17 @@ def _laid(flight: Record, box: Record) -> Record | None:
 
 
 def _even(own: np.ndarray, laid: np.ndarray, lively: np.ndarray) -> np.ndarray:
-    """The times at which a blackbox was laid over a flight, as of a clock that runs evenly, if it does.
+    """The times of a blackbox on the clock of the flight, corrected to an evenly running clock, if the clock runs
+    evenly.
 
-    Pieces of a flight show the offset of the clocks to a millisecond or two, a quiet one hardly: a straight line
-    through all of them, by how lively they are, shows it better.
+    A single piece of a flight shows the offset of the clocks to within a millisecond or two; a piece without much
+    motion hardly shows it. A straight line through all pieces, weighted by their motion, is more accurate.
     """
     some = slice(None, None, max(len(own) // 2000, 1))
     width = max(len(own) // 50, 1)
     weight = np.sqrt(np.convolve(lively**2, np.ones(width) / width, "same"))[some]
     line, spread = np.array([1.0, 0.0]), np.inf
-    for _ in range(3):  # what lies far from the line counts less
+    for _ in range(3):  # points far from the line get less weight
         line = np.polyfit(own[some], laid[some], 1, w=weight)
         off = laid[some] - np.polyval(line, own[some])
         spread = float(np.sqrt(np.average(off**2, weights=weight**2)))
@@ -87,9 +90,10 @@ def _means(values: np.ndarray, every: int) -> np.ndarray:
 
 
 def setpoint_delay(record: Record) -> float | None:
-    """From a command's sending until the rate loop was asked for it, s; None: the record does not show it.
+    """The time from the sending of a command until it is the setpoint of the rate loop, s. None: the record does not
+    show it.
 
-    The delay by which the commands, held, explain the setpoints best.
+    It is the delay at which the commands, each held until the next, explain the setpoints best.
     """
     if not record.has("command", "setpoint"):
         return None
@@ -102,9 +106,9 @@ def setpoint_delay(record: Record) -> float | None:
     least = float(left.min())
     if least > ALIKE * float(np.mean(np.var(inside.values, axis=0))):
         return None
-    return float(TRIED[left <= least * (1 + 1e-6)].mean())  # slow samples show a range of them
+    return float(TRIED[left <= least * (1 + 1e-6)].mean())  # with slow samples, a range of delays fits
 
 
 def _held(command: Stream, time: np.ndarray) -> np.ndarray:
-    """The body rates of the commands that were the newest at these times, (n, 3)."""
+    """The body rates of the newest command at each of these times, (n, 3)."""
     return command.values[np.searchsorted(command.time, time, side="right") - 1, 1:]

@@ -1,4 +1,6 @@
-"""Is a flight fit to learn from? Units, ranges, order of the rotors, clocks, duplicates: each refused by its name."""
+"""Checks whether a flight can be used for identification: units, ranges, order of the rotors, clocks, duplicates. Each
+error names its cause.
+"""
 
 import hashlib
 from collections.abc import Sequence
@@ -18,30 +20,31 @@ LIMITS = {
     "position": 1e4, "velocity": 100.0, "quaternion": 1.01, "body_rate": 60.0, "specific_force": 300.0,
     "rotor_speed": 1e4, "motor": 1.05, "command": 300.0, "setpoint": 60.0, "voltage": 100.0,
 }  # fmt: skip
-"""The largest size of a number that a quadrotor's log can hold, in the stream's unit."""
+"""Largest plausible absolute value in a quadrotor's log, in the stream's unit."""
 LOST = 1e-3
-"""Share of a stream that may lie outside, as single wrong samples, and is left out."""
+"""Largest fraction of a stream that may be outside these limits. Such samples are left out."""
 LEAST_VOLTS = 1.0
-"""Of any battery, V: what says less has no sensor."""
+"""Lowest plausible voltage of a battery, V. Lower values mean that there is no sensor."""
 MOVING = 0.3
-"""Speed from which on poses show a vehicle that moves, m/s."""
+"""Speed above which the poses show that the vehicle moves, m/s."""
 DRIFT = 0.02
-"""Change of the offset between two clocks over a flight from which on it is refused, s."""
+"""Largest accepted change of the offset between two clocks during a flight, s."""
 AGREE = 0.7
-"""Correlation of two streams of the same motion that counts as seeing it."""
+"""Lowest correlation at which two streams are taken to show the same motion."""
 AT_REST, LEVEL = 0.02, 0.2
-"""Motor output below which a vehicle on the ground is at rest; largest tilt of the poses' axes that is one, rad."""
+"""`AT_REST`: motor output below which a vehicle on the ground is at rest. `LEVEL`: largest tilt of the poses' axes that
+is corrected, rad."""
 SEEN = 0.12
-"""Correlation of the rotors' torques with what the body turns by that counts as seeing their order."""
+"""Lowest correlation between the rotors' torques and the body's angular acceleration that shows the rotor order."""
 _GRID = 0.005
 
 
 def checked(records: Sequence[Record], vehicle: Vehicle) -> list[Record]:
-    """The flights, cut down to what can be used; what was cut is in their notes.
+    """The flights, reduced to the parts that can be used. Their notes say what was cut.
 
     Args:
-        records: as read.
-        vehicle: for the geometry of its rotors.
+        records: the records as read.
+        vehicle: the vehicle, for the geometry of its rotors.
 
     Raises:
         ValueError: naming the file, what is wrong with it, and what is accepted.
@@ -96,7 +99,7 @@ def _within_limits(record: Record) -> Record:
 
 
 def _with_battery(record: Record) -> Record:
-    """Without voltages that are none: a flight controller without a sensor says 0 V."""
+    """The record without invalid voltages. A flight controller without a voltage sensor reports 0 V."""
     if "voltage" not in record.streams:
         return record
     stream = record.streams["voltage"]
@@ -149,10 +152,11 @@ def _check_units(record: Record) -> None:
 
 
 def _levelled(record: Record) -> Record:
-    """Turn the poses' body axes onto the accelerometer's, as far as a vehicle at rest before take-off shows.
+    """Rotate the body axes of the poses onto those of the accelerometer, as far as a vehicle at rest before take-off
+    shows the difference.
 
-    Motion capture puts a body's axes anywhere. What is left is the tilt between accelerometer and rotors, which stays
-    the same from flight to flight, where that of the poses changes whenever markers are placed anew.
+    Motion capture can place the axes of a body in any direction. The tilt between accelerometer and rotors remains. It
+    is the same for every flight, whereas the tilt of the poses changes whenever the markers are placed anew.
     """
     if not record.has("specific_force", "quaternion", "motor", "body_rate"):
         return record
@@ -172,7 +176,7 @@ def _levelled(record: Record) -> Record:
     w, x, y, z = _continuous(ground["quaternion"].values).mean(0)
     true = np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])  # up, in the body's axes
     true /= np.linalg.norm(true)
-    turn = np.cross(told, true)  # small, and about no axis of heading
+    turn = np.cross(told, true)  # small, and without a rotation in heading
     size = float(np.linalg.norm(turn))
     if not 1e-3 < size < LEVEL:
         return record
@@ -186,9 +190,10 @@ def _levelled(record: Record) -> Record:
 
 
 def _in_the_air(record: Record, vehicle: Vehicle) -> Record:
-    """Cut away what lies before take-off and after landing.
+    """Remove the parts before take-off and after landing.
 
-    In the air the motors turn; where nothing says so, the accelerometer is not quiet.
+    In the air, the rotor speeds or the motor outputs are high. If the log has neither, the height and the motion of the
+    poses decide.
     """
     hover = vehicle.hover_rotor_speed
     if record.has("rotor_speed"):
@@ -199,7 +204,7 @@ def _in_the_air(record: Record, vehicle: Vehicle) -> Record:
     elif record.has("position"):
         stream = record.streams["position"]
         height = stream.values[:, 2]
-        # what flies along the lowest height of a flight is not on the ground
+        # a vehicle that moves at the lowest height of a flight is not on the ground
         moves = np.linalg.norm(np.gradient(_smooth(stream.values), stream.time, axis=0), axis=1) > MOVING
         flying = (height > np.quantile(height, 0.02) + 0.1) | moves
     else:
@@ -227,7 +232,7 @@ def _in_the_air(record: Record, vehicle: Vehicle) -> Record:
 
 
 def _check_rotors(record: Record, vehicle: Vehicle) -> None:
-    """The rotors' order and spin, by what their torques do to the body rates."""
+    """Check the order of the rotors by the effect of their torques on the body rates."""
     name = "rotor_speed" if record.has("rotor_speed") else "motor" if record.has("motor") else ""
     if not name or not record.has("body_rate"):
         return
@@ -257,7 +262,9 @@ def _check_rotors(record: Record, vehicle: Vehicle) -> None:
 
 
 def _lagged(outputs: np.ndarray, vehicle: Vehicle) -> np.ndarray:
-    """What rotors make of motor outputs, about: late by the vehicle's lag and by two steps of the grid."""
+    """The approximate response of the rotors to motor outputs: with the vehicle's motor lag and a delay of two grid
+    steps.
+    """
     kept = float(np.exp(-_GRID / vehicle.motor_time_constant))
     late = np.concatenate([outputs[:1], outputs[:1], outputs[:-2]])
     first = kept * late[:1]
@@ -265,13 +272,13 @@ def _lagged(outputs: np.ndarray, vehicle: Vehicle) -> np.ndarray:
 
 
 def _on_one_clock(record: Record) -> Record:
-    """Move the poses by the offset of their clock; a clock that runs apart within the flight is refused."""
+    """Move the poses by the offset of their clock. Refuse a flight in which the clocks drift apart."""
     if not record.has("body_rate", "quaternion"):
         return record
     start, end = record.span
     thirds = [_behind(record.during(a, a + (end - start) / 3)) for a in (start, end - (end - start) / 3)]
     whole = _behind(record)
-    if whole is None:  # nor does anybody know their age, then
+    if whole is None:  # the age of the poses is then not known either
         return replace(record, pose_age=None)
     known = [x for x in thirds if x is not None]
     if len(known) == 2 and abs(known[1] - known[0]) > DRIFT:
@@ -293,7 +300,7 @@ def _on_one_clock(record: Record) -> Record:
 
 
 def _behind(record: Record) -> float | None:
-    """Seconds by which the poses come after the gyroscope; None where they see no common motion."""
+    """Time by which the poses lag behind the gyroscope, s. None if the two show no common motion."""
     if not record.has("body_rate", "quaternion"):
         return None
     told, true = _rates(record)
@@ -312,7 +319,7 @@ def _behind(record: Record) -> float | None:
 
 
 def _rates(record: Record) -> tuple[np.ndarray, np.ndarray]:
-    """Body rates by the gyroscope and by the attitude's derivative, smoothed, on one grid, (n, 3)."""
+    """Body rates from the gyroscope and from the derivative of the attitude, smoothed, on one grid, (n, 3)."""
     gyro, pose = record.streams["body_rate"], record.streams["quaternion"]
     grid = np.arange(max(gyro.time[0], pose.time[0]), min(gyro.time[-1], pose.time[-1]), _GRID)
     if len(grid) < 3:
@@ -330,7 +337,7 @@ def _rates(record: Record) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _continuous(q: np.ndarray) -> np.ndarray:
-    """The same attitudes by quaternions that do not change their sign from one to the next."""
+    """The same attitudes as quaternions that do not change their sign from one to the next."""
     flips = np.where(np.sum(q[1:] * q[:-1], axis=1) < 0, -1.0, 1.0)
     return q * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
 

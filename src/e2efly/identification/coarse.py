@@ -1,4 +1,4 @@
-"""Where the fit begins: a search over whole ranges, one quantity after the other, for vehicles far from their file."""
+"""The start of the fit: a search over the whole range of each quantity in turn, for vehicles far from their file."""
 
 import numpy as np
 
@@ -7,13 +7,13 @@ from e2efly.identification.shooting import cost
 from e2efly.identification.windows import Windows
 
 FEW = 64
-"""Windows that the search looks at."""
+"""Number of windows that the search uses."""
 PASSES = 2
-"""Times that all quantities are searched."""
+"""Number of passes over all quantities."""
 LOGS = np.linspace(-0.7, 0.7, 15)
-"""Logarithms of the factors that are tried: half to twice."""
+"""Logarithms of the factors that are tried: from half to twice the value."""
 DELAYS = np.arange(-0.1, 0.155, 0.01)
-"""Delays that are tried, s; below zero, so that clocks that do not fit together show."""
+"""Delays that are tried, s. Negative values are included, so that clocks that do not match become visible."""
 GROUPS: tuple[tuple[str, ...], ...] = (
     ("thrust",),
     ("latency",),
@@ -22,14 +22,15 @@ GROUPS: tuple[tuple[str, ...], ...] = (
     ("rate_gain_x", "rate_gain_y", "rate_gain_z"),
     ("torque_ratio",),
 )
-"""Unknowns that are tried, those of a group at one value; in the order of what moves a flight most."""
+"""Unknowns that are tried. All unknowns of a group get the same value. Those with the largest effect on a flight come
+first."""
 
 
 def begin(model: Model, windows: Windows) -> np.ndarray:
-    """A start of the fit, (u,): what explains the windows best among a few values of each quantity.
+    """The start of the fit, (u,): the values that explain the windows best, among a few values of each quantity.
 
-    The cost has valleys of its own far from the truth: 30 % less thrust looks like drag to Gauss-Newton, which goes
-    downhill only.
+    The cost has local minima far from the true values. For example, Gauss-Newton can mistake 30 % less thrust for drag,
+    because it only goes downhill.
     """
     names = [unknown.name for unknown in model.unknowns]
     some = windows.some(np.linspace(0, windows.count - 1, min(windows.count, FEW)).astype(int))

@@ -1,4 +1,4 @@
-"""How the errors of what was identified hang together: a matrix over the uncertain entries of the vehicle's file."""
+"""The correlation of the errors of the identified values: a matrix over the uncertain entries of the vehicle file."""
 
 from collections.abc import Iterable, Mapping
 
@@ -10,12 +10,13 @@ from e2efly.identification.model import Unknown
 from e2efly.vehicles.posterior import ADDED, TOGETHER, Entry
 
 OVER_MASS = ("thrust_map", "rotor_thrust_max", "inertia", "drag_linear", "drag_quadratic")
-"""Fields that flights give over the mass: an error of the scale moves them all in the same share."""
+"""Fields that flights determine only relative to the mass. A relative error of the mass changes all of them by the same
+fraction."""
 MASS = "mass"
 
 
 def entry_of(unknown: Unknown) -> Entry:
-    """What the vehicle's file calls an unknown of the fit."""
+    """The entry of the vehicle file that corresponds to an unknown of the fit."""
     whole = unknown.field in TOGETHER or not unknown.entries
     return Entry(unknown.field, None if whole else unknown.entries[0])
 
@@ -23,13 +24,13 @@ def entry_of(unknown: Unknown) -> Entry:
 def correlation(
     found: Iterable[Found], fused: Mapping[str, Estimate], mass_sigma: float
 ) -> tuple[list[str], np.ndarray]:
-    """Names of entries, and their correlation, (d, d).
+    """Names of entries, and their correlation matrix, (d, d).
 
     Args:
-        found: of flights.
-        fused: what all sources said together. Where another source knows an entry better than the flights do, its error
-            hangs less on theirs: the flights' part of it is the square root of their share of the information.
-        mass_sigma: relative standard deviation of the mass that the flights were given; 0: it is not known.
+        found: the results of the flights.
+        fused: the combined estimates of all sources. If another source knows an entry better than the flights do, its
+            error depends less on the errors of the flights: by the square root of their fraction of the information.
+        mass_sigma: relative standard deviation of the mass that was used for the flights. 0: it is not known.
     """
     names: list[str] = []
     blocks: list[np.ndarray] = []
@@ -46,7 +47,7 @@ def correlation(
         whole = own + np.outer(over, over)
         by_flight = np.sqrt(np.diag(whole))
         share = np.array([_sigma(fused[e.field], e) for e in entries]) / by_flight
-        # the fused variance over the flights' is the flights' share of the information
+        # the fused variance divided by that of the flights is the flights' fraction of the information
         block = whole / np.outer(by_flight, by_flight) * np.outer(*(np.minimum(share, 1.0),) * 2)
         np.fill_diagonal(block, 1.0)
         if mass_sigma and not blocks:
@@ -65,7 +66,7 @@ def correlation(
 
 
 def _sigma(estimate: Estimate, entry: Entry) -> float:
-    """Standard deviation of an entry: relative, of the delay s; 0 where it was not found."""
+    """Standard deviation of an entry, relative, for the delay in s. 0 if the entry was not found."""
     at = 0 if entry.index is None else entry.index
     value, sigma = (float(np.atleast_1d(x).flat[at]) for x in (estimate.value, estimate.sigma))
     if not np.isfinite(sigma):

@@ -1,4 +1,4 @@
-"""Logs of a Crazyflie's micro-SD deck (format 0xBC, version 2), of which the firmware writes blocks of fixed frequency.
+"""Logs of a Crazyflie's micro-SD deck (format 0xBC, version 2). The firmware writes their blocks at fixed frequencies.
 
 Source of the layout: Bitcraze, crazyflie-firmware, `uart/sdcard logging` documentation and its reader `cfusdlog`.
 """
@@ -26,20 +26,20 @@ FIELDS = {
     "velocity": (("stateEstimate.vx", "stateEstimate.vy", "stateEstimate.vz"), 1.0),
     "voltage": (("pm.vbat",), 1.0),
 }
-"""Our streams: names of theirs, and the factor to SI."""
+"""For each stream of a record, the names of the Crazyflie's variables and their factor to SI units."""
 
 
 def is_crazyflie(path: Path) -> bool:
-    """Whether a file begins as these logs do."""
+    """Whether a file begins like such a log."""
     with path.open("rb") as file:
         return file.read(3) == struct.pack("<BH", MAGIC, VERSION)
 
 
 def read_crazyflie(path: Path) -> Record:
-    """Read what is whole in a log.
+    """Read the complete samples of a log.
 
     Raises:
-        ValueError: where it is no such log, or holds none of the variables that are known here.
+        ValueError: when the file is not such a log, or has none of the variables that are known here.
     """
     data = path.read_bytes()
     if data[:3] != struct.pack("<BH", MAGIC, VERSION):
@@ -85,12 +85,12 @@ def _text(data: bytes, at: int) -> tuple[str, int]:
 
 
 def _rows(data: bytes, at: int, wanted: int, events: dict[int, tuple[str, list[tuple[str, str]]]]) -> np.ndarray:
-    """All samples of an event, up to the first block that is none."""
+    """All samples of an event, up to the first invalid block."""
     kinds = {
         n: np.dtype([("event", "<u2"), ("time", "<u8"), *((name, f"<{_NUMPY[kind]}") for name, kind in fields)])
         for n, (_, fields) in events.items()
     }
-    if len(events) == 1:  # as a block
+    if len(events) == 1:  # all rows have the same type: read them at once
         return _only(np.frombuffer(data, kinds[wanted], (len(data) - at) // kinds[wanted].itemsize, at), wanted)
     places = []
     while at + 2 <= len(data):

@@ -1,4 +1,6 @@
-"""Flights as CSV files: the columns of `KINDS`, any subset of them, in any order, empty where nothing was measured."""
+"""Flights as CSV files: any subset of the columns of `KINDS`, in any order. Entries are empty where nothing was
+measured.
+"""
 
 import csv
 import math
@@ -12,27 +14,27 @@ from e2efly.identification.record import KINDS, Record, Stream
 from e2efly.vehicles.names import unknown
 
 TIME = "t"
-"""The column of the time, s."""
+"""Name of the time column, s."""
 DIGITS = 9
-"""Of the times that are written: nanoseconds."""
+"""Decimal places of the times that are written: nanoseconds."""
 LINES = 1_000_000
-"""That are read of a file: half an hour at 500 Hz, in a third of a gigabyte."""
+"""Largest number of lines that are read from a file: half an hour at 500 Hz, which needs a third of a gigabyte."""
 COLUMNS = (TIME, *(name for kind in KINDS.values() for name in kind.columns))
-"""All that are known."""
+"""All known columns."""
 
 
 class Column(NamedTuple):
-    """Where one of our columns is in a file of other names."""
+    """The column of a file with other names that holds one of the columns of `KINDS`."""
 
     theirs: str
     factor: float
 
 
 def column_map(given: Iterable[str]) -> dict[str, Column]:
-    """Of entries `ours=theirs` or `ours=theirs*factor`.
+    """The columns by their name in `COLUMNS`, from entries `ours=theirs` or `ours=theirs*factor`.
 
     Raises:
-        ValueError: for an entry of another form, and for a column of ours that does not exist.
+        ValueError: for an entry of another form, and for a name `ours` that is not in `COLUMNS`.
     """
     found: dict[str, Column] = {}
     for entry in given:
@@ -53,14 +55,15 @@ def column_map(given: Iterable[str]) -> dict[str, Column]:
 
 
 def read_csv(path: Path, columns: Mapping[str, Column] | None = None) -> Record:
-    """Read a flight, line by line, and of a long file the first `LINES`.
+    """Read a flight line by line. Of a long file, only the first `LINES` lines are read.
 
     Args:
         path: a file with a header.
-        columns: names of theirs for ours; columns that are not in it go by our names.
+        columns: the columns of the file by their name in `COLUMNS`. Other columns are looked up by their name in
+            `COLUMNS`.
 
     Raises:
-        ValueError: naming the file, the line or the column, what is there and what is accepted.
+        ValueError: naming the file, the line or the column, its value and what is accepted.
     """
     columns, notes = columns or {}, []
     try:
@@ -91,7 +94,7 @@ def read_csv(path: Path, columns: Mapping[str, Column] | None = None) -> Record:
 
 
 def write_csv(record: Record, path: Path) -> None:
-    """Write a flight in our columns; a line for each time of any stream."""
+    """Write a flight with the columns of `COLUMNS`: one line for each time at which any stream has a sample."""
     times = np.unique(np.concatenate([stream.time for stream in record.streams.values()]).round(DIGITS))
     names, columns = [TIME], [times]
     for name, kind in KINDS.items():
@@ -109,7 +112,7 @@ def write_csv(record: Record, path: Path) -> None:
 
 
 def _places(path: Path, header: list[str], columns: Mapping[str, Column]) -> dict[str, int]:
-    """The place of each of our columns in a line."""
+    """The index of each column of `COLUMNS` in a line."""
     if len(set(header)) < len(header):
         twice = next(name for name in header if header.count(name) > 1)
         raise ValueError(f"{path}: has two columns {twice!r}; accepted: each name once")

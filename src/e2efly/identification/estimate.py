@@ -1,4 +1,4 @@
-"""What a source says of a vehicle's parameter, and what all sources say together."""
+"""Estimates of a vehicle's parameters from different sources, and their combination."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,33 +6,33 @@ from dataclasses import dataclass
 import numpy as np
 
 CONTRADICTION = 3.0
-"""Standard deviations of their difference from which on two sources contradict each other."""
+"""Difference from which on two sources contradict each other, in standard deviations of the difference."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter as a source gives it."""
+    """The estimate of a parameter from one source."""
 
     name: str
     """A field of `e2efly.vehicles.Vehicle`."""
     value: np.ndarray
-    """Of the field's shape and unit; NaN in entries of which the source says nothing."""
+    """Value, in the shape and unit of the field. NaN in entries for which the source has no value."""
     sigma: np.ndarray
     """Standard deviation of each entry, in the same unit."""
     source: str
-    """Where it is from: the file, and by which estimator."""
+    """Origin of the estimate: the file and the estimator."""
 
 
 class ContradictionError(ValueError):
-    """Two sources say what cannot both be true."""
+    """The values of two sources cannot both be true."""
 
 
 def fuse(estimates: Sequence[Estimate]) -> dict[str, Estimate]:
-    """One estimate a parameter: the mean weighted by one over the variance, entry by entry.
+    """One estimate per parameter: the mean weighted by one over the variance, entry by entry.
 
     Raises:
-        ContradictionError: naming parameter, entry, both values and both sources, where two of them are more than three
-            standard deviations of their difference apart.
+        ContradictionError: when two sources differ by more than three standard deviations of their difference, naming
+            the parameter, the entry, both values and both sources.
     """
     named: dict[str, list[Estimate]] = {}
     for estimate in estimates:

@@ -1,4 +1,4 @@
-"""What flights say of a vehicle: streams are checked, cut into windows, and explained by multiple shooting."""
+"""Identification of a vehicle from flights: streams are checked, cut into windows, and fitted by multiple shooting."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -17,38 +17,39 @@ from e2efly.identification.windows import LENGTH, LENGTHS, REACH, Windows, cut, 
 from e2efly.vehicles import Vehicle
 
 SHOWN = 0.5
-"""Part of the prior's standard deviation above which the flights have said nothing of an unknown."""
+"""If the standard deviation is above this fraction of the prior's, the flights say nothing about an unknown."""
 EXACT = {"latency": 0.02, "drag": 0.5}
-"""Standard deviation above which an unknown is not taken over, s or relative; of all others ..."""
+"""Standard deviation above which an unknown is refused, s or relative. `EXACT_ELSE` applies to all others."""
 EXACT_ELSE = 0.15
 STRUCTURE = {"thrust_map": 0.002, "inertia": 0.004, "rate_gain": 0.01, "motor_time_constant": 0.01, "latency": 3e-4}
-"""Spread of what is found over models that differ in what no log shows: how often the flight controller acts, how the
-accelerometer is filtered; s of the delay, else relative."""
+"""Spread of the results between models that differ in properties that no log shows: how often the flight controller
+runs, and how the accelerometer is filtered. In s for the delay, else relative."""
 MOTOR_STRUCTURE = STRUCTURE | {"thrust_map": 0.01, "inertia": 0.015}
-"""The same where motor outputs drive: how thrust rises with them is a guess, and so is the accelerometer's filter."""
+"""The same when motor outputs drive the simulation. The relation between outputs and thrust is then assumed, and so is
+the accelerometer's filter."""
 SLOW_STRUCTURE = STRUCTURE | {"thrust_map": 0.015, "motor_time_constant": 0.05}
-"""The same where motor outputs come so seldom that they are held between."""
+"""The same when motor outputs are logged so rarely that they are interpolated between samples."""
 HELD_OUT = 5
-"""One window of so many is kept out of the fit, for the judgement."""
+"""One window out of this many is held out of the fit, to judge the result."""
 POSE_DELAY = [name for name, _ in NUISANCES].index("pose_delay")
 LEAST = 4.0
-"""Seconds of flight that a fit needs."""
+"""Minimum flight time that a fit needs, s."""
 TORQUES = 200.0
-"""Samples of motor outputs a second from which on they tell the torques on the body."""
+"""Sampling rate of motor outputs from which on they show the torques on the body, Hz."""
 NEAR, REFITS = 1.0, 2
-"""Standard deviations by which unknowns may move when refused ones take the file's values, without another fit; and
-how many more fits at most."""
+"""`NEAR`: the number of standard deviations by which the other unknowns may change when refused ones are set to the
+values of the file; beyond it, the fit is repeated. `REFITS`: the largest number of such repetitions."""
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """An unknown that these flights do not give."""
+    """An unknown that cannot be found from these flights."""
 
     unknown: Unknown
     sigma: float
     """Standard deviation after the fit, s or relative."""
     impossible: bool = False
-    """No rigid body has what the fit found."""
+    """Whether the fitted value is impossible for a rigid body."""
 
     def __str__(self) -> str:
         if self.impossible:
@@ -60,27 +61,27 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Found:
-    """What flights said."""
+    """The result of the identification from flights."""
 
     model: Model
     fit: Fit
     windows: Windows
-    """All of them."""
+    """All windows."""
     held_out: np.ndarray
-    """Which of them the fit did not see."""
+    """(n,) which of the windows the fit did not see."""
     estimates: list[Estimate]
     refusals: list[Refusal]
     p: np.ndarray
-    """(u,) of the unknowns: the fit's, under what is refused being the file's."""
+    """(u,) values of the unknowns: those of the fit, given that refused unknowns have the values of the file."""
     sigma: np.ndarray
-    """(u,) of the unknowns; what is believed of the fit's."""
+    """(u,) standard deviations of the unknowns, including the uncertainty of the model itself."""
     structures: dict[str, np.ndarray]
-    """(u,) of the unknowns by models of another structure, by its name."""
+    """(u,) values of the unknowns found with models of another structure, by the name of the structure."""
 
     def drag_at(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
         """Drag along each axis at a speed, m/s, and its standard deviation, (3,) N.
 
-        A flight tells drag at its own speeds better than how it divides into a linear and a quadratic part.
+        A flight determines the drag at its own speeds better than the division into a linear and a quadratic part.
         """
         covariance = _whole_covariance(self.fit, self.sigma)
         value, sigma = np.zeros(3), np.zeros(3)
@@ -98,16 +99,16 @@ class Found:
 
 
 def _whole_covariance(found: Fit, sigma: np.ndarray) -> np.ndarray:
-    """The believed standard deviations with the fit's correlations."""
+    """The covariance with these standard deviations and the correlations of the fit."""
     spread = np.sqrt(np.diag(found.covariance))
     return found.covariance / np.outer(spread, spread) * np.outer(sigma, sigma)
 
 
 def driver_of(records: Sequence[Record], step: bool = False) -> str:
-    """What drives the simulation of these flights (`Model.driver`).
+    """The stream that drives the simulation of these flights (`Model.driver`).
 
     Raises:
-        ValueError: naming the flight that has none of them.
+        ValueError: naming the flight that has no such stream.
     """
     wanted = ("command",) if step else ("command", "rotor_speed", "motor")
     if not step and all(_shows_motors(record) and not record.has("rotor_speed") for record in records):
@@ -124,12 +125,12 @@ def driver_of(records: Sequence[Record], step: bool = False) -> str:
 
 
 def _shows_motors(record: Record) -> bool:
-    """Whether motor outputs were logged so often that a simulation can be driven by them."""
+    """Whether motor outputs were logged often enough to drive a simulation."""
     return record.has("motor") and record.streams["motor"].rate >= MOTORS
 
 
 def _volts(records: Sequence[Record]) -> float | None:
-    """Of the battery, about which it was in these flights; None where one of them does not say."""
+    """The typical battery voltage of these flights, V. None if one of them has no voltage."""
     if not all(record.has("voltage") for record in records):
         return None
     return float(np.median([np.median(record.streams["voltage"].values) for record in records]))
@@ -145,16 +146,16 @@ def identify(
     volts: float | None = None,
     told: Callable[[int, float], None] = lambda i, cost: None,
 ) -> Found:
-    """Find what flights say of a vehicle.
+    """Identify a vehicle from flights.
 
     Args:
-        vehicle: what is known of it. Thrust, inertia and drag are found over its mass.
-        records: of the flights.
-        believed: the vehicle in which the flight controller of the flights believed; left out: `vehicle`.
-        step: look for delay and rate loop alone, which steps of body rate show.
-        delay: with `step`, look for the delay, too.
-        volts: of the battery, at which the thrust is told; left out: about what it was in these flights.
-        told: (iteration, cost) after each of the fit's.
+        vehicle: what is known of the vehicle. Thrust, inertia and drag are found relative to its mass.
+        records: the flights.
+        believed: the vehicle that the flight controller of the flights assumed. If omitted, `vehicle`.
+        step: find only the delay and the rate loop, which steps of body rate show.
+        delay: with `step`, also find the delay.
+        volts: battery voltage for which the thrust is given, V. If omitted, the typical voltage of these flights.
+        told: called with (iteration, cost) after each iteration of the fit.
 
     Raises:
         ValueError: naming the flight and what it lacks.
@@ -194,7 +195,7 @@ def identify(
     for _ in range(REFITS):
         if not refused.any() or np.all(np.abs(p - found.p)[~refused] < NEAR * sigma[~refused]):
             break
-        # far from where it was fitted, the straight line of `_given` says nothing
+        # far from the fitted values, the linear correction of `_given` is not valid
         found = fit(model, seen, np.where(refused, 0.0, found.p), told=told, fixed=refused)
         sigma = np.where(refused, sigma, sigmas(model, found))
         p = np.where(refused, 0.0, found.p)
@@ -210,15 +211,17 @@ def identify(
     refusals = [Refusal(model.unknowns[i], float(sigma[i]), bool(impossible[i])) for i in np.flatnonzero(refused)]
     source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
     estimates = _estimates(model, p, sigma, refused, source)
-    if not step:  # steps show the time from command to response alone
+    if not step:  # with `step`, the fitted delay from command to response is the result
         estimates = [e for e in estimates if e.name != "latency"]
         estimates += _latency(model, records, found, p, sigma, refused, source)
     return Found(model, found, windows, held_out, estimates, refusals, p, sigma, structures)
 
 
 def _structures(model: Model, windows: Windows, p: np.ndarray, refused: np.ndarray) -> dict[str, np.ndarray]:
-    """What motor outputs say by models that explain them nearly as well: what of the motors' answer is delay and what
-    is lag, and how thrust begins, no such log decides, and lag, inertia and thrust move with it.
+    """The unknowns found with other models that explain motor outputs nearly as well.
+
+    Such logs cannot distinguish which part of the motors' response is delay and which is lag, nor how the thrust begins
+    at low outputs. Lag, inertia and thrust depend on it.
     """
     names, found = [u.name for u in model.unknowns], {}
     for label, name in (("without delay", "latency"), ("no thrust at no output", "motor_idle")):
@@ -231,7 +234,7 @@ def _structures(model: Model, windows: Windows, p: np.ndarray, refused: np.ndarr
         fixed = refused.copy()
         fixed[at] = True
         found[label] = fit(other, windows, np.where(fixed, 0.0, p), iterations=8, fixed=fixed).p
-        found[label][at] = p[at]  # what is left out has no say of itself
+        found[label][at] = p[at]  # a fixed unknown was not estimated
     return found
 
 
@@ -244,12 +247,13 @@ def _latency(
     refused: np.ndarray,
     source: str,
 ) -> list[Estimate]:
-    """From the vehicle's motion to its rate loop: from a command to the rate loop, and, where a log tells, the age of
-    the poses of which the command was made.
+    """The latency from the vehicle's motion to its rate loop. It is the delay from a command to the rate loop plus, if
+    the log contains it, the age of the poses from which the command was computed.
 
-    The first is what the setpoints show, where a flight controller logs them; else what the fit of commands found. A
-    delay of motor outputs is none of the vehicle's. How much later the poses are than what a flight controller tells
-    seldom says nothing of their age: what it tells is late itself, by up to the time between two samples.
+    The first delay is found from the setpoints, if the flight controller logs them, else by the fit of commands. A
+    delay of motor outputs is not a property of the vehicle. With rarely logged data of a flight controller, the delay
+    between that data and the poses says nothing about the age of the poses, because the data itself is late, by up to
+    the time between two samples.
     """
     shown = [late for late in map(setpoint_delay, records) if late is not None]
     at = [i for i, u in enumerate(model.unknowns) if u.field == "latency" and not refused[i]]
@@ -260,7 +264,7 @@ def _latency(
     else:
         return []
     seldom = model.driver == "motor_and_rate"
-    if seldom:  # anywhere within an interval is as likely
+    if seldom:  # every time within an interval is equally likely
         off = float(np.hypot(off, np.median([np.median(np.diff(r.streams["motor"].time)) for r in records]) / 12**0.5))
     ages = [
         record.pose_age + (0.0 if seldom else float(q[POSE_DELAY]))
@@ -272,15 +276,16 @@ def _latency(
 
 
 def _is_vague(unknown: Unknown, sigma: float) -> bool:
-    """Whether the flights say too little of an unknown."""
+    """Whether the flights say too little about an unknown."""
     limit = next((v for name, v in EXACT.items() if unknown.field.startswith(name)), EXACT_ELSE)
     return bool(sigma > min(limit, SHOWN * unknown.prior))
 
 
 def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
-    """Of a body whose moments of inertia, (3,), contradict the triangle inequality: the one that is too large, (u,).
+    """Which unknown, (u,), is a moment of inertia that is too large: the three moments must satisfy the triangle
+    inequality.
 
-    A torque that the model explains by something else, such as the rotors' own inertia, leaves a moment without bound.
+    If the model explains a torque by something else, such as the rotors' own inertia, a moment has no bound in the fit.
     """
     moments = np.asarray(vehicle_of(model, jnp.asarray(p)).inertia, float)
     largest = int(np.argmax(moments))
@@ -289,8 +294,8 @@ def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
 
 
 def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> np.ndarray:
-    """The unknowns, those that are refused being zero, as the file has them: the mean of the normal distribution under
-    that condition. The others then do not make up for what a refused one was found to be.
+    """The unknowns, given that the refused ones are zero (the values of the file). This is the mean of the normal
+    distribution under that condition. The others then no longer compensate for the fitted values of the refused ones.
     """
     if not refused.any() or refused.all():
         return np.where(refused, 0.0, p)
@@ -302,8 +307,8 @@ def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> np.nda
 
 
 def sigmas(model: Model, found: Fit) -> np.ndarray:
-    """Standard deviations of the unknowns: the larger of the windows' spread and of what white noise would leave, and
-    in squares over it what the model itself may be off by (`STRUCTURE`).
+    """Standard deviations of the unknowns. Each is the larger of two values, the spread between windows and the effect
+    of white noise, combined as a root sum of squares with the uncertainty of the model itself (`STRUCTURE`).
     """
     noise = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
     structure = {"motor": MOTOR_STRUCTURE, "motor_and_rate": SLOW_STRUCTURE}.get(model.driver, STRUCTURE)
@@ -311,7 +316,7 @@ def sigmas(model: Model, found: Fit) -> np.ndarray:
 
 
 def _estimates(model: Model, p: np.ndarray, sigma: np.ndarray, refused: np.ndarray, source: str) -> list[Estimate]:
-    """By field of the vehicle; what the flights do not say is left to the file."""
+    """The estimates by field of the vehicle. Fields that the flights do not determine are left to the file."""
     values: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for unknown, x, off, vague in zip(model.unknowns, p, sigma, refused, strict=True):
         if vague or not unknown.field:
@@ -330,5 +335,5 @@ def _estimates(model: Model, p: np.ndarray, sigma: np.ndarray, refused: np.ndarr
 
 
 def nuisances(found: Found) -> list[dict[str, float]]:
-    """Of each flight, by name."""
+    """The nuisance parameters of each flight, by name."""
     return [dict(zip((name for name, _ in NUISANCES), map(float, q), strict=True)) for q in found.fit.q]

@@ -1,4 +1,4 @@
-"""How much better the identified vehicle foretells what it has not seen: open loop, old against new."""
+"""Comparison of the identified vehicle and the file's vehicle in predicting unseen windows, open loop."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -18,19 +18,19 @@ class Prediction:
     """Windows that the fit did not see, simulated from their measured starts."""
 
     time: np.ndarray
-    """(m + 1,) s from a window's start."""
+    """(m + 1,) time since the start of a window, s."""
     before: dict[str, np.ndarray]
-    """By stream, (m + 1,): root mean square of what the file's vehicle gets wrong after that time."""
+    """By stream, (m + 1,): root mean square error of the file's vehicle at that time."""
     after: dict[str, np.ndarray]
-    """The same of the identified one."""
+    """The same for the identified vehicle."""
     measured: dict[str, np.ndarray]
-    """By stream, (n, m + 1, k)."""
+    """Measurements by stream, (n, m + 1, k)."""
     old: dict[str, np.ndarray]
     new: dict[str, np.ndarray]
 
 
 def judged(found: Found) -> Prediction:
-    """Foretell the windows that were held out."""
+    """Predict the windows that were held out of the fit."""
     windows = found.windows.some(found.held_out)
     model, p = found.model, found.p
     with jax.enable_x64(True):

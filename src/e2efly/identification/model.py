@@ -1,4 +1,4 @@
-"""What a window of a flight should have looked like: the vehicle's parameters to be found, simulated by our physics."""
+"""The model of the fit: the unknown parameters of a vehicle, and the simulation of a window of a flight with them."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -23,19 +23,19 @@ from e2efly.vehicles import Vehicle
 
 @dataclass(frozen=True)
 class Unknown:
-    """One number that the fit looks for; zero is the vehicle's file."""
+    """One number that the fit estimates. Zero means the value of the vehicle file."""
 
     name: str
     field: str
-    """Of the vehicle; empty for what belongs to the flight."""
+    """Field of the vehicle. Empty for a number that is not in the vehicle file."""
     entries: tuple[int, ...]
-    """Of the field, that it moves together; empty: all."""
+    """Entries of the field that it changes together. Empty: all entries."""
     prior: float
-    """Standard deviation of what it may be off by, before any flight: of the logarithm, or, of a delay, s."""
+    """Prior standard deviation, before any flight: of the logarithm, or for a delay in s."""
     drivers: tuple[str, ...]
-    """Whether it shows at all, by what drives the vehicle."""
+    """The drivers (`Model.driver`) with which a flight can show it."""
     fly: str
-    """What to fly and to log, where it cannot be found."""
+    """What to fly and to log if it cannot be found."""
 
 
 _TURNS = ("command", "motor", "rotor_speed")
@@ -67,57 +67,59 @@ UNKNOWNS: tuple[Unknown, ...] = (
     Unknown("rotor_inertia", "", (), 0.3, ("motor",), _YAW),
     Unknown("latency", "latency", (), 0.05, ("command", *_MOTORS), _STEPS),
 )  # fmt: skip
-"""Of the vehicle. Each is the logarithm of a factor on the file's value, but for what is added: the delay, s, the curve
-of the motors (the part of the thrust that rises with the square of the output), the share of the largest thrust at no
-output, and the rotors' inertia: the yaw rate that a vehicle gets when all rotors of one spin gain the speed of hover,
-rad/s, over ten."""
+"""Unknowns of the vehicle. Most are the logarithm of a factor on the value of the vehicle file. These are added
+instead: the delay, s; the curve of the motors (the part of the thrust that rises with the square of the output); the
+fraction of the largest thrust at zero output; and the rotors' inertia. The inertia is given by the yaw rate, rad/s,
+that the vehicle gains when all rotors of one spin direction gain the speed of hover, divided by ten."""
 NUISANCES: tuple[tuple[str, float], ...] = (
     ("gyro_x", 0.05), ("gyro_y", 0.05), ("gyro_z", 0.05), ("force_x", 0.5), ("force_y", 0.5), ("force_z", 0.3),
     ("pose_delay", 0.05), ("tilt_x", 0.03), ("tilt_y", 0.03), ("sag", 0.1), ("flight_thrust", 0.03),
     ("uneven_roll", 0.1), ("uneven_pitch", 0.1), ("uneven_yaw", 0.1), ("force_filter", 0.7),
 )  # fmt: skip
-"""Of each flight, with the standard deviation of their priors: biases of gyroscope (rad/s) and accelerometer (m/s^2),
-delay of the pose source (s), tilt of its body's axes (rad), share of the thrust lost by the end, of several flights the
-logarithm of the factor on the thrust of this one, and the share by which rotors pull more than the others on the left,
-at the rear, and among those of positive spin: worn propellers, or a centre of mass beside the middle. The last is the
-logarithm of the accelerometer's filter over `FORCE_FILTER`."""
+"""Nuisance parameters of each flight, with the standard deviation of their priors, in this order: biases of gyroscope
+(rad/s) and accelerometer (m/s^2); delay of the pose source (s); tilt of the pose source's body axes (rad); fraction of
+the thrust that is lost by the end of the flight; logarithm of a factor on the thrust of this flight, if there are
+several flights; fraction by which the rotors on the left, at the rear, and with positive spin pull more than the others
+(worn propellers, or a centre of mass that is not in the middle); logarithm of the accelerometer filter's time constant
+divided by `FORCE_FILTER`."""
 GYRO, FORCE, LOST, FACTOR, UNEVEN, FILTERED = slice(0, 3), slice(3, 6), 9, 10, slice(11, 14), 14
-"""Places in `NUISANCES`: of the biases, of what acts on the thrust, and of the accelerometer's filter."""
+"""Indices in `NUISANCES`: of the biases, of the changes of the thrust, and of the accelerometer's filter."""
 FORCE_FILTER = 0.011
-"""Time constant of each of the two stages by which a flight controller filters its accelerometer, s: together as late
-as Betaflight's own filter of 10 Hz. Not told of it, a fit takes the thrust to rise less with the motor outputs."""
+"""Time constant of each of the two stages with which a flight controller filters its accelerometer, s. Together they
+have the same delay as Betaflight's own 10 Hz filter. Without this filter, a fit would find a thrust that rises less
+with the motor outputs."""
 START = 16
-"""Numbers of a window's start: position, velocity, attitude, body rate, rotor speeds (as a share of hover's)."""
+"""Length of a window's start: position, velocity, attitude, body rate, rotor speeds (relative to that of hover)."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Model:
-    """What is known before the fit, and what drives the vehicle."""
+    """What is known before the fit, and what drives the simulated vehicle."""
 
     base: Vehicle
-    """At whose values the unknowns are zero."""
+    """The vehicle at which all unknowns are zero."""
     believed: Vehicle
-    """In which the flight controller of the flights believes."""
+    """The vehicle that the flight controller of the flights assumes."""
     mixer: Mixer
-    """That of the flight controller."""
+    """The mixer of the flight controller."""
     hover: float | Array
-    """rad/s."""
+    """Rotor speed of hover, rad/s."""
     driver: str = dataclasses.field(metadata={"static": True})
-    """The stream that drives it: command, motor or rotor_speed; motor_and_rate: motor outputs drive the rotors, and the
-    body turns by the measured rates, whatever the rotors' torques."""
+    """The stream that drives the simulation: command, motor or rotor_speed. With motor_and_rate, motor outputs drive
+    the rotors, and the body turns with the measured rates, whatever torques the rotors produce."""
     names: tuple[str, ...] = dataclasses.field(metadata={"static": True})
-    """Of the unknowns that are looked for."""
+    """Names of the unknowns that are estimated."""
 
     @staticmethod
     def of(vehicle: Vehicle, driver: str, believed: Vehicle | None = None, only: tuple[str, ...] = ()) -> "Model":
-        """Of loaded vehicles.
+        """The model of a vehicle.
 
         Args:
-            vehicle: what is known of what flies.
+            vehicle: what is known of the vehicle that flies.
             driver: the stream that drives it.
-            believed: in which its flight controller believes; left out: the same.
-            only: names of unknowns; left out: all that can show.
+            believed: the vehicle that its flight controller assumes. If omitted, the same vehicle.
+            only: names of the unknowns to estimate. If omitted, all that the flights can show.
         """
         believed = vehicle if believed is None else believed
         base, told = (jax.tree.map(lambda x: np.asarray(x, np.float64), v) for v in (vehicle, believed))
@@ -126,16 +128,16 @@ class Model:
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """What is looked for."""
+        """The unknowns that are estimated."""
         return tuple(u for u in UNKNOWNS if u.name in self.names)
 
     def controller(self, vehicle: Vehicle) -> Vehicle:
-        """What the flight controller goes by: the rate loop of a vehicle with some unknowns, the rest believed."""
+        """The vehicle that the flight controller uses: the rate gains of `vehicle`, everything else as `believed`."""
         return dataclasses.replace(self.believed, rate_gain=vehicle.rate_gain)
 
 
 def _shows(unknown: Unknown, base: Vehicle, driver: str) -> bool:
-    """A factor on nothing shows nothing."""
+    """Whether flights with this driver can show an unknown. A factor on a value of zero has no effect."""
     if driver not in unknown.drivers:
         return False
     return unknown.field in ("", "latency") or bool(np.any(_entries(base, unknown) != 0))
@@ -147,7 +149,7 @@ def _entries(vehicle: Vehicle, unknown: Unknown) -> np.ndarray:
 
 
 def vehicle_of(model: Model, p: Array) -> Vehicle:
-    """The vehicle at values of its unknowns, (u,)."""
+    """The vehicle for these values of its unknowns, (u,)."""
     changed: dict[str, Any] = {}
     for unknown, x in zip(model.unknowns, p, strict=True):
         if not unknown.field:
@@ -164,13 +166,13 @@ def vehicle_of(model: Model, p: Array) -> Vehicle:
 
 
 def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, Any]) -> dict[str, Array]:
-    """What the sensors say in a window, by stream, (m + 1, k).
+    """The simulated sensor readings in a window, by stream, (m + 1, k).
 
     Args:
-        model: what is simulated.
+        model: the model to simulate.
         p: unknowns of the vehicle, (u,).
         q: nuisances of the flight, (len(NUISANCES),).
-        start: of the window: what is added to its measured start, (START,).
+        start: correction that is added to the measured start of the window, (START,).
         window: `driven`, `when` and the measured start: position, velocity, quaternion, body_rate, rotor_speed.
     """
     vehicle = vehicle_of(model, p)
@@ -184,7 +186,7 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
         name: p[places[name]] if name in places else 0.0 for name in ("motor_curve", "motor_idle", "rotor_inertia")
     }
     spun, earlier = window["rotor_speed"], None
-    if model.driver in _MOTORS:  # nobody measured the speeds at the start: what the outputs before it have led to
+    if model.driver in _MOTORS:  # the start speeds were not measured: simulate them from the outputs before the start
         earlier = _spinning(plant, jnp.stack(_driven_speed(model, split4(before[:, :4]), added), -1))
         spun = earlier[-1]
     first = State(
@@ -209,7 +211,7 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
         elif model.driver == "motor_and_rate":
             parts = dataclasses.replace(parts, body_rate=Vec3.of(drive[4:] - q[GYRO]))
             parts = integrate(_without_torque(plant), parts, _driven_speed(model, drives, added), None, STEP)
-        else:  # a flight controller acts anew a thousand times a second or more: the mean of start and end of the step
+        else:  # a flight controller runs at 1 kHz or more: use the mean of its outputs at start and end of the step
             at_start = law(controller, model.mixer, parts, drives)
             at_end = law(controller, model.mixer, integrate(plant, parts, at_start, None, STEP), drives)
             mean = (
@@ -230,7 +232,9 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
 
 
 def _spinning(plant: Plant, asked: Array) -> Array:
-    """Rotor speeds under first-order lag towards what was asked for in each step, from rest at the first, (t, 4)."""
+    """Rotor speeds, (t, 4), that follow the requested speeds of each step with a first-order lag. They begin at the
+    first requested speeds.
+    """
 
     def follow(speed: Array, wanted: Array) -> tuple[Array, Array]:
         speed = wanted + (speed - wanted) * plant.decay
@@ -240,7 +244,7 @@ def _spinning(plant: Plant, asked: Array) -> Array:
 
 
 def _filtered(force: Array, q: Array) -> Array:
-    """A force, (t,), as the accelerometer's filter lets it through."""
+    """A force, (t,), after the accelerometer's filter."""
     kept = jnp.exp(-STEP / (FORCE_FILTER * jnp.exp(q[FILTERED])))
 
     def follow(stages: tuple[Array, Array], value: Array) -> tuple[tuple[Array, Array], Array]:
@@ -252,7 +256,9 @@ def _filtered(force: Array, q: Array) -> Array:
 
 
 def _driven_speed(model: Model, output: tuple[Array, ...], added: dict[str, Any]) -> Any:
-    """Rotor speeds that motor outputs lead to: thrust rises from that of no output linearly, and with the square."""
+    """Rotor speeds for motor outputs. The thrust rises from its value at zero output, with a linear and a quadratic
+    part.
+    """
     top, idle, curve = model.mixer.thrust_max, added["motor_idle"], 0.5 + added["motor_curve"]
 
     def thrust(u: Array) -> Array:
@@ -269,7 +275,7 @@ def _without_torque(plant: Plant) -> Plant:
 
 
 def _recoiled(model: Model, now: Parts, before: Parts, added: dict[str, Any]) -> Parts:
-    """After a step, with the yaw rate that rotors of some inertia leave to the body when their speeds change."""
+    """The state after a step, with the yaw rate that the rotors' inertia gives the body when their speeds change."""
     gained = jnp.stack(now.rotor_speed) - jnp.stack(before.rotor_speed)
     rate = now.body_rate
     turned = 10 * added["rotor_inertia"] * (gained @ model.base.rotor_spin) / (2 * model.hover)
@@ -277,9 +283,10 @@ def _recoiled(model: Model, now: Parts, before: Parts, added: dict[str, Any]) ->
 
 
 def commanded(model: Model, vehicle: Vehicle, driven: Array) -> tuple[Array, Array]:
-    """What acts on average over each step, a latency after it was sent: (past, 4) before the window, and (m, 4) in it.
+    """The mean command that acts in each step, one latency after it was sent: (past, 4) before the window, and (m, 4)
+    in it.
 
-    What was sent before the window's past is taken to be as at its beginning.
+    Commands from before the window's past are assumed to be the same as at its beginning.
     """
     delay = 0.0 if model.driver == "rotor_speed" else vehicle.latency
     place = jnp.arange(driven.shape[0]) - delay / STEP
@@ -291,7 +298,9 @@ def commanded(model: Model, vehicle: Vehicle, driven: Array) -> tuple[Array, Arr
 
 
 def _sensed(plant: Plant, parts: Parts, q: Array, earlier: Array | None = None) -> dict[str, Array]:
-    """What sensors say; the accelerometer through its filter, where the rotor speeds before, (past, 4), are known."""
+    """The simulated sensor readings. The accelerometer passes its filter if the earlier rotor speeds, (past, 4), are
+    known.
+    """
     collective, _ = rotor_wrench(plant, rotor_thrust(plant, parts.rotor_speed))
     felt = collective
     if earlier is not None:
@@ -300,7 +309,7 @@ def _sensed(plant: Plant, parts: Parts, q: Array, earlier: Array | None = None) 
     air = drag(plant, parts.attitude.unrotate(parts.velocity))
     force = Vec3(air.x, air.y, air.z + collective).stack() * plant.specific
     rate, velocity = parts.body_rate.stack(), parts.velocity.stack()
-    # a pose that is told late is that of a little earlier
+    # a pose that arrives late is the pose of a slightly earlier time
     late = q[6]
     turn = jnp.stack([q[7], q[8], jnp.zeros_like(q[7])]) - rate * late
     accelerated = parts.attitude.rotate(Vec3.of(force)).stack() - jnp.array([0.0, 0.0, 9.81])
@@ -315,7 +324,7 @@ def _sensed(plant: Plant, parts: Parts, q: Array, earlier: Array | None = None) 
 
 
 def _turned(quaternion: Array, angle: Array) -> Array:
-    """An attitude turned by a small angle about its own axes, rad."""
+    """An attitude, rotated by a small angle about its own axes, rad."""
     return Quat.of(quaternion).turned(Vec3.of(angle)).stack()
 
 

@@ -1,7 +1,7 @@
 """The digital prototype: mass, centre of mass and inertia of a vehicle from a list of its parts.
 
-The paper takes the inertia from a model of all parts (E2E-Fly, system identification). A part is a body of even
-density; its inertia about the vehicle's centre of mass follows by the parallel-axis theorem.
+The paper takes the inertia from a model of all parts (E2E-Fly, system identification). Each part is a body of uniform
+density. Its inertia about the vehicle's centre of mass follows from the parallel-axis theorem.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from e2efly.vehicles.names import unknown
 from e2efly.vehicles.tables import number, numbers, read_table, shown, text
 
 DRAWS = 4000
-"""Of the Monte Carlo over the tolerances: they give a standard deviation within 1.1 %."""
+"""Number of draws of the Monte Carlo simulation over the tolerances. It gives a standard deviation within 1.1 %."""
 _KEYS = {"name", "shape", "size", "mass", "place", "angles", "tolerance", "file"}
 _TOLERANCES = {"mass", "size", "place"}
 
@@ -30,35 +30,35 @@ class Part:
     shape: str
     """A name of `SHAPES`, or mesh."""
     size: np.ndarray
-    """What the shape is as large as, m; of a mesh, the factor on its coordinates."""
+    """Dimensions of the shape, m. For a mesh, the factor on its coordinates."""
     mass: float
-    """Of one of them, kg."""
+    """Mass of one part, kg."""
     places: np.ndarray
-    """Of the centres (of a mesh: of its origin), body axes FLU, any common origin, (n, 3) m."""
+    """Positions of the centres (for a mesh: of its origin), body axes FLU, any common origin, (n, 3) m."""
     turn: np.ndarray
-    """Body axes from the part's own, (3, 3)."""
+    """Rotation matrix from the part's own axes to the body axes, (3, 3)."""
     mass_sigma: float
-    """Standard deviation of its mass, kg, ..."""
+    """Standard deviation of the mass, kg."""
     size_sigma: float
-    """... of each of its sizes, m, ..."""
+    """Standard deviation of each dimension, m. For a mesh, of the factor."""
     place_sigma: float
-    """... and of its place, m per axis."""
+    """Standard deviation of the position, m per axis."""
     unit: tuple[np.ndarray, np.ndarray] | None = None
-    """Of a mesh at factor 1: centre of mass, m, and inertia about it over its mass, m^2."""
+    """For a mesh at factor 1: its centre of mass, m, and its inertia about that point divided by its mass, m^2."""
 
 
 @dataclass(frozen=True)
 class Prototype:
-    """What a list of parts comes to, with standard deviations."""
+    """Mass, centre of mass and inertia of a list of parts, with standard deviations."""
 
     mass: float
-    """kg."""
+    """Mass, kg."""
     mass_sigma: float
     centre: np.ndarray
-    """Centre of mass from the list's origin, FLU, (3,) m."""
+    """Centre of mass, relative to the origin of the list, FLU, (3,) m."""
     centre_sigma: np.ndarray
     inertia: np.ndarray
-    """About the centre of mass, body axes, (3, 3) kg*m^2."""
+    """Inertia about the centre of mass, body axes, (3, 3) kg*m^2."""
     inertia_sigma: np.ndarray
 
 
@@ -90,12 +90,14 @@ SHAPES: dict[str, tuple[str, Callable[[np.ndarray], np.ndarray]]] = {
     "tube": ("outer diameter, inner diameter, height", _tube),
     "sphere": ("diameter", _sphere),
 }
-"""What `size` lists, and the function from it to the inertia about the centre over the mass, m^2. Cylinders and tubes
-stand along their own z."""
+"""For each shape, the entries of `size`, and the function that computes from them the inertia about the centre divided
+by the mass, m^2. The axis of cylinders and tubes is their own z axis."""
 
 
 def prototype(parts: tuple[Part, ...], seed: int = 0) -> Prototype:
-    """Add up the parts; standard deviations by Monte Carlo over the tolerances, which are taken as independent."""
+    """Combine the parts. The standard deviations come from a Monte Carlo simulation over the tolerances, which are
+    assumed to be independent.
+    """
     rng = np.random.default_rng(seed)
     one = tuple(x[0] for x in _add(parts, np.zeros, 1))
     drawn = [x.std(0) for x in _add(parts, rng.standard_normal, DRAWS)]
@@ -105,7 +107,9 @@ def prototype(parts: tuple[Part, ...], seed: int = 0) -> Prototype:
 def _add(
     parts: tuple[Part, ...], error: Callable[[tuple[int, ...]], np.ndarray], draws: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Masses, centres and inertias of the whole, so many of them: each part off by `error` times its tolerances."""
+    """Mass, centre of mass and inertia of the whole, for `draws` draws. In each, every part deviates by `error` times
+    its tolerances.
+    """
     masses, places, inertias = [], [], np.zeros((draws, 3, 3))
     for part in parts:
         for place in part.places:
@@ -126,10 +130,10 @@ def _add(
 
 
 def estimates(path: Path) -> list[Estimate]:
-    """Mass and inertia of a vehicle by its list of parts.
+    """Mass and inertia of a vehicle from its list of parts.
 
     Raises:
-        ValueError: as of `read_parts`.
+        ValueError: as for `read_parts`.
     """
     found, source = prototype(read_parts(path)), f"{path.name}, parts list"
     return [
@@ -215,13 +219,13 @@ def _above(where: str, given: Any) -> float:
 
 
 def _turn(angles: np.ndarray) -> np.ndarray:
-    """The matrix of roll, pitch and yaw, rad."""
+    """The rotation matrix for roll, pitch and yaw, rad."""
     axes = Vec3(*np.eye(3))
     return Quat.of_euler(*angles).rotate(axes).stack().T
 
 
 def _mesh(where: str, path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Centre of mass, m, and inertia over mass, m^2, of a closed mesh of even density."""
+    """Centre of mass, m, and inertia divided by mass, m^2, of a closed mesh of uniform density."""
     if not path.is_file():
         raise ValueError(f"{where}: file {str(path)!r} does not exist; accepted: a mesh that trimesh reads")
     try:
@@ -230,7 +234,7 @@ def _mesh(where: str, path: Path) -> tuple[np.ndarray, np.ndarray]:
         raise ValueError(f"{where}: trimesh is missing ({error}); accepted: pip install 'e2efly[mesh]'") from None
     try:
         mesh: Any = trimesh.load(path, force="mesh")
-    except Exception as error:  # of readers of many formats
+    except Exception as error:  # readers of many formats raise many types
         raise ValueError(f"{where}: {path} is no mesh that trimesh reads ({error})") from None
     if not mesh.is_watertight or mesh.volume <= 0:
         raise ValueError(f"{where}: {path} is not closed; accepted: a watertight mesh, since open ones have no volume")

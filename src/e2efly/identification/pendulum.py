@@ -1,8 +1,9 @@
-"""Inertia from the periods of a bifilar pendulum: the vehicle hangs on two equal parallel threads and turns.
+"""Inertia from the periods of a bifilar pendulum: the vehicle hangs on two equal parallel threads and oscillates about
+the vertical.
 
-With threads of length L, a distance 2 a apart, the centre of mass in the middle between them, small turns about the
-vertical have the period T = 2 pi sqrt(J L / (m g a^2)), hence J = m g a^2 T^2 / (4 pi^2 L) (Jardin and Mueller,
-"Optimized Measurements of Unmanned-Air-Vehicle Mass Moment of Inertia with a Bifilar Pendulum", 2009, small angles).
+The threads have length L and distance 2 a, and the centre of mass is in the middle between them. Small oscillations
+then have the period T = 2 pi sqrt(J L / (m g a^2)), hence J = m g a^2 T^2 / (4 pi^2 L) (Jardin and Mueller, "Optimized
+Measurements of Unmanned-Air-Vehicle Mass Moment of Inertia with a Bifilar Pendulum", 2009, small angles).
 """
 
 from pathlib import Path
@@ -16,14 +17,15 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 AXES = ("x", "y", "z")
 SPREAD = 0.01
-"""Relative standard deviation that stays with the best set-up: air that swings along, threads that are not parallel."""
+"""Relative standard deviation that remains with the best set-up, from air that moves with the vehicle and from threads
+that are not parallel."""
 _KEYS = {"mass", "mass_sigma", "length", "length_sigma", "distance", "distance_sigma", "periods", "count"}
 
 
 def estimates(path: Path) -> list[Estimate]:
-    """Mass, where its sigma is given, and inertia about each axis that was hung vertically.
+    """The inertia about each axis that was hung vertically, and the mass, if its sigma is given.
 
-    The file has a table for each axis: `[x]`, `[y]`, `[z]`.
+    The file has one table per axis: `[x]`, `[y]`, `[z]`.
 
     Raises:
         ValueError: naming the file, the table, the key, the value and what is accepted.
@@ -46,7 +48,7 @@ def estimates(path: Path) -> list[Estimate]:
 
 
 def _axis(where: str, entry: Any) -> tuple[float, float, tuple[float, float]]:
-    """Inertia, its standard deviation, and the mass with its own."""
+    """Inertia and its standard deviation, and the mass with its standard deviation."""
     if not isinstance(entry, dict) or set(entry) - _KEYS:
         raise ValueError(f"{where} is {shown(entry)}; accepted: a table of {', '.join(sorted(_KEYS))}")
     if missing := [key for key in ("mass", "length", "distance", "periods") if key not in entry]:

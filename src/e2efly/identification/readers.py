@@ -1,4 +1,4 @@
-"""Flight logs of many kinds, read into records: which kind a file is, its beginning or its name says."""
+"""Read flight logs of many formats into records. The beginning of a file or its name shows its format."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -25,15 +25,15 @@ BLACKBOXES = (".bbl", ".bfl", ".bf")
 """Endings of the names of Betaflight's blackbox logs."""
 _PART = re.compile(r"(?P<name>.+):(?P<begin>\d+(\.\d+)?)-(?P<end>\d+(\.\d+)?)")
 _FLIP = np.array([1.0, -1.0, -1.0])
-"""FLU from FRD: forward stays, left is minus right, up is minus down."""
+"""Factors from FRD to FLU: forward stays, left is minus right, up is minus down."""
 
 
 def read_flights(path: Path, columns: Mapping[str, Column] | None = None) -> list[Record]:
-    """The flights of a log; a blackbox may hold several.
+    """The flights of a log. A blackbox can contain several.
 
     Args:
         path: the file, or the folder of a ROS 2 bag.
-        columns: names of a CSV file's columns for ours.
+        columns: for columns of a record, the names of the columns in a CSV file.
 
     Raises:
         ValueError: naming the file, what is wrong with it and what is accepted.
@@ -60,10 +60,10 @@ def read_flights(path: Path, columns: Mapping[str, Column] | None = None) -> lis
 
 
 def read_part(path: Path, columns: Mapping[str, Column] | None = None) -> list[Record]:
-    """The flights of a log, or of LOG:BEGIN-END what lies between two times, s after the log begins.
+    """The flights of a log. For LOG:BEGIN-END, only the part between these two times, s after the start of the log.
 
     Raises:
-        ValueError: as of `read_flights`; where nothing lies between the times.
+        ValueError: as for `read_flights`; when there is nothing between the two times.
     """
     asked = None if path.exists() else _PART.fullmatch(path.name)
     if asked is None:
@@ -84,10 +84,10 @@ def read_part(path: Path, columns: Mapping[str, Column] | None = None) -> list[R
 
 
 def read_mcap(path: Path) -> Record:
-    """A flight log of ours (docs/telemetry.md).
+    """A flight log of e2efly (docs/telemetry.md).
 
     Raises:
-        ValueError: as of `read_log`; where it has none of the channels that are used here.
+        ValueError: as for `read_log`; when it has none of the channels that are used here.
     """
     from e2efly.deploy.log.flight_log import read_log
 
@@ -129,9 +129,10 @@ def read_mcap(path: Path) -> Record:
 
 
 def _asked(command: Stream, channels: "Series") -> np.ndarray:
-    """The body rates that the controller's channels ask for, (n, 3) rad/s; NaN before the first command.
+    """The body rates that the channels of the remote control request, (n, 3) rad/s. NaN before the first command.
 
-    Which pulse is which rate, the log itself shows: by the delay at which smooth curves from one to the other fit best.
+    The relation between pulses and rates is found from the log: smooth curves are fitted from the pulses to the
+    commanded rates, at the delay at which they fit best.
     """
     time, pulses = channels.time, channels.numbers("channels", channels.width("channels"))[:, :3]
     x = (pulses - 1500) / 500
@@ -150,10 +151,10 @@ def _asked(command: Stream, channels: "Series") -> np.ndarray:
 
 
 def read_betaflight(path: Path) -> list[Record]:
-    """The sessions of a blackbox: body rates, motor outputs and the rates that were asked for.
+    """The sessions of a blackbox: body rates, motor outputs and the requested body rates.
 
     Raises:
-        ValueError: as of `read_blackbox`.
+        ValueError: as for `read_blackbox`.
     """
     from e2efly.deploy.log.blackbox import read_blackbox
 
@@ -164,17 +165,18 @@ def read_betaflight(path: Path) -> list[Record]:
         _put(streams, "motor", session.time, session.output)
         _put(streams, "setpoint", session.time, session.setpoint)
         hover = np.full((len(session.time), 1), np.nan)
-        hover[:] = 9.81  # a blackbox says nothing of thrust over mass; `step` needs the rates alone
+        hover[:] = 9.81  # a blackbox has no thrust over mass; `step` needs only the rates
         _put(streams, "command", session.time, np.concatenate([hover, session.setpoint], 1))
         records.append(_whole(path, streams, (f"session {session.session}, {session.firmware}",)))
     return records
 
 
 def read_ulog(path: Path) -> Record:
-    """A PX4 log: NED and FRD become ENU and FLU.
+    """A PX4 log, converted from NED and FRD to ENU and FLU.
 
     Raises:
-        ValueError: where it cannot be read, the package pyulog is missing, or no topic of it is known here.
+        ValueError: when it cannot be read, when the package pyulog is missing, or when none of its topics is known
+            here.
     """
     try:
         from pyulog import ULog
@@ -184,8 +186,8 @@ def read_ulog(path: Path) -> Record:
         ) from None
     try:
         with path.open("rb") as file:
-            data = {d.name: d.data for d in reversed(ULog(file).data_list)}  # of several instances the first
-    except Exception as error:  # of a reader that trusts what it reads
+            data = {d.name: d.data for d in reversed(ULog(file).data_list)}  # of several instances, use the first
+    except Exception as error:  # the reader does not check its input, so any exception is possible
         raise ValueError(f"{path}: no PX4 log that can be read ({type(error).__name__}: {error})") from None
     streams: dict[str, Stream] = {}
 
@@ -220,7 +222,7 @@ def read_ulog(path: Path) -> Record:
 
 
 def _ned_attitude(q: np.ndarray) -> np.ndarray:
-    """Body FLU in ENU from body FRD in NED, wxyz."""
+    """Convert attitudes of body FRD in NED to body FLU in ENU, wxyz."""
     w, x, y, z = q.T
     # half turns: about (1, 1, 0) / sqrt 2 from NED to ENU, about x from FLU to FRD
     s = np.sqrt(0.5)
@@ -230,10 +232,10 @@ def _ned_attitude(q: np.ndarray) -> np.ndarray:
 
 
 def read_bag(path: Path) -> Record:
-    """A ROS bag: the first topic of each kind: nav_msgs/Odometry, sensor_msgs/Imu, geometry_msgs/PoseStamped.
+    """A ROS bag. It uses the first topic of each type: nav_msgs/Odometry, sensor_msgs/Imu, geometry_msgs/PoseStamped.
 
     Raises:
-        ValueError: where it cannot be read, the package rosbags is missing, or no topic of these kinds is in it.
+        ValueError: when it cannot be read, when the package rosbags is missing, or when it has no topic of these types.
     """
     try:
         from rosbags.highlevel import AnyReader
@@ -298,7 +300,7 @@ _BAG: dict[str, Callable[[Any], dict[str, list[float]]]] = {
 
 
 def _put(streams: dict[str, Stream], name: str, time: np.ndarray, values: np.ndarray) -> None:
-    """Keep what is finite and whose time rises."""
+    """Store the samples that are finite and whose times increase."""
     good = np.isfinite(time) & np.isfinite(values).all(1)
     time, values = time[good], values[good]
     latest = np.concatenate([[-np.inf], np.maximum.accumulate(time)[:-1]]) if len(time) else time

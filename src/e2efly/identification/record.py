@@ -1,4 +1,4 @@
-"""A flight as it was recorded: streams of numbers, each with its own times. SI units, world ENU, body FLU."""
+"""A recorded flight: streams of numbers, each with its own times. SI units, world ENU, body FLU."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -12,11 +12,11 @@ class Kind:
     """One stream that a record may have."""
 
     columns: tuple[str, ...]
-    """Names of its numbers in a CSV file."""
+    """Names of its columns in a CSV file."""
     unit: str
-    """Their unit."""
+    """Unit of the numbers."""
     what: str
-    """What it is, and its frame."""
+    """Description, with the frame."""
 
 
 KINDS: dict[str, Kind] = {
@@ -40,7 +40,7 @@ KINDS: dict[str, Kind] = {
 
 
 MOTORS = 40.0
-"""Motor outputs that were logged less often, Hz, drive no simulation."""
+"""Lowest logging rate at which motor outputs can drive a simulation, Hz."""
 
 
 @dataclass(frozen=True)
@@ -48,17 +48,17 @@ class Stream:
     """Numbers over time."""
 
     time: np.ndarray
-    """(n,) s, rising, of the record's clock."""
+    """(n,) times, s of the record's clock, increasing."""
     values: np.ndarray
-    """(n, k) finite."""
+    """(n, k) finite values."""
 
     @property
     def rate(self) -> float:
-        """Samples a second: one over the median of their distances, Hz; 0 for fewer than two."""
+        """Sampling rate, Hz: one divided by the median time between samples. 0 for fewer than two samples."""
         return float(1 / np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
 
     def during(self, start: float, end: float) -> "Stream":
-        """What lies between two times, s."""
+        """The part between two times, s."""
         inside = (self.time >= start) & (self.time <= end)
         return Stream(self.time[inside], self.values[inside])
 
@@ -68,13 +68,13 @@ class Record:
     """One flight."""
 
     path: Path
-    """Where it was read from."""
+    """The file or folder from which it was read."""
     streams: Mapping[str, Stream]
-    """By the names of `KINDS`; what was not recorded is not there."""
+    """Streams by the names of `KINDS`. Streams that were not recorded are missing."""
     notes: tuple[str, ...] = field(default=())
-    """What was left out or changed while it was read, in words."""
+    """What was left out or changed during reading, in words."""
     pose_age: float | None = None
-    """How old the poses were, by the gyroscope's clock, when commands were made of them, s; None: not known."""
+    """Age of the poses when commands were computed from them, by the gyroscope's clock, s. None: not known."""
 
     @property
     def span(self) -> tuple[float, float]:
@@ -84,16 +84,16 @@ class Record:
 
     @property
     def duration(self) -> float:
-        """S."""
+        """Time from the first to the last sample of all streams, s."""
         start, end = self.span
         return end - start
 
     def during(self, start: float, end: float) -> "Record":
-        """What lies between two times, s."""
+        """The part between two times, s."""
         return replace(self, streams={name: stream.during(start, end) for name, stream in self.streams.items()})
 
     def has(self, *names: str) -> bool:
-        """Whether all of these streams were recorded."""
+        """Whether all of these streams were recorded, with at least two samples each."""
         return all(name in self.streams and len(self.streams[name].time) > 1 for name in names)
 
 

@@ -1,4 +1,4 @@
-"""Flights replayed: the simulator gets the commands that were sent, and starts as the vehicle was measured."""
+"""Replay of flights: the simulator gets the commands that were sent and starts from the measured state."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,38 +22,38 @@ SIGNALS = {
     "roll_rate": "rad/s", "pitch_rate": "rad/s", "yaw_rate": "rad/s", "thrust": "m/s^2", "attitude": "rad",
     "velocity": "m/s",
 }  # fmt: skip
-"""What is laid over what was measured, and its unit. Thrust is the specific force along body z, attitude the angle
-between both, velocity the length of the difference."""
+"""The signals in which a replay is compared with the measurement, and their units. Thrust is the specific force along
+body z, attitude is the angle between the two attitudes, velocity is the length of the difference."""
 RATES = ("roll_rate", "pitch_rate", "yaw_rate")
 
 
 @dataclass(frozen=True)
 class Stretches:
-    """n stretches of a flight, of m steps each, on an even grid of times."""
+    """n sections of a flight, with m steps each, on a uniform time grid."""
 
     begin: np.ndarray
-    """(n,) s of the record's clock."""
+    """(n,) start times, s of the record's clock."""
     time: np.ndarray
-    """(m + 1,) s from the beginning of each."""
+    """(m + 1,) time since the start of a section, s."""
     command: np.ndarray
-    """(n, m + 1, 4) as sent: thrust over mass, m/s^2, and body rates, rad/s."""
+    """(n, m + 1, 4) commands as sent: thrust over mass, m/s^2, and body rates, rad/s."""
     driven: np.ndarray
     """(n, past + m + 1, 4) integral of the commands over time."""
     rate_before: np.ndarray
-    """(n, past, 3) body rates up to each beginning, rad/s."""
+    """(n, past, 3) body rates before the start of each section, rad/s."""
     measured: dict[str, np.ndarray]
-    """By stream, (n, m + 1, k)."""
+    """Measurements by stream, (n, m + 1, k)."""
     there: dict[str, np.ndarray]
-    """By stream, (n, m + 1): whether a sample is near enough to count."""
+    """By stream, (n, m + 1): whether there is a sample near enough in time to be used."""
 
 
 def stretches(record: Record, begin: Sequence[float] | np.ndarray, length: float) -> Stretches:
-    """Stretches of a flight.
+    """Sections of a flight.
 
     Args:
         record: the flight, with commands and body rates.
-        begin: (n,) when each begins, s of the record's clock, rising.
-        length: of each, s.
+        begin: (n,) start times, s of the record's clock, increasing.
+        length: length of each section, s.
     """
     begin, past, m = np.asarray(begin, float), past_steps(), round(length / STEP)
     around = begin[:, None] + STEP * np.arange(-past, m + 1)
@@ -72,15 +72,16 @@ def stretches(record: Record, begin: Sequence[float] | np.ndarray, length: float
 
 
 def replay(model: Model, p: np.ndarray, flown: Stretches) -> dict[str, np.ndarray]:
-    """What the simulated vehicle does in each stretch, by stream, (n, m + 1, k): open loop, from its measured start.
+    """The motion of the simulated vehicle in each section, by stream, (n, m + 1, k): open loop, from the measured
+    start.
 
-    The rotors begin with the speeds that the commands and the body rates before the start lead to. Without poses in the
-    log the vehicle begins level and at rest.
+    The rotors begin with the speeds that result from the commands and the body rates before the start. If the log has
+    no poses, the vehicle begins level and at rest.
 
     Args:
-        model: driven by commands.
+        model: a model driven by commands.
         p: (u,) its unknowns.
-        flown: the stretches.
+        flown: the sections.
     """
     n = len(flown.begin)
     window: dict[str, Any] = {"driven": flown.driven, "when": np.zeros(n), "before": flown.rate_before}
@@ -101,7 +102,9 @@ def _replayed(model: Model, p: Array, windows: dict[str, Any]) -> dict[str, Arra
 
 
 def _rotors(model: Model, p: Array, window: dict[str, Any]) -> Array:
-    """Rotor speeds at the start, (4,) rad/s: the motors follow what the rate loop asked for at the measured rates."""
+    """Rotor speeds at the start, (4,) rad/s. The motors follow the outputs that the rate loop gives at the measured
+    rates.
+    """
     vehicle, before = vehicle_of(model, p), window["before"]
     plant = Plant.of(vehicle, STEP)
     asked, _ = commanded(model, vehicle, window["driven"])
@@ -120,9 +123,9 @@ def _rotors(model: Model, p: Array, window: dict[str, Any]) -> Array:
 
 
 def wrong(flown: Stretches, seen: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """By signal, (n, m + 1): how far a replay is from what was measured; NaN where nothing was.
+    """By signal, (n, m + 1): the difference between a replay and the measurement. NaN where nothing was measured.
 
-    Thrust and velocity are left out where the log does not say how much thrust was asked for.
+    Thrust and velocity are omitted if the log does not contain the commanded thrust.
     """
     out: dict[str, np.ndarray] = {}
 
@@ -144,10 +147,10 @@ def wrong(flown: Stretches, seen: dict[str, np.ndarray]) -> dict[str, np.ndarray
 
 
 def thrust_is_told(flown: Stretches) -> bool:
-    """Whether the thrust in the commands ever changes: some logs, as a blackbox, hold body rates alone."""
+    """Whether the thrust in the commands ever changes. Some logs, such as a blackbox, contain only body rates."""
     return bool(np.ptp(flown.command[..., 0]) > 0)
 
 
 def rms(error: np.ndarray) -> float:
-    """Root mean square of what is known."""
+    """Root mean square of the known values, those that are not NaN."""
     return float(np.sqrt(np.nanmean(error**2))) if np.isfinite(error).any() else float("nan")

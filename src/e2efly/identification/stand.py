@@ -1,4 +1,4 @@
-"""Thrust map, torque ratio, limits and lag of a rotor from a thrust stand's record."""
+"""Thrust map, torque ratio, limits and lag of a rotor, from the record of a thrust stand."""
 
 import csv
 import math
@@ -18,39 +18,39 @@ COLUMNS = {
     "thrust": "N",
     "torque": "N*m",
 }
-"""What a record may hold, by the names of its columns."""
+"""The columns that a record may have, with their units."""
 STEP = 0.1
 """Change of the throttle that counts as a step."""
 LONGEST = 0.5
-"""How long after a step its response is looked at, s."""
+"""Time after a step during which its response is used, s."""
 SETTLED = 0.02
 """Relative change of the rotor speed over 0.1 s below which it counts as steady."""
 FLOOR = 0.01
-"""Relative standard deviation of a stand's calibration, below which no sigma goes."""
+"""Relative standard deviation of a stand's calibration. No sigma becomes smaller than this."""
 
 
 @dataclass(frozen=True)
 class Stand:
-    """What a stand's record comes to."""
+    """The results of the record of a thrust stand."""
 
     thrust_map: np.ndarray
-    """[k2, k1, k0] of the vehicle's file."""
+    """[k2, k1, k0] as in the vehicle file."""
     covariance: np.ndarray
-    """Of the three, (3, 3)."""
+    """Covariance of these three, (3, 3)."""
     residual: float
-    """Root mean square of measured less fitted thrust, N."""
+    """Root mean square of measured minus fitted thrust, N."""
     torque_ratio: tuple[float, float] | None
-    """And its standard deviation, m."""
+    """Torque ratio and its standard deviation, m."""
     lag_up: np.ndarray
     """Time constant of each step upwards, s."""
     lag_down: np.ndarray
-    """... and downwards."""
+    """Time constant of each step downwards, s."""
     speed: tuple[float, float]
     """Slowest and fastest steady rotor speed, rad/s."""
     thrust_max: float
     """Largest steady thrust, N."""
     speed_per_volt: float | None
-    """Relative change of the rotor speed over relative change of the voltage at a given throttle."""
+    """Relative change of the rotor speed divided by the relative change of the voltage, at constant throttle."""
 
 
 def read_stand(path: Path) -> dict[str, np.ndarray]:
@@ -102,7 +102,8 @@ def evaluate(path: Path) -> Stand:
     """Fit a stand's record.
 
     Raises:
-        ValueError: as of `read_stand`; where thrust does not rise with speed, or too little of the range was measured.
+        ValueError: as for `read_stand`; when the thrust does not rise with the speed, or when too little of the range
+            was measured.
     """
     data = read_stand(path)
     steady = _steady(data)
@@ -112,7 +113,7 @@ def evaluate(path: Path) -> Stand:
             f"{path}: {len(speed)} steady points between {speed.min(initial=math.inf):.0f} and "
             f"{speed.max(initial=0):.0f} rad/s; accepted: 6 or more, the fastest at least twice the slowest"
         )
-    # scaled, or the normal equations of squares of thousands lose all digits
+    # scaled, because the normal equations of squared speeds in the thousands would lose all digits
     scale = speed.max()
     x = np.stack([(speed / scale) ** 2, speed / scale, np.ones_like(speed)], -1)
     fit, *_ = np.linalg.lstsq(x, thrust, rcond=None)
@@ -134,10 +135,10 @@ def evaluate(path: Path) -> Stand:
 
 
 def estimates(path: Path) -> list[Estimate]:
-    """Thrust map, largest thrust and speed, torque ratio and motor lag, whichever the record gives.
+    """Thrust map, largest thrust and speed, torque ratio and motor lag, as far as the record contains them.
 
     Raises:
-        ValueError: as of `evaluate`.
+        ValueError: as for `evaluate`.
     """
     found, source = evaluate(path), f"{path.name}, thrust stand"
     said = [
@@ -151,14 +152,14 @@ def estimates(path: Path) -> list[Estimate]:
     lags = np.concatenate([found.lag_up, found.lag_down])
     if len(lags):
         up, down = (np.mean(x) if len(x) else np.mean(lags) for x in (found.lag_up, found.lag_down))
-        # a model with one lag cannot have both: what lies between them counts as uncertainty
+        # the model has only one lag: half the difference between the two counts as uncertainty
         spread = np.hypot(np.std(lags) / np.sqrt(len(lags)), abs(up - down) / 2)
         said.append(Estimate("motor_time_constant", np.array((up + down) / 2), np.array(max(spread, 1e-3)), source))
     return said
 
 
 def _steady(data: dict[str, np.ndarray]) -> np.ndarray:
-    """Which points are steady: all, where there are no times."""
+    """Which points are steady. Without times, all points with a turning rotor."""
     speed = data["rotor_speed"]
     turning = speed > 0
     if "t" not in data:
@@ -180,7 +181,7 @@ def _torque(data: dict[str, np.ndarray], steady: np.ndarray) -> tuple[float, flo
 
 
 def _lags(data: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Time constants of the steps up and of those down."""
+    """Time constants of the steps upwards and of the steps downwards."""
     if "t" not in data or "throttle" not in data:
         return np.zeros(0), np.zeros(0)
     t, throttle, speed = data["t"], data["throttle"], data["rotor_speed"]
@@ -199,7 +200,7 @@ def _lags(data: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         try:
             bounds = ([0, 0, 1e-3, 0], [np.inf, np.inf, LONGEST, 0.1])
             best, _ = curve_fit(response, x, y, [y[0], y[-1], 0.03, 0.001], bounds=bounds)
-        except RuntimeError:  # no fit: a step that is not one
+        except RuntimeError:  # the fit failed: this was not a step
             continue
         if abs(best[1] - best[0]) > SETTLED * speed.max():
             found[throttle[start] > throttle[start - 1]].append(float(best[2]))
@@ -207,7 +208,7 @@ def _lags(data: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _per_volt(data: dict[str, np.ndarray], steady: np.ndarray) -> float | None:
-    """Exponent of the voltage in rotor speed = a throttle^p voltage^q, where the voltage varied by 3 % or more."""
+    """The exponent q in rotor speed = a throttle^p voltage^q, if the voltage varied by 3 % or more. Otherwise None."""
     if "voltage" not in data or "throttle" not in data:
         return None
     use = steady & (data["throttle"] > 0.05) & (data["voltage"] > 0)

@@ -1,4 +1,4 @@
-"""The vehicle file that comes out: the base's values, and what was identified in their place, with their sigmas."""
+"""The resulting vehicle file: the values of the base, with the identified values and their sigmas in their place."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,17 +15,18 @@ from e2efly.vehicles.vehicle import CORRELATION, check, quantities, vehicle_file
 
 
 def merged(base: Vehicle, found: Mapping[str, Estimate]) -> Vehicle:
-    """The base with what was found in place of its values. Moments of inertia that were not found grow as the others.
+    """The base vehicle with the identified values in place of its own. Moments of inertia that were not found are
+    scaled like the others.
 
     Raises:
-        ValueError: where the two together are no vehicle, naming the values.
+        ValueError: when the combined values are not a valid vehicle, naming the values.
     """
     values = {}
     for name, estimate in found.items():
         own = np.asarray(getattr(base, name), float)
         known = np.isfinite(estimate.value)
         new = np.where(known, estimate.value, own)
-        if name == "inertia" and known.any():  # or the three may be of no rigid body
+        if name == "inertia" and known.any():  # otherwise no rigid body might have these three
             new = np.where(known, new, own * np.mean(estimate.value[known] / own[known]))
         values[name] = new if new.shape else float(new)
     vehicle = Vehicle(**({f.name: getattr(base, f.name) for f in quantities(base)} | {"name": base.name} | values))
@@ -43,14 +44,14 @@ def write_vehicle(
     """Write the vehicle file.
 
     Args:
-        path: of the new TOML file.
-        base_name: the name or path of the base, whose sources stay with its values.
-        base: the base, loaded.
-        found: by field.
-        correlation: names of entries, and their matrix, as `e2efly.vehicles.posterior` reads it.
+        path: path of the new TOML file.
+        base_name: the name or path of the base. Its values keep their sources.
+        base: the loaded base.
+        found: the estimates, by field.
+        correlation: names of entries and their correlation matrix, as `e2efly.vehicles.posterior` reads them.
 
     Raises:
-        ValueError: as of `merged`.
+        ValueError: as for `merged`.
     """
     vehicle, table = merged(base, found), read_table(vehicle_file(base_name))
     lines = [
@@ -76,7 +77,7 @@ def write_vehicle(
 def _with_older(
     new: tuple[list[str], np.ndarray], old: tuple[list[str], np.ndarray], found: Mapping[str, Estimate]
 ) -> tuple[list[str], np.ndarray]:
-    """Correlations, with those of the base among the entries that nothing new was found of."""
+    """The new correlations, and those of the base between entries for which nothing new was found."""
     kept = [i for i, name in enumerate(old[0]) if Entry.of(name).field not in found]
     size = len(new[0])
     matrix = np.eye(size + len(kept))

@@ -1,4 +1,4 @@
-"""A flight on an even grid of times, cut into windows that are simulated each from a start of its own."""
+"""A flight on a uniform time grid, cut into windows. Each window is simulated from its own start."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,48 +8,49 @@ import numpy as np
 from e2efly.identification.record import KINDS, Record, Stream
 
 STEP = 0.004
-"""Time between two points of the grid, s: no longer than the physics is exact with (docs/physics.md)."""
+"""Time between two points of the grid, s. It is short enough for the physics to be accurate (docs/physics.md)."""
 LENGTH = 0.4
-"""Length of a window, s: long enough to see lag, delay and rate loop at work, short enough not to diverge."""
+"""Length of a window, s: long enough to show lag, delay and rate loop, short enough not to diverge."""
 LENGTHS = {"motor": 0.1, "motor_and_rate": 1.0}
-"""The same where motor outputs drive, s: with nothing to steer it, a simulated vehicle turns away from the flown one
-within tenths of a second; one that turns by the measured rates does not."""
+"""Length of a window when motor outputs drive the simulation, s. Without a controller, the simulated vehicle turns away
+from the real one within tenths of a second. With motor_and_rate it does not, because it turns with the measured
+rates."""
 REACH = 0.252
-"""How far back the commands of a window are kept, s: the largest delay that can be found."""
+"""Time before a window for which its commands are stored, s. This is the largest delay that can be found."""
 MEASURED = ("body_rate", "specific_force", "rotor_speed", "velocity", "quaternion", "position")
-"""Streams that a simulated window is compared with."""
+"""Streams with which a simulated window is compared."""
 GAP = 3.0
-"""Periods of a stream without a sample that count as a gap."""
+"""Number of periods of a stream without a sample that counts as a gap."""
 
 
 @dataclass(frozen=True)
 class Windows:
-    """n windows of m steps each, of one or several flights; NumPy arrays, float64."""
+    """n windows with m steps each, from one or several flights. NumPy arrays, float64."""
 
     flight: np.ndarray
-    """(n,) which flight each is of."""
+    """(n,) number of the flight of each window."""
     when: np.ndarray
-    """(n,) start of each, as a share of its flight, 0 to 1."""
+    """(n,) start of each window, as a fraction of its flight, 0 to 1."""
     begin: np.ndarray
-    """(n,) start of each, s of its record's clock."""
+    """(n,) start of each window, s of its record's clock."""
     driven: np.ndarray
-    """(n, past + m + 1, 4) integral over time of what drives the vehicle: commands, motor outputs or rotor speeds; with
-    the body rates 7."""
+    """(n, past + m + 1, 4) integral over time of the stream that drives the vehicle: commands, motor outputs or rotor
+    speeds. With motor_and_rate, the body rates are appended: 7 columns."""
     measured: dict[str, np.ndarray]
-    """By stream, (n, m + 1, k); zero where nothing was measured."""
+    """Measurements by stream, (n, m + 1, k). Zero where nothing was measured."""
     there: dict[str, np.ndarray]
-    """By stream, (n, m + 1): 1 where something was."""
+    """By stream, (n, m + 1): 1 where something was measured, else 0."""
     start: dict[str, np.ndarray]
-    """By stream, (n, k): between its samples, at the start of each."""
+    """By stream, (n, k): the value at the start of each window, interpolated between samples."""
 
     @property
     def count(self) -> int:
-        """How many windows."""
+        """Number of windows."""
         return len(self.flight)
 
     @property
     def length(self) -> float:
-        """Of each, s."""
+        """Length of each window, s."""
         return self.steps * STEP
 
     @property
@@ -70,19 +71,19 @@ class Windows:
 
 
 def past_steps() -> int:
-    """Steps before its start of which a window knows the commands."""
+    """Number of steps before the start of a window for which its commands are stored."""
     return round(REACH / STEP)
 
 
 def cut(record: Record, driver: str, flight: int = 0, volts: float | None = None, length: float = 0.0) -> Windows:
-    """Windows of a flight, one after the other; windows in which the driving stream has a gap are left out.
+    """Consecutive windows of a flight. Windows in which the driving stream has a gap are left out.
 
     Args:
         record: the flight.
-        driver: what drives (`Model.driver`).
-        flight: its number.
-        volts: of the battery, to which motor outputs are scaled; left out: they are taken as they are.
-        length: of a window, s; 0: as long as suits what drives.
+        driver: what drives the simulation (`Model.driver`).
+        flight: number of the flight.
+        volts: battery voltage to which motor outputs are scaled, V. If omitted, they are used as they are.
+        length: length of a window, s. 0: the length that suits the driver.
     """
     m, past = round((length or LENGTHS.get(driver, LENGTH)) / STEP), past_steps()
     names = [name for name in MEASURED if record.has(name)]
@@ -108,13 +109,13 @@ def cut(record: Record, driver: str, flight: int = 0, volts: float | None = None
     begin = grid[inner[:, 0]]
     windows = Windows(np.full(n, flight), np.arange(n) / max(n, 1), begin, driven[rows], measured, there, start)
     whole = windows.some(~torn & (there["body_rate"].mean(1) > 0.2))
-    if driver == "motor_and_rate":  # what is given is no witness
+    if driver == "motor_and_rate":  # an input of the simulation cannot be compared with its result
         del whole.measured["body_rate"], whole.there["body_rate"]
     return whole
 
 
 def _driving(record: Record, driver: str, volts: float | None) -> Stream:
-    """What drives, (n, 4), or with the body rates (n, 7)."""
+    """The stream that drives the simulation, (n, 4), or (n, 7) with the body rates."""
     if driver not in ("motor", "motor_and_rate"):
         return record.streams[driver]
     stream = record.streams["motor"]
@@ -128,7 +129,7 @@ def _driving(record: Record, driver: str, volts: float | None) -> Stream:
 
 
 def join(parts: Sequence[Windows]) -> Windows:
-    """Windows of several flights together, with the streams that any of them has."""
+    """The windows of several flights together, with every stream that any of the flights has."""
     names = [name for name in MEASURED if any(name in part.measured for part in parts)]
 
     def nothing(part: Windows, *size: int) -> np.ndarray:
@@ -148,7 +149,9 @@ def join(parts: Sequence[Windows]) -> Windows:
 
 
 def integral(stream: Stream, grid: np.ndarray, held: bool) -> np.ndarray:
-    """Integral over time, from the grid's start, of a stream whose samples hold until the next, or go over evenly."""
+    """Integral of a stream over time, from the start of the grid. With `held`, each sample holds until the next one.
+    Otherwise the values are interpolated linearly.
+    """
     t, x = stream.time, stream.values
     pieces = x[:-1] if held else (x[:-1] + x[1:]) / 2
     total = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(pieces * np.diff(t)[:, None], 0)])
@@ -159,13 +162,13 @@ def integral(stream: Stream, grid: np.ndarray, held: bool) -> np.ndarray:
 
 
 def on_grid(stream: Stream, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A stream between its samples, and where there is a sample close enough to be believed."""
+    """A stream interpolated on the grid, and the points of the grid at which a sample is close enough to be used."""
     t = stream.time
     values = np.stack([np.interp(grid, t, column) for column in stream.values.T], -1)
     after = np.clip(np.searchsorted(t, grid), 1, len(t) - 1)
     apart = t[after] - t[after - 1]
     nearest = np.minimum(np.abs(grid - t[after - 1]), np.abs(grid - t[after]))
     period = 1 / stream.rate
-    # of a stream slower than the grid, the points next to a sample count; of a faster one, all
+    # for a stream slower than the grid, only the points next to a sample count; for a faster stream, all points
     good = (nearest <= max(STEP / 2 + 1e-9, period / 2 if period <= 1.5 * STEP else 0)) & (apart < GAP * period + 1e-9)
     return values, good

@@ -1,9 +1,9 @@
-"""What each part of a reward is good for: the full reward and each without one part, over several seeds, at once.
+"""Ablation of a reward: train with the full reward, and with each part left out, for several seeds at the same time.
 
 A part is a term, or all terms of one of the paper's groups (`e2efly.rewards.GROUPS`).
 
-All of them are members of one compiled program: weights of the reward and seeds are its leaves. The devices share the
-members, where a single run shares its environments; each member is a run on one device.
+All runs are members of one compiled program: the weights of the reward and the seeds are its leaves. The members are
+divided among the devices, whereas a single run divides its environments among them. Each member runs on one device.
 """
 
 import dataclasses
@@ -35,7 +35,7 @@ from e2efly.rewards import grouped
 FULL = "full"
 """Name of the reward with all terms."""
 By = Literal["term", "group"]
-"""What of a reward is left out at a time."""
+"""Which part of a reward is left out in each variant."""
 
 
 @dataclass(frozen=True)
@@ -47,27 +47,27 @@ class Curves:
     steps: Float[np.ndarray, " t"]
     """Environment steps at each evaluation."""
     success: dict[str, Float[np.ndarray, "v s t"]]
-    """By criterion: of each variant and seed at each evaluation."""
+    """Success rate by criterion: for each variant and seed, at each evaluation."""
     error: dict[str, Float[np.ndarray, "v s t"]]
-    """The task's error, m: over a flight where the task follows something, else at its end."""
+    """The error of the task, m: the mean over the flight if the task follows something, else the error at its end."""
 
 
 @dataclass(frozen=True)
 class Kept:
-    """Where an ablation keeps how far it got, to go on from there after it was stopped."""
+    """Where an ablation stores its progress, so that it can continue after it was stopped."""
 
     path: Path
-    """The checkpoint's file."""
+    """The file of the checkpoint."""
     about: dict[str, Any]
-    """What decides the curves, as JSON."""
+    """Everything that determines the curves, as JSON."""
     period: float = 10.0
-    """Seconds between two checkpoints, at least."""
+    """Minimum time between two checkpoints, s."""
 
     def done(self) -> int:
-        """Evaluations that an earlier process got to.
+        """The number of evaluations that an earlier process completed.
 
         Raises:
-            ValueError: for a checkpoint that is damaged, or of another ablation.
+            ValueError: for a checkpoint that is damaged, or that belongs to another ablation.
         """
         if not self.path.exists():
             return 0
@@ -88,15 +88,15 @@ def ablate(
     """Train all variants.
 
     Args:
-        config: of the full reward; its seed is the first.
-        seeds: runs of each variant.
-        told: (share of the work done, mean success of the full reward) after each evaluation.
-        kept: where to keep how far it got, and to go on from.
-        by: what is left out at a time: a term, or a group of the paper's.
+        config: the configuration with the full reward; its seed is the first seed.
+        seeds: number of runs for each variant.
+        told: called after each evaluation with (fraction of the work done, mean success of the full reward).
+        kept: where to store the progress, and from where to continue.
+        by: what is left out in each variant: a term, or one of the paper's groups.
 
     Raises:
-        ValueError: for a configuration that cannot be used: with a curriculum, a reward of one part; for a checkpoint
-            that is damaged, or of another ablation.
+        ValueError: for a configuration that cannot be used: one with a curriculum, or a reward with only one part; for
+            a checkpoint that is damaged or belongs to another ablation.
     """
     terms = tuple(config.reward.weights)
     parts = grouped(terms) if by == "group" else {term: (term,) for term in terms}
@@ -111,7 +111,7 @@ def ablate(
     members = len(variants) * seeds
     setup.check(members)
     devices = min(len(jax.devices()), members)
-    room = -(-members // devices) * devices  # the last member repeated fills the devices
+    room = -(-members // devices) * devices  # copies of the last member fill the devices
     places = np.minimum(np.arange(room), members - 1)
     of_seed = places % seeds
     weights = {
@@ -154,11 +154,11 @@ def ablate(
 
 
 def _programs(setup: Setup, devices: int) -> tuple[Callable, Callable, Callable]:
-    """Programs on members, the leading axis of all that has one.
+    """Programs that run all members. The members are the leading axis of every value that differs between them.
 
     Returns:
-        (environment, weights, parameters, keys) -> states; (environment, weights, states, first update) -> states after
-        a chunk; (environment, policies) -> episodes.
+        Three programs: (environment, weights, parameters, keys) -> states; (environment, weights, states, first update)
+        -> states after a chunk; (environment, policies) -> episodes.
     """
     config, algorithm = setup.config, setup.algorithm
 
@@ -197,8 +197,8 @@ def _programs(setup: Setup, devices: int) -> tuple[Callable, Callable, Callable]
 
 
 def _each(function: Callable, *members: Any) -> Any:
-    """A function of every member. On a CPU one follows another: that takes two thirds of the time, and draws the random
-    numbers of a run alone, which those of a batch are not.
+    """Apply a function to every member. On a CPU the members run one after another. That takes two thirds of the time,
+    and each member draws the same random numbers as a single run, which a batch would not.
     """
     if jax.default_backend() == "cpu":
         return jax.lax.map(lambda member: function(*member), members)
@@ -206,7 +206,7 @@ def _each(function: Callable, *members: Any) -> Any:
 
 
 def _alone(function: Callable) -> Callable:
-    """A function that takes means over the devices, on one that is alone."""
+    """Make a function that takes means over the devices run on a single device."""
 
     def called(*args: Any) -> Any:
         out = jax.vmap(lambda _: function(*args), axis_name=AXIS, axis_size=1)(jnp.zeros(1))

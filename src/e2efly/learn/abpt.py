@@ -1,9 +1,10 @@
-"""Amended back-propagation through time (Li et al. 2025): windows of a stochastic policy between values of critics.
+"""Amended back-propagation through time (Li et al. 2025): windows of a stochastic policy, with critics at both ends.
 
-An update gathers transitions without gradients into a replay buffer, fits twin critics Q(s, a) to it, and then ascends
-the mean of two estimates of the return: the exact gradient of a window's reward with Q of where it ends, and Q of where
-it began. The first is sharp where rewards are smooth, the second knows of events that have no gradient. Windows begin
-at new starts and at visited states, at random, so that those far from a start are learned from, too.
+An update gathers transitions without gradients into a replay buffer and fits twin critics Q(s, a) to it. It then
+ascends the gradient of a weighted mean of two estimates of the return. The first is the reward of a window plus Q at
+its end, differentiated exactly. The second is Q at the start of the window. The first is accurate where rewards are
+smooth. The second includes events that have no gradient. Windows begin at random either at new starts or at visited
+states, so that the policy also learns from states far from a start.
 """
 
 import dataclasses
@@ -34,7 +35,7 @@ from e2efly.learn.replay import Places, Ring
 from e2efly.learn.rollout import RolloutState, advance, window
 
 QUIETEST = -5.0
-"""The log standard deviation of the action noise falls no lower."""
+"""Lower limit of the log standard deviation of the action noise."""
 
 
 @jax.tree_util.register_dataclass
@@ -55,30 +56,30 @@ class Parameters:
     log_std: Float[Array | np.ndarray, "4"]
     critics: tuple[Layers, Layers]
     targets: tuple[Layers, Layers]
-    """The critics as they were, on average, a while ago."""
+    """The target critics: a slowly following average of the critics."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Situation:
-    """Where a policy acts, as networks take it; each leaf (n, ...)."""
+    """The situation in which a policy acts, in the form that the networks take. Each leaf is (n, ...)."""
 
     features: Float[Array, "n f"]
     memory: Float[Array, "n k"]
     critic_input: Float[Array, "n c"]
-    """What critics are fed beside the action."""
+    """The input of the critics in addition to the action."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Transition:
-    """What the critics learn from, each leaf (n, ...)."""
+    """The transitions from which the critics learn. Each leaf is (n, ...)."""
 
     here: Situation
     action: Float[Array, "n 4"]
     reward: Float[Array, " n"]
     ended: Float[Array, " n"]
-    """1: for good, nothing follows."""
+    """1: the episode has terminated and nothing follows."""
     there: Situation
 
 
@@ -94,12 +95,12 @@ class ABPT(Algorithm):
         return Parameters(policy, np.full(4, config.log_std, np.float32), critics, jax.tree.map(np.copy, critics))
 
     def optimizer(self, config: ABPTConfig, parameters: Parameters) -> dict[str, Any]:
-        """Adam's initial states, of the policy and of the critics."""
+        """The initial states of Adam for the policy and for the critics."""
         policy = Stochastic(parameters.policy, parameters.log_std)
         return {"policy": adam_state(config, policy), "critics": adam_state(config, parameters.critics)}
 
     def replay(self, env: Env, config: ABPTConfig, state: EnvState, observation: Float[Array, "n o"]) -> dict[str, Any]:
-        """An empty buffer of transitions, and the first states as places to begin windows at."""
+        """An empty buffer of transitions, and the first states as places where windows can begin."""
         n = observation.shape[0]
         here = self._here(env, RolloutState(state, observation, self.actor.memory(n)))
         one = Transition(here, jnp.zeros((n, 4)), jnp.zeros(n), jnp.zeros(n), here)
@@ -110,7 +111,9 @@ class ABPT(Algorithm):
     def update(
         self, env: Env, config: ABPTConfig, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[TrainState, dict[str, Array]]:
-        """Steps into the buffer, gradient steps of the critics, one window and one gradient step of the policy."""
+        """Gather steps into the buffer, take gradient steps of the critics, then one window and one gradient step of
+        the policy.
+        """
         key, collect_key, critic_key, start_key, window_key = jax.random.split(state.key, 5)
         learned, rate = state.parameters, annealed(config, progress)
         policy = Stochastic(learned.policy, learned.log_std)
@@ -154,19 +157,23 @@ class ABPT(Algorithm):
         return one, other
 
     def _value(self, policy: Stochastic, targets: tuple[Layers, Layers], here: Situation, z: Array) -> Array:
-        """What follows from here by the policy's action: the smaller estimate of the two."""
+        """The value of acting here by the policy: the smaller of the two critics' estimates."""
         return jnp.minimum(*self._q(targets, here, self._act(policy, here, z)[0]))
 
     def _collect(
         self, env: Env, config: ABPTConfig, policy: Stochastic, state: TrainState, key: PRNGKeyArray
     ) -> tuple[RolloutState, Transition, dict[str, Array]]:
-        """Steps without gradients: where they end, the transitions (steps * n, ...), and the metrics."""
+        """Steps without gradients.
+
+        Returns:
+            The state at the end, the transitions (steps * n, ...), and the metrics.
+        """
 
         def step(at: RolloutState, z: Array) -> tuple[RolloutState, Any]:
             here = self._here(env, at)
             action, memory = self._act(policy, here, z)
             after, out = advance(env, config, at, action, memory, critic=True)
-            # where an episode's time is out its last image stands for the next: good enough for a value
+            # when an episode ends, its last image is used in place of the next one: good enough for a value
             images = tuple(
                 jnp.where(out.done.reshape(-1, *[1] * (new.ndim - 1)), old, new)
                 for old, new in zip(at.env.images, after.env.images, strict=True)
@@ -211,7 +218,7 @@ class ABPT(Algorithm):
         return critics, targets, optimizer, jnp.mean(losses)
 
     def _start(self, env: Env, config: ABPTConfig, places: Places, now: EnvState, key: PRNGKeyArray) -> RolloutState:
-        """Where windows begin: new starts and visited states."""
+        """The states at which windows begin: new starts and visited states."""
         reset_key, which_key, draw_key = jax.random.split(key, 3)
         state, observation, memory = places.drawn(draw_key)
         n = observation.shape[0]

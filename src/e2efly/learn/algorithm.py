@@ -1,4 +1,4 @@
-"""What every algorithm is to the runner, and what they share."""
+"""The interface between the algorithms and the runner, and the code that the algorithms share."""
 
 import dataclasses
 from abc import ABC, abstractmethod
@@ -24,10 +24,10 @@ from e2efly.registry import load, origin
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class TrainState:
-    """Everything that an update changes on one device: what a checkpoint holds of each."""
+    """Everything that an update changes on one device. A checkpoint holds this for each device."""
 
     parameters: Any
-    """What is learned: a dataclass with at least `policy`."""
+    """What is learned: a dataclass that has at least the field `policy`."""
     optimizer: Any
     env: EnvState
     observation: Float[Array, "n o"]
@@ -35,14 +35,14 @@ class TrainState:
     """Recurrent state of the policy."""
     key: PRNGKeyArray
     replay: Any = None
-    """What an off-policy method keeps of earlier steps."""
+    """The data of earlier steps that an off-policy method keeps."""
 
 
 @dataclass(frozen=True)
 class Algorithm(ABC):
-    """A learning algorithm on the shapes of one environment. Its numbers come in with `config` at every call.
+    """A learning algorithm for the shapes of one environment. Its numbers are passed in `config` at every call.
 
-    Whatever an update draws, flies and learns is in the `TrainState` that it takes and returns.
+    Everything that an update samples, flies and learns is in the `TrainState` that it takes and returns.
     """
 
     actor: Actor
@@ -50,35 +50,37 @@ class Algorithm(ABC):
 
     @abstractmethod
     def init(self, env: Env, config: Any, seed: int) -> Any:
-        """Fresh parameters, a registered dataclass with at least `policy`; made by NumPy: nothing to compile."""
+        """Fresh parameters: a registered dataclass with at least the field `policy`. Made with NumPy, so that nothing
+        has to be compiled.
+        """
 
     @abstractmethod
     def update(
         self, env: Env, config: Any, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[TrainState, dict[str, Array]]:
-        """One update, on each device, on its own environments, inside `e2efly.learn.devices.on_each`.
+        """One update. Each device runs it on its own environments, inside `e2efly.learn.devices.on_each`.
 
         Args:
             env: the environment.
             config: numbers of the algorithm.
-            state: where the last update ended.
-            progress: share of the run that is done, in [0, 1]: sets the learning rate.
+            state: the state at the end of the last update.
+            progress: the completed fraction of the run, in [0, 1]. It sets the learning rate.
 
         Returns:
             The new state, and scalar metrics of this update.
         """
 
     def optimizer(self, config: Any, parameters: Any) -> Any:
-        """The optimiser's initial state: Adam's, of all parameters."""
+        """The initial state of the optimiser. By default, that of Adam for all parameters."""
         return adam_state(config, parameters)
 
     def replay(self, env: Env, config: Any, state: EnvState, observation: Float[Array, "n o"]) -> Any:
-        """What an off-policy method keeps of earlier steps, as it is at first; None: nothing."""
+        """The initial value of the data that an off-policy method keeps of earlier steps. None: it keeps nothing."""
         return None
 
 
 def adam(max_grad_norm: float | Array) -> optax.GradientTransformation:
-    """Adam's direction of the norm-clipped gradient."""
+    """Adam's update direction, from the gradient after clipping by its norm."""
     return optax.chain(optax.clip_by_global_norm(max_grad_norm), optax.scale_by_adam())
 
 
@@ -88,9 +90,9 @@ def adam_state(config: AlgorithmConfig, parameters: Any) -> Any:
 
 
 def begin(algorithm: Algorithm, env: Env, config: AlgorithmConfig, parameters: Any, key: PRNGKeyArray) -> TrainState:
-    """A device's first state of a run: its part of the environments as started, the optimiser's initial state.
+    """The first state of a run on one device: its part of the fresh environments, and the optimiser's initial state.
 
-    All devices together start the same environments, however many they are.
+    All devices together start the same environments, whatever the number of devices.
     """
     part = jax.lax.axis_index(AXIS), jax.lax.axis_size(AXIS)
     env_state, observation = part_of(*env.reset(jax.random.fold_in(key, 0), config.envs), part)
@@ -103,13 +105,13 @@ def begin(algorithm: Algorithm, env: Env, config: AlgorithmConfig, parameters: A
 def descend(
     config: AlgorithmConfig, rate: Float[Array, ""], parameters: Any, optimizer: Any, gradient: Any
 ) -> tuple[Any, Any, Float[Array, ""]]:
-    """A step of Adam against the mean gradient of all devices.
+    """One step of Adam along the negative mean gradient of all devices.
 
-    Works on all parameters as one vector: a dozen small arrays take longer to compile, to add up over the devices and
-    to step than the rest of an update.
+    It treats all parameters as one vector. With a dozen small arrays, the compilation, the sum over the devices and the
+    step itself would take longer than the rest of an update.
 
     Returns:
-        The new parameters, the new state of the optimiser, and the gradient's norm.
+        The new parameters, the new state of the optimiser, and the norm of the gradient.
     """
     flat, shaped = ravel_pytree(gradient)
     flat = jax.lax.pmean(flat, AXIS)
@@ -127,23 +129,24 @@ def epochs(
     samples: Any,
     key: PRNGKeyArray,
 ) -> tuple[Any, Any, dict[str, Array]]:
-    """`config.epochs` passes over samples in minibatches, a step of Adam each.
+    """`config.epochs` passes over the samples in minibatches, with one step of Adam per minibatch.
 
     Args:
-        config: of the algorithm: envs, horizon, minibatch, epochs, max_grad_norm.
-        rate: of Adam's steps.
-        loss: (parameters, minibatch) -> what to descend, and losses by name.
-        parameters: at first.
-        optimizer: state of Adam at first.
+        config: options of the algorithm: envs, horizon, minibatch, epochs, max_grad_norm.
+        rate: the learning rate of Adam.
+        loss: (parameters, minibatch) -> the loss to minimise, and its parts by name.
+        parameters: the initial parameters.
+        optimizer: the initial state of Adam.
         samples: a tree whose leaves are (steps, n, ...).
-        key: decides the order.
+        key: random key that decides the order of the samples.
 
     Returns:
-        New parameters and optimiser, and the means of the losses and of the gradient's norm, `loss/NAME`.
+        The new parameters, the new state of the optimiser, and the means of the losses and of the gradient norm, as
+        `loss/NAME`.
     """
     steps, n = jax.tree.leaves(samples)[0].shape[:2]
     size, count = steps * n, config.envs * config.horizon // config.minibatch
-    # one sort of random bits: sorting is slow on a CPU, so that all epochs share the order
+    # only one sort of random bits: sorting is slow on a CPU, so all epochs share the same order
     order = jnp.argsort(jax.random.bits(key, (size,)))
     flat = jax.tree.map(lambda x: x.reshape(size, *x.shape[2:])[order], samples)
     batches = jax.tree.map(lambda x: x.reshape(count, size // count, *x.shape[1:]), flat)
@@ -162,22 +165,24 @@ def epochs(
 
 
 def followed(target: Any, source: Any, share: float | Array) -> Any:
-    """A slow copy of parameters, after it went `share` of the way to them."""
+    """A slow copy of parameters (`target`), moved by the fraction `share` towards the parameters (`source`)."""
     return jax.tree.map(lambda old, new: old + share * (new - old), target, source)
 
 
 def gradient_per_term(
     parts: Callable[[Any], tuple[dict[str, Array], Any]], parameters: Any, apart: bool
 ) -> tuple[Any, Any, dict[str, Array]]:
-    """The gradient of minus the sum of an objective's parts.
+    """The gradient of the negative sum of an objective's parts.
 
     Args:
-        parts: parameters -> the parts by name, scalars, and what else comes of it.
-        parameters: where.
-        apart: whether to go back for each part by itself, which takes as many times as long.
+        parts: parameters -> the parts by name (scalars), and other results.
+        parameters: where the gradient is evaluated.
+        apart: whether to differentiate each part separately. The backward pass then takes as many times as long as
+            there are parts.
 
     Returns:
-        The gradient; what else came; and, apart, the norm of each part's gradient on this device, `gradient/NAME`.
+        The gradient, the other results of `parts`, and, with `apart`, the norm of each part's gradient on this device,
+        as `gradient/NAME`.
     """
 
     def loss(parameters: Any) -> tuple[Array, Any]:
@@ -195,8 +200,9 @@ def gradient_per_term(
 
 
 def gradient_cuts(config: Any, progress: Float[Array, ""]) -> Bool[Array, " h"]:
-    """Before which steps of a window the gradient is cut: every `horizon_start` at first, nowhere at last; in between
-    the pieces grow exponentially. Without `horizon_start` it is cut nowhere.
+    """The steps of a window before which the gradient is cut. At the start of a run it is cut every `horizon_start`
+    steps, at the end of the run nowhere. In between, the pieces grow exponentially. Without `horizon_start` it is never
+    cut.
     """
     step = jnp.arange(config.horizon)
     start = config.horizon_start or config.horizon
@@ -205,25 +211,25 @@ def gradient_cuts(config: Any, progress: Float[Array, ""]) -> Bool[Array, " h"]:
 
 
 def episode_metrics(done: Array, success: Array) -> dict[str, Array]:
-    """How many episodes ended on all devices, and the share of them that met the criterion."""
+    """The number of episodes that ended on all devices, and the fraction of them that met the criterion."""
     episodes, successes = jax.lax.psum((jnp.sum(done), jnp.sum(success)), AXIS)
     return {"episodes": episodes, "train_success": successes / jnp.maximum(episodes, 1)}
 
 
 def annealed(config: Any, progress: Float[Array, ""]) -> Float[Array, ""]:
-    """The learning rate, exponential from `learning_rate` to `learning_rate_end`."""
+    """The learning rate, which changes exponentially from `learning_rate` to `learning_rate_end`."""
     return config.learning_rate * (config.learning_rate_end / config.learning_rate) ** progress
 
 
 METHODS = ("init", "update", "optimizer", "replay")
-"""What the program of an algorithm must have; `Algorithm` has the last two."""
+"""The methods that the program of an algorithm must have. `Algorithm` provides the last two."""
 
 
 def make_algorithm(config: AlgorithmConfig, actor: Actor) -> Algorithm:
     """The algorithm of a configuration.
 
     Raises:
-        ValueError: when `program` leads nowhere or to something that lacks a method, naming its file.
+        ValueError: when nothing is found at `program`, or when what is found lacks a method, naming its file.
     """
     program = load(config.program) if isinstance(config.program, str) else config.program
     if lacking := [name for name in METHODS if not hasattr(program, name)]:
@@ -237,7 +243,7 @@ def make_algorithm(config: AlgorithmConfig, actor: Actor) -> Algorithm:
 
 @cache
 def register_options(options: type) -> None:
-    """Make a class of options a pytree whose leaves are its numbers of type float."""
+    """Register a class of options as a pytree whose leaves are its fields of type float."""
     fields = dataclasses.fields(options)
     numbers = [field.name for field in fields if field.type is float]
     others = [field.name for field in fields if field.type is not float]

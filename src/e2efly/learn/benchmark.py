@@ -1,4 +1,4 @@
-"""Rates of the three layers, each in one compiled loop: physics, environment, training."""
+"""Simulation rates of the three layers (physics, environment, training), each measured in one compiled loop."""
 
 import dataclasses
 import time
@@ -21,9 +21,10 @@ from e2efly.vehicles.vehicle import quantities
 
 
 def physics_substeps(vehicles: int, calls: int = 200, general: bool = False) -> float:
-    """Physics sub-steps/s of VIS-R under CTBR commands: 10 sub-steps of 5 ms a call, all in one scan.
+    """Physics sub-steps per second of VIS-R under CTBR commands: 10 sub-steps of 5 ms per call, all in one scan.
 
-    `general`: every parameter of every vehicle is a number of its own; else they are constants of the program.
+    With `general`, every vehicle has its own value of every parameter. Otherwise the parameters are constants of the
+    program.
     """
     vehicle = load_vehicle("vis_r")
     physics = Physics.of(vehicle, control_rate=20.0)
@@ -47,7 +48,9 @@ def physics_substeps(vehicles: int, calls: int = 200, general: bool = False) -> 
 
 
 def environment_steps(task: str, envs: int, steps: int = 200, env_config: EnvConfig | None = None) -> float:
-    """Environment steps/s with random actions, everything included: latency, reward, new starts, randomisation."""
+    """Environment steps per second with random actions. Everything is included: latency, reward, new starts,
+    randomisation.
+    """
     config = presets.preset(task, "ppo")
     env_config = env_config or dataclasses.replace(config.env, randomize={"mass": 0.1, "motor_time_constant": 0.1})
     env = Env.of(config.task, config.reward, env_config)
@@ -74,13 +77,14 @@ _OWN = (
     "drag_quadratic",
 )  # fmt: skip
 GENERAL = dict.fromkeys(_OWN, 0.1)
-"""What makes every vehicle's flight its own: shares by which parameters are drawn anew in every episode."""
+"""Relative ranges of the parameters that are drawn anew in every episode, so that every vehicle is different."""
 
 
 def training_steps(task: str, algo: str, wide: bool = False, general: bool = False) -> float:
-    """Environment steps/s of training by a preset.
+    """Environment steps per second of training with a preset.
 
-    `wide`: 100 environments, horizon 96, networks of 192 and 96. `general`: vehicles with parameters of their own.
+    With `wide`: 100 environments, horizon 96, networks with 192 and 96 units. With `general`: every vehicle has its own
+    parameters.
     """
     config = presets.preset(task, algo)
     if general:
@@ -103,7 +107,7 @@ def training_steps(task: str, algo: str, wide: bool = False, general: bool = Fal
 
 
 def best_rate(count: int, run: Callable[[], Any], rounds: int = 9) -> float:
-    """`count` over the shortest time of `run`, after one run that compiles."""
+    """`count` divided by the shortest time of `run`, after one call that compiles."""
     run()
     times = []
     for _ in range(rounds):

@@ -1,8 +1,8 @@
 """Back-propagation through time: gradient ascent on the return, through physics, latency and policy.
 
-Each update rolls a window of the deterministic policy and follows the exact gradient of its discounted reward. The
-state carries over to the next window, detached; a new start inside a window cuts the gradient by itself, as it does
-not depend on what came before.
+Each update simulates a window of steps with the deterministic policy and follows the exact gradient of its discounted
+reward. The next window continues from the state at the end of this one, without its gradient. A new start inside a
+window cuts the gradient by itself, because it does not depend on earlier steps.
 """
 
 from dataclasses import dataclass
@@ -35,9 +35,9 @@ class Parameters:
     """What BPTT learns."""
 
     policy: Weights
-    """What is judged and shipped: what learns, or its running mean (`BPTTConfig.average`)."""
+    """The weights that are judged and shipped: those of `learner`, or their running mean (`BPTTConfig.average`)."""
     learner: Weights
-    """What flies the windows and takes the steps."""
+    """The weights that fly the windows and take the gradient steps."""
 
 
 class BPTT(Algorithm):
@@ -66,7 +66,7 @@ class BPTT(Algorithm):
         policy = learner
         if config.average is not None:
             count = optax.tree_utils.tree_get(optimizer, "count").astype(jnp.float32)
-            share = jnp.minimum(config.average, 1 - 1 / count)  # of few policies, their plain mean
+            share = jnp.minimum(config.average, 1 - 1 / count)  # with few policies, their plain mean
             policy = jax.tree.map(lambda a, b: b + share * (a - b), old.policy, learner)
         metrics |= {"loss/gradient_norm": norm, **norms}
         return end.into(state, parameters=Parameters(policy, learner), optimizer=optimizer), metrics

@@ -1,7 +1,7 @@
-"""What a run takes: memory and environment steps, by the options that decide them.
+"""Resources that a run needs: memory and environment steps, by the options that determine them.
 
-The constants are those of XLA's own account of the compiled programs of hover, avoid and race_clutter by all
-algorithms, within a factor of two.
+The constants agree, within a factor of two, with XLA's own figures for the compiled programs of hover, avoid and
+race_clutter with all algorithms.
 """
 
 from itertools import pairwise
@@ -14,22 +14,22 @@ from e2efly.env import Env
 from e2efly.learn.networks import Actor
 
 LARGEST = 2**31 - 1
-"""What the programs count with: int32."""
+"""Largest number that the programs can count to: they count with int32."""
 
 
 def check_run(config: TrainConfig, env: Env, actor: Actor, updates: int, judged: int, members: int = 1) -> None:
-    """Refuse a run that does not fit into the machine, that nobody can wait for, or that int32 cannot count.
+    """Refuse a run that does not fit into the machine's memory, that takes too long, or whose numbers exceed int32.
 
     Args:
-        config: the run; its numbers make sense one by one.
+        config: the run. Each of its numbers has already been checked by itself.
         env: its environment.
         actor: its policy.
-        updates: of the whole run.
-        judged: control steps of an evaluation of one start: of all criteria together.
-        members: runs that are trained together.
+        updates: updates of the whole run.
+        judged: control steps to evaluate one start with all criteria.
+        members: number of runs that are trained together.
 
     Raises:
-        ValueError: naming the options, what they take and what is accepted.
+        ValueError: naming the options, what they need and what is accepted.
     """
     check_memory(run_memory(config, env, actor, members), _memory())
     check_time({name: members * steps / FASTEST for name, steps in run_steps(config, updates, judged).items()})
@@ -43,7 +43,9 @@ def check_run(config: TrainConfig, env: Env, actor: Actor, updates: int, judged:
 
 
 def run_memory(config: TrainConfig, env: Env, actor: Actor, members: int = 1) -> dict[str, float]:
-    """Bytes that a run takes, by the options that decide them; low, by a factor of two at most."""
+    """Memory that a run needs, in bytes, by the options that determine it. The estimate is low by a factor of two at
+    most.
+    """
     algo, network, features = config.algo, config.network, float(actor.features.size)
     units = float(sum(network.hidden) + sum(network.encoder) * len(env.cameras) + 4 * network.recurrent)
     worlds = {name: getattr(config.task, name, None) for name in ("forest", "clutter")}
@@ -73,7 +75,7 @@ def run_memory(config: TrainConfig, env: Env, actor: Actor, members: int = 1) ->
 
 
 def run_steps(config: TrainConfig, updates: int, judged: int) -> dict[str, float]:
-    """Environment steps, and samples of gradient steps, of a whole run, by the options that decide them."""
+    """Environment steps of a whole run, with the samples of its gradient steps, by the options that determine them."""
     algo = config.algo
     samples, learning = algo.fitted()
     flown = f"eval_episodes is {config.eval_episodes}, task.episode_s {config.task.episode_s}"
@@ -84,7 +86,7 @@ def run_steps(config: TrainConfig, updates: int, judged: int) -> dict[str, float
 
 
 def _weights(actor: Actor) -> float:
-    """Numbers of a policy; a critic has as many."""
+    """Number of weights of a policy. A critic has about as many."""
     network, count = actor.network, 0.0
     size = actor.features.state_size + len(actor.features.views) * (network.encoder or (0,))[-1]
     for view in actor.features.views:
@@ -102,7 +104,7 @@ def _layers(sizes: tuple[int, ...]) -> float:
 
 
 def _memory() -> float:
-    """Bytes that JAX's devices have together; cores share the machine's."""
+    """Memory of all JAX devices together, in bytes. The cores of a CPU share the memory of the machine."""
     if jax.default_backend() == "cpu":
         return machine_memory()
     limits = [(device.memory_stats() or {}).get("bytes_limit", 0) for device in jax.local_devices()]

@@ -1,4 +1,4 @@
-"""Checkpoints: one safetensors file, written atomically, checked when read. No pickle."""
+"""Checkpoints: one safetensors file, written atomically and checked when it is read. No pickle."""
 
 import json
 import zlib
@@ -14,18 +14,18 @@ from e2efly.env import is_key, key_of, numbers_of
 from e2efly.storage import finite, write_atomically
 
 FORMAT = 2
-"""Version of what a checkpoint holds and of how a run goes on from it."""
+"""Version of the content of a checkpoint and of the way in which a run continues from it."""
 
 
 def save_checkpoint(path: Path, tree: Any, about: dict[str, Any]) -> None:
-    """Write the leaves of a tree, and what `about` says of them, as JSON."""
+    """Write the leaves of a tree, and the description `about` as JSON."""
     arrays = _arrays(tree)
     header = {**about, "format": FORMAT, "crc32": _checksum(arrays)}
     write_atomically(path, save(arrays, {"about": json.dumps(finite(header), allow_nan=False)}))
 
 
 def read_about(path: Path) -> dict[str, Any]:
-    """What a checkpoint says of itself.
+    """The description stored in a checkpoint.
 
     Raises:
         ValueError: when the file is missing, truncated or of another format.
@@ -58,10 +58,10 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def load_checkpoint(path: Path, like: Any) -> Any:
-    """Read a tree of the structure, shapes and types of `like`.
+    """Read a tree that has the structure, shapes and types of `like`.
 
     Raises:
-        ValueError: when the file is missing, truncated, damaged, or of another structure.
+        ValueError: when the file is missing, truncated, damaged, or has another structure.
     """
     arrays = read_arrays(path)
     leaves, structure = jax.tree_util.tree_flatten_with_path(like)

@@ -1,4 +1,4 @@
-"""What a run takes of the machine: time since the process began, imports included, and memory."""
+"""Resources that a run uses: time since the start of the process (imports included), and memory."""
 
 import os
 import resource
@@ -9,7 +9,9 @@ _IMPORTED = time.time()
 
 
 def since_process_start() -> float:
-    """Seconds since the operating system started this process (where it does not tell: since this was imported)."""
+    """Seconds since the operating system started this process. If the system does not report this, seconds since this
+    module was imported.
+    """
     try:
         with open("/proc/self/stat", encoding="ascii") as file:
             ticks = float(file.read().rsplit(")", 1)[1].split()[19])

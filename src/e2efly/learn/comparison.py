@@ -1,4 +1,4 @@
-"""Runs side by side: what they were asked, what came of them, and how they got there."""
+"""Comparison of runs: their options, their results, and the course of their training."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from e2efly.learn.judge import worst_success
 from e2efly.learn.rundir import RunDirectory, to_json
 
 GOOD = 0.99
-"""The success of an evaluation at which a run counts as there."""
+"""Success rate of an evaluation at which a run counts as successful."""
 
 
 @dataclass(frozen=True)
@@ -20,24 +20,24 @@ class Compared:
     """One run."""
 
     path: Path
-    """Its folder."""
+    """Folder of the run."""
     options: dict[str, Any]
-    """Its configuration, by dotted name."""
+    """Configuration of the run, by dotted name."""
     steps: Float[np.ndarray, " t"]
     """Environment steps at each evaluation."""
     seconds: Float[np.ndarray, " t"]
-    """Since the start of the process, of all processes of the run together."""
+    """Time since the start of the process at each evaluation, s. For a resumed run, summed over all its processes."""
     success: Float[np.ndarray, " t"]
-    """Of the worst criterion."""
+    """Success rate of the worst criterion at each evaluation."""
     summary: dict[str, Any] | None
-    """What the run said of itself at its end; None: it has not ended."""
+    """The summary that the run wrote at its end. None: it has not ended."""
 
     @staticmethod
     def of(path: Path) -> "Compared":
         """Read a run.
 
         Raises:
-            ValueError: when the folder holds no run, or one of another version.
+            ValueError: when the folder holds no run, or a run of another version.
         """
         run = RunDirectory(path)
         options = dict(_flat(to_json(run.config())))
@@ -49,25 +49,27 @@ class Compared:
 
     @property
     def there(self) -> tuple[float, float] | None:
-        """Environment steps and seconds at the first evaluation with `GOOD`; None: there was none."""
+        """Environment steps and seconds at the first evaluation with at least `GOOD`. None: there was none."""
         found = np.flatnonzero(self.success >= GOOD)
         return (float(self.steps[found[0]]), float(self.seconds[found[0]])) if len(found) else None
 
     @property
     def shipped(self) -> float | None:
-        """Success of the policy that is shipped, on the vehicles of the training; None: the run has not ended."""
+        """Success rate of the shipped policy with the vehicles of the training. None: the run has not ended."""
         return None if self.summary is None else worst_success(self.summary["shipped"])
 
 
 def differing(runs: Sequence[Compared]) -> dict[str, list[Any]]:
-    """The options in which runs differ, by dotted name: the value of each run; None where it has no such option."""
+    """The options in which runs differ, by dotted name, with the value of each run. The value is None if a run has no
+    such option.
+    """
     names = dict.fromkeys(name for run in runs for name in run.options)
     columns = {name: [run.options.get(name) for run in runs] for name in names}
     return {name: column for name, column in columns.items() if any(value != column[0] for value in column)}
 
 
 def table(runs: Sequence[Compared]) -> list[dict[str, str]]:
-    """A row per run, as text."""
+    """One row per run, as text."""
     different = differing(runs)
     rows = []
     for i, run in enumerate(runs):

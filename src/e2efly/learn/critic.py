@@ -1,4 +1,4 @@
-"""What critics share: what they are fed, and estimates of what follows."""
+"""Code shared by the critics: their inputs, and estimates of the reward that follows."""
 
 import jax
 import jax.numpy as jnp
@@ -10,12 +10,12 @@ from e2efly.learn.networks import Actor, Layers, init_mlp, mlp
 
 
 def init_critic(rng: np.random.Generator, actor: Actor, env: Env) -> Layers:
-    """A fresh value network of the policy's hidden layers, made by NumPy."""
+    """A fresh value network with the same hidden layers as the policy, made with NumPy."""
     return init_mlp(rng, (actor.features.state_size + env.privileged_size, *actor.network.hidden, 1), 1.0)
 
 
 def critic_input(actor: Actor, observation: Float[Array, "n o"], privileged: Float[Array, "n p"]) -> Array:
-    """The features of an observation and, where there are cameras, of the true scene (`Env.privileged`): (n, c)."""
+    """The features of an observation and, with cameras, the true scene (`Env.privileged`): (n, c)."""
     seen = actor.features.of_state(observation)
     return jnp.concatenate([seen, privileged], axis=-1) if privileged.shape[-1] else seen
 
@@ -34,14 +34,15 @@ def gae(
     gamma: float | Array,
     lam: float | Array,
 ) -> Float[Array, "t n"]:
-    """Generalised advantage estimate (Schulman et al. 2016); plus `value` it is the TD(lambda) return.
+    """Generalised advantage estimate (Schulman et al. 2016). The estimate plus `value` is the TD(lambda) return.
 
     Args:
-        reward: of each step.
-        value: of the observation acted on.
-        next_value: of the observation reached, before any new start.
-        terminated: the step ended the episode for good: nothing follows.
-        done: the step ended the episode, also by time-out: the sum stops, the bootstrap stays.
+        reward: reward of each step.
+        value: value of the observation before the step.
+        next_value: value of the observation after the step, before any new start.
+        terminated: whether the step terminated the episode. No reward follows.
+        done: whether the step ended the episode, by termination or by time-out. The sum over later steps stops. After a
+            time-out, the bootstrap with `next_value` remains.
         gamma: discount.
         lam: lambda.
     """

@@ -1,4 +1,4 @@
-"""Curricula: stages of a run whose environments differ in numbers alone, so that nothing is compiled again."""
+"""Curricula: stages of a run whose environments differ only in numbers, so that nothing has to be compiled again."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ from e2efly.env import Env
 
 @dataclass(frozen=True)
 class Stage:
-    """What is trained on until the promotion, and what that is judged by."""
+    """The environment that is trained on until the promotion, and the environments that decide about the promotion."""
 
     env: Env
     judges: dict[str, Env]
     """The environments of the evaluation, by the name of their criterion."""
     config: StageConfig | None
-    """None: the last stage, the task itself."""
+    """Configuration of the stage. None: the last stage, which is the task itself."""
 
     def is_over(self, success: float, steps: int) -> bool:
-        """Whether the next stage comes.
+        """Whether this stage ends and the next one begins.
 
         Args:
-            success: of the last evaluation in this stage.
+            success: success rate of the last evaluation in this stage.
             steps: environment steps since the stage began.
         """
         if self.config is None:
@@ -38,7 +38,7 @@ def stages(config: TrainConfig) -> tuple[Stage, ...]:
     """The stages of a run: those of the curriculum, then the task itself.
 
     Raises:
-        ValueError: naming the stage, what it is and what is accepted.
+        ValueError: naming the stage, its value and what is accepted.
     """
     last = _stage(config, config.task, None)
     shape = _shape(last)
@@ -67,7 +67,7 @@ def changed(config: Any, path: str, value: Any, where: str) -> Any:
     """A configuration with another value at a dotted path.
 
     Raises:
-        ValueError: when there is no such field, or its value is of another kind.
+        ValueError: when there is no such field, or when its value has another type or shape.
     """
     name, _, rest = path.partition(".")
     fields = getattr(config, "__dataclass_fields__", {})
@@ -89,6 +89,6 @@ def _stage(config: TrainConfig, task: TaskConfig, stage: StageConfig | None) -> 
 
 
 def _shape(stage: Stage) -> Any:
-    """What decides which program runs."""
+    """The structure, shapes and types that decide which program runs."""
     leaves, structure = jax.tree.flatten((stage.env, list(stage.judges.values())))
     return structure, [(np.shape(x), np.asarray(x).dtype) for x in leaves]

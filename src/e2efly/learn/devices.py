@@ -1,8 +1,9 @@
-"""The environments of a run, shared out among the devices: one program, each device on its part.
+"""Distribution of the environments of a run among the devices: one program, and each device works on its part.
 
-Within a program made by `on_each` every device has environments, random numbers and a replica of the parameters of its
-own; gradients and metrics are averaged over the axis `AXIS`. The cores of a CPU count as devices: two threads that each
-step their own vehicles take half the time, while two that share every small array operation take longer than one.
+Inside a program made by `on_each`, every device has its own environments, its own random numbers and its own copy of
+the parameters. Gradients and metrics are averaged over the axis `AXIS`. The cores of a CPU count as devices: two
+threads that each step their own vehicles take half the time, while two threads that share every small array operation
+take longer than one.
 """
 
 from collections.abc import Callable
@@ -18,21 +19,22 @@ from e2efly.env import is_key, key_of, numbers_of
 AXIS = "devices"
 """Name of the axis over which a program may take means and sums."""
 SAME, OWN = PartitionSpec(), PartitionSpec(AXIS)
-"""A value that every device has, and one whose leading axis is shared out."""
+"""`SAME`: a value that is the same on every device. `OWN`: a value whose leading axis is divided among the devices."""
 LEAST = 32
-"""Environments that a device should have at least."""
+"""Minimum number of environments that a device should have."""
 
 
 def share(envs: int, minibatch: int | None, asked: int | None) -> int:
-    """How many devices to share `envs` environments among: as many as divide the work, each with `LEAST` or more.
+    """The number of devices among which to divide `envs` environments: the largest number that divides the work evenly
+    and gives each device `LEAST` environments or more.
 
     Args:
         envs: environments of the run.
-        minibatch: samples of a gradient step, where there are minibatches.
-        asked: what the user wants; None: as many as there are.
+        minibatch: samples of a gradient step, if the algorithm has minibatches.
+        asked: the number that the user requests. None: as many as possible.
 
     Raises:
-        ValueError: when so many are not to be had or do not divide the work.
+        ValueError: when so many devices are not available or do not divide the work.
     """
 
     def divides(count: int) -> bool:
@@ -53,7 +55,7 @@ def share(envs: int, minibatch: int | None, asked: int | None) -> int:
 
 
 def mesh(count: int, axis: str = AXIS) -> Mesh:
-    """The first devices of each process, `count` in all."""
+    """A mesh of the first devices of each process, `count` devices in total."""
     each, hosts = count // jax.process_count(), range(jax.process_count())
     chosen = [d for host in hosts for d in [d for d in jax.devices() if d.process_index == host][:each]]
     return jax.make_mesh((count,), (axis,), axis_types=(AxisType.Auto,), devices=chosen)
@@ -71,13 +73,13 @@ def on_each(
     """`function`, compiled to run on each of `count` devices.
 
     Args:
-        function: of the device's own parts; it may use collectives over `AXIS`.
-        count: devices.
-        takes: `SAME` or `OWN` for each argument (a tree of them for the parts of one).
+        function: a function of the device's own parts. It may use collectives over `AXIS`.
+        count: number of devices.
+        takes: `SAME` or `OWN` for each argument, or a tree of them for the parts of an argument.
         returns: the same for the result.
-        donate: arguments whose memory the result may take.
-        axis: name of the devices' axis, `AXIS` where what they hold belongs together.
-        vehicles: how many a device steps together, where it is known: see `e2efly.device.wide_vectors`.
+        donate: arguments whose memory the result may use.
+        axis: name of the axis of the devices: `AXIS` if their parts belong to one run.
+        vehicles: number of vehicles that a device steps together, if known. See `e2efly.device.wide_vectors`.
     """
     takes, returns = (
         jax.tree.map(lambda place: SAME if place == SAME else PartitionSpec(axis), x) for x in (takes, returns)
@@ -94,7 +96,7 @@ def shardings(places: Any, count: int, axis: str = AXIS) -> Any:
 
 
 def placed(tree: Any, count: int) -> Any:
-    """A tree from the host, with the leading axis of every leaf shared out."""
+    """A tree from the host, with the leading axis of every leaf divided among the devices."""
 
     def put(x: Any) -> jax.Array:
         return key_of(put(np.asarray(numbers_of(x)))) if is_key(x) else jax.device_put(x, shardings(OWN, count))
@@ -103,10 +105,10 @@ def placed(tree: Any, count: int) -> Any:
 
 
 def own(tree: Any) -> Any:
-    """The device's part of a tree whose leaves have one entry a device."""
+    """The device's part of a tree whose leaves have one entry per device."""
     return jax.tree.map(lambda x: x[0], tree)
 
 
 def stacked(tree: Any) -> Any:
-    """The device's part with the leading axis that `own` takes off."""
+    """The device's part, with the leading axis that `own` removes."""
     return jax.tree.map(lambda x: x[None], tree)

@@ -1,7 +1,7 @@
-"""TensorBoard's events, written in the thread that has them.
+"""TensorBoard events, written in the calling thread.
 
-A thread of the writer's own, as tensorboardX's `SummaryWriter` has, dies of a full disk with a traceback, and whoever
-hands it more then waits for ever.
+tensorboardX's `SummaryWriter` writes in its own thread. If the disk is full, that thread ends with a traceback, and the
+next call that hands it an event waits for ever.
 """
 
 import sys
@@ -26,11 +26,11 @@ def event_file(folder: Path, first: int) -> Iterator[Callable[[Mapping[str, floa
     """A new file of events.
 
     Args:
-        folder: where.
-        first: step from which on events of earlier files are void.
+        folder: the folder of the file.
+        first: step from which on the events of earlier files are no longer valid.
 
     Yields:
-        Writes numbers by name, at a step.
+        A function that writes numbers by name, at a step.
 
     Raises:
         OSError: naming the folder, when it cannot be written.
@@ -52,7 +52,7 @@ def event_file(folder: Path, first: int) -> Iterator[Callable[[Mapping[str, floa
         yield write
     finally:
         if writer is not None:
-            with suppress(OSError):  # what was whole is written
+            with suppress(OSError):  # complete events are already written
                 writer.close()
 
 

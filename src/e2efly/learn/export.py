@@ -26,7 +26,7 @@ from e2efly.vehicles import load_family, nominal_vehicle
 from e2efly.vehicles.vehicle import quantities, terms
 
 OPSET, IR_VERSION = 17, 8
-"""Old enough for the ONNX Runtime of any companion computer in use."""
+"""Versions that are old enough for the ONNX Runtime of any companion computer in use."""
 
 
 def contract_of(env: Env, config: TrainConfig) -> Contract:
@@ -34,10 +34,10 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
 
     Args:
         env: the environment that the policy was trained in.
-        config: the run's; its `env` is what `env` was built from, and has the exact numbers.
+        config: configuration of the run. `env` was built from its field `env`, which has the exact numbers.
 
     Raises:
-        ValueError: when `env` was not built from `config.env` and the vehicle as it is now, naming the field.
+        ValueError: when `env` was not built from `config.env` and the current vehicle file, naming the field.
     """
     about, physics = config.env, env.physics
     vehicle, mode, family = (
@@ -80,7 +80,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
 
 
 def images_of(actor: Actor, control_rate: float) -> tuple[Image, ...]:
-    """What the contract says of the images of a policy that is asked so many times a second."""
+    """The images of a policy as described in the contract, for a policy called at this control rate, Hz."""
     return tuple(_image(f"image_{i}", view, control_rate) for i, view in enumerate(actor.features.views))
 
 
@@ -132,14 +132,14 @@ def _image(name: str, view: View, control_rate: float) -> Image:
 def export_policy(path: Path, weights: Weights, actor: Actor, contract: Contract) -> None:
     """Write a policy as ONNX with its digest, atomically: float32 `observation` (n, o) -> `action` (n, 4) in [-1, 1].
 
-    A policy with cameras has an input `image_0`, ... for each, (n, h, w) or (n, h, w, 3): what the camera measures. One
-    with a GRU has `memory` (n, k) -> `next_memory` (n, k).
+    A policy with cameras has one input `image_0`, ... for each camera: its image, (n, h, w) or (n, h, w, 3). A policy
+    with a GRU also has `memory` (n, k) -> `next_memory` (n, k).
 
     Args:
-        path: where to.
-        weights: what was learned.
-        actor: the policy's shape; its features are made of observation and images inside the graph.
-        contract: what the file says of itself.
+        path: the file to write.
+        weights: the learned weights.
+        actor: the structure of the policy. The graph computes its features from the observation and the images.
+        contract: the contract that is stored in the file.
 
     Raises:
         ValueError: naming what does not fit together: weights, actor or contract.
@@ -178,19 +178,19 @@ def write_policy(path: Path, graph: onnx.GraphProto, contract: Contract) -> None
 
 
 def parity(path: Path, weights: Weights, actor: Actor, count: int = 10_000, seed: int = 0) -> float:
-    """The largest absolute difference between an exported policy and the one it was exported from.
+    """The largest absolute difference between the actions of an exported policy and those of the original policy.
 
-    Both act on random observations and images; a GRU, from random memories.
+    Both act on random observations and images. A GRU also starts from random memories.
 
     Args:
-        path: the `policy.onnx`, run as on the vehicle.
+        path: the `policy.onnx`, run in the same way as on the vehicle.
         weights: as for `export_policy`.
         actor: as for `export_policy`.
-        count: how many random observations.
-        seed: of the observations.
+        count: number of random observations.
+        seed: seed of the observations.
 
     Returns:
-        The difference of actions, whose range is [-1, 1].
+        The largest difference of the actions, whose range is [-1, 1].
     """
     rng, exported = np.random.default_rng(seed), load_policy(path)
     observation = random_observations(rng, actor.features.fields, count)
@@ -206,7 +206,7 @@ def parity(path: Path, weights: Weights, actor: Actor, count: int = 10_000, seed
 
 
 def _check(weights: Weights, actor: Actor) -> None:
-    """Every array as the policy's shape says, and finite."""
+    """Check that every array has the shape that the policy needs and is finite."""
     if actor.network.activation not in OPERATORS:
         raise ValueError(f"activation is {actor.network.activation!r}; accepted: {', '.join(OPERATORS)}")
     wanted = _arrays(actor.init(np.random.default_rng(0), np.zeros(4)))
@@ -221,12 +221,12 @@ def _check(weights: Weights, actor: Actor) -> None:
 
 
 def _arrays(weights: Weights) -> dict[str, np.ndarray]:
-    """By place: .head[0][1] is the bias of the head's first layer."""
+    """The arrays by their path: .head[0][1] is the bias of the first layer of the head."""
     return {jax.tree_util.keystr(at): np.asarray(x) for at, x in jax.tree_util.tree_leaves_with_path(weights)}
 
 
 def _same(name: str, has: Any, wanted: Any) -> None:
-    """Equal, up to the rounding of the environment's type."""
+    """Check that two values are equal, up to the rounding of the environment's number type."""
     if has is None or wanted is None:
         same = has is wanted
     else:
@@ -240,5 +240,5 @@ def _floats(values: Any) -> tuple[float, ...]:
 
 
 def _decimals(values: Any) -> tuple[float, ...]:
-    """The shortest decimal numbers that round to these, so that 0.03 in float32 reads 0.03."""
+    """The shortest decimal numbers that round to these values, so that 0.03 in float32 is written as 0.03."""
     return tuple(float(str(value)) for value in np.asarray(values))

@@ -1,9 +1,9 @@
-"""PPO refined by first-order gradients: what noise explores is followed by the exact gradient of the same flights.
+"""PPO refined by first-order gradients: exploration with noise, then the exact gradient of the same flights.
 
-A rollout of the policy with noise is differentiated through physics, latency and policy. Its samples go through PPO's
-epochs, which find ways that no gradient points to (round a tumble, past an event); then the policy takes one step along
-the exact gradient of the rollout's reward and of the critic's value of where it ends, which says precisely how to fly
-what was found.
+A rollout of the policy with noise is differentiated through physics, latency and policy. PPO's epochs learn from its
+samples. They find solutions that no gradient points to (avoiding a tumble, passing an event). The policy then takes one
+step along the exact gradient of the rollout's reward and of the critic's value of the state where the rollout ends.
+This step refines the solution that was found.
 """
 
 import dataclasses
@@ -26,13 +26,13 @@ class FOPPO(PPO):
     """PPO refined by first-order gradients; see the module."""
 
     def optimizer(self, config: FOPPOConfig, parameters: Parameters) -> dict[str, Any]:
-        """Adam's initial states, of PPO's epochs and of the exact gradient."""
+        """The initial states of Adam for PPO's epochs and for the exact gradient."""
         return {"epochs": adam_state(config, parameters), "exact": adam_state(config, parameters.policy)}
 
     def update(
         self, env: Env, config: FOPPOConfig, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[TrainState, dict[str, Array]]:
-        """A rollout and its exact gradient, PPO's epochs over it, then a step along the gradient."""
+        """A rollout and its exact gradient, PPO's epochs over its samples, then one step along the gradient."""
         key, noise_key, epoch_key = jax.random.split(state.key, 3)
         learned, rate, adam = state.parameters, annealed(config, progress), state.optimizer
 
@@ -56,7 +56,9 @@ class FOPPO(PPO):
         key: PRNGKeyArray,
         progress: Float[Array, ""],
     ) -> tuple[dict[str, Array], Any]:
-        """What the rollout gains, with gradient; and where it ends, the samples and the metrics, without."""
+        """The gain of the rollout, with its gradient. Then the end of the rollout, the samples and the metrics, without
+        gradient.
+        """
         n = state.observation.shape[0]
         noise, cuts = jax.random.normal(key, (config.horizon, n, 4)), gradient_cuts(config, progress)
 

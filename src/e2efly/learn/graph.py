@@ -1,4 +1,4 @@
-"""The ONNX graph of a policy: `e2efly.learn.networks` again, in ONNX's operators."""
+"""The ONNX graph of a policy: the computations of `e2efly.learn.networks` as ONNX operators."""
 
 from typing import Any
 
@@ -11,31 +11,31 @@ from e2efly.learn.networks import FAINTEST, NEAREST, Actor, Features, Gru, Layer
 from e2efly.sensors.eyes import image_shape
 
 OPERATORS = {"relu": "Relu", "tanh": "Tanh", "elu": "Elu"}
-"""Activations by name."""
+"""ONNX operators of the activations, by name."""
 _PAIRS = ("xx", "yy", "zz", "xy", "xz", "yz", "wx", "wy", "wz")
 _R_WORLD_BODY = ("-yy-zz", "+xy-wz", "+xz+wy", "+xy+wz", "-xx-zz", "+yz-wx", "+xz-wy", "+yz+wx", "-xx-yy")
-"""Row by row, half of R_world_body less the identity, as sums of products of quaternion entries."""
+"""(R_world_body - identity) / 2, row by row, as sums of products of quaternion entries."""
 
 
 class _Graph:
-    """Nodes and constants as they come."""
+    """Collects the nodes and the constants of a graph."""
 
     def __init__(self) -> None:
         self.nodes: list[onnx.NodeProto] = []
         self.constants: dict[str, np.ndarray] = {}
 
     def node(self, operator: str, inputs: list[str], output: str, **attributes: Any) -> str:
-        """The name of the output."""
+        """Add a node and return the name of its output."""
         self.nodes.append(helper.make_node(operator, inputs, [output], **attributes))
         return output
 
     def constant(self, name: str, value: Any) -> str:
-        """Its name."""
+        """Add a constant and return its name."""
         self.constants[name] = np.asarray(value, order="C")
         return name
 
     def layers(self, layers: Layers, source: str, operators: list[str], target: str, prefix: str = "") -> str:
-        """Layers, each with its activation; `target` is what comes out of the last."""
+        """Add layers, each with its activation. `target` is the name of the last layer's output."""
         for i, ((weight, bias), operator) in enumerate(zip(layers, operators, strict=True)):
             named = [self.constant(f"{prefix}weight_{i}", weight), self.constant(f"{prefix}bias_{i}", bias)]
             linear = self.node("Gemm", [source, *named], f"{prefix}linear_{i}")
@@ -43,12 +43,12 @@ class _Graph:
         return source
 
     def clip(self, source: str, most: float, target: str) -> str:
-        """Clipped to [-most, most]."""
+        """Add a node that clips `source` to [-most, most]."""
         ends = [self.constant(f"{target}_{side}", np.float32(sign * most)) for side, sign in (("low", -1), ("high", 1))]
         return self.node("Clip", [source, *ends], target)
 
     def whole(self, inputs: dict[str, tuple[int, ...]], outputs: dict[str, tuple[int, ...]]) -> onnx.GraphProto:
-        """All of it, of inputs and outputs of these shapes behind the batch axis."""
+        """The complete graph. The shapes of inputs and outputs are given without the batch axis, which comes first."""
         taken, given = (
             [helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", *shape]) for name, shape in shapes.items()]
             for shapes in (inputs, outputs)
@@ -61,7 +61,7 @@ def policy_graph(weights: Weights, actor: Actor, images: list[str]) -> onnx.Grap
     """The graph of a policy.
 
     Args:
-        weights: float32, as the actor's shape says.
+        weights: float32 weights that match the structure of the actor.
         actor: features, encoders, GRU and head.
         images: the name of each camera's input.
     """
@@ -87,14 +87,15 @@ def perceptron_graph(
     raw: bool = False,
     normal: tuple[np.ndarray, np.ndarray, float] | None = None,
 ) -> onnx.GraphProto:
-    """The graph of a multilayer perceptron that another framework has learned; its actions are clipped to [-1, 1].
+    """The graph of a multi-layer perceptron that another framework has learned. Its actions are clipped to [-1, 1].
 
     Args:
-        features: that it was shown.
+        features: the features that it was given in training.
         layers: weights (in, out) and biases (out,), float32.
-        operators: ONNX's operator behind each layer, such as Tanh or Identity.
-        raw: whether it was shown the observation itself rather than its features.
-        normal: mean and standard deviation by which its input is normalised, and where that is clipped.
+        operators: the ONNX operator after each layer, such as Tanh or Identity.
+        raw: whether it was given the observation itself instead of the features.
+        normal: mean and standard deviation with which its input is normalised, and the limit to which the normalised
+            input is clipped.
     """
     graph, source = _Graph(), INPUT
     if not raw:
@@ -110,7 +111,7 @@ def perceptron_graph(
 
 
 def _encoded(graph: _Graph, name: str, view: View, layers: Layers, operator: str) -> str:
-    """What the encoder makes of an image, with the channels before the rows as ONNX has them: `View`."""
+    """Add the encoder of an image (see `View`), with the channels before the rows, as ONNX requires."""
     c = view.camera
 
     def at(what: str) -> str:
@@ -158,7 +159,7 @@ def _encoded(graph: _Graph, name: str, view: View, layers: Layers, operator: str
 
 
 def _remembered(graph: _Graph, cell: Gru, source: str) -> str:
-    """The next memory: `Gru`, gate by gate. ONNX's own operator ends the process on an empty batch."""
+    """Add the next memory: `Gru`, gate by gate. ONNX's own GRU operator crashes the process for an empty batch."""
     names = {f"gru_{name}": value for name, value in vars(cell).items()}
     weight, recurrent, bias, recurrent_bias = (graph.constant(name, value) for name, value in names.items())
     graph.node("Gemm", [source, weight, bias], "gates_of_input")
@@ -177,14 +178,14 @@ def _remembered(graph: _Graph, cell: Gru, source: str) -> str:
 
 
 def _of_state(graph: _Graph, features: Features) -> None:
-    """From `observation` to `features`: `Features.of_state`."""
+    """Add the computation of `features` from `observation`, see `Features.of_state`."""
     starts = np.cumsum([0, *(field.size for field in features.fields)])
     columns = [(field, list(range(a, a + field.size))) for field, a in zip(features.fields, starts, strict=False)]
     attitude = next(where[0] for field, where in columns if field.frame == "world_body")
     vectors = [i for field, where in columns if field.frame == "world" for i in where]
     rest = [i for field, where in columns if field.frame in ("body", "none") for i in where]
-    # turned vectors, up and the rest lie side by side in `parts`; `order` puts them into the order of the fields,
-    # up, of three numbers and no scale, in the place of the attitude's first three
+    # `parts` holds the rotated vectors, the up axis and the rest side by side; `order` puts them into the order of the
+    # fields; the up axis has three numbers and no scale, and takes the place of the attitude's first three numbers
     place = {column: p for p, column in enumerate([*vectors, *range(attitude, attitude + 3), *rest])}
     order = [place[i] for _, where in columns for i in where if i in place]
     scale = [1.0 if f.frame == "world_body" else f.scale for f, where in columns for i in where if i in place]

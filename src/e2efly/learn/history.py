@@ -1,7 +1,8 @@
-"""The policies that a training went through, for those who watch it: weights alone, at even distances.
+"""Policies from the course of a training, for viewing it: only weights, at regular intervals.
 
-A run's folder `history` has a file of weights for an update, named by it. Which updates are kept depends on the
-configuration alone, so that a run that was killed and resumed ends with the same files.
+The folder `history` of a run holds one file of weights per kept update, named by the number of the update. Which
+updates are kept depends only on the configuration. A run that was killed and resumed therefore ends with the same
+files.
 """
 
 from pathlib import Path
@@ -11,7 +12,7 @@ from e2efly.learn.checkpoint import load_checkpoint, save_checkpoint
 from e2efly.learn.networks import Weights
 
 MOST = 64
-"""Policies that are kept of a run, and perhaps a last one more."""
+"""Largest number of policies that are kept of a run. The last policy can be one more."""
 _SUFFIX = ".safetensors"
 
 
@@ -19,9 +20,9 @@ def is_kept(update: int, chunk: int, updates: int) -> bool:
     """Whether the policy after an update is kept.
 
     Args:
-        update: how many updates there were.
+        update: number of updates so far.
         chunk: updates between two evaluations.
-        updates: of the whole run.
+        updates: updates of the whole run.
     """
     apart = -(-(updates // chunk) // MOST)
     return update == updates or update // chunk % apart == 0
@@ -31,20 +32,20 @@ def keep(folder: Path, update: int, weights: Weights, success: float) -> None:
     """Write the policy after an update.
 
     Args:
-        folder: `RunDirectory.history`; made where it is not there.
-        update: its number.
-        weights: of the policy.
-        success: of its evaluation.
+        folder: `RunDirectory.history`. It is created if it does not exist.
+        update: number of the update.
+        weights: weights of the policy.
+        success: success rate in the evaluation of the policy.
 
     Raises:
-        OSError: when it cannot be written.
+        OSError: when the file cannot be written.
     """
     folder.mkdir(exist_ok=True)
     save_checkpoint(folder / f"{update:08d}{_SUFFIX}", weights, {"update": update, "success": success})
 
 
 def kept(folder: Path) -> list[int]:
-    """The updates of which policies are there, in order."""
+    """The updates whose policies were kept, in order."""
     return sorted(int(path.stem) for path in folder.glob(f"*{_SUFFIX}") if path.stem.isdigit())
 
 
@@ -52,12 +53,12 @@ def policy_at(folder: Path, update: int, like: Any) -> Weights:
     """The policy after an update.
 
     Args:
-        folder: of the run's history.
-        update: one of `kept`.
+        folder: the folder of the run's history.
+        update: one of the updates that `kept` returns.
         like: weights of the same shapes.
 
     Raises:
-        ValueError: when the file is damaged, or of another network.
+        ValueError: when the file is damaged, or belongs to another network.
     """
     return load_checkpoint(folder / f"{update:08d}{_SUFFIX}", like)
 

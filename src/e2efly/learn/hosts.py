@@ -1,6 +1,7 @@
 """Processes that train together, on one machine or on several (`e2efly.device.Hosts`).
 
-Each runs the same program on devices of its own; process 0 alone reads and writes files. Alone, a process is process 0.
+Each process runs the same program on its own devices. Only process 0 reads and writes files. A process that runs alone
+is process 0.
 """
 
 import json
@@ -15,7 +16,7 @@ from e2efly.env import is_key, key_of, numbers_of
 
 
 class LostHostError(RuntimeError):
-    """Another process of the run ended, or cannot be reached any more."""
+    """Another process of the run has ended or can no longer be reached."""
 
 
 def first() -> bool:
@@ -24,7 +25,7 @@ def first() -> bool:
 
 
 def whole(tree: Any) -> Any:
-    """A tree of arrays as NumPy arrays, with the parts that are with other processes; random keys as their numbers."""
+    """A tree of arrays as NumPy arrays, with the parts held by other processes. Random keys become their numbers."""
 
     def gathered(x: Any) -> np.ndarray:
         x = numbers_of(x)
@@ -38,11 +39,11 @@ def whole(tree: Any) -> Any:
 
 
 def of_first(tree: Any, like: Any) -> Any:
-    """Process 0's arrays, in every process.
+    """The arrays of process 0, in every process.
 
     Args:
-        tree: process 0's; of no matter elsewhere.
-        like: shapes and types.
+        tree: the arrays in process 0. Ignored in other processes.
+        like: their shapes and types.
     """
     if jax.process_count() == 1:
         return tree
@@ -57,7 +58,7 @@ def of_first(tree: Any, like: Any) -> Any:
 
 
 def told(content: Any) -> Any:
-    """Process 0's JSON content, in every process."""
+    """The JSON content of process 0, in every process."""
     if jax.process_count() == 1:
         return content
     data = np.frombuffer(json.dumps(content).encode(), np.uint8) if first() else np.zeros(0, np.uint8)
@@ -66,7 +67,7 @@ def told(content: Any) -> Any:
 
 
 def any_of(flag: bool) -> bool:
-    """Whether it is so in any process."""
+    """Whether `flag` is true in any process."""
     if jax.process_count() == 1:
         return flag
     from jax.experimental.multihost_utils import process_allgather
@@ -76,14 +77,14 @@ def any_of(flag: bool) -> bool:
 
 @contextmanager
 def together() -> Iterator[None]:
-    """Name the loss of another process as what it is.
+    """Report the loss of another process by an error of its own.
 
     Raises:
         LostHostError: when a computation over all processes fails.
     """
     try:
         yield
-    except (ValueError, RuntimeError) as error:  # as JAX raises what its collectives say
+    except (ValueError, RuntimeError) as error:  # the types with which JAX reports failed collectives
         text = str(error)
         if jax.process_count() > 1 and any(word in text for word in ("Gloo", "NCCL", "oordination service")):
             raise LostHostError(

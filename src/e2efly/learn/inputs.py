@@ -1,5 +1,5 @@
-"""The files that a run is made from (vehicle, track, reference, table of a noise, first policy): named, kept, compared
-by content.
+"""The input files of a run (vehicle, track, reference, table of a noise, first policy): their names, copies of them,
+and comparison by content.
 """
 
 import dataclasses
@@ -13,7 +13,7 @@ from e2efly.courses.tracks import track_file
 from e2efly.vehicles import vehicle_file
 
 OWN_FILES = (".toml", ".csv", ".npy")
-"""Endings of names that are a user's files; other names are of files that come with the package."""
+"""Endings of names that refer to the user's files. Other names refer to files that come with the package."""
 
 
 def input_files(config: TrainConfig) -> dict[str, Path]:
@@ -34,7 +34,8 @@ def input_files(config: TrainConfig) -> dict[str, Path]:
 
 
 def by_content(config: TrainConfig) -> TrainConfig:
-    """A configuration with the content of each file in place of its path, so that two can be compared.
+    """A configuration in which a hash of the content of each file replaces its path, so that two configurations can be
+    compared.
 
     Raises:
         ValueError: when a file cannot be read.
@@ -45,14 +46,14 @@ def by_content(config: TrainConfig) -> TrainConfig:
 
 
 def value_at(tree: Any, field: str) -> Any:
-    """The value at a dotted path through nested dataclasses and tuples; None where there is no such field."""
+    """The value at a dotted path through nested dataclasses and tuples. None if there is no such field."""
     name, _, rest = field.partition(".")
     value = {str(i): x for i, x in enumerate(tree)}.get(name) if isinstance(tree, tuple) else getattr(tree, name, None)
     return value_at(value, rest) if rest else value
 
 
 def replaced(tree: Any, field: str, value: str) -> Any:
-    """Nested dataclasses and tuples with another value at a dotted path."""
+    """A copy of nested dataclasses and tuples with another value at a dotted path."""
     name, _, rest = field.partition(".")
     if isinstance(tree, tuple):
         return tuple((replaced(x, rest, value) if rest else value) if str(i) == name else x for i, x in enumerate(tree))
@@ -63,7 +64,7 @@ def content_of(path: Path) -> bytes:
     """The content of a file.
 
     Raises:
-        ValueError: naming it, when it cannot be read.
+        ValueError: naming the file, when it cannot be read.
     """
     try:
         return path.read_bytes()
@@ -72,7 +73,7 @@ def content_of(path: Path) -> bytes:
 
 
 def sha256(data: bytes) -> str:
-    """As hexadecimal digits."""
+    """The SHA-256 hash, as hexadecimal digits."""
     return hashlib.sha256(data).hexdigest()
 
 
@@ -81,13 +82,13 @@ class Kept:
     """A copy of a file, kept in a run."""
 
     copy: Path
-    """Where it is."""
+    """Path of the copy."""
     original: Path
-    """Where the file was when the run began."""
+    """Path of the file when the run began."""
     named: str
-    """What the configuration names it: a path, or what comes with the package."""
+    """Its name in the configuration: a path, or the name of a file that comes with the package."""
     sha256: str
-    """Of the content."""
+    """SHA-256 hash of the content."""
 
     @property
     def own(self) -> bool:
@@ -95,10 +96,10 @@ class Kept:
         return self.named.endswith(OWN_FILES)
 
     def usable(self) -> str:
-        """What to load: the copy; or the name of what comes with the package, where that is as it was.
+        """What to load: the copy, or, for an unchanged file of the package, its name.
 
         Raises:
-            ValueError: when the copy is missing or not as it was.
+            ValueError: when the copy is missing or has changed.
         """
         if not self.own and self._now() == self.sha256:
             return self.named
@@ -107,7 +108,7 @@ class Kept:
         return str(self.copy)
 
     def check_original(self) -> None:
-        """Refuse a user's file that is another one now. One that was moved or deleted does not matter.
+        """Refuse a user's file whose content has changed. A file that was moved or deleted is accepted.
 
         Raises:
             ValueError: naming both files and both hashes.
@@ -121,7 +122,7 @@ class Kept:
             )
 
     def _now(self) -> str | None:
-        """Hash of what stands in the original's place; None where nothing does."""
+        """Hash of the file that is now at the original's path. None if there is no readable file."""
         try:
             return sha256(self.original.read_bytes())
         except OSError:

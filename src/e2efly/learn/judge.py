@@ -1,4 +1,4 @@
-"""How good a policy is: episodes of every criterion, and what to make of them."""
+"""How good a policy is: episodes for every criterion, and their evaluation."""
 
 import math
 from functools import partial
@@ -17,16 +17,20 @@ from e2efly.learn.programs import acting
 from e2efly.learn.setup import Setup
 
 WATCHED, CONFIRMED, REPORTED = 1, 2, 3
-"""Streams of starts: those that training watches, those that a goal is met on, and the unseen ones of the report."""
+"""Streams of starts: those of the evaluations during training, those that confirm that `stop_at` is reached, and the
+unseen starts of the report."""
 LEARNED = 0.95
-"""Success by the worst criterion from which on a task counts as learned, where the user asks for no other."""
+"""Success rate of the worst criterion at which a task counts as learned, unless the user asks for another."""
 
 
 def judge(
     setup: Setup, evaluate: Any, weights: Weights, stream: int, episodes: int, judges: dict[str, Env] | None = None
 ) -> dict[str, Episodes]:
-    """Fly at least `episodes` starts of a stream in every environment of `judges`, which are the task's own where none
-    are given; NumPy arrays.
+    """Fly `episodes` starts of a stream in every environment of `judges`. If none are given, these are the task's own
+    environments.
+
+    Returns:
+        The episodes by the name of their environment, as NumPy arrays.
     """
     once = setup.config.eval_episodes
     flown = {}
@@ -38,8 +42,11 @@ def judge(
 
 
 def stressed(setup: Setup, weights: Weights, episodes: int) -> dict[str, Episodes]:
-    """Fly so many starts of every criterion, each with a vehicle, air and sensors that draw all rows of the stress at
-    once (`e2efly.env.stress`); NumPy arrays.
+    """Fly `episodes` starts for every criterion. The vehicle, the air and the sensors of each start are drawn from all
+    rows of the stress test at once (`e2efly.env.stress`).
+
+    Returns:
+        The episodes by the name of their criterion, as NumPy arrays.
     """
     rng, flown = np.random.default_rng(REPORTED), {}
     options = fast_compile() if setup.config.fast_compile else {}
@@ -63,11 +70,12 @@ def success(flown: dict[str, Episodes]) -> float:
 
 
 def score(task: TaskConfig, flown: dict[str, Episodes]) -> float:
-    """What the best policy is chosen by: success of the worst criterion; among equals, the task's `precision`.
+    """The score by which the best policy is chosen: the success rate of the worst criterion, and for equal success
+    rates the task's `precision`.
 
-    No precision counts as much as one more success among the episodes, but for a task whose precision is `pace`: there
-    each success counts by one over the time that it took (success weighted by completion time, SCT), by the geometric
-    mean of the criteria.
+    The precision always counts less than one more success among the episodes. A task whose precision is `pace` is
+    different. There each success counts as one divided by its duration (success weighted by completion time, SCT), and
+    the score is the geometric mean over the criteria.
     """
     if task.precision == "pace":
         paces = [float(np.mean(e.success / np.maximum(e.duration, 1e-3))) for e in flown.values()]
@@ -82,24 +90,25 @@ def score(task: TaskConfig, flown: dict[str, Episodes]) -> float:
 
 
 def worst_success(found: dict[str, Any]) -> float:
-    """The success rate of the worst criterion, of `shipped` or `last` in a run's summary."""
+    """The success rate of the worst criterion in `shipped` or `last` of a run's summary."""
     return min(criterion["success"] for name, criterion in found.items() if name != "update")
 
 
 def reported(summary: dict[str, Any]) -> float:
-    """The success of a run's best policy: on the vehicle of the file, and by its worst criterion."""
+    """The success rate of a run's best policy with the vehicle of the file, for the worst criterion."""
     return worst_success(summary.get("nominal", summary["shipped"]))
 
 
 def verdict(summary: dict[str, Any], stop_at: float | None) -> str:
-    """Whether a run learned its task: what `stop_at` asks for, or most of the starts of its worst criterion.
+    """A sentence that says whether a run learned its task. The success rate of the worst criterion must be at least
+    `stop_at`, or `LEARNED` if that is not given.
 
     Args:
-        summary: of the run.
-        stop_at: the success that the user asked for.
+        summary: summary of the run.
+        stop_at: the success rate that the user asked for.
     """
     what, rate = f"{summary['task']} by {summary['algorithm'].upper()}", reported(summary)
-    if stop_at:  # which was asked of the vehicles of the training
+    if stop_at:  # it applies to the vehicles of the training
         rate = worst_success(summary["shipped"])
     if summary["reached_criterion"] or rate >= (stop_at or LEARNED):
         return f"Learned {what}: {rate:.1%} success"

@@ -1,6 +1,8 @@
-"""Policy and critic: features of observation and images, encoders of the images, perhaps a GRU, then a perceptron.
+"""Policy and critic: features of the observation and the images, encoders of the images, optionally a GRU, then a
+multi-layer perceptron.
 
-The features are part of the policy and of its exported graph: observation and images stay what the vehicle measures.
+The features are part of the policy and of its exported graph. The inputs of the graph are therefore the observation and
+the images as the vehicle measures them.
 """
 
 import math
@@ -25,28 +27,30 @@ ACTIVATIONS = {"relu": jax.nn.relu, "tanh": jnp.tanh, "elu": jax.nn.elu}
 
 
 NEAREST = 0.3
-"""Encodings of depth tell nothing apart that is nearer than this, m."""
+"""Lower limit of the depth before it is encoded, m. Smaller depths have the same encoding as this one."""
 FAINTEST = 1e-2
-"""Keeps a mask that shows nothing from being divided by its mean, which is 0."""
+"""Added to the norm of a mask before the mask is divided by it, because the norm of an empty mask is 0."""
 
 
 @dataclass(frozen=True)
 class View:
-    """One camera's part of the features: its image, averaged over the cells of a grid (of depth the nearest is kept);
-    then its encoder.
+    """One camera's part of the features and its encoder. The features are its image, averaged over the cells of a grid.
+    For depth, the nearest value of each cell is kept instead.
 
-    A mask is followed by itself divided by its mean: what is far is small, and seen as clearly as what is near.
+    A mask is given twice: as it is, and divided by its norm. Far objects cover few pixels; after the division they are
+    as clear as near ones.
     """
 
     camera: CameraConfig
     rows: int
     columns: int
     patches: tuple[int, ...] = ()
-    """Sides of the patches of the encoder's convolutions."""
+    """Side lengths of the patches of the encoder's convolutions, pixels."""
 
     @staticmethod
     def of(camera: CameraConfig, network: NetworkConfig) -> "View":
-        """Check that the grid, or the convolutions, divide the image and that a network can take it.
+        """Create the view. Check that the grid or the convolutions divide the image, and that a network can use the
+        image.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.
@@ -66,22 +70,22 @@ class View:
 
     @property
     def channels(self) -> int:
-        """Of the features."""
+        """Number of channels of the features."""
         return {"mask": 2, "rgb": 3, "normal": 3}.get(self.camera.sees, 1)
 
     @property
     def size(self) -> int:
-        """Numbers that the encoder takes: row by row, column by column, channel by channel."""
+        """Number of values that the encoder takes, ordered by rows, then columns, then channels."""
         return self.rows * self.columns * self.channels
 
     @property
     def measures(self) -> bool:
-        """Whether it sees how far things are: a cell shows the nearest then, not the mean."""
+        """Whether the camera measures distance. A cell then shows the nearest value, not the mean."""
         return self.camera.sees in ("depth", "range")
 
     @property
     def contrast(self) -> float:
-        """Times a mask over its norm: that is a quarter of itself over its root mean square."""
+        """Factor of a mask divided by its norm. The result is the mask divided by four times its root mean square."""
         return math.sqrt(self.rows * self.columns) / 4
 
     def __call__(self, image: Float[Array, "*image"]) -> Float[Array, "*n f"]:
@@ -99,7 +103,9 @@ class View:
         return x.reshape(*lead, -1)
 
     def init(self, rng: np.random.Generator, network: NetworkConfig) -> Layers:
-        """Weights of the encoder: of each convolution, (side * side * channels, next channels); then of the layers."""
+        """Weights of the encoder: first of each convolution, (side * side * channels, next channels), then of the
+        layers.
+        """
         layers, shape = [], (self.rows, self.columns, self.channels)
         for side, channels in zip(self.patches, network.convolution, strict=True):
             layers += init_mlp(rng, (side * side * shape[2], channels), math.sqrt(2))
@@ -107,7 +113,7 @@ class View:
         return layers + init_mlp(rng, (math.prod(shape), *network.encoder), math.sqrt(2))
 
     def encode(self, layers: Layers, features: Float[Array, "*n f"], activation: str) -> Float[Array, "*n e"]:
-        """What the encoder makes of the features."""
+        """The output of the encoder for the features of an image."""
         act, lead = ACTIVATIONS[activation], features.shape[:-1]
         x = features.reshape(*lead, self.rows, self.columns, self.channels)
         for side, (weight, bias) in zip(self.patches, layers, strict=False):
@@ -119,7 +125,9 @@ class View:
 
 
 def _encoded(camera: CameraConfig, image: Array) -> Array:
-    """Depth as the network takes it: 0 for the farthest and for a hole, as most holes are farther than it measures."""
+    """The depth as encoded for the network. It is 0 for the largest depth and for a hole, because most holes are beyond
+    the range of the camera.
+    """
     far = camera.reach[1]
     depth = jnp.maximum(jnp.where(image > 0, image, far), NEAREST)
     if camera.encoding == "inverse":
@@ -128,7 +136,7 @@ def _encoded(camera: CameraConfig, image: Array) -> Array:
 
 
 def _patches(camera: CameraConfig, convolution: tuple[int, ...]) -> tuple[int, ...]:
-    """The side of each convolution's patches."""
+    """The side length of the patches of each convolution, pixels."""
     sides, rows, columns = [], camera.height, camera.width
     for _ in convolution:
         side = next((k for k in (4, 2) if rows % k == 0 and columns % k == 0), None)
@@ -144,10 +152,11 @@ def _patches(camera: CameraConfig, convolution: tuple[int, ...]) -> tuple[int, .
 
 @dataclass(frozen=True)
 class Features:
-    """What the networks are fed: static, as it is the same for every vehicle.
+    """The inputs of the networks. This class is static, because it is the same for every vehicle.
 
-    World vectors are turned into the body frame and the attitude becomes the world's up axis seen from the body, so
-    that nothing changes with the heading; every entry is divided by its field's scale. The images' features follow.
+    World vectors are rotated into the body frame, and the attitude becomes the world's up axis in the body frame. The
+    features therefore do not change with the heading. Every entry is divided by the scale of its field. The features of
+    the images come last.
     """
 
     fields: tuple[Field, ...]
@@ -155,12 +164,12 @@ class Features:
 
     @property
     def state_size(self) -> int:
-        """Numbers of the observation's features: the attitude's four become three."""
+        """Number of the observation's features. The four numbers of the attitude become three."""
         return sum(3 if f.frame == "world_body" else f.size for f in self.fields)
 
     @property
     def size(self) -> int:
-        """Numbers of the feature vector."""
+        """Length of the feature vector."""
         return self.state_size + sum(view.size for view in self.views)
 
     def __call__(self, observation: Float[Array, "*n o"], images: Sequence[Array] = ()) -> Float[Array, "*n f"]:
@@ -170,7 +179,7 @@ class Features:
         return jnp.concatenate([state, *seen], axis=-1) if seen else state
 
     def apart(self, features: Float[Array, "*n f"]) -> list[Float[Array, "*n p"]]:
-        """The observation's part of a feature vector, and each image's."""
+        """The part of the observation in a feature vector, and the part of each image."""
         ends = np.cumsum([self.state_size, *(view.size for view in self.views)])
         return jnp.split(features, ends[:-1], axis=-1) if self.views else [features]
 
@@ -193,7 +202,9 @@ class Features:
 
 
 def init_mlp(rng: np.random.Generator, sizes: tuple[int, ...], last_gain: float) -> Layers:
-    """Orthogonal layers (gain sqrt 2, the last one `last_gain`) and zero biases, in NumPy: nothing to compile."""
+    """Orthogonal layers (gain sqrt 2, for the last layer `last_gain`) and zero biases. Made with NumPy, so that nothing
+    has to be compiled.
+    """
     layers = []
     for i, (n, m) in enumerate(pairwise(sizes)):
         gain = last_gain if i == len(sizes) - 2 else math.sqrt(2)
@@ -205,7 +216,7 @@ def init_mlp(rng: np.random.Generator, sizes: tuple[int, ...], last_gain: float)
 
 
 def mlp(layers: Layers, x: Float[Array, "*n f"], activation: str) -> Float[Array, "*n m"]:
-    """A multi-layer perceptron, its last layer linear."""
+    """A multi-layer perceptron with a linear last layer."""
     act = ACTIVATIONS[activation]
     for weight, bias in layers[:-1]:
         x = act(x @ weight + bias)
@@ -216,16 +227,18 @@ def mlp(layers: Layers, x: Float[Array, "*n f"], activation: str) -> Float[Array
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Gru:
-    """A gated recurrent unit (Cho et al. 2014), its three gates side by side: update, reset, candidate."""
+    """A gated recurrent unit (Cho et al. 2014). The three gates are side by side in each array: update, reset,
+    candidate.
+    """
 
     inputs: Array | np.ndarray
-    """(i, 3 k)."""
+    """Weights of the inputs, (i, 3 k)."""
     recurrent: Array | np.ndarray
-    """(k, 3 k)."""
+    """Weights of the memory, (k, 3 k)."""
     bias: Array | np.ndarray
-    """(3 k,) beside the inputs."""
+    """Bias added to the inputs' part, (3 k,)."""
     recurrent_bias: Array | np.ndarray
-    """(3 k,) beside the memory."""
+    """Bias added to the memory's part, (3 k,)."""
 
     def __call__(self, x: Float[Array, "*n i"], memory: Float[Array, "*n k"]) -> Float[Array, "*n k"]:
         """The next memory."""
@@ -242,14 +255,14 @@ class Weights:
     """What a policy learns."""
 
     encoders: tuple[Layers, ...]
-    """An image's each."""
+    """One encoder per image."""
     cell: Gru | None
     head: Layers
 
 
 @dataclass(frozen=True)
 class Actor:
-    """A policy's shape: features, encoders, GRU, head. Its weights come in at every call."""
+    """The structure of a policy: features, encoders, GRU, head. Its weights are passed at every call."""
 
     features: Features
     network: NetworkConfig
@@ -271,7 +284,9 @@ class Actor:
         return Actor(Features(fields, tuple(View.of(camera, network) for camera in cameras)), network)
 
     def init(self, rng: np.random.Generator, hover: np.ndarray) -> Weights:
-        """Weights that start near `hover`, the action that hovers; made by NumPy: nothing to compile."""
+        """Initial weights. The policy starts with actions near `hover`, the action at which the vehicle hovers. Made
+        with NumPy, so that nothing has to be compiled.
+        """
         encoders = tuple(view.init(rng, self.network) for view in self.features.views)
         size = self.features.state_size + len(encoders) * self.network.encoder[-1]
         cell, units = None, self.network.recurrent
@@ -284,13 +299,13 @@ class Actor:
         return Weights(encoders, cell, head)
 
     def memory(self, n: int) -> Float[Array, "n k"]:
-        """What the GRUs of n policies know at the start of an episode: nothing."""
+        """The memories of n GRUs at the start of an episode: zeros."""
         return jnp.zeros((n, self.network.recurrent))
 
     def __call__(
         self, weights: Weights, features: Float[Array, "*n f"], memory: Float[Array, "*n k"]
     ) -> tuple[Float[Array, "*n 4"], Float[Array, "*n k"]]:
-        """The action: tanh of the network, in (-1, 1); and the GRU's next memory."""
+        """The action (tanh of the network, in (-1, 1)) and the GRU's next memory."""
         activation = self.network.activation
         state, *images = self.features.apart(features)
         of_images = zip(self.features.views, weights.encoders, images, strict=True)

@@ -1,9 +1,10 @@
 """Proximal policy optimisation (Schulman et al. 2017) on the environment.
 
 The policy is a tanh network with Gaussian noise of learned, state-independent size; actions are clipped to [-1, 1]
-by the environment's action map. Time-outs bootstrap with the value of the observation before the new start. Where
-there are cameras the critic sees no images but the true scene (`Env.privileged`). A GRU learns from pieces of
-`sequence` steps: each begins with the memory that the rollout had there, and the gradient goes back to its first step.
+by the environment's action map. Time-outs bootstrap with the value of the observation before the new start. If the
+policy has cameras, the critic sees the true scene (`Env.privileged`) instead of the images. A GRU learns from pieces of
+`sequence` steps. Each piece begins with the memory that the rollout had at that step, and the gradient goes back to the
+first step of the piece.
 """
 
 from dataclasses import dataclass
@@ -34,7 +35,7 @@ class Parameters:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Acted:
-    """What was acted on and how, each leaf (steps, n, ...) or flat."""
+    """The inputs of the policy and the critic, and the actions taken. Each leaf is (steps, n, ...) or flat."""
 
     features: Float[Array, "*t f"]
     memory: Float[Array, "*t k"]
@@ -45,18 +46,18 @@ class Acted:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Samples:
-    """What the epochs learn from, each leaf (steps, n, ...) or flat."""
+    """The samples from which the epochs learn. Each leaf is (steps, n, ...) or flat."""
 
     acted: Acted
     log_prob: Float[Array, "*t"]
     advantage: Float[Array, "*t"]
     value_target: Float[Array, "*t"]
     done: Bool[Array, "*t"]
-    """Whether the episode ended with this step: the next begins without memory."""
+    """Whether the episode ended with this step. The next step then begins without memory."""
 
 
 def log_prob(z: Float[Array, "*t 4"], log_std: Float[Array | np.ndarray, "4"]) -> Float[Array, "*t"]:
-    """Log density of a diagonal Gaussian, `z` standard deviations from its mean."""
+    """Log density of a diagonal Gaussian at a point that is `z` standard deviations from the mean."""
     return -jnp.sum(0.5 * z**2 + log_std + 0.5 * jnp.log(2 * jnp.pi), axis=-1)
 
 
@@ -67,7 +68,7 @@ class PPO(Algorithm):
         """Fresh networks, made by NumPy.
 
         Raises:
-            ValueError: for pieces of a GRU that fill neither a rollout nor a minibatch.
+            ValueError: with a GRU, when the length of its pieces does not divide a rollout or a minibatch.
         """
         if self.actor.network.recurrent and (config.horizon % config.sequence or config.minibatch % config.sequence):
             raise ValueError(
@@ -84,7 +85,7 @@ class PPO(Algorithm):
     def update(
         self, env: Env, config: Any, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[TrainState, dict[str, Array]]:
-        """A rollout of every environment, then epochs of minibatches over it."""
+        """A rollout of every environment, then several epochs of minibatches over its samples."""
         key, rollout_key, epoch_key = jax.random.split(state.key, 3)
         samples, end, metrics = self._rollout(env, config, state, rollout_key)
         parameters, optimizer, losses = self.improve(
@@ -96,7 +97,7 @@ class PPO(Algorithm):
     def act(
         self, env: Env, parameters: Parameters, at: RolloutState, z: Float[Array, "n 4"]
     ) -> tuple[Array, Array, Acted]:
-        """An action with noise, the next recurrent state, and what a sample keeps of them."""
+        """The action with noise, the next recurrent state, and the data that a sample stores."""
         features = self.actor.features(at.observation, at.env.images)
         mean, memory = self.actor(parameters.policy, features, at.memory)
         action = mean + jnp.exp(parameters.log_std) * z
@@ -121,7 +122,11 @@ class PPO(Algorithm):
         samples: Samples,
         key: PRNGKeyArray,
     ) -> tuple[Parameters, Any, dict[str, Array]]:
-        """Epochs of minibatches over the samples of a rollout: new parameters and optimiser, and the mean losses."""
+        """Run epochs of minibatches over the samples of a rollout.
+
+        Returns:
+            The new parameters, the new state of the optimiser, and the mean losses.
+        """
 
         def loss(parameters: Parameters, batch: Samples) -> tuple[Array, dict[str, Array]]:
             return _loss(self.actor, parameters, config, batch)
@@ -144,12 +149,12 @@ class PPO(Algorithm):
             return after, (acted, to_there, Record.of(out))
 
         end, (acted, to_there, record) = jax.lax.scan(step, RolloutState.of(state), noise)
-        follows = value(self.actor, parameters.critic, to_there)  # of all steps at once
+        follows = value(self.actor, parameters.critic, to_there)  # for all steps at once
         return self.samples(config, parameters, acted, noise, follows, record), end, record.metrics()
 
 
 def in_pieces(samples: Samples, length: int) -> Samples:
-    """Samples of (steps, n) as pieces of successive ones, (steps / length, n, length, ...)."""
+    """Samples (steps, n, ...), cut into pieces of successive steps: (steps / length, n, length, ...)."""
 
     def cut(x: Array) -> Array:
         return jnp.swapaxes(x.reshape(-1, length, *x.shape[1:]), 1, 2)
@@ -158,7 +163,7 @@ def in_pieces(samples: Samples, length: int) -> Samples:
 
 
 def means(actor: Actor, policy: Weights, batch: Samples) -> Float[Array, "*t 4"]:
-    """What the policy would do without noise in each sample; with a GRU, of pieces (m, length, ...)."""
+    """The action of the policy without noise for each sample. With a GRU, the samples are pieces (m, length, ...)."""
     acted = batch.acted
     if not actor.network.recurrent:
         return actor(policy, acted.features, acted.memory)[0]

@@ -1,8 +1,9 @@
-"""The compiled programs of a run, and the cache of what was traced.
+"""The compiled programs of a run, and the cache of traced programs.
 
-XLA's results are kept by JAX's own compilation cache. Tracing Python to reach them takes as long as a training, so that
-a second cache keeps the traced programs (StableHLO, by `jax.export`). It is for processes that run this package's code
-alone: its key knows the configuration, the vehicle and the files of the package, and no code of the user's.
+JAX's own compilation cache stores the results of XLA. But the tracing of Python before it takes as long as a training.
+A second cache therefore stores the traced programs (StableHLO, by `jax.export`). It may only be used by processes that
+run nothing but this package's code: its key covers the configuration, the vehicle and the files of the package, but no
+code of the user.
 """
 
 import dataclasses
@@ -44,19 +45,20 @@ class Programs:
     """(environment, parameters, key) -> the first state of each device."""
     chunk: Callable[[Env, Any, TrainState, int, int], tuple[TrainState, dict[str, jax.Array]]]
     """(environment, numbers of the algorithm, state, first update, updates of the run) -> the state after
-    `config.chunk` updates, and the metrics of each. The state that goes in is gone."""
+    `config.chunk` updates, and the metrics of each update. The memory of the input state is reused, so that it cannot
+    be used again."""
     evaluate: Callable[[Env, Weights, jax.Array], Episodes]
-    """(environment, policy weights, key) -> `eval_episodes` episodes, or a few repeated more."""
+    """(environment, policy weights, key) -> `eval_episodes` episodes, or a few more, which are repetitions."""
 
     @staticmethod
     def compile(setup: Setup, parameters: Any, traced: Path | None = None) -> "Programs":
-        """Compile the training while the evaluation is traced and compiled.
+        """Compile the training, and at the same time trace and compile the evaluation.
 
         Args:
             setup: the run.
-            parameters: of the algorithm, as started.
-            traced: a folder where traced programs are kept and found; None: trace anew. Only for processes in which
-                nothing of the package was replaced.
+            parameters: initial parameters of the algorithm.
+            traced: a folder from which traced programs are read and to which they are written. None: trace anew. Only
+                for processes in which no code of the package was replaced.
         """
         config, env = setup.config, setup.env
         options = fast_compile() if config.fast_compile else {}
@@ -84,7 +86,7 @@ class Programs:
 
 
 def traced_folder(config: TrainConfig) -> Path | None:
-    """Where traced programs of a configuration are kept; None: they hold code that is not the package's."""
+    """The folder for traced programs of a configuration. None: they contain code from outside the package."""
     terms = (TERMS[name].function for name in config.reward.weights if name in TERMS)
     shipped = all(map(is_shipped, (type(config.task), type(config.algo), *terms)))
     own_noise = any(camera.noise.own for camera in config.env.cameras)
@@ -101,7 +103,9 @@ def start_program(setup: Setup) -> Any:
 
 
 def evaluation_program(setup: Setup) -> Any:
-    """The program (environment, weights, key) -> `Episodes` of `eval_episodes` starts, or a few repeated more."""
+    """The program (environment, weights, key) -> `Episodes` of `eval_episodes` starts, or of a few more, which are
+    repetitions.
+    """
     return on_each(_evaluate(setup), setup.devices, (SAME, SAME, SAME), SAME, vehicles=setup.watched)
 
 
@@ -138,7 +142,7 @@ def acting(actor: Actor, weights: Weights) -> Act:
 
 
 def _of_leaves(function: Callable, args: tuple, result: Callable[[Any], Any]) -> Callable:
-    """`function` of the leaves of its arguments: a traced program keeps no classes."""
+    """`function` as a function of the leaves of its arguments, because a traced program cannot store classes."""
     structure = jax.tree.structure(args)
     return lambda *leaves: result(function(*jax.tree.unflatten(structure, leaves)))
 
@@ -146,11 +150,11 @@ def _of_leaves(function: Callable, args: tuple, result: Callable[[Any], Any]) ->
 def _lower(
     function: Callable, setup: Setup, args: tuple, takes: tuple, returns: Any, traced: Path | None, name: str
 ) -> jax.stages.Lowered:
-    """Trace a program of leaves, or find it traced, for compilation."""
+    """Trace a program of leaves, or read the traced program from the cache, and prepare it for compilation."""
     places = tuple(place for arg, place in zip(args, takes, strict=True) for _ in jax.tree.leaves(arg))
     leaves = jax.tree.leaves(args)
     donated = tuple(i for i, place in enumerate(places) if place == OWN)
-    program = on_each(function, setup.devices, places, returns, donated)  # traced only where it is needed
+    program = on_each(function, setup.devices, places, returns, donated)  # traced only when needed
     if traced is None:
         return program.lower(*leaves)
     file = traced / f"{name}-{_fingerprint(setup, args)}"
@@ -166,14 +170,14 @@ def _lower(
 
 
 def _read(file: Path) -> bytes | None:
-    """The content of a cache file; None where it is missing or damaged: it is made again."""
+    """The content of a cache file. None if it is missing or damaged; it is then made again."""
     if not file.is_file():
         return None
     return opened(file.read_bytes(), file)
 
 
 def _fingerprint(setup: Setup, args: tuple) -> str:
-    """Of everything that a traced program depends on."""
+    """Hash of everything that a traced program depends on."""
     config = dataclasses.asdict(dataclasses.replace(setup.config, seed=0, stop_at=None, start_from=None))
     shapes = [(np.shape(x), str(x.dtype) if hasattr(x, "dtype") else type(x).__name__) for x in jax.tree.leaves(args)]
     numbers = [np.asarray(x).tolist() for x in jax.tree.leaves((setup.env, setup.judges))]
@@ -185,7 +189,7 @@ def _fingerprint(setup: Setup, args: tuple) -> str:
 
 @cache
 def _source_hash() -> str:
-    """Of every Python file of the package; its data files are in the numbers of the environments."""
+    """Hash of every Python file of the package. The data files are covered by the numbers of the environments."""
     package = Path(str(resources.files("e2efly")))
     total = hashlib.sha256()
     for file in sorted(package.rglob("*.py")):

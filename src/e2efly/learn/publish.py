@@ -1,7 +1,7 @@
-"""A run's metrics, handed to an experiment tracker by a process of its own: the training waits for nobody.
+"""Sends a run's metrics to an experiment tracker, in a separate process, so that the training never waits for it.
 
-How far a run has been published stands in RUN/published/TRACKER/published.json, so that nothing is sent twice: not
-when the command is started again, and not when the run was killed and does some updates again. Imports no JAX.
+The file RUN/published/TRACKER/published.json records how far a run has been published, so that nothing is sent twice.
+This also holds when the command is started again, or when the run was killed and repeats some updates. Imports no JAX.
 """
 
 import dataclasses
@@ -19,7 +19,7 @@ from e2efly.learn.trackers import Asked, tracker
 from e2efly.storage import held, is_held, read_json, write_json
 
 LOOK_S = 2.0
-"""Between two looks at a run that goes on, s."""
+"""Time between two checks of a run that is still in progress, s."""
 
 
 @dataclass(frozen=True)
@@ -27,13 +27,13 @@ class Published:
     """How far a run has been published."""
 
     project: str
-    """Of the tracker."""
+    """Project of the tracker."""
     id: str
-    """Of the run there."""
+    """Identifier of the run in the tracker."""
     update: int
-    """The last that was sent; 0: none."""
+    """The last update that was sent. 0: none."""
     config_sha256: str
-    """Of the run's config.json."""
+    """SHA-256 of the run's config.json."""
 
 
 def publish(
@@ -44,22 +44,22 @@ def publish(
     begun: Callable[[], None] = lambda: None,
     look_s: float = LOOK_S,
 ) -> int:
-    """Send the configuration, once, and each row of the metrics by environment steps, until the run's process ends.
+    """Send the configuration once, and each row of the metrics by environment steps, until the run's process ends.
 
     Args:
-        run: finished, cut short, or going on.
+        run: a run that is finished, was stopped early, or is in progress.
         to: a name of `TRACKERS`.
-        project: of the tracker.
-        name: of the run there.
-        begun: called once the tracker has opened its run, which other programs must not hold up.
-        look_s: between two looks, s.
+        project: project of the tracker.
+        name: name of the run in the tracker.
+        begun: called when the tracker has opened its run. Other programs must not delay that.
+        look_s: time between two checks of the run, s.
 
     Returns:
-        The rows that were sent.
+        The number of rows that were sent.
 
     Raises:
-        ValueError: for a tracker that there is not; for a folder without a run; where another process publishes it;
-            where it was published as another project, or where it holds another run now.
+        ValueError: for an unknown tracker; for a folder without a run; when another process publishes the run; when the
+            run was published in another project, or when the folder now holds another run.
         OSError: when the tracker or the folder cannot be written to.
     """
     opened, sent = tracker(to), 0
@@ -74,7 +74,7 @@ def publish(
             _keep(run, file, done)
             begun()
             while True:
-                going = is_held(run.path)  # asked first: what its process has written last is read below
+                going = is_held(run.path)  # checked first, so that the last rows of its process are read below
                 _check(run, file, done, project)
                 rows = [row for row in run.rows() if row["update"] > done.update]
                 for row in rows:
@@ -89,7 +89,7 @@ def publish(
 
 
 def _wait_for_config(run: RunDirectory, look_s: float) -> None:
-    """Until a training that has just begun says what it is."""
+    """Wait until a training that has just begun has written its config.json."""
     while not (run.path / "config.json").is_file():
         if not is_held(run.path):
             raise ValueError(f"{run.path} holds no run: there is no config.json")
@@ -97,7 +97,7 @@ def _wait_for_config(run: RunDirectory, look_s: float) -> None:
 
 
 def _check(run: RunDirectory, file: Path, known: Published | None, project: str) -> None:
-    """Refuse to go on where that would mix two runs, or two projects."""
+    """Refuse to continue if that would mix two runs or two projects."""
     if known is None:
         return
     if known.project != project:
@@ -117,7 +117,7 @@ def _another(run: RunDirectory, file: Path) -> ValueError:
 
 
 def _keep(run: RunDirectory, file: Path, done: Published) -> None:
-    """Write how far it has been published, unless the folder has gone with the run."""
+    """Write how far the run has been published, unless the folder was deleted with the run."""
     try:
         write_json(file, dataclasses.asdict(done))
     except OSError:
@@ -133,16 +133,16 @@ def _read(file: Path) -> Published | None:
 
 
 def _digest(run: RunDirectory) -> str:
-    """Of the configuration; empty while there is none, as when a run is being overwritten."""
+    """SHA-256 of the configuration. Empty if there is none, for example while a run is being overwritten."""
     file = run.path / "config.json"
     return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
 
 
 def _config(run: RunDirectory) -> dict[str, Any]:
-    """What decides the outcome, as the run's files say it."""
+    """Everything that determines the result, from the files of the run."""
     return {**run.read_json("config.json"), "versions": run.read_json("versions.json")}
 
 
 def _numbers(row: Mapping[str, float]) -> dict[str, float]:
-    """All that there is of an update; trackers have no word for what is not finite."""
+    """All finite numbers of an update. Trackers cannot represent numbers that are not finite."""
     return {name: value for name, value in row.items() if name != "steps" and math.isfinite(value)}

@@ -1,4 +1,4 @@
-"""Rollouts of a policy that learns, and windows whose gradient is followed up to a critic's value."""
+"""Rollouts of a policy that learns, and differentiable windows that end with a critic's value."""
 
 import dataclasses
 from collections.abc import Callable
@@ -20,32 +20,32 @@ Value = Callable[[tuple[Array, ...], Array, Array, Array, Any], Array]
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class RolloutState:
-    """Where n vehicles are in a rollout."""
+    """The state of n vehicles in a rollout."""
 
     env: EnvState
     observation: Float[Array, "n o"]
     memory: Float[Array, "n k"]
     """Recurrent state of the policy."""
     discount: Any = None
-    """Of the next reward, where rewards are summed. Of shape (n,): 1 again where an episode begins; a scalar: of the
-    window, whatever ends within."""
+    """Discount of the next reward, if rewards are summed. With shape (n,), it returns to 1 when an episode begins. A
+    scalar applies to the whole window, also when episodes end inside it."""
 
     @staticmethod
     def of(state: TrainState, discount: Array | None = None) -> "RolloutState":
-        """Where the last update ended."""
+        """The state at the end of the last update."""
         return RolloutState(state.env, state.observation, state.memory, discount)
 
     def into(self, state: TrainState, **changes: Any) -> TrainState:
-        """The training state that goes on from here, with other changes of its fields."""
+        """The training state that continues from here, with `changes` to its other fields."""
         return dataclasses.replace(state, env=self.env, observation=self.observation, memory=self.memory, **changes)
 
     def cut(self, here: Bool[Array, ""]) -> "RolloutState":
-        """The same flight, with no gradient from what came before where `here` holds: a new piece begins."""
+        """The same state. If `here` is true, the gradient to earlier steps is cut: a new piece begins."""
         env, observation, memory = damped((self.env, self.observation, self.memory), 1.0 - here)
         return RolloutState(env, observation, memory, jnp.where(here, 1.0, self.discount))
 
     def value(self, env: Env, value: Value, noise: Any = None) -> Float[Array, ""]:
-        """The mean of what follows, discounted."""
+        """The mean over the vehicles of the discounted value of the reward that follows."""
         follows = value(self.env.images, self.observation, env.privileged(self.env), self.memory, noise)
         return jnp.mean(self.discount * follows)
 
@@ -53,7 +53,7 @@ class RolloutState:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Record:
-    """What every rollout gathers, each leaf (steps, n), the terms (steps,)."""
+    """The data that every rollout gathers. Each leaf is (steps, n), the terms are (steps,)."""
 
     reward: Float[Array, "*t"]
     terminated: Bool[Array, "*t"]
@@ -63,7 +63,7 @@ class Record:
 
     @staticmethod
     def of(out: Step) -> "Record":
-        """Of one step."""
+        """The record of one step."""
         terms = {name: jnp.mean(x) for name, x in out.terms.items()}
         return Record(out.reward, out.terminated, out.done, out.success, terms)
 
@@ -77,7 +77,7 @@ class Record:
 
 
 def damped(tree: Any, keep: Array) -> Any:
-    """The same values; their gradient scaled by `keep`."""
+    """The same values, with their gradient scaled by `keep`."""
 
     def damp(x: Array) -> Array:
         return keep * x + jax.lax.stop_gradient((1 - keep) * x) if jnp.issubdtype(x.dtype, jnp.floating) else x
@@ -88,15 +88,16 @@ def damped(tree: Any, keep: Array) -> Any:
 def advance(
     env: Env, config: Any, at: RolloutState, action: Float[Array, "n 4"], memory: Float[Array, "n k"], critic: bool
 ) -> tuple[RolloutState, Step]:
-    """A control step, and new starts.
+    """One control step, with new starts where episodes ended.
 
     Args:
         env: the environment.
-        config: of the algorithm. Where rewards are summed, its `gamma` discounts and its `gradient_decay` damps.
-        at: before the step.
-        action: in [-1, 1], clipped by the environment.
+        config: options of the algorithm. If rewards are summed, `gamma` is their discount and `gradient_decay` damps
+            the gradient.
+        at: the state before the step.
+        action: the action, in [-1, 1]; the environment clips it.
         memory: recurrent state after the action was chosen.
-        critic: whether the result is to have `final_privileged`.
+        critic: whether the result must contain `final_privileged`.
     """
     state, out = env.step(at.env, action, privileged=critic)
     memory = jnp.where(out.done[:, None], 0.0, memory)
@@ -118,22 +119,23 @@ def window(
     cuts: Bool[Array, " t"],
     last_noise: Float[Array, "n 4"] | None = None,
 ) -> tuple[dict[str, Array], RolloutState, tuple[Any, Array, Record]]:
-    """A rollout whose gradient is followed, with a critic's value where it ends, is cut or an episode's time is out.
+    """A differentiable rollout. A critic's value is added where the window ends, where the gradient is cut, and where
+    an episode times out.
 
     Args:
         env: the environment.
         config: numbers of the algorithm.
-        start: where it begins, with a discount of 1 each.
-        act: (before the step, noise) -> action, next recurrent state, and what to gather of it.
-        value: the critic's estimate of what follows.
-        noise: of the actions.
-        cuts: before which steps the gradient is cut (`algorithm.gradient_cuts`); unused without `horizon_start`.
-        last_noise: of the action whose value the window ends with.
+        start: the state where the window begins, with a discount of 1 for each vehicle.
+        act: (state before the step, noise) -> action, next recurrent state, and data to gather.
+        value: the critic's estimate of the reward that follows.
+        noise: noise of the actions.
+        cuts: the steps before which the gradient is cut (`algorithm.gradient_cuts`). Unused without `horizon_start`.
+        last_noise: noise of the action whose value is added at the end of the window.
 
     Returns:
-        What a step gained on average, discounted, by part: the reward (with `term_gradients`: each of its terms), and
-        `value`; where the window ended; and, without gradient: what `act` gathers, the value of where each step led,
-        and the record.
+        The discounted gain per step, on average, by part: the reward (with `term_gradients`: each of its terms) and
+        `value`. The state at the end of the window. Without gradient: the data that `act` gathers, the value of the
+        state after each step, and the record.
     """
 
     def step(at: RolloutState, x: tuple[Array, Array]) -> tuple[RolloutState, Any]:

@@ -1,4 +1,4 @@
-"""The run directory: everything needed to reproduce a run and to fly its policy.
+"""The run directory: everything that is needed to reproduce a run and to fly its policy.
 
 config.json  versions.json  inputs.json  inputs/  metrics.csv  events/  checkpoint.safetensors  history/  plots/
 policy.onnx  summary.json  published/
@@ -29,7 +29,7 @@ _FILES = (
     "policy.images.npz", "summary.json",
 )  # fmt: skip
 _FOLDERS = ("inputs", "events", "history", "plots", "published")
-"""All that a run, or `e2efly publish` of it, writes into its folder."""
+"""Everything that a run, or `e2efly publish` for this run, writes into its folder."""
 _PACKAGES = ("e2efly", "jax", "jaxlib", "numpy", "optax", "onnx", "onnxruntime")
 
 
@@ -51,17 +51,17 @@ class RunDirectory:
 
     @property
     def metrics(self) -> Path:
-        """A line for every update."""
+        """The metrics: one line per update."""
         return self.path / "metrics.csv"
 
     @property
     def history(self) -> Path:
-        """Policies on the way: see `e2efly.learn.history`."""
+        """Policies from the course of the training. See `e2efly.learn.history`."""
         return self.path / "history"
 
     @property
     def plots(self) -> Path:
-        """PNG files."""
+        """The folder of the plots, PNG files."""
         return self.path / "plots"
 
     @property
@@ -71,13 +71,13 @@ class RunDirectory:
 
     @property
     def began(self) -> bool:
-        """Whether a run in this folder ever got to a checkpoint: one that did not is worth nothing, and gives way."""
+        """Whether a run in this folder ever reached a checkpoint. One that did not may be replaced."""
         if any(path.exists() for path in (self.checkpoint, self.policy, self.path / "summary.json")):
             return True
         return sum("seconds" in row for row in self.rows()) > 1  # the first evaluation comes before the checkpoint
 
     def held(self) -> AbstractContextManager[None]:
-        """Keep other processes from writing to the run; see `e2efly.storage.held`."""
+        """Prevent other processes from writing to the run. See `e2efly.storage.held`."""
         return held(self.path)
 
     def check_new(self) -> None:
@@ -93,7 +93,7 @@ class RunDirectory:
             )
 
     def clear(self) -> None:
-        """Delete the run's files, where the folder holds a run; others stay."""
+        """Delete the files of the run, if the folder holds one. Other files are kept."""
         if (self.path / "config.json").is_file():
             for name in _FILES:
                 (self.path / name).unlink(missing_ok=True)
@@ -101,28 +101,28 @@ class RunDirectory:
                 shutil.rmtree(self.path / name, ignore_errors=True)
 
     def create(self, config: TrainConfig, overwrite: bool = False) -> None:
-        """Make the folder; write the configuration, the versions and copies of the files that it is made from.
+        """Create the folder. Write the configuration, the versions and copies of the input files.
 
         Args:
-            config: everything that decides the outcome.
-            overwrite: delete the run that it holds.
+            config: everything that determines the result.
+            overwrite: delete the run that the folder holds.
 
         Raises:
-            OSError: when it cannot be written.
-            ValueError: when it already holds a run.
+            OSError: when the folder cannot be written.
+            ValueError: when the folder already holds a run.
         """
         inputs = {field: (path, content_of(path)) for field, path in input_files(config).items()}
-        if overwrite:  # perhaps the run that the files are of
+        if overwrite:  # only now, because the input files may belong to the run that is deleted
             self.clear()
         self.check_new()
         try:
             self.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OSError(f"cannot make --out {self.path}: {error.strerror}") from error
-        self.metrics.unlink(missing_ok=True)  # of a run that never got to a checkpoint
+        self.metrics.unlink(missing_ok=True)  # of a run that never reached a checkpoint
         self._keep(config, inputs)
         self.write_json("versions.json", versions())
-        self.write_json("config.json", to_json(config))  # last: with it a folder holds a run
+        self.write_json("config.json", to_json(config))  # last: this file marks that the folder holds a run
 
     def _keep(self, config: TrainConfig, inputs: dict[str, tuple[Path, bytes]]) -> None:
         """Write copies of the files that a configuration names."""
@@ -135,7 +135,7 @@ class RunDirectory:
         self.write_json("inputs.json", about)
 
     def inputs(self) -> dict[str, Kept]:
-        """The files that the run is made from, by the dotted path of the field; none in runs of older versions.
+        """The input files of the run, by the dotted path of the field. Runs of older versions have none.
 
         Raises:
             ValueError: when inputs.json is damaged.
@@ -154,7 +154,7 @@ class RunDirectory:
         return found
 
     def with_copies(self, config: TrainConfig) -> TrainConfig:
-        """A configuration of the run with the run's own copies of the files that it names."""
+        """A configuration of the run in which the run's own copies replace the files that it names."""
         for field, kept in self.inputs().items():
             config = replaced(config, field, kept.usable())
         return config
@@ -167,19 +167,20 @@ class RunDirectory:
         """Read a JSON file.
 
         Raises:
-            ValueError: when it is missing, no JSON, or JSON of something else than an object.
+            ValueError: when the file is missing, is not JSON, or does not contain a JSON object.
         """
         return read_json(self.path / name)
 
     def config(self, names_vehicle: bool = False) -> TrainConfig:
-        """The configuration of the run, with its own copies of the files that it is made from.
+        """The configuration of the run, with its own copies of its input files.
 
         Args:
-            names_vehicle: whether the caller names what flies; then it does not matter if the run's vehicle changed.
+            names_vehicle: whether the caller names the vehicle that flies. It then does not matter whether the run's
+                vehicle file has changed.
 
         Raises:
-            ValueError: when the folder holds no run, or one that this version does not understand; when a file that
-                the run is made from has changed, naming both.
+            ValueError: when the folder holds no run, or a run that this version does not understand; when an input file
+                of the run has changed, naming the file and its copy.
         """
         if not (self.path / "config.json").is_file():
             raise ValueError(f"{self.path} holds no run: there is no config.json")
@@ -190,13 +191,13 @@ class RunDirectory:
         return self.with_copies(config)
 
     def check_same(self, config: TrainConfig) -> None:
-        """Refuse another configuration than the run's; the files that they name are compared by content.
+        """Refuse a configuration that differs from that of the run. The files that they name are compared by content.
 
         Raises:
             ValueError: naming every field that differs.
         """
         wanted = self.config()
-        if type(config.task) is not type(wanted.task):  # nothing else counts, and other files are named
+        if type(config.task) is not type(wanted.task):  # no other difference matters, and other files are named
             raise self._another(differences(wanted, config))
         for field, kept in self.inputs().items():
             if value_at(config, field) == kept.named and not kept.original.exists():
@@ -208,10 +209,10 @@ class RunDirectory:
         return ValueError(f"{self.path} holds a run of another configuration: {'; '.join(different)}")
 
     def check_resumable(self) -> None:
-        """Refuse to begin again where a run has lost its checkpoint.
+        """Refuse to start from the beginning when a run has lost its checkpoint.
 
         Raises:
-            ValueError: when it has.
+            ValueError: when the checkpoint is missing.
         """
         if self.began and not self.checkpoint.exists():
             raise ValueError(
@@ -220,18 +221,18 @@ class RunDirectory:
             )
 
     def rows(self) -> list[dict[str, float]]:
-        """The metrics, a row for every update; without a line that was not finished."""
+        """The metrics, one row per update, without an incomplete last line."""
         return [{k: float(v) for k, v in row.items() if v} for row in csv.DictReader(self._whole_lines())]
 
     def _whole_lines(self) -> list[str]:
-        """The lines of the metrics that were written to their ends: the header, and a line for every update."""
+        """The lines of the metrics that were written completely: the header and one line per update."""
         if not self.metrics.is_file():
             return []
         with self.metrics.open(newline="", encoding="utf-8") as file:
             return [line for line in file if line.endswith("\n")]
 
     def append(self, rows: list[dict[str, float]]) -> None:
-        """Append metrics."""
+        """Append rows to the metrics."""
         if not rows:
             return
         text = io.StringIO()
@@ -243,8 +244,8 @@ class RunDirectory:
             file.write(text.getvalue())
 
     def forget_after(self, update: int) -> None:
-        """Drop metrics and policies of updates that a resumed run will do again, and files that a killed one had not
-        finished.
+        """Delete the metrics and policies of updates that a resumed run will repeat, and the files that a killed run
+        did not finish.
         """
         from e2efly.learn import history  # which needs JAX
 
@@ -255,25 +256,27 @@ class RunDirectory:
         if header:
             kept = [line for line in lines if int(line.split(",", 1)[0]) <= update]
             write_atomically(self.metrics, "".join([header, *kept]).encode())
-        else:  # a full disk, or cut in the header
+        else:  # a full disk, or an incomplete header
             self.metrics.unlink(missing_ok=True)
 
 
 def run_folder(config: TrainConfig) -> Path:
-    """Where a run lies unless told: runs/TASK-ALGO-SEED, with the vehicle before the seed where it is another one."""
+    """The default folder of a run: runs/TASK-ALGO-SEED. If the vehicle is not the default one, its name comes before
+    the seed.
+    """
     usual = config.env.vehicle == EnvConfig().vehicle
     parts = config.task.name, config.algo.name, *(() if usual else (Path(config.env.vehicle).stem,))
     return Path("runs") / "-".join((*parts, str(config.seed)))
 
 
 def run_of(path: Path) -> RunDirectory | None:
-    """The run that a path is the folder, or the policy.onnx, of."""
+    """The run whose folder or policy.onnx this path is."""
     folder = path.parent if path.name == "policy.onnx" else path
     return RunDirectory(folder) if path.is_dir() or (folder / "config.json").is_file() else None
 
 
 def versions() -> dict[str, str]:
-    """Versions of what decides the outcome."""
+    """Versions of the software that determines the result."""
     return {
         "python": platform.python_version(),
         "platform": platform.platform(),
@@ -289,16 +292,16 @@ def _version(package: str) -> str:
 
 
 def to_json(config: TrainConfig) -> dict[str, Any]:
-    """A configuration as JSON, with the names of its task and algorithm, or where they are from."""
+    """A configuration as JSON, with the names of its task and its algorithm, or references to them."""
     names = {"task_name": TASKS.reference(type(config.task)), "algo_name": ALGORITHMS.reference(type(config.algo))}
     return {**names, **dataclasses.asdict(config)}
 
 
 def from_json(content: dict[str, Any], where: str) -> TrainConfig:
-    """The configuration that `to_json` wrote, of this version or an older one.
+    """The configuration that `to_json` wrote, in this version or an older one.
 
     Raises:
-        ValueError: for unknown keys and missing ones without a default, naming them; for a value of another type,
+        ValueError: for unknown keys, and for missing keys without a default, naming them; for a value of another type,
             naming the field, the value and what is accepted.
     """
     names = {"task_name": TASKS, "algo_name": ALGORITHMS}
@@ -313,7 +316,9 @@ def from_json(content: dict[str, Any], where: str) -> TrainConfig:
 
 
 def differences(a: TrainConfig, b: TrainConfig) -> Iterator[str]:
-    """Where two configurations differ, as `field: this and that`; by another task or algorithm, nothing else counts."""
+    """The differences between two configurations, as `field: this and that`. If the task or the algorithm differs, only
+    these are given.
+    """
     these, those = to_json(a), to_json(b)
     kind = [name for name in ("task_name", "algo_name") if these[name] != those[name]]
     yield from (f"{name.removesuffix('_name')}: {these[name]} and {those[name]}" for name in kind)
@@ -322,7 +327,7 @@ def differences(a: TrainConfig, b: TrainConfig) -> Iterator[str]:
 
 
 def different_values(a: Any, b: Any, prefix: str = "") -> Iterator[str]:
-    """Where two trees of JSON differ, as `field: this and that`."""
+    """The differences between two JSON trees, as `field: this and that`."""
     if isinstance(a, dict) and isinstance(b, dict):
         for key in sorted({*a, *b}):
             yield from different_values(a.get(key), b.get(key), f"{prefix}.{key}" if prefix else key)

@@ -1,7 +1,7 @@
-"""Training a policy: compile, update, evaluate, log, checkpoint, and ship the best.
+"""Training a policy: compile, update, evaluate, log, write checkpoints, and ship the best policy.
 
 A run is a pure function of its configuration: the number of updates, the evaluations and all random numbers depend
-on nothing else, so that a run that was killed and resumed ends bit for bit like one that was not.
+on nothing else. A run that was killed and resumed therefore ends bit for bit like a run that was not interrupted.
 """
 
 import dataclasses
@@ -41,30 +41,39 @@ REPORT_EPISODES = 1000
 
 
 class Reporter(Protocol):
-    """What shows the progress of a run."""
+    """Shows the progress of a run."""
 
     def compiling(self) -> None:
         """The programs are being compiled."""
         ...
 
     def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
-        """Environment steps done, of how many, steps/s, success of the last and of the best evaluation, and the stage
-        of the curriculum, where there is one.
+        """Show the progress.
+
+        Args:
+            steps: environment steps done so far.
+            total: environment steps of the whole run.
+            rate: environment steps per second.
+            success: success rate of the last evaluation.
+            best: success rate of the best evaluation.
+            stage: the stage of the curriculum; empty without a curriculum.
         """
         ...
 
     def judging(self, starts: int) -> None:
-        """The training is over; the policy flies so many starts that it never saw."""
+        """The training is over. The policy now flies `starts` starts that it has never seen."""
         ...
 
     def ended(self, setup: Setup, flown: dict[str, Episodes], /) -> None:
-        """The run, and how its best policy flew unseen starts of each criterion: nominal, where there is that."""
+        """The run has ended. `flown` holds the flights of its best policy from unseen starts, for each criterion. If
+        there are nominal environments, these are the nominal flights.
+        """
         ...
 
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run is: what a checkpoint says of itself."""
+    """The progress of a run, as stored in the header of a checkpoint."""
 
     update: int = 0
     seconds: float = 0.0
@@ -73,11 +82,12 @@ class Progress:
     best_success: float = 0.0
     last_success: float = 0.0
     stage: int = 0
-    """Of the curriculum."""
+    """Stage of the curriculum."""
     stage_update: int = 0
-    """The update at which it began."""
+    """The update at which this stage began."""
     reached: dict[str, float] = dataclasses.field(default_factory=dict)
-    """Seconds from process start and environment steps at the first evaluation at `stop_at`; empty before."""
+    """Seconds since the start of the process, and environment steps, at the first evaluation that reached `stop_at`.
+    Empty before that."""
 
 
 class NonFiniteError(FloatingPointError):
@@ -96,21 +106,21 @@ def train(
     """Train a policy into a run directory.
 
     Args:
-        config: everything that decides the outcome.
-        out: the run directory: new, or with `resume` an unfinished one.
+        config: everything that determines the result.
+        out: the run directory: a new one, or with `resume` that of an unfinished run.
         reporter: shows the progress.
-        resume: go on from the checkpoint.
-        overwrite: delete the run that `out` holds, once this one has been compiled.
+        resume: continue from the checkpoint.
+        overwrite: delete the run that `out` holds, after the new run has been compiled.
         traced: a folder for traced programs, see `Programs.compile`.
 
     Returns:
-        The summary that is also in summary.json.
+        The summary that is also written to summary.json.
 
     Raises:
         ValueError: for a configuration, folder or checkpoint that cannot be used.
-        LostHostError: when another process of the run is gone; the last checkpoint is kept.
+        LostHostError: when another process of the run has ended or cannot be reached. The last checkpoint is kept.
         OSError: when the folder cannot be written.
-        NonFiniteError: naming the term and the update; the last good checkpoint is kept.
+        NonFiniteError: naming the term and the update. The last good checkpoint is kept.
     """
     run = RunDirectory(out)
     setup = Setup.of(config)
@@ -121,7 +131,7 @@ def train(
 def _train(
     setup: Setup, run: RunDirectory, reporter: Reporter, resume: bool, overwrite: bool, traced: Path | None
 ) -> dict[str, Any]:
-    """In a folder that is this run's alone."""
+    """Train, in a folder that no other process writes to."""
     config, content = setup.config, by_content(setup.config)
     if hosts.first():
         hosts.told({"resume": resume, "versions": _deciding(versions()), "config": to_json(content)})
@@ -145,13 +155,13 @@ def _train(
         progress = Progress()
     if hosts.first():
         if not resume:
-            run.create(config, overwrite)  # once all that a configuration can spoil has gone well
+            run.create(config, overwrite)  # only after every step that can fail because of the configuration
         run.forget_after(progress.update)
         setup = dataclasses.replace(setup, config=run.with_copies(config))
         if different := list(differences(content, by_content(setup.config))):
             raise ValueError(f"a file changed while the run began: {'; '.join(different)}; start it again")
     if config.start_from is not None and not progress.update:
-        _save(run, config, state, best, progress)  # the run that it begins with may be gone when this one is resumed
+        _save(run, config, state, best, progress)  # the run it starts from may be gone when this run is resumed
     state, best, progress, stopped = _loop(setup, programs, run, reporter, state, best, progress)
     return _finish(setup, programs, run, reporter, state, best, progress, stopped)
 
@@ -159,13 +169,16 @@ def _train(
 def _loop(
     setup: Setup, programs: Programs, run: RunDirectory, reporter: Reporter, state: Any, best: Any, progress: Progress
 ) -> tuple[Any, Any, Progress, bool]:
-    """Chunks of updates, an evaluation and a checkpoint after each. Ends at the last update, the goal, or Ctrl-C."""
+    """Run chunks of updates, with an evaluation and a checkpoint after each chunk.
+
+    It ends after the last update, when `stop_at` is reached, or at Ctrl-C.
+    """
     config = setup.config
     before, stopped = progress.seconds, False  # of earlier processes of this run
     with _writing(run, progress.update * setup.steps_per_update) as write, _interruptible() as stop:
         while progress.update < setup.updates and not progress.reached:
             if stopped := hosts.any_of(stop.is_set()):
-                if not progress.update:  # there is none yet to go on from
+                if not progress.update:  # there is no checkpoint yet to continue from
                     _save(run, config, state, best, progress)
                 break
             began = time.perf_counter()
@@ -185,7 +198,7 @@ def _loop(
                     reached = {"seconds": before + since_process_start(), "steps": steps}
             update = progress.update + config.chunk
             promoted = stage.is_over(last, (update - progress.stage_update) * setup.steps_per_update)
-            # a policy counts by the task itself; what met the criterion is what is shipped
+            # only the task itself (the last stage) ranks policies; the policy that met `stop_at` is the one shipped
             better = now > progress.best_score or not final or bool(reached)
             progress = Progress(
                 update=update,
@@ -216,7 +229,7 @@ def _loop(
 
 
 def _save(run: RunDirectory, config: TrainConfig, state: Any, best: Any, progress: Progress) -> None:
-    """Write a checkpoint, in process 0; all processes take part."""
+    """Write a checkpoint. Process 0 writes the file; all processes contribute their part."""
     whole = hosts.whole({"state": state, "best": best})
     if hosts.first():
         save_checkpoint(run.checkpoint, whole, _about(config, progress))
@@ -232,7 +245,7 @@ def _finish(
     progress: Progress,
     stopped: bool,
 ) -> dict[str, Any]:
-    """Judge the best and the last policy on unseen starts; write policy.onnx and summary.json."""
+    """Judge the best and the last policy on unseen starts, and write policy.onnx and summary.json."""
     from e2efly.learn.export import contract_of, export_policy
 
     trained = progress.seconds
@@ -266,7 +279,7 @@ def _finish(
     }
     if nominal := setup.nominal:
         summary["nominal"] = told(by_best := flown(best, nominal))
-        if setup.env.family is None:  # the rows of the stress lie about one vehicle
+        if setup.env.family is None:  # the rows of the stress test are defined relative to one vehicle
             summary["stress"] = told(stressed(setup, best, REPORT_EPISODES))
     if hosts.first():
         contract = contract_of(setup.env, config)
@@ -279,13 +292,13 @@ def _finish(
 
 
 def _seen(state: TrainState, contract: Contract) -> dict[str, np.ndarray]:
-    """What the policy saw last in training, by the names of its images."""
+    """The last images that the policy saw in training, by their names."""
     seen = (image.addressable_data(0) if isinstance(image, jax.Array) else image for image in state.env.images)
     return {image.name: np.asarray(x).reshape(-1, *image.shape) for image, x in zip(contract.images, seen, strict=True)}
 
 
 def policy_of(state: TrainState) -> Weights:
-    """The policy on the host: every device has the same."""
+    """The weights of the policy, on the host. They are the same on every device."""
     return jax.tree.map(
         lambda x: np.asarray(x.addressable_data(0) if isinstance(x, jax.Array) else x)[0], state.parameters.policy
     )
@@ -293,7 +306,10 @@ def policy_of(state: TrainState) -> Weights:
 
 @contextmanager
 def _writing(run: RunDirectory, steps: int) -> Iterator[Callable[[list[dict[str, float]]], None]]:
-    """Writes rows to metrics.csv, and the last of them to TensorBoard's events, by environment steps; in process 0."""
+    """A function that writes rows to metrics.csv, and the last row to the TensorBoard events, by environment steps.
+
+    In processes other than 0 it does nothing.
+    """
     from e2efly.learn.events import event_file
 
     if not hosts.first():
@@ -316,7 +332,7 @@ def _rows(
     flown: dict[str, Episodes],
     stage: int,
 ) -> list[dict[str, float]]:
-    """A row an update; the evaluation stands in the chunk's last."""
+    """One row per update. The last row of the chunk also holds the evaluation."""
     chunk = setup.config.chunk
     rows = []
     for i in range(chunk):
@@ -350,12 +366,12 @@ def _about(config: TrainConfig, progress: Progress) -> dict[str, Any]:
 
 
 def _deciding(versions: dict[str, str]) -> dict[str, str | None]:
-    """Of versions, those of what a run cannot go on with another of."""
+    """The versions of those packages that must not change while a run is interrupted."""
     return {name: versions.get(name) for name in ("e2efly", "jax", "jaxlib")}
 
 
 def _check_same(config: TrainConfig, resume: bool) -> None:
-    """Refuse what is not as process 0 has it; files by their content."""
+    """Refuse anything that differs from process 0. Files are compared by their content."""
     wanted = hosts.told(None)
     different = list(different_values(wanted["versions"], _deciding(versions())))
     if not different:  # versions may differ in what can be configured
@@ -375,7 +391,7 @@ def _check_resume(run: RunDirectory, config: TrainConfig) -> None:
 
 @contextmanager
 def _interruptible() -> Iterator[threading.Event]:
-    """Ctrl-C asks the loop to stop after its chunk; a second one interrupts at once."""
+    """The first Ctrl-C asks the loop to stop after the current chunk. A second one interrupts at once."""
     stop = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield stop
@@ -386,7 +402,7 @@ def _interruptible() -> Iterator[threading.Event]:
         stop.set()
         signal.signal(signal.SIGINT, old)
 
-    watched = signal.set_wakeup_fd(-1)  # or the command line's watcher would end what is to stop in order
+    watched = signal.set_wakeup_fd(-1)  # else the watcher of the command line would end a run that must stop in order
     old = signal.signal(signal.SIGINT, ask)
     try:
         yield stop
@@ -399,7 +415,7 @@ def load_policy_weights(setup: Setup, run: RunDirectory, which: str) -> Weights:
     """The `best` or the `last` policy of a run's checkpoint.
 
     Raises:
-        ValueError: when there is no whole checkpoint.
+        ValueError: when there is no complete checkpoint.
     """
     parameters = setup.algorithm.init(setup.env, setup.config.algo, setup.config.seed)
     loaded = load_checkpoint(run.checkpoint, _checkpoint_like(setup, parameters))
@@ -407,7 +423,7 @@ def load_policy_weights(setup: Setup, run: RunDirectory, which: str) -> Weights:
 
 
 def _resumed(setup: Setup, run: RunDirectory, parameters: Any) -> tuple[TrainState, Weights, Progress]:
-    """Where process 0's checkpoint is."""
+    """The state, the best policy and the progress in process 0's checkpoint."""
     like, loaded, about = _checkpoint_like(setup, parameters), None, None
     if hosts.first():
         loaded, about = load_checkpoint(run.checkpoint, like), read_about(run.checkpoint)
@@ -420,6 +436,6 @@ def _resumed(setup: Setup, run: RunDirectory, parameters: Any) -> tuple[TrainSta
 
 
 def _checkpoint_like(setup: Setup, parameters: Any) -> dict[str, Any]:
-    """Shapes and types of what a checkpoint holds."""
+    """Shapes and types of the content of a checkpoint."""
     state = jax.eval_shape(start_program(setup), setup.env, parameters, random_key(0))
     return {"state": state, "best": parameters.policy}

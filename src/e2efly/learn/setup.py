@@ -1,4 +1,4 @@
-"""What a configuration comes to, before anything is compiled."""
+"""The objects that a configuration defines, before anything is compiled."""
 
 import dataclasses
 import math
@@ -16,11 +16,11 @@ from e2efly.learn.networks import Actor
 
 @dataclass(frozen=True)
 class Setup:
-    """What a configuration comes to, before anything is compiled."""
+    """The objects that a configuration defines, before anything is compiled."""
 
     config: TrainConfig
     stages: tuple[Stage, ...]
-    """Of the curriculum; the last is the task itself."""
+    """Stages of the curriculum. The last stage is the task itself."""
     algorithm: Algorithm
     actor: Actor
     updates: int
@@ -49,18 +49,18 @@ class Setup:
         return setup
 
     def check(self, members: int = 1) -> None:
-        """Refuse what `members` such runs, trained together, cannot have: see `e2efly.learn.budget`."""
+        """Refuse a configuration if `members` such runs, trained together, exceed a limit (`e2efly.learn.budget`)."""
         judged = self.episode_steps * len(self.judges)
         check_run(self.config, self.env, self.actor, self.updates, judged, members)
 
     @property
     def vehicles(self) -> int:
-        """Vehicles that a device steps together."""
+        """Number of vehicles that a device steps together."""
         return self.config.algo.envs // self.devices
 
     @property
     def watched(self) -> int:
-        """Vehicles that a device flies together in an evaluation."""
+        """Number of vehicles that a device flies together in an evaluation."""
         return -(-self.config.eval_episodes // self.devices)
 
     @property
@@ -75,21 +75,23 @@ class Setup:
 
     @property
     def nominal(self) -> dict[str, Env]:
-        """The same with the vehicle of the file in still air; empty where they are like that already."""
+        """The same environments with the vehicle of the file in still air. Those that are already like this are left
+        out.
+        """
         return {name: env.undisturbed() for name, env in self.judges.items() if env.is_disturbed}
 
     @property
     def steps_per_update(self) -> int:
-        """Environment steps of one update."""
+        """Environment steps per update."""
         return self.config.algo.steps
 
     @property
     def episode_steps(self) -> int:
-        """Control steps of the longest episode that the policy is judged by."""
+        """Control steps of the longest episode in which the policy is judged."""
         longest = max(float(task.episode_s) for task in self.config.task.criteria().values())
         return math.ceil(longest / self.env.control_period - 1e-6)
 
     @property
     def settle(self) -> float:
-        """Seconds after which the mean error counts."""
+        """Time from which on the mean error counts, s."""
         return float(getattr(self.config.task, "settle_s", 0.0))

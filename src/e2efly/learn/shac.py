@@ -1,8 +1,9 @@
 """Short-horizon actor-critic (Xu et al. 2022): back-propagation through a short window, and a critic at its end.
 
-The policy ascends the exact gradient of the window's discounted reward plus the value of where it ends; the critic
-gives what lies beyond, and smooths events (a crash, a gate) that have no gradient of their own. It learns TD(lambda)
-returns of a slowly following copy of itself. Where there are cameras it sees the true scene (`Env.privileged`).
+The policy ascends the exact gradient of the window's discounted reward plus the value of the state where the window
+ends. The critic estimates the reward after the window. It also smooths events (a crash, a gate) that have no gradient
+of their own. It learns TD(lambda) returns that use a slowly following copy of itself. If the policy has cameras, the
+critic sees the true scene (`Env.privileged`).
 """
 
 from dataclasses import dataclass
@@ -39,13 +40,13 @@ class Parameters:
     policy: Weights
     critic: Layers
     target: Layers
-    """The critic as it was, on average, a while ago."""
+    """The target critic: a slowly following average of the critic."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Samples:
-    """What the critic learns from, each leaf (steps, n, ...) or flat."""
+    """The samples from which the critic learns. Each leaf is (steps, n, ...) or flat."""
 
     critic_input: Float[Array, "*t c"]
     value_target: Float[Array, "*t"]
@@ -61,13 +62,13 @@ class SHAC(Algorithm):
         return Parameters(policy, critic, jax.tree.map(np.copy, critic))
 
     def optimizer(self, config: SHACConfig, parameters: Parameters) -> dict[str, Any]:
-        """Adam's initial states, of the policy and of the critic."""
+        """The initial states of Adam for the policy and for the critic."""
         return {name: adam_state(config, getattr(parameters, name)) for name in ("policy", "critic")}
 
     def update(
         self, env: Env, config: SHACConfig, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[TrainState, dict[str, Array]]:
-        """One window, one gradient step of the policy, and epochs of minibatches of the critic."""
+        """One window, one gradient step of the policy, then epochs of minibatches for the critic."""
         key, noise_key, batch_key = jax.random.split(state.key, 3)
         learned, rate, adam = state.parameters, annealed(config, progress), state.optimizer
 

@@ -1,6 +1,6 @@
-"""Experiment trackers of others, each behind the same three calls: open, send, close. Imports no JAX.
+"""Third-party experiment trackers, each with the same three calls: open, send, close. Imports no JAX.
 
-Of the machine and of the publishing process they are told nothing: only what they are handed.
+They receive only the data that is sent to them, and nothing about the machine or the publishing process.
 """
 
 import secrets
@@ -13,25 +13,25 @@ from typing import Any, NamedTuple
 
 @dataclass(frozen=True)
 class Asked:
-    """The run as it is to be there."""
+    """The run to open in the tracker."""
 
     project: str
-    """Of the tracker."""
+    """Project of the tracker."""
     name: str
-    """Of the run, for people."""
+    """Name of the run, for people."""
     id: str | None
-    """Of the run there, which goes on; None: it is new."""
+    """Identifier of an existing run in the tracker, which is continued. None: the run is new."""
     config: Mapping[str, Any]
-    """What the run is made from."""
+    """Configuration of the run."""
 
 
 class Opened(NamedTuple):
-    """A run there."""
+    """An open run in the tracker."""
 
     id: str
-    """By which it is opened again."""
+    """Identifier with which the run is opened again."""
     send: Callable[[Mapping[str, float], int], None]
-    """Numbers by name, at a step; steps rise."""
+    """Send numbers by name, at a step. The steps must increase."""
 
 
 Tracker = Callable[[Asked], AbstractContextManager[Opened]]
@@ -39,9 +39,9 @@ Tracker = Callable[[Asked], AbstractContextManager[Opened]]
 
 @contextmanager
 def _trackio(asked: Asked) -> Iterator[Opened]:
-    """In a folder of this machine, unless Trackio's own settings name a Space or a server.
+    """Trackio: stores the run in a folder on this machine, unless Trackio's own settings name a Space or a server.
 
-    It knows runs by their names alone, so that a name of its own is made for each.
+    Trackio identifies runs only by their names, so a unique name is made for each run.
     """
     import trackio  # pyright: ignore[reportMissingImports]
 
@@ -61,7 +61,9 @@ def _trackio(asked: Asked) -> Iterator[Opened]:
 
 @contextmanager
 def _wandb(asked: Asked) -> Iterator[Opened]:
-    """Where W&B's own settings say: its service, a server of one's own, or with WANDB_MODE=offline a folder."""
+    """W&B: stores the run where W&B's own settings say: its service, a private server, or, with WANDB_MODE=offline, a
+    folder.
+    """
     import wandb
 
     alone = wandb.Settings(
@@ -82,14 +84,14 @@ def _wandb(asked: Asked) -> Iterator[Opened]:
 
 
 TRACKERS: dict[str, Tracker] = {"trackio": _trackio, "wandb": _wandb}
-"""By the name of the package, which is the name of the extra, too."""
+"""Trackers by the name of their package, which is also the name of the extra."""
 
 
 def tracker(name: str) -> Tracker:
     """A tracker.
 
     Raises:
-        ValueError: for one that is not known, or not installed, with what is accepted.
+        ValueError: for a tracker that is unknown or not installed, with what is accepted.
     """
     if name not in TRACKERS:
         raise ValueError(f"--to is {name!r}; accepted: {', '.join(TRACKERS)}")

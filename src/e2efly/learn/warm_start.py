@@ -1,4 +1,4 @@
-"""A training that begins with what another one has learned: the weights of a policy.onnx that e2efly has written."""
+"""Start a training from the result of another one: the weights of a policy.onnx that e2efly has written."""
 
 import dataclasses
 from pathlib import Path
@@ -21,19 +21,20 @@ from e2efly.learn.setup import Setup
 
 
 def started_from(parameters: Any, path: Path, setup: Setup) -> Any:
-    """Parameters of an algorithm whose policy is that of a file.
+    """Parameters of an algorithm whose policy is read from a file.
 
-    Where the file is the policy.onnx of a run of the same algorithm, the rest (critics, noise of the actions) is what
-    that run ended with. Otherwise it is as `init` makes it. Optimisers always begin anew.
+    If the file is the policy.onnx of a run with the same algorithm, the other parameters (critics, noise of the
+    actions) are those at the end of that run. Otherwise they are the initial ones of `init`. Optimisers always start
+    anew.
 
     Args:
-        parameters: as the algorithm's `init` makes them; every copy of the policy in them is replaced.
+        parameters: the parameters from the algorithm's `init`. Every copy of the policy in them is replaced.
         path: a policy.onnx.
-        setup: the run that is to learn.
+        setup: the run that will learn.
 
     Raises:
-        ValueError: for a policy that cannot be loaded, that sees other fields or images or commands otherwise, or whose
-            network has other sizes: naming the file, what it has and what is accepted.
+        ValueError: for a policy that cannot be loaded, that has other observation fields, images or commands, or whose
+            network has other sizes, naming the file, what it has and what is accepted.
     """
     has, wanted = _shape(load_policy(path).contract), _shape(contract_of(setup.env, setup.config))
     for name, accepted in wanted.items():
@@ -52,7 +53,9 @@ def started_from(parameters: Any, path: Path, setup: Setup) -> Any:
 
 
 def _of_run(parameters: Any, path: Path, setup: Setup) -> Any:
-    """What the run that a file is the policy of ended with; `parameters` where there is none, or of another shape."""
+    """The parameters at the end of the run that wrote the policy file. If there is no such run, or its parameters have
+    another shape, `parameters`.
+    """
     run = run_of(path)
     if run is None or not run.checkpoint.is_file():
         return parameters
@@ -67,7 +70,7 @@ def _of_run(parameters: Any, path: Path, setup: Setup) -> Any:
 
 
 def _weights(path: Path, like: Weights, actor: Actor) -> Weights:
-    """What `e2efly.learn.graph.policy_graph` has written, read again."""
+    """Read the weights that `e2efly.learn.graph.policy_graph` has written."""
     graph = onnx.load(str(path)).graph
     constants = {x.name: numpy_helper.to_array(x) for x in graph.initializer}
     operators = {node.output[0]: node.op_type for node in graph.node}
@@ -118,7 +121,9 @@ def _same(a: Any, b: Any) -> bool:
 
 
 def _shape(contract: Contract) -> dict[str, Any]:
-    """What of a contract a network and its normalisation depend on, by name; a camera may sit elsewhere."""
+    """The parts of a contract on which a network and its normalisation depend, by name. The position of a camera is not
+    among them.
+    """
     found: dict[str, Any] = {"observation": [field.name for field in contract.observation]}
     found |= {"number of images": len(contract.images), "memory_size": contract.memory_size}
     found["command mode"] = contract.action.mode

@@ -1,4 +1,4 @@
-"""How a reward's variants learn: the paper's two figures, one an algorithm."""
+"""Learning curves of the variants of a reward: the paper's two figures, one per algorithm."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,21 +16,22 @@ _DASHES = ("-", (0, (4, 2)), (0, (1, 1.2)))
 
 @dataclass(frozen=True)
 class Panel:
-    """One task's curves and what to draw of them."""
+    """The curves of one task, and which of them to draw."""
 
     task: str
     curves: Curves
     by_error: bool
-    """The error in place of the success."""
+    """Draw the error instead of the success rate."""
 
 
 def plot_ablation(panels: Sequence[Panel], path: str | Path, title: str) -> None:
-    """Draw a panel a task: the mean over seeds of every variant against steps, a band from the worst to the best seed.
+    """Draw one panel per task: for every variant, the mean over the seeds against steps, and a band from the worst to
+    the best seed.
 
     Args:
-        panels: of the tasks.
+        panels: the panels of the tasks.
         path: the PNG file.
-        title: of the figure.
+        title: title of the figure.
     """
     columns = min(2, len(panels))
     rows = -(-len(panels) // columns)
@@ -72,7 +73,7 @@ def _draw(ax: Axes, panel: Panel) -> None:
 
 
 def worst(curves: Curves, by_error: bool) -> np.ndarray:
-    """(variants, seeds, evaluations): success (%), or error (m), of the worst criterion."""
+    """Success rate (%), or error (m), of the worst criterion: (variants, seeds, evaluations)."""
     if by_error:
         return np.max(list(curves.error.values()), axis=0)
     return 100 * np.min(list(curves.success.values()), axis=0)

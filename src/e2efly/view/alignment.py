@@ -1,4 +1,4 @@
-"""Pictures of an alignment: what was asked, what the vehicle did, and what the simulator does, before and after."""
+"""Plots of an alignment: the commands, the vehicle's response, and the simulator's response before and after it."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,9 +18,9 @@ from e2efly.physics.rotation import yaw_pitch_roll
 from e2efly.view.style import BLUE, GREY, PALE, VERMILLION, figure, say
 
 STEPPED = ("thrust (m/s²)", "roll rate (rad/s)", "pitch rate (rad/s)", "yaw rate (rad/s)")
-"""By channel of a command."""
+"""Labels by channel of a command."""
 ROW_S, ROW_COUNT = 1.0, 5
-"""Length of the stretches of the replay, s, and how many are shown in a row."""
+"""Length of the sections of the replay, s, and the number of consecutive sections that are shown."""
 ASKED: dict[str, Any] = {"color": GREY, "linewidth": 1.2, "drawstyle": "steps-post", "label": "commanded"}
 MEASURED: dict[str, Any] = {"color": INK, "linewidth": 2.2, "alpha": 0.75, "label": "measured"}
 BEFORE: dict[str, Any] = {"color": VERMILLION, "linewidth": 1.4, "linestyle": (0, (4, 2)), "label": "simulator, before"}
@@ -29,7 +29,7 @@ _ANGLES = ("roll (deg)", "pitch (deg)", "yaw (deg)")
 
 
 def plot_alignment(folder: Path, alignment: Alignment, records: Sequence[Record]) -> list[Path]:
-    """Draw all figures; returns their files."""
+    """Draw all figures and return their files."""
     paths = [folder / f"{name}.png" for name in ("steps", "replay", "errors")]
     plot_steps(paths[0], alignment, records[0])
     plot_replay(paths[1], alignment, records[0])
@@ -38,13 +38,13 @@ def plot_alignment(folder: Path, alignment: Alignment, records: Sequence[Record]
 
 
 def both(alignment: Alignment, flown: Stretches) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Replays by the file and by the aligned vehicle."""
+    """Replays with the vehicle of the file and with the aligned vehicle."""
     before, found = alignment.model, alignment.found
     return replay(before, np.zeros(len(before.names)), flown), replay(found.model, found.p, flown)
 
 
 def plot_steps(path: Path, alignment: Alignment, record: Record, title: str = "Response to steps") -> None:
-    """The paper's figure: a step of each body rate and of the thrust, and what answers to it."""
+    """The paper's figure: a step of each body rate and of the thrust, and the responses to it."""
     notes = [
         f"The clearest step of each command in {record.path.name}. The simulator starts as measured, at the left edge."
     ]
@@ -78,12 +78,12 @@ def _draw_step(ax: Axes, alignment: Alignment, flown: Stretches, channel: int) -
 
 
 def _measured(stream: str) -> dict[str, Any]:
-    """An accelerometer shakes: a thin line leaves the others to be seen."""
+    """Line style of a measurement. Accelerometer data is noisy, so a thin line keeps the others visible."""
     return MEASURED | ({"linewidth": 1.3, "alpha": 0.8} if stream == "specific_force" else {})
 
 
 def plot_replay(path: Path, alignment: Alignment, record: Record) -> None:
-    """The liveliest seconds of a flight, replayed in stretches that each start as measured."""
+    """The seconds of a flight with the most motion, replayed in sections that each start from the measured state."""
     flown = _liveliest(record)
     old, new = both(alignment, flown)
     notes = [
@@ -111,7 +111,7 @@ def plot_replay(path: Path, alignment: Alignment, record: Record) -> None:
 
 
 def _liveliest(record: Record) -> Stretches:
-    """A row of stretches in which the commanded body rates change most."""
+    """Consecutive sections in which the commanded body rates change most."""
     sent, rates = record.streams["command"], record.streams["body_rate"]
     first = max(sent.time[0], rates.time[0]) + REACH
     last = min(sent.time[-1], rates.time[-1])
@@ -142,7 +142,7 @@ def _draw_stretches(
         ax.plot(t[there], measured[k, there], **(_measured(stream) | labelled))
         for replayed, style in zip(seen, (BEFORE, AFTER), strict=True):
             line = _shown(replayed[stream], stream)[k, :, axis]
-            if stream == "quaternion":  # a full turn further is the same angle
+            if stream == "quaternion":  # angles that differ by a full turn are the same
                 line = line - 360 * np.round((line[0] - measured[k, 0]) / 360)
             ax.plot(t, line, **(style | labelled))
         ax.axvline(start, color=PALE, linewidth=0.8, zorder=0)
@@ -150,7 +150,7 @@ def _draw_stretches(
 
 
 def _shown(values: np.ndarray, stream: str) -> np.ndarray:
-    """Numbers as they are drawn: an attitude by its angles, deg, without jumps of a full turn."""
+    """Values as they are drawn. An attitude becomes its angles, deg, without jumps of a full turn."""
     if stream != "quaternion":
         return values
     angles = np.asarray(yaw_pitch_roll(jnp.asarray(values)))[..., ::-1]
@@ -158,7 +158,7 @@ def _shown(values: np.ndarray, stream: str) -> np.ndarray:
 
 
 def plot_errors(path: Path, alignment: Alignment) -> None:
-    """What is left of the errors in the stretches that the fit did not see."""
+    """The remaining errors in the sections that the fit did not see."""
     names = list(alignment.before)
     found = alignment.found
     count, length = int(found.held_out.sum()), found.windows.steps * STEP

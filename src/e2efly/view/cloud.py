@@ -1,4 +1,4 @@
-"""What a LiDAR meets, as points."""
+"""The points that a LiDAR measures."""
 
 from pathlib import Path
 from typing import Any
@@ -13,21 +13,21 @@ from e2efly.view.images import Sight, resolution
 from e2efly.view.style import SPEED, VERMILLION, figure
 
 SHOWN = 20.0
-"""Points of a LiDAR are drawn within this, m."""
+"""Largest distance at which points of a LiDAR are drawn, m."""
 
 
 def cloud(sight: Sight) -> np.ndarray:
-    """The points that a LiDAR meets, (m, 3), world, m."""
+    """The points that a LiDAR measures, (m, 3), world, m."""
     metres = sight.images["range"]
     met = (metres > 0) & (metres < sight.camera.reach[1])
     return sight.origin + metres[met][:, None] * sight.directions[met]
 
 
 def write_cloud(sight: Sight, path: Path, where: str) -> None:
-    """A LiDAR's points, in 3D and from above, coloured by height.
+    """Draw a LiDAR's points, in 3D and from above, coloured by height.
 
     Args:
-        sight: what it sees.
+        sight: what the LiDAR sees.
         path: the PNG file.
         where: a line under the title.
     """
@@ -64,7 +64,7 @@ def _height(points: np.ndarray) -> Normalize:
 
 
 def plan_of(ax: Axes, sight: Sight, title: str = "From above") -> None:
-    """A LiDAR's points from above, on axes, coloured by height; the higher ones over the lower."""
+    """Draw a LiDAR's points from above, on axes, coloured by height. Higher points cover lower ones."""
     points = _nearby(sight, cloud(sight))
     points = points[np.argsort(points[:, 2])]
     ax.scatter(*points.T[:2], c=points[:, 2], cmap=SPEED, norm=_height(points), s=2.0, linewidths=0, zorder=2)

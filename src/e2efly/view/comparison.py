@@ -1,4 +1,4 @@
-"""Runs side by side: how their success rose."""
+"""Comparison of runs: the course of their success rates."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,11 +7,11 @@ from e2efly.learn.comparison import Compared
 from e2efly.view.style import CYCLE, figure
 
 LINES = ("-", "--", ":", "-.")
-"""Beyond so many runs as there are colours, lines are drawn otherwise."""
+"""Line styles. If there are more runs than colours, the next line style is used."""
 
 
 def plot_runs(runs: Sequence[Compared], path: str | Path) -> None:
-    """Draw the success of each evaluation over environment steps and over seconds; write a PNG file."""
+    """Draw the success rate of each evaluation over environment steps and over seconds, as a PNG file."""
     notes = ["Success of the worst criterion at each evaluation in training; a dot: the first with 99 %"]
     with figure(path, f"{len(runs)} runs", 4.6 + 0.16 * len(runs), notes) as fig:
         axes = fig.subplots(1, 2, sharey=True)

@@ -19,14 +19,14 @@ from e2efly.view.seen import plot_seen
 from e2efly.view.worlds import plot_flights_in_worlds
 
 DRAWN = 12
-"""Flights of each criterion that are drawn."""
+"""Number of flights that are drawn for each criterion."""
 
 
 def plot_evaluation(found: Evaluation, folder: Path) -> None:
-    """Draw flights of each criterion, all errors and, where the policy lies in its run, how it was learned.
+    """Draw flights of each criterion, all errors and, if the policy is in the folder of its run, its learning curves.
 
     Raises:
-        OSError: when the folder cannot be made.
+        OSError: when the folder cannot be created.
     """
     _make(folder)
     flew = found.candidate
@@ -42,10 +42,10 @@ def plot_evaluation(found: Evaluation, folder: Path) -> None:
 
 
 def plot_run(run: Path, setup: Setup, flown: dict[str, Episodes]) -> None:
-    """Draw the same of a run that has just ended, into its folder: what was flown is not flown again.
+    """Draw the same plots for a run that has just ended, into its folder. Its flights are not flown again.
 
     Raises:
-        OSError: when the folder cannot be made.
+        OSError: when the folder cannot be created.
     """
     folder, config = run / "plots", setup.config
     title = f"{config.task.name} on {setup.env.physics.nominal.name}"
@@ -79,7 +79,7 @@ def _flights(flights: Flights, suite: Any, env: Env, key: Any, folder: Path, nam
         course = "".join(f", {key} {value}" for key, value in suite.course().items() if isinstance(value, str))
         shown = f"{note}, {len(flights.length)} episodes{course}"
         plots.plot_flights(suite, flights, folder / f"flights_{name}.png", title, notes=[shown])
-    worst = int(np.argmin(flights.success))  # the first that failed, or else the first
+    worst = int(np.argmin(flights.success))  # the first failed flight, or else the first flight
     plots.plot_time(flights, worst, folder / f"time_{name}.png", title, env.physics.nominal)
 
 

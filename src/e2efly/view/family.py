@@ -1,4 +1,4 @@
-"""The picture of the vehicles that a family draws."""
+"""The plot of the vehicles that are drawn from a family."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ _SHIPPED = dict(zip(vehicle_names(), (CYCLE[1], CYCLE[2], CYCLE[4]), strict=Fals
 
 
 def plot_family(family: Family, path: str | Path) -> None:
-    """Draw what a family draws, pair by pair, with the shipped vehicles among them; write a PNG file."""
+    """Plot vehicles that are drawn from a family, for pairs of parameters, with the shipped vehicles, as a PNG file."""
     drawn = [_shown(vehicle) for vehicle in family.sample(DRAWS, SEED)]
     columns = {name: np.array([each[name] for each in drawn]) for name in drawn[0]}
     shipped = {name: _shown(load_vehicle(name)) for name in _SHIPPED}
@@ -40,7 +40,7 @@ def plot_family(family: Family, path: str | Path) -> None:
 
 
 def _shown(vehicle: Vehicle) -> dict[str, float]:
-    """What the picture shows of a vehicle."""
+    """The values of a vehicle that the plot shows."""
     v, m = vehicle, measured(vehicle)
     pull = float(v.drag_linear[0] * 5 + v.drag_quadratic[0] * 25)
     low, high = v.thrust_range

@@ -1,4 +1,4 @@
-"""What the figures of a flight share: colours of modes, bands behind plots over time, words where nothing is."""
+"""Shared parts of the figures of a flight: colours of modes, bands behind plots over time, texts in empty plots."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ MODE_COLOR = {
     "INIT": GREY, "TAKEOFF": ORANGE, "HOVER": BLUE, "POLICY": VERMILLION, "LAND": GREEN, "DONE": PALE,
     "DISARMED": PALE,
 }  # fmt: skip
-"""Colour of a mode; what is not here takes purple, then sky."""
+"""Colours of the modes. Other modes get purple, then sky."""
 XYZ = (BLUE, VERMILLION, GREEN)
 
 
@@ -63,7 +63,7 @@ def stepped_in_marks(ax: Axes, log: FlightLog) -> list[Any]:
 
 
 def empty(ax: Axes) -> None:
-    """Say so where no line has a finite value."""
+    """Write a text into the axes if no line has a finite value."""
     if not any(np.isfinite(np.asarray(line.get_ydata(), float)).any() for line in ax.get_lines()):
         say(ax, "not recorded")
 

@@ -11,7 +11,7 @@ from e2efly.view.flight_log import blackbox_responses, gyro, responses
 
 
 def draw(log: FlightLog, out: Path, laid: tuple[Blackbox, Alignment] | None = None) -> list[Path]:
-    """Draw the figures of a flight for which anything was recorded into a folder; their paths."""
+    """Draw the figures of a flight for which data was recorded, into a folder. Returns their paths."""
     estimates = {"log": responses(log)} | ({"blackbox": blackbox_responses(laid[0])} if laid else {})
     figures: dict[str, tuple[tuple[str, ...], Callable[[Path], None]]] = {
         "track": (("odometry",), lambda path: report.plot_tracks(log, path)),
@@ -34,10 +34,10 @@ def draw(log: FlightLog, out: Path, laid: tuple[Blackbox, Alignment] | None = No
 
 
 def laid_over(log: FlightLog, path: Path) -> tuple[Blackbox, Alignment]:
-    """The session of a blackbox log that is of this flight, and where it lies.
+    """The session of a blackbox log that belongs to this flight, and its alignment in time.
 
     Raises:
-        ValueError: where none is.
+        ValueError: when no session belongs to this flight.
     """
     time, rate, _ = gyro(log)
     found: list[tuple[Blackbox, Alignment]] = []

@@ -1,4 +1,4 @@
-"""The figures of a flight log that show how hardware and software did: loop, link, battery, throttle, blackbox."""
+"""The figures of a flight log about hardware and software: control loop, link, battery, throttle, blackbox."""
 
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,12 @@ from e2efly.view.flight_log import AXES, GROUNDED, gyro, intervals
 from e2efly.view.style import BLUE, CYCLE, GREEN, GREY, PURPLE, SKY, VERMILLION, figure, say
 
 LAG = 0.04
-"""From a throttle sent to the thrust measured, s: middle of the 35 to 45 ms that Betaflight quadrotors show."""
+"""Time from a sent throttle to the measured thrust, s: the middle of the 35 to 45 ms that Betaflight
+quadrotors show."""
 
 
 def plot_loop(log: FlightLog, path: str | Path) -> None:
-    """How punctual the control loop was: histograms of its times, and lateness and missed deadlines over the flight."""
+    """Timing of the control loop: histograms of its times, and lateness and missed deadlines over the flight."""
     timing, inference = log["timing"], log["policy"].numbers("inference_s")
     period, work, late = (timing.numbers(name) for name in ("period_s", "work_s", "lateness_s"))
     missed = timing.numbers("deadline_missed") > 0
@@ -41,7 +42,7 @@ def plot_loop(log: FlightLog, path: str | Path) -> None:
         over.set_ylabel("lateness (ms)")
         if len(timing):
             over.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderpad=0.1)
-        spent = timing.numbers("cpu_load")  # told once per second
+        spent = timing.numbers("cpu_load")  # recorded once per second
         load.plot(timing.time[np.isfinite(spent)], 100 * spent[np.isfinite(spent)], color=BLUE, label="companion")
         load.plot(log["status"].time, 100 * log["status"].numbers("cpu_load"), color=VERMILLION, label="controller")
         load.set_ylabel("processor load (%)")
@@ -54,7 +55,7 @@ def plot_loop(log: FlightLog, path: str | Path) -> None:
 
 
 def _histogram(ax: Axes, x: np.ndarray, color: str) -> None:
-    """A histogram with a logarithmic count, on which one late round in ten thousand is seen, and its quantiles."""
+    """A histogram with a logarithmic count, which shows even one late cycle in ten thousand, and its quantiles."""
     if not len(x):
         say(ax, "not recorded")
         return
@@ -154,7 +155,7 @@ def _throttle_points(log: FlightLog) -> tuple[np.ndarray, np.ndarray]:
 
 
 def plot_blackbox(log: FlightLog, blackbox: Blackbox, alignment: Alignment, path: str | Path) -> None:
-    """The controller's blackbox laid over the flight log: rates of both, its setpoint, and its motors."""
+    """The flight controller's blackbox over the flight log: the rates of both, its setpoint, and its motors."""
     commands = log["command"]
     time, measured, source = gyro(log)
     start = liveliest(commands.time, commands.numbers("body_rate", 3), 1.5)

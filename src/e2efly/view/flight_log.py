@@ -1,4 +1,4 @@
-"""A flight log as a report needs it: intervals of modes, responses, and its figures of merit as plain numbers."""
+"""The data of a flight log for a report: intervals of modes, responses, and figures of merit as plain numbers."""
 
 import datetime
 import math
@@ -19,27 +19,27 @@ AXES = ("roll", "pitch", "yaw")
 GROUNDED = ("INIT", "DONE", "DISARMED", "")
 """Modes in which the vehicle does not follow commands."""
 ALIGNED_S = 5.0
-"""Time in all others that an alignment needs, s."""
+"""Time in all other modes that an alignment needs, s."""
 TOGETHER_S = 0.3
-"""Changes by the filter, for the same limit, that are nearer to each other than this are told as one, s."""
+"""Changes by the filter for the same limit that are closer in time than this, s, are reported as one."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A mode, while it lasted."""
+    """The interval of a mode."""
 
     mode: str
     """Its name."""
     start: float
-    """When it began, s since the start of the log."""
+    """Time when it began, s since the start of the log."""
     end: float
-    """When it ended, s."""
+    """Time when it ended, s since the start of the log."""
     reasons: tuple[str, ...]
-    """Why it began."""
+    """The reasons why it began."""
 
 
 def intervals(log: FlightLog) -> list[Interval]:
-    """The modes of a flight in order; one without a name where none was recorded."""
+    """The modes of a flight in order. If none was recorded, one mode without a name."""
     changes = log["mode"]
     if not len(changes):
         return [Interval("", 0.0, log.duration, ())]
@@ -52,10 +52,10 @@ def intervals(log: FlightLog) -> list[Interval]:
 
 
 def gyro(log: FlightLog) -> tuple[np.ndarray, np.ndarray, str]:
-    """Body rate as measured: times (n,) s, values (n, 3) rad/s, and from where: the odometry without an IMU."""
+    """Measured body rate: times (n,) s, values (n, 3) rad/s, and the source. Without an IMU: the odometry."""
     for source, field in (("imu", "gyro"), ("odometry", "body_rate")):
         rate = log[source].numbers(field, 3)
-        known = np.isfinite(rate).all(axis=1)  # messages of a channel may carry some of its fields only
+        known = np.isfinite(rate).all(axis=1)  # messages of a channel may have only some of its fields
         if known.any():
             break
     return log[source].time[known], rate[known], f"{source}.{field}"
@@ -71,7 +71,7 @@ def responses(log: FlightLog) -> dict[str, StepResponse]:
 
 
 def align_command(log: FlightLog, found: Mapping[str, StepResponse]) -> str | None:
-    """What to type to align the simulator with this flight; None where the log has not what that needs.
+    """The command to align the simulator with this flight. None if the log does not have the data for it.
 
     Args:
         log: the flight.
@@ -87,7 +87,7 @@ def align_command(log: FlightLog, found: Mapping[str, StepResponse]) -> str | No
 
 
 def blackbox_responses(blackbox: Blackbox) -> dict[str, StepResponse]:
-    """The same from the blackbox's own setpoint and gyro: without the link, and finer in time."""
+    """The step responses from the blackbox's own setpoint and gyroscope: without the link, and finer in time."""
     t, x, y = blackbox.time, blackbox.setpoint, blackbox.gyro
     return {axis: step_response(t, x[:, i], t, y[:, i]) for i, axis in enumerate(AXES)}
 
@@ -104,7 +104,9 @@ def errors(log: FlightLog) -> tuple[np.ndarray, np.ndarray]:
 
 
 def stepped_in(log: FlightLog) -> list[Interval]:
-    """When the filter changed commands: intervals of changes less than `TOGETHER_S` apart, of limits as modes."""
+    """The intervals in which the filter changed commands. Changes less than `TOGETHER_S` apart are one interval, and
+    its mode is the name of the limit.
+    """
     changes = log["filter"]
     limits, found = changes.texts("limit"), list[Interval]()
     for i in range(len(changes)):
@@ -117,7 +119,7 @@ def stepped_in(log: FlightLog) -> list[Interval]:
 
 
 def _filter(log: FlightLog, modes: list[Interval]) -> dict[str, Any] | None:
-    """Where the filter stepped in; None where it never did."""
+    """The interventions of the filter. None if there were none."""
     changes = log["filter"]
     if not len(changes):
         return None
@@ -137,12 +139,12 @@ def _least(changes: Series, mine: np.ndarray) -> float:
 
 
 def tilt(quaternion: np.ndarray) -> np.ndarray:
-    """Angle, rad, between body z and up of quaternions (n, 4)."""
+    """Angle between body z and up, rad, for quaternions (n, 4)."""
     return Quat.of(quaternion).tilt()
 
 
 def summary(log: FlightLog, blackbox: Blackbox | None = None, alignment: Alignment | None = None) -> dict[str, Any]:
-    """The flight in numbers, SI units, None where nothing is known; it can be written as JSON."""
+    """The flight in numbers, SI units. None where nothing is known. It can be written as JSON."""
     motion, timing, link, battery = log["odometry"], log["timing"], log["link"], log["battery"]
     speed = np.linalg.norm(motion.numbers("velocity", 3), axis=1)
     began = datetime.datetime.fromtimestamp(log.start * 1e-9, datetime.UTC) if log.series else None
@@ -202,7 +204,7 @@ def summary(log: FlightLog, blackbox: Blackbox | None = None, alignment: Alignme
 
 
 def _errors(log: FlightLog, modes: list[Interval]) -> dict[str, dict[str, float]]:
-    """Root mean square and largest distance to the setpoint by mode."""
+    """Root mean square and maximum of the distance to the setpoint, by mode."""
     time, error = errors(log)
     found: dict[str, list[np.ndarray]] = {}
     for i in modes:
@@ -245,7 +247,7 @@ def _largest(x: np.ndarray) -> float | None:
 
 
 def _json(value: Any) -> Any:
-    """The same with None for every number that is not finite."""
+    """The same value with None in place of every number that is not finite."""
     if isinstance(value, Mapping):
         return {key: _json(entry) for key, entry in value.items()}
     if isinstance(value, list):

@@ -17,12 +17,12 @@ from e2efly.view.flight_log import AXES, Interval, errors, gyro, intervals, tilt
 from e2efly.view.rate_response import StepResponse
 from e2efly.view.style import GREY, PALE, figure, say
 
-_CHANGES = 15  # of mode, the first included, that are told
+_CHANGES = 15  # largest number of mode changes that are listed, the first mode included
 _DASHED: dict[str, Any] = {"linewidth": 1.1, "linestyle": (0, (4, 2))}
 
 
 def plot_tracks(log: FlightLog, path: str | Path) -> None:
-    """Where it flew, in 3D and from above, coloured by mode, with the setpoint."""
+    """The flight path in 3D and from above, coloured by mode, with the setpoint."""
     modes = intervals(log)
     color = colors(modes)
     time, position = log["odometry"].time, log["odometry"].numbers("position", 3)
@@ -69,7 +69,7 @@ def plot_tracks(log: FlightLog, path: str | Path) -> None:
 
 
 def plot_motion(log: FlightLog, path: str | Path) -> None:
-    """Position, velocity, tilt and error over time; each change of mode is a number, whose reasons stand above."""
+    """Position, velocity, tilt and error over time. Each change of mode has a number; its reasons are listed above."""
     modes = intervals(log)
     motion, commands = log["odometry"], log["command"]
     position, velocity = motion.numbers("position", 3), motion.numbers("velocity", 3)
@@ -107,7 +107,7 @@ def plot_motion(log: FlightLog, path: str | Path) -> None:
 
 
 def plot_rates(log: FlightLog, path: str | Path) -> None:
-    """Body rates asked and measured: the whole flight, and the two seconds in which most was asked."""
+    """Commanded and measured body rates: the whole flight, and the two seconds with the largest commands."""
     modes = intervals(log)
     commands = log["command"]
     asked = commands.numbers("body_rate", 3)
@@ -139,12 +139,12 @@ def plot_rates(log: FlightLog, path: str | Path) -> None:
 def plot_response(
     by_source: dict[str, dict[str, StepResponse]], path: str | Path, title: str = "Rate loop: response to a step"
 ) -> None:
-    """Step responses by axis; of the flight log, and of the blackbox where there is one.
+    """Step responses by axis, from the flight log and, if there is one, from the blackbox.
 
     Args:
-        by_source: by source, by axis, the estimates.
+        by_source: the estimates, by source and by axis.
         path: the PNG file.
-        title: of the figure.
+        title: title of the figure.
     """
     notes = [
         "estimated from the flight. Told and marked: delay until 10 %, time until 63 % of the settled value; overshoot"
@@ -187,7 +187,7 @@ def _change(modes: list[Interval], k: int) -> str:
 
 
 def _numbers(ax: Axes, modes: list[Interval], duration: float) -> None:
-    """A number at each change of mode, inside the axes at the top; those too close together are moved apart."""
+    """Draw a number at each change of mode, inside the axes at the top. Numbers that are too close are moved apart."""
     room, last = 0.025 * max(duration, 1e-6), -1e9
     for k, interval in enumerate(modes[1:_CHANGES], 1):
         at = last = max(interval.start, last + room)

@@ -1,4 +1,4 @@
-"""Flights of a policy as NumPy arrays: what the plots draw."""
+"""Flights of a policy as NumPy arrays, for the plots."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,10 +13,10 @@ from e2efly.episodes import Act, trace
 
 @dataclass(frozen=True)
 class Flights:
-    """`n` episodes over `t` control steps. Row k is what step k reached; rows from `length` on lie after the end."""
+    """`n` episodes over `t` control steps. Row k is the state after step k. Rows from `length` on are after the end."""
 
     time: Float[np.ndarray, " t"]
-    """Since the start of the episode, s: the end of each step, so that the first is one control period."""
+    """Time since the start of the episode at the end of each step, s. The first time is one control period."""
     position: Float[np.ndarray, "t n 3"]
     """Centre of mass, world, m."""
     velocity: Float[np.ndarray, "t n 3"]
@@ -28,19 +28,19 @@ class Flights:
     rotor_speed: Float[np.ndarray, "t n 4"]
     """Rear right, front right, rear left, front left, rad/s."""
     command: Float[np.ndarray, "t n 4"]
-    """What the policy asked for at the start of the step, in the units of the command mode; it acts a latency later."""
+    """Command of the policy at the start of the step, in the units of the command mode. It acts one latency later."""
     goal: Float[np.ndarray, "t n 3"]
-    """Where to be at `time`, world, m."""
+    """Goal position at `time`, world, m."""
     length: Int[np.ndarray, " n"]
-    """Steps until the episode ended."""
+    """Number of steps until the episode ended."""
     success: Bool[np.ndarray, " n"]
-    """Whether it ended well."""
+    """Whether the episode succeeded."""
     command_mode: str = "ctbr"
-    """A name of `e2efly.control.COMMAND_MODES`: what `command` is."""
+    """The command mode of `command`, a name of `e2efly.control.COMMAND_MODES`."""
     late: Bool[np.ndarray, " n"] | None = None
-    """Whether it ended because the time was out; None: not known."""
+    """Whether the episode timed out. None: not known."""
     images: tuple[np.ndarray, ...] = ()
-    """What the policy was shown at the start of each step by each camera: (t, n, h, w) or (t, n, h, w, 3)."""
+    """The images that the policy saw at the start of each step, by camera: (t, n, h, w) or (t, n, h, w, 3)."""
 
     def ending(self, index: int) -> str:
         """How an episode ended, in a word or two."""
@@ -52,7 +52,7 @@ class Flights:
 
     @property
     def speed(self) -> Float[np.ndarray, "t n"]:
-        """m/s."""
+        """Speed, m/s."""
         return np.linalg.norm(self.velocity, axis=-1)
 
     @property
@@ -73,9 +73,9 @@ def fly(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int) -> Flights:
     Args:
         env: the environment.
         act: the policy.
-        key: decides the starts and all noise.
-        n: episodes, side by side.
-        steps: control steps; an episode that is longer is cut.
+        key: random key that decides the starts and all noise.
+        n: number of episodes, which are simulated together.
+        steps: largest number of control steps. Longer episodes are cut off.
     """
     shown = list[tuple[np.ndarray, ...]]()
 

@@ -1,4 +1,4 @@
-"""Pictures of a rehearsal of hardware in the loop."""
+"""Plots of a rehearsal of hardware in the loop."""
 
 from pathlib import Path
 from typing import Any
@@ -17,18 +17,18 @@ from e2efly.view.style import BLUE, FAILURE, GREY, START, VERMILLION, figure, sa
 from e2efly.view.worlds import draw_plan
 
 _MARGIN = 0.8
-"""About what is drawn, m."""
+"""Margin around the drawing, m."""
 _MOST_TRIANGLES = 5000
-"""Of a scene, in a picture."""
+"""Largest number of triangles of a scene in a plot."""
 
 
 def plot_lap(lap: Lap, scene: Scene | MeshScene, origin: Origin, path: str | Path) -> None:
-    """One flight: in the room from above, and in the scene from above and from the side.
+    """Draw one flight: in the room from above, and in the scene from above and from the side.
 
     Args:
-        lap: with its true motion.
+        lap: the flight, with its true motion.
         scene: one world.
-        origin: of the scene in the room.
+        origin: origin of the scene in the room.
         path: the PNG file.
     """
     title = f"Rehearsal in the world of seed {lap.seed}"
@@ -67,7 +67,7 @@ def plot_lap(lap: Lap, scene: Scene | MeshScene, origin: Origin, path: str | Pat
 
 
 def plot_times(laps: list[Lap], path: str | Path) -> None:
-    """What came late, of all flights: a row of dots for each kind, with 99 % and the maximum.
+    """Draw the delays of all flights: one row of dots for each kind, with the 99 % quantile and the maximum.
 
     Args:
         laps: the flights.
@@ -102,7 +102,7 @@ def _notes(lap: Lap) -> list[str]:
 
 
 def _track(ax: Axes, points: np.ndarray, flown: np.ndarray) -> None:
-    """A path (t, 2), and which part of it (t,) the policy flew."""
+    """Draw a path (t, 2), and mark the part of it (t,) that the policy flew."""
     pieces = np.stack([points[:-1], points[1:]], axis=1)
     colours = [VERMILLION if policy else BLUE for policy in flown[1:]]
     ax.add_collection(LineCollection(list(pieces), colors=colours, linewidths=1.6, zorder=3))
@@ -110,7 +110,7 @@ def _track(ax: Axes, points: np.ndarray, flown: np.ndarray) -> None:
 
 
 def _draw_side(ax: Axes, things: list[Body]) -> None:
-    """Solids as they are seen along y, the far ones first."""
+    """Draw solids as seen along y, the far ones first."""
     order = sorted(things, key=lambda body: -body.quads[..., 1].mean())
     for body in order:
         faces = list(body.quads[..., [0, 2]])
@@ -119,14 +119,16 @@ def _draw_side(ax: Axes, things: list[Body]) -> None:
 
 
 def _draw_triangles(ax: Axes, scene: MeshScene, axes: tuple[int, int]) -> None:
-    """The edges of a scene's triangles, of many the largest, seen along the axis that is left out."""
+    """Draw the edges of a scene's triangles, as seen along the axis that is not in `axes`. If there are too many, only
+    the largest triangles are drawn.
+    """
     largest = np.argsort(-np.linalg.norm(np.ptp(scene.triangles, axis=1), axis=1))[:_MOST_TRIANGLES]
     flat = list(scene.triangles[largest][..., list(axes)])
     ax.add_collection(PolyCollection(flat, facecolors="none", edgecolors=GREY, linewidths=0.3, alpha=0.4, zorder=1.6))
 
 
 def _fit(ax: Axes, points: np.ndarray, others: list[np.ndarray]) -> None:
-    """Show a path and the solids about it, to scale."""
+    """Set the limits of the axes so that a path and the solids around it are visible, to scale."""
     low, high = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
     near = [x for x in others if (x.min(axis=0) < high + 2).all() and (x.max(axis=0) > low - 2).all()]
     if near:

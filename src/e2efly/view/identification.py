@@ -1,4 +1,4 @@
-"""Pictures of an identification: fit against data, what is foretold and what is left, and what is now believed."""
+"""Plots of an identification: the fit and the data, predictions and residuals, and the identified values."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,7 +13,7 @@ from e2efly.vehicles import Vehicle
 from e2efly.view.style import BLUE, GREY, INK, VERMILLION, figure
 
 UNITS = {name: kind.unit for name, kind in KINDS.items()} | {"quaternion": "rad"}
-"""Of errors: that of an attitude is an angle."""
+"""Units of the errors. The error of an attitude is an angle."""
 _NAMES = {
     "body_rate": "body rate", "specific_force": "specific force", "rotor_speed": "rotor speed", "velocity": "velocity",
     "quaternion": "attitude", "position": "position",
@@ -27,7 +27,7 @@ def plot_identified(
     found: Mapping[str, Found],
     outside: Mapping[str, Prediction],
 ) -> list[Path]:
-    """Draw all figures; returns their files."""
+    """Draw all figures and return their files."""
     paths = [folder / "parameters.png"]
     _plot_parameters(paths[0], base, fused)
     for kind, each in found.items():
@@ -80,7 +80,7 @@ def _plot_prediction(path: Path, each: Found, outside: Prediction) -> None:
 
 
 def _plot_fit(path: Path, each: Found, outside: Prediction) -> None:
-    """The liveliest held-out windows, one after the other."""
+    """The held-out windows with the most motion, one after the other."""
     windows = each.windows.some(each.held_out)
     names = [name for name in ("body_rate", "specific_force", "velocity", "position") if name in outside.measured][:2]
     lively = np.argsort(-np.var(outside.measured[names[0]], axis=1).sum(-1))[:6]

@@ -1,4 +1,4 @@
-"""What cameras and LiDARs see, as pictures with titles, scales and legends."""
+"""The images of cameras and LiDARs, as pictures with titles, scales and legends."""
 
 import dataclasses
 import math
@@ -38,25 +38,25 @@ SENSORS = {
     "instance": "Instance",
     "normal": "Surface normal",
 }
-"""What a camera sees, and its title."""
+"""Titles of the images by sensor."""
 DARK, BRIGHT, LONGEST = 0.25, 0.4, 3.0
-"""Median of the colours below which a world is dark, that to which its pictures are exposed then, and the largest
-factor for that."""
+"""`DARK`: median of the colours below which a world is dark. `BRIGHT`: median to which its pictures are then exposed.
+`LONGEST`: largest exposure factor."""
 TILE = 16
-"""Rows and columns of images are multiples of it: the ray caster's tiles."""
+"""Rows and columns of images are multiples of this, the size of the ray caster's tiles."""
 
 
 @dataclass(frozen=True)
 class Sight:
-    """What one camera sees at one moment."""
+    """The view of one camera at one moment."""
 
     camera: CameraConfig
     images: dict[str, np.ndarray]
-    """By a name of `SENSORS`, (h, w) or (h, w, 3); depth and range as the camera measures them, m."""
+    """Images by a name of `SENSORS`, (h, w) or (h, w, 3). Depth and range are as the camera measures them, m."""
     directions: np.ndarray
     """(h, w, 3) unit vectors of the rays, world."""
     origin: np.ndarray
-    """(3,) world, m."""
+    """(3,) origin of the rays, world, m."""
 
 
 @partial(jax.jit, static_argnums=0, static_argnames="channels")
@@ -76,7 +76,7 @@ def _triangles(
 def _followed(
     camera: CameraConfig, follow: Callable, position: Array, quaternion: Array, channels: tuple[str, ...]
 ) -> tuple[dict[str, Array], Array, Array]:
-    """Images, the rays' directions and their origin."""
+    """The images, the directions of the rays and their origin."""
     rays = pattern(camera)
     origin, matrix = pose(mount(camera, 1), position[None], quaternion[None])
     images = follow(origin, matrix, rays, channels, usual_light(1) if "rgb" in channels else None)
@@ -85,7 +85,9 @@ def _followed(
 
 
 def sized(camera: CameraConfig, columns: int, width: int | None, height: int | None) -> CameraConfig:
-    """The camera with so many columns, or `width`; square pixels where `height` is left out. A LiDAR keeps its rays."""
+    """The camera with `columns` columns, or with `width` if given. Without `height`, its pixels are square. A LiDAR
+    keeps its rays.
+    """
     if camera.projection == "spherical":
         return dataclasses.replace(camera, width=width or camera.width, height=height or camera.height)
     width = width or columns
@@ -105,13 +107,13 @@ def look_around(
     """Everything that a camera on a vehicle in a world sees.
 
     Args:
-        camera: of the vehicle.
+        camera: the camera of the vehicle.
         scene: one world.
-        time: of what moves, s.
-        position: of the vehicle, world, m.
-        quaternion: of the vehicle, body to world.
-        channels: of `CHANNELS`; where depth is among them, range comes with it.
-        exposed: factor on the colours; what gets brighter than white is white.
+        time: time for moving objects, s.
+        position: position of the vehicle, world, m.
+        quaternion: attitude of the vehicle, body to world.
+        channels: names of `CHANNELS`. With depth, range is also given.
+        exposed: factor on the colours. Values above white become white.
     """
     when, *place = (jnp.asarray(x, jnp.float32) for x in (time, position, quaternion))
     if isinstance(scene, MeshScene):
@@ -131,14 +133,14 @@ def look_around(
 
 
 def exposure(pictures: Iterable[np.ndarray]) -> float:
-    """How much longer than usual a camera exposes in a world, for all pictures of it alike; 1 where it is not dark.
+    """The exposure factor of a camera in a world, the same for all its pictures. It is 1 if the world is not dark.
 
-    Under a roof there is no sun, and what light remains leaves most of a picture nearly black.
+    Under a roof there is no sun, and the remaining light leaves most of a picture nearly black.
 
     Args:
-        pictures: RGB in [0, 1], (h, w, 3), of some places in it.
+        pictures: RGB in [0, 1], (h, w, 3), from several places in the world.
     """
-    usual = float(np.median([picture.mean(axis=-1) for picture in pictures]))  # the sky in a window does not count much
+    usual = float(np.median([picture.mean(axis=-1) for picture in pictures]))  # a median: sky in a window hardly counts
     return 1.0 if usual >= DARK else min(BRIGHT / max(usual, 1e-6), LONGEST)
 
 
@@ -146,9 +148,9 @@ def in_colours(name: str, image: np.ndarray, far: float) -> np.ndarray:
     """An image of a sensor as RGB in [0, 1], (h, w, 3).
 
     Args:
-        name: of `SENSORS`.
-        image: what it sees.
-        far: the end of the distances' scale, m.
+        name: a name of `SENSORS`.
+        image: the image of this sensor.
+        far: end of the scale of distances, m.
     """
     match name:
         case "depth" | "range":
@@ -165,7 +167,7 @@ def in_colours(name: str, image: np.ndarray, far: float) -> np.ndarray:
 
 
 def _distinct(count: int) -> np.ndarray:
-    """A colour of each instance: sky and ground pale, neighbours far apart on the wheel of hues."""
+    """A colour for each instance: pale for sky and ground. Consecutive instances have very different hues."""
     index = np.arange(count)
     vivid = colormaps["hsv"]((index * 0.381966) % 1.0)[:, :3]
     colours = (0.25 + 0.65 * vivid) * np.where(index % 2, 0.75, 1.0)[:, None]
@@ -174,7 +176,7 @@ def _distinct(count: int) -> np.ndarray:
 
 
 def show(ax: Axes, name: str, image: np.ndarray, camera: CameraConfig, title: str) -> None:
-    """One sensor's image on axes, its pixels as large as their angles are."""
+    """Draw one sensor's image on axes, with pixels sized in proportion to their angles."""
     aspect = shape_of(camera)[0] / shape_of(camera)[1] * image.shape[1] / image.shape[0]
     ax.imshow(in_colours(name, image, camera.reach[1]), interpolation="nearest", aspect=aspect)
     ax.set(xticks=[], yticks=[])
@@ -192,7 +194,7 @@ def shape_of(camera: CameraConfig) -> tuple[float, float]:
 
 
 def scale(fig: Figure, ax: Any, far: float, **place: Any) -> None:
-    """The bar of distances beside axes."""
+    """Draw the colour bar of distances beside axes."""
     bar = fig.colorbar(ScalarMappable(Normalize(0.0, far), DISTANCE), ax=ax, **place)
     bar.set_label("m")
     bar.outline.set_visible(False)
@@ -208,12 +210,12 @@ def classes(image: np.ndarray) -> list[Patch]:
 
 
 def write_pictures(sight: Sight, folder: Path, where: str) -> list[Path]:
-    """One PNG of each sensor.
+    """Write one PNG file per sensor.
 
     Args:
         sight: what a camera sees.
-        folder: of the files.
-        where: of the picture: a line under the title.
+        folder: the folder of the files.
+        where: place of the picture, a line under the title.
     """
     written = []
     height, width = shape_of(sight.camera)

@@ -1,4 +1,4 @@
-"""Flights of a validation beside its report, so that they can be watched: report.flights.npz beside report.json."""
+"""Flights of a validation, stored next to its report so that they can be viewed: report.flights.npz for report.json."""
 
 import io
 import zipfile
@@ -13,9 +13,9 @@ from jaxtyping import Int
 from e2efly.view.flights import Flights
 
 PLACES = ("training", "plant")
-"""Where the flights were flown: in the training simulator and on the plant."""
+"""The two places of the flights: the training simulator and the plant."""
 _MOVED = {"position": 3, "velocity": 3, "quaternion": 4, "body_rate": 3, "command": 4, "goal": 3}
-"""What is kept of each flight, and how many numbers of each step."""
+"""The quantities that are stored of each flight, and their count of numbers per step."""
 
 
 @dataclass(frozen=True)
@@ -23,18 +23,18 @@ class Pair:
     """Some starts of a criterion, flown in two places."""
 
     starts: Int[np.ndarray, " n"]
-    """Their numbers among the starts of the report."""
+    """Numbers of these starts in the report."""
     flown: Mapping[str, Flights]
-    """By a name of `PLACES`, in that order; flights in the order of `starts`."""
+    """Flights by the names of `PLACES`, in that order. The flights are in the order of `starts`."""
 
 
 def flights_file(report: Path) -> Path:
-    """Where they are: report.flights.npz beside report.json."""
+    """The file of the flights: report.flights.npz next to report.json."""
     return report.with_suffix(".flights.npz")
 
 
 def packed(pairs: Mapping[str, Pair]) -> bytes:
-    """The content of such a file; pairs by criterion."""
+    """The content of such a file, from the pairs by criterion."""
     arrays: dict[str, Any] = {}
     for criterion, pair in pairs.items():
         arrays[f"{criterion}/starts"] = pair.starts
@@ -48,10 +48,10 @@ def packed(pairs: Mapping[str, Pair]) -> bytes:
 
 
 def read_flights(path: Path) -> dict[str, Pair]:
-    """The flights of such a file, by criterion; rotor speeds are not kept.
+    """The flights of such a file, by criterion. Rotor speeds are not stored.
 
     Raises:
-        ValueError: naming the file, where it holds something else.
+        ValueError: when the file contains something else, naming it.
     """
     accepted = "accepted: what `e2efly validate --json` has written beside its report"
     try:
@@ -67,11 +67,11 @@ def read_flights(path: Path) -> dict[str, Pair]:
 
 
 def _flights(arrays: Mapping[str, np.ndarray], where: str, n: int) -> Flights:
-    """Of one place.
+    """The flights of one place.
 
     Raises:
-        KeyError: for an array that is missing.
-        ValueError: for one of another shape.
+        KeyError: for a missing array.
+        ValueError: for an array with another shape.
     """
     time, length, success = (arrays[f"{where}/{name}"] for name in ("time", "length", "success"))
     t = len(time)

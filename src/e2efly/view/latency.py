@@ -1,4 +1,4 @@
-"""A histogram of latencies, with the quantiles that matter."""
+"""A histogram of latencies, with the important quantiles."""
 
 from pathlib import Path
 
@@ -8,12 +8,12 @@ from e2efly.view.style import BLUE, GREY, figure
 
 
 def plot_latencies(seconds: np.ndarray, rate: float, path: str | Path) -> None:
-    """From the newest pose to the image.
+    """Draw the latencies from the newest pose to the image.
 
     Args:
-        seconds: (n,) of each image, s.
-        rate: at which images came, Hz.
-        path: of the PNG.
+        seconds: (n,) latency of each image, s.
+        rate: rate of the images, Hz.
+        path: the PNG file.
     """
     ms = 1e3 * np.asarray(seconds)
     middle, late = np.quantile(ms, (0.5, 0.99))

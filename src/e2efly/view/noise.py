@@ -1,4 +1,4 @@
-"""Pictures of noise: what it does to depth, to colours and to a mask, and the Allan deviation of an IMU."""
+"""Plots of noise: its effect on depth, on colours and on a mask, and the Allan deviation of an IMU."""
 
 import dataclasses
 from pathlib import Path
@@ -22,7 +22,7 @@ from e2efly.view.style import BLUE, GREY, VERMILLION, figure
 
 
 def plot_depth_noise(sight: Sight, key: PRNGKeyArray, path: str | Path) -> None:
-    """Each noise of depth, and under it the error; of a pinhole camera."""
+    """Draw each noise of depth, and below it the error, for a pinhole camera."""
     camera = dataclasses.replace(sight.camera, sees="depth")
     clean = sight.images["depth"]
     error = Normalize(-0.3, 0.3)
@@ -46,7 +46,7 @@ def plot_depth_noise(sight: Sight, key: PRNGKeyArray, path: str | Path) -> None:
 
 
 def plot_image_noise(sight: Sight, mask: Float[np.ndarray, "h w"], key: PRNGKeyArray, path: str | Path) -> None:
-    """Each noise of values in [0, 1]: of colours, and of a mask of 0 and 1."""
+    """Draw each noise of values in [0, 1]: on colours, and on a mask of 0 and 1."""
     colour, label = (dataclasses.replace(sight.camera, sees=sees) for sees in ("rgb", "label"))
     with figure(path, "Noise of images in [0, 1]", 4.1, ["Of colours, and of a mask of 0 and 1"]) as fig:
         for column, (name, config) in zip(fig.subplots(2, 4).T, IMAGE_NOISES.items(), strict=True):
@@ -63,7 +63,7 @@ def allan_deviation(signal: Float[np.ndarray, "t *n"], group: int) -> float:
 
 
 def rest(config: ImuConfig, key: PRNGKeyArray, seconds: float, rate: float, n: int) -> ImuState:
-    """What n IMUs at rest measure: leaves (t, n, ...), NumPy."""
+    """The measurements of n IMUs at rest: leaves (t, n, ...), NumPy."""
 
     @jax.jit
     def program(key: PRNGKeyArray) -> ImuState:
@@ -79,7 +79,7 @@ def rest(config: ImuConfig, key: PRNGKeyArray, seconds: float, rate: float, n: i
 
 
 def plot_imu(config: ImuConfig, key: PRNGKeyArray, path: str | Path, seconds: float = 20_000.0) -> None:
-    """The Allan deviation of both sensors at rest beside what its numbers promise."""
+    """Draw the Allan deviation of both sensors at rest, and the values that the configuration predicts."""
     rate = 50.0
     record = rest(config, key, seconds, rate, 2)
     groups = np.unique(np.geomspace(1, len(record.gyroscope) // 8, 40).astype(int))

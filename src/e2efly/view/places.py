@@ -1,4 +1,4 @@
-"""Worlds by name, to be looked at: what stands there, and where a flight through it leads."""
+"""Worlds by name, for viewing: their objects, and the route of a flight through them."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,28 +24,28 @@ from e2efly.vehicles.tables import read_table
 BAR, DEPTH = 0.1, 0.05
 """Width and half depth of a track's gates, m."""
 GENERATED = ("forest", "clutter", "room", "corridor")
-"""Random worlds; room and corridor hold clutter."""
+"""Random worlds. Room and corridor contain clutter."""
 _VALUES = 400_000
-"""Of a grid of distances, about."""
+"""Approximate number of values in a grid of distances."""
 _TIMES = np.linspace(0.0, 12.0, 7)
-"""When a flight asks where the moving solids are, s."""
+"""Times at which the positions of moving solids are evaluated, s."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """One world and a way through it."""
+    """One world and a route through it."""
 
     scene: Scene | MeshScene
     """One world."""
     route: Float[np.ndarray, "k 3"]
-    """Corners of a way through it, world, m."""
+    """Corners of a route through it, world, m."""
     straight: Bool[np.ndarray, " k-1"]
-    """Whether a flight keeps to the straight line to the next corner: through a gate."""
+    """Whether a flight follows the straight line to the next corner, because it passes a gate."""
     grid: DistanceGrid | None = None
-    """Of a world of triangles."""
+    """Distance grid, for a world of triangles."""
 
     def clearance(self, points: Float[Array, "n 3"]) -> Float[Array, " n"]:
-        """Signed distance of points to what is ever nearest, m."""
+        """Signed distance of points to the nearest solid over all times, m."""
         scene = self.scene
         if isinstance(scene, MeshScene):
             low, high = scene.bounds
@@ -60,7 +60,7 @@ class Place:
 
 
 def _times(scene: Scene) -> np.ndarray:
-    """When to ask where the solids are, s: once where none moves."""
+    """Times at which to evaluate the positions of the solids, s. Only one time if none of them moves."""
     moves = any(bool(np.any(np.asarray(s.rate) != 0)) for s in scene.solids.values())
     return _TIMES if moves else _TIMES[:1]
 
@@ -74,11 +74,11 @@ def find_place(name: str, key: PRNGKeyArray) -> Place:
     """A place by its name, or by the path of a file: a scene's or a track's .toml, or a mesh.
 
     Args:
-        name: of `place_names`, or a path.
-        key: of a random world.
+        name: a name of `place_names`, or a path.
+        key: random key for a random world.
 
     Raises:
-        ValueError: for an unknown name or a broken file: what is wrong, and what is accepted.
+        ValueError: for an unknown name or a damaged file, naming what is wrong and what is accepted.
     """
     if name.endswith(".toml"):
         return _of_track(load_track(name)) if _has_gates(Path(name)) else _of_scene(load_scene(Path(name)))
@@ -117,7 +117,7 @@ def _place(solids: dict[str, Solids], route: np.ndarray) -> Place:
 
 
 def _has_gates(path: Path) -> bool:
-    """Whether a file is a track's; what is wrong in one its loader says."""
+    """Whether a file is a track. Errors in the file are reported by its loader."""
     try:
         return "gates" in read_table(path)
     except ValueError:
@@ -132,7 +132,7 @@ def _of_track(track: RaceTrack) -> Place:
 
 
 def _through(position: np.ndarray, yaw: np.ndarray, closed: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Corners before and behind each gate; on a closed track, the first gate once more."""
+    """Corners before and behind each gate. On a closed track, the first gate is repeated at the end."""
     ahead = 0.6 * np.column_stack([np.cos(yaw), np.sin(yaw), np.zeros_like(yaw)])
     pairs = np.stack([position - ahead, position + ahead], axis=1)
     pairs = np.concatenate([pairs, pairs[:1]]) if closed else pairs
@@ -140,7 +140,7 @@ def _through(position: np.ndarray, yaw: np.ndarray, closed: bool = False) -> tup
 
 
 def _of_scene(scene: Scene) -> Place:
-    """Through the gates of a scene in order, or else along its longer side."""
+    """A place with a route through the gates of a scene in order. Without gates, along its longer side."""
     there = {kind: np.asarray(s.active[0]) for kind, s in scene.solids.items()}
     if "gate" in scene.kinds and there["gate"].any():
         s = scene.solids["gate"]
@@ -161,7 +161,9 @@ def _of_scene(scene: Scene) -> Place:
 
 
 def _of_mesh(scene: MeshScene) -> Place:
-    """Along its longer side, between places with air around them, as low as there are any."""
+    """A place with a route along the longer side of a mesh, between positions with free space around them, as low as
+    possible.
+    """
     low, high = scene.bounds
     grid = DistanceGrid.of(scene, max(0.2, float(np.prod(high - low + 2.0) / _VALUES) ** (1 / 3)))
     middle, half = (low + high) / 2, (high - low) / 2

@@ -22,9 +22,9 @@ from e2efly.view.style import BLUE, CYCLE, GREEN, GREY, PURPLE, VERMILLION, figu
 
 Rows = list[dict[str, float]]
 NEARLY = 0.8
-"""Share of a bound from which on it is drawn."""
+"""Fraction of a bound from which on the bound is drawn."""
 LEARNED = 0.99
-"""Success whose first time is marked on learning curves."""
+"""Success rate. The first time at which it is reached is marked on learning curves."""
 
 _STEPS = "environment steps (million)"
 _DASHED: dict[str, Any] = {"linewidth": 1.2, "linestyle": (0, (4, 2))}
@@ -36,10 +36,10 @@ def plot_learning(rows: Rows, path: str | Path, title: str, best_update: int | N
     """Draw the learning curves of a run.
 
     Args:
-        rows: of metrics.csv, as `RunDirectory.rows` reads them: an update each, some with an evaluation.
+        rows: rows of metrics.csv, as `RunDirectory.rows` reads them: one per update, some with an evaluation.
         path: the PNG file.
-        title: of the figure.
-        best_update: the update whose policy was shipped, marked in every panel; None: no mark.
+        title: title of the figure.
+        best_update: the update whose policy was shipped. It is marked in every panel. None: no mark.
     """
     evaluated = [row for row in rows if "seconds" in row]
     best = next((row for row in evaluated if row["update"] == best_update), None)
@@ -73,7 +73,7 @@ def plot_learning(rows: Rows, path: str | Path, title: str, best_update: int | N
 
 
 def _curve(ax: Axes, rows: Rows, x: str, scale: float, y: str, color: str, **style: Any) -> None:
-    """One column over another, of the rows that have both; with dots where there are few."""
+    """Draw one column over another, from the rows that have both. If there are few, with dots."""
     points = np.array([(scale * row[x], row[y]) for row in rows if x in row and y in row]).reshape(-1, 2)
     if len(points) == 0:
         say(ax, "nothing measured yet")
@@ -95,7 +95,7 @@ def _success(ax: Axes, rows: Rows, x: str, scale: float) -> None:
 
 
 def _least_success(row: dict[str, float]) -> float:
-    """Of the criteria of an evaluation; 0 without any."""
+    """The lowest success rate over the criteria of an evaluation. 0 if there are none."""
     return min((x for key, x in row.items() if key.startswith("eval/") and key.endswith("/success")), default=0.0)
 
 
@@ -105,7 +105,7 @@ def _mark(ax: Axes, best: dict[str, float] | None, x: str, scale: float) -> None
 
 
 def _terms(ax: Axes, rows: Rows) -> None:
-    """The weighted terms of the reward, on an axis that is linear about zero and logarithmic beyond."""
+    """Draw the weighted terms of the reward, on an axis that is linear around zero and logarithmic farther out."""
     keys = list(dict.fromkeys(key for row in rows for key in row if key.startswith("reward/")))
     ax.set_xlabel(_STEPS)
     ax.set_ylabel("mean weighted term\nof a step")
@@ -130,10 +130,11 @@ def plot_time(flights: Flights, index: int, path: str | Path, title: str, vehicl
 
     Args:
         flights: the episodes.
-        index: which of them.
+        index: index of the episode.
         path: the PNG file.
-        title: of the figure.
-        vehicle: its largest body rates, thrust and rotor speed are drawn where they are nearly reached; None: none.
+        title: title of the figure.
+        vehicle: the vehicle. Its largest body rates, thrust and rotor speed are drawn where they are nearly reached.
+            None: no limits are drawn.
     """
     steps, mode = int(flights.length[index]), COMMAND_MODES[flights.command_mode]
     time, command = flights.time[:steps], flights.command[:steps, index]
@@ -183,7 +184,9 @@ def plot_time(flights: Flights, index: int, path: str | Path, title: str, vehicl
 
 
 def _bound(ax: Axes, top: float, both: bool = False) -> None:
-    """A dotted line at what the vehicle can do at most, and at its negative, where a curve comes near it."""
+    """Draw a dotted line at the largest value that the vehicle can reach (and at its negative with `both`), if a curve
+    comes close to it.
+    """
     values = np.concatenate([np.asarray(line.get_ydata(), float) for line in ax.get_lines()])
     for sign in (1.0, -1.0) if both else (1.0,):
         if np.nanmax(sign * values, initial=0.0) > NEARLY * top:
@@ -191,7 +194,7 @@ def _bound(ax: Axes, top: float, both: bool = False) -> None:
 
 
 def _command(ax: Axes, time: Float[np.ndarray, " t"], command: Float[np.ndarray, "t 4"], name: str) -> None:
-    """The collective thrust against gravity, where the mode has one; else all four numbers of the command."""
+    """Draw the collective thrust relative to gravity, if the mode has one. Otherwise all four command numbers."""
     mode = COMMAND_MODES[name]
     if mode.fields[0] == "collective_thrust":
         ax.axhline(1.0, color=GREY, label="hover: 1 g", **_DASHED)
@@ -224,13 +227,13 @@ def plot_errors(
     title: str,
     limits: Mapping[str, Mapping[str, float]] | None = None,
 ) -> None:
-    """Draw how errors, durations, speeds and roughness are distributed over many episodes.
+    """Draw the distributions of errors, durations, speeds and roughness over many episodes.
 
     Args:
-        episodes: by criterion.
+        episodes: episodes by criterion.
         path: the PNG file.
-        title: of the figure, to which the success of each criterion and its 95 % interval (Wilson) are added.
-        limits: by criterion and field of `Episodes`: drawn as vertical lines; see `limits`.
+        title: title of the figure. The success rate of each criterion and its 95 % interval (Wilson) are added to it.
+        limits: limits by criterion and field of `Episodes`, drawn as vertical lines. See `limits`.
     """
     notes = [_rate(name, np.asarray(e.success)) for name, e in episodes.items()]
     colors = dict(zip(episodes, CYCLE * len(episodes), strict=False))
@@ -255,7 +258,7 @@ def plot_errors(
 
 
 def _varies(episodes: Mapping[str, Episodes], field: str) -> bool:
-    """Whether a field has more than one value over all episodes: a constant has no distribution."""
+    """Whether a field has more than one value over all episodes. A constant has no distribution to draw."""
     whole = np.concatenate([np.zeros(0), *(_finite(getattr(e, field), field) for e in episodes.values())])
     return bool(np.ptp(whole) > 1e-6 * np.abs(whole).max()) if len(whole) else False
 
@@ -268,7 +271,7 @@ def _rate(name: str, success: np.ndarray) -> str:
 
 
 def _finite(values: Any, field: str) -> np.ndarray:
-    """Sorted finite values; a mean error of exactly zero belongs to an episode that ended before errors counted."""
+    """Sorted finite values. A mean error of exactly zero is left out: that episode ended before errors counted."""
     array = np.sort(np.asarray(values, np.float64))
     array = array[np.isfinite(array)]
     return array[array > 0] if field == "mean_error" else array
@@ -281,7 +284,7 @@ def _distributions(
     colors: Mapping[str, str],
     logarithmic: bool,
 ) -> None:
-    """Empirical distribution functions over pale histograms; where allowed and of use, on a logarithmic axis."""
+    """Draw empirical distribution functions over pale histograms, on a logarithmic axis if allowed and useful."""
     ax.set_ylim(0, 104)
     ax.set_yticks([0, 25, 50, 75, 100])
     whole = np.concatenate([np.zeros(0), *values.values()])

@@ -1,4 +1,4 @@
-"""Picture of what an identification leaves open: the distribution that `--env.randomize identified` draws from."""
+"""Plot of the uncertainty of an identification: the distribution from which `--env.randomize identified` draws."""
 
 from pathlib import Path
 
@@ -9,19 +9,19 @@ from e2efly.vehicles.posterior import Posterior
 from e2efly.view.style import BLUE, INK, VERMILLION, figure
 
 DRAWS = 500
-"""Vehicles that are shown."""
+"""Number of vehicles that are shown."""
 PAIRS = 3
-"""Pairs of parameters that hang together most, each shown by itself."""
+"""Number of the most correlated pairs of parameters, each shown in its own panel."""
 WITHIN = np.sqrt(-2 * np.log(0.1))
-"""Standard deviations of a normal distribution in the plane within which 90 % of it lie."""
+"""Number of standard deviations of a two-dimensional normal distribution that contain 90 % of it."""
 
 
 def plot_posterior(path: Path, posterior: Posterior) -> None:
-    """Draw the correlations of all entries, and draws of those that hang together most.
+    """Draw the correlations of all entries, and samples of the most correlated ones.
 
     Args:
         path: the PNG file.
-        posterior: of a vehicle's file; it has at least one entry.
+        posterior: the posterior of a vehicle file, with at least one entry.
     """
     covariance = posterior.root @ posterior.root.T
     spread = np.sqrt(np.diag(covariance))
@@ -73,7 +73,7 @@ def _label(name: str) -> str:
 
 
 def _scale(name: str) -> tuple[float, str]:
-    """What a deviation is shown in: milliseconds of the delay, per cent of all else."""
+    """Factor and unit in which a deviation is shown: milliseconds for the delay, per cent for everything else."""
     return (1e3, "ms") if name == "latency" else (100.0, "%")
 
 

@@ -1,8 +1,8 @@
-"""The rate loop's step response from a flight: what a body rate does that is asked for.
+"""The step response of the rate loop, estimated from a flight: the response of the body rate to its command.
 
-No step is flown. The impulse response h of the response y to the command x is the one of `WINDOW` s that explains y
-best, min |y - h * x|^2 + ridge |h|^2: Wiener's deconvolution in the time domain (Wiener 1949), whose normal equations
-are Toeplitz matrices of correlations. Its running sum is the step response.
+The flight does not need to contain a step. The impulse response h from the command x to the response y has a length of
+`WINDOW` s and explains y best, min |y - h * x|^2 + ridge |h|^2. This is Wiener's deconvolution in the time domain
+(Wiener 1949). Its normal equations are Toeplitz matrices of correlations. The running sum of h is the step response.
 """
 
 from dataclasses import dataclass
@@ -14,40 +14,40 @@ from scipy.signal import correlate
 WINDOW = 0.5
 """Length of the estimated response, s."""
 SETTLED = 0.3
-"""From here on the response counts as settled, s."""
+"""Time from which on the response counts as settled, s."""
 RIDGE = 1e-3
-"""Weight of the ridge, of the command's power."""
+"""Weight of the ridge, relative to the command's power."""
 EXCITATION = 0.1
 """Root mean square of the command's changes within a second that an estimate needs, rad/s."""
 EXPLAINED = 0.7
-"""Share of the response's variance that the estimate must explain to be believed ..."""
+"""Fraction of the response's variance that the estimate must explain to be valid."""
 SETTLES = (0.6, 1.5)
-"""... and where it must settle: a loop with an integrator ends at 1."""
+"""Range in which a valid estimate must settle. A loop with an integrator ends at 1."""
 _GRID = (0.001, 0.02)  # s: finest and coarsest step in time
 
 
 @dataclass(frozen=True)
 class StepResponse:
-    """The response of one axis to a step of 1 rad/s, or why there is none."""
+    """The response of one axis to a step of 1 rad/s, or the reason why there is none."""
 
     time: np.ndarray
-    """(k,) s since the step."""
+    """(k,) time since the step, s."""
     response: np.ndarray
-    """(k,) rad/s."""
+    """(k,) body rate, rad/s."""
     delay: float
-    """Until 10 % of the settled value, s; NaN where there is none."""
+    """Time until 10 % of the settled value, s. NaN if there is none."""
     rise: float
-    """Until 63 % of the settled value, s: of a first-order lag its dead time plus its time constant."""
+    """Time until 63 % of the settled value, s. For a first-order lag, this is its dead time plus its time constant."""
     overshoot: float
-    """Largest value over the settled one, less 1; 0 for none."""
+    """Largest value divided by the settled value, minus 1. 0: no overshoot."""
     gain: float
     """The settled value."""
     excitation: float
     """Root mean square of the command's changes within a second, rad/s."""
     explained: float
-    """Share of the response's variance that the estimate explains."""
+    """Fraction of the response's variance that the estimate explains."""
     reason: str
-    """Why the numbers are not to be believed; empty where they are."""
+    """The reason why the numbers are not valid. Empty if they are valid."""
 
 
 def step_response(
@@ -60,11 +60,11 @@ def step_response(
     """Estimate a step response.
 
     Args:
-        command_time: (m,) s, rising.
-        command: (m,) rad/s, each held until the next.
-        response_time: (n,) s, rising, on the same clock.
-        response: (n,) rad/s.
-        intervals: from and to, s: when the loop was closed; None: always.
+        command_time: (m,) times, s, increasing.
+        command: (m,) commanded rates, rad/s, each held until the next.
+        response_time: (n,) times, s, increasing, on the same clock.
+        response: (n,) measured rates, rad/s.
+        intervals: start and end times of the intervals in which the loop was closed, s. None: always.
     """
     x, y, step = _aligned(command_time, command, response_time, response, intervals or [(-np.inf, np.inf)])
     if len(x) * step < 4 * WINDOW:
@@ -97,7 +97,7 @@ def _nothing(reason: str, excitation: float) -> StepResponse:
 def _aligned(
     t_x: np.ndarray, x: np.ndarray, t_y: np.ndarray, y: np.ndarray, intervals: list[tuple[float, float]]
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Command and response on one grid, without their means, zero outside the intervals; and its step, s."""
+    """Command and response on one grid, without their means and zero outside the intervals, and the grid step, s."""
     t_x, x = t_x[np.isfinite(x)], x[np.isfinite(x)]
     t_y, y = t_y[np.isfinite(y)], y[np.isfinite(y)]
     if len(t_x) < 2 or len(t_y) < 2:
@@ -132,7 +132,7 @@ def _smooth(x: np.ndarray, width: int) -> np.ndarray:
 
 
 def _reaches(time: np.ndarray, curve: np.ndarray, level: float) -> float:
-    """The first time at which the curve reaches a level, between samples; NaN where it does not."""
+    """The first time at which the curve reaches a level, interpolated between samples. NaN if it does not reach it."""
     above = np.flatnonzero(curve >= level)
     if len(above) == 0 or level <= 0:
         return float("nan")

@@ -1,4 +1,4 @@
-"""What a flight has in space: the task's own things, or the way of its goal."""
+"""The objects of a flight in space: those of the task, or else the path of its goal."""
 
 from e2efly.config import TaskConfig
 from e2efly.drawing import Line, Thing
@@ -7,7 +7,7 @@ from e2efly.view.style import HALO
 
 
 def scene(task: TaskConfig, flights: Flights) -> list[Thing]:
-    """What the task says that there is; else the goals of the flights."""
+    """The objects of the task. If it has none, the goals of the flights."""
     if (things := task.drawing()) is not None:
         return things
     return [

@@ -1,4 +1,4 @@
-"""What cameras saw on a flight: a strip of images."""
+"""The images of cameras on a flight, as a strip."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,18 +11,18 @@ from e2efly.view.images import show
 from e2efly.view.style import PALE, WIDTH, figure
 
 COLUMNS = 8
-"""Images of a strip, at even times from the first to the last."""
+"""Number of images in a strip, at uniform times from the first to the last."""
 
 
 def plot_seen(flights: Flights, cameras: Sequence[CameraConfig], path: str | Path, title: str, count: int = 3) -> None:
-    """Draw what the policy was shown on a few flights, those without success first: a row for each camera of each.
+    """Draw the images that the policy saw on a few flights, failed ones first. Each camera of each flight has one row.
 
     Args:
-        flights: with images.
-        cameras: whose images they are, in order.
+        flights: the flights, with images.
+        cameras: the cameras of the images, in order.
         path: the PNG file.
-        title: of the figure.
-        count: how many flights.
+        title: title of the figure.
+        count: number of flights.
     """
     order = np.argsort(flights.success, kind="stable")
     rows = [(int(i), k) for i in order[:count] for k in range(len(cameras))]

@@ -32,7 +32,7 @@ IMAGE_NOISES = {
     "Salt and pepper, 0.05": ImageNoiseConfig(salt_and_pepper=0.05),
 }
 BAR = {"pad": 0.01, "fraction": 0.03, "aspect": 12}
-"""How a scale stands beside a row."""
+"""Layout of the colour bar beside a row."""
 
 
 def noised(config: ImageNoiseConfig, key: PRNGKeyArray, image: np.ndarray, camera: CameraConfig) -> np.ndarray:
@@ -47,13 +47,13 @@ def write_sheet(
 
     Args:
         sight: what the camera sees.
-        lidar: what a LiDAR sees from there.
+        lidar: what a LiDAR sees from the same place.
         place: the world.
         tour: the flight through it.
-        key: of the noise.
+        key: random key of the noise.
         path: the PNG file.
-        title: of the figure.
-        where: a line under it.
+        title: title of the figure.
+        where: a line under the title.
     """
     camera = sight.camera
     high, wide = shape_of(camera)
@@ -112,7 +112,7 @@ def _sensors(first: Any, second: Any, sight: Sight, lidar: Sight, place: Place, 
 
 
 def _ground_plan(ax: Axes, place: Place, height: float) -> None:
-    """What stands in a world from above; of a world of triangles, what is solid at a height, m."""
+    """Draw the objects of a world from above. For a world of triangles, the solid areas at a height, m."""
     if isinstance(place.scene, Scene):
         draw_plan(ax, bodies(place.scene))
         return

@@ -29,7 +29,7 @@ from e2efly.view.worlds import draw_plan, draw_space
 
 Corner = Float[np.ndarray, "3"]
 Solid = Any
-"""An `Axes3D`: Matplotlib ships no types for it."""
+"""An `Axes3D`. Matplotlib has no types for it."""
 
 _TEXT: dict[str, Any] = {
     "color": INK, "ha": "center", "va": "center", "weight": "bold", "zorder": 6,
@@ -41,14 +41,14 @@ def plot_flights(
     task: TaskConfig, flights: Flights, path: str | Path, title: str, solids: Sequence[Body] = (),
     notes: Sequence[str] = (),
 ) -> None:  # fmt: skip
-    """Draw episodes in space, in 3D and from above, coloured by speed, with what the task has there.
+    """Draw episodes in 3D and from above, coloured by speed, with the objects of the task.
 
     Args:
-        task: its options.
+        task: the options of the task.
         flights: the episodes.
         path: the PNG file.
-        title: of the figure.
-        solids: of the world that all of them fly in.
+        title: title of the figure.
+        solids: the solids of the world in which all of them fly.
         notes: lines under the title.
     """
     things = scene(task, flights)
@@ -74,7 +74,7 @@ def plot_flights(
 
 
 def _fit(fig: Figure, ax: Solid, low: Corner, high: Corner, room: Bbox) -> None:
-    """Zoom and shift 3D axes so that their box and labels fill `room`, in parts of the figure."""
+    """Zoom and shift 3D axes so that their box and labels fill `room`, in fractions of the figure."""
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     zoom = 1.0
 
@@ -96,7 +96,7 @@ def _fit(fig: Figure, ax: Solid, low: Corner, high: Corner, room: Bbox) -> None:
 
 
 def _bounds(tracks: list[np.ndarray], things: list[Thing], solids: Sequence[Body]) -> tuple[Corner, Corner]:
-    """Corners of a box about all that is drawn, ground included, at least 0.6 m wide with a margin."""
+    """Corners of a box around everything that is drawn, with the ground and a margin, at least 0.6 m wide."""
     points = [np.atleast_2d(thing.point if isinstance(thing, Mark) else thing.points) for thing in things]
     points += [body.quads.reshape(-1, 3) for body in solids]
     whole = np.concatenate([*tracks, *points]) if tracks or points else np.zeros((1, 3))
@@ -117,14 +117,14 @@ def _segments(points: np.ndarray) -> np.ndarray:
 
 
 def _paths(flights: Flights) -> tuple[np.ndarray, np.ndarray]:
-    """The segments (s, 2, 3) of all flights until their ends, and the speed on each."""
+    """The segments (s, 2, 3) of all flights up to their ends, and the speed on each segment."""
     segments = [_segments(flights.position[:k, i]) for i, k in enumerate(flights.length)]
     speeds = [(flights.speed[: max(k - 1, 0), i] + flights.speed[1:k, i]) / 2 for i, k in enumerate(flights.length)]
     return np.concatenate([np.zeros((0, 2, 3)), *segments]), np.concatenate([np.zeros(0), *speeds])
 
 
 def _ends(flights: Flights) -> tuple[np.ndarray, np.ndarray]:
-    """Where the flights begin, (n, 3), and where those without success end."""
+    """The positions at which the flights begin, (n, 3), and at which failed flights end."""
     kept = np.flatnonzero(flights.length > 0)
     last = flights.position[flights.length[kept] - 1, kept]
     return flights.position[0, kept], last[~flights.success[kept].astype(bool)]

@@ -1,4 +1,4 @@
-"""The picture of a policy under stress."""
+"""The plot of a policy's stress test."""
 
 from pathlib import Path
 
@@ -9,11 +9,11 @@ from e2efly.stress import Report
 from e2efly.view.style import BLUE, GREY, ORANGE, VERMILLION, figure
 
 GOOD, FAIR = 0.97, 0.8
-"""From these success rates on a bar is blue, and orange; below it is red."""
+"""Success rates from which on a bar is blue (`GOOD`) or orange (`FAIR`). Below `FAIR` it is red."""
 
 
 def plot_stress(report: Report, path: str | Path) -> None:
-    """Draw the success rate of each row, of the worst criterion, with its 95 % interval (Wilson); write a PNG file."""
+    """Draw the success rate of each row for the worst criterion, with its 95 % interval (Wilson), as a PNG file."""
     contract = report.candidate.policy.contract
     rows = list(report.success)
     counts = [min((int(np.sum(e.success)), len(e.success)) for e in report.flown[row].values()) for row in rows]

@@ -1,4 +1,4 @@
-"""How all plots look. Drawn by Matplotlib's objects, without pyplot: no global state, no window."""
+"""The style of all plots. They use Matplotlib's objects without pyplot, so there is no global state and no window."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -15,27 +15,27 @@ from e2efly.drawing import INK, ORANGE
 
 BLUE, VERMILLION, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 CYCLE = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY)
-"""Okabe and Ito's palette: told apart with every kind of colour vision."""
+"""Okabe and Ito's palette, which can be distinguished with every kind of colour vision."""
 GREY, PALE, HALO = "#767676", "#D0D0D0", "#F5CE85"
 
 WIDTH, DPI = 10.0, 120
-"""Inches and dots an inch: 1200 pixels."""
+"""Width in inches and dots per inch: 1200 pixels."""
 
 SPEED = LinearSegmentedColormap.from_list("speed", [colormaps["viridis"](0.92 * i / 255) for i in range(256)])
-"""Viridis without its pale end, which white paper swallows."""
+"""Viridis without its pale end, which is hard to see on white paper."""
 MARK: dict[str, Any] = {
     "color": INK, "markersize": 12, "markeredgecolor": "white", "markeredgewidth": 0.8, "linestyle": "",
 }  # fmt: skip
-"""A place."""
+"""Style of the mark of a place."""
 START: dict[str, Any] = {
     "marker": "o", "markersize": 5, "markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 1.2,
     "linestyle": "",
 }  # fmt: skip
-"""Where a flight begins."""
+"""Style of the mark where a flight begins."""
 FAILURE: dict[str, Any] = {
     "marker": "X", "markersize": 8, "markerfacecolor": VERMILLION, "markeredgecolor": "white", "linestyle": "",
 }  # fmt: skip
-"""Where one without success ends."""
+"""Style of the mark where a failed flight ends."""
 
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans", "font.size": 10, "axes.titlesize": 11, "axes.labelsize": 10,
@@ -53,19 +53,19 @@ _STYLE: dict[Any, Any] = {
 def figure(
     path: str | Path, title: str, height: float, notes: Sequence[str] = (), free: bool = False
 ) -> Iterator[Figure]:
-    """A figure, written to `path` as PNG when the block ends well.
+    """A figure that is written to `path` as PNG when the block ends without an error.
 
     Args:
         path: the PNG file.
-        title: in bold.
-        height: inches.
+        title: title, in bold.
+        height: height, inches.
         notes: lines under the title.
         free: whether the block places its axes itself.
     """
     with rc_context(_STYLE):
         fig = Figure(figsize=(WIDTH, height), dpi=DPI)
         FigureCanvasAgg(fig)
-        lines = 0.42 + 0.21 * len(notes)  # inches over the axes
+        lines = 0.42 + 0.21 * len(notes)  # inches above the axes
         fig.text(0.012, 1 - 0.12 / height, title, va="top", weight="bold", size=13)
         fig.text(0.012, 1 - 0.40 / height, "\n".join(notes), va="top", linespacing=1.45)
         if not free:
@@ -76,5 +76,5 @@ def figure(
 
 
 def say(ax: Axes, text: str) -> None:
-    """A word in the middle of axes that have nothing to show."""
+    """Write a text in the middle of axes that have nothing to show."""
     ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=GREY)

@@ -1,4 +1,4 @@
-"""A smooth flight through a world, clear of what stands there, and how a vehicle is turned on it."""
+"""A smooth flight through a world, clear of solids, and the attitude of a vehicle on it."""
 
 import itertools
 from collections.abc import Callable
@@ -19,13 +19,14 @@ from scipy.spatial.transform import Rotation
 from e2efly.vehicles.vehicle import GRAVITY
 
 CLEAR, WANTED = 0.3, 0.9
-"""The way is looked for at least this far from solids, and pushed away from what is nearer than this, m."""
+"""`CLEAR`: minimum distance from solids in the search for a path, m. `WANTED`: the path is pushed away from solids that
+are closer than this, m."""
 AROUND = 4.0
-"""How far beside its corners the way is looked for, m."""
+"""Distance around the corners in which a path is searched, m."""
 NODES = 20_000
-"""Of that grid, about."""
+"""Approximate number of nodes of the search grid."""
 ACCELERATION = 4.0
-"""Largest, along the way and in its curves, m/s^2."""
+"""Largest acceleration, along the path and in its curves, m/s^2."""
 
 Clearance = Callable[[Float[Array, "n 3"]], Float[Array, " n"]]
 
@@ -35,7 +36,7 @@ class Tour:
     """A flight, frame by frame."""
 
     time: Float[np.ndarray, " t"]
-    """s."""
+    """Times, s."""
     position: Float[np.ndarray, "t 3"]
     """World, m."""
     quaternion: Float[np.ndarray, "t 4"]
@@ -43,22 +44,23 @@ class Tour:
 
     @staticmethod
     def of(position: Float[np.ndarray, "t 3"], period: float) -> "Tour":
-        """Along positions that follow each other every `period` seconds, turned as `attitudes` says."""
+        """A flight along positions at intervals of `period` seconds, with the attitudes from `attitudes`."""
         return Tour(period * np.arange(len(position)), position, attitudes(position, period))
 
 
 def attitudes(position: Float[np.ndarray, "t 3"], period: float) -> Float[np.ndarray, "t 4"]:
-    """How a quadrotor is turned that flies so: thrust along acceleration minus gravity, heading along the velocity.
+    """The attitude of a quadrotor that flies this path: thrust along acceleration minus gravity, heading along the
+    velocity.
 
-    Differential flatness (Mellinger and Kumar 2011) with the heading of docs/conventions.md; where it hardly moves
-    over ground it keeps its heading.
+    Differential flatness (Mellinger and Kumar 2011) with the heading of docs/conventions.md. Where the horizontal speed
+    is very low, the heading does not change.
 
     Args:
-        position: world, m.
-        period: seconds from one to the next.
+        position: positions, world, m.
+        period: time from one position to the next, s.
 
     Returns:
-        Body to world, wxyz.
+        Quaternions, body to world, wxyz.
     """
     velocity = np.gradient(position, period, axis=0)
     thrust = gaussian_filter1d(np.gradient(velocity, period, axis=0), 0.1 / period, axis=0)
@@ -79,14 +81,14 @@ def attitudes(position: Float[np.ndarray, "t 3"], period: float) -> Float[np.nda
 def plan(
     clearance: Clearance, route: Float[np.ndarray, "k 3"], straight: np.ndarray, period: float, seconds: float = 9.0
 ) -> Tour:
-    """A flight along a route: the shortest clear way on a grid, then made smooth.
+    """A flight along a route: the shortest collision-free path on a grid, then smoothed.
 
     Args:
         clearance: points (n, 3) -> signed distance to the nearest solid, m; differentiable.
         route: corners, world, m.
-        straight: (k - 1,) whether a leg is flown as it is, through a gate.
-        period: seconds from frame to frame.
-        seconds: about how long it takes; at 1.5 to 6 m/s.
+        straight: (k - 1,) whether a leg is flown in a straight line, through a gate.
+        period: time between frames, s.
+        seconds: approximate duration, s. The speed is between 1.5 and 6 m/s.
     """
     polyline = _clear_way(clearance, route, straight)
     length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(polyline, axis=0), axis=1)))
@@ -97,7 +99,7 @@ def plan(
 
 
 def _clear_way(clearance: Clearance, route: np.ndarray, straight: np.ndarray) -> np.ndarray:
-    """Corner to corner by Dijkstra's algorithm, on a grid that stays clear of solids where it can."""
+    """The path from corner to corner by Dijkstra's algorithm, on a grid that stays clear of solids where possible."""
     margin = np.array([AROUND, AROUND, 1.0])
     low, high = route.min(axis=0) - margin, route.max(axis=0) + margin
     cell = max(0.3, float(np.prod(high - low) / NODES) ** (1 / 3))
@@ -137,7 +139,7 @@ def _clear_way(clearance: Clearance, route: np.ndarray, straight: np.ndarray) ->
 
 
 def _smooth(clearance: Clearance, points: np.ndarray, gates: np.ndarray) -> np.ndarray:
-    """Bend less, keep away from solids, still meet the gates; the ends stay."""
+    """Smooth the path: less curvature, and away from solids. It still passes the gates, and its ends stay."""
     spacing = float(np.mean(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     met = np.argmin(np.linalg.norm(points[:, None] - gates[None], axis=2), axis=0) if len(gates) else np.zeros(0, int)
 

@@ -1,4 +1,4 @@
-"""The same starts flown in two places, laid over each other."""
+"""Plots of the same starts flown in two places, drawn over each other."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,9 +26,9 @@ _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": BLUE, "linewidth": 2.8, "alpha": 0.5},
     {"color": VERMILLION, "linewidth": 1.2},
 )
-"""The first place wide and pale, the second thin on top of it: where they agree, both are seen."""
+"""Line styles: the first place is wide and pale, the second thin and on top. Where they agree, both are visible."""
 DRAWN = 6
-"""Starts of each criterion that are drawn."""
+"""Number of starts that are drawn for each criterion."""
 _FAILED: dict[str, Any] = {"marker": "X", "markersize": 8, "markeredgecolor": "white", "linestyle": ""}
 
 
@@ -36,10 +36,10 @@ def plot_overlay(task: Any, flown: Mapping[str, Flights], path: str | Path, titl
     """Draw all flights from above and from the side, and the first of them over time: speed, height and commands.
 
     Args:
-        task: its options.
-        flown: flights of the same starts in the same order, by the name of the place; two places.
+        task: the options of the task.
+        flown: flights of the same starts in the same order, by the name of the place. There are two places.
         path: the PNG file.
-        title: of the figure.
+        title: title of the figure.
 
     Raises:
         ValueError: when there are not two places with equally many flights.
@@ -83,7 +83,7 @@ def plot_overlay(task: Any, flown: Mapping[str, Flights], path: str | Path, titl
 
 
 def _space(ax: Axes, places: list, things: list[Thing], axes: tuple[int, int]) -> None:
-    """All flights projected onto two of the world's axes, over what the task has there."""
+    """Draw all flights projected onto two of the world's axes, over the objects of the task."""
     columns = list(axes)
     for thing in things:
         if isinstance(thing, Line):
@@ -105,7 +105,9 @@ def _space(ax: Axes, places: list, things: list[Thing], axes: tuple[int, int]) -
 
 
 def flown_again(found: Validation) -> dict[str, Pair]:
-    """Some starts of each criterion, failures first, on the plant and by the same runtime in the training simulator."""
+    """Some starts of each criterion, failures first, flown on the plant and, with the same runtime, in the training
+    simulator.
+    """
     flew = found.candidate
     contract = flew.policy.contract
     nominal = flew.flown.body if contract.vehicle_ranges else load_vehicle(flew.env.vehicle)
@@ -130,15 +132,15 @@ def flown_again(found: Validation) -> dict[str, Pair]:
 
 
 def plot_validation(found: Validation, pairs: Mapping[str, Pair], folder: Path) -> None:
-    """Lay the flights of either place over each other, a picture for each criterion.
+    """Draw the flights of both places over each other, one plot per criterion.
 
     Args:
         found: the validation.
-        pairs: of `flown_again`.
-        folder: of the pictures; made where it is not there.
+        pairs: the pairs from `flown_again`.
+        folder: the folder of the plots. It is created if it does not exist.
 
     Raises:
-        OSError: when the folder cannot be made.
+        OSError: when the folder cannot be created.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -151,14 +153,14 @@ def plot_validation(found: Validation, pairs: Mapping[str, Pair], folder: Path) 
 
 
 def _flights(policy: Acting, flights: list[Any], duration: np.ndarray, success: np.ndarray) -> Any:
-    """What the plots draw, until the episodes ended."""
+    """The flights in the form that the plots need, up to the end of each episode."""
     period = 1 / policy.contract.control_rate_hz
     length = np.rint(duration / period).astype(int)
     steps = max(int(length.max()), 1)
     time = period * np.arange(1, steps + 1)
 
     def column(name: str, first: int) -> np.ndarray:
-        """(steps, n, ...): what is missing behind the end of a flight is not a number."""
+        """Values as (steps, n, ...). Values after the end of a flight are NaN."""
         rows = [getattr(f, name)[first:][:steps] for f in flights]
         whole = np.full((steps, len(rows), *rows[0].shape[1:]), np.nan)
         for i, row in enumerate(rows):

@@ -1,4 +1,4 @@
-"""Videos of flights: from the vehicle's eyes, frame by frame, and files of any frames."""
+"""Videos of flights: the view from the vehicle, frame by frame, and video files of any frames."""
 
 import importlib.util
 import shutil
@@ -18,19 +18,19 @@ from e2efly.view.tour import Tour
 
 PANELS = {"rgb": "Colour", "depth": "Depth", "label": "Class"}
 HEAD, GAP = 20, 6
-"""Room of a title over a panel, and between panels, pixels."""
+"""Space for a title above a panel, and between panels, pixels."""
 LOOKS = 5
-"""Places of a flight by which its camera is exposed."""
+"""Number of places of a flight from which the exposure of its camera is computed."""
 FILMS = (".gif", ".mp4", ".webm", ".png")
-"""Endings of the names of what `write_film` writes."""
+"""Endings of the names of the files that `write_film` can write."""
 STRETCHED = 3.0
-"""Pictures wider than so many times their height are stacked, others stand side by side."""
+"""Pictures wider than this many times their height are stacked. Others are placed side by side."""
 
 Frame = UInt8[np.ndarray, "h w 3"]
 
 
 def exposure_of(camera: CameraConfig, scene: Scene | MeshScene, tour: Tour) -> float:
-    """For `frames`: how a camera on this flight is exposed, see `e2efly.view.images.exposure`."""
+    """The exposure factor of a camera on this flight, for `frames`. See `e2efly.view.images.exposure`."""
     rows = np.linspace(0, len(tour.time) - 1, LOOKS).astype(int)
     places = zip(tour.time[rows], tour.position[rows], tour.quaternion[rows], strict=True)
     return exposure(look_around(camera, scene, *place, tuple(PANELS)).images["rgb"] for place in places)
@@ -42,10 +42,10 @@ def frames(
     """The flight, frame by frame.
 
     Args:
-        camera: of the vehicle.
+        camera: the camera of the vehicle.
         scene: one world.
         tour: the flight.
-        width: of a panel, pixels.
+        width: width of a panel, pixels.
         exposed: factor on the colours.
     """
     high, wide = shape_of(camera)
@@ -57,7 +57,7 @@ def frames(
 
 
 def compose(pictures: dict[str, np.ndarray], size: tuple[int, int], clock: str, stacked: bool) -> Frame:
-    """Panels side by side or under each other, with their titles: even numbers of rows and columns, as codecs want."""
+    """Panels side by side or stacked, with their titles. Rows and columns are even numbers, as codecs require."""
     width, height = size
     across, down = (0, height + HEAD) if stacked else (width + GAP, 0)
     count = len(pictures) - 1
@@ -73,18 +73,18 @@ def compose(pictures: dict[str, np.ndarray], size: tuple[int, int], clock: str, 
 
 
 def write_video(film: Iterable[Frame], path: Path, period: float) -> list[Path]:
-    """Write `path`.gif and, where ffmpeg is there, `path`.mp4.
+    """Write `path`.gif and, if ffmpeg is installed, `path`.mp4.
 
     Args:
         film: the frames.
-        path: without suffix.
-        period: seconds from frame to frame.
+        path: path without suffix.
+        period: time between frames, s.
 
     Returns:
-        What was written.
+        The files that were written.
 
     Raises:
-        OSError: where ffmpeg is there and fails: what it says.
+        OSError: when ffmpeg is installed but fails, with its message.
     """
     kept = [np.asarray(frame) for frame in film]
     gif = _gif(kept, path.with_suffix(".gif"), period)
@@ -109,16 +109,16 @@ def check_film(path: Path) -> None:
 
 
 def write_film(film: Iterable[Frame], path: Path, period: float) -> None:
-    """Write pictures as one file, by its suffix: GIF, MP4 (H.264 by the program ffmpeg), WebM (VP8 by OpenCV), or PNG
-    of the last one.
+    """Write pictures as one file. Its suffix decides the format: GIF, MP4 (H.264 by the program ffmpeg), WebM (VP8 by
+    OpenCV), or PNG (only the last picture).
 
     Args:
-        film: the frames, all of one size.
+        film: the frames, all of the same size.
         path: the file; see `check_film`.
-        period: seconds from frame to frame.
+        period: time between frames, s.
 
     Raises:
-        OSError: when it cannot be written.
+        OSError: when the file cannot be written.
     """
     match path.suffix:
         case ".png":

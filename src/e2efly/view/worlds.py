@@ -23,18 +23,19 @@ from e2efly.view.flights import Flights
 from e2efly.view.style import FAILURE, GREY, MARK, SPEED, START, WIDTH, figure
 
 HEADINGS = 12
-"""Of a flight, at how many times its heading is drawn."""
+"""Number of times at which the heading of a flight is drawn."""
 APART, MANY = 0.3, 40
-"""A goal that jumps by more, m, is another one; with more jumps than this it is one that moves."""
+"""`APART`: a goal that jumps by more than this, m, is a new goal. `MANY`: with more jumps than this, it is one moving
+goal."""
 NUMBER: dict[str, Any] = {
     "color": INK, "size": 8, "weight": "bold", "zorder": 6,
     "path_effects": [withStroke(linewidth=2, foreground="white")],
 }  # fmt: skip
-"""Of the number of a goal."""
+"""Style of the number of a goal."""
 
 
 def draw_plan(ax: Axes, things: Sequence[Body]) -> None:
-    """Add solids to axes x, y in m: filled outlines from above, dotted where they move."""
+    """Add solids to axes x, y in m: filled outlines from above, dotted for solids that move."""
     outlines = [body.outline for body in things]
     faces = [_pale(body.colour, 0.35) for body in things]
     ax.add_collection(PolyCollection(outlines, facecolors=faces, edgecolors=GREY, linewidths=0.6, zorder=1.6))
@@ -56,15 +57,15 @@ def draw_space(ax: Any, things: Sequence[Body]) -> None:
 def plot_flights_in_worlds(
     flights: Flights, scene: Scene, path: str | Path, title: str, count: int = 6, notes: Sequence[str] = ()
 ) -> None:
-    """Draw flights, each in its own world as that was when the flight ended, coloured by speed: from above, with the
-    heading now and then, and their height over the distance flown.
+    """Draw flights, each in its own world as it was at the end of the flight, coloured by speed: from above with the
+    heading at some times, and the height over the distance flown.
 
     Args:
         flights: n episodes.
-        scene: n worlds, that of each episode; or one, that of all.
+        scene: n worlds, one for each episode, or one world for all.
         path: the PNG file.
-        title: of the figure.
-        count: how many flights, those without success first.
+        title: title of the figure.
+        count: number of flights, failed ones first.
         notes: lines under the title.
     """
     order = np.argsort(flights.success, kind="stable")
@@ -122,7 +123,7 @@ def plot_flights_in_worlds(
 
 
 def _path(ax: Axes, points: np.ndarray, speed: np.ndarray, norm: Normalize) -> None:
-    """A path, (m, 2), coloured by speed."""
+    """Draw a path, (m, 2), coloured by speed."""
     lines = LineCollection(
         list(np.stack([points[:-1], points[1:]], axis=1)), array=(speed[:-1] + speed[1:]) / 2,
         cmap=SPEED, norm=norm, linewidths=2.0, zorder=3, capstyle="round",
@@ -131,7 +132,7 @@ def _path(ax: Axes, points: np.ndarray, speed: np.ndarray, norm: Normalize) -> N
 
 
 def _headings(ax: Axes, track: np.ndarray, quaternion: np.ndarray, length: float) -> None:
-    """Where the vehicle's nose points, at even times, by lines of a length, m."""
+    """Draw the direction of the vehicle's nose at uniform times, as lines of a length, m."""
     at = np.unique(np.linspace(0, len(track) - 1, HEADINGS).round().astype(int))
     yaw = Quat.of(quaternion[at]).yaw()
     ends = track[at, :2] + length * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
@@ -141,7 +142,7 @@ def _headings(ax: Axes, track: np.ndarray, quaternion: np.ndarray, length: float
 
 
 def _goals(plan: Axes, side: Axes, goal: np.ndarray, way: np.ndarray) -> None:
-    """One goal by a star; several, one after the other, by their numbers, and where each was reached."""
+    """Draw one goal as a star. Draw several goals as their numbers, in order, and mark where each was reached."""
     changes = np.flatnonzero(np.linalg.norm(np.diff(goal, axis=0), axis=1) > APART)
     if not 0 < len(changes) <= MANY:
         plan.plot(*goal[-1, :2, None], marker="*", **MARK, zorder=2.5)
@@ -155,8 +156,8 @@ def _goals(plan: Axes, side: Axes, goal: np.ndarray, way: np.ndarray) -> None:
 
 
 def _bounds(tracks: list[np.ndarray], worlds: list[list[Body]]) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of a level rectangle about the flights and the middles of the solids, with a margin: of a long wall there
-    is no more to be seen than where it is flown through.
+    """Corners of a horizontal rectangle around the flights and the centres of the solids, with a margin. Of a long
+    wall, only the part near the flights is visible.
     """
     points = [track[:, :2] for track in tracks]
     points += [body.outline.mean(axis=0, keepdims=True) for world in worlds for body in world]
@@ -168,5 +169,5 @@ def _bounds(tracks: list[np.ndarray], worlds: list[list[Body]]) -> tuple[np.ndar
 
 
 def _pale(colour: np.ndarray, share: float) -> tuple[float, ...]:
-    """A colour mixed with a share of white."""
+    """A colour mixed with a fraction of white."""
     return tuple((1 - share) * colour + share)

@@ -1,4 +1,4 @@
-"""The viewer as a process beside a training or a flight, which computes only while those leave a core idle."""
+"""The viewer as a separate process during a training or a flight. It computes only while these leave a core idle."""
 
 import json
 import socket
@@ -10,21 +10,23 @@ from typing import Any
 from e2efly.watch.port import free_port
 
 HOST = "127.0.0.1"
-"""Where the page is served, and where it gets poses."""
+"""Address at which the page is served and poses are received."""
 
 
 class Beside:
-    """`e2efly watch WHAT` beside what makes it. Whatever becomes of the viewer, that goes on."""
+    """`e2efly watch WHAT` as a process beside the program that produces WHAT. That program continues, whatever happens
+    to the viewer.
+    """
 
     def __init__(self, port: int, *what: str) -> None:
-        """Find a port; the process begins with `begin`.
+        """Find a port. The process starts with `begin`.
 
         Args:
-            port: of the page; 0: any.
+            port: port of the page. 0: any free port.
             what: arguments of `e2efly watch`.
 
         Raises:
-            ValueError: for a port that there is not, or that is in use; where viser is not installed.
+            ValueError: for a port that is invalid or in use; when viser is not installed.
         """
         if not 0 <= port <= 65535:
             raise ValueError(f"--watch is {port}; accepted: a port, 1 to 65535, or 0 for any")
@@ -33,7 +35,7 @@ class Beside:
 
     @property
     def address(self) -> str:
-        """Of the page."""
+        """Address of the page."""
         return f"http://{HOST}:{self.port}"
 
     def begin(self) -> None:
@@ -47,13 +49,13 @@ class Beside:
         )  # fmt: skip
 
     def wait(self) -> None:
-        """Until somebody ends it with Ctrl-C, which ends it here, too."""
+        """Wait until the user ends the viewer with Ctrl-C, which also ends this waiting."""
         with suppress(KeyboardInterrupt):
             if self._process is not None:
                 self._process.wait()
 
     def close(self) -> None:
-        """End it."""
+        """End the process."""
         if self._process is not None:
             self._process.terminate()
             with suppress(subprocess.TimeoutExpired):
@@ -62,17 +64,17 @@ class Beside:
 
 
 class Shown:
-    """A log, as of a flight, that shows the vehicle on a page. It sends datagrams, which wait for nobody."""
+    """Takes the same records as a flight log and shows the vehicle on a page. It sends datagrams, which never block."""
 
     def __init__(self, port: int, *what: str) -> None:
         """Start the viewer.
 
         Args:
-            port: of the page; 0: any.
+            port: port of the page. 0: any free port.
             what: more arguments of `e2efly watch`.
 
         Raises:
-            ValueError: for a port that there is not, or that is in use; where viser is not installed.
+            ValueError: for a port that is invalid or in use; when viser is not installed.
         """
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
@@ -83,12 +85,12 @@ class Shown:
         self.page.begin()
 
     def record(self, channel: str, time: float, values: dict[str, Any]) -> None:
-        """Show an odometry; what else there is is left out."""
+        """Show an odometry record. Other records are ignored."""
         if channel == "odometry" and values.get("position") is not None and values.get("quaternion") is not None:
             self.show(time, values["position"], values["quaternion"])
 
     def show(self, time: float, position: Any, quaternion: Any) -> None:
-        """Show the vehicle at a place, (3,) m, in an attitude, (4,) wxyz, at a time, s."""
+        """Show the vehicle at a position, (3,) m, with an attitude, (4,) wxyz, at a time, s."""
         pose = {"stamp": time, "position": [*map(float, position)], "quaternion": [*map(float, quaternion)]}
         with suppress(OSError):
             self._socket.sendto(json.dumps(pose).encode(), self._to)

@@ -1,6 +1,7 @@
-"""The same pictures without a browser: a still or a video, drawn by casting rays at triangles. Needs the extra `mesh`.
+"""The pictures of the viewer without a browser: a still or a video, drawn by ray casting. Needs the extra `mesh`.
 
-Light is a hemisphere's: a face is bright by how far it looks up and towards the sun; there are no shadows.
+The light comes from a hemisphere: the brightness of a face depends on how far it points up and towards the sun. There
+are no shadows.
 """
 
 from collections import deque
@@ -35,32 +36,32 @@ from e2efly.watch.shapes import (
 SIZE = (360, 640)
 """Rows and columns of a picture."""
 MARGIN = 8
-"""About an image of a camera, pixels."""
+"""Margin around the image of a camera, pixels."""
 SPREAD = 0.55
-"""Half of the vertical field of view over the distance."""
+"""Half the visible height divided by the distance: the tangent of half the vertical field of view."""
 GROUND, GRID = np.array([236, 238, 240]) / 255, np.array([0.72, 0.74, 0.77])
 """RGB of the ground and of its lines."""
 SUN = np.array([0.35, 0.25, 0.9]) / np.linalg.norm([0.35, 0.25, 0.9])
 CELL, LINE = 1.0, 0.012
 """Distance and half width of the lines on the ground, m."""
 TRAIL = 90
-"""Frames of which the trail is shown."""
+"""Number of frames for which the trail is shown."""
 THICK = 0.012
-"""Of a trail and of lines, m."""
+"""Thickness of a trail and of lines, m."""
 
 
 @dataclass(frozen=True)
 class Soup:
-    """Triangles with a colour each."""
+    """Triangles, each with its own colour."""
 
     triangles: Float[np.ndarray, "f 3 3"]
-    """World, m."""
+    """Corners, world, m."""
     colour: Float[np.ndarray, "f 3"]
     """RGB in [0, 1]."""
 
     @staticmethod
     def of(meshes: Iterable[Mesh]) -> "Soup":
-        """Of meshes in the world."""
+        """The triangles of meshes in the world."""
         parts = [(m.vertices[m.faces], np.tile(m.colour, (len(m.faces), 1))) for m in meshes]
         if not parts:
             return Soup(np.zeros((0, 3, 3)), np.zeros((0, 3)))
@@ -71,7 +72,7 @@ class Soup:
 
 
 def picture(soup: Soup, eye: np.ndarray, look_at: np.ndarray, ground: bool, size: tuple[int, int] = SIZE) -> Any:
-    """(h, w, 3) uint8, of what an eye sees that looks at a point; up is up."""
+    """The picture, (h, w, 3) uint8, from an eye that looks at a point. World up is up in the picture."""
     rows, columns = size
     ahead = (look_at - eye) / np.linalg.norm(look_at - eye)
     right = np.cross(ahead, [0, 0, 1.0])
@@ -112,11 +113,11 @@ def picture(soup: Soup, eye: np.ndarray, look_at: np.ndarray, ground: bool, size
 
 
 def beside(seen: UInt8[np.ndarray, "h w 3"], eyes: Mapping[str, np.ndarray]) -> UInt8[np.ndarray, "h v 3"]:
-    """A picture with images of cameras at its right, one under the other, as large as there is room.
+    """A picture with camera images to its right, one below the other, as large as the space allows.
 
     Args:
         seen: the picture.
-        eyes: by name, RGB or grey in [0, 1]; none: the picture stays as it is.
+        eyes: the images by name, RGB or grey in [0, 1]. If there are none, the picture is not changed.
     """
     if not eyes:
         return seen
@@ -136,14 +137,15 @@ def beside(seen: UInt8[np.ndarray, "h w 3"], eyes: Mapping[str, np.ndarray]) -> 
 def film(
     source: Source, seconds: float, rate: float, camera: str = "follow", size: tuple[int, int] = SIZE
 ) -> Iterator[Any]:
-    """Pictures of a source, (h, w, 3) uint8, with what the first vehicle's cameras see beside them.
+    """Pictures of a source, (h, w, 3) uint8, with the images of the first vehicle's cameras beside them.
 
     Args:
-        source: of the frames; the first vehicle is followed.
-        seconds: of the flight.
+        source: the source of the frames. The first vehicle is followed.
+        seconds: duration of the flight, s.
         rate: pictures per second of the flight.
-        camera: of `viewer.CAMERAS`; the one that stays looks at the first vehicle from where that began.
-        size: rows and columns, without the cameras'.
+        camera: a name of `viewer.CAMERAS`. A camera that stays in place looks at the first vehicle from where that
+            began.
+        size: rows and columns, without the camera images.
     """
     first = source.stage_of(0)
     stage, still, shape = first, _standing(first), quadrotor(first.vehicle)
@@ -183,7 +185,7 @@ def film(
 
 
 def _standing(stage: Stage) -> Soup:
-    """All that stands still."""
+    """Everything that stands still."""
     meshes = [mesh_of(body.quads, body.colour) for body in stage.bodies if body.path is None]
     for thing in stage.things:
         if isinstance(thing, Face):
@@ -200,7 +202,7 @@ def _moving(stage: Stage, time: float, origin: np.ndarray) -> Soup:
 
 
 def _flying(shape: Quadrotor, frame: Frame, angle: np.ndarray, goal: float) -> Soup:
-    """The vehicles, and the goal of the first, of that half width, m."""
+    """The vehicles, and the goal of the first vehicle with the half width `goal`, m."""
 
     def placed(mesh: Mesh, place: np.ndarray, attitude: np.ndarray) -> Mesh:
         return Mesh(place + turned(attitude[None], mesh.vertices), mesh.faces, mesh.colour)

@@ -1,4 +1,4 @@
-"""What a viewer shows: a stage that stands, and frames that pass. NumPy alone."""
+"""The data that a viewer shows: a stage, which stands still, and frames, which follow each other. Needs only NumPy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,63 +14,63 @@ from e2efly.vehicles import Vehicle
 
 @dataclass(frozen=True)
 class Stage:
-    """What stands still, or moves by itself."""
+    """The objects that stand still or move by themselves."""
 
     vehicle: Vehicle
-    """What flies: its rotors' places decide how it looks."""
+    """The vehicle that flies. Its shape is drawn from the positions of its rotors."""
     bodies: Sequence[Body] = ()
-    """Solids, as they are at time 0."""
+    """Solids, at time 0."""
     things: Sequence[Thing] = ()
-    """What the task has in space."""
+    """Objects of the task in space."""
     ground: bool = True
     """Whether there is level ground at height 0."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A moment of n vehicles."""
+    """One moment of n vehicles."""
 
     time: float
-    """Of the worlds' motion, s."""
+    """Time of the worlds' motion, s."""
     position: Float[np.ndarray, "n 3"]
     """Centre of mass, world, m."""
     quaternion: Float[np.ndarray, "n 4"]
-    """Unit, wxyz, body to world."""
+    """Unit quaternion, wxyz, body to world."""
     velocity: Float[np.ndarray, "n 3"]
     """World, m/s."""
     rotor_speed: Float[np.ndarray, "n 4"]
-    """Rad/s; zero where it is not known."""
+    """Rotor speeds, rad/s. Zero if not known."""
     goal: Float[np.ndarray, "n 3"] | None = None
-    """Where to be; NaN: nowhere."""
+    """Goal positions, m. NaN: no goal."""
     images: dict[str, np.ndarray] = field(default_factory=dict)
-    """What the cameras of the followed vehicle see, RGB in [0, 1] or grey, by name."""
+    """Images of the followed vehicle's cameras by name, RGB in [0, 1] or grey."""
     series: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    """Numbers of the followed vehicle by title: what was commanded, then what came of it; or one alone."""
+    """Numbers of the followed vehicle by title: the commanded value, then the actual value, or only one value."""
     fresh: bool = False
-    """The followed vehicle begins anew here: its trail ends."""
+    """Whether the followed vehicle starts anew in this frame. Its old trail then ends."""
     note: str = ""
-    """About the moment, Markdown."""
+    """Note about the moment, Markdown."""
 
 
 class Source(Protocol):
-    """Where frames come from."""
+    """A source of frames."""
 
     period: float
-    """Seconds from frame to frame at the usual speed."""
+    """Time between frames at normal speed, s."""
 
     @property
     def origin(self) -> np.ndarray:
-        """(3,) of the stage's world in the frames' world, m."""
+        """Origin of the stage's world in the frames' world, (3,) m."""
         ...
 
     def stage_of(self, followed: int) -> Stage:
-        """What stands in the world of a vehicle; the same object until it changes."""
+        """The stage of a vehicle's world. It is the same object until the stage changes."""
         ...
 
     def step(self, followed: int) -> Frame:
         """The next frame.
 
         Args:
-            followed: the vehicle whose images, series and world are wanted.
+            followed: the vehicle whose images, series and world are requested.
         """
         ...

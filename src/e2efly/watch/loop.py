@@ -1,4 +1,4 @@
-"""The loop of `e2efly watch`: frames at their time, wishes in between."""
+"""The loop of `e2efly watch`: it shows frames at the right time and handles user inputs between them."""
 
 import time
 from collections.abc import Callable
@@ -8,9 +8,9 @@ from e2efly.watch.panels import Panel
 from e2efly.watch.viewer import Viewer
 
 FASTEST = 1 / 33
-"""Frames are shown no more often than this on average, s: a step that came late makes the next one no later."""
+"""Minimum mean time between frames, s. If a step is late, the next one is not delayed by it."""
 IDLE_S = 0.05
-"""Between two looks at the wishes while the flight is paused, or while nobody looks at it, s."""
+"""Time between two checks of the user inputs while the flight is paused or nobody is watching, s."""
 
 
 def run(
@@ -24,12 +24,12 @@ def run(
     """Show a source until Ctrl-C.
 
     Args:
-        source: of the frames.
-        viewer: of the vehicles.
-        panel: of the controls.
-        until: whether it is to end; asked before every frame.
+        source: the source of the frames.
+        viewer: shows the vehicles.
+        panel: shows the controls.
+        until: returns whether the loop must end; called before every frame.
         between: called before every frame.
-        watched: whether anybody looks; the source rests while nobody does.
+        watched: returns whether anybody is watching. The source pauses while nobody is.
     """  # fmt: skip
     due, turn, elapsed = time.monotonic(), 0.0, 0.0
     while not until():

@@ -1,4 +1,4 @@
-"""The page's panel: buttons, sliders, pictures and plots. What people do is told to the loop as functions to call."""
+"""The panel of the page: buttons, sliders, pictures and plots. The loop receives user inputs as functions to call."""
 
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -19,22 +19,22 @@ if TYPE_CHECKING:
     from e2efly.watch.training import Progress
 
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
-"""Of the flight, over real time."""
+"""Speeds of the flight, relative to real time."""
 PLOT_S = 5.0
-"""How much of the flight a plot shows, s."""
+"""Length of the flight that a plot shows, s."""
 PLOT_EVERY, IMAGE_EVERY = 3, 2
-"""Frames between two drawings of the plots, and of the images."""
+"""Number of frames between updates of the plots, and of the images."""
 LARGEST_WIND = 10.0
-"""m/s per axis."""
+"""Largest wind that can be set, m/s per axis."""
 PIXELS = 240
-"""Columns of an image in the panel."""
+"""Width of an image in the panel, pixels."""
 
 
 class Panel:
     """Controls of the flight and of the view."""
 
     def __init__(self, viewer: Viewer) -> None:
-        """Add them to the viewer's page."""
+        """Add the controls to the viewer's page."""
         self.viewer, self.wishes = viewer, SimpleQueue[Callable[[], Any]]()
         self.paused, self.speed = False, 1.0
         gui = self._gui = viewer.server.gui
@@ -62,7 +62,7 @@ class Panel:
     def slider(
         self, label: str, low: float, high: float, step: float, value: float, wish: Callable[[float], Any]
     ) -> Any:
-        """Add a slider; the loop is told of its value when it is moved."""
+        """Add a slider. When it is moved, the loop calls `wish` with its value."""
         slider = self._gui.add_slider(label, min=low, max=high, step=step, initial_value=value)
         slider.on_update(lambda _: self.wishes.put(lambda: wish(float(slider.value))))
         return slider
@@ -72,12 +72,12 @@ class Panel:
         return self._gui.add_folder(label)
 
     def fulfil(self) -> None:
-        """Do what people wished since the last call."""
+        """Carry out the user inputs since the last call."""
         while not self.wishes.empty():
             self.wishes.get()()
 
     def show(self, frame: Frame, elapsed: float) -> None:
-        """Show what a frame tells beside the vehicles' places."""
+        """Show the data of a frame other than the positions of the vehicles."""
         if frame.note != self._shown:
             self._note.content = self._shown = frame.note
         self._time += elapsed
@@ -130,7 +130,7 @@ class Panel:
 
 
 def _enlarged(image: np.ndarray) -> np.ndarray:
-    """As large pixels, uint8; grey ones from the smallest to the largest value."""
+    """The image enlarged, uint8. A grey image is scaled from its smallest to its largest value."""
     x = np.asarray(image, np.float32)
     if x.ndim == 2:
         low, high = float(np.nanmin(x)), float(np.nanmax(x))
@@ -140,10 +140,10 @@ def _enlarged(image: np.ndarray) -> np.ndarray:
 
 
 def hands_on(panel: Panel, simulation: "Simulation") -> None:
-    """Add the controls of a simulation: new starts, throws, wind, mass, thrust, delay, and a goal to be dragged.
+    """Add the controls of a simulation: new starts, throws, wind, mass, thrust, delay, and a goal that can be dragged.
 
     Args:
-        panel: of the page.
+        panel: the panel of the page.
         simulation: a `Simulation`.
     """
     from e2efly.watch.simulation import LATEST
@@ -170,7 +170,7 @@ def hands_on(panel: Panel, simulation: "Simulation") -> None:
 
 
 def _drag(panel: Panel, simulation: "Simulation") -> None:
-    """Arrows by which the goal, and the task's world with it, are moved."""
+    """Add arrows that move the goal and, with it, the task's world."""
     arrows = panel.viewer.server.scene.add_transform_controls(
         "/world/move", 0.5, active_axes=(True, True, not simulation.levels), disable_rotations=True,
         disable_sliders=True, position=tuple(map(float, simulation.goal_now(0))),
@@ -185,14 +185,14 @@ def _drag(panel: Panel, simulation: "Simulation") -> None:
 
 
 def policies_on(panel: Panel, progress: "Progress") -> Callable[[], None]:
-    """Add the controls of a run's policies: the newest as it comes, or one of the older ones.
+    """Add the controls of a run's policies: always the newest, or one of the older ones.
 
     Args:
-        panel: of the page.
-        progress: of the run, a `Progress`.
+        panel: the panel of the page.
+        progress: the `Progress` of the run.
 
     Returns:
-        What is to be called between frames: it looks for new ones.
+        A function to call between frames. It looks for new policies.
     """
     gui = panel.viewer.server.gui
     with panel.folder("Policies of the run"):
@@ -230,14 +230,14 @@ def policies_on(panel: Panel, progress: "Progress") -> Callable[[], None]:
 
 
 def times_on(panel: Panel, recording: "Recording") -> Callable[[], None]:
-    """Add a slider of the time of a recording.
+    """Add a slider for the time of a recording.
 
     Args:
-        panel: of the page.
+        panel: the panel of the page.
         recording: a `Recording`.
 
     Returns:
-        What is to be called between frames: it moves the slider on.
+        A function to call between frames. It moves the slider forward.
     """
 
     def end() -> float:
@@ -267,12 +267,12 @@ def times_on(panel: Panel, recording: "Recording") -> Callable[[], None]:
 
 
 def starts_on(panel: Panel, recording: "Recording", starts: "Sequence[Shown]") -> None:
-    """Add a choice of the start of a report whose flights are shown.
+    """Add a menu to choose the start of a report whose flights are shown.
 
     Args:
-        panel: of the page.
-        recording: of the first of them.
-        starts: of the report.
+        panel: the panel of the page.
+        recording: the recording of the first start.
+        starts: the starts of the report.
     """
     by_name = {start.name: start for start in starts}
     choice = panel.viewer.server.gui.add_dropdown("Start", tuple(by_name), initial_value=starts[0].name)

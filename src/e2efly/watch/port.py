@@ -1,4 +1,4 @@
-"""The port of the page. Imports neither JAX nor viser: a bridge and a training ask for it."""
+"""The port of the page. Imports neither JAX nor viser, because a bridge and a training use it, too."""
 
 import errno
 import importlib.util
@@ -6,10 +6,10 @@ import socket
 
 
 def free_port(host: str, port: int) -> int:
-    """The port, or a free one for 0.
+    """The given port, or a free port for 0.
 
     Raises:
-        ValueError: where viser is not installed; where the port is in use.
+        ValueError: when viser is not installed, or when the port is in use.
         OSError: for an address that this machine does not have.
     """
     if importlib.util.find_spec("viser") is None:

@@ -1,4 +1,4 @@
-"""A vehicle where a pose source sees it: a real one, or one that another process flies."""
+"""Shows a vehicle at the poses of a pose source: a real vehicle, or one that another process flies."""
 
 import time
 from collections.abc import Sequence
@@ -15,21 +15,22 @@ from e2efly.vehicles import Vehicle
 from e2efly.watch.frames import Frame, Stage
 
 LOST_S, RESTART_S = 0.3, 1.0
-"""A pose older than this is told to be lost; after so long without a good one tracking starts anew, s."""
+"""`LOST_S`: a pose older than this is reported as lost, s. `RESTART_S`: after this time without a good pose, tracking
+starts anew, s."""
 TURNING = 400.0
-"""Of rotors whose speed nobody tells, while the vehicle moves, rad/s."""
+"""Rotor speed that is drawn while the vehicle moves, if the real speed is not known, rad/s."""
 
 
 @dataclass
 class Poses:
-    """A source of frames: the newest pose, as it comes."""
+    """A source of frames: always the newest pose."""
 
     source: PoseSource
-    """Opened; it is closed by who opened it."""
+    """An open pose source. The caller that opened it closes it."""
     vehicle: Vehicle
-    """As it is drawn."""
+    """The vehicle that is drawn."""
     bodies: Sequence[Body] = ()
-    """What stands in the poses' world."""
+    """Solids in the world of the poses."""
     period: float = field(default=1 / 30, init=False)
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3), init=False)
 
@@ -47,7 +48,7 @@ class Poses:
         return self._stage
 
     def step(self, followed: int) -> Frame:
-        """Where it was seen last; far below the ground before the first pose."""
+        """The vehicle at its last pose. Before the first pose, far below the ground."""
         del followed
         now = time.monotonic()
         if self._track.fault and now - self._received > RESTART_S:

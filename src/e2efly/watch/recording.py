@@ -1,4 +1,4 @@
-"""Flights that were recorded: one log, or several side by side, as ghosts of each other."""
+"""Recorded flights: one log, or several together, with the others as ghosts."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,17 +14,17 @@ from e2efly.vehicles import Vehicle, load_vehicle, vehicle_names
 from e2efly.watch.frames import Frame, Stage
 
 PERIOD = 1 / 30
-"""Seconds from frame to frame."""
+"""Time between frames, s."""
 POSES = ("position", "quaternion")
-"""Streams without which there is nothing to see."""
+"""Streams that a flight needs to be shown."""
 
 
 @dataclass(frozen=True)
 class Flight:
-    """One recorded flight at even times, `PERIOD` apart."""
+    """One recorded flight on a uniform time grid with step `PERIOD`."""
 
     name: str
-    """Of its file."""
+    """Name of its file."""
     position: Float[np.ndarray, "t 3"]
     """World, m."""
     quaternion: Float[np.ndarray, "t 4"]
@@ -32,26 +32,26 @@ class Flight:
     velocity: Float[np.ndarray, "t 3"]
     """World, m/s."""
     rotor_speed: Float[np.ndarray, "t 4"]
-    """rad/s; by the motors' outputs where only those are there; 0 where nothing is."""
+    """Rotor speeds, rad/s. If only motor outputs are known, they are computed from these. 0 if nothing is known."""
     goal: Float[np.ndarray, "t 3"]
-    """Where it was to be, m; NaN where it is not known."""
+    """Goal positions, m. NaN where not known."""
     command: Float[np.ndarray, "t 3"]
-    """Body rates that were commanded, rad/s; NaN where they are not known."""
+    """Commanded body rates, rad/s. NaN where not known."""
     body_rate: Float[np.ndarray, "t 3"]
-    """As measured, rad/s; NaN likewise."""
+    """Measured body rates, rad/s. NaN where not known."""
     notes: Sequence[tuple[float, str]] = ()
-    """What happened, s since the start, in order."""
+    """Events, with their time in s since the start, in order."""
 
 
 def read_flight(path: Path, vehicle: Vehicle) -> Flight:
-    """Of any log that `e2efly identify flight` reads; the first flight in it that has poses.
+    """The first flight with poses in a log. Any log that `e2efly identify flight` reads is accepted.
 
     Args:
         path: the file.
-        vehicle: whose largest rotor speed the motors' outputs are shares of.
+        vehicle: the vehicle, whose largest rotor speed corresponds to a motor output of 1.
 
     Raises:
-        ValueError: naming the file, where it is no log, or has no poses.
+        ValueError: when the file is not a log or has no poses, naming the file.
     """
     records = read_flights(path)
     found = next((record for record in records if record.has(*POSES)), None)
@@ -72,12 +72,12 @@ def read_flight(path: Path, vehicle: Vehicle) -> Flight:
 
 
 def even(name: str, streams: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Flight:
-    """A flight at even times, from the first to the last of its positions.
+    """A flight on a uniform time grid, from its first to its last position.
 
     Args:
-        name: of the flight.
-        streams: times, (n,) s, and values, (n, k): position and quaternion; velocity, rotor_speed, goal, command and
-            body_rate where they are known, of which the last columns count.
+        name: name of the flight.
+        streams: times, (n,) s, and values, (n, k), by stream: position and quaternion, and if known velocity,
+            rotor_speed, goal, command and body_rate. If a stream has more columns than needed, the last ones are used.
     """
     begin, end = streams["position"][0][[0, -1]]
     time = np.arange(begin, max(end, begin + PERIOD), PERIOD)
@@ -98,7 +98,7 @@ def even(name: str, streams: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Fli
 
 
 def _told(path: Path, time: np.ndarray) -> tuple[np.ndarray, list[tuple[float, str]]]:
-    """Setpoints and modes of a log of ours, times s since its first pose."""
+    """Setpoints and modes of a log of e2efly, with times in s since its first pose."""
     log = read_log(path)
     first = log["odometry"].stamp[0] if len(log["odometry"]) else log.start
     commands, modes = log["command"], log["mode"]
@@ -111,23 +111,23 @@ def _told(path: Path, time: np.ndarray) -> tuple[np.ndarray, list[tuple[float, s
 
 
 def vehicle_of(path: Path) -> Vehicle | None:
-    """The shipped vehicle that a log of ours says it is of; None: it does not say, or that is not shipped."""
+    """The shipped vehicle that a log of e2efly names. None: it names no vehicle, or one that is not shipped."""
     name = read_log(path).meta.get("vehicle", "").partition(" ")[0] if path.suffix == ".mcap" else ""
     return load_vehicle(name) if name in vehicle_names() else None
 
 
 @dataclass
 class Recording:
-    """A source of frames: recorded flights, over and over."""
+    """A source of frames: recorded flights, repeated endlessly."""
 
     flights: Sequence[Flight]
-    """They begin together."""
+    """The flights. They begin at the same time."""
     vehicle: Vehicle
-    """As it is drawn."""
+    """The vehicle that is drawn."""
     stage: Stage | None = None
-    """What stands there; None: level ground."""
+    """The stage. None: level ground."""
     at: int = 0
-    """The next frame."""
+    """Number of the next frame."""
     period: float = field(default=PERIOD, init=False)
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3), init=False)
 
@@ -135,21 +135,21 @@ class Recording:
         self._ground = Stage(self.vehicle)
 
     def fly(self, flights: Sequence[Flight], stage: Stage) -> None:
-        """Show as many other flights, from their beginning."""
+        """Show other flights, the same number as before, from their beginning."""
         self.flights, self.stage, self.at = flights, stage, 0
 
     @property
     def length(self) -> int:
-        """Frames of the longest flight."""
+        """Number of frames of the longest flight."""
         return max(len(flight.position) for flight in self.flights)
 
     def stage_of(self, followed: int) -> Stage:
-        """What stands there; of a log, level ground."""
+        """The stage. For a log, level ground."""
         del followed
         return self.stage or self._ground
 
     def step(self, followed: int) -> Frame:
-        """The next frame; after the last the first. A flight that is over stays where it ended."""
+        """The next frame. After the last frame comes the first. A flight that is over stays where it ended."""
         i, self.at = self.at, (self.at + 1) % self.length
 
         def now(name: str) -> np.ndarray:

@@ -1,4 +1,6 @@
-"""A validation report's flights: the policy on a plant, and the same start in the training simulator as its ghost."""
+"""The flights of a validation report: the policy on a plant, and as a ghost the same start in the simulator of the
+training.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,18 +24,18 @@ from e2efly.watch.simulation import stage
 
 @dataclass(frozen=True)
 class Told:
-    """What is needed of a report of `e2efly validate`."""
+    """The entries of a report of `e2efly validate` that are needed here."""
 
     policy: str
-    """Its policy.onnx."""
+    """The policy.onnx."""
     vehicle: str
-    """What flew."""
+    """The vehicle that flew."""
     controller: Controller
-    """The vehicle that the flight controller believed in."""
+    """The vehicle that the flight controller assumed."""
     plant: str
-    """Where it was flown."""
+    """The plant on which it was flown."""
     seed: int
-    """Of the starts."""
+    """Seed of the starts."""
 
 
 @dataclass(frozen=True)
@@ -41,19 +43,19 @@ class Shown:
     """One start."""
 
     name: str
-    """For people: criterion, number, how it ended."""
+    """Label for people: criterion, number, and how the flight ended."""
     criterion: str
     flights: tuple[Flight, ...]
-    """On the plant, in the training simulator."""
+    """The flight on the plant, then the flight in the training simulator."""
     stage: Stage
     """The world of that start."""
 
 
 def report_of(path: Path) -> Path | None:
-    """The report that a path names: the file, or the only one in a folder; None: it names none.
+    """The report that a path names: the file itself, or the only report in a folder. None: it names no report.
 
     Raises:
-        ValueError: for a folder with several.
+        ValueError: for a folder with several reports.
     """
     if path.suffix == ".json":
         return path
@@ -66,12 +68,12 @@ def report_of(path: Path) -> Path | None:
 
 
 def read_report(path: Path) -> tuple[list[Shown], Vehicle]:
-    """The starts of a report whose flights are kept, failures first, and the vehicle that flew them.
+    """The starts of a report whose flights were stored, failures first, and the vehicle that flew them.
 
-    Their worlds are drawn again from the seed.
+    Their worlds are generated again from the seed.
 
     Raises:
-        ValueError: where it is no report with flights; where policy or task are not what they were.
+        ValueError: when the file is not a report with flights, or when the policy or the task has changed.
     """
     accepted = "accepted: a report of `e2efly validate --json`, with its .flights.npz beside it"
     content = read_json(path)
@@ -106,7 +108,7 @@ def read_report(path: Path) -> tuple[list[Shown], Vehicle]:
 
 
 def _check(path: Path, criteria: Mapping[str, Any], criterion: str, pair: Pair, starts: Starts) -> None:
-    """Refuse a report whose starts are not those that are drawn today.
+    """Refuse a report whose starts differ from those that are generated now.
 
     Raises:
         ValueError: naming the start.
@@ -125,7 +127,7 @@ def _check(path: Path, criteria: Mapping[str, Any], criterion: str, pair: Pair, 
 
 
 def _flight(name: str, begin: Any, flights: Flights, row: int) -> Flight:
-    """One flight from its start on."""
+    """One flight, including its start."""
     steps = int(flights.length[row])
     time = np.append(0.0, flights.time[:steps])
     period = float(flights.time[0])

@@ -1,4 +1,4 @@
-"""What vehicles and solids look like, as triangles: for the viewer and for films. NumPy alone."""
+"""The shapes of vehicles and solids as triangles, for the viewer and for films. Needs only NumPy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,15 +19,15 @@ GOAL = FRONT
 SKY = (0.87, 0.9, 0.93)
 """RGB of the background."""
 SLOWEST = 40.0
-"""Rotors are drawn turning at this part of their speed: faster would look like standing still."""
+"""Factor by which rotors are drawn slower than they turn. At full speed they would seem to stand still."""
 BEHIND = np.array([-1.1, -1.1, 0.6])
-"""Where the eye is that follows, seen from the vehicle, m."""
+"""Position of the following camera relative to the vehicle, m."""
 NOSE = 0.12
-"""How far before the centre of mass the first person's eye is, m."""
+"""Distance of the first-person camera in front of the centre of mass, m."""
 LIFTED = 0.004
-"""Faces on the ground are drawn so far above it, m."""
+"""Height above the ground at which faces on the ground are drawn, m."""
 REACH = 0.46
-"""Radius of a rotor over the distance of the nearest two."""
+"""Radius of a rotor divided by the distance between the nearest two rotors."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class Mesh:
     """Triangles of one colour."""
 
     vertices: Float[np.ndarray, "v 3"]
-    """m."""
+    """Corners, m."""
     faces: Int[np.ndarray, "f 3"]
-    """Indices of corners, counter-clockwise from outside."""
+    """Indices of the corners, counter-clockwise as seen from outside."""
     colour: tuple[float, float, float]
     """RGB in [0, 1]."""
 
@@ -47,17 +47,17 @@ class Quadrotor:
     """A vehicle's meshes."""
 
     body: tuple[Mesh, ...]
-    """In the body's frame."""
+    """Meshes in the body frame."""
     rotor: Mesh
-    """Two blades about the origin; turns about z."""
+    """Two blades at the origin. They turn about z."""
     rotors: Float[np.ndarray, "4 3"]
-    """Where the rotors are, body frame, m."""
+    """Positions of the rotors, body frame, m."""
     spin: Float[np.ndarray, "4"]
-    """Sign of the turning about body z, seen from above counter-clockwise positive."""
+    """Sign of the rotation about body z. Counter-clockwise as seen from above is positive."""
 
 
 def mesh_of(quads: Quads, colour: Sequence[float] | Float[np.ndarray, "3"]) -> Mesh:
-    """Of faces with four corners, of which two may be the same.
+    """The mesh of faces with four corners, of which two may coincide.
 
     Args:
         quads: (f, 4, 3), m.
@@ -74,20 +74,22 @@ def mesh_of(quads: Quads, colour: Sequence[float] | Float[np.ndarray, "3"]) -> M
 
 
 def face(thing: Face) -> Mesh:
-    """Of a flat polygon of a task."""
+    """The mesh of a flat polygon of a task."""
     corners = np.asarray(thing.points, np.float32) + np.array([0, 0, LIFTED], np.float32)
     fan = np.array([[0, i, i + 1] for i in range(1, len(corners) - 1)], np.uint32)
     return Mesh(corners, fan, rgb(thing.color))
 
 
 def rgb(colour: str) -> tuple[float, float, float]:
-    """RGB in [0, 1] of `#RRGGBB`."""
+    """The colour `#RRGGBB` as RGB in [0, 1]."""
     red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
     return red, green, blue
 
 
 def quadrotor(vehicle: Vehicle) -> Quadrotor:
-    """Arms from the middle to the rotors, those in front in orange; sizes follow the rotors' places."""
+    """The meshes of a vehicle: arms from the middle to the rotors, the front ones in orange. The sizes follow from the
+    positions of the rotors.
+    """
     places = np.asarray(vehicle.rotor_position, float).reshape(-1, 4, 2)[0]
     apart = min(float(np.linalg.norm(a - b)) for i, a in enumerate(places) for b in places[:i])
     thick, reach = 0.07 * apart, REACH * apart
@@ -108,7 +110,7 @@ def quadrotor(vehicle: Vehicle) -> Quadrotor:
     blade = box([reach / 2, 0.06 * apart, 0.08 * thick])
     blades = np.concatenate([blade + np.array([side * reach / 2, 0, 0]) for side in (-1, 1)])
     height = np.full((4, 1), 1.15 * thick)
-    # the reaction torque on the body turns against the rotor
+    # the reaction torque on the body is opposite to the rotation of the rotor
     spin = -np.sign(np.asarray(vehicle.rotor_spin, float).reshape(-1, 4)[0])
     return Quadrotor(body, mesh_of(blades, BLADE), np.concatenate([places, height], axis=1), spin)
 
@@ -123,7 +125,7 @@ def _bar(start: np.ndarray, end: np.ndarray, thick: float) -> Quads:
 
 
 def turned(quaternion: Float[np.ndarray, "*n 4"], vector: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-    """Vectors of the body in the world's axes; the quaternions are unit, wxyz."""
+    """Vectors of the body frame in world axes. The quaternions are unit quaternions, wxyz."""
     w, axis = quaternion[..., :1], quaternion[..., 1:]
     across = 2 * np.cross(axis, vector)
     return vector + w * across + np.cross(axis, across)
@@ -135,13 +137,13 @@ def spun(
     quaternion: Float[np.ndarray, "n 4"],
     angle: Float[np.ndarray, "n 4"],
 ) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, "m 4"]]:
-    """Places and attitudes of the rotors of n vehicles, m = 4 n, in the world.
+    """Positions and attitudes of the m = 4 n rotors of n vehicles, in the world.
 
     Args:
-        shape: of the vehicles.
-        position: m.
-        quaternion: wxyz, body to world.
-        angle: of each rotor about body z, rad.
+        shape: the shape of the vehicles.
+        position: positions of the vehicles, m.
+        quaternion: attitudes of the vehicles, wxyz, body to world.
+        angle: angle of each rotor about body z, rad.
     """  # fmt: skip
     places = position[:, None] + turned(quaternion[:, None], shape.rotors[None])
     w, x, y, z = np.moveaxis(quaternion, -1, 0)[:, :, None]

@@ -1,6 +1,6 @@
-"""A policy in the training's simulator, with hands on it: wind, mass, thrust, delay, throws, a moved goal.
+"""A policy in the training simulator, with user interventions: wind, mass, thrust, delay, throws, a moved goal.
 
-What the hands do is told to one compiled program as numbers, so that nothing is compiled anew while it flies.
+The interventions are passed to one compiled program as numbers, so that nothing is compiled again during the flight.
 """
 
 from dataclasses import dataclass, field, replace
@@ -24,23 +24,23 @@ from e2efly.view.images import in_colours
 from e2efly.watch.frames import Frame, Stage
 
 HELD = ("mass", "inertia", "thrust_map")
-"""Parameters of the vehicle that hands change."""
+"""Parameters of the vehicle that the user can change."""
 LATEST = 0.2
-"""Largest delay, s."""
+"""Largest delay that can be set, s."""
 THROW_SPEED, THROW_RATE = 3.0, 8.0
-"""Of a throw, m/s and rad/s: standard deviations per axis."""
+"""Standard deviations of a throw per axis: velocity, m/s, and body rate, rad/s."""
 LAST = 100
-"""Episodes of which the success is told."""
+"""Number of recent episodes over which the success rate is shown."""
 
 
 def stage(vehicle: Vehicle, task: TaskConfig, scene: Any, world: int) -> Stage:
-    """What stands in one world of a task.
+    """The stage of one world of a task.
 
     Args:
-        vehicle: as it is drawn.
-        task: its options, of a criterion.
-        scene: the worlds, as the task's part that trains gives them.
-        world: which of them.
+        vehicle: the vehicle that is drawn.
+        task: the options of the task, for one criterion.
+        scene: the worlds, from the task's simulation class.
+        world: index of the world.
     """
     solids = bodies(scene, world, ceilings=True)
     drawn = task.drawing() or ()
@@ -50,20 +50,20 @@ def stage(vehicle: Vehicle, task: TaskConfig, scene: Any, world: int) -> Stage:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Hands:
-    """What is done to all vehicles. NaN: as the episode has drawn it."""
+    """The interventions that act on all vehicles. NaN: the value that was drawn for the episode."""
 
     wind: Float[Array | np.ndarray, "3"] = field(default_factory=lambda: np.full(3, np.nan, np.float32))
-    """World, m/s."""
+    """Wind, world, m/s."""
     mass: float = np.nan
-    """Mass and inertia over the vehicle file's."""
+    """Mass and inertia relative to the vehicle file."""
     thrust: float = np.nan
-    """Thrust of the rotors at a speed over the vehicle file's."""
+    """Thrust of the rotors at a given speed, relative to the vehicle file."""
     delay: float = np.nan
-    """From observation to command, s; at most `LATEST`."""
+    """Delay from observation to command, s, at most `LATEST`."""
 
 
 def held(env: Env) -> Env:
-    """The environment with room for `Hands`: the same programs fly it whatever they do."""
+    """The environment prepared for `Hands`. The same compiled programs fly it with any interventions."""
     env = with_longer_queue(env)
     widths = {name: env.randomize.get(name, 0.0) for name in sorted({*HELD, *env.randomize})}
     wind = 0.0 if env.wind is None else env.wind
@@ -72,7 +72,7 @@ def held(env: Env) -> Env:
 
 
 def under(env: Env, state: EnvState, hands: Hands) -> EnvState:
-    """The state of n vehicles with what the hands do."""
+    """The state of n vehicles with the interventions applied."""
 
     def chosen(own: Array, wanted: Any) -> Array:
         wanted = jnp.broadcast_to(jnp.asarray(wanted, own.dtype), own.shape)
@@ -92,10 +92,10 @@ def under(env: Env, state: EnvState, hands: Hands) -> EnvState:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Push:
-    """What happens to n vehicles in one step."""
+    """The changes to the states of n vehicles in one step."""
 
     shift: Float[Array | np.ndarray, "3"]
-    """Of the places, m."""
+    """Shift of the positions, m."""
     speed: Float[Array | np.ndarray, "n 3"]
     """Added to the velocities, world, m/s."""
     rate: Float[Array | np.ndarray, "n 3"]
@@ -129,22 +129,22 @@ def _advance(
 
 @dataclass
 class Simulation:
-    """A source of frames: n vehicles, each in one episode after the other."""
+    """A source of frames: n vehicles, each of which flies one episode after the other."""
 
     env: Env
-    """Of the criterion that is flown."""
+    """Environment of the criterion that is flown."""
     vehicle: Vehicle
-    """What flies, as it is drawn."""
+    """The vehicle that is drawn."""
     task: TaskConfig
-    """Of the criterion."""
+    """Task options of the criterion."""
     act: Act
-    """The policy; may be replaced by another of the same kind at any time."""
+    """The policy. It may be replaced by another policy of the same kind at any time."""
     count: int
-    """Vehicles."""
+    """Number of vehicles."""
     seed: int = 0
-    """Of the starts."""
+    """Seed of the starts."""
     hands: Hands = field(default_factory=Hands)
-    """What is done to the vehicles; may be replaced at any time."""
+    """Interventions on the vehicles. They may be replaced at any time."""
 
     def __post_init__(self) -> None:
         self.env = held(self.env)
@@ -160,7 +160,7 @@ class Simulation:
         self.begin()
 
     def begin(self) -> None:
-        """Start all episodes anew, each from another place than before."""
+        """Start all episodes anew, each from a new start."""
         self._state, observation = self._begin(self.env, random_key(int(self._random.integers(1 << 31))))
         self._observation = np.asarray(observation)
         self._memory = self.act.begin(self.count)
@@ -175,20 +175,20 @@ class Simulation:
         self._push = replace(self._push, speed=speed, rate=rate)
 
     def move(self, by: np.ndarray) -> None:
-        """Move what the policy is to fly to, and the task's world with it, by (3,) m: the vehicles stay where they are.
+        """Move the goal, and the task's world with it, by (3,) m. The vehicles stay where they are.
 
-        A policy is shown no place but by the way to its goal, so that this is all that moving a goal can be.
+        A policy sees positions only relative to its goal. Moving the goal is therefore the same as moving the world.
         """
         self._origin = self._origin + by
         self._push = replace(self._push, shift=self._push.shift - np.asarray(by, np.float32))
 
     @property
     def levels(self) -> bool:
-        """Whether the goal may be moved level only: there is something to hit, or the ground to land on."""
+        """Whether the goal may only be moved horizontally, because there are obstacles, or the ground to land on."""
         return bool(self.env.cameras) or getattr(self.env.task, "lands", False) or bool(self._scene().kinds)
 
     def step(self, followed: int) -> Frame:
-        """A control step later."""
+        """The frame after the next control step."""
         images = tuple(np.asarray(image) for image in self._state.images)
         action, self._memory = self.act.act(self._observation, images, self._memory)
         push, self._push = self._push, self._none()
@@ -202,7 +202,7 @@ class Simulation:
         fresh = bool(done[followed]) or self._began
         self._began = False
         if done[followed] and (self.env.cameras or self.task.own_worlds):
-            self._stage = None  # another world; of the others it stays, and need not be drawn again
+            self._stage = None  # it has another world now; the other vehicles' worlds stay and need not be drawn again
         return Frame(
             time=float(seen["time"][followed]),
             position=seen["position"] + self._origin,
@@ -218,16 +218,16 @@ class Simulation:
 
     @property
     def origin(self) -> np.ndarray:
-        """(3,) of the task's world in the viewer's, m."""
+        """Origin of the task's world in the viewer's world, (3,) m."""
         return self._origin
 
     def goal_now(self, followed: int) -> np.ndarray:
-        """(3,) where a vehicle is to be, m."""
+        """Current goal position of a vehicle, (3,) m."""
         state = self._state
         return np.asarray(self.env.task.goal(state.memory, state.time))[followed] + self._origin
 
     def stage_of(self, followed: int) -> Stage:
-        """What stands in a vehicle's world, in the task's own coordinates; the same object until it changes."""
+        """The stage of a vehicle's world, in the task's own coordinates. It is the same object until it changes."""
         if self._stage is None or self._stage[0] != followed:
             self._stage = followed, stage(self.vehicle, self.task, self._scene(), followed)
         return self._stage[1]

@@ -1,4 +1,4 @@
-"""The policies of a run, as it goes or afterwards: the newest one flies as soon as it is written."""
+"""The policies of a run, during or after the training. The newest policy flies as soon as it is written."""
 
 import time
 from dataclasses import dataclass, field
@@ -15,23 +15,23 @@ from e2efly.learn.rundir import RunDirectory
 from e2efly.learn.setup import Setup
 
 LOOK_S = 0.5
-"""Between two looks at the run's folder, s."""
+"""Time between two checks of the run's folder, s."""
 
 
 @dataclass
 class Progress:
-    """Which policies a run has, and which of them flies."""
+    """The policies that a run has, and the one that flies."""
 
     run: RunDirectory
     """The run."""
     setup: Setup
-    """What its configuration comes to."""
+    """The setup from its configuration."""
     update: int = -1
-    """Of the policy that flies; -1: there is none yet."""
+    """Update of the policy that flies. -1: there is none yet."""
     newest: bool = True
-    """Whether the newest flies, whichever that is."""
+    """Whether always the newest policy flies."""
     updates: list[int] = field(default_factory=list)
-    """Of the policies that there are."""
+    """Updates of the available policies."""
 
     def __post_init__(self) -> None:
         config = self.setup.config
@@ -43,7 +43,7 @@ class Progress:
 
     @property
     def act(self) -> Act:
-        """The policy that flies, whichever that is when it is asked."""
+        """A policy that always acts as the one that flies at the time of the call."""
 
         def asked(observation: Any, images: Any, memory: Any) -> tuple[Any, Any]:
             action, memory = self._act(self._weights, observation, images, memory)
@@ -52,7 +52,9 @@ class Progress:
         return Act(asked, self.setup.actor.memory)
 
     def look(self) -> bool:
-        """Whether there is something new: look at the folder, where it is time to, and take the newest if asked to."""
+        """Check the folder, if it is time to, and switch to the newest policy if `newest` is set. Returns whether
+        something is new.
+        """
         now = time.monotonic()
         if now - self._looked < LOOK_S:
             return False
@@ -75,7 +77,7 @@ class Progress:
         self.update = update
 
     def wait(self, seconds: float) -> bool:
-        """Whether there is a policy within so long."""
+        """Wait for a policy for at most `seconds`. Returns whether there is one."""
         end = time.monotonic() + seconds
         self.look()
         while self.update < 0 and time.monotonic() < end:
@@ -89,9 +91,9 @@ def _act(actor: Actor, weights: Any, observation: Any, images: Any, memory: Any)
 
 
 def of_run(run: RunDirectory) -> Progress:
-    """What there is to watch of a run.
+    """The progress of a run, for watching it.
 
     Raises:
-        ValueError: when the folder holds no run, or one of another version.
+        ValueError: when the folder holds no run, or a run of another version.
     """
     return Progress(run, Setup.of(run.config()))

@@ -17,32 +17,33 @@ from e2efly.watch.shapes import BEHIND, GOAL, NOSE, SKY, SLOWEST, Mesh, face, me
 
 Camera = Literal["follow", "orbit", "first person"]
 CAMERAS: tuple[Camera, ...] = ("follow", "orbit", "first person")
-"""How the page looks at the followed vehicle: moving along, about it as the mouse says; from where the mouse says;
-from its nose."""
+"""Camera modes for the followed vehicle, in order: the camera moves with the vehicle and the mouse turns it around the
+vehicle; the mouse sets the position of the camera; the camera looks from the vehicle's nose."""
 TRAIL_POINTS = 120
-"""Of the followed vehicle's path: in so many pieces, a frame each, it is shown."""
+"""Number of pieces in which the followed vehicle's path is shown, one per frame."""
 MANY = 32
-"""Of more vehicles, goals are drawn for the followed one alone."""
+"""With more vehicles than this, only the goal of the followed vehicle is drawn."""
 FAR_OFF = np.array([[0, 0, 3000], [0, 0, -3000]], np.float32)
-"""Places of two more instances of each mesh, m: three.js draws none of a mesh whose first places are out of view."""
+"""Positions of two additional instances of each mesh, m. Without them, three.js would not draw a mesh whose first
+positions are out of view."""
 LEVEL = np.array([1, 0, 0, 0], np.float32)
 ANCHOR = np.array([0.0, 0.0, 1.0])
-"""Where the followed vehicle is in the page's space."""
+"""Position of the followed vehicle in the space of the page."""
 GHOST = (120, 140, 165)
-"""RGB of all vehicles but the followed one, where there are several plants."""
+"""RGB of all vehicles except the followed one, when there are several plants."""
 
 
 def serve(host: str, port: int, title: str) -> Any:
-    """A server of viser.
+    """A viser server.
 
     Raises:
-        ValueError: where viser is not installed; where the port is in use.
+        ValueError: when viser is not installed, or when the port is in use.
         OSError: for an address that this machine does not have.
     """
     port = free_port(host, port)
     import viser
 
-    with contextlib.redirect_stdout(io.StringIO()):  # it draws a box about its address
+    with contextlib.redirect_stdout(io.StringIO()):  # it prints a box with its address
         server = viser.ViserServer(host, port, title, verbose=False)
     scene, first = server.scene, server.initial_camera
     scene.set_up_direction("+z")
@@ -57,15 +58,15 @@ def serve(host: str, port: int, title: str) -> Any:
 
 
 class Viewer:
-    """Shows frames to all who look at the page. Nothing here waits for a browser."""
+    """Shows frames to everyone who has the page open. Nothing here waits for a browser."""
 
     def __init__(self, server: Any, count: int, ghosts: bool = False) -> None:
         """Show `count` vehicles.
 
         Args:
-            server: of `serve`.
-            count: vehicles of each frame.
-            ghosts: whether all but the followed one are pale.
+            server: the server from `serve`.
+            count: number of vehicles in each frame.
+            ghosts: whether all vehicles except the followed one are pale.
         """
         self.server, self.count, self.ghosts = server, count, ghosts
         self.followed, self.camera = 0, CAMERAS[0]
@@ -87,10 +88,10 @@ class Viewer:
         """Show a frame.
 
         Args:
-            stage: of the followed vehicle's world.
-            origin: of that world in the frame's, m.
-            frame: the moment.
-            elapsed: since the last frame, s of the flight.
+            stage: the stage of the followed vehicle's world.
+            origin: origin of that world in the frame's world, m.
+            frame: the frame.
+            elapsed: flight time since the last frame, s.
         """
         with self.server.atomic():
             if stage is not self._stage:
@@ -103,7 +104,7 @@ class Viewer:
             self._draw_trail(frame)
 
     def _set(self, stage: Stage) -> None:
-        """Draw what stands."""
+        """Draw a stage."""
         new = self._stage is None or stage.vehicle is not self._stage.vehicle
         self._stage = stage
         if self._standing is not None:
@@ -142,7 +143,7 @@ class Viewer:
         ]
 
     def _batch(self, name: str, mesh: Mesh, each: int = 1) -> Any:
-        """So many instances for each vehicle."""
+        """Add a mesh with `each` instances for each vehicle."""
         count = each * self.count
         colours = np.tile(_rgb(mesh.colour), (count + len(FAR_OFF), 1))
         if self.ghosts:
@@ -213,9 +214,10 @@ class Viewer:
         self._trail.clear()
 
     def _look(self, frame: Frame) -> None:
-        """Keep the followed vehicle in view: the world moves past it, so that people's cameras stay theirs to move.
+        """Keep the followed vehicle in view. The world moves past the vehicle, so that users can still move their
+        cameras.
 
-        The vehicles are no part of that world: a busy browser draws its parts at different times.
+        The vehicles are not a part of that world, because a busy browser draws its parts at different times.
         """
         here, q = frame.position[self.followed], frame.quaternion[self.followed]
         if self.camera != "orbit" or not self._placed:
@@ -223,7 +225,7 @@ class Viewer:
             self._world.position = tuple(map(float, self._offset))
         if self.camera == "first person":
             for client in self.server.get_clients().values():
-                with contextlib.suppress(AssertionError, ValueError):  # it has not told of its camera yet
+                with contextlib.suppress(AssertionError, ValueError):  # the browser has not reported its camera yet
                     _look_ahead(client.camera, ANCHOR, q)
 
 
@@ -236,13 +238,13 @@ def _look_ahead(camera: Any, here: np.ndarray, q: np.ndarray) -> None:
 
 
 def _and_far_off(attitude: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Attitudes and places with those of the instances that are never seen."""
+    """Attitudes and positions, with those of the instances that are never seen."""
     more = np.tile(LEVEL, (len(FAR_OFF), 1))
     return np.concatenate([attitude, more]), np.concatenate([place, FAR_OFF])
 
 
 def coloured(speed: Float[np.ndarray, " n"]) -> np.ndarray:
-    """(n, 3) uint8: from blue, at rest, over green to yellow, at the fastest of the speeds, m/s."""
+    """Colours, (n, 3) uint8, of speeds, m/s: from blue at rest over green to yellow at the largest of the speeds."""
     share = np.asarray(speed, float) / max(float(np.max(speed, initial=0.0)), 0.5)
     stops = np.array([[68, 60, 140], [33, 145, 140], [94, 201, 98], [253, 200, 37]], float)
     at = share * (len(stops) - 1)

@@ -1,13 +1,13 @@
-"""A page that stands where the viewer's will: until a browser asks for it, nothing is imported or computed."""
+"""A placeholder at the address of the viewer's page. Nothing is imported or computed until a browser requests it."""
 
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from threading import Event
 
 LOOK_S = 0.2
-"""Between two looks whether it is still to wait, s."""
+"""Time between two checks whether to continue waiting, s."""
 MARK = "e2efly-waiting"
-"""Of this page; the viewer's has none."""
+"""Marks this page. The viewer's page does not contain it."""
 PAGE = f"""<!doctype html><html><head><meta charset="utf-8"><title>e2efly watch</title></head>
 <body id="{MARK}" style="font-family: sans-serif; margin: 3em">
 <p>The viewer starts. It takes what the cores leave idle.</p>
@@ -23,12 +23,12 @@ setInterval(async () => {{
 
 
 def asked_for(host: str, port: int, over: Callable[[], bool]) -> bool:
-    """Wait until a browser asks for the page; whether one did before it was over.
+    """Wait until a browser requests the page. Returns whether one did before `over` became true.
 
     Args:
         host: address of the page.
-        port: of the page.
-        over: whether to wait no longer; asked every `LOOK_S`.
+        port: port of the page.
+        over: returns whether to stop waiting; called every `LOOK_S`.
 
     Raises:
         OSError: for an address that this machine does not have, or a port in use.

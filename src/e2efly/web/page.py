@@ -21,28 +21,28 @@ from e2efly.tasks import TASKS
 from e2efly.tasks.task import world_of
 
 ASSETS = Path(__file__).parent / "assets"
-"""What `make web` builds."""
+"""The folder of the files that `make web` builds."""
 COPIED = ("index.html", "page.css", "page.js", "licenses.txt")
-"""Assets that a page has as they are."""
+"""Assets that are copied to a page unchanged."""
 RUNTIME = "runtime.wasm.gz"
 """ONNX Runtime as WebAssembly."""
 STARTS = 12
-"""Starts of each course."""
+"""Number of starts of each course."""
 ENDLESS = 1e300
-"""For a number without end: JSON has no infinity."""
+"""Stands for infinity, which JSON does not have."""
 
 
 def write_page(folder: Path, found: Candidate) -> None:
-    """Write a page that flies a policy: `index.html` and what it loads.
+    """Write a page that flies a policy: `index.html` and the files that it loads.
 
-    It needs no server: a browser opens the file itself, or any host of files shows it.
+    It needs no server. A browser can open the file itself, and any static file host can serve it.
 
     Args:
-        folder: where to; made where it is not there.
+        folder: the folder to write to. It is created if it does not exist.
         found: the policy, its task and its environment.
 
     Raises:
-        ValueError: for a policy that sees by cameras, a task that the page does not know, and a folder that is none.
+        ValueError: for a policy with cameras, a task that the page does not know, and a path that is not a folder.
         OSError: when a file cannot be written.
     """
     if folder.exists() and not folder.is_dir():
@@ -63,10 +63,10 @@ def write_page(folder: Path, found: Candidate) -> None:
 
 
 def flight(found: Candidate, starts: int = STARTS) -> dict[str, Any]:
-    """What a page is told of a policy: its contract's numbers, and those of `numbers`, as JSON.
+    """The data of a policy for a page: the numbers of its contract, and those of `numbers`, as JSON.
 
     Raises:
-        ValueError: for a policy that sees by cameras, and a task that the page does not know.
+        ValueError: for a policy with cameras, and for a task that the page does not know.
     """
     contract = found.policy.contract
     _check(found)
@@ -84,8 +84,8 @@ def numbers(envs: Mapping[str, Env], starts: int = STARTS) -> dict[str, Any]:
     """The numbers of vehicle and task with which the page simulates an environment, as JSON; see `still`.
 
     Args:
-        envs: by the name of their course; they differ in their tasks alone.
-        starts: beginnings of each course.
+        envs: the environments by the name of their course. They differ only in their tasks.
+        starts: number of starts of each course.
     """
     envs = {name: still(env) for name, env in envs.items()}
     env = next(iter(envs.values()))
@@ -112,8 +112,8 @@ def numbers(envs: Mapping[str, Env], starts: int = STARTS) -> dict[str, Any]:
 
 
 def still(env: Env) -> Env:
-    """The environment that the page simulates: the vehicle of the file, its delay, still air, nothing random but the
-    starts; of a family, the vehicle in the middle of its ranges.
+    """The environment that the page simulates: the vehicle of the file, its delay, still air, and nothing random except
+    the starts. For a family, the vehicle in the middle of its ranges.
     """
     return dataclasses.replace(env, family=None).undisturbed()
 
@@ -128,7 +128,9 @@ def _check(found: Candidate) -> None:
 
 
 def _kind(task: Any) -> str:
-    """What the page calls a task's world: what that class says itself, as one that extends it may fly otherwise."""
+    """The page's name for a task's world. Only the class itself can define it, not a parent class, because a class that
+    extends another may fly differently.
+    """
     kind = vars(type(task)).get("page")
     if kind is None:
         raise ValueError(
@@ -143,7 +145,7 @@ def _simulated() -> str:
 
 
 def _course(name: str, env: Env, starts: int) -> dict[str, Any]:
-    """A criterion: its task's numbers, and where its episodes begin."""
+    """A criterion: the numbers of its task, and the starts of its episodes."""
     kind, drawn = _kind(env.task), beginnings(env, starts)
     rows = [jax.tree.map(lambda x, i=i: np.asarray(x[i]), (drawn.vehicle, drawn.memory)) for i in range(starts)]
     return {
@@ -155,15 +157,16 @@ def _course(name: str, env: Env, starts: int) -> dict[str, Any]:
 
 
 def beginnings(env: Env, starts: int) -> EnvState:
-    """Starts of a course."""
+    """The starts of a course."""
     begun = jax.jit(lambda env, key: env.reset(key, starts)[0], compiler_options=fast_compile())
     return begun(env, random_key(SEED, UNSEEN, 0))
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON has it: dataclasses as objects, arrays as lists, what is infinite as `ENDLESS`.
+    """A value in JSON form: dataclasses as objects, arrays as lists, infinities as `ENDLESS`.
 
-    Of single precision, the shortest decimal number that rounds to it: the file's 0.03 reads 0.03.
+    A number in single precision becomes the shortest decimal number that rounds to it, so that 0.03 in the file is
+    written as 0.03.
     """
     if dataclasses.is_dataclass(value):
         return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}

@@ -54,10 +54,10 @@ _STARTS = (b"$M>", b"$X>")
 
 
 class Reply(NamedTuple):
-    """What the controller answered last to a code."""
+    """The last reply of the controller to a code."""
 
     message: Any
-    """The parsed message, an instance of `MESSAGES[code]`; the payload itself for other codes."""
+    """The parsed message, an instance of `MESSAGES[code]`. For other codes, the payload itself."""
     time: float
     """When it came, s on the monotonic clock."""
     latency: float
@@ -89,7 +89,8 @@ class Client:
     """How long the newest answer took, s; those to stick frames not counted. The controller answers in order, so that
     stick frames reach it as late."""
     quickest: float = math.inf
-    """The least time that an answer took on this connection, s: what the link itself takes, there and back."""
+    """How long the newest reply took, s, not counting replies to stick frames. The controller answers in order, so
+    stick frames reach it with the same delay."""
     heard: float = -math.inf
     """When the newest reply came, s on the monotonic clock; those to stick frames not counted."""
     run_together: int = 0

@@ -22,7 +22,7 @@ class ControllerInfo:
     variant: str
     """`BTFL`."""
     version: tuple[int, int, int]
-    """Of the firmware: the bytes of FC_VERSION."""
+    """Version of the firmware: the bytes of FC_VERSION."""
     api: tuple[int, int]
     """MSP version."""
     built: str
@@ -40,13 +40,13 @@ class ControllerInfo:
     rx: settings.RxConfig
     """How channels are read."""
     rx_map: settings.RxMap
-    """Which channel is for what."""
+    """Which channel has which function."""
     deadband: settings.RcDeadband
     """Deadbands of the sticks."""
     failsafe: settings.FailsafeConfig
-    """What it does when the receiver falls silent."""
+    """What it does when the receiver's signal is lost."""
     rx_fail: settings.RxFailConfig
-    """What each channel becomes then."""
+    """What each channel becomes in that case."""
     modes: tuple[settings.ModeRange, ...]
     """Which switches make which modes active."""
     box_ids: tuple[int, ...]
@@ -66,7 +66,7 @@ class ControllerInfo:
 
     @property
     def release(self) -> Release:
-        """What is known of its firmware; raises `ValueError` where nothing is."""
+        """What is known about its firmware. Raises `ValueError` if nothing is known."""
         return release_of(self.api, self.version)
 
     @property

@@ -42,20 +42,20 @@ class Reading:
     """What was known of the flight controller at a control step."""
 
     link_problem: str | None
-    """Why it is not heard."""
+    """Why the flight controller is not heard. None: it is."""
     armed: bool
     override: bool
-    """It takes its sticks from here."""
+    """The controller takes its stick inputs from this program."""
     pilot: Pilot | None
-    """None: what he wants is not known."""
+    """What the pilot wants. None: it is not known."""
     failsafe: bool
     """By its last word it does not hear the receiver: it flies by a failsafe of its own, not by what it is sent."""
     voltage: float | None
-    """Of a cell, V; None: it does not know it."""
+    """Voltage of a cell, V. None: the controller does not know it."""
     meddling: tuple[str, ...]
     """The modes in which the sticks that are sent would be no body rates, in words."""
     channels: Rc | None
-    """The sticks that it flies by."""
+    """The channels that the controller uses."""
     attitude: Attitude | None
     fresh: dict[int, Any]
     """The replies that came since the reading before, by code."""
@@ -203,7 +203,7 @@ class ChannelProbe:
     """Until it is armed, the sticks are sent apart by `PROBE`: does the controller take each for what it is?"""
 
     seen: bool = False
-    """It does."""
+    """Whether it does."""
     _since: float | None = None
     """When they were first looked for."""
 

@@ -32,12 +32,12 @@ class Link(Protocol):
 
     @property
     def alive(self) -> bool:
-        """Connected."""
+        """Whether the link is connected."""
         ...
 
     @property
     def reason(self) -> str:
-        """Why it is not alive; empty while it is."""
+        """Why the link is not alive. Empty while it is."""
         ...
 
     @property
@@ -46,7 +46,7 @@ class Link(Protocol):
         ...
 
     def poll(self, now: float) -> None:
-        """Connect where need be. `now` is in s on the monotonic clock."""
+        """Connect if necessary. `now` is in s on the monotonic clock."""
         ...
 
     def send(self, data: bytes) -> None:
@@ -54,7 +54,7 @@ class Link(Protocol):
         ...
 
     def receive(self) -> bytes:
-        """The bytes that have come; empty where there are none."""
+        """The bytes that have come. Empty if there are none."""
         ...
 
     def close(self) -> None:
@@ -93,7 +93,7 @@ class StreamLink:
 
     @property
     def alive(self) -> bool:
-        """Connected."""
+        """Whether the link is connected."""
         return self._alive
 
     def poll(self, now: float) -> None:

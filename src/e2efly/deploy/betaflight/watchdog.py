@@ -30,17 +30,17 @@ from e2efly.deploy.betaflight.messages import CHANNEL_RANGE, MAX_CHANNELS, Attit
 TIMEOUT_S = 0.1
 """Silence of the bridge in flight after which this process takes over, s."""
 PERIOD_S = 0.01
-"""Between two frames of a take-over, s."""
+"""Time between two frames of a take-over, s."""
 STALL_S = 0.05
 """A round of this process counts for no longer: if the whole machine stood still, the bridge may speak first, s."""
 STALE_S = 0.2
-"""A controller's attitude older than this is not levelled by, s."""
+"""A controller's attitude that is older than this is not used for levelling, s."""
 DEAF_S = 10.0
 """A controller that has not said for so long whether it is armed is given up after the descent, s."""
 ARM = 1
 """Bit of the mode ARM in `StatusEx.boxes`: it is always the first."""
 LEVEL_GAIN = 4.0
-"""Body rate over tilt, 1/s."""
+"""Body rate divided by tilt, 1/s."""
 LEVEL_RATE = 3.0
 """Largest body rate of levelling, rad/s."""
 BYTES, PLAN, STATUS, TAKEN = b"B", b"P", b"S", b"T"
@@ -181,18 +181,18 @@ class WatchedLink:
                 self.taken_over = self.reason = f"the watchdog has taken over: {content.decode()}"
 
     def send(self, data: bytes) -> None:
-        """Bytes for the controller."""
+        """Send bytes to the controller."""
         self._hand(BYTES + data)
 
     def receive(self) -> bytes:
-        """Bytes of the controller."""
+        """The bytes from the controller."""
         self.poll(0.0)
         data = bytes(self._received)
         self._received.clear()
         return data
 
     def plan(self, plan: Plan) -> None:
-        """What to do should the bridge fall silent."""
+        """Tell the watchdog what to do if the bridge falls silent."""
         self._hand(PLAN + json.dumps(asdict(plan)).encode())
 
     def close(self) -> None:

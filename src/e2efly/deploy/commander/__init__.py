@@ -1,1 +1,1 @@
-"""Commands from outside: another program flies in place of a policy, and the bridge treats it as one."""
+"""Commands from outside: another program flies in place of a policy, and the bridge treats it like a policy."""

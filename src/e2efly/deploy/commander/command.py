@@ -1,6 +1,7 @@
-"""A command from outside: how it is written, and how far it may go. Pure.
+"""A command from outside: how it is written, and the limits for it. Pure.
 
-Five modes, those of `e2efly.control.modes` that end in collective thrust and body rates. World ENU, body FLU, SI units.
+There are five modes: those of `e2efly.control.modes` that end in collective thrust and body rates. World ENU, body FLU,
+SI units.
 """
 
 import math
@@ -17,7 +18,7 @@ from e2efly.deploy.settings import Fence
 from e2efly.vehicles import Vehicle
 
 WHAT = "command"
-"""What messages call it."""
+"""The name of a command in messages."""
 MAIN = {
     "position": "position", "velocity": "velocity", "acceleration": "acceleration", "attitude": "attitude",
     "ctbr": "body_rate",
@@ -28,36 +29,36 @@ _WITH_HEADING = ("position", "velocity", "acceleration")
 KEYS = ("mode", *MAIN.values(), THRUST, ALTITUDE, YAW, YAW_RATE, "stamp", "frame")
 """All keys of a message."""
 FRAMES = ("", "map", "odom", "world")
-"""Names of frames that mean the world."""
+"""Names of frames that stand for the world frame."""
 TWICE = 2.0
-"""A number up to so many times as far from the middle of its range as the range's ends is clipped to the range; what is
-farther off is no command in these units, and refused."""
+"""A number beyond its range is clipped to the range, if its distance from the middle of the range is at most this many
+times half the range. A number that is farther away is refused, because it cannot be a command in these units."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """One message of a commander, as it came."""
+    """One message of a commander, as it arrived."""
 
     received: float
-    """When it arrived, s on this machine's monotonic clock."""
+    """Time of arrival, s on this machine's monotonic clock."""
     mode: str
     """A key of `MAIN`."""
     main: np.ndarray
     """(3,) world position, m, velocity, m/s, or acceleration, m/s^2; roll, pitch, yaw, rad; or body rates, rad/s."""
     thrust: float | None = None
-    """Collective thrust over mass, m/s^2, of attitude and CTBR."""
+    """Collective thrust divided by mass, m/s^2, for the modes attitude and CTBR."""
     altitude: float | None = None
-    """Height to hold in the world, m: then the velocity's z is 0 here and counts for nothing."""
+    """Height to hold in the world, m. The velocity's z is then 0 here and is not used."""
     yaw: float | None = None
-    """Heading to hold, rad; None with no yaw rate: as it is."""
+    """Heading to hold, rad. None without a yaw rate: the present heading."""
     yaw_rate: float | None = None
-    """By which the heading turns, rad/s."""
+    """Yaw rate of the heading, rad/s."""
     stamp: float | None = None
-    """When it was made, s on any steady clock of the sender; None: it does not say."""
+    """When it was made, s on any steady clock of the sender. None: the sender does not say."""
     sender: str = ""
-    """Address that it came from; empty: not known."""
+    """Address of the sender. Empty: not known."""
     clipped: bool = False
-    """Whether a number was beyond the vehicle's limits, and is now at them."""
+    """Whether a number was beyond the vehicle's limits and has been clipped to them."""
 
 
 def parse_command(message: bytes, received: float, sender: str = "") -> Command:
@@ -65,8 +66,8 @@ def parse_command(message: bytes, received: float, sender: str = "") -> Command:
 
     Args:
         message: a JSON object in UTF-8; see `docs/commands.md`.
-        received: when it arrived, s on the local monotonic clock.
-        sender: address that it came from.
+        received: time of arrival, s on the local monotonic clock.
+        sender: address of the sender.
 
     Raises:
         ValueError: naming the key, the value and what is accepted.
@@ -101,27 +102,27 @@ def parse_command(message: bytes, received: float, sender: str = "") -> Command:
 
 @dataclass(frozen=True)
 class Limits:
-    """How far commands may go."""
+    """The limits for commands."""
 
     vehicle: Vehicle
-    """That flies, as loaded."""
+    """The vehicle that flies, as loaded."""
     fence: Fence
-    """Places are to be inside it."""
+    """Commanded positions have to be inside this fence."""
     distance: float
-    """A place is at most so far from the vehicle, m."""
+    """The largest distance of a commanded position from the vehicle, m."""
 
 
 def within(limits: Limits, command: Command, odometry: Odometry | None) -> Command:
-    """The command, its numbers clipped to the vehicle's limits as a policy's are.
+    """The command, with its numbers clipped to the vehicle's limits like those of a policy.
 
     Args:
-        limits: of the flight.
-        command: as it came.
-        odometry: where the vehicle is; None: not known, and nothing is said of distances.
+        limits: the limits of the flight.
+        command: the command as it arrived.
+        odometry: the motion of the vehicle. None: not known, and distances are not checked.
 
     Raises:
-        ValueError: for a number far beyond them, a place out of the fence or far from the vehicle, naming it and what
-            is accepted.
+        ValueError: for a number far beyond the limits, or a position outside the fence or far from the vehicle. It
+            names the number and what is accepted.
     """
     mode, vehicle = COMMAND_MODES[command.mode], limits.vehicle
     low, high = command_limits(mode, vehicle)
@@ -143,7 +144,7 @@ def within(limits: Limits, command: Command, odometry: Odometry | None) -> Comma
     most = float(vehicle.body_rate_max[2])
     rate = None if command.yaw_rate is None else _clipped(YAW_RATE, command.yaw_rate, -most, most, "rad/s")
     yaw = None if command.yaw is None else _heading(command.yaw)
-    angle = slice(0, 2 if command.mode == "attitude" else 3)  # a yaw is turned by whole turns, not clipped
+    angle = slice(0, 2 if command.mode == "attitude" else 3)  # a yaw is wrapped by whole turns, not clipped
     same = (main[angle], thrust, rate) == (command.main.tolist()[angle], command.thrust, command.yaw_rate)
     return replace(command, main=np.array(main), thrust=thrust, yaw=yaw, yaw_rate=rate, clipped=not same)
 

@@ -1,7 +1,7 @@
-"""A commander outside, in place of a policy: the bridge asks it as it asks one.
+"""An external commander in place of a policy. The bridge calls it as it calls a policy.
 
-A command is flown by the cascade of the hover, at its own level, with the gains of the hover: at every control step
-anew, until the next one comes or the time-out is over.
+A command is flown by the cascade of the hover, entered at the command's own level, with the gains of the hover. It is
+evaluated again at every control step, until the next command comes or the time-out is over.
 """
 
 import math
@@ -21,17 +21,17 @@ from e2efly.deploy.settings import FlightSettings
 from e2efly.vehicles import Vehicle
 
 NAME = "commander"
-"""What the log calls it."""
+"""The name in the log."""
 DISTANCE = 3.0
-"""A place to fly to is at most so far from the vehicle, m, where the envelope says nothing else."""
+"""The largest distance of a commanded position from the vehicle, m, unless the envelope gives another."""
 LEASH = 0.5
-"""A yaw rate leads the heading to hold at most so far from the vehicle's, rad."""
+"""The largest lead of the heading to hold over the vehicle's heading, while a yaw rate turns it, rad."""
 LONGEST_STEP = 0.1
-"""A control step turns the heading for no longer than this, s."""
+"""A control step turns the heading by at most this duration times the yaw rate, s."""
 
 
 class CommandSource(Protocol):
-    """Delivers commands as they come. Nothing here blocks or raises once it is open."""
+    """Delivers commands as they arrive. Nothing here blocks or raises once the source is open."""
 
     @property
     def refused(self) -> int:
@@ -40,19 +40,19 @@ class CommandSource(Protocol):
 
     @property
     def problem(self) -> str | None:
-        """What was wrong last; None: nothing so far."""
+        """The last problem. None: no problem so far."""
         ...
 
     def read(self, now: float) -> list[Command]:
-        """What arrived since the last call, oldest first; now: s on this machine's monotonic clock."""
+        """The commands that arrived since the last call, oldest first. `now`: s on this machine's monotonic clock."""
         ...
 
     def close(self) -> None:
-        """Let go of everything; may be called twice."""
+        """Release all resources. May be called twice."""
         ...
 
     def describe(self) -> str:
-        """What this is, for people and logs."""
+        """A description of the source, for people and logs."""
         ...
 
 
@@ -61,23 +61,23 @@ class Heading:
     """What is remembered of a flight by commands."""
 
     yaw: float
-    """To hold, rad."""
+    """Yaw to hold, rad."""
     time: float
-    """Of the last control step, s."""
+    """Time of the last control step, s."""
     told: int = 0
-    """Messages that had come by then."""
+    """Messages that had arrived by then."""
 
 
 class Commander:
-    """Flies by a source of commands. None of its methods raises for what comes over it."""
+    """Flies by the commands of a source. None of its methods raises because of what the source delivers."""
 
     name = NAME
     images: tuple[Image, ...] = ()
-    """It sees nothing."""
+    """It uses no images."""
     lands = done = False
-    """The pilot ends its flight, and lands."""
+    """It never ends its flight or lands by itself. The pilot ends the flight and lands."""
     native_id: int | None = None
-    """It needs no thread."""
+    """It has no thread."""
 
     def __init__(
         self,
@@ -92,14 +92,15 @@ class Commander:
 
         Args:
             source: delivers commands.
-            vehicle: as loaded.
-            settings: of the flight: time-out and fence.
-            envelope: in which state of the vehicle it may take over, and how far off a place may be.
-            latency: from the vehicle's motion to its rate loop, s; None: the vehicle file's.
+            vehicle: the loaded vehicle.
+            settings: the settings of the flight, for the time-out and the fence.
+            envelope: the states of the vehicle in which it may take over, and the largest distance of a commanded
+                position.
+            latency: the time from the vehicle's motion to its rate loop, s. None: the value of the vehicle file.
         """
         self.source, self.timeout, self.envelope = source, settings.command_timeout, envelope or Envelope()
         self.gentle = flight_gains(vehicle, vehicle.latency if latency is None else latency)
-        """The vehicle with the gains by which commands are flown."""
+        """The vehicle with the gains with which commands are flown."""
         distance = DISTANCE if self.envelope.distance is None else self.envelope.distance
         self.limits = Limits(vehicle, settings.fence, distance)
         self.stream = Stream()
@@ -109,7 +110,7 @@ class Commander:
         self._counted, self._known = source.refused, source.problem
 
     def hear(self, odometry: Odometry | None, now: float) -> None:
-        """Take in what has come."""
+        """Process the messages that have arrived."""
         flying = self.state is not None
         for command in self.source.read(now):
             self.stream = take(self.stream, command, self.limits, odometry, now, self.timeout, flying=flying)
@@ -119,7 +120,7 @@ class Commander:
         self._counted, self._known = refused, problem
 
     def readiness(self, odometry: Odometry, now: float) -> str | None:
-        """Why it must not take over now; None: it may."""
+        """Why it must not take over now. None: it may."""
         limits = (
             ("speed", float(np.linalg.norm(odometry.velocity)), self.envelope.speed, "m/s"),
             ("tilt", tilt_of(odometry.quaternion), self.envelope.tilt, "rad"),
@@ -128,20 +129,21 @@ class Commander:
         return silence(self.stream, now, self.timeout) or unsteady(self.stream, now) or "; ".join(stands) or None
 
     def start(self, odometry: Odometry, now: float) -> None:
-        """It takes over, in the vehicle's heading."""
+        """Take over, with the vehicle's present heading."""
         self.problem = self.decision = None
         self.state = Heading(yaw_of(odometry.quaternion), now)
 
     def stop(self) -> None:
-        """It flies no more."""
+        """Stop flying."""
         self.state = self.decision = None
 
     def step(
         self, odometry: Odometry, now: float, slack: float, imu: Imu | None, images: Sequence[np.ndarray] = ()
     ) -> bool:
-        """Make collective thrust and body rates of the newest command; whether a message has come since the last step.
+        """Convert the newest command to collective thrust and body rates. Returns whether a message has come since the
+        last step.
 
-        That there is none is in `problem`.
+        If there is no command to fly by, `problem` says why.
         """
         del slack, imu, images
         command, before = self.stream.command, self.state
@@ -167,7 +169,7 @@ class Commander:
 
 
 def heading(command: Command, before: Heading, odometry: Odometry, now: float) -> float:
-    """The yaw to hold now, rad: the command's, or the one so far, turned by its yaw rate."""
+    """The yaw to hold now, rad: the command's yaw, or the previous one turned by the command's yaw rate."""
     here = yaw_of(odometry.quaternion)
     if command.mode == "ctbr":
         return here
@@ -186,10 +188,10 @@ def numbers(vehicle: Vehicle, command: Command, odometry: Odometry, yaw: float) 
     """The four numbers of the command's mode in `COMMAND_MODES`.
 
     Args:
-        vehicle: with the gains of the flight; its position gain holds an altitude.
-        command: within the limits.
-        odometry: the motion now.
-        yaw: to hold, rad.
+        vehicle: the vehicle with the gains of the flight. Its position gain holds an altitude.
+        command: a command within the limits.
+        odometry: the present motion.
+        yaw: the yaw to hold, rad.
     """
     x, y, z = command.main.tolist()
     if command.thrust is not None:

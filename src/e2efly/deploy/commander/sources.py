@@ -22,11 +22,11 @@ def open_commands(text: str) -> CommandSource:
     """Open a source of commands.
 
     Args:
-        text: as `FORMS` says; without a HOST it listens at 127.0.0.1.
+        text: a text as `FORMS` says. Without a HOST, it listens at 127.0.0.1.
 
     Raises:
-        ValueError: naming the text and what is accepted; for a port that is taken; for a package that is not installed
-            or a peer that does not answer, with what to do.
+        ValueError: naming the text and what is accepted. Also for a port that is taken. For a package that is not
+            installed or a peer that does not answer, it says what to do.
     """
     kind, _, where = text.partition(":")
     source: Any

@@ -1,4 +1,4 @@
-"""What is known of a stream of commands: the newest that can be flown by, how old it is, what was refused. Pure."""
+"""What is known about a stream of commands: the newest usable command, its age, and what was refused. Pure."""
 
 import math
 from dataclasses import dataclass, replace
@@ -8,38 +8,38 @@ from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.pose.clock import ClockMap, follow_clock, start_clock
 
 STEADY_S = 0.3
-"""Commands must have come for so long, s, none of them refused and none too late, before a commander takes over."""
+"""Before a commander takes over, commands must have come for this time, s, with none refused and none too late."""
 CLOCK_JUMP = 0.05
-"""Steps forward of the sender's clock larger than this are refused, s."""
+"""Forward jumps of the sender's clock that are larger than this are refused, s."""
 
 
 @dataclass(frozen=True)
 class Stream:
-    """Commands so far. `Stream()` before the first."""
+    """The commands so far. `Stream()` before the first one."""
 
     command: Command | None = None
-    """The newest that was accepted, within the limits."""
+    """The newest command that was accepted, within the limits."""
     time: float = -math.inf
-    """When it was made, or where it does not say, when it arrived, s on the local monotonic clock."""
+    """When it was made, s on the local monotonic clock. If the sender does not say, when it arrived."""
     accepted: float = -math.inf
-    """When it was, s."""
+    """When it was accepted, s."""
     since: float = math.inf
-    """Since when commands have been coming without a gap or a refusal, s; infinite: they do not."""
+    """Time since which commands have come without a gap or a refusal, s. Infinite: they do not."""
     clock: ClockMap | None = None
-    """From the sender's clock to this machine's."""
+    """Map from the sender's clock to this machine's clock."""
     taken: int = 0
-    """Commands that were accepted."""
+    """Number of commands that were accepted."""
     refused: int = 0
-    """Messages that were not."""
+    """Number of messages that were refused."""
     clipped: int = 0
-    """Commands with a number beyond the vehicle's limits."""
+    """Number of commands with a value beyond the vehicle's limits."""
     problem: str = ""
-    """Why the last message was refused that was, or what ails the source: whichever came later."""
+    """Why the last refused message was refused, or the problem of the source, whichever came later."""
     problem_time: float = -math.inf
-    """When it was, s."""
+    """When that was, s."""
 
     def age(self, now: float) -> float:
-        """Of the newest command, s; infinite before the first."""
+        """Age of the newest command, s. Infinite before the first one."""
         return now - self.time
 
 
@@ -53,17 +53,18 @@ def take(
     *,
     flying: bool = False,
 ) -> Stream:
-    """Take a message in.
+    """Process one message.
 
     Args:
-        stream: so far.
-        command: as it was read.
-        limits: of the flight.
-        odometry: where the vehicle is; None: not known.
+        stream: the stream so far.
+        command: the command as it was read.
+        limits: the limits of the flight.
+        odometry: the motion of the vehicle. None: not known.
         now: s on the local monotonic clock.
-        timeout: an older command is too old, s.
-        flying: whether the commander flies: only while it does not may a stream that was silent begin anew, with
-            another clock or another sender. Otherwise stamps that stand would be accepted once every time-out.
+        timeout: the largest age of a command, s.
+        flying: whether the commander flies. A stream that was silent may start again, with another clock or another
+            sender, only while the commander does not fly. Otherwise, stamps that do not advance would be accepted once
+            per time-out.
     """
     silent = stream.age(now) > timeout and not flying
     first = command.sender if silent or stream.command is None else stream.command.sender
@@ -84,7 +85,7 @@ def take(
 
 
 def _dated(clock: ClockMap | None, command: Command) -> tuple[ClockMap | None, float]:
-    """The clock's map with a command, and when it was made, s on the local monotonic clock."""
+    """The clock's map after a command, and when the command was made, s on the local monotonic clock."""
     received, stamp = command.received, command.stamp
     if stamp is None:
         return clock, received
@@ -99,17 +100,19 @@ def _dated(clock: ClockMap | None, command: Command) -> tuple[ClockMap | None, f
 
 
 def refuse(stream: Stream, problem: str, now: float, count: int = 1) -> Stream:
-    """Count messages that are no commands, or with a count of 0 note what ails the source: they move nothing."""
+    """Count messages that are not commands, or with a count of 0 note a problem of the source. They do not move the
+    vehicle.
+    """
     return replace(stream, since=math.inf, refused=stream.refused + count, problem=problem, problem_time=now)
 
 
 def silence(stream: Stream, now: float, timeout: float) -> str | None:
-    """Why there is no command to fly by now; None: there is one.
+    """Why there is no command to fly by now. None: there is one.
 
     Args:
-        stream: so far.
+        stream: the stream so far.
         now: s.
-        timeout: an older command is too old, s.
+        timeout: the largest age of a command, s.
     """
     age = stream.age(now)
     if age <= timeout:
@@ -120,7 +123,7 @@ def silence(stream: Stream, now: float, timeout: float) -> str | None:
 
 
 def unsteady(stream: Stream, now: float) -> str | None:
-    """Why a commander that is heard must not take over yet; None: it may."""
+    """Why a commander whose commands arrive must not take over yet. None: it may."""
     going = now - stream.since
     if going >= STEADY_S:
         return None

@@ -1,1 +1,1 @@
-"""A filter between policy and sticks: it changes a command only where the vehicle could not stop in time otherwise."""
+"""A filter between policy and sticks. It changes a command only if the vehicle could otherwise not stop in time."""

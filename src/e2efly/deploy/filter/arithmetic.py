@@ -1,6 +1,7 @@
-"""Functions of numbers under NumPy's names, so that one formula serves one vehicle in flight and thousands in a study.
+"""Functions of numbers under NumPy's names, so that one formula works for one vehicle in flight and for thousands in a
+study.
 
-NumPy takes about a microsecond for a function of a single number; the standard library takes a twentieth of that.
+NumPy takes about a microsecond for a function of a single number. The standard library takes a twentieth of that.
 """
 
 import math
@@ -33,7 +34,7 @@ class Scalars:
 
     @staticmethod
     def where(condition: bool, a: float, b: float) -> float:
-        """The first where the condition holds, else the second."""
+        """The first value if the condition holds, otherwise the second."""
         return a if condition else b
 
 
@@ -41,7 +42,7 @@ SCALARS = Scalars()
 
 
 def library(sample: Number) -> Any:
-    """What computes with such numbers: `SCALARS` for floats, NumPy for arrays."""
+    """The functions for such numbers: `SCALARS` for floats, NumPy for arrays."""
     return np if isinstance(sample, np.ndarray) else SCALARS
 
 

@@ -1,4 +1,4 @@
-"""The backup manoeuvre: turn the thrust against the velocity, brake to rest, hover. Where it leads is in `way`."""
+"""The backup manoeuvre: turn the thrust against the velocity, brake to rest, hover. Its path is computed in `way`."""
 
 import math
 from dataclasses import dataclass
@@ -10,80 +10,87 @@ from e2efly.deploy.filter.turn import Step, steps_of
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 TILT_GAIN = 9.0
-"""Body rate over the angle that is left to turn, 1/s: of a state forecast to when the command acts, without delay."""
+"""Body rate divided by the angle that remains to turn, 1/s. It may be this large because the state is forecast to the
+time at which the command acts, so there is no delay."""
 TURN_RATE = 0.8
-"""Share of the vehicle's `body_rate_max` that the backup turns with."""
+"""Share of the vehicle's `body_rate_max` with which the backup turns."""
 THRUST_SHARE = 0.8
-"""Share of the largest thrust that is counted on: a flat battery takes a fifth."""
+"""Share of the largest thrust that is assumed to be available. A flat battery costs a fifth of it."""
 UNSEEN = 0.85
-"""Share of the thrust that is left before a loss of it is noticed."""
+"""Share of the thrust that remains before a loss of thrust is noticed."""
 STEEPEST = math.radians(65)
-"""Largest tilt of the manoeuvre, rad, where the fence allows it."""
+"""The largest tilt of the manoeuvre, rad, if the fence allows it."""
 TILT_MARGIN, LEAN_MARGIN, LEAST_TILT = 0.32, 0.36, 0.1
-"""The largest tilt is kept to with this margin, rad; the manoeuvre itself, whose turns a rate loop may overshoot, leans
-no farther than the second; so much must be left."""
+"""Margins below the largest tilt, rad. The first is the margin with which the tilt limit is kept. The second is the
+margin of the manoeuvre itself, because a rate loop may overshoot its turns. The third is the smallest tilt that must
+remain."""
 COUNTED = (0.5, 0.55)
-"""Shares of what is commanded that are counted on, sideways and of a fall: until a loss of thrust is noticed."""
+"""Shares of the commanded deceleration that are assumed, sideways and for a fall. They cover the time until a loss of
+thrust is noticed."""
 DIAGONAL = 1.4 / THRUST_SHARE
-"""By which turning about a diagonal with a flat battery takes more of the rotors than about x or y with a full one."""
+"""How much more rotor thrust a turn about a diagonal takes with a flat battery than a turn about x or y with a full
+one, as a factor."""
 YAW_KEPT = 0.8
-"""Share of the turning about the thrust that the manoeuvre keeps: stopping it at once takes what else would tilt."""
+"""Share of the rotation about the thrust axis that the manoeuvre keeps. Stopping it at once would take the control
+authority that tilting needs."""
 CLIMB_SHARE = 0.85
-"""Share of that thrust which may point up to brake a fall; braking sideways gets what is left."""
+"""Share of that thrust that may point up to brake a fall. Braking sideways gets the rest."""
 SINK = 4.5
-"""Deceleration of a climb, m/s^2: the thrust that is left can still brake sideways."""
+"""Deceleration of a climb, m/s^2. The remaining thrust can still brake sideways."""
 GUST = 0.4
-"""What air may push against the braking, m/s^2: a gust of 3 m/s at 10 m/s, on the vehicles that are shipped."""
+"""How strongly the air may push against the braking, m/s^2: a gust of 3 m/s at 10 m/s, for the vehicles that are
+shipped."""
 MARGIN_S2 = 0.0065
-"""The manoeuvre stays inside by so much of the vehicle's largest thrust over mass, s^2: what the forecast leaves out
-grows with the thrust. That is 0.18 m for VIS-R. It is more ..."""
+"""The manoeuvre stays inside by this time squared multiplied by the vehicle's largest thrust over mass, s^2, because
+the errors of the forecast grow with the thrust. For VIS-R this is 0.18 m. The margin is increased by ..."""
 TIMING, TURNING = 0.05, 0.016
-"""... by the way of so long, s: in the forecast's time, too, there are errors; and by so much of the body rate, m s:
-fast turns are foreseen less well."""
+"""... the distance flown in the first time, s, because the forecast's time also has errors, and by the second value, m
+s, multiplied by the body rate, because fast turns are predicted less well."""
 SPEED_GAIN = 12.0
-"""Deceleration over speed where the manoeuvre comes to rest, 1/s."""
+"""Deceleration divided by speed as the manoeuvre comes to rest, 1/s."""
 WAY_GAINS = (4.0, 3.0)
-"""The same, sideways and up, for what is foreseen of the turn: there it is held from the begin, 1/s, and must not have
-turned the velocity round at the end."""
+"""The same gains, sideways and up, for the prediction of the turn, 1/s. There the deceleration is held from the
+beginning, and must not have reversed the velocity at the end."""
 LEAD, LEAD_UP = 0.1, 0.04
-"""The velocity that is braked is that so much later, s: while it turns, the thrust still pushes where it pointed. Up
-and down it only has to follow the rotors."""
+"""The velocity that is braked is the velocity after this time, s, because the thrust still pushes in its old direction
+while it turns. Vertically, the thrust only has to wait for the rotors, so the time is shorter."""
 REST_S = LEAD + 1 / SPEED_GAIN
 """Time constant with which the manoeuvre comes to rest, s."""
 
 
 @dataclass(frozen=True)
 class Backup:
-    """The manoeuvre of a vehicle. Make it with `Backup.of`."""
+    """The manoeuvre of a vehicle. Create it with `Backup.of`."""
 
     response: Response
-    """The vehicle."""
+    """The response of the vehicle."""
     most: float
-    """Thrust over mass that is counted on, m/s^2."""
+    """Thrust over mass that is assumed to be available, m/s^2."""
     level: float
-    """Deceleration sideways that is commanded, m/s^2."""
+    """Sideways deceleration that is commanded, m/s^2."""
     climb: float
     """Deceleration of a fall that is commanded, m/s^2."""
     braking: tuple[float, float, float]
-    """Decelerations sideways, of a fall and of a climb that are counted on, m/s^2."""
+    """Decelerations that are assumed sideways, for a fall and for a climb, m/s^2."""
     steepest: float
-    """Largest tilt, rad."""
+    """The largest tilt, rad."""
     rate: float
-    """Largest body rate, rad/s."""
+    """The largest body rate, rad/s."""
     steps: tuple[Step, ...]
-    """Of the turn."""
+    """Steps of the turn."""
 
     @property
     def margin(self) -> float:
-        """By which the manoeuvre stays inside at rest, m."""
+        """Margin by which the manoeuvre stays inside at rest, m."""
         return MARGIN_S2 * self.response.thrust[1]
 
     @staticmethod
     def of(vehicle: Vehicle, tilt: float) -> "Backup":
-        """Of a loaded vehicle, within a tilt, rad.
+        """The manoeuvre of a loaded vehicle, within a tilt, rad.
 
         Raises:
-            ValueError: for a vehicle with too little thrust to brake with, or a tilt that is too small, naming it.
+            ValueError: for a vehicle with too little thrust for braking, or a tilt that is too small. It names the
+                value.
         """
         response = Response.of(vehicle)
         most = response.thrust[1] * THRUST_SHARE
@@ -106,34 +113,36 @@ class Backup:
 
 
 class Brake(NamedTuple):
-    """Where the manoeuvre points the thrust, and what it will have made of the attitude by itself."""
+    """The direction in which the manoeuvre points the thrust, and the attitude that the present rotation reaches by
+    itself.
+    """
 
     bx: Number
-    """Direction of the thrust as it is, world."""
+    """Present direction of the thrust, world."""
     by: Number
     bz: Number
     cx: Number
-    """Direction in which the turning that goes on comes to rest, world."""
+    """Direction at which the present rotation comes to rest, world."""
     cy: Number
     cz: Number
     tx: Number
-    """Direction that is wanted, world."""
+    """Desired direction, world."""
     ty: Number
     tz: Number
     thrust: Number
-    """Collective thrust over mass that is wanted along it, m/s^2."""
+    """Desired collective thrust over mass along that direction, m/s^2."""
     share: Number
-    """Thrust over that of the command."""
+    """Actual thrust divided by the commanded thrust."""
     vx: Number
     """The velocity that is braked, m/s."""
     vy: Number
     vz: Number
     wx: Number
-    """Rate at which the thrust turns, world, rad/s."""
+    """Rate at which the thrust direction turns, world, rad/s."""
     wy: Number
     wz: Number
     ax: Number
-    """Its change by the rotors, world, rad/s^2."""
+    """Change of that rate by the rotors, world, rad/s^2."""
     ay: Number
     az: Number
 
@@ -149,7 +158,7 @@ def axes(m: Motion) -> tuple[Number, ...]:
 
 
 def axes_z(w: Number, x: Number, y: Number, z: Number) -> tuple[Number, Number, Number]:
-    """The body's z axis in the world, of a quaternion."""
+    """The body's z axis in the world, from a quaternion."""
     return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
 
 
@@ -161,9 +170,10 @@ def brake(
     back: tuple[Number, ...] = (0.0, 0.0, 0.0),
     gains: tuple[float, float] = (SPEED_GAIN, SPEED_GAIN),
 ) -> Brake:
-    """The manoeuvre from a state, to rest or to a velocity back, world, m/s, by decelerations over speed, 1/s.
+    """The manoeuvre from a state, to rest or to a return velocity `back`, world, m/s. `gains` are decelerations divided
+    by speed, 1/s.
 
-    The turning that goes on comes to rest by itself at the attitude c of `Brake`.
+    The present rotation comes to rest by itself at the attitude c of `Brake`.
     """
     r = b.response
     xx, xy, xz, yx, yy, yz, bx, by, bz = axes(m)
@@ -196,10 +206,11 @@ def brake(
 
 
 def _coast(xp: Any, r: Response, m: Motion) -> tuple[Number, Number]:
-    """The turn about body x and y that is left in the rate loop when it is told to stop, rad.
+    """The angle about body x and y that the rate loop still turns after the command to stop, rad.
 
-    That is the integral of its free response, (rate + lag * acceleration) / gain; of a rate that takes more than the
-    rotors have, the way under their largest acceleration down to the rate that does not, with their lag besides.
+    This is the integral of its free response, (rate + lag * acceleration) / gain. For a rate that needs more than the
+    rotors can give, it is the angle turned under their largest acceleration, down to the rate that does not need more,
+    plus the effect of their lag.
     """
     gain, (low, high) = UNSEEN * min(r.gain[:2]), r.thrust
     x, y = m.wx + r.motor_time * m.ax, m.wy + r.motor_time * m.ay
@@ -211,20 +222,21 @@ def _coast(xp: Any, r: Response, m: Motion) -> tuple[Number, Number]:
 
 
 def command(xp: Any, b: Backup, m: Motion, k: Brake) -> Command:
-    """What the manoeuvre sends now: turn by the shortest way, with no more thrust than points where it is wanted.
+    """The command that the manoeuvre sends now: turn by the shortest way, with the part of the thrust that already
+    points in the desired direction.
 
     Args:
-        xp: computes.
+        xp: the functions to compute with.
         b: the vehicle's manoeuvre.
         m: the state when the command acts.
-        k: the manoeuvre from there.
+        k: the manoeuvre from that state.
     """
     xx, xy, xz, yx, yy, yz, bx, by, bz = axes(m)
     nx, ny, nz = by * k.tz - bz * k.ty, bz * k.tx - bx * k.tz, bx * k.ty - by * k.tx
     sine = xp.sqrt(nx * nx + ny * ny + nz * nz + 1e-18)
     cosine = bx * k.tx + by * k.ty + bz * k.tz
     turn = xp.minimum(TILT_GAIN * xp.arctan2(sine, cosine), b.rate) / sine
-    # upside down to where it should point there is no shortest way: about body x is as good as any
+    # if the thrust points exactly opposite to the desired direction, there is no shortest way: use body x
     over = (sine < 1e-3) & (cosine < 0.0)
     wx = xp.where(over, b.rate, turn * (nx * xx + ny * xy + nz * xz))
     wy = xp.where(over, 0.0, turn * (nx * yx + ny * yy + nz * yz))

@@ -1,8 +1,9 @@
-"""How the vehicle answers to collective thrust and body rates, as the filter forecasts it.
+"""How the vehicle responds to collective thrust and body rates in the filter's forecast.
 
-A rigid body without drag. The rate loop asks for an angular acceleration in proportion to the rate's error; rotors
-follow with their lag, which is one of their speed, the root of the thrust. As in the flight controller's mixer attitude
-goes before thrust: turning hard needs a spread between the rotors, which raises a small thrust and lowers a large one.
+It is a rigid body without drag. The rate loop demands an angular acceleration in proportion to the rate error. The
+rotors follow with a lag, which is a lag of their speed, the root of the thrust. As in the flight controller's mixer,
+attitude has priority over thrust: a hard turn needs a spread between the rotors, which raises a small thrust and lowers
+a large one.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ class Command(NamedTuple):
     """Collective thrust and body rates."""
 
     thrust: Number
-    """Over mass, m/s^2."""
+    """Collective thrust over mass, m/s^2."""
     x: Number
     """Body rate about body x, rad/s."""
     y: Number
@@ -27,7 +28,9 @@ class Command(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """The vehicle's state, taken apart: a tuple, as a frozen dataclass takes ten times as long to make."""
+    """The vehicle's state as single numbers. It is a tuple because a frozen dataclass takes ten times as long to
+    create.
+    """
 
     px: Number
     """Position, world, m."""
@@ -47,14 +50,14 @@ class Motion(NamedTuple):
     wy: Number
     wz: Number
     ax: Number
-    """Angular acceleration of the rotors about body x, rad/s^2."""
+    """Angular acceleration of the vehicle about body x by its rotors, rad/s^2."""
     ay: Number
     f: Number
-    """Collective thrust over mass by the commands, m/s^2."""
+    """Collective thrust over mass from the commands, m/s^2."""
 
 
 class Actuators(NamedTuple):
-    """The part of the state that no pose tells: what the commands that were sent have made of the rotors."""
+    """The part of the state that no pose contains: the effect of the sent commands on the rotors."""
 
     wx: Number
     wy: Number
@@ -65,38 +68,38 @@ class Actuators(NamedTuple):
 
 
 class Residual(NamedTuple):
-    """What the odometry shows and the forecast does not explain."""
+    """What the odometry shows but the forecast does not explain."""
 
     x: Number
-    """Acceleration, world, m/s^2: of wind and drag."""
+    """Acceleration from wind and drag, world, m/s^2."""
     y: Number
     z: Number
     share: Number
-    """Thrust over that of the command: below 1 for a battery that sags, or a throttle map that is wrong."""
+    """Actual thrust divided by the commanded thrust. Below 1 for a sagging battery or a wrong throttle map."""
 
 
 NOTHING = Residual(0.0, 0.0, 0.0, 1.0)
-"""All is explained."""
+"""Everything is explained."""
 
 
 @dataclass(frozen=True)
 class Response:
-    """The numbers of a vehicle. Make it with `Response.of`."""
+    """The response of a vehicle. Create it with `Response.of`."""
 
     thrust: tuple[float, float]
     """Smallest and largest collective thrust over mass, m/s^2."""
     motor_time: float
     """Time constant of the rotors, s."""
     gain: tuple[float, float, float]
-    """Angular acceleration over the error of the body rate, 1/s."""
+    """Angular acceleration divided by the error of the body rate, 1/s."""
     spread: tuple[float, float, float]
-    """Thrust over mass that an angular acceleration about body x, y, z takes from either end, m."""
+    """Thrust over mass that an angular acceleration about body x, y, z takes from either end of the thrust range, m."""
     rate_max: tuple[float, float, float]
-    """Largest body rates that are commanded, rad/s."""
+    """The largest body rates that are commanded, rad/s."""
 
     @staticmethod
     def of(vehicle: Vehicle) -> "Response":
-        """Of a loaded vehicle."""
+        """The response of a loaded vehicle."""
         low, high = vehicle.thrust_range
         arm_x, arm_y = (float(np.mean(np.abs(vehicle.rotor_position[:, i]))) for i in range(2))
         mass, (jx, jy, jz) = float(vehicle.mass), (float(j) for j in vehicle.inertia)
@@ -113,12 +116,13 @@ class Response:
 
 @lru_cache(maxsize=4096)
 def turning(gain: float, motor_time: float, h: float) -> tuple[float, float, float, float]:
-    """The exact step of a rate loop with a rotor's lag: (rate error, acceleration) after h s is this matrix times them.
+    """The exact step of a rate loop with rotor lag. The matrix maps (rate error, acceleration) to their values after h
+    s.
 
     Args:
-        gain: of the rate loop, 1/s.
-        motor_time: s.
-        h: s.
+        gain: gain of the rate loop, 1/s.
+        motor_time: time constant of the rotors, s.
+        h: length of the step, s.
     """
     m = np.array([[0.0, 1.0], [-gain / motor_time, -1.0 / motor_time]]) * (h / 64)
     total, term = np.eye(2), np.eye(2)
@@ -133,13 +137,13 @@ def turning(gain: float, motor_time: float, h: float) -> tuple[float, float, flo
 
 @lru_cache(maxsize=4096)
 def lag(time_constant: float, h: float) -> tuple[float, float]:
-    """What is left of a lag after h s, and its mean over them."""
+    """The share of an error that a lag leaves after h s, and the mean of this share over that time."""
     left = float(np.exp(-h / time_constant))
     return left, (1 - left) * time_constant / h
 
 
 def actuated(xp: Any, r: Response, a: Actuators, command: Command, h: float) -> Actuators:
-    """The rotors after h s of a command; where turning takes more than the rotors have, it is slower."""
+    """The rotors after h s of a command. If a turn needs more than the rotors can give, the turn is slower."""
     (kx, ky, kz), (sx, sy, sz), (low, high) = r.gain, r.spread, r.thrust
     ax, bx, cx, dx = turning(kx, r.motor_time, h)
     ay, by, cy, dy = turning(ky, r.motor_time, h)
@@ -162,7 +166,7 @@ def actuated(xp: Any, r: Response, a: Actuators, command: Command, h: float) -> 
 
 
 def moved(xp: Any, r: Response, m: Motion, command: Command, air: Residual, h: float) -> Motion:
-    """The motion after h s of a command; h is so short that the attitude turns by a fraction of a radian."""
+    """The motion after h s of a command. h is so short that the attitude turns by only a fraction of a radian."""
     a = actuated(xp, r, Actuators(m.wx, m.wy, m.wz, m.ax, m.ay, m.f), command, h)
     s = 0.25 * h
     tx, ty, tz = s * (m.wx + a.wx), s * (m.wy + a.wy), s * (m.wz + a.wz)  # half of the turn

@@ -1,9 +1,9 @@
-"""The filter: forecasts the vehicle over the delay, and changes a command no more than the backup manoeuvre needs.
+"""The filter: forecasts the vehicle over the delay, and changes a command only as much as the backup manoeuvre needs.
 
-A command passes, bit for bit, if after it the backup manoeuvre would still keep every limit: fence, floor, largest
-speed and tilt, solids. Otherwise it is moved towards the manoeuvre's own command, by the smallest share that does. This
-is a backup-controller barrier (Singletary et al., Onboard safety guarantees for racing drones, 2022; and Chen et al.,
-Backup control barrier functions, 2021), with the manoeuvre's way in closed form where it can be.
+A command passes unchanged, bit for bit, if the backup manoeuvre after it would still keep every limit: fence, floor,
+largest speed and tilt, solids. Otherwise it is moved towards the manoeuvre's own command by the smallest share that
+keeps them. This is a backup-controller barrier (Singletary et al., Onboard safety guarantees for racing drones, 2022;
+and Chen et al., Backup control barrier functions, 2021). The manoeuvre's path is in closed form where possible.
 """
 
 import itertools
@@ -22,38 +22,40 @@ from e2efly.deploy.settings import Fence
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 HOLD = 0.01
-"""A command is judged as if it were held for so long, s."""
+"""A command is judged as if it were held for this time, s."""
 HALVINGS = 3
-"""How often the share of the change is halved: to an eighth."""
+"""How many times the share of the change is halved: down to an eighth."""
 AIR_S, AIR_MOST = 0.4, 4.0
-"""Acceleration that the forecast leaves out is averaged over so long, s, and is at most so much an axis, m/s^2."""
+"""The acceleration that the forecast does not explain is averaged over the first value, s, and is at most the second
+value per axis, m/s^2."""
 SHARE_S, SHARES = 0.2, (0.6, 1.3)
-"""The thrust over that of the command is averaged over so long, s, and stays within these; it is seen only ..."""
+"""The ratio of actual to commanded thrust is averaged over this time, s, and stays within these limits. It is only
+measured ..."""
 SHARE_SEEN = 4.0
-"""... while the command's is at least so much, m/s^2."""
+"""... while the commanded thrust is at least this, m/s^2."""
 LONGEST = 0.02
-"""Longest step of the forecast, s."""
+"""The longest step of the forecast, s."""
 OLDEST = 0.5
-"""Commands that were sent so long ago act no more, s."""
+"""Commands that were sent longer ago than this no longer act, s."""
 FELT_S = 0.03
-"""Answers of the gyro that are no farther apart tell the angular acceleration, s."""
+"""The largest time between two gyro replies from which the angular acceleration is computed, s."""
 
 
 @dataclass(frozen=True)
 class Filter:
-    """What is filtered for. Make it with `Filter.of`."""
+    """The vehicle, the limits and the latency for which commands are filtered. Create it with `Filter.of`."""
 
     backup: Backup
     limits: Limits
     latency: float
-    """From the vehicle's motion to its rate loop, s."""
+    """The time from the vehicle's motion to its rate loop, s."""
 
     @staticmethod
     def of(vehicle: Vehicle, fence: Fence, latency: float | None = None) -> "Filter":
-        """Of a loaded vehicle in a fence.
+        """The filter for a loaded vehicle in a fence.
 
         Raises:
-            ValueError: naming the field, for a vehicle that cannot brake, or a fence in which it could not stop.
+            ValueError: naming the field, for a vehicle that cannot brake or a fence in which it could not stop.
         """
         backup = Backup.of(vehicle, fence.tilt)
         limits = Limits.of(fence, float(vehicle.radius), backup.margin)
@@ -63,12 +65,14 @@ class Filter:
 
 
 def stopping_distance(filter: Filter, speed: float) -> float:
-    """Room that level flight at a speed, m/s, needs before a wall, m: the delay, the manoeuvre, and the margin."""
+    """The distance to a wall, m, that level flight at a speed, m/s, needs to stop: for the delay, the manoeuvre and the
+    margin.
+    """
     return speed * (filter.latency + TIMING) + stopping(filter.backup, speed) + filter.backup.margin
 
 
 def stopping_height(filter: Filter, speed: float) -> float:
-    """Height that level flight at a speed, m/s, needs between floor and ceiling to stop in, m, with both margins."""
+    """The height between floor and ceiling, m, that level flight at a speed, m/s, needs to stop, with both margins."""
     b, m = filter.backup, Motion(0.0, 0.0, 0.0, speed, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
     here = (0.0, 0.0, 0.0)
     left = rooms(SCALARS, b, Limits(here, here, speed, math.inf), m, NOTHING)
@@ -92,7 +96,9 @@ def _check(filter: Filter, fence: Fence) -> None:
 
 
 def _fastest(filter: Filter, needed: Callable[[Filter, float], float], size: float, below: float) -> float | None:
-    """The largest speed below another, m/s, that stops within a size, m, in steps of 0.1; None: none does."""
+    """The largest speed below `below`, m/s, from which the vehicle stops within a size, m, in steps of 0.1. None: no
+    speed does.
+    """
     speeds = [tenth / 10 for tenth in range(1, math.ceil(10 * below))]
     return max(itertools.takewhile(lambda speed: needed(filter, speed) <= size, speeds), default=None)
 
@@ -102,43 +108,44 @@ class Memory:
     """What the filter remembers from step to step."""
 
     sent: tuple[tuple[float, Command], ...] = ()
-    """When each command was sent, s, and the command, which holds until the next; oldest first."""
+    """When each command was sent, s, and the command, which holds until the next one. Oldest first."""
     actuators: Actuators | None = None
-    """What the commands that act in the newest odometry have made of the rotors; None: none was sent."""
+    """The state of the rotors at the newest odometry, from the commands that act by then. None: no command was sent."""
     stamp: float = -math.inf
-    """Of the newest odometry, s."""
+    """Time of the newest odometry, s."""
     velocity: tuple[Number, Number, Number] | None = None
     """Its velocity, world, m/s."""
     since: float = 0.0
-    """When it came, s."""
+    """When it arrived, s."""
     air: Residual = NOTHING
     """What the forecast does not explain."""
     felt: tuple[tuple[float, tuple[float, float, float]], ...] = ()
-    """When the flight controller's gyro was asked, s, and the body rate that it felt, rad/s; oldest first."""
+    """When each reading of the flight controller's gyro was requested, s, and its body rate, rad/s. Oldest first."""
 
 
 @dataclass(frozen=True)
 class Filtered:
-    """What became of a command."""
+    """The result of filtering a command."""
 
     command: Command
     share: Number
-    """Of the change towards the manoeuvre's command; 0: it passed as it was."""
+    """Share of the change towards the manoeuvre's command. 0: the command passed unchanged."""
     room: Number
-    """The least that the manoeuvre would have left after the command as it came, m; NaN after what is not finite."""
+    """The smallest room that the manoeuvre would have left after the wanted command, m. NaN if a number is not
+    finite."""
     limit: Any
-    """The index of that limit in `room.NAMES`; beyond them: in `solids`."""
+    """The index of that limit in `room.NAMES`. Indices beyond it refer to `solids`."""
     solids: tuple[str, ...] = ()
-    """Names of the solids that were near."""
+    """Names of the nearby solids."""
 
     @property
     def name(self) -> str:
-        """Of that limit, of one vehicle alone."""
+        """Name of that limit. Only for a single vehicle."""
         return (*NAMES, *self.solids)[self.limit]
 
 
 def remember(memory: Memory, sent: Command, now: float) -> Memory:
-    """The memory after a command was sent; the same one once more changes nothing."""
+    """The memory after a command was sent. Sending the same command again changes nothing."""
     kept = memory.sent
     if kept and isinstance(sent.thrust, float) and kept[-1][1] == sent:
         return memory
@@ -148,20 +155,20 @@ def remember(memory: Memory, sent: Command, now: float) -> Memory:
 
 
 def feel(memory: Memory, rate: tuple[float, float, float], asked: float) -> Memory:
-    """The memory after an answer of the gyro, rad/s, that was asked for with the command of `asked` s."""
+    """The memory after a gyro reading, rad/s, that was requested at the control step of `asked` s."""
     kept = tuple(one for one in memory.felt if asked - OLDEST < one[0] < asked)
     return replace(memory, felt=(*kept, (asked, rate)))
 
 
 def watch(filter: Filter, memory: Memory, odometry: Odometry, now: float, *, flying: bool) -> Memory:
-    """The memory after the newest odometry, which may be the one of before.
+    """The memory after the newest odometry, which may be the same as before.
 
     Args:
         filter: the filter.
-        memory: so far.
+        memory: the memory so far.
         odometry: position, velocity (*n, 3), quaternion (*n, 4), body rate (*n, 3).
         now: s.
-        flying: whether nothing but the air carries the vehicle.
+        flying: whether only the air carries the vehicle.
     """
     if odometry.time == memory.stamp or not memory.sent:
         return memory
@@ -193,7 +200,9 @@ def _felt(
     f: Number,
     dt: float,
 ) -> Residual:
-    """What is not explained after a change of velocity in dt s: along the thrust by its share, across it by the air."""
+    """The unexplained part of a change of velocity in dt s: along the thrust as its share, across the thrust as the
+    air's push.
+    """
     bx, by, bz = axis
     thrust = air.share * f
     ex = (v1[0] - v0[0]) / dt - thrust * bx - air.x
@@ -211,7 +220,7 @@ def _felt(
 
 
 def forecast(filter: Filter, memory: Memory, odometry: Odometry, now: float) -> Motion:
-    """The state at which a command acts that is sent now."""
+    """The state at which a command that is sent now begins to act."""
     xp, (px, py, pz) = _apart(odometry.position)
     _, (vx, vy, vz) = _apart(odometry.velocity)
     _, (qw, qx, qy, qz) = _apart(odometry.quaternion)
@@ -230,7 +239,7 @@ def forecast(filter: Filter, memory: Memory, odometry: Odometry, now: float) -> 
 
 
 def _turning(m: Motion, rate: tuple[float, float, float], at: float, before: tuple[float, Any] | None) -> Motion:
-    """The state with the body rate that was felt, and the angular acceleration since the answer before."""
+    """The state with the measured body rate, and with the angular acceleration since the previous gyro reading."""
     ax, ay = m.ax, m.ay
     if before is not None and 0.0 < at - before[0] < FELT_S:
         ax, ay = ((rate[i] - before[1][i]) / (at - before[0]) for i in range(2))
@@ -240,12 +249,12 @@ def _turning(m: Motion, rate: tuple[float, float, float], at: float, before: tup
 def filtered(
     filter: Filter, memory: Memory, odometry: Odometry, now: float, wanted: Command, *, floor: bool = True
 ) -> Filtered:
-    """The command that keeps all limits, as near to the wanted one as it goes.
+    """The command nearest to the wanted one that keeps all limits.
 
     Args:
         filter: the filter.
-        memory: after `watch`.
-        odometry: the newest.
+        memory: the memory after `watch`.
+        odometry: the newest odometry.
         now: s.
         wanted: thrust over mass and body rates, floats or (n,) each, within the vehicle's limits.
         floor: whether the lowest height of the fence counts.
@@ -276,7 +285,7 @@ def filtered(
 
 
 def _worst(xp: Any, rooms: tuple[Number, ...]) -> tuple[Number, Any]:
-    """The least room, and the index of its limit."""
+    """The smallest room, and the index of its limit."""
     if xp is SCALARS:
         least = min(rooms)
         return least, rooms.index(least)
@@ -285,7 +294,9 @@ def _worst(xp: Any, rooms: tuple[Number, ...]) -> tuple[Number, Any]:
 
 
 def _least(xp: Any, spare: Any, zero: Number) -> Number:
-    """The least share, of eighths, by which a command must be changed so that enough is left; 1 where none does."""
+    """The smallest share, in eighths, by which a command must be changed so that enough room is left. 1 if no smaller
+    share is enough.
+    """
     low, high = zero, zero + 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
@@ -299,7 +310,9 @@ def _between_two(a: Command, b: Command, share: Number) -> Command:
 
 
 def _between(sent: tuple[tuple[float, Command], ...], begin: float, end: float) -> list[tuple[Command, float]]:
-    """The commands that held from `begin` to `end`, s, and for how long; before the first one held the first."""
+    """The commands that held from `begin` to `end`, s, and for how long. Before the first command, the first one
+    counts.
+    """
     parts: list[tuple[Command, float]] = []
     for i, (at, c) in enumerate(sent):
         start = begin if i == 0 else max(at, begin)
@@ -311,13 +324,13 @@ def _between(sent: tuple[tuple[float, Command], ...], begin: float, end: float) 
 
 
 def _reach(m: Motion) -> float:
-    """Solids farther away than this matter to no manoeuvre, m."""
+    """Solids farther away than this do not matter for any manoeuvre, m."""
     speed = math.sqrt(m.vx**2 + m.vy**2 + m.vz**2)
     return 2.0 + speed + 0.2 * speed**2
 
 
 def _apart(rows: Any) -> tuple[Any, tuple[Number, ...]]:
-    """What computes, and the components: floats of an array (k,), arrays (n,) of one (n, k)."""
+    """The functions to compute with, and the components: floats for an array (k,), arrays (n,) for an array (n, k)."""
     if rows.ndim == 1:
         return SCALARS, tuple(rows.tolist())
     import numpy as np

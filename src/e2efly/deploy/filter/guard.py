@@ -1,4 +1,4 @@
-"""The filter as the bridge uses it: on commands and odometry as they are elsewhere in `deploy`."""
+"""The filter as the bridge uses it, with the command and odometry types of the rest of `deploy`."""
 
 import math
 from dataclasses import dataclass
@@ -16,34 +16,35 @@ class Change:
     """How the filter changed a command."""
 
     limit: str
-    """What would not have been kept: a name of `room.NAMES`, or of a solid."""
+    """The limit that would not have been kept: a name of `room.NAMES`, or of a solid."""
     room: float
-    """What the backup manoeuvre would have left to it after the wanted command, m; negative: beyond it."""
+    """The room to that limit that the backup manoeuvre would have left after the wanted command, m. Negative: beyond
+    it."""
     share: float
-    """How far towards the manoeuvre's command it was changed, 0 to 1."""
+    """How far it was changed towards the manoeuvre's command, 0 to 1."""
     wanted: Ctbr
-    """The command as it came."""
+    """The command as it came from the policy."""
 
 
 class FilterError(Exception):
-    """The filter has no command, for numbers that are not finite."""
+    """The filter has no command, because a number is not finite."""
 
 
 def keep(
     filter: Filter, memory: Memory, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool = True
 ) -> tuple[Ctbr, Change | None]:
-    """The command to send, which is the wanted one itself where that keeps all limits, and how it was changed.
+    """The command to send, and how it was changed. It is the wanted command itself if that keeps all limits.
 
     Args:
-        filter: for this vehicle and fence.
-        memory: after `watch`.
-        odometry: the newest.
+        filter: the filter for this vehicle and fence.
+        memory: the memory after `watch`.
+        odometry: the newest odometry.
         now: s.
-        wanted: of the policy.
+        wanted: the command of the policy.
         floor: whether the lowest height of the fence counts.
 
     Raises:
-        FilterError: where a number is not finite.
+        FilterError: if a number is not finite.
     """
     told = Command(*(float(x) for x in (wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z)))
     try:
@@ -59,7 +60,7 @@ def keep(
 
 
 def sent(memory: Memory, command: Ctbr | None, now: float) -> Memory:
-    """The memory after a command was sent; None: the throttle was closed."""
+    """The memory after a command was sent. None: the throttle was closed."""
     if command is None:
         return remember(memory, Command(0.0, 0.0, 0.0, 0.0), now)
     rate = command.rate
@@ -67,30 +68,32 @@ def sent(memory: Memory, command: Ctbr | None, now: float) -> Memory:
 
 
 class Keeper:
-    """The filter in flight: what it remembers, what it has changed, why it has failed."""
+    """The filter in flight: its memory, its last change, and why it has failed."""
 
     def __init__(self, filter: Filter) -> None:
         """Filter for a vehicle in a fence."""
         self.filter, self.memory = filter, Memory()
         self.change: Change | None = None
-        """How the newest command was changed; None: not at all."""
+        """How the newest command was changed. None: not at all."""
         self.problem: str | None = None
-        """Why it cannot filter: no policy flies until the vehicle stands; None: it can."""
+        """Why it cannot filter. No policy flies then until the vehicle is on the ground. None: it can."""
 
     def see(self, odometry: Odometry | None, now: float, *, flying: bool) -> None:
-        """Take in the newest odometry; `flying`: nothing but the air carries the vehicle."""
+        """Process the newest odometry. `flying`: only the air carries the vehicle."""
         self.change = None
         if odometry is not None:
             self.memory = watch(self.filter, self.memory, odometry, now, flying=flying)
 
     def feel(self, rate: np.ndarray, asked: float) -> None:
-        """Take in an answer of the flight controller's gyro, (3,) rad/s, that was asked for at `asked` s."""
+        """Process a reading of the flight controller's gyro, (3,) rad/s, that was requested at `asked` s."""
         x, y, z = rate.tolist()
         if all(map(math.isfinite, (x, y, z))):
             self.memory = feel(self.memory, (x, y, z), asked)
 
     def keep(self, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool) -> Ctbr | None:
-        """The command in place of a policy's, arguments as of the function `keep`; None, with `problem`: it failed."""
+        """The command in place of a policy's command, with the arguments of the function `keep`. None: it failed, and
+        `problem` says why.
+        """
         try:
             command, self.change = keep(self.filter, self.memory, odometry, now, wanted, floor=floor)
         except FilterError as error:
@@ -99,5 +102,5 @@ class Keeper:
         return command
 
     def sent(self, command: Ctbr | None, now: float) -> None:
-        """Remember what was sent; None: the throttle was closed."""
+        """Remember the command that was sent. None: the throttle was closed."""
         self.memory = sent(self.memory, command, now)

@@ -1,8 +1,8 @@
-"""What the filter keeps a vehicle away from: the fence's boxes, and the solids of its scene file, as convex bodies.
+"""The obstacles that the filter avoids: the fence's boxes, and the solids of its scene file, as convex bodies.
 
-A body is a box with a disc and a ball added to it (a Minkowski sum): a cylinder is a line with a disc, a capsule a line
-with a ball. So one formula tells the nearest point of each. The plane through that point, square to the direction to
-it, has all of the body behind it.
+A body is a box with a disc and a ball added to it (a Minkowski sum). A cylinder is a line with a disc, and a capsule is
+a line with a ball. One formula therefore gives the nearest point of each body. The whole body lies behind the plane
+through that point that is perpendicular to the direction to it.
 """
 
 import math
@@ -25,36 +25,36 @@ class Plane(NamedTuple):
     y: float
     z: float
     gap: float
-    """Distance to it, m; negative inside."""
+    """Distance to it, m. Negative inside the obstacle."""
     name: str
-    """Of the obstacle."""
+    """Name of the obstacle."""
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A convex body that stands."""
+    """A convex body that does not move."""
 
     name: str
-    """For people."""
+    """Name, for people."""
     centre: tuple[float, float, float]
-    """World, m."""
+    """Centre, world, m."""
     axes: tuple[float, ...]
     """Its x, y and z axes in the world, nine numbers."""
     half: tuple[float, float, float]
     """Half lengths of the box, m."""
     disc: float = 0.0
-    """Radius of the disc across z, m."""
+    """Radius of the disc perpendicular to z, m."""
     ball: float = 0.0
     """Radius of the ball, m."""
 
     @cached_property
     def reach(self) -> float:
-        """Radius of a ball about its centre that holds it, m."""
+        """Radius of a ball about its centre that contains it, m."""
         x, y, z = self.half
         return math.hypot(math.hypot(x, y) + self.disc, z) + self.ball
 
     def plane(self, x: float, y: float, z: float, within: float) -> Plane | None:
-        """The nearest side, seen from a place, world, m; None: it is farther away than so much, m."""
+        """The nearest side, seen from a position, world, m. None: it is farther away than `within`, m."""
         x, y, z = x - self.centre[0], y - self.centre[1], z - self.centre[2]
         if math.sqrt(x * x + y * y + z * z) > within + self.reach:
             return None
@@ -74,8 +74,8 @@ class Obstacle:
         return Plane(a * xx + b * yx + c * zx, a * xy + b * yy + c * zy, a * xz + b * yz + c * zz, gap, self.name)
 
     def _inside(self, u: float, v: float, w: float) -> tuple[float, tuple[float, float, float]]:
-        """How deep a place of its own frame is within box and disc, as a negative gap, and the way in from there: the
-        opposite of the shortest way out.
+        """How deep a position in the body's own frame is inside the box and disc, as a negative gap, and the direction
+        inwards from there: the opposite of the shortest way out.
         """
         (x, y, z), round_ = self.half, self.disc + self.ball
         sides = [(z + self.ball - abs(w), (0.0, 0.0, -math.copysign(1.0, w)))]
@@ -90,10 +90,11 @@ class Obstacle:
 
 
 def obstacles(fence: Fence) -> tuple[Obstacle, ...]:
-    """Those of a fence: its boxes, named `solid 1` and so on, and those of its scene file, `solids[0]` and so on.
+    """The obstacles of a fence: its boxes, named `solid 1` and so on, and the solids of its scene file, `solids[0]` and
+    so on.
 
     Raises:
-        ValueError: naming the file, the key, the value and what is accepted; for a solid that moves, too.
+        ValueError: naming the file, the key, the value and what is accepted. Also for a solid that moves.
     """
     upright = Quat(1.0, 0.0, 0.0, 0.0)
     found = [
@@ -111,10 +112,10 @@ def obstacles(fence: Fence) -> tuple[Obstacle, ...]:
 
 
 def _bodies(name: str, solid: Solid) -> Iterator[Obstacle]:
-    """A solid as convex bodies: of a gate its four bars, of a triangular pad the disc about it."""
+    """A solid as convex bodies. A gate gives its four bars. A triangular pad gives its circumscribed disc."""
     turn = Quat.of_euler(*solid.angles)
     centre, size = solid.centre.tolist(), solid.size.tolist()
-    if solid.path is not None:  # at rest, at the begin of its way
+    if solid.path is not None:  # at rest, at the beginning of its path
         centre = (solid.centre + solid.path.cosine).tolist()
     match solid.kind:
         case "box":
@@ -147,7 +148,7 @@ def _placed(
     name: str, centre: list[float], turn: Quat, half: list[float] | None = None, disc: float = 0.0, ball: float = 0.0,
     at: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Obstacle:  # fmt: skip
-    """A body whose middle is off the centre by `at`, m, of the turned frame."""
+    """A body whose middle is offset from the centre by `at`, m, in the turned frame."""
     axes = [turn.rotate(Vec3(*axis)) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
     middle, (a, b, c) = Vec3(*centre) + turn.rotate(Vec3(*at)), half or (0.0, 0.0, 0.0)
     numbers = tuple(float(n) for axis in axes for n in (axis.x, axis.y, axis.z))

@@ -1,4 +1,4 @@
-"""How much room the backup manoeuvre leaves: to the fence's walls, to solids, to the largest speed and tilt."""
+"""How much room the backup manoeuvre leaves to the fence's walls, to solids, and to the largest speed and tilt."""
 
 import math
 from dataclasses import dataclass
@@ -12,41 +12,42 @@ from e2efly.deploy.filter.way import Way, run_out, way
 from e2efly.deploy.settings import Fence
 
 SPEED_MARGIN, SPEED_S = 0.7, 0.25
-"""The largest speed is kept to with this margin, m/s; so much of it counts as a metre of room, s."""
+"""The margin with which the largest speed is kept, m/s, and the factor that converts a difference of speed to room,
+s."""
 TILT_M = 0.3
-"""A radian of tilt counts as so much room, m."""
+"""The room that corresponds to one radian of tilt, m."""
 FADES = 2.0
-"""At this speed against it, m/s, the air's push is not counted on at all."""
+"""At this speed against the air's push, m/s, the push is not counted at all."""
 RETREAT, BACK, BACK_UP = 2.0, 0.05, 0.35
-"""Speed back inside over the distance beyond the margin, 1/s; it comes to rest so far within, m, and over the floor:
-there the policy has room again, and may leave the wall."""
+"""Speed of the return divided by the distance beyond the margin, 1/s. The return ends this far inside, m, from the
+walls and over the floor. There the policy has room again, and may leave the wall."""
 WALLS = ("x low", "x high", "y low", "y high", "floor", "ceiling")
-"""Names of the limits, in the order of their rooms; those of solids follow."""
+"""Names of the limits, in the order of their rooms. The solids follow."""
 NAMES = (*WALLS, "speed", "tilt")
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Where the vehicle may be and how it may move. Lengths in m, the margins taken off."""
+    """Where the vehicle may be and how it may move. Lengths are in m, with the margins already subtracted."""
 
     low: tuple[float, float, float]
-    """World."""
+    """Lower corner, world."""
     high: tuple[float, float, float]
     speed: float
-    """m/s."""
+    """Largest speed, m/s."""
     tilt: float
-    """rad; infinite where no tilt is too much."""
+    """Largest tilt, rad. Infinite if every tilt is allowed."""
     solids: tuple[Obstacle, ...] = ()
-    """To keep out of."""
+    """The solids to avoid."""
     radius: float = 0.0
-    """What is kept between the centre of mass and a solid."""
+    """Distance to keep between the centre of mass and a solid."""
 
     @staticmethod
     def of(fence: Fence, radius: float, margin: float) -> "Limits":
-        """Of a fence, for a vehicle of this radius, m, that stays inside by a margin, m.
+        """The limits of a fence, for a vehicle with this radius, m, that stays inside by a margin, m.
 
         Raises:
-            ValueError: as `obstacles`.
+            ValueError: as for `obstacles`.
         """
         (a, b, c), (d, e, f) = fence.low, fence.high
         m = margin
@@ -57,7 +58,9 @@ class Limits:
 
 
 def near(limits: Limits, m: Motion, reach: float) -> tuple[Plane, ...]:
-    """The nearest sides of the solids within `reach` m, their gaps less what is kept. Of one vehicle alone."""
+    """The nearest sides of the solids within `reach` m. The distance to keep is subtracted from their gaps. Only for a
+    single vehicle.
+    """
     found = (solid.plane(m.px, m.py, m.pz, reach + limits.radius) for solid in limits.solids)
     return tuple(plane._replace(gap=plane.gap - limits.radius) for plane in found if plane is not None)
 
@@ -72,17 +75,18 @@ def rooms(
     floor: bool = True,
     at: Motion | None = None,
 ) -> tuple[Number, ...]:
-    """What the manoeuvre from a state leaves to each limit of `NAMES`, then to each solid; m, negative beyond it.
+    """The room that the manoeuvre from a state leaves to each limit of `NAMES`, then to each solid. In m, negative
+    beyond the limit.
 
     Args:
-        xp: computes.
+        xp: the functions to compute with.
         b: the vehicle's manoeuvre.
-        limits: to keep.
+        limits: the limits to keep.
         m: the state.
         air: what the forecast does not explain.
-        solids: as `near` tells.
+        solids: the nearby sides, from `near`.
         floor: whether the lowest height counts.
-        at: the state for which `near` was asked.
+        at: the state for which `near` was called.
     """
     air = against(xp, m, air)
     k = brake(xp, b, m, air, gains=WAY_GAINS)
@@ -114,7 +118,9 @@ def rooms(
 
 
 def against(xp: Any, m: Motion, air: Residual) -> Residual:
-    """The part of the air's push that is counted on while braking: what brakes by itself may end with the speed."""
+    """The part of the air's push that is counted while braking. A push that helps the braking may end as the speed
+    falls, so it is not counted.
+    """
     x, y, z = (
         push * clip(xp, 1.0 + speed * push / (FADES * (abs(push) + 1e-9)), 0.0, 1.0)
         for push, speed in zip(air[:3], (m.vx, m.vy, m.vz), strict=True)
@@ -123,7 +129,7 @@ def against(xp: Any, m: Motion, air: Residual) -> Residual:
 
 
 def retreat(xp: Any, limits: Limits, m: Motion, floor: bool = True) -> tuple[Number, ...]:
-    """The velocity back inside, world, m/s: in proportion to how far a state is beyond the margins, or near them."""
+    """The velocity back inside, world, m/s, in proportion to how far a state is beyond the margins or close to them."""
     (x0, y0, z0), (x1, y1, z1) = limits.low, limits.high
     z0 = z0 if floor else -math.inf
     return tuple(
@@ -133,7 +139,7 @@ def retreat(xp: Any, limits: Limits, m: Motion, floor: bool = True) -> tuple[Num
 
 
 def _ends(xp: Any, places: tuple[Number, ...], tail: Number) -> tuple[Number, Number]:
-    """The smallest and the largest coordinate on the way."""
+    """The smallest and the largest coordinate on the path."""
     low = high = places[0]
     for place in places[1:]:
         low, high = xp.minimum(low, place), xp.maximum(high, place)
@@ -142,7 +148,7 @@ def _ends(xp: Any, places: tuple[Number, ...], tail: Number) -> tuple[Number, Nu
 
 
 def _towards(xp: Any, w: Way, at: Motion, normal: tuple[float, ...], tail: tuple[Number, ...]) -> Number:
-    """How far the way goes in a direction."""
+    """How far the path goes in a direction."""
     nx, ny, nz = normal
     most = 0.0
     for x, y, z in zip(w.px, w.py, w.pz, strict=True):
@@ -152,7 +158,9 @@ def _towards(xp: Any, w: Way, at: Motion, normal: tuple[float, ...], tail: tuple
 
 
 def _tilt_room(xp: Any, limits: Limits, k: Brake) -> Number:
-    """The thrust turns from c to t on a great circle: between two directions within a cone it stays within it."""
+    """The room to the largest tilt. The thrust turns from c to t on a great circle. Between two directions within a
+    cone, it stays within the cone.
+    """
     if limits.tilt == math.inf:
         return 0.0 * k.cz + 1e3
     tilt = xp.arctan2(xp.sqrt(k.cx * k.cx + k.cy * k.cy), k.cz)

@@ -1,36 +1,36 @@
-"""The turn of the backup manoeuvre in steps, with what the vehicle's lags make of each."""
+"""The turn of the backup manoeuvre in steps, with the effect of the vehicle's lags on each step."""
 
 from typing import NamedTuple
 
 from e2efly.deploy.filter.body import Response, lag, turning
 
 STEPS = (0.02, 0.03, 0.04, 0.05, 0.07, 0.09, 0.1)
-"""Steps of the turn, s: it is quickest at its begin."""
+"""Steps of the turn, s. They are shorter at the beginning, where the turn is fastest."""
 SEEN = (1, 3, 4, 5, 6)
-"""After these of them the position is compared with the limits."""
+"""Indices of the steps after which the position is compared with the limits."""
 TURN = sum(STEPS)
-"""Length of the turn, s."""
+"""Duration of the turn, s."""
 
 
 class Step(NamedTuple):
-    """A step of the turn: its length and what the lags make of it."""
+    """A step of the turn: its length and the effect of the lags on it."""
 
     h: float
-    """s."""
+    """Length, s."""
     end: float
-    """Since the begin of the turn, s."""
+    """Time at its end since the beginning of the turn, s."""
     loop: tuple[float, float, float, float]
-    """Of the rate loop: `turning`."""
+    """Step of the rate loop: `turning`."""
     kept: float
-    """Of the error of the rotors' speed, after the step, ..."""
+    """The share of the error of the rotors' speed that remains after the step, ..."""
     mean: float
-    """... on average ..."""
+    """... its mean over the step ..."""
     square: float
-    """... and of its square, on average."""
+    """... and the mean of its square."""
     free: float
-    """In its middle, the share of the turn that goes on by itself which is still to come."""
+    """The share of the free rotation that is still to come in the middle of the step."""
     seen: bool
-    """Whether the position after it is compared with the limits."""
+    """Whether the position after the step is compared with the limits."""
 
 
 def steps_of(r: Response) -> tuple[Step, ...]:
@@ -39,7 +39,7 @@ def steps_of(r: Response) -> tuple[Step, ...]:
     for i, h in enumerate(STEPS):
         a, _, c, _ = turning(gain, r.motor_time, at + h / 2)
         at += h
-        free = min(max(a + r.motor_time * c, 0.0), 1.0)  # of a rate of one, with rotors at rest
+        free = min(max(a + r.motor_time * c, 0.0), 1.0)  # for a rate of 1, with the rotors at rest
         steps.append(
             Step(
                 h,

@@ -1,8 +1,9 @@
-"""Where the backup manoeuvre leads.
+"""The path of the backup manoeuvre.
 
-Its way is found in the plane in which the thrust turns: there the rate loop, the mixer and the rotors' lag make one
-angle and one thrust over time, both with the vehicle's own numbers. What the thrust does to the velocity follows by
-adding up. After `turn.TURN` s the thrust points where it brakes, and the rest of the way is in closed form.
+The path is computed in the plane in which the thrust turns. There, the rate loop, the mixer and the rotors' lag give
+one angle and one thrust over time, both with the vehicle's own numbers. The effect of the thrust on the velocity
+follows by summation. After `turn.TURN` s the thrust points in the braking direction, and the rest of the path is in
+closed form.
 """
 
 import math
@@ -25,31 +26,31 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 
 class Way(NamedTuple):
-    """Where the manoeuvre leads."""
+    """The path of the manoeuvre."""
 
     px: tuple[Number, ...]
     """Positions during the turn, at the moments of `SEEN`, world, m."""
     py: tuple[Number, ...]
     pz: tuple[Number, ...]
     lz: tuple[Number, ...]
-    """Heights, m, if the battery goes flat now ..."""
+    """Heights, m, if the battery becomes flat now ..."""
     wz: Number
-    """... and the speed of falling after the turn, m/s, at most 0."""
+    """... and the vertical velocity after the turn, m/s, at most 0: the speed of falling."""
     speed2: Number
-    """Square of the largest speed on the way, (m/s)^2."""
+    """Square of the largest speed on the path, (m/s)^2."""
     vx: Number
-    """Velocity after the turn, m/s; zero where braking would have turned it round."""
+    """Velocity after the turn, m/s. Zero in an axis where braking would have reversed it."""
     vy: Number
     vz: Number
 
 
 def way(xp: Any, b: Backup, m: Motion, k: Brake, air: Residual) -> Way:
-    """Where the manoeuvre leads from a state.
+    """The path of the manoeuvre from a state.
 
     The manoeuvre turns in the plane of c and t of `Brake`, about an axis u. There the angle to t obeys the rate loop,
-    from the rate about u that there is; d(angle) is the direction. What turns across that plane comes to rest by
-    itself: of the distance `off` of the thrust from the plane, a share e is still left. So the thrust points along
-    d(angle) + e * off, with d(angle) = sin(angle) / sin(whole) c + sin(whole - angle) / sin(whole) t.
+    starting from the present rate about u; d(angle) is the direction. Rotation across that plane comes to rest by
+    itself. Of the distance `off` of the thrust from the plane, a share e still remains. The thrust therefore points
+    along d(angle) + e * off, with d(angle) = sin(angle) / sin(whole) c + sin(whole - angle) / sin(whole) t.
     """
     low, high = b.response.thrust
     gain, motor_time, top, most = min(b.response.gain[:2]), b.response.motor_time, b.rate, k.thrust / k.share
@@ -112,13 +113,17 @@ def way(xp: Any, b: Backup, m: Motion, k: Brake, air: Residual) -> Way:
 
 
 def stopping(b: Backup, speed: float) -> float:
-    """Distance in which level flight at a speed, m/s, comes to rest by the manoeuvre, from its first command on, m."""
+    """The distance in which level flight at a speed, m/s, comes to rest with the manoeuvre, from its first command on,
+    m.
+    """
     m = Motion(0.0, 0.0, 0.0, speed, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
     w = way(SCALARS, b, m, brake(SCALARS, b, m, NOTHING, gains=WAY_GAINS), NOTHING)
     return max(*w.px, w.px[-1] + run_out(SCALARS, w.vx, b.braking[0]))
 
 
 def run_out(xp: Any, speed: Number, braking: Number) -> Number:
-    """The distance in which a speed, m/s, comes to rest: braked by so much, m/s^2, then with `REST_S`, m."""
+    """The distance in which a speed, m/s, comes to rest, m: first with the deceleration `braking`, m/s^2, then with the
+    time constant `REST_S`.
+    """
     slow = braking * REST_S
     return xp.where(speed < slow, speed * REST_S, 0.5 * speed * speed / braking + 0.5 * slow * REST_S)

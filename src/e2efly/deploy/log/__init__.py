@@ -1,1 +1,1 @@
-"""What is kept of a flight, and how it is read again."""
+"""The records of a flight, and how they are read again."""

@@ -1,6 +1,6 @@
 """Flight logs as bags of ROS 1 and ROS 2, written without ROS by the package `rosbags`.
 
-What the messages are, and their frames, is in `process/ros_topics.py`.
+The messages and their frames are described in `process/ros_topics.py`.
 """
 
 from collections.abc import Iterator
@@ -17,17 +17,17 @@ def export_bag(log: FlightLog, path: str | Path, version: int) -> dict[str, int]
     """Write a flight log as a bag.
 
     Args:
-        log: what `read_log` gave.
+        log: a log from `read_log`.
         path: a new file ending in `.bag` (version 1), or a new folder (version 2: sqlite3 storage).
-        version: 1 or 2, of ROS.
+        version: the version of ROS, 1 or 2.
 
     Returns:
-        Messages written, by topic.
+        Number of messages written, by topic.
 
     Raises:
-        ValueError: for another version, a path that exists, an ending that the version does not have, a log without any
-            of the channels that a bag has or with a message that is not of its schema, or where the package `rosbags`
-            is not there.
+        ValueError: for another version, a path that exists, or an ending that does not fit the version. Also for a log
+            that has none of the channels of a bag or has a message that does not follow its schema, and if the package
+            `rosbags` is missing.
     """
     if version not in (1, 2):
         raise ValueError(f"bag: version is {version!r}; accepted: 1 (ROS 1) or 2 (ROS 2)")

@@ -1,8 +1,9 @@
-"""Betaflight's blackbox logs: read, and put on the clock of a flight log.
+"""Betaflight's blackbox logs: reading, and alignment with the clock of a flight log.
 
-Decoded by the package `betaflight-chirp-core`. What the firmware logs (4.6, found by feeding it known body rates):
-gyro and setpoint in deg/s (tenths with `blackbox_high_resolution`), with the signs of FLU: roll to the right, nose down
-and yaw to the left positive; motors in the range of the header `motorOutput`; time in us since the controller started.
+They are decoded by the package `betaflight-chirp-core`. The firmware (4.6; found by feeding it known body rates) logs
+gyro and setpoint in deg/s (in tenths with `blackbox_high_resolution`), with the signs of FLU: roll to the right, nose
+down and yaw to the left are positive. Motors are in the range of the header `motorOutput`. Time is in us since the
+controller started.
 """
 
 import math
@@ -15,10 +16,10 @@ import numpy as np
 WINDOW = 1.0
 """Length of the pieces that are aligned, s."""
 AGREEMENT = 0.8
-"""Correlation of the gyros in a piece that counts as the same motion."""
-_RATE = 200.0  # Hz: grid on which shifts are tried; parabolas refine them
-_SEEDS = 8  # windows that are looked for in the whole flight
-_REACH = (0.1, 1.0)  # s: change of the shift from one piece to the next; the wider where the narrower finds nothing
+"""Correlation of the gyros in a piece above which they count as the same motion."""
+_RATE = 200.0  # Hz: grid of the tried shifts; parabolas refine them
+_SEEDS = 8  # windows that are searched for in the whole flight
+_REACH = (0.1, 1.0)  # s: change of the shift between pieces; the second if the first finds nothing
 _AXES = range(3)
 
 
@@ -31,42 +32,43 @@ class Blackbox:
     gyro: np.ndarray
     """(n, 3) filtered body rate, FLU, rad/s."""
     setpoint: np.ndarray
-    """(n, 3) body rate asked of the rate loop, FLU, rad/s; NaN where it was not logged."""
+    """(n, 3) body rate setpoint of the rate loop, FLU, rad/s. NaN if it was not logged."""
     motor: np.ndarray
-    """(n, 4) motor outputs over idle, 0 to 1, in Betaflight's order; NaN where they were not logged."""
+    """(n, 4) motor outputs above idle, 0 to 1, in Betaflight's order. NaN if they were not logged."""
     firmware: str
-    """What the header says of the firmware."""
+    """The firmware, from the header."""
     session: int
-    """Which session of the file, from 1."""
+    """Number of the session in the file, from 1."""
     reach: tuple[float, float] = (0.0, 1.0)
-    """What the ESCs are told where `motor` is 0 and 1: 0 is 1000 us or DShot's 48, 1 is 2000 us or DShot's 2047."""
+    """The ESC commands at which `motor` is 0 and 1. Here 0 is 1000 us or DShot's 48, and 1 is 2000 us or DShot's
+    2047."""
 
     @property
     def output(self) -> np.ndarray:
-        """(n, 4) what the ESCs are told, 0 to 1, as MSP tells it, too."""
+        """(n, 4) ESC commands, 0 to 1, in the scale that MSP also uses."""
         idle, full = self.reach
         return idle + (full - idle) * self.motor
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """How a blackbox log lies over a flight log."""
+    """How a blackbox log is aligned with a flight log."""
 
     time: np.ndarray
-    """(n,) s of the flight log at each of the blackbox's frames."""
+    """(n,) time in the flight log of each frame of the blackbox, s."""
     correlation: float
-    """Of the two gyros where they overlap, -1 to 1."""
+    """Correlation of the two gyros where they overlap, -1 to 1."""
     overlap: float
     """Length of the overlap, s."""
     drift: float
-    """How much faster the blackbox's clock runs over the overlap, as a ratio less 1."""
+    """How much faster the blackbox's clock runs over the overlap, as a ratio minus 1."""
 
 
 def read_blackbox(path: str | Path) -> list[Blackbox]:
     """All sessions of a blackbox log that have frames.
 
     Raises:
-        ValueError: where there is no such file, no session with gyro data in it, or no decoder.
+        ValueError: if there is no such file, no session with gyro data in it, or no decoder.
     """
     path = Path(path)
     if not path.is_file():
@@ -84,7 +86,7 @@ def read_blackbox(path: str | Path) -> list[Blackbox]:
             parser.parse_header()
             parser.parse_data()
             sessions.append(_session(parser, number))
-        except Exception as error:  # of a decoder that trusts what it reads: one bad session leaves the others
+        except Exception as error:  # the decoder trusts its input: one bad session must not affect the others
             reasons.append(f"session {number}: {type(error).__name__}: {error}")
     if not sessions:
         why = "; ".join(reasons) or "no session in it"
@@ -123,18 +125,19 @@ def _session(parser: Any, number: int) -> Blackbox:
 
 
 def align(time: np.ndarray, gyro: np.ndarray, blackbox: Blackbox) -> Alignment:
-    """Put a blackbox log on a flight log's clock by what both gyros saw.
+    """Align a blackbox log with a flight log's clock by the measurements of both gyros.
 
-    The liveliest windows are looked for in the whole flight; from the one found best, neighbours are followed outwards
-    with small shifts only, so that clocks may run at different and changing rates (SITL's does, by some percent).
+    The windows with the most motion are searched for in the whole flight. From the best match, the neighbouring windows
+    are followed outwards with small shifts only. The clocks may therefore run at different and changing rates. SITL's
+    clock does, by some percent.
 
     Args:
-        time: (n,) s, rising, of the flight log.
-        gyro: (n, 3) rad/s, of the flight log.
+        time: (n,) s, increasing, from the flight log.
+        gyro: (n, 3) rad/s, from the flight log.
         blackbox: the session.
 
     Raises:
-        ValueError: where either has less than `WINDOW` of gyro, or they agree nowhere.
+        ValueError: if either has less than `WINDOW` of gyro data, or if they agree nowhere.
     """
     good = np.isfinite(gyro).all(axis=1)
     time, gyro = time[good], gyro[good]
@@ -179,7 +182,9 @@ def _alignment(time: np.ndarray, gyro: np.ndarray, blackbox: Blackbox, moved: np
 
 
 def _best(flight: np.ndarray, window: np.ndarray, low: int, high: int) -> tuple[float, float]:
-    """Where in `flight`, from sample `low` to `high`, a window agrees best, in parts of a sample; the correlation."""
+    """The position in `flight`, from sample `low` to `high`, where a window agrees best, in fractions of a sample, and
+    the correlation.
+    """
     low, high = max(low, 0), min(high, len(flight) - len(window))
     if high < low:
         return 0.0, -1.0
@@ -200,7 +205,7 @@ def _resampled(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def vertex(y: np.ndarray, i: int) -> float:
-    """Offset of the vertex of the parabola through three samples from the middle one, in samples."""
+    """Offset of the vertex of the parabola through three samples from the middle sample, in samples."""
     if not 0 < i < len(y) - 1:
         return 0.0
     left, middle, right = y[i - 1 : i + 2]

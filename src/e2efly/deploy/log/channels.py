@@ -1,4 +1,5 @@
-"""What a flight log holds: its channels, their fields, units and frames. Schemas, reader and documentation follow it.
+"""What a flight log contains: its channels, their fields, units and frames. Schemas, reader and documentation follow
+from it.
 
 SI units, world ENU, body FLU, quaternions wxyz body to world. A field that is not known at the moment is null.
 """
@@ -27,9 +28,9 @@ class LogField:
     kind: Kind
     """A number, numbers, a flag, a text or texts."""
     unit: str
-    """Unit, `1` for a ratio; empty for what is no quantity."""
+    """Unit, `1` for a ratio. Empty if it is not a quantity."""
     description: str
-    """What it is, and its frame where it has one."""
+    """What it is, and its frame if it has one."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Channel:
     name: str
     """Its topic."""
     description: str
-    """When it is recorded and of what."""
+    """When it is recorded, and what it contains."""
     fields: tuple[LogField, ...]
     """Its fields."""
 

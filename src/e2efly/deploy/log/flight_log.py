@@ -1,4 +1,4 @@
-"""Read flight logs, finished or cut off by a crash, a power loss or a full disk."""
+"""Reads flight logs, complete or cut off by a crash, a power loss or a full disk."""
 
 import json
 import struct
@@ -15,33 +15,33 @@ from e2efly.deploy.log.mcap_file import PROFILE
 
 @dataclass(frozen=True)
 class Series:
-    """The messages of one channel, in the order of their times."""
+    """The messages of one channel, in time order."""
 
     channel: str
-    """Its name."""
+    """Name of the channel."""
     stamp: np.ndarray
-    """(n,) int64, ns since 1970 by the wall clock at the start and the monotonic clock since."""
+    """(n,) int64, ns since 1970: the wall clock at the start plus the monotonic time since then."""
     time: np.ndarray
     """(n,) s since the first message of the log."""
     values: tuple[dict[str, Any], ...]
     """The n messages as they were recorded."""
 
     def __len__(self) -> int:
-        """How many messages there are."""
+        """Number of messages."""
         return len(self.time)
 
     def numbers(self, field: str, size: int | None = None) -> np.ndarray:
-        """A field as float64, NaN where it is null, missing or of another length.
+        """A field as float64. NaN where it is null, missing or of another length.
 
         Args:
             field: a field of numbers or flags.
-            size: entries of a message; None: one number, no list.
+            size: number of entries in a message. None: a single number, not a list.
 
         Returns:
             Shape (n,) or (n, size).
 
         Raises:
-            ValueError: naming channel and field where a message has no numbers there.
+            ValueError: naming the channel and the field, if a message has no numbers there.
         """
         out = np.full((len(self),) if size is None else (len(self), size), np.nan)
         for i, message in enumerate(self.values):
@@ -56,11 +56,11 @@ class Series:
         return out
 
     def width(self, field: str) -> int:
-        """Entries of the longest list in a field; 0 where there is none."""
+        """Number of entries in the longest list of a field. 0 if there is no list."""
         return max((len(v) for m in self.values if isinstance(v := m.get(field), list)), default=0)
 
     def texts(self, field: str) -> list[str]:
-        """A field as texts, empty where there is none."""
+        """A field as texts. Empty where the field is missing."""
         return ["" if m.get(field) is None else str(m[field]) for m in self.values]
 
 
@@ -73,12 +73,12 @@ class FlightLog:
     series: dict[str, Series]
     """The channels that have messages, by name."""
     meta: dict[str, str]
-    """What flew: the fields of the channel `meta`, later ones over earlier ones."""
+    """What flew: the fields of the channel `meta`. Later fields replace earlier ones."""
     cut_off: str
-    """Why the file ends early; empty where it was closed properly."""
+    """Why the file ends early. Empty if it was closed properly."""
 
     def __getitem__(self, channel: str) -> Series:
-        """The messages of a channel, none where nothing was recorded.
+        """The messages of a channel. Empty if nothing was recorded.
 
         Raises:
             KeyError: for a channel that flight logs do not have.
@@ -90,20 +90,20 @@ class FlightLog:
 
     @property
     def start(self) -> int:
-        """Stamp of the first message, ns; 0 without any."""
+        """Stamp of the first message, ns. 0 if there is none."""
         return min((int(s.stamp[0]) for s in self.series.values()), default=0)
 
     @property
     def duration(self) -> float:
-        """From the first to the last message, s."""
+        """Time from the first to the last message, s."""
         return max((float(s.time[-1]) for s in self.series.values()), default=0.0)
 
 
 def read_log(path: str | Path) -> FlightLog:
-    """Read all that is whole in a flight log.
+    """Read everything that is intact in a flight log.
 
     Raises:
-        ValueError: where there is no such file, or it is no flight log at all; where a message is not JSON.
+        ValueError: if there is no such file, if it is not a flight log, or if a message is not JSON.
     """
     path = Path(path)
     if not path.is_file():
@@ -132,13 +132,13 @@ def _series(channel: str, messages: list[tuple[int, int, dict[str, Any]]], start
 
 
 class _End:
-    """Why reading ended early; empty at the proper end."""
+    """Why reading ended early. Empty at the proper end."""
 
     reason = ""
 
 
 def _messages(path: Path, end: _End) -> Iterator[tuple[str, int, int, bytes]]:
-    """Channel, stamp, number and data of every message up to the end of the file or of what is whole in it."""
+    """Channel, stamp, number and data of every message, up to the end of the file or of its intact part."""
     from mcap.exceptions import EndOfFile, McapError
     from mcap.records import Channel, Chunk, Footer, Header, Message
     from mcap.stream_reader import StreamReader, breakup_chunk
@@ -165,7 +165,7 @@ def _messages(path: Path, end: _End) -> Iterator[tuple[str, int, int, bytes]]:
             end.reason = "the end of the file is missing: it was not closed"
         except (McapError, struct.error, ValueError, EOFError, MemoryError, KeyError, RuntimeError, OverflowError) as e:
             end.reason = f"the file breaks off ({type(e).__name__}{f': {e}' if str(e) else ''})"
-        except Exception as error:  # of the decompressor, whose errors have no common class
+        except Exception as error:  # from the decompressor, whose errors have no common class
             if type(error).__module__.partition(".")[0] not in ("zstandard", "lz4"):
                 raise
             end.reason = f"the file is damaged from here on ({error})"

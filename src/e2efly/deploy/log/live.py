@@ -1,6 +1,6 @@
-"""A flight, live: its records to Foxglove, ROS 1, ROS 2, an MCAP file or a bag, each by a process of its own.
+"""A live flight: its records to Foxglove, ROS 1, ROS 2, an MCAP file or a bag, each through its own process.
 
-The control loop puts a record into a socket that keeps a megabyte and is never waited for. What a process, its
+The control loop puts a record into a socket that buffers a megabyte, and never waits for it. What a process, its
 subscribers or its disk do not take in time is dropped and counted.
 """
 
@@ -27,11 +27,11 @@ from e2efly.deploy.sight.watch import Seen
 FORMS = "foxglove[:[HOST:]PORT], ros1[:/PREFIX], ros2[:/PREFIX], mcap:FILE.mcap, bag:FILE.bag"
 """How outlets are written."""
 PORT = 8765
-"""Of Foxglove."""
+"""Port of Foxglove."""
 PREFIX = "/e2efly"
-"""Of topics."""
+"""Prefix of topics."""
 THIS_PYTHON = "E2EFLY_LIVE_PYTHON"
-"""Environment variable that names an interpreter for all but ROS."""
+"""Environment variable that names an interpreter for all kinds except ROS."""
 ADVICE = {
     "foxglove": "pip install 'e2efly[live]'",
     "ros1": "install rospy (Debian: apt-get install python3-rospy python3-nav-msgs python3-geometry-msgs "
@@ -40,24 +40,24 @@ ADVICE = {
     "mcap": "pip install 'e2efly[ros]'",
     "bag": "pip install 'e2efly[ros]'",
 }
-"""What to do where one does not open."""
+"""What to do if a kind does not open."""
 _FORMS = {"depth": "32FC1", "range": "32FC1", "mask": "mono8", "rgb": "rgb8", "normal": "rgb8"}
 
 
 @dataclass(frozen=True)
 class Target:
-    """Where a flight is published."""
+    """A destination for a flight's records."""
 
     text: str
-    """As it was written."""
+    """The text as it was written."""
     kind: str
     """A key of `ADVICE`."""
     settings: dict[str, Any]
-    """What the kind needs to know."""
+    """What this kind needs to know."""
 
 
 def targets_of(texts: Sequence[str]) -> tuple[Target, ...]:
-    """Read what `--live` says; nothing is opened.
+    """Parse the texts of `--live`. Nothing is opened.
 
     Raises:
         ValueError: naming the text and what is accepted.
@@ -94,7 +94,7 @@ def _target(text: str) -> Target:
 
 
 class Live:
-    """A `Log` that several processes publish. No method but the first waits for them, and none raises."""
+    """A `Log` that several processes publish. Only the first method waits for them or raises."""
 
     def __init__(
         self, targets: Sequence[Target], images: Sequence[Image] = (), say: Callable[[str], None] = lambda line: None
@@ -103,8 +103,8 @@ class Live:
 
         Args:
             targets: where to publish.
-            images: what the policy sees.
-            say: is told, once, of a process that ends in flight; it must not block.
+            images: the images that the policy sees.
+            say: called once for each process that ends in flight. It must not block.
 
         Raises:
             ValueError: naming the target that does not open, why, and what to do.
@@ -116,7 +116,7 @@ class Live:
         self._images = opened = tuple(_Shown.of(image, i) for i, image in enumerate(images))
         shared = {shown.image.name: shown.layout() for shown in self._images}
         schemas = {name: json_schema(channel) for name, channel in CHANNELS.items()}
-        wall = time.time_ns() - round(time.monotonic() * 1e9)  # from here on a clock that is set disorders nothing
+        wall = time.time_ns() - round(time.monotonic() * 1e9)  # setting the wall clock later does not matter
         try:
             for target in targets:
                 config = {"kind": target.kind, "wall": wall, "images": shared, **target.settings}
@@ -128,21 +128,21 @@ class Live:
             self.close()
             raise
         finally:
-            for shown in opened:  # the processes have it open: it goes with them, however that ends
+            for shown in opened:  # the processes have it open: it disappears when they end, in whatever way
                 shown.memory.path.unlink(missing_ok=True)
 
     def record(self, channel: str, time: float, values: dict[str, Any]) -> None:
-        """Hand a record to every process, or drop it where there is no room."""
+        """Hand a record to every process. A process without room does not get it."""
         try:
             data = encode([channel, time, values])
-        except Exception:  # the flight's own log tells what was wrong with it
+        except Exception:  # the flight's own log reports what was wrong with it
             return
         for outlet in self.outlets:
             if outlet.send(data):
                 self.say(f"live {outlet.name}: {outlet.ended}; the flight goes on without it")
 
     def show(self, cameras: Sequence[Seen]) -> None:
-        """Publish what the policy sees, where it is new; call it once the sticks are sent."""
+        """Publish the images that the policy sees, if they are new. Call it after the sticks are sent."""
         for shown, seen in zip(self._images, cameras, strict=False):
             if seen.frame is not None and seen.frame.time != shown.last:
                 shown.last = seen.frame.time
@@ -151,7 +151,7 @@ class Live:
 
     @property
     def problems(self) -> list[str]:
-        """What went wrong so far, for people."""
+        """The problems so far, for people."""
         return [f"{outlet.name}: {problem}" for outlet in self.outlets for problem in outlet.problems]
 
     def describe(self) -> list[str]:
@@ -159,7 +159,7 @@ class Live:
         return [f"{outlet.name}: {outlet.detail}" for outlet in self.outlets]
 
     def close(self) -> None:
-        """Let the processes publish what waits, and end; a few seconds at most. May be called twice."""
+        """Let the processes publish what is waiting, and end. This takes a few seconds at most. May be called twice."""
         for outlet in self.outlets:
             outlet.close()
         for shown in self._images:
@@ -169,7 +169,7 @@ class Live:
 
 @dataclass
 class _Shown:
-    """An image of the policy on its way out."""
+    """An image of the policy that is published."""
 
     image: Image
     memory: SharedImages
@@ -181,7 +181,7 @@ class _Shown:
         return _Shown(image, SharedImages(f"live_{os.getpid()}_{number}", image.shape, dtype))
 
     def layout(self) -> dict[str, Any]:
-        """What a process needs to know to read and to tell it."""
+        """What a process needs to know to read and publish it."""
         layout = self.memory.layout
         step = layout.width * layout.channels * (4 if _FORMS[self.image.sees] == "32FC1" else 1)
         return {
@@ -194,17 +194,17 @@ class _Shown:
 
 
 def optical(pitch: float) -> list[float]:
-    """The optical frame of a camera (x right, y down, z ahead) in the body's, wxyz.
+    """The optical frame of a camera (x right, y down, z ahead) in the body frame, wxyz.
 
     Args:
-        pitch: of the camera, downwards from straight ahead, rad.
+        pitch: pitch of the camera, downwards from straight ahead, rad.
     """
     down = Quat(math.cos(pitch / 2), 0.0, math.sin(pitch / 2), 0.0)
     return [float(part) for part in down.compose(Quat(0.5, -0.5, 0.5, -0.5)).stack()]
 
 
 def _drawn(image: Image, values: np.ndarray) -> np.ndarray:
-    """What the policy sees as ROS and Foxglove show it: metres; 0 to 255 for 0 to 1, and for -1 to 1 of normals."""
+    """An image as ROS and Foxglove show it: in metres, or 0 to 255 for 0 to 1, and also for -1 to 1 of normals."""
     if _FORMS[image.sees] == "32FC1":
         return np.asarray(values, np.float32)
     low, high = image.limits

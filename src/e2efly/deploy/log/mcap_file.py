@@ -1,4 +1,4 @@
-"""An MCAP file that grows by whole blocks, and that can give some up to say at its end what is missing."""
+"""An MCAP file that grows by whole blocks. It can give up some blocks to say at its end what is missing."""
 
 import json
 import os
@@ -13,30 +13,30 @@ from e2efly.storage import finite
 
 PROFILE = "e2efly"
 """Profile in the header of the file."""
-_BLOCKS_KEPT = 64  # so many of the last blocks of the file may give way to the word of what is missing
+_BLOCKS_KEPT = 64  # so many of the last blocks may be replaced by the event that says what is missing
 
 
 class McapFile:
-    """An MCAP file that grows by whole chunks only. Raises `OSError` where the disk does not take one."""
+    """An MCAP file that grows by whole chunks only. Raises `OSError` if the disk does not take a chunk."""
 
     def __init__(self, file: int) -> None:
         self._file, self._size, self._block = file, 0, _Block()
         self.pending: list[float] = []
-        """When the messages were that are in no block of the file yet, s."""
+        """Times of the messages that are not yet in any block of the file, s."""
         self._blocks: deque[tuple[int, list[float]]] = deque(maxlen=_BLOCKS_KEPT)
-        """Where the last blocks of the file begin, and when their messages were."""
+        """Where the last blocks of the file begin, and the times of their messages."""
         self._room = 0
-        """Bytes of the blocks that were given up, which the file still has on the disk."""
+        """Bytes of the blocks that were given up. The file still has this space on the disk."""
         self._writer = mcap_writer()(self._block, chunk_size=1 << 30)
         self._channels: dict[str, int] = {}
         self._writer.start(profile=PROFILE, library="e2efly")
         self._commit()
 
     def add(self, channel: str, when: int, number: int, values: Mapping[str, Any]) -> None:
-        """Take a message in, to be written with the next block; `when` is its log time, ns.
+        """Take a message, to be written with the next block. `when` is its log time, ns.
 
         Raises:
-            ValueError: when it cannot be written.
+            ValueError: if it cannot be written.
         """
         data = encode(values)
         if not 0 <= when < 1 << 63:
@@ -48,34 +48,35 @@ class McapFile:
             self._writer.add_metadata("meta", {_text(key): _text(value) for key, value in values.items()})
 
     def flush(self) -> None:
-        """Write what waits as one block."""
+        """Write the waiting messages as one block."""
         self._writer.flush()
         self._commit()
 
     def finish(self) -> None:
-        """Write what waits, the index and the end of the file."""
+        """Write the waiting messages, the index and the end of the file."""
         self._writer.finish()
         self._commit()
 
     def end_with(self, when: int, number: int, event: Mapping[str, Any]) -> bool:
-        """Write one last event, over what was given up of the file; False where there is no room for it yet.
+        """Write one last event over the part of the file that was given up. False if there is not enough room for it
+        yet.
 
         Raises:
-            OSError: when there is no block left to give up.
+            OSError: if there is no block left to give up.
         """
         block = _Block()
         writer = mcap_writer()(block, chunk_size=1 << 30)
         writer.start(profile=PROFILE, library="e2efly")
         writer.flush()
-        block.take()  # the file begins with it already
-        known = dict.fromkeys((*self._channels, "event"))  # in their order, so that each has the number that it had
+        block.take()  # the file already begins with it
+        known = dict.fromkeys((*self._channels, "event"))  # in the same order, so that each keeps its number
         numbers = {channel: _register(writer, channel) for channel in known}
         writer.add_message(numbers["event"], when, encode(event), when, number & 0xFFFFFFFF)
         writer.flush()
         data = block.take()
         try:
             written = 0
-            while written < len(data):  # over what is there, it takes no room on the disk
+            while written < len(data):  # overwriting existing data needs no new room on the disk
                 written += os.pwrite(self._file, data[written:], self._size + written)
         except OSError:
             os.ftruncate(self._file, self._size + self._room)
@@ -86,14 +87,14 @@ class McapFile:
         return True
 
     def give_up_block(self) -> list[float]:
-        """Leave the last block to `end_with`; when its messages were."""
+        """Give up the last block, so that `end_with` can use its space. Returns the times of its messages."""
         begin, moments = self._blocks.pop()
         self._room += self._size - begin
         self._size = begin
         return moments
 
     def _commit(self) -> None:
-        """Give the block to the operating system whole, or cut the file back to where it was."""
+        """Hand the whole block to the operating system, or cut the file back to where it was."""
         data = memoryview(self._block.take())
         try:
             written = 0
@@ -114,7 +115,7 @@ def _register(writer: Any, channel: str) -> int:
 
 
 class _Block:
-    """The stream that the MCAP writer sees: it gathers what is to be written next."""
+    """The stream that the MCAP writer sees. It collects what is to be written next."""
 
     def __init__(self) -> None:
         self._data, self._offset = bytearray(), 0
@@ -136,7 +137,7 @@ class _Block:
 
 
 def mcap_writer() -> Any:
-    """The writer's class; imported late, as flying needs a log but looking at a policy does not."""
+    """The writer's class. It is imported late, because flying needs a log but looking at a policy does not."""
     try:
         from mcap.writer import Writer
     except ImportError as error:
@@ -145,7 +146,7 @@ def mcap_writer() -> Any:
 
 
 def _text(value: Any) -> str:
-    """A text that UTF-8 can hold."""
+    """A text that can be encoded in UTF-8."""
     text = value if isinstance(value, str) else json.dumps(value, default=_plain)
     return text.encode("utf-8", "backslashreplace").decode()
 
@@ -154,11 +155,11 @@ def encode(values: Mapping[str, Any] | list[Any]) -> bytes:
     """A record as JSON, with null for a number that is not finite.
 
     Raises:
-        TypeError: for what JSON has not.
+        TypeError: for a type that JSON does not have.
     """
     try:
         return json.dumps(values, allow_nan=False, default=_plain, separators=(",", ":")).encode()
-    except ValueError:  # a number that is not finite, which is rare: the fast way is tried first
+    except ValueError:  # a number that is not finite. This is rare, so the fast way is tried first
         return json.dumps(finite(values), allow_nan=False, default=_plain, separators=(",", ":")).encode()
 
 

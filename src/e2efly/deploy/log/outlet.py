@@ -1,4 +1,4 @@
-"""The bridge's end of a process that publishes a flight: records go to it by a socket that is never waited for."""
+"""The bridge's end of a process that publishes a flight. Records go to it through a socket, without waiting."""
 
 import json
 import os
@@ -14,33 +14,33 @@ from e2efly.deploy.child import OPENING
 from e2efly.deploy.terminal import printable
 
 SCRIPT = Path(__file__).parent / "process" / "live.py"
-"""What runs in the process."""
+"""The script that runs in the process."""
 BUFFER = 1 << 20
-"""Bytes of records that the kernel is asked to keep for the process, some seconds of flight."""
+"""Bytes of records that the kernel is asked to buffer for the process: some seconds of flight."""
 CLOSING = 5.0
-"""Longest time that the process has to publish what waits and to close its file, s."""
+"""The longest time that the process has to publish what is waiting and to close its file, s."""
 
 
 class Outlet:
-    """One process. `send` takes some microseconds, whatever the process does: stands still, is killed, is slow."""
+    """One process. `send` takes some microseconds, even if the process stands still, is killed or is slow."""
 
     def __init__(self, name: str, python: str, config: dict[str, Any]) -> None:
         """Start the process and wait until it is ready.
 
         Args:
-            name: what to call it.
-            python: the interpreter that has the package of the peer.
-            config: for `process/live.py`.
+            name: the name of the process in messages.
+            python: the interpreter that has the package that the process needs.
+            config: the configuration for `process/live.py`.
 
         Raises:
-            ValueError: what the process says of its failure, or that it does not answer in time.
+            ValueError: with what the process reports about its failure, or because it does not answer in time.
         """
         self.name, self.detail = name, ""
-        """`detail`: where it publishes, as it says."""
+        """`detail`: where it publishes, as it reports."""
         self.sent, self.dropped = 0, 0
-        """Records handed over, and those for which there was no room."""
+        """Number of records that were handed over, and of those for which there was no room."""
         self.ended: str | None = None
-        """Why it takes nothing any more."""
+        """Why it no longer takes records. None: it does."""
         self._said: list[str] = []
         self._lines = b""
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -48,7 +48,7 @@ class Outlet:
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER)
         self._errors, errors = os.pipe()
         for end in (self._errors, errors):
-            os.set_blocking(end, False)  # what nobody reads must not stop the process either
+            os.set_blocking(end, False)  # unread output must not stop the process either
         try:
             self._process = subprocess.Popen(
                 [python, str(SCRIPT), json.dumps(config)],
@@ -56,7 +56,7 @@ class Outlet:
                 stdout=subprocess.PIPE,
                 stderr=errors,
                 bufsize=0,
-                start_new_session=True,  # Ctrl+C is the bridge's to act on
+                start_new_session=True,  # only the bridge acts on Ctrl+C
             )
         except OSError as error:
             self._socket.close()
@@ -82,7 +82,7 @@ class Outlet:
             raise ValueError(f"live {name}: {reason}")
 
     def send(self, data: bytes) -> bool:
-        """Hand a record over, or drop it; whether the process has ended since the last call."""
+        """Hand over a record, or drop it. Returns whether the process has ended since the last call."""
         if self.ended is not None:
             self.dropped += 1
             return False
@@ -102,7 +102,7 @@ class Outlet:
 
     @property
     def problems(self) -> list[str]:
-        """What went wrong so far, for people."""
+        """The problems so far, for people."""
         if not self._out.closed:
             self._hear()
         found = list(self._said)
@@ -111,7 +111,7 @@ class Outlet:
         return ([self.ended] if self.ended else []) + found
 
     def close(self, wait: float = CLOSING) -> None:
-        """Let the process finish, for `wait` s at most; may be called twice."""
+        """Let the process finish, for at most `wait` s. May be called twice."""
         if self._out.closed:
             return
         self._socket.close()
@@ -126,7 +126,7 @@ class Outlet:
         os.close(self._errors)
 
     def _hear(self, *, ended: bool = False) -> None:
-        """Take the lines that the process has written."""
+        """Read the lines that the process has written."""
         while True:
             try:
                 data = os.read(self._out.fileno(), 65536)
@@ -150,7 +150,7 @@ class Outlet:
                     self._said.append(text)
 
     def _tail(self) -> str:
-        """The last line of its errors."""
+        """The last line of its error output."""
         with suppress(OSError):
             said = os.read(self._errors, 65536).strip().split(b"\n")[-1]
             return f": {printable(said.decode(errors='replace'))}" if said else ""

@@ -1,4 +1,4 @@
-"""What is kept of each control step: the messages of `e2efly.deploy.log.channels`."""
+"""What is recorded of each control step: the messages of `e2efly.deploy.log.channels`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ from e2efly.deploy.policy.worker import Worker
 
 
 class Log(Protocol):
-    """What keeps the flight's record; it never raises."""
+    """Keeps the flight's record. It never raises."""
 
     def record(self, channel: str, time: float, values: dict[str, Any]) -> None:
-        """Keep a message of a channel."""
+        """Record a message of a channel."""
         ...
 
 
@@ -35,7 +35,7 @@ class Logs:
     """Each gets every message."""
 
     def record(self, channel: str, time: float, values: dict[str, Any]) -> None:
-        """Keep a message of a channel in each."""
+        """Record a message of a channel in each log."""
         for log in self.logs:
             log.record(channel, time, values)
 
@@ -45,25 +45,25 @@ class Sent:
     """What a control step sent."""
 
     source: str
-    """Who asked for it."""
+    """The source of the command."""
     command: Ctbr | None
-    """None: the throttle is closed."""
+    """The command. None: the throttle is closed."""
     throttle: float
-    """0 to 1."""
+    """Throttle, 0 to 1."""
     channels: tuple[int, ...]
-    """us."""
+    """Pulse width of each channel, us."""
     saturated: tuple[str, ...] = ()
 
 
 def record_mode(log: Log, now: float, before: Flight, flight: Flight) -> None:
-    """Keep a change of mode and its reasons."""
+    """Record a change of mode and its reasons."""
     log.record("mode", now, {
         "mode": str(flight.mode), "previous": str(before.mode), "reasons": [str(reason) for reason in flight.reasons],
     })  # fmt: skip
 
 
 def record_policy(log: Log, now: float, worker: Worker, image_ages: Sequence[float] = ()) -> None:
-    """Keep what the policy saw and wants, or what the commander said; of each camera's image, how old it was, s."""
+    """Record what the policy saw and wants, or what the commander sent, and the age of each camera's image, s."""
     if isinstance(worker, Commander):
         _record_commander(log, now, worker)
         return
@@ -86,7 +86,7 @@ def _record_commander(log: Log, now: float, commander: Commander) -> None:
 
 
 def record_odometry(log: Log, now: float, odometry: Odometry) -> None:
-    """Keep where the vehicle is."""
+    """Record the motion of the vehicle."""
     o = odometry
     log.record("odometry", now, {
         "time": o.time, "age": now - o.time, "position": o.position.tolist(), "velocity": o.velocity.tolist(),
@@ -95,7 +95,7 @@ def record_odometry(log: Log, now: float, odometry: Odometry) -> None:
 
 
 def record_sent(log: Log, now: float, sent: Sent, mode: str, setpoint: list[float] | None, yaw: float | None) -> None:
-    """Keep what was sent, by whom, and where it is to lead: world, m; rad."""
+    """Record what was sent, its source, and the setpoint: world, m; rad."""
     command = sent.command
     log.record("command", now, {
         "source": f"{mode}: {sent.source}",
@@ -109,7 +109,7 @@ def record_sent(log: Log, now: float, sent: Sent, mode: str, setpoint: list[floa
 
 
 def record_filter(log: Log, now: float, change: Change) -> None:
-    """Keep how the filter changed a command; the command that was sent is the channel `command`'s."""
+    """Record how the filter changed a command. The command that was sent is in the channel `command`."""
     log.record("filter", now, {
         "limit": change.limit, "room": change.room, "share": change.share,
         "wanted_thrust": float(change.wanted.thrust), "wanted_rate": rates_of(change.wanted),
@@ -117,7 +117,7 @@ def record_filter(log: Log, now: float, change: Change) -> None:
 
 
 def record_map(log: Log, now: float, throttle_map: ThrottleMap) -> None:
-    """Keep what has been learned of the throttle."""
+    """Record the learned throttle map."""
     log.record("throttle_map", now, {
         "scale": throttle_map.scale * throttle_map.nominal(1.0), "voltage_gain": throttle_map.learned[1],
         "residual": throttle_map.residual,
@@ -125,7 +125,7 @@ def record_map(log: Log, now: float, throttle_map: ThrottleMap) -> None:
 
 
 def record_link(log: Log, now: float, client: Client) -> None:
-    """Keep how well the controller is heard."""
+    """Record the quality of the link to the controller."""
     log.record("link", now, {
         "requests": client.requests,
         "replies": client.replies,
@@ -137,7 +137,7 @@ def record_link(log: Log, now: float, client: Client) -> None:
 
 
 def record_message(log: Log, info: ControllerInfo, code: int, reply: Reply, imu: Imu | None) -> None:
-    """Keep what the controller answered."""
+    """Record a reply of the controller."""
     m, at = reply.message, reply.time
     if code == StatusEx.CODE:
         log.record("status", at, {

@@ -1,8 +1,9 @@
-"""The flight log: MCAP, written beside the control loop so that neither disk nor data can disturb it.
+"""The flight log: MCAP, written by other threads than the control loop, so that neither the disk nor the data can
+disturb it.
 
-`Telemetry.record` puts a message into a queue. A thread turns the queue into chunks, one every `FLUSH_PERIOD`, each
-handed to the operating system whole; another thread asks it to put them on the disk. What a killed process leaves is
-whole chunks, which `e2efly.deploy.log.flight_log` and every MCAP reader that reads in order can read.
+`Telemetry.record` puts a message into a queue. One thread turns the queue into chunks, one every `FLUSH_PERIOD`, and
+hands each chunk as a whole to the operating system. Another thread asks it to write them to the disk. A killed process
+leaves whole chunks. `e2efly.deploy.log.flight_log` can read them, and so can every MCAP reader that reads in order.
 """
 
 import math
@@ -21,30 +22,31 @@ from e2efly.deploy.log.channels import CHANNELS
 from e2efly.deploy.log.mcap_file import McapFile, mcap_writer
 
 FLUSH_PERIOD = 0.1
-"""Seconds between two chunks: the most that dies with the process, plus the time to write one."""
+"""Seconds between two chunks. A process that dies loses at most this much, plus the time to write one chunk."""
 SYNC_PERIOD = 1.0
-"""Seconds between two requests to put the file on the disk: the most that dies with the power, plus their duration."""
+"""Seconds between two requests to write the file to the disk. A power loss costs at most this much, plus the duration
+of a request."""
 QUEUE_SIZE = 20_000
-"""Messages that wait at most: some 20 s of flight at 100 Hz."""
-_SLICE = 8  # messages encoded without a pause: the control loop waits for the interpreter no longer than these take
-_KINDS_OF_PROBLEMS = 64  # more than these are counted together, so that nothing grows without end in flight
+"""The largest number of messages that wait: some 20 s of flight at 100 Hz."""
+_SLICE = 8  # messages encoded without a pause: the longest time that the control loop waits for the interpreter
+_KINDS_OF_PROBLEMS = 64  # any further kinds are counted together, so that nothing grows without limit in flight
 
 
 class Telemetry:
-    """A flight log that is being written. Every method may be called from any thread, and none raises but the first.
+    """A flight log that is being written. Every method may be called from any thread. Only the first one raises.
 
-    Use it in a `with` block, or call `close`; what is not closed is readable too, less its last moments.
+    Use it in a `with` block, or call `close`. A log that is not closed can be read too, without its last moments.
     """
 
     def __init__(self, path: str | Path, queue_size: int = QUEUE_SIZE) -> None:
         """Create the file and start writing.
 
         Args:
-            path: the file; its folder is made where there is none.
-            queue_size: messages that wait at most; what comes beyond is dropped and counted.
+            path: path of the file. Its folder is created if necessary.
+            queue_size: the largest number of messages that wait. Further messages are dropped and counted.
 
         Raises:
-            ValueError: where the file exists already or cannot be made, or the package `mcap` is not there.
+            ValueError: if the file exists already or cannot be created, or if the package `mcap` is missing.
         """
         mcap_writer()  # now rather than in flight
         self.path = Path(path)
@@ -69,13 +71,14 @@ class Telemetry:
         self._syncer.start()
 
     def record(self, channel: str, time: float, values: Mapping[str, Any]) -> None:
-        """Hand a message over: some microseconds, whatever happens.
+        """Hand over a message. This takes some microseconds, whatever happens.
 
         Args:
             channel: a key of `e2efly.deploy.log.channels.CHANNELS`.
-            time: when, s on this machine's monotonic clock (`time.monotonic`).
-            values: by field: numbers, lists or arrays of numbers, flags, texts, lists of texts, None. Lists and
-                arrays are copied. A number that is not finite is written as null, as JSON has none such.
+            time: time of the message, s on this machine's monotonic clock (`time.monotonic`).
+            values: values by field: numbers, lists or arrays of numbers, flags, texts, lists of texts, None. Lists and
+                arrays are copied. A number that is not finite is written as null, because JSON does not have such
+                numbers.
         """
         try:
             self._count += 1
@@ -91,30 +94,32 @@ class Telemetry:
 
     @property
     def problems(self) -> dict[str, int]:
-        """What went wrong and how often: empty where everything recorded is, or soon will be, in the file."""
+        """The problems and how often they occurred. Empty if everything recorded is, or soon will be, in the file."""
         return dict(self._problems)
 
     @property
     def failed(self) -> bool:
-        """Whether writing has ended early, as on a full disk: nothing recorded since is in the file."""
+        """Whether writing has ended early, as on a full disk. Nothing recorded since then is in the file."""
         return any(problem.startswith("disk") for problem in self.problems)
 
     @property
     def missing(self) -> str:
-        """What a disk that failed did not take, for people; empty where it took everything."""
+        """What a failed disk did not take, for people. Empty if it took everything."""
         if not self._missing:
             return ""
         first, last = (max(moment - self._monotonic, 0.0) for moment in (self._missing_from, self._missing_to))
         return f"{self._missing} messages from {first:.1f} s to {last:.1f} s after the start of the log are missing"
 
     def close(self, timeout: float = 5.0) -> None:
-        """Write what waits, the index and the end of the file; give up on a disk that hangs after `timeout` s."""
+        """Write the waiting messages, the index and the end of the file. Gives up on a disk that hangs after `timeout`
+        s.
+        """
         self._closing.set()
         self._writer.join(timeout)
         self._syncer.join(timeout)
         if self._writer.is_alive() or self._syncer.is_alive():
             self._problem("disk: it did not take the end of the file in time")
-        elif self._queue:  # came while the writer wrote its last
+        elif self._queue:  # these came during the writer's last write
             self._problems["closed: a message came after the end"] += len(self._queue)
             self._queue.clear()
 
@@ -133,7 +138,9 @@ class Telemetry:
         self._problems[text if known else "other problems"] += 1
 
     def _log_time(self, monotonic: float) -> int:
-        """Wall time at the start plus the monotonic time since, ns: a clock set in flight disorders nothing."""
+        """Wall time at the start plus the monotonic time since then, ns. Setting the wall clock in flight does not
+        change the order.
+        """
         return max(self._wall + round((monotonic - self._monotonic) * 1e9), 0)
 
     def _write(self) -> None:
@@ -142,7 +149,7 @@ class Telemetry:
         try:
             log = McapFile(self._file)
             while True:
-                last = self._closing.wait(FLUSH_PERIOD)  # before the queue is emptied: nothing may come after
+                last = self._closing.wait(FLUSH_PERIOD)  # first: no message may come afterwards
                 self._drain(log)
                 if last:
                     log.finish()
@@ -154,7 +161,7 @@ class Telemetry:
             self._problem(f"disk: {reason}; the flight goes on without a log")
             self._swallow(log)
             self._say_what_is_missing(log, reason)
-        except Exception as error:  # a fault of ours must end up here rather than end the flight
+        except Exception as error:  # an error of ours must end here and not end the flight
             self._problem(f"disk: writer stopped by {type(error).__name__}: {error}")
             self._swallow(log)
         finally:
@@ -165,7 +172,7 @@ class Telemetry:
         for i in range(len(self._queue)):
             if i % _SLICE == _SLICE - 1:
                 time.sleep(0.0005)
-                if time.monotonic() - began > FLUSH_PERIOD:  # many at once: in chunks of the usual length
+                if time.monotonic() - began > FLUSH_PERIOD:  # many messages at once: write chunks of the usual length
                     log.flush()
                     began = time.monotonic()
             channel, when, number, values = self._queue.popleft()
@@ -185,7 +192,7 @@ class Telemetry:
                 self._problem(f"{channel}: field {str(name)[:40]!r} is not in its schema")
 
     def _swallow(self, log: "McapFile | None") -> None:
-        """Without a disk: empty the queue and count what is lost, so that memory does not grow in flight."""
+        """Without a disk: empty the queue and count the lost messages, so that memory does not grow in flight."""
         for when in log.pending if log else ():
             self._lose(when)
         while True:
@@ -201,7 +208,7 @@ class Telemetry:
         self._missing_from, self._missing_to = min(self._missing_from, when), max(self._missing_to, when)
 
     def _say_what_is_missing(self, log: "McapFile | None", reason: str) -> None:
-        """Put an event with what is missing at the end of the file, in the place of its last blocks if need be."""
+        """Write an event that says what is missing at the end of the file, if necessary in place of its last blocks."""
         try:
             while log is not None:
                 now = time.monotonic()
@@ -210,7 +217,7 @@ class Telemetry:
                     return
                 for when in log.give_up_block():
                     self._lose(when)
-        except Exception as error:  # there is nothing left to be done
+        except Exception as error:  # nothing more can be done
             self._problem(f"disk: {type(error).__name__}: the log does not say what is missing")
 
     def _sync(self) -> None:
@@ -230,7 +237,7 @@ class Telemetry:
 
 
 def _copied(value: Any) -> Any:
-    """A list or an array as it is now: its owner may use it again before it is written."""
+    """A copy of a list or an array, because its owner may change it before it is written."""
     if type(value) is list:
         return value[:]
     return value.copy() if isinstance(value, np.ndarray) else value

@@ -1,7 +1,7 @@
-"""The flight controller's accelerometer: whether it can be flown by, and what its numbers are worth.
+"""The flight controller's accelerometer: whether it is good enough to fly with, and the scale of its numbers.
 
-On the ground it must show gravity, upright. In the air poses tell its scale: over seconds the force that it feels is
-gravity and what the velocity has changed by.
+On the ground it must show gravity, upright. In the air, poses tell its scale: over some seconds, the force that it
+measures is gravity plus the change of velocity.
 """
 
 import math
@@ -14,20 +14,20 @@ from e2efly.deploy.attitude import Attitude
 from e2efly.vehicles.vehicle import GRAVITY
 
 COUNTS = (200.0, 9000.0)
-"""Counts per gravity that controllers use: 256 to 8192, with their errors."""
+"""Counts per gravity that controllers use: 256 to 8192, with a margin for their errors."""
 UPRIGHT = 0.35
-"""Largest angle between the force at rest and the body's z axis, rad."""
+"""The largest angle between the force at rest and the body's z axis, rad."""
 MEMORY_S = 1.0
-"""Over which the scale is learned, s."""
+"""Time over which the scale is learned, s."""
 RANGE = (0.85, 1.18)
 """Bounds of the scale."""
 
 
 def standing_problem(counts: np.ndarray) -> str | None:
-    """Why this is no accelerometer of a vehicle that stands; None: it may be one.
+    """Why this cannot be the accelerometer of a vehicle that stands on the ground. None: it can.
 
     Args:
-        counts: (3,) as the controller tells them, body FLU, smoothed.
+        counts: (3,) counts as the controller reports them, body FLU, smoothed.
     """
     size = float(np.linalg.norm(counts))
     shown = [round(float(c)) for c in counts]
@@ -44,18 +44,18 @@ def standing_problem(counts: np.ndarray) -> str | None:
 
 @dataclass(frozen=True)
 class Scale:
-    """The factor that makes the accelerometer's force the true one, as poses in flight show it."""
+    """The factor that corrects the accelerometer's force, learned from poses in flight."""
 
     felt: float = GRAVITY
-    """Vertical force that it felt, smoothed over `MEMORY_S`, m/s^2."""
+    """Vertical force that the accelerometer measured, smoothed over `MEMORY_S`, m/s^2."""
     flown: float = GRAVITY
-    """The one that the poses showed, m/s^2."""
+    """Vertical force that the poses showed, m/s^2."""
     climb: float | None = None
     """Vertical velocity of the newest pose, m/s."""
 
     @property
     def value(self) -> float:
-        """The factor, within `RANGE`; 1 before anything was learned."""
+        """The factor, within `RANGE`. 1 before anything was learned."""
         return min(max(self.flown / max(self.felt, 0.1), RANGE[0]), RANGE[1])
 
 
@@ -63,11 +63,11 @@ def learn(before: Scale, attitude: Attitude, force: np.ndarray, climb: float, dt
     """Learn from a measurement in flight.
 
     Args:
-        before: so far.
-        attitude: the flight controller's.
-        force: (3,) specific force, body FLU, m/s^2, by the scale at rest.
-        climb: vertical velocity by the newest pose, m/s.
-        dt: since the measurement before, s.
+        before: the scale so far.
+        attitude: the flight controller's attitude.
+        force: (3,) specific force, body FLU, m/s^2, with the scale at rest.
+        climb: vertical velocity of the newest pose, m/s.
+        dt: time since the previous measurement, s.
     """
     share = -math.expm1(-dt / MEMORY_S)
     up = float(level(attitude, force)[2])
@@ -80,7 +80,7 @@ def learn(before: Scale, attitude: Attitude, force: np.ndarray, climb: float, dt
 
 
 def level(attitude: Attitude, vector: Sequence[float] | np.ndarray) -> np.ndarray:
-    """(3,) a vector of the body, FLU, in axes that are level and look along the heading."""
+    """(3,) a vector of the body, FLU, expressed in level axes that point along the heading."""
     fx, fy, fz = (float(v) for v in vector)
     cr, sr = math.cos(attitude.roll), math.sin(attitude.roll)
     cp, sp = math.cos(attitude.pitch), math.sin(attitude.pitch)

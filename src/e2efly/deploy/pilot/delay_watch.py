@@ -1,20 +1,17 @@
-"""How late the odometry is: its rotation beside that of the flight controller's gyro. Pure.
+"""The delay of the odometry, found by comparing its rotation with that of the flight controller's gyro. Pure.
 
-A constant delay of a source cannot be seen in its messages: the quickest way counts as none. But the gyro feels each
-rotation at once, so the same rotation is looked for in the odometry's attitude some time later. Any rotation will do:
-the vehicle in somebody's hands before arming, the first wobble of a take-off. Standing still, or carried without being
-turned, nothing is told.
+A constant delay of a source cannot be seen in its messages, because the shortest delay counts as zero. But the gyro
+measures each rotation at once, so the same rotation is searched for in the odometry's attitude some time later. Any
+rotation is suitable: the vehicle turned by hand before arming, or the first wobble of a take-off. If the vehicle stands
+still or is carried without rotation, no delay is given.
 
 Its errors in 100 synthetic measurements each (`tests/deploy/test_delay_watch.py`): delays from 0 to 0.3 s, attitudes at
 100 Hz with 1 mrad of noise and a drift, a gyro at 50 Hz with a bias and 0.03 rad/s of noise, dated within 5 ms:
 
-| motion | told | standard deviation | largest error |
-| --- | --- | --- | --- |
-| turned by hand, up to 0.4 rad at 0.5 to 1.5 Hz | 100 | 0.4 ms | 0.9 ms |
-| the same, attitudes at 30 Hz with 5 mrad of noise | 100 | 0.6 ms | 1.9 ms |
-| the same, 0.3 rad/s of vibration in the gyro | 100 | 2.5 ms | 5.7 ms |
-| turned gently, up to 0.15 rad at 0.3 to 1 Hz | 100 | 1.5 ms | 6.1 ms |
-| the first 1.3 s of a flight, 0.03 rad at 0.8 to 3 Hz | 100 | 2.7 ms | 11.6 ms |
+| motion | told | standard deviation | largest error | | --- | --- | --- | --- | | turned by hand, up to 0.4 rad at 0.5
+to 1.5 Hz | 100 | 0.4 ms | 0.9 ms | | the same, attitudes at 30 Hz with 5 mrad of noise | 100 | 0.6 ms | 1.9 ms | | the
+same, 0.3 rad/s of vibration in the gyro | 100 | 2.5 ms | 5.7 ms | | turned gently, up to 0.15 rad at 0.3 to 1 Hz | 100
+| 1.5 ms | 6.1 ms | | the first 1.3 s of a flight, 0.03 rad at 0.8 to 3 Hz | 100 | 2.7 ms | 11.6 ms |
 
 On the rig with real firmware, while the pilot moved the hover point: 22 ms told of 20, 79 ms of 80, with standard
 deviations of 4 and 9 ms. A calm take-off turns by less than 0.01 rad/s, and tells nothing: turn the vehicle by hand.
@@ -34,38 +31,39 @@ from e2efly.deploy.pose.tracking import rotation_between
 WINDOW_S = 3.5
 """How long motion is remembered, s."""
 SHORTEST_S = 1.0
-"""The odometry is watched for so long at least, s."""
+"""The shortest time for which the odometry is watched, s."""
 SOONEST, LATEST = -0.05, 0.4
-"""Delays that are looked for, s."""
+"""The range of delays that is searched, s."""
 GRID_S = 0.01
-"""Both motions are compared so often, s."""
+"""Time step of the comparison of both motions, s."""
 APART_S = 0.004
-"""Attitudes nearer to one another are left out, s."""
+"""Attitudes that are closer together in time are left out, s."""
 SMOOTHING = np.hanning(23)[1:-1] / np.hanning(23).sum()
-"""Weights over which both are smoothed, `GRID_S` apart."""
+"""Weights for smoothing both motions, `GRID_S` apart."""
 LIKE = 0.7
-"""How alike the two motions must be, 0 to 1."""
+"""The smallest likeness of the two motions that is accepted, 0 to 1."""
 ANOTHER = 0.9
-"""A second delay at which they are so alike, beside the best, makes the answer ambiguous: the motion was periodic."""
+"""If the likeness at a second delay is more than this share of the best one, the answer is ambiguous: the motion was
+periodic."""
 UNSURE_S = 0.015
-"""Largest standard deviation of what is told, s."""
+"""The largest standard deviation of an answer, s."""
 
 
 @dataclass(frozen=True)
 class Delay:
-    """How late the odometry is."""
+    """The delay of the odometry."""
 
     seconds: float
-    """From the motion to the time that the odometry gives for it, s."""
+    """Time from the motion to the time stamp that the odometry gives for it, s."""
     deviation: float
-    """Standard deviation, as the remaining differences tell, s."""
+    """Standard deviation, estimated from the remaining differences, s."""
     likeness: float
-    """Of the two motions at this delay, up to 1."""
+    """Likeness of the two motions at this delay, at most 1."""
 
 
 @dataclass(frozen=True)
 class DelayWatch:
-    """What has been seen within the last `WINDOW_S`."""
+    """The motion within the last `WINDOW_S`."""
 
     rates: tuple[tuple[float, np.ndarray], ...] = ()
     """Times, s, and body rates (3,) of the gyro, rad/s."""
@@ -79,9 +77,9 @@ def felt(watch: DelayWatch, time: float, body_rate: tuple[float, float, float]) 
     """The watch after a reading of the gyro.
 
     Args:
-        watch: so far.
-        time: when it was true, s: of an answer the middle between question and arrival.
-        body_rate: body FLU, rad/s; a wrong scale or a bias does no harm.
+        watch: the watch so far.
+        time: when the reading was true, s. For a reply, this is the middle between the request and its arrival.
+        body_rate: body FLU, rad/s. A wrong scale or a bias does no harm.
     """
     if watch.rates and time <= watch.rates[-1][0]:
         return watch
@@ -89,7 +87,7 @@ def felt(watch: DelayWatch, time: float, body_rate: tuple[float, float, float]) 
 
 
 def turned(watch: DelayWatch, odometry: Odometry) -> DelayWatch:
-    """The watch after another odometry, of which time and attitude count."""
+    """The watch after another odometry. Only its time and attitude are used."""
     if watch.attitude is None:
         return replace(watch, angles=((odometry.time, np.zeros(3)),), attitude=odometry.quaternion)
     before, angle = watch.angles[-1]
@@ -101,7 +99,7 @@ def turned(watch: DelayWatch, odometry: Odometry) -> DelayWatch:
 
 
 def delay_of(watch: DelayWatch) -> Delay | None:
-    """How late the odometry is; None: the motion does not tell. Takes a fraction of a millisecond."""
+    """The delay of the odometry. None: the motion does not show it. This takes a fraction of a millisecond."""
     if len(watch.rates) < 2 or len(watch.angles) < 2:
         return None
     half = (len(SMOOTHING) // 2 + 1) * GRID_S
@@ -127,7 +125,7 @@ def delay_of(watch: DelayWatch) -> Delay | None:
     felt = gyro[best]
     gain = float((felt * seen).sum() / (felt**2).sum())
     left, slope = seen - gain * felt, np.gradient(felt, GRID_S, axis=-1)
-    alike = len(SMOOTHING)  # smoothing makes neighbours alike: so many of them count as one
+    alike = len(SMOOTHING)  # smoothing makes neighbours alike: this many of them count as one
     deviation = math.sqrt(alike * float((left**2).mean()) / float((slope**2).sum())) / max(gain, 1e-9)
     if deviation > UNSURE_S:
         return None
@@ -135,11 +133,12 @@ def delay_of(watch: DelayWatch) -> Delay | None:
 
 
 def delay_problem(delay: Delay | None, accepted: float) -> str | None:
-    """Why nobody should fly by poses that are so late, in words; None: they are not, or nothing is known.
+    """The reason, in words, why nobody should fly with poses that are so late. None: they are not late, or the delay is
+    unknown.
 
     Args:
-        delay: as measured.
-        accepted: largest delay, s.
+        delay: the measured delay.
+        accepted: the largest accepted delay, s.
     """
     if delay is None or delay.seconds - 2 * delay.deviation <= accepted:
         return None
@@ -150,7 +149,7 @@ def delay_problem(delay: Delay | None, accepted: float) -> str | None:
 
 
 def _recent(row: tuple[tuple[float, np.ndarray], ...], now: float) -> tuple[tuple[float, np.ndarray], ...]:
-    """What is not too old: the oldest one or two go."""
+    """The entries that are not too old. Only the oldest one or two are removed."""
     gone = sum(time < now - WINDOW_S for time, _ in row[:2])
     return row[gone:]
 

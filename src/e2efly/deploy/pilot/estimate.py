@@ -1,4 +1,4 @@
-"""The vehicle's motion by poses and by the controller's sensors, and whether either can be flown by. Pure."""
+"""The vehicle's motion from poses and from the controller's sensors, and whether each is fit to fly by. Pure."""
 
 import math
 from collections.abc import Iterable
@@ -17,65 +17,69 @@ from e2efly.deploy.pose.pace import Pace, paced
 from e2efly.deploy.pose.tracking import Track, age, track
 
 RESTART_S = 1.0
-"""After so long without a good pose, on the ground, tracking starts anew, s."""
+"""On the ground, tracking starts again after this time without a good pose, s."""
 OUTLIERS_S = 0.03
-"""Poses are refused for so long before the odometry counts as lost, s: one or two outliers end no flight."""
+"""How long poses may be refused before the odometry counts as lost, s. One or two outliers must not end a flight."""
 LATE_S = 0.05
-"""Poses may be so much later than the latency for which the gains are, s."""
+"""How much later than the latency assumed by the gains poses may be, s."""
 FROZEN = "its numbers do not change"
-"""Reported of an accelerometer that does not even feel the rotors turn."""
+"""Reported for an accelerometer that does not even measure the vibration of the rotors."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """The vehicle's motion as far as it is known, and what was found wrong with poses and sensors."""
+    """The vehicle's motion as far as it is known, and the problems found with poses and sensors."""
 
     checks: Checks
-    """What a pose must satisfy."""
+    """The conditions that a pose must satisfy."""
     latest: float
-    """Largest accepted delay of poses, from the motion to their arrival, s."""
+    """The largest accepted delay of poses, from the motion to their arrival, s."""
     odometry: Odometry | None = None
-    """The newest that passed the checks."""
+    """The newest odometry that passed the checks."""
     good_at: float = -math.inf
-    """When a pose passed the checks last, s."""
+    """When a pose last passed the checks, s."""
     refused: str | None = None
-    """Why poses are refused now; None: they are not, or for less than `OUTLIERS_S`."""
+    """Why poses are refused now. None: they are not refused, or for less than `OUTLIERS_S`."""
     stale: str | None = None
-    """Why the newest pose is too old; None: it is not."""
+    """Why the newest pose is too old. None: it is not."""
     track: Track = Track()
-    """Memory of the checks on poses."""
+    """Memory of the checks of poses."""
     pace: Pace = Pace()
     """How often poses come."""
     heading: HeadingWatch = HeadingWatch()
-    """Comparison of the poses' heading with the one that the flight shows."""
+    """Comparison of the poses' heading with the heading that the flight shows."""
     inertial: Inertial = Inertial()
     """Accelerometer, gyroscope, and the velocity without poses."""
     delays: DelayWatch = DelayWatch()
-    """Rotations by poses and gyroscope on the ground, by which the delay of the poses is measured."""
+    """Rotations from poses and gyroscope on the ground, with which the delay of the poses is measured."""
     delay: Delay | None = None
-    """The delay of the poses; None: not measured."""
+    """The delay of the poses. None: not measured."""
     opposed: str | None = None
-    """How poses and sensors contradicted each other when the vehicle was carried, until they agree."""
+    """How poses and sensors contradicted each other when the vehicle was carried. Kept until they agree."""
 
     @property
     def pose_problem(self) -> str | None:
-        """Why there is no good pose now; None: there is one."""
+        """Why there is no good pose now. None: there is one."""
         return self.refused or self.stale
 
     @property
     def heading_error(self) -> float | None:
-        """The poses' heading minus the true one, rad; None: unknown, or there is no good pose."""
+        """The poses' heading minus the true heading, rad. None: unknown, or there is no good pose."""
         return None if self.pose_problem else self.heading.error
 
     def attitude_error(self, attitude: Attitude | None) -> float | None:
-        """Larger difference of roll and of pitch between controller and poses, rad; None: one of them is unknown."""
+        """The larger of the differences in roll and in pitch between controller and poses, rad. None: one of them is
+        unknown.
+        """
         if attitude is None or self.odometry is None:
             return None
         roll, pitch = roll_pitch(self.odometry.quaternion)
         return max(abs(math.remainder(attitude.roll - roll, math.tau)), abs(attitude.pitch - pitch))
 
     def accelerometer_problem(self, mode: Mode) -> str | None:
-        """Why the accelerometer cannot be flown by; a problem found in flight lasts until the landing."""
+        """Why the accelerometer must not be used for flight. None: it may. A problem found in flight lasts until the
+        landing.
+        """
         if mode in GROUNDED:
             return self.inertial.rest_problem
         if self.inertial.frozen:
@@ -85,7 +89,7 @@ class Estimate:
         return self.inertial.watch.accelerometer_problem
 
     def motion_problem(self, mode: Mode) -> str | None:
-        """How poses and sensors contradict each other, or how late the poses are; None: they agree."""
+        """How poses and sensors contradict each other, or how late the poses are. None: they agree."""
         if mode in GROUNDED:
             return self.opposed or delay_problem(self.delay, self.latest)
         velocity = self.refused if (self.refused or "").startswith("velocity") else None
@@ -93,7 +97,7 @@ class Estimate:
 
 
 def height_of(odometry: Odometry | None, flight: Flight) -> float:
-    """Height over the place of take-off, m; 0 without odometry."""
+    """Height over the place of take-off, m. 0 without odometry."""
     return 0.0 if odometry is None else float(odometry.position[2]) - flight.home
 
 
@@ -104,22 +108,22 @@ def see(
 
     Args:
         before: the estimate so far.
-        samples: the poses that have come, oldest first; perhaps none.
+        samples: the poses that have come, oldest first. May be empty.
         flight: the state of the flight.
-        attitude: the controller's; None: unknown.
+        attitude: the controller's attitude. None: unknown.
         now: s.
-        said: the pose source's own problem; empty: none.
+        said: the problem that the pose source reports. Empty: none.
     """
     after = before
     waited = before.refused and now - before.good_at > RESTART_S
     if flight.mode in GROUNDED and (before.track.fault or waited):
-        after = replace(after, track=Track(), good_at=now)  # it may have been carried elsewhere, its clock set
+        after = replace(after, track=Track(), good_at=now)  # it may have been carried away, or its clock set
     for sample in samples:
         tracked, odometry, refused = track(after.checks, after.track, sample)
         after = replace(after, track=tracked, refused=refused)
         if odometry is not None:
             after = _accept(after, odometry, sample.received, flight, attitude, now)
-    frozen = (after.refused or "").startswith("frozen")  # which lasts already
+    frozen = (after.refused or "").startswith("frozen")  # this has lasted for some time already
     if not after.track.fault and now - after.good_at < OUTLIERS_S and not frozen:
         after = replace(after, refused=None)
     old = age(after.track, now)
@@ -138,7 +142,7 @@ def _accept(
         heading = watched(heading, odometry, attitude) if lifted else HeadingWatch()
     told = inertial.see(
         before.inertial, odometry, now,
-        moved=before.track.same_since == odometry.time,  # or it may be frozen, and the motion has gone on
+        moved=before.track.same_since == odometry.time,  # otherwise it may be frozen while the motion goes on
         trusted=not flight.misled or flight.turned is not None, turned=flight.turned or 0.0, latest=before.latest,
     )  # fmt: skip
     return replace(
@@ -148,11 +152,12 @@ def _accept(
 
 
 def compare(before: Estimate, mode: Mode, *, measure_delay: bool) -> Estimate:
-    """On the ground: what was found while the vehicle was carried stays until it is carried again and agrees.
+    """On the ground: a contradiction that was found while the vehicle was carried stays until it is carried again and
+    agrees.
 
     Args:
         before: the estimate so far.
-        mode: of the flight; in the air nothing changes.
+        mode: the mode of the flight. In the air nothing changes.
         measure_delay: measure the delay of the poses, which takes a fraction of a millisecond.
     """
     if mode not in GROUNDED:
@@ -168,13 +173,13 @@ def compare(before: Estimate, mode: Mode, *, measure_delay: bool) -> Estimate:
 
 
 def feel(before: Estimate, m: Measurement, turned_at: float, mode: Mode, now: float) -> Estimate:
-    """The estimate after an answer of the inertial sensors.
+    """The estimate after a reply of the inertial sensors.
 
     Args:
         before: the estimate so far.
-        m: the answer.
+        m: the measurement in the reply.
         turned_at: when its body rate was true, s.
-        mode: of the flight.
+        mode: the mode of the flight.
         now: s.
     """
     x, y, z = m.gyro.tolist()
@@ -183,7 +188,9 @@ def feel(before: Estimate, m: Measurement, turned_at: float, mode: Mode, now: fl
 
 
 def enter(before: Estimate, flight_before: Flight, flight: Flight) -> Estimate:
-    """The estimate after a step of the state machine: what a new mode, or a landing without poses, begins anew."""
+    """The estimate after a step of the state machine, which resets what a new mode or a landing without poses starts
+    again.
+    """
     told, delays = before.inertial, before.delays
     if flight.blind and not flight_before.blind and flight.turned is None:
         told = inertial.alone(told, wrong=flight.misled is not None)

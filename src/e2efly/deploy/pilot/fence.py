@@ -1,4 +1,4 @@
-"""Where the vehicle may be: the fence, the guard that sees it coming, and targets that stay inside."""
+"""Where the vehicle may be: the fence, the guard that acts before it is reached, and targets that stay inside."""
 
 import math
 
@@ -13,13 +13,13 @@ MARGIN = 0.1
 
 
 def fence_problem(fence: Fence, odometry: Odometry, floor: bool = True, *, guard: bool = True) -> str | None:
-    """Why the vehicle is outside the fence, or cannot stop inside it any more; None: neither.
+    """Why the vehicle is outside the fence, or can no longer stop inside it. None: neither.
 
     Args:
         fence: the fence.
-        odometry: where the vehicle is and how it moves.
+        odometry: the position and motion of the vehicle.
         floor: whether the lowest height counts.
-        guard: whether it counts that it cannot stop inside.
+        guard: whether it counts if the vehicle cannot stop inside.
     """
     v = odometry.velocity
     speed, tilt = float(np.linalg.norm(v)), tilt_of(odometry.quaternion)
@@ -38,20 +38,22 @@ def fence_problem(fence: Fence, odometry: Odometry, floor: bool = True, *, guard
 
 
 def here(odometry: Odometry) -> Target:
-    """The place and heading of the vehicle."""
+    """The position and heading of the vehicle."""
     x, y, z = (float(value) for value in odometry.position)
     return Target((x, y, z), yaw_of(odometry.quaternion))
 
 
 def stopping(fence: Fence, odometry: Odometry) -> Target:
-    """Where the vehicle can come to rest, kept inside the fence."""
+    """Where the vehicle can come to rest, limited to the inside of the fence."""
     inside = np.clip(_stop(fence, odometry), np.add(fence.low, MARGIN), np.subtract(fence.high, MARGIN))
     x, y, z = (float(value) for value in inside)
     return Target((x, y, z), yaw_of(odometry.quaternion))
 
 
 def moved(settings: FlightSettings, target: Target, pilot: Pilot, dt: float) -> Target:
-    """The target moved by the sticks for `dt` s, in the vehicle's heading; never out of the fence, nor farther out."""
+    """The target moved by the sticks for `dt` s, relative to the target's heading. It never leaves the fence. If it is
+    outside, it does not move farther out.
+    """
 
     def beyond(stick: float) -> float:
         dead = settings.stick_deadband
@@ -67,6 +69,8 @@ def moved(settings: FlightSettings, target: Target, pilot: Pilot, dt: float) -> 
 
 
 def _stop(fence: Fence, odometry: Odometry) -> np.ndarray:
-    """Where it comes to rest: at its speed for the reaction time, then braking, each axis by itself. (3,) m."""
+    """(3,) m: where the vehicle comes to rest, computed for each axis separately: at its present speed for the reaction
+    time, then braking.
+    """
     v = odometry.velocity
     return odometry.position + v * fence.reaction + v * np.abs(v) / (2 * fence.braking)

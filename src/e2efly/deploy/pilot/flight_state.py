@@ -1,4 +1,4 @@
-"""What the state machine knows, remembers and says: its inputs, its state, its reasons."""
+"""What the state machine knows, remembers and reports: its inputs, its state, its reasons."""
 
 import math
 from dataclasses import dataclass, replace
@@ -11,19 +11,19 @@ class Mode(StrEnum):
     """Who flies."""
 
     INIT = "init"
-    """On the ground; the throttle is closed."""
+    """On the ground. The throttle is closed."""
     TAKEOFF = "takeoff"
-    """The hover controller, its target rising."""
+    """The hover controller flies, and its target rises."""
     HOVER = "hover"
-    """The hover controller; the pilot's sticks move its target."""
+    """The hover controller flies. The pilot's sticks move its target."""
     POLICY = "policy"
-    """The policy."""
+    """The policy flies."""
     LAND = "land"
-    """The hover controller, its target sinking; without odometry: level and a gentle descent."""
+    """The hover controller flies, and its target sinks. Without odometry: a level attitude and a gentle descent."""
     PILOT = "pilot"
-    """The pilot, by the override switch."""
+    """The pilot flies, through the override switch."""
     DONE = "done"
-    """Landed, throttle closed, until disarmed."""
+    """Landed. The throttle is closed until the vehicle is disarmed."""
 
 
 AIRBORNE = (Mode.TAKEOFF, Mode.HOVER, Mode.POLICY, Mode.LAND)
@@ -44,7 +44,7 @@ class Mission(StrEnum):
 
 
 class Reason(StrEnum):
-    """Every reason there is; some are followed by a colon and numbers."""
+    """All reasons. Some are followed by a colon and numbers."""
 
     NO_ODOMETRY = "no good odometry"
     MOVING = "moving"
@@ -83,21 +83,21 @@ class Reason(StrEnum):
 
 @dataclass(frozen=True)
 class Pilot:
-    """What the pilot's receiver says."""
+    """What the pilot's receiver reports."""
 
     mission: Mission
     roll: float = 0.0
     """Stick, -1 to 1, right positive."""
     pitch: float = 0.0
-    """Forward positive."""
+    """Stick, forward positive."""
     throttle: float = 0.0
-    """Up positive."""
+    """Stick, up positive."""
     yaw: float = 0.0
-    """Right positive."""
+    """Stick, right positive."""
 
     @property
     def deflection(self) -> float:
-        """The stick that is farthest from its centre."""
+        """The deflection of the stick that is farthest from its centre."""
         return max(abs(self.roll), abs(self.pitch), abs(self.throttle), abs(self.yaw))
 
 
@@ -106,50 +106,53 @@ class Inputs:
     """What is known at a control step."""
 
     odometry: Odometry | None = None
-    """The newest that passed the checks."""
+    """The newest odometry that passed the checks."""
     odometry_problem: str | None = None
-    """Why there is none that is fresh and good."""
+    """Why there is no fresh and good odometry. None: there is."""
     link_problem: str | None = None
-    """Why the flight controller is not heard."""
+    """Why there is no working link to the flight controller. None: there is."""
     silent: bool = False
-    """It says nothing at all: it may hold the last command, and hear nothing."""
+    """The controller sends nothing at all. It may hold the last command and receive nothing."""
     armed: bool = False
     override: bool = False
-    """The controller takes its sticks from here."""
+    """The controller takes its stick inputs from this program."""
     pilot: Pilot | None = None
-    """None: the receiver is not heard."""
+    """What the pilot wants. None: the receiver is not heard."""
     voltage: float | None = None
-    """Of a cell, V."""
+    """Voltage of a cell, V."""
     settings_problems: tuple[str, ...] = ()
-    """How the controller's settings are unlike what the policy needs."""
+    """How the controller's settings differ from what the flight needs."""
     attitude_error: float | None = None
-    """Between the controller's roll and pitch and the odometry's, rad; None: the controller's are not heard."""
+    """Difference between the controller's and the odometry's roll and pitch, rad. None: the controller's attitude is
+    not heard."""
     accelerometer_problem: str | None = None
-    """Why the controller's accelerometer cannot be flown by."""
+    """Why the controller's accelerometer must not be used for flight. None: it may."""
     motion_problem: str | None = None
-    """How the poses contradict what the controller's sensors feel."""
+    """How the poses contradict the controller's sensors. None: they agree."""
     buried: bool = False
-    """Without odometry: what is reckoned is far under the ground, and no sensor can feel whether it stands."""
+    """Without odometry: the estimated height is far under the ground, and no sensor can tell whether the vehicle
+    stands."""
     touched: bool = False
-    """In a landing without odometry the ground was felt."""
+    """In a landing without odometry, the ground was felt."""
     supported: bool = False
-    """Something carries the vehicle: it feels more force than its rotors give."""
+    """Something carries the vehicle: it measures more force than its rotors give."""
     heading_error: float | None = None
-    """The odometry's heading minus the one that the flight shows, rad; None: it shows none now."""
+    """The odometry's heading minus the heading that the flight shows, rad. None: the flight shows none now."""
     policy_problem: str | None = None
-    """Why the policy must not fly, or must stop: failed, late, non-finite, outside its envelope."""
+    """Why the policy must not fly, or must stop: failed, late, non-finite, outside its envelope. None: it may fly."""
     policy_done: bool = False
-    """Its task is over."""
+    """The policy's task is over."""
     policy_lands: bool = False
-    """Its task is to land: the floor of the fence is open to it."""
+    """The policy's task is to land, so the floor of the fence does not apply to it."""
     filtered: bool = False
-    """A filter keeps the policy inside the fence: the guard ends its flight outside alone, not before."""
+    """A filter keeps the policy inside the fence. The guard then ends the policy's flight only outside the fence, not
+    before."""
     missed_deadlines: int = 0
-    """Late control steps within the last second."""
+    """Number of late control steps within the last second."""
 
     @property
     def seen(self) -> Odometry | None:
-        """The odometry, where it is fresh, good and finite; None: the flight is blind."""
+        """The odometry, if it is fresh, good and finite. None: the flight is blind."""
         o = self.odometry
         if o is None or self.odometry_problem:
             return None
@@ -158,21 +161,21 @@ class Inputs:
 
     @property
     def blindness(self) -> str:
-        """Why nothing is seen."""
+        """Why there is no usable odometry."""
         problem = self.odometry_problem or ("none came yet" if self.odometry is None else "not finite")
         return f"{Reason.NO_ODOMETRY}: {problem}"
 
 
 @dataclass(frozen=True)
 class Target:
-    """Where the hover controller is to hold."""
+    """The place that the hover controller has to hold."""
 
     position: tuple[float, float, float]
     """World, m."""
     yaw: float
     """rad."""
     climb: float = 0.0
-    """Vertical speed with which it moves, m/s."""
+    """Vertical speed with which the target moves, m/s."""
 
 
 @dataclass(frozen=True)
@@ -181,43 +184,44 @@ class Flight:
 
     mode: Mode = Mode.INIT
     since: float = 0.0
-    """When the mode began, or in it the flight without odometry, s; moved along when the clock jumps."""
+    """When the mode, or the flight without odometry within it, began, s. It is shifted when the clock jumps."""
     lost: tuple[float, float, float] | None = None
-    """Landing without odometry: when it was good last, s, and the height over home, m, and climb, m/s, of that time."""
+    """In a landing without odometry: when it was last good, s, and the height over home, m, and the climb, m/s, at that
+    time."""
     found_since: float | None = None
-    """Landing without odometry: since when it has been good again, s."""
+    """In a landing without odometry: time since which it has been good again, s."""
     standing_since: float | None = None
-    """Landing: since when the newest odometry, good or just lost, has stayed at one place, s ..."""
+    """In a landing: time since which the newest odometry, good or just lost, has stayed at one place, s ..."""
     stood_at: tuple[float, float, float] | None = None
-    """... which is this, m."""
+    """... and this place, m."""
     now: float = 0.0
-    """Of the last step, s."""
+    """Time of the last step, s."""
     reasons: tuple[str, ...] = ()
-    """Why this mode; in INIT: why no take-off yet."""
+    """Reasons for this mode. In INIT: why no take-off is possible yet."""
     target: Target | None = None
-    """The hover controller's; None where it does not fly."""
+    """Target of the hover controller. None if it does not fly."""
     home: float = 0.0
-    """Height at which it stood before take-off, m; start with that of the ground."""
+    """Height at which the vehicle stood before take-off, m. At the start, this is the height of the ground."""
     blind: bool = False
-    """Landing without odometry."""
+    """The landing is without odometry."""
     rearm: bool = True
     """The mission switch must go to its low position before a take-off."""
     lock: bool = False
     """The mission switch must leave its policy position before the policy flies again."""
     still_since: float | None = None
-    """Since when it has been still while landing, s."""
+    """In a landing: time since which the vehicle has been still, s."""
     fallen_since: float | None = None
-    """Since when it has been still and far from level, s."""
+    """Time since which the vehicle has been still and far from level, s."""
     nearest: float = math.inf
-    """How near the vehicle has come to the target, horizontally, m; infinite until it was slow there once."""
+    """The smallest horizontal distance to the target so far, m. Infinite until the vehicle was slow there once."""
     turned: float | None = None
-    """The error of the odometry's heading for which it counts as lost, rad."""
+    """The error of the odometry's heading, because of which the odometry counts as lost, rad."""
     misled: str | None = None
-    """Why the odometry is not the vehicle's own: until it stands, it counts as lost; None: it is."""
+    """Why the odometry is not that of this vehicle. It then counts as lost until the vehicle stands. None: it is."""
 
 
 def to(
     flight: Flight, mode: Mode, *reasons: str, target: Target | None = None, blind: bool = False, **changes: bool
 ) -> Flight:
-    """The flight in another mode, for these reasons, with the target and the fields that are given."""
+    """The flight in another mode, for these reasons, with the given target and fields."""
     return replace(flight, mode=mode, reasons=reasons, target=target, blind=blind, **changes)

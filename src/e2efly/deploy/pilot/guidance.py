@@ -1,6 +1,6 @@
-"""The commands of take-off, hover and landing, with odometry and without it. Pure.
+"""The commands for take-off, hover and landing, with odometry and without it. Pure.
 
-Each adds a trim to the thrust, which makes up for an error of the throttle map.
+Each function adds a trim to the thrust. The trim compensates for an error of the throttle map.
 """
 
 import math
@@ -19,15 +19,17 @@ from e2efly.vehicles.vehicle import GRAVITY
 TRIM = (-3.0, 5.0)
 """Bounds of the thrust that a take-off adds while the throttle map is still wrong, m/s^2."""
 TRIM_GAIN = 3.0
-"""Growth of the trim over the climb's speed error, 1/s."""
+"""Rate of change of the trim divided by the error of the climb speed, 1/s."""
 TRIM_FADE = 1.0
 """Time constant with which the trim fades as the map learns, s."""
 STEADY = 0.03
-"""Body rates of a hover below this are sent as zero, rad/s: should the link fall silent now, they are held for long."""
+"""Body rates of a hover that are below this are sent as zero, rad/s. If the link falls silent now, they are held for a
+long time."""
 OVERDUE = 0.3
-"""A blind descent whose height is reckoned so far under the ground feels for the ground, m, ..."""
+"""A blind descent whose estimated height is this far under the ground tries to feel the ground, m, ..."""
 WEIGHT, LIGHTER, LIGHTEST = 0.97, 0.04, 0.6
-"""... and gives no more than this share of its weight, less with each metre, and the last at least."""
+"""... and commands at most this share of its weight (first value), less for each further metre (second value), but at
+least the last value."""
 
 
 def hover(
@@ -42,21 +44,21 @@ def hover(
     *,
     silent: bool = False,
 ) -> tuple[Ctbr, Any, float]:
-    """Fly to a target by odometry.
+    """Fly to a target with odometry.
 
     Args:
-        controller: that flies.
-        memory: of the controller, from its `begin` or the last step.
-        flight: its mode and its home count.
-        target: where to be.
-        seen: the motion now.
-        under_way: what was sent and does not act yet.
-        trim: so far, m/s^2.
-        dt: since the last control step, s.
-        silent: the flight controller is not heard, and may not get what is sent.
+        controller: the hover controller that flies.
+        memory: the memory of the controller, from its `begin` or the last step.
+        flight: the state of the flight. Its mode and its home are used.
+        target: where the vehicle should be.
+        seen: the present motion.
+        under_way: the commands that were sent but do not act yet.
+        trim: the trim so far, m/s^2.
+        dt: time since the last control step, s.
+        silent: the flight controller is not heard, and may not receive what is sent.
 
     Returns:
-        The command, what the controller is handed next, and the trim, m/s^2.
+        The command, the new memory of the controller, and the trim, m/s^2.
     """
     x, y, z = target.position
     height, climb = float(seen.position.z), float(seen.velocity.z)
@@ -67,7 +69,7 @@ def hover(
     else:
         trim *= math.exp(-dt / TRIM_FADE)
     on_ground = taking_off and low
-    if on_ground:  # no tilt before the feet are free
+    if on_ground:  # no tilt before the feet have left the ground
         x, y = float(seen.position.x), float(seen.position.y)
     place = Place(Vec3(x, y, z), Vec3(0.0, 0.0, target.climb), yaw=target.yaw)
     memory, wanted = controller.step(memory, seen, under_way, place, dt, held=low or silent)
@@ -78,18 +80,18 @@ def hover(
 def descend(
     flight: Flight, told: Inertial, attitude: Attitude | None, trim: float, now: float, dt: float
 ) -> tuple[Ctbr, float, Inertial]:
-    """Descend without odometry, and feel for the ground.
+    """Descend without odometry, and detect the ground.
 
     Args:
         flight: the state of the flight.
-        told: what the inertial sensors tell.
-        attitude: the controller's; None: unknown.
-        trim: so far, m/s^2.
+        told: the state of the inertial sensors.
+        attitude: the controller's attitude. None: unknown.
+        trim: the trim so far, m/s^2.
         now: s.
-        dt: since the last control step, s.
+        dt: time since the last control step, s.
 
     Returns:
-        The command; the trim, m/s^2; what the inertial sensors tell, with the ground being felt for.
+        The command; the trim, m/s^2; the state of the inertial sensors, including the detection of the ground.
     """
     reckoned, ground, overdue = told.reckoned, flight.home, True
     if reckoned is None:

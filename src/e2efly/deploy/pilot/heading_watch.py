@@ -1,10 +1,11 @@
-"""Whether the odometry's heading is the vehicle's own: a tilt must push it the way it is seen to go.
+"""Whether the odometry's heading is that of the vehicle: a tilt must accelerate the vehicle in the direction that is
+seen.
 
-Nothing on the ground shows a wrong heading, and a hover controller that is led by one pushes to the wrong side, ever
-harder. In the air the horizontal acceleration that goes with the flight controller's roll and pitch, turned by the
-odometry's heading, is compared with the one that the odometry flies: turned by the heading's error they are alike,
-whether the source's axes are turned or the body's. Wind and gusts, which push without a tilt, are seldom alike, and not
-for long.
+Nothing on the ground shows a wrong heading. A hover controller with a wrong heading pushes to the wrong side, harder
+and harder. In the air, two horizontal accelerations are compared. The first follows from the flight controller's roll
+and pitch, turned by the odometry's heading. The second follows from the odometry's velocity. Turned by the heading's
+error, the two are alike, whether the source's axes are turned or the body's. Wind and gusts, which push without a tilt,
+are seldom alike, and not for long.
 """
 
 import cmath
@@ -16,46 +17,47 @@ from e2efly.deploy.odometry import Odometry, yaw_of
 from e2efly.vehicles.vehicle import GRAVITY
 
 SMOOTHING_S = 0.15
-"""Over which velocities become accelerations, s."""
+"""Time over which velocities are differentiated to accelerations, s."""
 STEADY_S = 2.0
-"""What stays for longer is wind, or a tilted sensor, s."""
+"""A difference that lasts longer than this is wind or a tilted sensor, s."""
 MEMORY_S = 0.7
-"""Over which accelerations are compared, s."""
+"""Time over which accelerations are compared, s."""
 PUSH = 0.3
-"""With less acceleration nothing can be told, m/s^2, root mean square."""
+"""With less acceleration than this, the heading cannot be determined, m/s^2, root mean square."""
 COHERENCE = 0.93
-"""How alike what is flown is to what is pushed, 0 to 1, for the error to be believed ..."""
+"""How alike the seen and the expected acceleration must be for the error to be trusted, 0 to 1, ..."""
 RATIO = (0.7, 1.5)
-"""... and how large, beside it."""
+"""... and the allowed range of their ratio."""
 SMALL, LASTING_S = 0.35, 0.12
-"""An error above this, rad, is believed after so long only, s: a growing gust can look like one for a moment."""
+"""An error above the first value, rad, is trusted only after the second, s, because a growing gust can look like one
+for a moment."""
 LONGEST_STEP = 0.1
-"""Between two odometries; after a longer pause the comparison begins anew, s."""
+"""The longest time between two odometries, s. After a longer pause the comparison starts again."""
 
 
 @dataclass(frozen=True)
 class HeadingWatch:
-    """What has been seen so far; horizontal vectors are complex numbers, x + iy, world."""
+    """What has been observed so far. Horizontal vectors are complex numbers, x + iy, world."""
 
     time: float = -math.inf
-    """Of the newest odometry, s."""
+    """Time of the newest odometry, s."""
     velocity: complex = 0j
-    """Smoothed, m/s."""
+    """Velocity, smoothed, m/s."""
     push: complex = 0j
-    """Acceleration that goes with the tilt, smoothed, m/s^2."""
+    """Expected acceleration from the tilt (the push), smoothed, m/s^2."""
     steady: tuple[complex, complex] = (0j, 0j)
-    """What stays of the push and of the flown acceleration, m/s^2."""
+    """Lasting parts of the push and of the flown acceleration, m/s^2."""
     cross: complex = 0j
-    """Mean of the flown acceleration times the conjugate push."""
+    """Mean of the flown acceleration times the complex conjugate of the push."""
     power: tuple[float, float] = (0.0, 0.0)
     """Mean squares of the push and of the flown acceleration."""
 
     lasting: float = 0.0
-    """For how long the error has been large, s."""
+    """How long the error has been large, s."""
 
     @property
     def error(self) -> float | None:
-        """The heading seen minus the true one, rad, -pi to pi; None: it cannot be told now."""
+        """The seen heading minus the true heading, rad, -pi to pi. None: it cannot be determined now."""
         error = self._error
         return None if error is not None and abs(error) > SMALL and self.lasting < LASTING_S else error
 
@@ -75,8 +77,8 @@ def watched(before: HeadingWatch, odometry: Odometry, attitude: Attitude) -> Hea
 
     Args:
         before: the watch so far.
-        odometry: checked.
-        attitude: the flight controller's; its roll and pitch count.
+        odometry: an odometry that passed the checks.
+        attitude: the flight controller's attitude. Only its roll and pitch are used.
     """
     velocity = complex(*(float(v) for v in odometry.velocity[:2]))
     roll, pitch = attitude.roll, attitude.pitch

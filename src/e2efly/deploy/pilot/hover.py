@@ -1,4 +1,4 @@
-"""The controllers that fly take-off, hover and landing, and turn a policy's commands into body rates."""
+"""The controllers for take-off, hover and landing, and the conversion of a policy's commands to body rates."""
 
 import dataclasses
 import math
@@ -12,26 +12,29 @@ from e2efly.deploy.odometry import Odometry
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 LEVEL_GAIN = 4.0
-"""Body rate over tilt of the blind descent, 1/s."""
+"""Body rate divided by tilt in a blind descent, 1/s."""
 LEVEL_RATE = 3.0
-"""Largest body rate of it, rad/s."""
+"""The largest body rate in a blind descent, rad/s."""
 SINK_SPEED, SINK_ACCELERATION = 0.55, 3.0
-"""A blind descent first goes to this speed, m/s, by this acceleration, m/s^2 ..."""
+"""A blind descent first reaches this speed, m/s, with this acceleration, m/s^2 ..."""
 SINK_TIME = SINK_SPEED / SINK_ACCELERATION
-"""... which takes so long from rest, s ..."""
+"""... which takes this time from rest, s ..."""
 SINK_THRUST = 0.95
-"""... and goes on with this share of the weight: it must sink, whatever the throttle map's last error."""
+"""... and then continues with this share of the weight. It must sink, whatever the last error of the throttle map."""
 SINK_FASTER = 0.2
-"""By which the speed of sinking grows, m/s^2: more than what a throttle map is wrong by, so that it always sinks."""
+"""Rate at which the sink speed grows, m/s^2. It is larger than the error of a throttle map, so that the vehicle always
+sinks."""
 SLOWEST_SINK, SLOWEST_FASTER = 0.5, 0.07
-"""The slowest that it sinks, m/s, and by which that grows, m/s^2: by them the time to the ground is estimated."""
+"""The slowest possible sink speed, m/s, and its slowest growth, m/s^2. The time to the ground is estimated with
+them."""
 LIFTED = 0.12
-"""The vehicle flies from this height over the ground on, m: below, nothing is learned and no tilt is asked."""
+"""Height over the ground above which the vehicle counts as flying. Below it, nothing is learned and no tilt is
+commanded."""
 
 
 @dataclass(frozen=True)
 class FlightMotion:
-    """Odometry taken apart, as the controllers take it."""
+    """The parts of an odometry, as the controllers use them."""
 
     position: Vec3
     velocity: Vec3
@@ -39,31 +42,31 @@ class FlightMotion:
 
     @staticmethod
     def of(odometry: Odometry) -> "FlightMotion":
-        """Of an odometry."""
+        """The motion of an odometry."""
         return FlightMotion(Vec3(*odometry.position), Vec3(*odometry.velocity), Quat(*odometry.quaternion))
 
 
 def flight_gains(vehicle: Vehicle, latency: float) -> Vehicle:
-    """The vehicle with gains that a latency allows.
+    """The vehicle with gains that suit a latency.
 
-    In the simulator the attitude loop runs in the flight controller, without delay; here it is closed over the link.
-    A loop of bandwidth k behind a delay T loses k T of phase: the attitude loop keeps to half a radian of it, the
-    velocity loop to a third of the attitude loop's bandwidth, the position loop to 0.4 of the velocity loop's.
+    In the simulator, the attitude loop runs in the flight controller, without delay. Here it is closed over the link. A
+    loop with bandwidth k and delay T loses k T of phase. The attitude loop is limited to half a radian of this loss,
+    the velocity loop to a third of the attitude loop's bandwidth, and the position loop to 0.4 of the velocity loop's.
 
     Args:
-        vehicle: as loaded.
-        latency: from the motion to the body-rate setpoint, s.
+        vehicle: the loaded vehicle.
+        latency: the time from the motion to the body-rate setpoint, s.
     """
     slowest = latency + 1 / float(np.min(vehicle.rate_gain[:2]))
     attitude = np.minimum(vehicle.attitude_gain, 0.5 / slowest)
-    # up and down there is no attitude loop in between, only the motors, as slow as the rate loop
+    # vertically there is no attitude loop in between, only the motors, as slow as the rate loop
     velocity = np.minimum(vehicle.velocity_gain, [attitude[0] / 3, attitude[0] / 3, 0.5 / slowest])
     position = np.minimum(vehicle.position_gain, 0.4 * velocity)
     return dataclasses.replace(vehicle, attitude_gain=attitude, velocity_gain=velocity, position_gain=position)
 
 
 def controlled(vehicle: Vehicle, mode: str, odometry: Odometry, command: tuple[float, ...] | np.ndarray) -> Ctbr:
-    """CTBR of a command of a command mode that has a controller: the simulator's own cascade."""
+    """The CTBR command for a command of a mode that has a controller, from the simulator's own cascade."""
     a, b, c, d = (np.float64(x) for x in command)
     controller = COMMAND_MODES[mode].controller
     assert controller is not None
@@ -71,12 +74,12 @@ def controlled(vehicle: Vehicle, mode: str, odometry: Odometry, command: tuple[f
 
 
 def blind(attitude: Attitude | None, elapsed: float, climb: float = 0.0) -> Ctbr:
-    """Level by the controller's own attitude, and sink; without any attitude the rates are held at zero.
+    """Level by the controller's own attitude, and sink. Without any attitude, the body rates are zero.
 
     Args:
-        attitude: the flight controller's.
-        elapsed: since the descent began, s.
-        climb: vertical speed when it began, m/s: a climb is ended and a fall is caught first.
+        attitude: the flight controller's attitude.
+        elapsed: time since the descent began, s.
+        climb: vertical speed when it began, m/s. A climb is stopped, and a fall is slowed, first.
     """
     thrust = SINK_THRUST * GRAVITY
     if elapsed < sink_time(climb):
@@ -97,12 +100,12 @@ def _levelling(angle: float) -> float:
 
 
 def sink_time(climb: float = 0.0) -> float:
-    """How long a blind descent that begins with a vertical speed, m/s, takes to reach its own, s."""
+    """The time that a blind descent that begins with a vertical speed, m/s, takes to reach its own speed, s."""
     return abs(climb + SINK_SPEED) / SINK_ACCELERATION
 
 
 def blind_time(height: float, climb: float = 0.0) -> float:
-    """After how long a blind descent from a height, m, has surely ended, s; the throttle is closed then."""
+    """The time after which a blind descent from a height, m, has surely ended, s. The throttle is then closed."""
     up = max(climb, 0.0)
     top = max(height, 0.0) + up**2 / (2 * SINK_ACCELERATION)
     sinking = (math.sqrt(SLOWEST_SINK**2 + 2 * SLOWEST_FASTER * top) - SLOWEST_SINK) / SLOWEST_FASTER

@@ -1,6 +1,7 @@
-"""What accelerometer, gyroscope, attitude and throttle tell beside the poses. Pure: state in, state out.
+"""What accelerometer, gyroscope, attitude and throttle tell in addition to the poses. Pure: state in, state out.
 
-The scale of the accelerometer, whether poses are the vehicle's own, the velocity without them, and the ground.
+They give the accelerometer's scale, a check that the poses are those of this vehicle, the velocity without poses, and
+the ground.
 """
 
 import math
@@ -19,84 +20,88 @@ from e2efly.deploy.pilot.touch import Touch
 from e2efly.vehicles.vehicle import GRAVITY
 
 FRESH_S = 0.1
-"""The force is taken for so long, s."""
+"""How long a measured force is used, s."""
 DELIVERED = 0.3
-"""After a silence: by so much nearer must the force be to what was sent than to what was held, m/s^2, to show that the
-commands came all the same."""
+"""After a silence: how much closer the measured force must be to the sent command than to the held command, m/s^2, to
+show that the sent commands arrived."""
 SHARE_RATE, SHARE_S, SHARE_RANGE = 0.05, 0.3, (0.7, 1.3)
 """How fast the share of the map's force is followed, 1/s and s, and its bounds."""
 QUIET = 1.0
-"""The accelerometer's scale is learned while less is felt than this, m/s within `motion_watch.MEMORY_S`: in a fast
-flight the poses come too late to be compared with it."""
+"""The accelerometer's scale is learned while the sensors measure less motion than this, m/s within
+`motion_watch.MEMORY_S`. In a fast flight the poses come too late for a comparison."""
 BELIEVED = 0.3
-"""Share by which the force along the body's z axis may be unlike the thrust: beyond, the accelerometer is broken."""
+"""The share by which the force along the body's z axis may differ from the thrust. Beyond it, the accelerometer is
+broken."""
 BURIED, BURIED_S = 1.5, 2.0
-"""So far under the ground by the largest height that is plausible, m, the vehicle surely stands; not sooner after the
-last pose than this, s, as what was reckoned at first may be wrong."""
+"""If the largest plausible height is this far under the ground, m, the vehicle surely stands. This counts only after
+this time since the last pose, s, because the first estimates may be wrong."""
 REST_SHARE = 0.05
 """Weight of a new measurement at rest."""
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """An answer of the controller, and what goes with it."""
+    """A reply of the controller, and the information that belongs to it."""
 
     counts: np.ndarray
-    """(3,) of the accelerometer, body FLU."""
+    """(3,) counts of the accelerometer, body FLU."""
     gyro: np.ndarray
     """(3,) body rate, FLU, rad/s."""
     attitude: Attitude | None
-    """The controller's; None: not known."""
+    """The controller's attitude. None: not known."""
     thrust: tuple[float, float] | None
-    """Specific force by the throttle, and how far that may be off, m/s^2; None: not known."""
+    """Specific force from the throttle, and its possible error, m/s^2. None: not known."""
     asked: float
-    """When it was asked for, s: what had been sent until then had arrived as it was taken."""
+    """When the measurement was requested, s. Everything sent before that had arrived when it was taken."""
     standing: bool = False
-    """It stands on the ground, disarmed."""
+    """The vehicle stands on the ground, disarmed."""
     flying: bool = False
-    """It is in the air."""
+    """The vehicle is in the air."""
     climb: float | None = None
-    """Vertical velocity by good poses in flight, m/s; None: there are none, or it does not fly."""
+    """Vertical velocity from good poses in flight, m/s. None: there are none, or the vehicle does not fly."""
 
 
 @dataclass(frozen=True)
 class Inertial:
-    """What was told so far. `Inertial()` at first."""
+    """What is known so far. `Inertial()` at first."""
 
     rest: np.ndarray | None = None
     """(3,) counts of the accelerometer at rest, smoothed."""
     scale: Scale = Scale()
-    """Of the accelerometer, as poses in flight show it."""
+    """Scale of the accelerometer, learned from poses in flight."""
     watch: MotionWatch = MotionWatch()
-    """Poses against sensors."""
+    """Comparison of poses and sensors."""
     reckonings: Reckonings = Reckonings()
-    """The velocity, carried on from the poses by what was sent."""
+    """The velocity, propagated from the poses with what was sent."""
     held: Reckonings | None = None
     """The same since the newest measurement, if the controller has held the command of that time ever since ..."""
     held_thrust: float | None = None
-    """... and the specific force of it, m/s^2."""
+    """... and the specific force of that command, m/s^2."""
     touch: Touch = Touch()
-    """The ground."""
+    """Detection of the ground."""
     force: np.ndarray | None = None
     """(3,) newest specific force, body FLU, m/s^2."""
     gyro: np.ndarray | None = None
     """(3,) newest body rate, FLU, rad/s."""
     time: float = -math.inf
-    """Of the newest measurement, s."""
+    """Time of the newest measurement, s."""
     share: float = 1.0
-    """Of the throttle map's force that is felt, while poses are good."""
+    """The share of the throttle map's force that is measured while poses are good."""
     learned: tuple[tuple[float, Scale, float], ...] = ()
-    """What scale and share were at some moments, s, oldest first: wrong poses teach wrong ones before they are told."""
+    """Scale and share at some moments, s, oldest first. Wrong poses can corrupt the scale and share before they are
+    detected, so older values are kept."""
     frozen: bool = False
-    """The accelerometer repeats itself: the thrust stands for it."""
+    """The accelerometer repeats its numbers. The thrust is used in its place."""
 
     @property
     def reckoned(self) -> Reckoning | None:
-        """The velocity, from the newest pose on."""
+        """The velocity, propagated from the newest pose."""
         return self.reckonings.newest
 
     def at_rest(self) -> "Inertial":
-        """As a flight begins: of earlier ones, which may have ended in a fall, nothing counts but gravity at rest."""
+        """The state at the beginning of a flight. Of earlier flights, which may have ended in a fall, only gravity at
+        rest is kept.
+        """
         return Inertial(rest=self.rest, reckonings=self.reckonings, force=self.force, gyro=self.gyro, time=self.time)
 
     def buried(self, ground: float, now: float) -> bool:
@@ -107,12 +112,12 @@ class Inertial:
 
     @property
     def rest_problem(self) -> str | None:
-        """Why the accelerometer cannot be flown by; None: it can."""
+        """Why the accelerometer must not be used for flight. None: it may."""
         return "it is not heard" if self.rest is None else standing_problem(self.rest)
 
 
 def measure(before: Inertial, m: Measurement, now: float) -> Inertial:
-    """Take in a measurement that came at `now`, s."""
+    """Process a measurement that arrived at `now`, s."""
     rest = before.rest
     if m.standing:
         rest = m.counts if rest is None else rest + REST_SHARE * (m.counts - rest)
@@ -151,16 +156,16 @@ def measure(before: Inertial, m: Measurement, now: float) -> Inertial:
 def see(
     before: Inertial, odometry: Odometry, now: float, *, moved: bool, trusted: bool, turned: float, latest: float
 ) -> Inertial:
-    """Take in an odometry that passed the checks.
+    """Process an odometry that passed the checks.
 
     Args:
-        before: so far.
-        odometry: the newest.
+        before: the state so far.
+        odometry: the newest odometry.
         now: s.
-        moved: it is no repetition of the one before.
-        trusted: the velocity is reckoned on from it.
+        moved: it is not a repetition of the previous one.
+        trusted: the velocity is propagated from it.
         turned: error of its heading, rad.
-        latest: so late poses may be, s.
+        latest: the largest accepted delay of poses, s.
     """
     watch = motion_watch.see(before.watch, odometry, latest)
     if not (moved and trusted):
@@ -181,17 +186,17 @@ def carry(
     *,
     held: tuple[float, float] | None = None,
 ) -> Inertial:
-    """Reckon on to `now`, s: see `reckoning.reckon`.
+    """Propagate the velocity to `now`, s; see `reckoning.reckon`.
 
-    A controller that is not heard may get the commands, or hold the last one: both are reckoned, and the first
-    measurement afterwards tells which.
+    A controller that is not heard may receive the commands, or may hold the last one. Both cases are computed, and the
+    first measurement afterwards shows which one is true.
 
     Args:
-        before: so far.
-        attitude: the controller's; None: not known.
-        thrust: specific force of the throttle that was sent, and how far it may be off, m/s^2; None: not known.
+        before: the state so far.
+        attitude: the controller's attitude. None: not known.
+        thrust: specific force of the throttle that was sent, and its possible error, m/s^2. None: not known.
         now: s.
-        held: the same of the throttle that was sent as the controller was heard last.
+        held: the same for the throttle that was sent when the controller was last heard.
     """
     force = None if before.force is None or now - before.time > FRESH_S else tuple(before.force.tolist())
 
@@ -208,7 +213,7 @@ def carry(
 
 
 def _after_silence(before: Inertial, m: Measurement, force: np.ndarray, now: float) -> Reckonings:
-    """The velocity by what has come of the commands while nothing was heard."""
+    """The velocity according to the commands that arrived while nothing was heard."""
     if before.held is None or before.held_thrust is None or m.thrust is None or now - before.time <= FRESH_S:
         return before.reckonings
     z = float(force[2])
@@ -217,7 +222,7 @@ def _after_silence(before: Inertial, m: Measurement, force: np.ndarray, now: flo
 
 
 def alone(before: Inertial, *, wrong: bool) -> Inertial:
-    """From here on without poses: see `Reckonings.alone`."""
+    """Continue without poses; see `Reckonings.alone`."""
     if wrong and before.learned:
         _, scale, share = before.learned[0]
         before = replace(before, scale=scale, share=share)
@@ -226,13 +231,13 @@ def alone(before: Inertial, *, wrong: bool) -> Inertial:
 
 
 def feel_for_ground(before: Inertial, thrust: float, now: float, *, overdue: bool) -> Inertial:
-    """In a landing without poses: begin to feel for the ground, where there is a reason.
+    """In a landing without poses: begin to test for the ground, if there is a reason.
 
     Args:
-        before: so far.
-        thrust: by the throttle now, m/s^2.
+        before: the state so far.
+        thrust: thrust from the present throttle, m/s^2.
         now: s.
-        overdue: by its height the vehicle ought to stand.
+        overdue: by its height, the vehicle should already stand.
     """
     if before.force is None or now - before.time > FRESH_S:
         return before

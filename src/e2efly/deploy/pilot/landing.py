@@ -1,7 +1,8 @@
-"""The landing: by odometry, without it, and while nothing is heard of the controller. Pure.
+"""The landing: with odometry, without it, and while the controller is not heard. Pure.
 
-It ends where the vehicle stands: at the height of its take-off by the odometry, higher up only where something is felt
-to carry it, without odometry where the ground is felt or by the clock; and never while the link is silent.
+It ends where the vehicle stands. With odometry, this is at the height of its take-off, or higher only if something is
+felt to carry it. Without odometry, it ends when the ground is felt, or after a time. It never ends while the link is
+silent.
 """
 
 import dataclasses
@@ -16,30 +17,33 @@ from e2efly.deploy.pilot.hover import blind_time
 from e2efly.deploy.settings import FlightSettings
 
 STANDING = 0.1
-"""A still vehicle this near to the height at which it stood before stands there again, m."""
+"""A still vehicle within this distance of the height at which it stood before stands there again, m."""
 SLOW = 0.5
 """Horizontal speed below which a landing sinks, m/s ..."""
 SLOWED_S = 3.0
-"""... or after so long: in a gust it may never be that slow, s."""
+"""... or after this time, because in a gust the vehicle may never be that slow, s."""
 UNHEARD_SINK = 0.35
-"""While the link is silent it sinks so slowly, m/s: the newest command may be held for long."""
+"""Sink speed while the link is silent, m/s. It is small because the newest command may be held for a long time."""
 LEAD = 0.6
-"""How far the target of a landing may be under the vehicle, m: farther shows no more than that there is ground."""
+"""How far the target of a landing may be under the vehicle, m. A larger distance only shows that the ground is
+there."""
 PRESSED = 0.5
-"""A still vehicle with its target so far under it stands on something, m."""
+"""A still vehicle whose target is this far under it stands on something, m."""
 PRESSING = 0.5
-"""One that is still in the air, by its height, is pressed down ever harder until it is felt that it stands, m/s."""
+"""A vehicle that is still although its height is not that of the ground is pressed down more and more, until it is felt
+that it stands, m/s."""
 FOUND_S = 0.5
-"""Odometry that was lost in a landing must be good for so long, s, to be flown by again: one that comes and goes must
-not begin the landing anew each time."""
+"""Odometry that was lost in a landing must be good for this time before it is used again, s. Odometry that comes and
+goes must not restart the landing each time."""
 STAYS_S, AWAY_S = 1.0, 3.0
-"""A landing that stays at one place for so long has ended at home, s, and, sent down blindly, elsewhere, s."""
+"""A landing has ended when the vehicle has stayed at one place for `STAYS_S` at home, or for `AWAY_S` elsewhere if it
+descends blindly, s."""
 RECENT_S = 0.5
-"""An odometry as old as this still tells that the vehicle stands, s."""
+"""Odometry up to this age still shows that the vehicle stands, s."""
 
 
 def land(settings: FlightSettings, flight: Flight, inputs: Inputs, *reasons: str) -> Flight:
-    """Begin a landing for these reasons: by odometry where there is some, without it otherwise."""
+    """Begin a landing for these reasons: with odometry if there is some, otherwise without it."""
     if inputs.seen is None:
         return _blindly(settings, flight, inputs, *reasons)
     return to(flight, Mode.LAND, *reasons, target=_down_from(settings, inputs.seen))
@@ -52,7 +56,9 @@ def _blindly(settings: FlightSettings, flight: Flight, inputs: Inputs, *reasons:
 
 
 def _down_from(settings: FlightSettings, odometry: Odometry) -> Target:
-    """Where it can stop, but no higher than it is: what has nearly landed must not rise to the fence's floor."""
+    """Where the vehicle can stop, but no higher than it is. A vehicle that has nearly landed must not rise to the
+    fence's floor.
+    """
     target = stopping(settings.fence, odometry)
     x, y, z = target.position
     return dataclasses.replace(target, position=(x, y, min(z, float(odometry.position[2]))))
@@ -61,7 +67,7 @@ def _down_from(settings: FlightSettings, odometry: Odometry) -> Target:
 def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
     """A landing after another control step of `dt` s."""
     flight = _looked(flight, inputs)
-    if inputs.link_problem and inputs.silent:  # what it does meanwhile is not known: nothing counts as landed
+    if inputs.link_problem and inputs.silent:  # its motion is not known: nothing counts as landed
         return _unheard(settings, flight, inputs, dt)
     if has_stood(settings, flight, inputs.odometry):
         assert inputs.odometry is not None
@@ -83,7 +89,9 @@ def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
 
 
 def _lowered(settings: FlightSettings, flight: Flight, odometry: Odometry, dt: float) -> Flight:
-    """The target sinks by another control step, and never far under the vehicle; since when that has been still."""
+    """Lower the target by one control step, but never far under the vehicle. Also note since when the vehicle has been
+    still.
+    """
     assert flight.target is not None
     x, y, z = flight.target.position
     height = float(odometry.position[2])
@@ -97,7 +105,7 @@ def _lowered(settings: FlightSettings, flight: Flight, odometry: Odometry, dt: f
 
 
 def _see(settings: FlightSettings, flight: Flight, odometry: Odometry) -> Flight:
-    """Land by odometry from where it is."""
+    """Land with odometry from the present position."""
     return dataclasses.replace(
         flight, blind=False, found_since=None, lost=None, target=_down_from(settings, odometry), still_since=None,
         nearest=math.inf,
@@ -105,9 +113,10 @@ def _see(settings: FlightSettings, flight: Flight, odometry: Odometry) -> Flight
 
 
 def _unheard(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
-    """While the link is down: it goes on landing, as its commands may arrive, but no clock of the landing runs.
+    """While the link is down: the landing goes on, because its commands may arrive, but no timer of the landing runs.
 
-    It may drift far meanwhile, so its target goes with it: once heard again it stops there, and does not fly back.
+    The vehicle may drift far meanwhile, so its target moves with it. Once it is heard again, it stops there and does
+    not fly back.
     """
     if inputs.seen is None:
         flight = dataclasses.replace(flight, still_since=None)
@@ -122,7 +131,7 @@ def _unheard(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float
 
 
 def _looked(flight: Flight, inputs: Inputs) -> Flight:
-    """In a landing: since when the newest odometry, good or lost just now, has stayed at one place."""
+    """In a landing: note since when the newest odometry, good or just lost, has stayed at one place."""
     odometry = inputs.odometry
     if odometry is None or flight.misled or flight.now - odometry.time > RECENT_S:
         return dataclasses.replace(flight, standing_since=None, stood_at=None)
@@ -135,7 +144,7 @@ def _looked(flight: Flight, inputs: Inputs) -> Flight:
 
 
 def has_stood(settings: FlightSettings, flight: Flight, odometry: Odometry | None) -> bool:
-    """Whether a landing has stayed at one place for so long that it has ended there, by the newest odometry."""
+    """Whether a landing has stayed at one place long enough to have ended there, according to the newest odometry."""
     if odometry is None or flight.standing_since is None:
         return False
     stayed = flight.now - flight.standing_since
@@ -145,7 +154,9 @@ def has_stood(settings: FlightSettings, flight: Flight, odometry: Odometry | Non
 
 
 def _last_seen(settings: FlightSettings, flight: Flight, inputs: Inputs) -> tuple[float, float, float]:
-    """Now, and the height over home, m, and the climb, m/s, that the newest odometry tells; mirrored, it is as high."""
+    """Now, and the height over home, m, and the climb, m/s, from the newest odometry. Absolute values are used because
+    it may be mirrored.
+    """
     o = inputs.odometry
     height, climb = (math.nan, math.nan) if o is None else (float(o.position[2]) - flight.home, float(o.velocity[2]))
     if not math.isfinite(height):
@@ -154,7 +165,9 @@ def _last_seen(settings: FlightSettings, flight: Flight, inputs: Inputs) -> tupl
 
 
 def _sinking(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
-    """Landing without odometry ends with the ground felt, or by the clock: what has landed must not start up again."""
+    """A landing without odometry ends when the ground is felt, or after a time. A vehicle that has landed must not
+    start up again.
+    """
     if not flight.blind:
         return _blindly(settings, flight, inputs, inputs.blindness)
     if inputs.touched:
@@ -168,6 +181,6 @@ def _sinking(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
 
 
 def stands(settings: FlightSettings, flight: Flight, odometry: Odometry) -> bool:
-    """Whether it is still, at the height of its take-off."""
+    """Whether the vehicle is still, at the height of its take-off."""
     still = float(np.linalg.norm(odometry.velocity)) < settings.still_speed
     return still and abs(float(odometry.position[2]) - flight.home) < STANDING

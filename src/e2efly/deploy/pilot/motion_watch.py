@@ -20,9 +20,9 @@ from e2efly.deploy.pose.tracking import rotation_between
 from e2efly.vehicles.vehicle import GRAVITY
 
 MEMORY_S = 0.5
-"""Over which changes are compared, s."""
+"""Time over which changes are compared, s."""
 LATEST_S = 0.16
-"""Poses may be so late, s."""
+"""The largest delay of poses that is considered, s."""
 STEADY_S, LARGEST_STEADY = 4.0, 0.8
 """What of the difference stays for longer is a tilted sensor, s; its bound, m/s^2."""
 SPEED, SPEED_SHARE = 0.3, 0.6
@@ -51,7 +51,7 @@ class Felt:
     """What the inertial sensors felt up to a moment, fading with `MEMORY_S`."""
 
     time: float
-    """s."""
+    """Time, s."""
     speed: np.ndarray
     """(3,) change of velocity, world, by the heading of the poses, m/s."""
     lift: float
@@ -64,7 +64,7 @@ class Felt:
 
 @dataclass(frozen=True)
 class Differs:
-    """How poses and sensors differ."""
+    """The differences between poses and sensors."""
 
     speed: np.ndarray
     """(3,) change of velocity, world, m/s."""
@@ -84,7 +84,7 @@ class MotionWatch:
     """What was compared so far. `MotionWatch()` before the first measurement."""
 
     felt: tuple[Felt, ...] = ()
-    """Of the last `LATEST_S`."""
+    """What was felt within the last `LATEST_S`."""
     effort: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """All that was felt, whatever its direction, fading: along the ground and up, m/s, and turned, rad."""
     doubt: float = 0.0
@@ -96,11 +96,11 @@ class MotionWatch:
     turn: np.ndarray | None = None
     """(3,) angle turned that the odometry told, fading, body FLU, rad."""
     steady: np.ndarray | None = None
-    """(3,) what stays of the difference, world, m/s^2."""
+    """(3,) lasting part of the difference, world, m/s^2."""
     differs: Differs = NOTHING
-    """Now."""
+    """The present differences."""
     lasting: float = 0.0
-    """For how long they have differed by too much, s."""
+    """How long they have differed by too much, s."""
     late: float = 0.0
     """How late the poses were when that could be told last, s; at most `LATEST_S`."""
     late_for: float = 0.0
@@ -108,21 +108,21 @@ class MotionWatch:
 
     @property
     def problem(self) -> str | None:
-        """How the poses contradict the sensors in flight; None: they do not."""
+        """How the poses contradict the sensors in flight. None: they do not."""
         if self.late_for >= LASTING_S and not self._accelerometer:
             return f"poses are {self.late:.2f} s late or more, and the controller's gains are for less (--latency)"
         return self._text if self.lasting >= LASTING_S and not self._accelerometer else None
 
     @property
     def accelerometer_problem(self) -> str | None:
-        """How the accelerometer contradicts poses and throttle, which agree; None: it does not."""
+        """How the accelerometer contradicts poses and throttle, which agree. None: it does not."""
         if self.lasting < BLAMED_S or not self._accelerometer:
             return None
         return f"it contradicts poses and throttle, which agree, by {abs(float(self.differs.speed[2])):.1f} m/s"
 
     @property
     def opposed(self) -> str | None:
-        """How the poses contradict the sensors while the vehicle is carried; None: they do not."""
+        """How the poses contradict the sensors while the vehicle is carried. None: they do not."""
         x, y, z = (float(d) for d in self.differs.speed)
         off = (math.hypot(x, y), abs(z), self.differs.turn)
         apart = any(
@@ -133,7 +133,7 @@ class MotionWatch:
 
     @property
     def agrees(self) -> bool:
-        """It was moved, and poses and sensors told the same."""
+        """Whether the vehicle was moved, and poses and sensors agreed."""
         return self.moved > MOVED and float(np.linalg.norm(self.differs.speed)) < ALIKE * self.moved
 
     @property
@@ -143,7 +143,7 @@ class MotionWatch:
 
     @property
     def _accelerometer(self) -> bool:
-        """The throttle takes the side of the poses."""
+        """Whether the throttle agrees with the poses."""
         x, y, z = (abs(float(v)) for v in self.differs.speed)
         return math.hypot(x, y) < z / 2 and abs(self.differs.lift) + self.doubt < z / 2 and not self._turned
 

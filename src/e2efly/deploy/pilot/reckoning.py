@@ -1,4 +1,4 @@
-"""Without odometry: the velocity seen last, carried on by the accelerometer and by the throttle.
+"""Flight without odometry: the last known velocity, propagated with the accelerometer and with the throttle.
 
 Neither is good for long: an accelerometer that is wrong by 1 % of gravity is off by half a metre a second after five,
 and so is a throttle map. But the map was learned while poses were good, and knows how well. The vertical speed is the
@@ -26,7 +26,7 @@ BRAKE_GAIN, BRAKE_ACCELERATION = 1.5, 3.0
 BRAKE_S = 2.0
 """Horizontal motion is braked for so long, s: then its reckoning is too old, and the vehicle is held level."""
 SINK_GAIN = 3.0
-"""Acceleration over the error of the vertical speed, 1/s."""
+"""Acceleration divided by the error of the vertical speed, 1/s."""
 FASTEST_SINK, LOW_SINK, LOW = 2.0, 1.3, 3.0
 """The speed of sinking grows up to the first, m/s, and below the height in the last, m, up to the second."""
 SAG, SMOOTH_S, SAG_RATE, SAG_S = 0.02, 0.1, 0.05, 0.3
@@ -36,7 +36,7 @@ the accelerometer."""
 SLOWER = 0.3
 """The height is reckoned with a speed that is so much higher, m/s, at most."""
 DOUBT = 0.05
-"""Error of the vertical speed that the poses show, m/s."""
+"""Error of the vertical speed from the poses, m/s."""
 ANCHOR_S, ANCHORS = 0.2, 6
 """Between two poses from which the velocity is reckoned on, s, and how many there are: those of the last moments may
 have been wrong already when that is found out, and one alone is noisy."""
@@ -52,15 +52,15 @@ class Reckoning:
     velocity: tuple[float, float, float]
     """Forward, left and up along the heading, by the accelerometer, m/s."""
     lifted: float
-    """Vertical speed by the throttle, m/s."""
+    """Vertical speed from the throttle, m/s."""
     doubt: float
-    """How far that one may be off, m/s."""
+    """Possible error of that speed, m/s."""
     share: float
     """Of the throttle's thrust that comes, as a battery sags."""
     time: float
-    """Up to when it is reckoned, s."""
+    """Time up to which it is propagated, s."""
     since: float
-    """When the odometry was seen last, s."""
+    """When the odometry was last seen, s."""
     height: float
     """Reckoned from the odometry's last, world, m: the largest that is plausible."""
     unlike: float | None = None
@@ -77,9 +77,9 @@ class Reckonings:
     """The velocity, reckoned on from several poses. `Reckonings()` before the first."""
 
     newest: Reckoning | None = None
-    """From the newest pose on."""
+    """Propagated from the newest pose."""
     anchors: tuple[Reckoning, ...] = ()
-    """From older poses on, oldest first."""
+    """Propagated from older poses, oldest first."""
 
     def seen(self, newest: Reckoning) -> "Reckonings":
         """With another pose."""

@@ -33,7 +33,7 @@ BELIEVED = (0.25, 4.0)
 VOLTAGE_BELIEVED = (0.6, 1.4)
 """Voltage over that at which the factor holds, between which it is believed."""
 NOISE = 0.1
-"""Of the accelerometer and of what the map leaves out, standard deviation, gravities."""
+"""Standard deviation of the accelerometer's noise and of what the map leaves out, gravities."""
 WANDER = np.diag([4e-6, 1e-5])
 """Variance that factor and voltage gain gain a second: the factor is followed within 7 s, the gain within minutes."""
 START = ((0.05, 0.0), (0.0, 0.5))
@@ -52,7 +52,7 @@ class ThrottleMap:
     """Throttle (0: idle, 1: full) against specific force along body z, m/s^2. Make it with `ThrottleMap.of`."""
 
     vehicle_hash: str
-    """Of the vehicle that it is a map of."""
+    """Hash of the vehicle to which the map belongs."""
     mass: float
     """kg."""
     thrust_map: tuple[float, float, float]
@@ -68,11 +68,11 @@ class ThrottleMap:
     learned: tuple[float, float] = (1.0, 2.0)
     """The factor at `voltage`, and its voltage gain, as the filter has them."""
     covariance: tuple[tuple[float, float], tuple[float, float]] = START
-    """Of `learned`."""
+    """Covariance of `learned`."""
     last_voltage: float | None = None
-    """The last that was believed, V per cell; None: none yet."""
+    """The last voltage that was trusted, V per cell. None: none yet."""
     updates: int = 0
-    """Measurements learned from."""
+    """Number of measurements learned from."""
     residual: float = 0.0
     """Smoothed root of the squared error of its predictions, m/s^2."""
 
@@ -99,7 +99,7 @@ class ThrottleMap:
         return 4 * max((k2 * speed + k1) * speed + k0, 0.0) / self.mass
 
     def force(self, throttle: float, voltage: float | None = None) -> float:
-        """Specific force, m/s^2, of a throttle, as learned; voltage of a cell, None: the last that was known."""
+        """Specific force, m/s^2, of a throttle, as learned. `voltage` is per cell. None: the last known voltage."""
         return self.nominal(throttle) * self._factor(voltage)
 
     def expected(self, throttle: float, voltage: float | None = None) -> tuple[float, float]:
@@ -184,7 +184,7 @@ def _towards(value: float, goal: float, reach: float) -> float:
 
 
 def as_json(m: ThrottleMap) -> str:
-    """What was learned, to be saved with the flight and offered to the next."""
+    """What was learned, as JSON, to be saved with the flight and offered to the next."""
     values = (m.vehicle_hash, m.voltage, *m.learned, m.updates, m.residual)
     return json.dumps(finite(dict(zip(_FIELDS, values, strict=True))), indent=2)
 
@@ -223,14 +223,14 @@ def _refusal(name: str, value: Any, accepted: str) -> ValueError:
 
 
 class ThrottleHistory:
-    """The throttles that were sent, to be met with what they caused."""
+    """The throttles that were sent, to be matched with the forces that they caused."""
 
     def __init__(self, seconds: float = 5.0) -> None:
         self._sent: deque[tuple[float, float]] = deque()
         self._seconds = seconds
 
     def add(self, time: float, throttle: float) -> None:
-        """A throttle was sent at `time`, s."""
+        """Add a throttle that was sent at `time`, s."""
         self._sent.append((time, throttle))
         while self._sent and self._sent[0][0] < time - self._seconds:
             self._sent.popleft()

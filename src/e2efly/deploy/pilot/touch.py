@@ -1,7 +1,8 @@
-"""The ground, felt without poses: it carries a vehicle whose rotors do not.
+"""Detects the ground without poses: the ground carries a vehicle whose rotors do not.
 
-In the air the force that the accelerometer feels follows the throttle, whatever the scale of either; on the ground it
-stays. After a shock, or where the ground is overdue, the thrust is lowered for a moment, and the force is watched.
+In the air, the force that the accelerometer measures follows the throttle, whatever the scale of either. On the ground
+it stays constant. After a shock, or when the ground is overdue, the thrust is lowered for a moment and the force is
+observed.
 """
 
 import math
@@ -10,11 +11,11 @@ from dataclasses import dataclass, replace
 from e2efly.vehicles.vehicle import GRAVITY
 
 SHOCK = 3.0
-"""Force beyond what thrust explains that a touch of the ground shows, m/s^2."""
+"""Force beyond the thrust that shows a touch of the ground, m/s^2."""
 DIP, DIP_S = 0.15, 0.32
 """Share of the thrust that is left out for so long, s, to feel whether the ground carries."""
 DELAY_S = 0.12
-"""From the arrival of a command until the force shows it, s."""
+"""Time from the arrival of a command until the force shows it, s."""
 ENOUGH = 5
 """Measurements of each kind by which a dip is judged; those of several dips are taken together until there are so
 many, as a bad link lets few through."""
@@ -25,7 +26,7 @@ FOLLOWS = 0.5
 WEIGHT = (0.75, 1.3)
 """Force of what stands, gravities, by an accelerometer that is calibrated badly."""
 AGAIN_S = 1.0
-"""Between two dips, s."""
+"""The shortest time between two dips, s."""
 USUAL_S, UNUSUAL = 0.5, 1.5
 """Over which the difference of force and thrust is smoothed, s; beyond this difference, m/s^2, it is a shock's."""
 FROZEN_S, IGNORED, LONGEST_SAME_S = 0.15, 0.4, 0.4
@@ -66,7 +67,7 @@ class Touch:
     """For how long the force has been beyond the thrust, s."""
 
     def factor(self, now: float) -> float:
-        """By which the thrust is multiplied at `now`, s."""
+        """The factor by which the thrust is multiplied at `now`, s."""
         return 1 - DIP if now - self.dip < DIP_S else 1.0
 
     def afresh(self) -> "Touch":

@@ -1,4 +1,4 @@
-"""What a sample of a pose source must satisfy before anything flies by it."""
+"""The conditions that a sample of a pose source must satisfy before it is used for flight."""
 
 import math
 from dataclasses import dataclass, fields
@@ -17,50 +17,55 @@ REASONS = {
     "velocity": "its velocity disagrees with how its position changes",
     "starting": "too few samples for an estimate of velocity or body rate",
 }
-"""First word of each reason, before a colon, and what it means."""
+"""The first word of each reason, before a colon, and its meaning."""
 
 
 @dataclass(frozen=True)
 class Checks:
-    """What a sample must satisfy, and how motion is estimated."""
+    """The conditions that a sample must satisfy, and how motion is estimated."""
 
     frame: str = ""
-    """Name of the frame that samples must carry; empty: any."""
+    """Name of the frame that samples must have. Empty: any frame."""
     max_age: float = 0.1
-    """Longest time from true to arrived, beyond the shortest of the source, s."""
+    """The longest delay from measurement to arrival, beyond the source's shortest delay, s."""
     latency: float = 0.0
-    """Shortest time from true to arrived, s, as the source's data sheet says: no clock mapping can see it."""
+    """The shortest delay from measurement to arrival, s, from the source's data sheet. No clock mapping can measure
+    it."""
     clock_jump: float = 0.05
-    """Steps of the source's clock larger than this are reported, s."""
+    """Jumps of the source's clock that are larger than this are reported, s."""
     out_of_order: str = "refuse"
-    """What to say of samples that are not later than the one before: "refuse" gives a reason, "ignore" none."""
+    """What to do with samples that are not later than the one before. "refuse" gives a reason, "ignore" gives none."""
     quaternion_tolerance: float = 0.01
-    """How far the length of the quaternion may be from 1; within, it is normalised."""
+    """The largest deviation of the quaternion's length from 1. Within this limit, the quaternion is normalised."""
     jump_position: float = 0.05
-    """Step of the position that is allowed between any two samples, m, added to `jump_speed` times their interval."""
+    """Position step that is allowed between any two samples, m. `jump_speed` times their interval is added to it."""
     jump_speed: float = 15.0
     """Largest speed, m/s."""
     jump_attitude: float = 0.2
-    """Step of the attitude that is allowed between any two samples, rad, added to `jump_rate` times their interval."""
+    """Attitude step that is allowed between any two samples, rad. `jump_rate` times their interval is added to it."""
     jump_rate: float = 35.0
     """Largest body rate, rad/s."""
     jump_count: int = 3
-    """Successive samples at a place that was jumped to after which the jump stays a fault."""
+    """Number of successive samples at the place of a jump after which the jump becomes a lasting fault."""
     frozen_after: float = 0.2
-    """How long the pose may repeat bit for bit, s; infinite for a source without noise."""
+    """How long the pose may repeat bit for bit, s. Use infinity for a source without noise."""
     velocity_cutoff: float = 15.0
-    """Corner of the low-pass of the estimated velocity, Hz; its delay is 1 / (pi * cutoff), 21 ms at 15 Hz."""
+    """Cut-off frequency of the low-pass filter of the estimated velocity, Hz. Its delay is 1 / (pi * cutoff): 21 ms at
+    15 Hz."""
     rate_cutoff: float = 30.0
-    """Corner of the low-pass of the estimated body rate, Hz; its delay is 1 / (pi * cutoff), 11 ms at 30 Hz."""
+    """Cut-off frequency of the low-pass filter of the estimated body rate, Hz. Its delay is 1 / (pi * cutoff): 11 ms at
+    30 Hz."""
     velocity_mismatch: float = 2.0
-    """Largest difference between the velocity that the source gives and the one estimated from its positions, m/s,
-    added to 0.3 times the speed: larger when a source leaves its velocity at zero or gives it in another frame."""
+    """The largest difference between the source's velocity and the velocity estimated from its positions, m/s. 0.3
+    times the speed is added to it. The difference is larger if a source leaves its velocity at zero or gives it in
+    another frame."""
     velocity_drift: float = 0.08
-    """How far, within half a second, the velocity that the source gives may lead away from its positions, m ..."""
+    """The largest distance, m, between the path that the source's velocities give and its positions, within half a
+    second. `velocity_share` of the path is added to it."""
     velocity_share: float = 0.3
-    """... and share of the way that is added to it."""
+    """The share of the path's length that is added to `velocity_drift`."""
     gap: float = 0.5
-    """After a pause longer than this the estimates of velocity and body rate start anew, s."""
+    """After a pause longer than this, the estimates of velocity and body rate start again, s."""
 
     def __post_init__(self) -> None:
         for name in (f.name for f in fields(self)):

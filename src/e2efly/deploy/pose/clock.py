@@ -1,20 +1,20 @@
-"""From a source's clock to this machine's monotonic clock. Pure.
+"""The mapping from a source's clock to this machine's monotonic clock. Pure.
 
-A message that was true at `stamp` on the source's clock arrives at `received` on ours. `received - stamp` is the
-difference of the clocks plus the delay of this message; its running minimum is the difference plus the smallest delay,
-so mapping by the minimum takes the jitter of the way out of the times. The minimum may rise slowly, as two crystals
-drift apart.
+A message that was true at `stamp` on the source's clock arrives at `received` on this machine's clock. `received -
+stamp` is the difference of the clocks plus the delay of this message. Its running minimum is the difference plus the
+smallest delay. Mapping with the minimum therefore removes the jitter of the delay from the times. The minimum may rise
+slowly, because two crystals drift apart.
 """
 
 from dataclasses import dataclass
 
 DRIFT = 2e-4
-"""How fast the running minimum may rise, s/s: twice what two ordinary crystals (50 ppm each) drift apart."""
+"""How fast the running minimum may rise, s/s. This is twice the drift between two ordinary crystals (50 ppm each)."""
 
 
 @dataclass(frozen=True)
 class ClockMap:
-    """Maps stamps of one source."""
+    """Maps the stamps of one source."""
 
     offset: float
     """Running minimum of received - stamp, s."""
@@ -28,16 +28,16 @@ def start_clock(received: float, stamp: float) -> ClockMap:
 
 
 def follow_clock(clock: ClockMap, received: float, stamp: float) -> tuple[ClockMap, float]:
-    """Take one message in.
+    """Process one message.
 
     Args:
         clock: the map so far.
-        received: when it arrived, s on the local monotonic clock.
-        stamp: when it was true, s on the source's clock; later than the last one.
+        received: time of arrival, s on the local monotonic clock.
+        stamp: time at which the message was true, s on the source's clock. It must be later than the last one.
 
     Returns:
-        The map, and the time of the message, s on the local monotonic clock: at most `received`, and early by no more
-        than the drift of the clocks since the message that took the shortest way.
+        The map, and the time of the message, s on the local monotonic clock. This time is at most `received`. It is
+            early by at most the drift of the clocks since the message with the shortest delay.
     """
     offset = min(clock.offset + DRIFT * (stamp - clock.stamp), received - stamp)
     return ClockMap(offset, stamp), stamp + offset

@@ -1,4 +1,4 @@
-"""Poses as JSON, one object per message: what datagrams and lines hold."""
+"""Poses as JSON, one object per message: the content of datagrams and lines."""
 
 import contextlib
 import json
@@ -13,11 +13,12 @@ from e2efly.storage import unique
 from e2efly.vehicles.names import nearest
 
 ARRAYS = {"position": 3, "quaternion": 4, "velocity": 3, "body_rate": 3}
-"""Numbers of each array; the first two must be there."""
+"""Number of elements of each array. The first two arrays are required."""
 KEYS = (*ARRAYS, "stamp", "frame")
 """All keys of a message."""
 LONGEST_GUESS = 20
-"""Characters of an unknown key for which a known one is looked for: the comparison takes long for long ones."""
+"""Only so many characters of an unknown key are compared with the known keys, because the comparison is slow for long
+keys."""
 
 
 def parse_pose(message: bytes, received: float) -> Sample:
@@ -25,7 +26,7 @@ def parse_pose(message: bytes, received: float) -> Sample:
 
     Args:
         message: a JSON object in UTF-8; see `docs/pose-sources.md`.
-        received: when it arrived, s on the local monotonic clock.
+        received: time of arrival, s on the local monotonic clock.
 
     Raises:
         ValueError: naming the key, the value and what is accepted.
@@ -39,15 +40,15 @@ def parse_pose(message: bytes, received: float) -> Sample:
 
 
 def object_of(what: str, message: bytes, keys: tuple[str, ...]) -> dict[str, Any]:
-    """The JSON object that a message is.
+    """Parse the JSON object in a message.
 
     Args:
-        what: to call the message.
-        message: in UTF-8.
-        keys: that are known.
+        what: the name of the message for error messages.
+        message: the message in UTF-8.
+        keys: the known keys.
 
     Raises:
-        ValueError: for what is no such object, naming the key where there is one.
+        ValueError: if it is not such an object. The message names the key if there is one.
     """
     if len(message) > LONGEST:
         raise ValueError(f"{what}: {len(message)} bytes; accepted: at most {LONGEST}")
@@ -66,7 +67,7 @@ def object_of(what: str, message: bytes, keys: tuple[str, ...]) -> dict[str, Any
 
 
 def header_of(what: str, content: dict[str, Any]) -> tuple[float | None, str]:
-    """The stamp of a message, s, None where it has none, and its frame, empty where it has none.
+    """The stamp of a message, s, or None if there is none, and its frame, or an empty text if there is none.
 
     Raises:
         ValueError: naming the key, the value and what is accepted.
@@ -96,7 +97,7 @@ def number_of(what: str, key: str, value: Any, accepted: str = "a finite number"
     Raises:
         ValueError: naming the key, the value and what is accepted.
     """
-    if type(value) in (int, float):  # not bool, which is an int to Python
+    if type(value) in (int, float):  # not bool, which is an int in Python
         with contextlib.suppress(OverflowError):
             number = float(value)
             if math.isfinite(number):
@@ -109,6 +110,6 @@ def _no_constant(name: str) -> float:
 
 
 def short(value: Any) -> str:
-    """A value of a message, in few characters."""
+    """A value of a message, shortened to a few characters."""
     text = repr(value)
     return text if len(text) <= 80 else f"{text[:77]}..."

@@ -1,16 +1,17 @@
 """How often a pose source delivers, and how old the newest pose becomes before the next one. Pure.
 
-A source that is slow, or that has a gap twice a second, is good for a moment between two gaps. A take-off in such a
-moment would be given up at the next gap. So the last seconds are judged before it.
+A source that is slow, or that has a gap twice a second, looks good for a moment between two gaps. A take-off in such a
+moment would be aborted at the next gap. Therefore the last seconds before a take-off are judged.
 """
 
 import math
 from dataclasses import dataclass, replace
 
 WINDOW_S = 3.0
-"""What is judged: at most the last so many seconds, at least half of them."""
+"""Length of the window that is judged, s: at most this many seconds, and at least half of them."""
 SHARE = 0.75
-"""Of `odometry_timeout` that the newest pose may become old: what was watched for seconds is no upper bound."""
+"""The share of `odometry_timeout` that the age of the newest pose may reach. A few seconds of observation give no upper
+bound, so some margin is kept."""
 
 
 @dataclass(frozen=True)
@@ -18,19 +19,19 @@ class Half:
     """One half of the window."""
 
     began: float = math.inf
-    """When, s."""
+    """When it began, s."""
     count: int = 0
     """Good poses in it."""
     oldest: float = 0.0
-    """How old the newest pose has become in it, s."""
+    """The largest age that the newest pose reached in it, s."""
 
 
 @dataclass(frozen=True)
 class Pace:
-    """What has been seen of a source so far."""
+    """What has been observed of a source so far."""
 
     time: float | None = None
-    """When the newest good pose was true, s; None before the first."""
+    """When the newest good pose was true, s. None before the first pose."""
     received: float = 0.0
     """When it arrived, s."""
     before: Half = Half()
@@ -45,19 +46,19 @@ class Pace:
 
     @property
     def oldest(self) -> float:
-        """How old the newest pose has become within the window, s."""
+        """The largest age that the newest pose reached within the window, s."""
         return max(self.before.oldest, self.present.oldest)
 
 
 def paced(pace: Pace, time: float, received: float) -> Pace:
-    """The pace with one more good pose.
+    """The pace after one more good pose.
 
     Args:
-        pace: so far.
+        pace: the pace so far.
         time: when the pose was true, s on the local monotonic clock.
         received: when it arrived, s on the same clock.
     """
-    if pace.time is None:  # the first begins the watch, and is no part of its rate
+    if pace.time is None:  # the first pose starts the observation and does not count for the rate
         return Pace(time, received, present=Half(began=received))
     before, present = pace.before, pace.present
     if received - present.began > WINDOW_S / 2:
@@ -67,10 +68,10 @@ def paced(pace: Pace, time: float, received: float) -> Pace:
 
 
 def pace_problem(pace: Pace, timeout: float) -> str | None:
-    """Why nobody should take off by this source, in words; None: it delivers often enough.
+    """The reason, in words, why nobody should take off with this source. None: it delivers often enough.
 
     Args:
-        pace: of the source, in which the age of the newest pose at this moment is not counted.
+        pace: the pace of the source. The age of the newest pose at this moment is not included.
         timeout: `odometry_timeout` of the flight, s.
     """
     accepted = SHARE * timeout

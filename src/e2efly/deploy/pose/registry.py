@@ -1,4 +1,4 @@
-"""The pose sources by name. A source registers itself; one of the user's own is a reference to its file."""
+"""The pose sources by name. A source registers itself. A user's own source is given as a reference to its file."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,9 +16,9 @@ class Kind:
     """A kind of pose source."""
 
     open: Callable[[str], PoseSource]
-    """Opens one, given the text behind its name; raises ValueError with what is accepted."""
+    """Opens a source, given the text after its name. Raises ValueError that says what is accepted."""
     form: str
-    """How it is written."""
+    """How the text for the source is written."""
 
 
 SOURCES: Registry[Kind] = Registry("pose source", source=lambda kind: kind.open)
@@ -28,18 +28,18 @@ F = TypeVar("F", bound=Callable[[str], PoseSource])
 
 
 class MalformedError(ValueError):
-    """The text behind the name of a source is not as its form says."""
+    """The text after the name of a source does not have the form that is required."""
 
 
 def register(name: str, form: str) -> Callable[[F], F]:
-    """Register a function or a class that opens a pose source, given the text behind its name.
+    """Register a function or a class that opens a pose source, given the text after its name.
 
     Args:
-        name: by which `e2efly fly --pose NAME:...` finds it.
-        form: how the whole is written, for people.
+        name: the name in `e2efly fly --pose NAME:...`.
+        form: how the whole text is written, for people.
 
     Raises:
-        ValueError: for a name that is taken.
+        ValueError: if the name is taken.
     """
 
     def registered(opener: F) -> F:
@@ -50,10 +50,10 @@ def register(name: str, form: str) -> Callable[[F], F]:
 
 
 def opened(kind: Kind, text: str, where: str) -> PoseSource:
-    """A source of a kind.
+    """Open a source of a kind.
 
     Raises:
-        ValueError: naming the text and what is accepted; naming the file of a source that lacks a method.
+        ValueError: naming the text and what is accepted, or naming the file of a source that lacks a method.
     """
     try:
         source = kind.open(where)
@@ -67,7 +67,7 @@ def part_of(text: str) -> str:
     """A part of a source's text that must not be empty.
 
     Raises:
-        MalformedError: when it is empty.
+        MalformedError: if it is empty.
     """
     if not text.strip():
         raise MalformedError(text)
@@ -75,10 +75,10 @@ def part_of(text: str) -> str:
 
 
 def port_of(text: str) -> int:
-    """A port.
+    """A port number.
 
     Raises:
-        MalformedError: when it is none.
+        MalformedError: if the text is not a port number.
     """
     if not (text.isascii() and text.isdigit() and 1 <= int(text) <= 65535):
         raise MalformedError(text)

@@ -1,4 +1,4 @@
-"""A source that runs in a process of its own and passes lines on: `process/pose_relay.py`."""
+"""A source that runs in its own process and passes lines on: `process/pose_relay.py`."""
 
 import time
 from collections.abc import Callable
@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 class RelaySource(Generic[T]):
-    """Messages of a relay. Reading them takes neither a thread nor the packages of the peer in this process."""
+    """Messages of a relay. Reading them needs no thread, and needs none of the relay's packages in this process."""
 
     def __init__(
         self,
@@ -25,14 +25,14 @@ class RelaySource(Generic[T]):
         """Start the relay and wait until it is ready.
 
         Args:
-            name: what to call the source.
-            python: the interpreter that has the package of the peer.
-            arguments: of the relay: its kind, and what it needs to know.
-            parse: what a message says; takes it and the time of its arrival, s.
-            what: to call its messages.
+            name: the name of the source in messages.
+            python: the interpreter that has the package that the relay needs.
+            arguments: arguments of the relay: its kind, and what it needs to know.
+            parse: parses a message. It takes the message and its time of arrival, s.
+            what: the name of its messages in error messages.
 
         Raises:
-            ValueError: what the relay says of its failure, or that it does not answer in time.
+            ValueError: with what the relay reports about its failure, or because it does not answer in time.
         """
         self._inbox: Inbox[T] = Inbox(_timed(parse))
         self._name = name
@@ -48,12 +48,12 @@ class RelaySource(Generic[T]):
 
     @property
     def problem(self) -> str | None:
-        """Why the relay has ended, or else what was wrong with a message last."""
+        """Why the relay has ended, or otherwise the last problem with a message."""
         ended = self._child.ended
         return f"{self._name}: {ended}" if ended else self._inbox.problem
 
     def read(self, now: float) -> list[T]:
-        """What came since the last call; `received` is when the relay took them."""
+        """The messages since the last call. `received` is the time at which the relay received them."""
         for line in self._child.lines():
             kind, _, rest = line.partition(b" ")
             if kind == b"message":
@@ -63,16 +63,16 @@ class RelaySource(Generic[T]):
         return self._inbox.take()
 
     def close(self) -> None:
-        """End the relay; takes up to 2 s."""
+        """End the relay. This takes up to 2 s."""
         self._child.close()
 
     def describe(self) -> str:
-        """What it listens to, and by which package of which interpreter."""
+        """What it listens to, and which package of which interpreter it uses."""
         return f"{self._name} ({self._child.detail})"
 
 
 def _timed(parse: Callable[[bytes, float], Any]) -> Callable[[bytes, float], Any]:
-    """Reads `RECEIVED JSON`; the monotonic clock is the same one in all processes of a machine."""
+    """A parser for `RECEIVED JSON`. The monotonic clock is the same in all processes of a machine."""
 
     def parsed(message: bytes, now: float) -> Any:
         received, _, content = message.partition(b" ")
@@ -90,10 +90,10 @@ def open_relay(
     parse: Callable[[bytes, float], Any] = parse_pose,
     what: str = "pose",
 ) -> RelaySource[Any]:
-    """Start a relay by the first interpreter that has its package.
+    """Start a relay with the first interpreter that has the required package.
 
     Raises:
-        ValueError: with what each interpreter says, and the advice.
+        ValueError: with what each interpreter reports, and the advice.
     """
 
     def opened(python: str) -> RelaySource[Any]:

@@ -1,12 +1,13 @@
 """How fast a measured quantity changes: a line fitted with exponential forgetting. Pure.
 
-The line minimises the sum of exp(-rate * age) * |value - line|^2 over all samples so far. It is exact for motion of
-constant speed whatever the times of the samples, needs no start values, and answers as s * rate^2 / (s + rate)^2: a
-derivative behind a critically damped second-order low-pass. With w the rate and T the interval of regular samples:
+The line minimises the sum of exp(-rate * age) * |value - line|^2 over all samples so far. It is exact for motion with
+constant speed, whatever the sample times, and needs no start values. Its transfer function is s * rate^2 / (s +
+rate)^2: a derivative followed by a critically damped second-order low-pass filter. Let w be the rate and T the interval
+of regular samples:
 
 - delay: 2 / w (a constant acceleration a gives an error of -2 a / w);
-- noise: white noise of standard deviation 1 in the value becomes
-  sqrt(2 (1 - b)^3 / (1 + b)^3) / T with b = exp(-w T), about sqrt(w^3 T) / 2, in the slope.
+- noise: white noise of standard deviation 1 in the value becomes sqrt(2 (1 - b)^3 / (1 + b)^3) / T with b = exp(-w T),
+  about sqrt(w^3 T) / 2, in the slope.
 
 Both follow from the moments of the exponential weights: E[age] = 1 / w, E[age^2] = 2 / w^2, E[age^3] = 6 / w^3.
 """
@@ -45,13 +46,13 @@ def start_slope(time: float, value: np.ndarray) -> Slope:
 
 
 def follow_slope(fit: Slope, rate: float, time: float, value: np.ndarray) -> Slope:
-    """Take one sample in.
+    """Add one sample to the fit.
 
     Args:
-        fit: the samples so far.
-        rate: how fast they are forgotten, 1/s.
-        time: when the value was true, s; later than `fit.last`.
-        value: (n,), u.
+        fit: the fit of the samples so far.
+        rate: how fast samples are forgotten, 1/s.
+        time: when the value was true, s. It must be later than `fit.last`.
+        value: (n,) the new value, u.
     """
     kept = math.exp(-rate * (time - fit.last))
     weight = kept * fit.weight + 1
@@ -70,16 +71,20 @@ def follow_slope(fit: Slope, rate: float, time: float, value: np.ndarray) -> Slo
 
 
 def slope(fit: Slope) -> np.ndarray:
-    """(n,) change of the value, u/s; needs two samples at least."""
+    """(n,) rate of change of the value, u/s. It needs at least two samples."""
     return fit.covariance / fit.variance
 
 
 def settled(fit: Slope, rate: float) -> bool:
-    """Whether the noise of the slope is near what it will stay at: three samples over twice the time constant."""
+    """Whether the noise of the slope is near its final level: at least three samples over at least twice the time
+    constant.
+    """
     return fit.count >= 3 and fit.last - fit.first >= 2 / rate
 
 
 def noise_gain(rate: float, interval: float) -> float:
-    """Standard deviation of the slope, u/s, for white noise of 1 u in samples every `interval`, s."""
+    """Standard deviation of the slope, u/s, for white noise with a standard deviation of 1 u in samples every
+    `interval` s.
+    """
     b = math.exp(-rate * interval)
     return math.sqrt(2 * ((1 - b) / (1 + b)) ** 3) / interval

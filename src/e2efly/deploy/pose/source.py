@@ -8,11 +8,12 @@ from e2efly.deploy.odometry import Sample
 
 T = TypeVar("T")
 LARGEST_BATCH = 16
-"""Most messages that one `read` parses: of a flood the newest, so that the control loop stays in time."""
+"""The largest number of messages that one `read` parses. If more arrive, the newest are parsed, so that the control
+loop stays on time."""
 
 
 class PoseSource(Protocol):
-    """Delivers samples as they come. Nothing here blocks or raises once it is open."""
+    """Delivers samples as they arrive. Nothing here blocks or raises once the source is open."""
 
     @property
     def refused(self) -> int:
@@ -21,23 +22,23 @@ class PoseSource(Protocol):
 
     @property
     def problem(self) -> str | None:
-        """What was wrong last; None: nothing so far."""
+        """The last problem. None: no problem so far."""
         ...
 
     def read(self, now: float) -> list[Sample]:
-        """What arrived since the last call, oldest first.
+        """The samples that arrived since the last call, oldest first.
 
         Args:
-            now: this machine's monotonic clock, s; what `Sample.received` is counted on.
+            now: time on this machine's monotonic clock, s, the clock of `Sample.received`.
         """
         ...
 
     def close(self) -> None:
-        """Let go of everything; may be called twice."""
+        """Release all resources. May be called twice."""
         ...
 
     def describe(self) -> str:
-        """What this is, for people and logs."""
+        """A description of the source, for people and logs."""
         ...
 
 
@@ -48,23 +49,25 @@ class PlantSource:
         """Wrap a plant.
 
         Args:
-            state: takes the local time, s, and gives the samples since its last call, oldest first.
-            name: what to call it.
+            state: takes the local time, s, and returns the samples since its last call, oldest first.
+            name: the name of the source in messages.
         """
         self.refused = 0
         self.problem: str | None = None
         self._state, self._name = state, name
 
     def read(self, now: float) -> list[Sample]:
-        """What the plant has produced since the last call; an exception of it is counted and kept as the problem."""
+        """The samples that the plant has produced since the last call. If it raises an exception, this is counted and
+        kept as the problem.
+        """
         try:
             return list(self._state(now))
-        except Exception as error:  # a plant that fails is a source that falls silent, never a crash of the loop
+        except Exception as error:  # a plant that fails is a silent source; it must not crash the loop
             self.refused, self.problem = self.refused + 1, f"{self._name}: {type(error).__name__}: {error}"
             return []
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Does nothing: there are no resources to release."""
 
     def describe(self) -> str:
         """Its name."""
@@ -72,13 +75,13 @@ class PlantSource:
 
 
 class Inbox(Generic[T]):
-    """Messages as they came, parsed when read: the part that all sources of bytes share."""
+    """Messages as they arrived, parsed when they are read. All sources of bytes share this class."""
 
     def __init__(self, parse: Callable[..., T]) -> None:
         """Start empty.
 
         Args:
-            parse: takes a message, its time of arrival, s, and, where `put` was told it, who sent it; raises ValueError
+            parse: takes a message, its time of arrival, s, and the sender, if `put` was given one. Raises ValueError
                 for a malformed message.
         """
         self.refused = 0
@@ -88,21 +91,23 @@ class Inbox(Generic[T]):
         self._come = 0
 
     def put(self, message: bytes, received: float, *sender: str) -> None:
-        """Keep a message; of too many the oldest go."""
+        """Keep a message. If there are too many, the oldest are dropped."""
         self._come += 1
         self._messages.append((message, received, sender))
 
     def extend(self, messages: list[bytes], received: float, dropped: int) -> None:
-        """Keep messages that were read together, before which others were dropped; of too many the oldest go."""
+        """Keep messages that were read together. `dropped` is the number of messages dropped before them. If there are
+        too many, the oldest are dropped.
+        """
         self._come += len(messages) + dropped
         self._messages.extend((message, received, ()) for message in messages)
 
     def refuse(self, problem: str, count: int = 1) -> None:
-        """Count messages that are no samples."""
+        """Count messages that are not samples."""
         self.refused, self.problem = self.refused + count, problem
 
     def take(self) -> list[T]:
-        """What all messages say, oldest first."""
+        """The parsed content of all messages, oldest first."""
         if dropped := self._come - len(self._messages):
             self.refuse(f"more than {LARGEST_BATCH} messages at once; the oldest were dropped", dropped)
         self._come, samples = 0, []

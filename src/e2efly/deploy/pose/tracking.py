@@ -1,7 +1,7 @@
-"""From samples of a pose source to odometry that can be flown by, or to the reason why not. Pure.
+"""From samples of a pose source to odometry that is good enough to fly with, or to the reason for a refusal. Pure.
 
-One sample in, one `Odometry` or one reason out. Nothing that is refused changes the motion: after a refusal the last
-good odometry stays the last good one and grows older, and `age` is what the flight is judged by.
+One sample goes in; one `Odometry` or one reason comes out. A refused sample does not change the motion. After a
+refusal, the last good odometry stays valid as the last good one and grows older. The flight is judged by its `age`.
 """
 
 import math
@@ -15,21 +15,23 @@ from e2efly.deploy.pose.clock import ClockMap, follow_clock, start_clock
 from e2efly.deploy.pose.slope import Slope, follow_slope, settled, slope, start_slope
 
 LARGEST = 1e6
-"""Numbers beyond this are nonsense, and their squares may overflow."""
+"""Numbers beyond this are invalid, and their squares may overflow."""
 TRAVEL_S = 0.5
-"""Over which the way that a source's velocities add up to is compared with that of its positions, s."""
+"""Time over which the path that a source's velocities add up to is compared with the path of its positions, s."""
 LARGEST_STAMP = 1e11
-"""Stamps beyond this, s, are too coarse: a float is then known to 15 microseconds."""
+"""Stamps beyond this are too coarse, s. There, a float is only accurate to 15 microseconds."""
 
 
 @dataclass(frozen=True)
 class Track:
-    """What is remembered of the samples so far; `Track()` before the first, and to start anew after a lasting fault."""
+    """What is remembered of the samples so far. Use `Track()` before the first sample, and to start again after a
+    lasting fault.
+    """
 
     clock: ClockMap | None = None
-    """Map of the source's clock; None before the first stamp."""
+    """Map of the source's clock. None before the first stamp."""
     odometry: Odometry | None = None
-    """The last that was handed out, what `age` counts from."""
+    """The last odometry that was returned. `age` is counted from it."""
     pose: tuple[float, np.ndarray, np.ndarray] | None = None
     """Time, s, position (3,), m, and quaternion (4,) of the last good sample."""
     velocity: Slope | None = None
@@ -37,40 +39,41 @@ class Track:
     body_rate: Slope | None = None
     """Fit of `angle`."""
     strayed: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    """(3,) way by the source's velocities minus that of its positions, fading with `TRAVEL_S`, m."""
+    """(3,) path from the source's velocities minus path of its positions, m. It fades with the time constant
+    `TRAVEL_S`."""
     travelled: float = 0.0
-    """Length of that way, fading, m."""
+    """Length of that path, m. It fades in the same way."""
     angle: np.ndarray = field(default_factory=lambda: np.zeros(3))
     """(3,) sum of the small rotations about the body's axes so far, rad."""
     same_since: float = 0.0
-    """Time since which the pose repeats bit for bit, s."""
+    """Time since which the pose has repeated bit for bit, s."""
     same_pose: bytes = b""
-    """Bits of the last pose as it came."""
+    """Bits of the last pose as it arrived."""
     suspect: tuple[float, np.ndarray, np.ndarray] | None = None
-    """Time, s, position (3,), m, and quaternion (4,) that were jumped to last."""
+    """Time, s, position (3,), m, and quaternion (4,) after the last jump."""
     suspect_count: int = 0
-    """Successive samples there."""
+    """Number of successive samples there."""
     fault: str | None = None
-    """Reason of a fault that only a new `Track()` ends."""
+    """Reason for a fault that only a new `Track()` ends."""
 
 
 def age(track: Track, now: float) -> float:
-    """How old the last odometry is, s; infinite before the first. `now` is on the local monotonic clock, s."""
+    """Age of the last odometry, s. Infinite before the first one. `now` is on the local monotonic clock, s."""
     return now - track.odometry.time if track.odometry is not None else math.inf
 
 
 def track(checks: Checks, track: Track, sample: Sample) -> tuple[Track, Odometry | None, str | None]:
-    """Check one sample and estimate what it does not say.
+    """Check one sample and estimate what it does not contain.
 
     Args:
-        checks: what it must satisfy.
-        track: what is remembered of the samples before.
-        sample: the sample; samples must come in the order in which they were received.
+        checks: the conditions that the sample must satisfy.
+        track: what is remembered of the earlier samples.
+        sample: the sample. Samples must come in the order in which they were received.
 
     Returns:
-        What to remember; the odometry, or None; why there is none, or None. A reason starts with a key of `REASONS` and
-        a colon, and names the value and what is accepted. Neither odometry nor reason: a sample out of order that is
-        ignored.
+        The new track; the odometry, or None; the reason why there is none, or None. A reason starts with a key of
+            `REASONS` and a colon, and names the value and what is accepted. If both are None, the sample was out of
+            order and is ignored.
     """
     if (reason := _content(checks, sample)) is not None:
         return track, None, reason
@@ -85,7 +88,7 @@ def track(checks: Checks, track: Track, sample: Sample) -> tuple[Track, Odometry
     quaternion = np.asarray(sample.quaternion, np.float64)
     quaternion = quaternion / math.sqrt(float(quaternion @ quaternion))
     if track.pose is not None and float(quaternion @ track.pose[2]) < 0:
-        quaternion = -quaternion  # q and -q are one attitude: stay on the side of the last one
+        quaternion = -quaternion  # q and -q are the same attitude: keep the sign of the last one
     position = np.array(sample.position, np.float64)
     track, reason = _jump(checks, track, time, position, quaternion)
     if reason is not None:
@@ -94,7 +97,7 @@ def track(checks: Checks, track: Track, sample: Sample) -> tuple[Track, Odometry
 
 
 def _content(checks: Checks, sample: Sample) -> str | None:
-    """Refusal of what the sample says by itself."""
+    """The reason to refuse a sample because of its own content. None: the content is good."""
     arrays = (
         ("position", sample.position, 3),
         ("quaternion", sample.quaternion, 4),
@@ -126,7 +129,7 @@ def _content(checks: Checks, sample: Sample) -> str | None:
 
 
 def _time(checks: Checks, track: Track, sample: Sample) -> tuple[ClockMap | None, float, str | None]:
-    """The map of the clock, the time of the sample on the local clock, s, and why it is refused."""
+    """The map of the clock, the time of the sample on the local clock, s, and the reason for a refusal."""
     clock, last = track.clock, track.pose[0] if track.pose is not None else -math.inf
     time = sample.received - checks.latency
     if sample.stamp is None:
@@ -141,7 +144,7 @@ def _time(checks: Checks, track: Track, sample: Sample) -> tuple[ClockMap | None
     if -checks.clock_jump <= step <= 0:
         return clock, time, f"order: its stamp is {abs(step):.4g} s before the last; accepted: later"
     followed, mapped = follow_clock(clock, sample.received, sample.stamp)
-    ahead = clock.offset - (sample.received - sample.stamp)  # by the old map it comes from the future
+    ahead = clock.offset - (sample.received - sample.stamp)  # according to the old map, it comes from the future
     if step < 0 or ahead > checks.clock_jump:
         jump = step if step < 0 else ahead
         text = f"clock: the source's clock jumped by {jump:+.4g} s; accepted: steps below {checks.clock_jump:g} s"
@@ -167,11 +170,12 @@ def _frozen(checks: Checks, track: Track, sample: Sample, time: float) -> tuple[
 def _jump(
     checks: Checks, track: Track, time: float, position: np.ndarray, quaternion: np.ndarray
 ) -> tuple[Track, str | None]:
-    """Refuse what the vehicle cannot have flown to; a jump that lasts becomes a fault.
+    """Refuse a pose that the vehicle cannot have reached by flight. A jump that lasts becomes a fault.
 
-    The allowance grows with time, so that a lasting jump would pass by itself after some samples. A sample that is
-    nearer to where the jump has led on to than to where the track leads on to is therefore refused with it. Both are
-    led on by the last velocity and body rate: a vehicle that turns fast is soon far from where it was seen last.
+    The allowance grows with time, so a lasting jump would be accepted by itself after some samples. Both the pose
+    before the jump and the pose after it are therefore extrapolated with the last velocity and body rate. A sample that
+    is nearer to the extrapolated jump than to the extrapolated track is refused too. The extrapolation is needed
+    because a vehicle that turns fast is soon far from its last pose.
     """
     if track.pose is None:
         return track, None
@@ -202,7 +206,7 @@ def _jump(
 
 
 def _apart(pose: tuple[float, np.ndarray, np.ndarray], position: np.ndarray, quaternion: np.ndarray) -> tuple:
-    """How far from a pose, m and rad."""
+    """The distance to a pose, m and rad."""
     return (
         float(np.linalg.norm(position - pose[1])), float(np.linalg.norm(rotation_between(pose[2], quaternion))),
     )  # fmt: skip
@@ -211,7 +215,7 @@ def _apart(pose: tuple[float, np.ndarray, np.ndarray], position: np.ndarray, qua
 def _led_on(
     track: Track, pose: tuple[float, np.ndarray, np.ndarray], time: float
 ) -> tuple[float, np.ndarray, np.ndarray]:
-    """Where a pose has come to by `time` s, should the motion go on as the last odometry had it."""
+    """The pose extrapolated to `time` s, if the motion goes on as in the last odometry."""
     if track.odometry is None:
         return pose
     since = time - pose[0]
@@ -234,14 +238,14 @@ def _led_on(
 def _motion(
     checks: Checks, track: Track, sample: Sample, time: float, position: np.ndarray, quaternion: np.ndarray
 ) -> tuple[Track, Odometry | None, str | None]:
-    """Odometry of a good sample: velocities as the source gives them, or else estimated."""
+    """The odometry of a good sample. Velocities are the source's, if it gives them, or otherwise estimated."""
     velocity_rate, body_rate_rate = (2 * math.pi * f for f in (checks.velocity_cutoff, checks.rate_cutoff))
     shift, turn, before = track.velocity, track.body_rate, track.pose
     if track.pose is None or shift is None or turn is None or time - track.pose[0] > checks.gap:
         shift, turn = start_slope(time, position), start_slope(time, np.zeros(3))
         angle = np.zeros(3)
     else:
-        # The angles turned add up to a quantity whose derivative is the body rate, and noise does not add up in them.
+        # The derivative of the sum of these angles is the body rate, and noise does not accumulate in the sum.
         angle = track.angle + rotation_between(track.pose[2], quaternion)
         shift = follow_slope(shift, velocity_rate, time, position)
         turn = follow_slope(turn, body_rate_rate, time, angle)
@@ -273,7 +277,7 @@ def _motion(
 def _strayed(
     checks: Checks, track: Track, before: tuple[float, np.ndarray, np.ndarray], velocity: np.ndarray, seen: np.ndarray
 ) -> tuple[Track, str | None]:
-    """Refuse a velocity that is slow, zero, negated or of other axes: its way is not the one that the positions go."""
+    """Refuse a velocity that is too slow, zero, negated or in other axes: its path differs from the positions' path."""
     assert track.pose is not None
     dt = track.pose[0] - before[0]
     if not 0 < dt <= checks.gap:
@@ -293,7 +297,7 @@ def _strayed(
 def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(3,) the rotation vector from attitude `a` to `b`, both (4,) unit wxyz, in the axes of the body, rad.
 
-    The logarithm of conj(a) b, the shorter way round.
+    It is the logarithm of conj(a) b, for the shorter rotation.
     """
     w = float(a @ b)
     (aw, ax, ay, az), (bw, bx, by, bz) = a.tolist(), b.tolist()  # floats: many times faster than arrays of three

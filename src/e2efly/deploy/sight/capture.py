@@ -1,4 +1,4 @@
-"""An image source whose driver runs in a process of its own: `process/capture.py`, which publishes in shared memory."""
+"""An image source whose driver runs in its own process: `process/capture.py`, which publishes in shared memory."""
 
 import math
 import os
@@ -11,29 +11,29 @@ from e2efly.deploy.sight.shared import SharedCamera, place
 from e2efly.deploy.sight.source import Frame
 
 SCRIPT = "capture.py"
-"""What runs in the process."""
+"""The script that runs in the process."""
 
 
 class Captured:
-    """Images of a capture process. Reading them takes neither a thread nor the camera's driver in this process."""
+    """Images of a capture process. Reading them needs no thread, and no camera driver in this process."""
 
     def __init__(self, name: str, image: Image, python: str, kind: str, where: str, fov: str = "") -> None:
         """Start the process and wait for its first image.
 
         Args:
-            name: what to call the source.
+            name: the name of the source in messages.
             image: the camera of the policy's contract.
-            python: the interpreter that has the package of the camera.
-            kind: of the capture process.
-            where: what the kind needs to know.
+            python: the interpreter that has the camera's package.
+            kind: the kind of the capture process.
+            where: what this kind needs to know, such as a path or a topic.
             fov: the field of view, as `field_of_view` gives it.
 
         Raises:
-            ValueError: what the process says of its failure, that no image comes in time, or that the images are not
-                what the policy sees.
+            ValueError: with what the process reports about its failure. Also if no image comes in time, or if the
+                images are not what the policy sees.
         """
         self._name = name
-        self._memory = f"capture-{os.getpid()}-{secrets.token_hex(4)}"  # nobody else publishes there
+        self._memory = f"capture-{os.getpid()}-{secrets.token_hex(4)}"  # a name that no other program uses
         self._problem: str | None = None
         self._closed = False
         try:
@@ -50,12 +50,12 @@ class Captured:
 
     @property
     def problem(self) -> str | None:
-        """Why the process has ended, or else what was wrong with an image last."""
+        """Why the process has ended, or otherwise the last problem with an image."""
         ended = self._child.ended
         return f"{self._name}: {ended}" if ended else self._problem or self._camera.problem
 
     def read(self, now: float) -> list[Frame]:
-        """The newest image, where it is new."""
+        """The newest image, if it is new."""
         if self._closed:
             return []
         for line in self._child.lines():
@@ -64,7 +64,7 @@ class Captured:
         return self._camera.read(now)
 
     def close(self) -> None:
-        """End the process; takes up to 2 s."""
+        """End the process. This takes up to 2 s."""
         if not self._closed:
             self._closed = True
             self._child.close()
@@ -72,7 +72,7 @@ class Captured:
             self._forget()
 
     def describe(self) -> str:
-        """What it is, how large, and by which package."""
+        """The name of the source, the image size, and the package that it uses."""
         size = self._camera.describe().partition(", ")[2]
         return f"{self._name}, {size} ({self._child.detail})"
 
@@ -81,29 +81,29 @@ class Captured:
 
 
 def open_captured(text: str, image: Image, pythons: Sequence[str], advice: str, where: str, fov: str = "") -> Captured:
-    """Start a capture process by the first interpreter that has its package.
+    """Start a capture process with the first interpreter that has the required package.
 
     Args:
-        text: what the source is called: KIND:WHERE.
+        text: the name of the source: KIND:WHERE.
         image: the camera of the policy's contract.
         pythons: interpreters to try.
-        advice: what to do when it does not open.
-        where: what the kind needs to know.
+        advice: what to do if it does not open.
+        where: what this kind needs to know, such as a path or a topic.
         fov: the field of view, as `field_of_view` gives it.
 
     Raises:
-        ValueError: with what each interpreter says, and the advice.
+        ValueError: with what each interpreter reports, and the advice.
     """
     kind = text.partition(":")[0]
     return first_opened(list(pythons), advice, lambda python: Captured(text, image, python, kind, where, fov))
 
 
 def field_of_view(text: str, name: str) -> tuple[str, str]:
-    """WHERE[?fov=ACROSSxDOWN] as WHERE and its field of view: `ACROSSxDOWN` in rad, `policy`, or empty.
+    """Split WHERE[?fov=ACROSSxDOWN] into WHERE and the field of view: `ACROSSxDOWN` in rad, `policy`, or empty.
 
     Args:
-        text: behind the name of the source.
-        name: of the source, for errors.
+        text: the text after the name of the source.
+        name: the name of the source, for errors.
 
     Raises:
         ValueError: naming the option and what is accepted.

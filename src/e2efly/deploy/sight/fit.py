@@ -1,4 +1,4 @@
-"""An image of a camera, cut and resampled to the camera that a policy was trained with."""
+"""Crops and resamples a camera image to the camera with which a policy was trained."""
 
 import math
 
@@ -7,24 +7,26 @@ import numpy as np
 from e2efly.deploy.policy.images import Image
 
 NARROWER = 0.02
-"""By how much of the field of view a camera may see less than the policy's."""
+"""The share of the field of view by which a camera may see less than the policy's camera."""
 
 
 def fitted(image: np.ndarray, fov: tuple[float, float], camera: Image, where: str) -> np.ndarray:
     """The image as the policy's camera would have taken it.
 
-    Each value is of a cell of the policy's image: of depth the nearest valid one of the cell, as the camera's pooling
-    in training, 0 where all are holes; of a mask whether half of the cell shows it; of colours the mean. A camera of no
-    rows and columns takes each pixel as it is, and grey as a colour.
+    Each value belongs to one cell of the policy's image. For depth, it is the nearest valid value of the cell, as in
+    the camera's pooling in training, and 0 if the cell has only holes. For a mask, it says whether at least half of the
+    cell shows the object. For colours, it is the mean. If the policy's camera has 0 rows and 0 columns, each pixel is
+    taken as it is, and a grey image is converted to colours.
 
     Args:
-        image: (h, w) or (h, w, 3): depth in m (0: a hole), a mask or colours in [0, 1].
-        fov: its horizontal and vertical field of view, rad, pinhole; zeros: that of the policy's camera.
-        camera: of the policy's contract.
-        where: whose image it is, for errors.
+        image: (h, w) or (h, w, 3): depth in m (0: a hole), a mask, or colours in [0, 1].
+        fov: its horizontal and vertical field of view, rad, pinhole. Zeros: the field of view of the policy's camera.
+        camera: the camera of the policy's contract.
+        where: the name of the image's source, for errors.
 
     Raises:
-        ValueError: naming what does not fit: colours for depth, a camera that sees less, or one with fewer pixels.
+        ValueError: naming what does not fit: colours instead of depth, a camera that sees less, or one with fewer
+            pixels.
     """
     whole = camera.width == 0 and camera.height == 0
     if whole and camera.sees == "rgb" and image.ndim == 2:
@@ -60,31 +62,33 @@ def fitted(image: np.ndarray, fov: tuple[float, float], camera: Image, where: st
 
 
 def _share(wants: float, has: float) -> float:
-    """Of a pinhole image's width: the part that a narrower one takes."""
+    """The share of a pinhole image's width that a narrower image covers."""
     return math.tan(wants / 2) / math.tan(has / 2)
 
 
 def _middle(image: np.ndarray, shares: tuple[float, float]) -> np.ndarray:
-    """The part of an image that a camera sees which takes these shares of its width and height."""
+    """The middle part of an image, with these shares of its width and height."""
     across, down = (round(n * (1 - min(share, 1.0)) / 2) for n, share in zip(image.shape[1::-1], shares, strict=True))
     return image[down : image.shape[0] - down, across : image.shape[1] - across]
 
 
 def _edges(pixels: int, cells: int, share: float) -> np.ndarray | None:
-    """First pixel of each cell, and the one behind the last; None: there are too few pixels."""
+    """The first pixel of each cell, and the pixel after the last cell. None: there are too few pixels."""
     share = min(share, 1.0)
     edges = np.round(pixels / 2 + pixels / 2 * share * np.linspace(-1, 1, cells + 1)).astype(int)
     return edges if np.all(np.diff(edges) > 0) else None
 
 
 def _by_cell(together: np.ufunc, image: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """One value of each cell, whose first pixels these are; the last entries stand behind the last cell."""
+    """One value for each cell. `rows` and `columns` hold the first pixel of each cell; their last entries are the end
+    of the last cell.
+    """
     inside = image[: rows[-1], : columns[-1]]
     return together.reduceat(together.reduceat(inside, rows[:-1], axis=0), columns[:-1], axis=1)
 
 
 def _within(depth: np.ndarray, camera: Image) -> np.ndarray:
-    """Depth as the policy's camera tells it: nothing nearer than its reach, and nothing farther."""
+    """Depth as the policy's camera gives it: 0 if nearer than its reach, and at most its far limit."""
     if camera.sees not in ("depth", "range"):
         return depth.astype(np.float32)
     near, far = camera.reach_m

@@ -1,7 +1,7 @@
-"""Where `e2efly hil` gives its images: `--image NAME=KIND:WHERE`, as often as wanted for each image.
+"""Where `e2efly hil` sends its images: `--image NAME=KIND:WHERE`, as often as needed for each image.
 
-All images go into shared memory. What goes farther is given by a process of its own for each output, which reads them
-there: a reader that stalls can hold up nothing else.
+All images go into shared memory. For each further output, a separate process reads them there and sends them on. A
+reader that stalls can therefore delay nothing else.
 """
 
 import sys
@@ -13,32 +13,32 @@ from e2efly.deploy.policy.contract import Contract
 from e2efly.deploy.policy.images import Image
 
 EXACT = "exact"
-"""Behind a port: values as they are, in place of rounded ones."""
+"""After a port: send exact values instead of rounded ones."""
 FORMS = "shm:NAME, tcp:PORT, tcp:PORT:exact, ros1:/topic or ros2:/topic"
 """How outputs are written."""
 
 
 @dataclass(frozen=True)
 class Output:
-    """Where an image goes."""
+    """An output of an image."""
 
     kind: str
     """shm, tcp, ros1 or ros2."""
     where: str
     """Name, port or topic."""
     exact: bool = False
-    """Whether the values are as they are; of tcp."""
+    """Whether the values are exact. Only for tcp."""
 
     @property
     def taken(self) -> tuple[str, ...]:
-        """What no other output may have."""
+        """The resources that no other output may use."""
         if self.kind in ("ros1", "ros2"):
             return f"{self.kind}:{self.where}", f"{self.kind}:{camera_info(self.where)}"
         return (f"{self.kind}:{self.where}",)
 
 
 def camera_info(topic: str) -> str:
-    """The topic of the camera's intrinsics beside a topic of images."""
+    """The topic of the camera's intrinsics that belongs to a topic of images."""
     return f"{topic.rpartition('/')[0]}/camera_info"
 
 
@@ -46,8 +46,8 @@ def outputs(texts: Sequence[str], contract: Contract) -> dict[str, list[Output]]
     """The outputs of each image of a contract.
 
     Raises:
-        ValueError: naming the text and what is accepted: no such image or kind, what is taken by another, an image that
-            goes nowhere, one in two places of shared memory.
+        ValueError: naming the text and what is accepted. The cause is an unknown image or kind, a resource that another
+            output uses, an image without an output, or an image with two places in shared memory.
     """
     found: dict[str, list[Output]] = {image.name: [] for image in contract.images}
     taken: dict[str, str] = {}
@@ -83,16 +83,16 @@ def _output(text: str, uri: str) -> Output:
 
 
 def give(image: Image, name: str, output: Output, host: str) -> Child:
-    """Start the process that gives an image farther.
+    """Start the process that sends an image on from shared memory.
 
     Args:
-        image: of the contract.
-        name: of the shared memory in which it is, float32.
-        output: where to; none of shared memory.
+        image: the image of the contract.
+        name: the name of the shared memory that holds it, float32.
+        output: the output. Not for shared memory.
         host: address on which TCP is served.
 
     Raises:
-        ValueError: naming the output and why it cannot be: a port in use, no ROS, no pinhole camera for ROS.
+        ValueError: naming the output and why it is not possible: a port in use, no ROS, or no pinhole camera for ROS.
     """
     where = f"--image {image.name}={output.kind}:{output.where}"
     pinhole = image.projection == "pinhole"

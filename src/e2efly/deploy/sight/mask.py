@@ -1,7 +1,8 @@
-"""Masks made of the colours of another image source.
+"""Masks made from the colours of another image source.
 
-Finding a tag takes milliseconds and needs the camera's own resolution, so it happens before the image is resampled, in
-a process of its own: that opens the other source and publishes masks, which the bridge reads as any camera's images.
+Finding a tag takes milliseconds and needs the camera's own resolution. It is therefore done before the image is
+resampled, in a separate process. That process opens the other source and publishes masks, which the bridge reads like
+the images of any camera.
 """
 
 import dataclasses
@@ -16,15 +17,15 @@ from e2efly.deploy.sight.segment import chosen, opencv
 from e2efly.deploy.sight.watch import Seen, see
 
 WAIT_S = 0.001
-"""Between two looks for a new image, s."""
+"""Time between two checks for a new image, s."""
 FORM = "mask:apriltag:FAMILY[:ID[xFACTOR],...]@URI, mask:colour:H,S,V,H,S,V@URI or mask:onnx[:FILE]@URI"
 
 
 def parts_of(text: str) -> tuple[str, str]:
-    """SEGMENTER@URI as its two parts; the first @ parts them.
+    """Split SEGMENTER@URI into its two parts at the first @.
 
     Raises:
-        ValueError: where one is missing.
+        ValueError: if one part is missing.
     """
     segmenter, _, uri = text.partition("@")
     if not segmenter or not uri:
@@ -33,7 +34,7 @@ def parts_of(text: str) -> tuple[str, str]:
 
 
 def colours_for(image: Image) -> Image:
-    """The camera that a mask is made of: that of the policy, in colours, with all pixels that the source has.
+    """The camera from which a mask is made: the policy's camera, in colours, with all pixels that the source has.
 
     Raises:
         ValueError: for a policy that sees no mask.
@@ -44,17 +45,17 @@ def colours_for(image: Image) -> Image:
 
 
 def capture(output: Any, where: str) -> None:
-    """What the process does: a kind of `process/capture.py`.
+    """Run the process: a kind of `process/capture.py`.
 
-    A camera that is covered or frozen would give masks that look like those of a ground without the object, so colours
-    are checked as those of a policy would be: of what does not pass there is no mask.
+    A camera that is covered or frozen would give masks that look like masks of a ground without the object. Colours are
+    therefore checked like the colours of a policy. An image that fails the checks gives no mask.
 
     Args:
-        output: of that script.
-        where: JSON: `segmenter`, `uri` and `image`, the camera of the policy's contract.
+        output: the output of that script.
+        where: JSON with `segmenter`, `uri` and `image`, the camera of the policy's contract.
 
     Raises:
-        ValueError: where either does not open.
+        ValueError: if the segmenter or the source does not open.
     """
     from e2efly.deploy.sight.sources import open_image  # which imports this module's source
 

@@ -1,4 +1,4 @@
-"""What a policy's network is shown, for people: a picture in the terminal, and a PNG."""
+"""What a policy's network receives, shown to people: as a picture in the terminal, and as a PNG."""
 
 import struct
 import zlib
@@ -11,24 +11,24 @@ from rich.text import Text
 from e2efly.deploy.policy.images import Image
 
 HOLE = (90, 0, 60)
-"""Where depth has no value: red, green, blue, 0 to 255."""
+"""Colour where depth has no value: red, green, blue, 0 to 255."""
 COLUMNS = 64
-"""Widest picture of the terminal, characters."""
+"""The widest picture in the terminal, characters."""
 PIXELS = 512
-"""A PNG is magnified by a whole number to about this width, pixels."""
+"""A PNG is enlarged by a whole number to about this width, pixels."""
 GAP = 2
-"""Between a picture and others beside it, pixels."""
+"""Gap between a picture and the pictures beside it, pixels."""
 
 
 def colours(image: np.ndarray, camera: Image) -> np.ndarray:
     """An image as red, green and blue, (h, w, 3) uint8.
 
-    Depth is bright near and dark far, over the camera's reach, and `HOLE` where it is 0; normals are laid from [-1, 1]
-    to [0, 1].
+    Depth is bright near and dark far, over the camera's reach, and `HOLE` where it is 0. Normals are mapped from [-1,
+    1] to [0, 1].
 
     Args:
-        image: of the camera, as `Image.check` accepts it.
-        camera: of the policy's contract.
+        image: an image of the camera that `Image.check` accepts.
+        camera: the camera of the policy's contract.
     """
     low, high = camera.limits
     share = np.clip((image - low) / (high - low), 0.0, 1.0)
@@ -40,14 +40,14 @@ def colours(image: np.ndarray, camera: Image) -> np.ndarray:
 
 
 def sheet(shown: np.ndarray, others: Sequence[np.ndarray]) -> np.ndarray:
-    """A picture with others of its size to its right, two rows of them, behind a gap.
+    """A picture with others of the same size to its right, in two rows, after a gap.
 
     Args:
         shown: (h, w, 3) uint8.
-        others: (h, w, 3) uint8 each; none: the picture alone.
+        others: (h, w, 3) uint8 each. If empty, the result is the picture alone.
 
     Returns:
-        (h or 2 h, ..., 3) uint8; the picture stands in the upper left.
+        (h or 2 h, ..., 3) uint8. The picture is in the upper left.
     """
     if not len(others):
         return shown
@@ -67,7 +67,7 @@ def blocks(pixels: np.ndarray, columns: int = COLUMNS) -> Text:
 
     Args:
         pixels: (h, w, 3) uint8.
-        columns: the widest that it may be, characters; of a wider picture every second, third, ... pixel is left.
+        columns: its largest width, characters. A wider picture is reduced to every second, third, ... pixel.
     """
     step = -(-pixels.shape[1] // columns)
     small = pixels[::step, ::step].astype(int)
@@ -82,14 +82,14 @@ def blocks(pixels: np.ndarray, columns: int = COLUMNS) -> Text:
 
 
 def write_png(path: Path, pixels: np.ndarray) -> None:
-    """Write a picture, magnified (ISO/IEC 15948: 8 bits, colour type 2, no filter).
+    """Write a picture, enlarged (ISO/IEC 15948: 8 bits, colour type 2, no filter).
 
     Args:
-        path: of the file; its folder is made.
+        path: path of the file. Its folder is created.
         pixels: (h, w, 3) uint8.
 
     Raises:
-        OSError: when it cannot be written.
+        OSError: if it cannot be written.
     """
     times = max(PIXELS // pixels.shape[1], 1)
     large = pixels.repeat(times, axis=0).repeat(times, axis=1)

@@ -1,4 +1,4 @@
-"""The recording of `e2efly hil`: an MCAP file with images, poses, latencies and collisions, written elsewhere."""
+"""The recording of `e2efly hil`: an MCAP file with images, poses, latencies and collisions, from another process."""
 
 import json
 import os
@@ -15,15 +15,15 @@ from e2efly.deploy.policy.images import Image
 
 
 class Recorder:
-    """A process that records. What it cannot take at once is dropped: telling it never waits."""
+    """A process that records. Messages that it cannot take at once are dropped, so sending never waits."""
 
     def __init__(self, path: Path, images: Sequence[Image], names: Sequence[str]) -> None:
-        """Start it.
+        """Start the process.
 
         Args:
-            path: of a new file, whose name ends in .mcap.
-            images: of the contract.
-            names: of the shared memory of each.
+            path: path of a new file, whose name ends in .mcap.
+            images: the images of the contract.
+            names: the name of the shared memory of each image.
 
         Raises:
             ValueError: naming the file and what is accepted.
@@ -32,7 +32,7 @@ class Recorder:
             raise ValueError(f"--record is {path}; accepted: a new file whose name ends in .mcap")
         path.parent.mkdir(parents=True, exist_ok=True)
         self.dropped = 0
-        """Messages that were not taken; images that were not are told in the file."""
+        """Messages that were not taken. The number of dropped images is recorded in the file."""
         self._folder = tempfile.TemporaryDirectory(prefix="e2efly-hil-")
         self._place = f"{self._folder.name}/{os.getpid()}"
         parts = [part for image, name in zip(images, names, strict=True) for part in (name, image.name, image.sees)]
@@ -45,14 +45,14 @@ class Recorder:
         self._socket.setblocking(False)
 
     def tell(self, topic: str, message: dict[str, Any]) -> None:
-        """Record a message of the topics of `process/record.py`."""
+        """Record a message on one of the topics of `process/record.py`."""
         try:
             self._socket.sendto(json.dumps({"topic": topic, **message}).encode(), self._place)
         except OSError:  # it is busy, or it has ended
             self.dropped += 1
 
     def close(self) -> None:
-        """End it, with the file complete."""
+        """End the process. The file is then complete."""
         self.child.close()
         self._socket.close()
         with suppress(OSError):

@@ -1,4 +1,4 @@
-"""The image sources by name. A source registers itself; one of the user's own is a reference to its file."""
+"""The image sources by name. A source registers itself. A user's own source is given as a reference to its file."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ METHODS = ("problem", "read", "close", "describe")
 """What an image source must have."""
 
 Opener = Callable[[str, Image], ImageSource]
-"""Opens a source, given the text behind its name and the camera of the policy's contract to which it cuts and resamples
-its images; raises ValueError with what is accepted."""
+"""Opens a source, given the text after its name and the camera of the policy's contract, to which the source crops and
+resamples its images. Raises ValueError that says what is accepted."""
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,9 @@ class Kind:
     """A kind of image source."""
 
     open: Opener
-    """Opens one."""
+    """Opens a source."""
     form: str
-    """How it is written."""
+    """How the text for the source is written."""
 
 
 SOURCES: Registry[Kind] = Registry("image source", source=lambda kind: kind.open)
@@ -33,14 +33,14 @@ F = TypeVar("F", bound=Opener)
 
 
 def register(name: str, form: str) -> Callable[[F], F]:
-    """Register a function or a class that opens an image source, given the text behind its name and the camera.
+    """Register a function or a class that opens an image source, given the text after its name and the camera.
 
     Args:
-        name: by which `e2efly fly --image IMAGE=NAME:...` finds it.
-        form: how the whole is written, for people.
+        name: the name in `e2efly fly --image IMAGE=NAME:...`.
+        form: how the whole text is written, for people.
 
     Raises:
-        ValueError: for a name that is taken.
+        ValueError: if the name is taken.
     """
 
     def registered(opener: F) -> F:
@@ -51,10 +51,10 @@ def register(name: str, form: str) -> Callable[[F], F]:
 
 
 def opened(kind: Kind, where: str, image: Image) -> ImageSource:
-    """A source of a kind.
+    """Open a source of a kind.
 
     Raises:
-        ValueError: naming the text and what is accepted; naming the file of a source that lacks a method.
+        ValueError: naming the text and what is accepted, or naming the file of a source that lacks a method.
     """
     source = kind.open(where, image)
     check_methods(source, METHODS)

@@ -1,4 +1,4 @@
-"""Images that a policy saw in training, beside its file: `fly --check` shows them next to what a camera shows."""
+"""Images that a policy saw in training, kept beside its file. `fly --check` shows them next to a camera's images."""
 
 import io
 import zipfile
@@ -11,19 +11,19 @@ import numpy as np
 from e2efly.deploy.policy.images import Image
 
 COUNT = 6
-"""How many are kept of each of a policy's images."""
+"""How many samples are kept of each image of a policy."""
 
 
 def samples_file(policy: Path) -> Path:
-    """Where they are: policy.images.npz beside policy.onnx."""
+    """Path of the samples: policy.images.npz beside policy.onnx."""
     return policy.with_suffix(".images.npz")
 
 
 def packed(images: Mapping[str, np.ndarray]) -> bytes:
-    """The content of such a file.
+    """The content of a samples file.
 
     Args:
-        images: by the names of the contract, (k, h, w) or (k, h, w, 3), of which the first `COUNT` are kept.
+        images: images by the names of the contract, (k, h, w) or (k, h, w, 3). The first `COUNT` of each are kept.
     """
     content = io.BytesIO()
     kept: Any = {name: np.asarray(seen[:COUNT], np.float16) for name, seen in images.items()}
@@ -32,10 +32,10 @@ def packed(images: Mapping[str, np.ndarray]) -> bytes:
 
 
 def read_samples(policy: Path, image: Image) -> np.ndarray | None:
-    """What a policy saw of one of its images: (k, h, w) or (k, h, w, 3) float32; None: nothing is kept of it.
+    """Samples of one image of a policy: (k, h, w) or (k, h, w, 3) float32. None: no samples are kept of it.
 
     Raises:
-        ValueError: naming the file, where it does not hold images of this shape.
+        ValueError: naming the file, if it does not hold images of this shape.
     """
     path = samples_file(policy)
     if not path.is_file():

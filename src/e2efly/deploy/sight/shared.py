@@ -1,7 +1,7 @@
-"""Images in shared memory: the newest one of a camera, from the process that takes them to the one that flies.
+"""Images in shared memory: the newest image of a camera, from the process that takes it to the process that flies.
 
-A camera's driver may block, start threads or crash, so it lives in a process of its own. That process publishes; the
-bridge reads the newest image and never waits. The layout is in docs/image-sources.md, for publishers in any language.
+A camera's driver may block, start threads or crash, so it runs in its own process. That process publishes. The bridge
+reads the newest image and never waits. The layout is in docs/image-sources.md, for publishers in any language.
 """
 
 import mmap
@@ -27,38 +27,39 @@ from e2efly.deploy.sight.source import Frame
 __all__ = ["SharedCamera", "SharedImages", "place"]
 _TYPES = tuple(np.dtype(name).newbyteorder("<") for name in TYPES)
 _HELD_UP_S = 1.0
-"""So long the reading loop may have been held up since its `now`, s, and images may have come since."""
+"""The longest time for which the reading loop may have been delayed since its `now`, s. New images may have come in
+this time."""
 _TRIES = 3
-"""How often a reader begins anew where the publisher has overtaken it."""
+"""How many times a reader tries again if the publisher has overtaken it."""
 
 
 class SharedImages:
-    """The publisher's end."""
+    """The publisher's side."""
 
     def __init__(
         self, name: str, shape: tuple[int, ...], dtype: str = "float32", fov: tuple[float, float] = (0.0, 0.0)
     ) -> None:
-        """Make room, or take the room of an earlier publisher of the same images.
+        """Create the shared memory, or take over that of an earlier publisher of the same images.
 
         Args:
-            name: by which `--image NAME=shm:name` finds them.
+            name: the name for `--image NAME=shm:name`.
             shape: (h, w) or (h, w, 3).
             dtype: float32 (the value), uint8 (255 for 1) or uint16 (millimetres).
-            fov: horizontal and vertical field of view, rad; left out: that of the policy's camera.
+            fov: horizontal and vertical field of view, rad. If omitted, the field of view of the policy's camera.
 
         Raises:
-            ValueError: naming what is wrong with shape, type or name.
-            OSError: where the file cannot be written.
+            ValueError: naming what is wrong with the shape, the type or the name.
+            OSError: if the file cannot be written.
         """
         self._publisher = Publisher(name, Layout.wanted(shape, dtype, fov))
         self.layout, self.path = self._publisher.layout, self._publisher.path
 
     def publish(self, time: float, image: np.ndarray) -> None:
-        """Make an image the newest.
+        """Publish an image as the newest.
 
         Args:
-            time: when it was exposed, s on this machine's monotonic clock (`time.monotonic()`), not when it arrived.
-            image: of the shape and the type that were announced.
+            time: time of exposure, s on this machine's monotonic clock (`time.monotonic()`), not the time of arrival.
+            image: an image of the shape and the type that were announced.
 
         Raises:
             ValueError: for another shape or type.
@@ -71,23 +72,24 @@ class SharedImages:
         self._publisher.put(time, np.ascontiguousarray(image).tobytes())
 
     def close(self) -> None:
-        """Let go; what was published stays until the machine restarts, and grows too old to be flown by."""
+        """Release the memory. What was published stays until the machine restarts, and becomes too old for flight."""
         self._publisher.close()
 
 
 class SharedCamera:
-    """The bridge's end: an image source."""
+    """The bridge's side: an image source."""
 
     def __init__(self, name: str, camera: Image, called: str | None = None) -> None:
-        """Open what somebody publishes.
+        """Open images that another program publishes.
 
         Args:
-            name: of the images.
-            camera: of the policy's contract, to which they are cut and resampled.
-            called: the name of the source for people; left out: that of the images.
+            name: the name of the images.
+            camera: the camera of the policy's contract, to which the images are cropped and resampled.
+            called: the name of the source for people. If omitted, the name of the images.
 
         Raises:
-            ValueError: when nobody publishes under this name, or what is published is not what the policy sees.
+            ValueError: if no program publishes under this name, or if the published images are not what the policy
+                sees.
         """
         self.problem: str | None = None
         self._name, self._camera, self._last = called or f"shm:{name}", camera, 0
@@ -106,7 +108,7 @@ class SharedCamera:
         fitted(np.zeros(self._layout.shape, np.float32), self._layout.fov, camera, where)  # refused here, not in flight
 
     def read(self, now: float) -> list[Frame]:
-        """The newest image, where it is new; one that was exposed after `now` is for the next time."""
+        """The newest image, if it is new. An image that was exposed after `now` is left for the next call."""
         for _ in range(_TRIES):
             (count,) = SEQUENCE.unpack_from(self._memory, AT_SEQUENCE)
             if count == self._last:
@@ -125,16 +127,16 @@ class SharedCamera:
         return []
 
     def close(self) -> None:
-        """Let go."""
+        """Release the memory."""
         self._memory.close()
 
     def describe(self) -> str:
-        """Where from, and how large."""
+        """The source, and the size of its images."""
         return f"{self._name}, {self._layout.height} rows, {self._layout.width} columns"
 
     def _fitted(self, raw: np.ndarray) -> np.ndarray:
         value = raw.astype(np.float32) * (1.0, 1 / 255, 1e-3)[self._layout.kind]
-        if raw.dtype == _TYPES[0] and self._camera.sees in ("depth", "range"):  # what ROS says of holes and of the sky
+        if raw.dtype == _TYPES[0] and self._camera.sees in ("depth", "range"):  # ROS's holes and sky
             far = self._camera.reach_m[1]
             value = np.nan_to_num(value, copy=False, nan=0.0, posinf=far, neginf=0.0)
         return fitted(value, self._layout.fov, self._camera, self._name)

@@ -1,4 +1,4 @@
-"""Where images come from: one small interface, as poses have one."""
+"""Where images come from: one small interface, like that for poses."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -11,27 +11,27 @@ class Frame:
     """An image as a camera took it."""
 
     time: float
-    """When it was exposed, s on this machine's monotonic clock."""
+    """Time of exposure, s on this machine's monotonic clock."""
     image: np.ndarray
-    """(h, w) or (h, w, 3): what `e2efly.deploy.policy.images.Image` says of its values."""
+    """(h, w) or (h, w, 3). `e2efly.deploy.policy.images.Image` defines its values."""
 
 
 class ImageSource(Protocol):
-    """One camera. Nothing here blocks or raises once it is open."""
+    """One camera. Nothing here blocks or raises once the source is open."""
 
     @property
     def problem(self) -> str | None:
-        """What was wrong last; None: nothing so far."""
+        """The last problem. None: no problem so far."""
         ...
 
     def read(self, now: float) -> list[Frame]:
-        """What has come since the last call, oldest first; `now`: this machine's monotonic clock, s."""
+        """The images that came since the last call, oldest first. `now` is on this machine's monotonic clock, s."""
         ...
 
     def close(self) -> None:
-        """Let go of everything; may be called twice."""
+        """Release all resources. May be called twice."""
         ...
 
     def describe(self) -> str:
-        """What this is, for people and logs."""
+        """A description of the source, for people and logs."""
         ...

@@ -1,6 +1,6 @@
-"""Whether the images of a camera can be flown by: a pure state that every new frame goes through.
+"""Whether the images of a camera are good enough to fly with: a pure state that processes every new frame.
 
-A policy must never act on an image that is stale or that shows nothing. What is wrong is a text: POLICY ends with it.
+A policy must never act on an image that is stale or that shows nothing. A problem is given as a text, and ends POLICY.
 """
 
 import dataclasses
@@ -16,46 +16,50 @@ from e2efly.deploy.policy.images import Image
 from e2efly.deploy.sight.source import Frame
 
 SLACK_S = 0.05
-"""An image may be older than in training by this, s: 50 ms are a control step and a half."""
+"""How much older than in training an image may be, s. 50 ms is one and a half control steps."""
 AHEAD_S = 0.005
-"""A frame that was exposed so long after now, s, has a clock of its own."""
+"""A frame that was exposed this long after now, s, has times of another clock."""
 FROZEN = 3
-"""So many equal images in a row that show something are no camera's: its noise alone would change them."""
+"""This many equal images in a row that show something do not come from a real camera. Its noise alone would change
+them."""
 DARK = 0.02
-"""Colours below this, of 1, are black."""
+"""Colours below this value, with 1 as the maximum, are black."""
 BEYOND = 1.3
-"""Nothing can be farther away than the ground: measured by this factor farther, and `BEYOND_M`, it contradicts it."""
+"""Nothing can be farther away than the ground. An image contradicts the ground if it measures more than this factor
+times the ground's distance, plus `BEYOND_M`."""
 BEYOND_M = 0.2
-"""m."""
+"""The distance that is added, m."""
 MOST = 0.7
-"""Share of the lowest row that has to be so for an image to contradict the ground."""
+"""Share of the lowest row that has to be too far away for an image to contradict the ground."""
 WRONG = 10
-"""So many images in a row that contradict the ground are of a camera that sits otherwise, upside down for example."""
+"""After this many images in a row that contradict the ground, the camera is mounted differently, upside down for
+example."""
 LEVEL, TURNING = 0.35, 1.0
-"""Tilt, rad, and body rate, rad/s, up to which a pose tells where the ground is in an image that is a little older."""
+"""The largest tilt, rad, and body rate, rad/s, at which a pose still tells where the ground is in a slightly older
+image."""
 
 
 @dataclass(frozen=True)
 class Seen:
-    """What is known of one camera of a policy."""
+    """What is known about one camera of a policy."""
 
     camera: Image
-    """What the contract says of it."""
+    """The camera of the contract."""
     frame: Frame | None = None
-    """The newest that passed the checks."""
+    """The newest frame that passed the checks."""
     fault: str | None = None
-    """Why the newest frame did not pass; None: it did."""
+    """Why the newest frame did not pass. None: it passed."""
     same: int = 1
-    """Equal images in a row."""
+    """Number of equal images in a row."""
     empty: bool = False
-    """Whether the newest shows nothing."""
+    """Whether the newest image shows nothing."""
     wrong: int = 0
-    """Images in a row that contradict where the ground is."""
+    """Number of images in a row that contradict the position of the ground."""
     trouble: str | None = None
-    """What the source says was wrong last: why none come, if it knows."""
+    """The last problem that the source reported. It says why no images come, if the source knows."""
 
     def problem(self, now: float) -> str | None:
-        """Why no policy may act on the newest image; None: it may."""
+        """Why no policy may act on the newest image. None: it may."""
         name, frame = f"image {self.camera.name!r}", self.frame
         why = f" ({self.trouble})" if self.trouble else ""
         if self.fault is not None:
@@ -74,7 +78,9 @@ class Seen:
 
     @property
     def oldest(self) -> float:
-        """Largest age of an image that may be acted on, s: that of the training, an image's time, and `SLACK_S`."""
+        """The largest age of an image on which a policy may act, s. It is the largest latency of the training plus one
+        image period plus `SLACK_S`.
+        """
         return self.camera.latency_range_s[1] + 1 / self.camera.rate_hz + SLACK_S
 
 
@@ -91,15 +97,15 @@ def see(
     ground: float = 0.0,
     trouble: str | None = None,
 ) -> Seen:
-    """Take in new frames, oldest first.
+    """Process new frames, oldest first.
 
     Args:
-        seen: what was known.
-        frames: as the source gave them.
+        seen: what was known before.
+        frames: frames as the source gave them.
         now: this machine's monotonic clock, s.
-        odometry: the vehicle's motion in the air: it tells where the ground is in an image; None: it is not known.
+        odometry: the vehicle's motion in the air. It tells where the ground is in an image. None: it is not known.
         ground: height of the ground, world, m.
-        trouble: what the source says was wrong last.
+        trouble: the last problem that the source reported.
     """
     if trouble != seen.trouble:
         seen = dataclasses.replace(seen, trouble=trouble)
@@ -138,14 +144,14 @@ def _fault(seen: Seen, frame: Frame, now: float) -> str | None:
 
 
 def _shows(camera: Image, image: np.ndarray) -> bool:
-    """Whether there is anything in an image; a mask without its object is an image, too."""
+    """Whether an image shows anything. A mask without its object is also a valid image."""
     if camera.sees == "mask":
         return True
     return bool(np.any(image > DARK)) if camera.sees == "rgb" else bool(np.any(image != 0))
 
 
 def _contradicts(camera: Image, image: np.ndarray, odometry: Odometry, ground: float) -> bool | None:
-    """Whether the lowest row of a depth image is farther away than the ground there; None: it does not tell."""
+    """Whether the lowest row of a depth image is farther away than the ground there. None: the image cannot tell."""
     turning = float(np.linalg.norm(odometry.body_rate)) > TURNING
     if camera.sees != "depth" or camera.projection != "pinhole" or turning or tilt_of(odometry.quaternion) > LEVEL:
         return None

@@ -6,7 +6,7 @@ from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, sent, t
 from e2efly.vehicles.vehicle import Vehicle
 
 DEFAULT = "pid"
-"""What flies unless told."""
+"""The hover controller that flies if none is named."""
 
 __all__ = [
     "DEFAULT", "HOVERS", "ROTOR_SPEED", "HoverController", "Seen", "UnderWay", "ahead", "hover_controller", "register",

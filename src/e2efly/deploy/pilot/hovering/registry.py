@@ -16,7 +16,7 @@ ROTOR_SPEED = "rotor_speed"
 
 
 class HoverController(Protocol):
-    """Flies a vehicle to a place, with a memory that each control step hands to the next. Its methods are pure."""
+    """Flies a vehicle to a place, with a memory that each control step passes to the next. Its methods are pure."""
 
     needs: ClassVar[tuple[str, ...]]
     """Telemetry that it cannot fly without: `ROTOR_SPEED`, or nothing."""
@@ -36,7 +36,7 @@ class HoverController(Protocol):
         ...
 
     def begin(self) -> Any:
-        """What the first step is handed: no integral, nothing known of what pushes."""
+        """The memory for the first step: no integral, and no known push."""
         ...
 
     def step(

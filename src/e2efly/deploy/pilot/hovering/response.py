@@ -10,7 +10,7 @@ from e2efly.control.vectors import Array, namespace
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 LONGEST_STEP = 0.02
-"""Of the prediction, s."""
+"""The longest step of the prediction, s."""
 SLIP_S, SLIP = 1.0, Vec3(2.0, 2.0, 2.0)
 """Time constant with which the slip of the body rates is followed, s, and its bound, rad/s."""
 
@@ -28,11 +28,11 @@ class Seen:
     body_rate: Vec3
     """Body, rad/s."""
     force: Vec3 | None = None
-    """Specific force by the accelerometer, body, m/s^2; None: not known."""
+    """Specific force from the accelerometer, body, m/s^2. None: not known."""
     age: float = 0.0
-    """How long ago that motion was, s."""
+    """The age of that motion, s."""
     thrust: Array | None = None
-    """Collective thrust over mass by the measured speeds of the rotors, m/s^2; None: they are not measured."""
+    """Collective thrust over mass from the measured rotor speeds, m/s^2. None: they are not measured."""
 
 
 @dataclass(frozen=True)

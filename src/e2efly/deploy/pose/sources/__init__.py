@@ -1,4 +1,4 @@
-"""The kinds of pose sources, one file each, and the choice among them by a line of text."""
+"""The kinds of pose sources, one file each, and how a line of text selects one."""
 
 import importlib
 import pkgutil
@@ -15,12 +15,13 @@ def open_source(text: str) -> PoseSource:
     """Open a pose source.
 
     Args:
-        text: NAME:... of a registered kind (of an installed package, too), written as its form says; or the reference
-            of a class or a function, path/to/file.py:Name or module:Name, and behind another colon what it is given.
+        text: NAME:... of a registered kind, also of an installed package, written as its form says. Or a reference to a
+            class or a function, path/to/file.py:Name or module:Name, optionally followed by another colon and the text
+            that it is given.
 
     Raises:
-        ValueError: naming the text and what is accepted; for a port that is taken or a host without an address; for a
-            package that is not installed or a peer that does not answer, with what to do.
+        ValueError: naming the text and what is accepted. Also for a port that is taken or a host without an address.
+            For a package that is not installed or a peer that does not answer, it says what to do.
     """
     name, _, where = text.partition(":")
     if name not in SOURCES and name.isidentifier():

@@ -1,4 +1,4 @@
-"""Motion capture systems, by the package `motioncapture`."""
+"""Motion capture systems, through the package `motioncapture`."""
 
 import sys
 
@@ -7,11 +7,11 @@ from e2efly.deploy.pose.registry import part_of, register
 from e2efly.deploy.pose.relay import RelaySource, open_relay
 
 SYSTEMS = ("vrpn", "optitrack", "vicon", "qualisys", "nokov", "fzmotion", "mock")
-"""Systems that `motioncapture` may be built for; it says itself which ones it is."""
+"""Systems for which `motioncapture` may be built. The package itself reports which of them it supports."""
 ADVICE = (
     "install the package motioncapture (pip install motioncapture), and check that the system streams to this machine"
 )
-"""What to do when it does not open."""
+"""What to do if it does not open."""
 
 
 @register("mocap", "mocap:TYPE:HOST:RIGID_BODY")
@@ -22,7 +22,7 @@ def open_mocap(where: str) -> RelaySource[Sample]:
         where: one of `SYSTEMS`, the address of the machine that streams, and the name of the rigid body there.
 
     Raises:
-        ValueError: for an unknown system, a package that is not installed, a system that does not answer.
+        ValueError: for an unknown system, a package that is not installed, or a system that does not answer.
     """
     system, _, rest = where.partition(":")
     host, _, body = rest.partition(":")

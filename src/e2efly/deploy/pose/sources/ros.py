@@ -15,38 +15,38 @@ ADVICE = {
     2: 'install the package rclpy (pip install "ros-rclpy[fastrtps]" ros-nav-msgs ros-geometry-msgs, or source the '
     "ROS 2 installation)",
 }
-"""What to do when it does not open."""
+"""What to do if it does not open."""
 
 
 @register("ros1", "ros1:/topic")
 def open_ros1(topic: str) -> RelaySource[Sample]:
-    """Subscribe by ROS 1; see `open_ros`."""
+    """Subscribe with ROS 1; see `open_ros`."""
     return open_ros(1, part_of(topic))
 
 
 @register("ros2", "ros2:/topic")
 def open_ros2(topic: str) -> RelaySource[Sample]:
-    """Subscribe by ROS 2; see `open_ros`."""
+    """Subscribe with ROS 2; see `open_ros`."""
     return open_ros(2, part_of(topic))
 
 
 def open_ros(
     version: int, topic: str, parse: Callable[[bytes, float], Any] = parse_pose, what: str = "pose"
 ) -> RelaySource[Any]:
-    """Subscribe to a topic, of one of the types that carry what is asked for: see `process/pose_relay.py`.
+    """Subscribe to a topic of one of the types that `process/pose_relay.py` accepts.
 
-    ROS 1 and ROS 2 have packages of the same names, so that one Python environment holds either; the relay therefore
-    runs in whichever of this interpreter and the system's has the one asked for, or in the one that `E2EFLY_ROS_PYTHON`
-    names.
+    ROS 1 and ROS 2 have packages with the same names, so one Python environment holds only one of them. The relay
+    therefore runs in this interpreter or in the system's, whichever has the requested version, or in the interpreter
+    that `E2EFLY_ROS_PYTHON` names.
 
     Args:
         version: 1 or 2.
-        topic: name of the topic, from the root: "/odometry".
-        parse: what a message says, which the relay has made JSON; takes it and the time of its arrival, s.
+        topic: absolute name of the topic: "/odometry".
+        parse: parses a message, which the relay has converted to JSON. It takes the message and its time of arrival, s.
         what: "pose" or "command".
 
     Raises:
-        ValueError: for a topic that is not from the root, a package that is not installed, a ROS master that does not
+        ValueError: for a topic without an absolute name, a package that is not installed, or a ROS master that does not
             answer.
     """
     if not topic.startswith("/"):

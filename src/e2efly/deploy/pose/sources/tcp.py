@@ -12,9 +12,9 @@ from e2efly.deploy.pose.source import LARGEST_BATCH, Inbox
 RETRY = 0.5
 """Time between attempts to connect, s."""
 SILENCE = 2.0
-"""A TCP link that brings nothing for so long is opened anew, s."""
+"""A TCP link that delivers nothing for this time is opened again, s."""
 CHUNK, CHUNKS = 64 << 10, 8
-"""Bytes of a TCP link that are taken at a time, and most such times of one `read`."""
+"""Bytes of a TCP link that are read at a time, and the largest number of such reads in one `read`."""
 
 
 @register("tcp", "tcp:HOST:PORT")
@@ -25,13 +25,13 @@ def open_tcp(where: str) -> "TcpSource":
 
 
 class TcpSource:
-    """One JSON object per line, from a server; connects anew whenever the link is lost or silent."""
+    """One JSON object per line, from a server. It connects again whenever the link is lost or silent."""
 
     def __init__(self, host: str, port: int) -> None:
-        """Look the host up; the first `read` connects.
+        """Look up the host. The first `read` connects.
 
         Raises:
-            ValueError: when the host has no address.
+            ValueError: if the host has no address.
         """
         self._inbox = Inbox(parse_pose)
         self._name = f"tcp:{host}:{port}"
@@ -55,17 +55,17 @@ class TcpSource:
 
     @property
     def problem(self) -> str | None:
-        """What ails the link, or else what was wrong with a line last."""
+        """The problem with the link, or otherwise the last problem with a line."""
         return f"{self._name}: {self._link_problem}" if self._link_problem else self._inbox.problem
 
     def read(self, now: float) -> list[Sample]:
-        """Lines since the last call."""
+        """The samples of the lines since the last call."""
         if self._socket is None and now - self._tried >= RETRY:
             self._connect(now)
         if self._socket is not None:
             self._receive(self._socket, now)
         samples = self._inbox.take()
-        # Lines without a stamp that were read at once cannot be told apart in time: the newest counts.
+        # Lines without a stamp that were read together cannot be separated in time: only the newest is used.
         return [sample for i, sample in enumerate(samples, 1) if sample.stamp is not None or i == len(samples)]
 
     def close(self) -> None:

@@ -14,9 +14,11 @@ from e2efly.deploy.pose.registry import port_of, register
 from e2efly.deploy.pose.source import Inbox
 
 BUFFER = 32 << 10
-"""Bytes that the kernel is asked to keep between two reads, some 80 poses. It keeps the oldest: the less, the newer."""
+"""Bytes that the kernel is asked to buffer between two reads, about 80 poses. It keeps the oldest, so a smaller buffer
+gives newer poses."""
 DRAIN = 128
-"""Most datagrams that one `read` takes, which is more than the buffer holds; most are thrown away unread."""
+"""The largest number of datagrams that one `read` takes. This is more than the buffer holds. Most of them are then
+dropped unparsed."""
 T = TypeVar("T")
 _TIMESTAMP = 35  # SO_TIMESTAMPNS of Linux, which Python's socket module does not name
 
@@ -28,17 +30,17 @@ def open_udp(where: str) -> "UdpSource[Sample]":
 
 
 def address_of(where: str) -> tuple[str, int]:
-    """Where to listen, by [HOST:]PORT.
+    """The address at which to listen, from [HOST:]PORT.
 
     Raises:
-        MalformedError: when it is not written so.
+        MalformedError: if it is not written in this form.
     """
     host, _, port = where.rpartition(":")
     return host or "127.0.0.1", port_of(port)
 
 
 class UdpSource(Generic[T]):
-    """One JSON object per datagram; bound to an address of this machine."""
+    """One JSON object per datagram. The socket is bound to an address of this machine."""
 
     def __init__(
         self,
@@ -49,24 +51,24 @@ class UdpSource(Generic[T]):
         *,
         tells_sender: bool = False,
     ) -> None:
-        """Bind.
+        """Bind the socket.
 
         Args:
-            host: address of this machine; 0.0.0.0 listens to the whole network.
-            port: 0 takes a free one.
-            parse: what a datagram says; takes it and the time of its arrival, s.
-            what: to call a datagram in messages.
-            tells_sender: whether `parse` is told the address that a datagram came from, too.
+            host: address of this machine. 0.0.0.0 listens to the whole network.
+            port: the port. 0 selects a free one.
+            parse: parses a datagram. It takes the datagram and its time of arrival, s.
+            what: the name of a datagram in messages.
+            tells_sender: whether `parse` is also told the address of the sender.
 
         Raises:
-            ValueError: when it cannot be bound.
+            ValueError: if the socket cannot be bound.
         """
         self._inbox: Inbox[T] = Inbox(parse)
         self._what, self._tells_sender = what, tells_sender
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
-        with contextlib.suppress(OSError):  # elsewhere than on Linux `now` has to do
+        with contextlib.suppress(OSError):  # not on Linux: no time stamps
             self._socket.setsockopt(socket.SOL_SOCKET, _TIMESTAMP, 1)
         try:
             self._socket.bind((host, port))
@@ -85,11 +87,13 @@ class UdpSource(Generic[T]):
 
     @property
     def problem(self) -> str | None:
-        """What was wrong last."""
+        """The last problem."""
         return self._inbox.problem
 
     def read(self, now: float) -> list[T]:
-        """Datagrams since the last call; `received` is when the kernel took them, not when they were read."""
+        """The datagrams since the last call. `received` is the time at which the kernel took them, not when they were
+        read.
+        """
         del now
         for _ in range(DRAIN):
             try:
@@ -119,7 +123,9 @@ class UdpSource(Generic[T]):
 
 
 def _waited(extra: list[tuple[int, int, bytes]]) -> float:
-    """How long ago the kernel took a datagram, s, from the time stamp it gives along (wall clock); 0 without one."""
+    """How long ago the kernel took a datagram, s, from the time stamp that comes with it (wall clock). 0 without a time
+    stamp.
+    """
     for level, kind, data in extra:
         if level == socket.SOL_SOCKET and kind == _TIMESTAMP and len(data) == struct.calcsize("@ll"):
             seconds, nanoseconds = struct.unpack("@ll", data)

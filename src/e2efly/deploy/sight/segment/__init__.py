@@ -1,4 +1,4 @@
-"""Who finds what a mask is of in the colours of a camera: pure functions of an image, and how they are written."""
+"""Segmenters, which find the object of a mask in a camera's colours: pure functions of an image, and their names."""
 
 import importlib
 from collections.abc import Callable
@@ -12,10 +12,10 @@ from e2efly.vehicles.names import unknown
 
 
 class Segmenter(Protocol):
-    """Makes a mask of colours. Two calls with the same colours give the same mask."""
+    """Makes a mask from colours. Two calls with the same colours give the same mask."""
 
     def __call__(self, colours: np.ndarray) -> np.ndarray:
-        """The mask, uint8 (h, w), 1 where the object is seen, else 0, of colours, uint8 (h, w, 3), red first."""
+        """The mask, uint8 (h, w), 1 where the object is seen, 0 elsewhere, for colours, uint8 (h, w, 3), red first."""
         ...
 
     def describe(self) -> str:
@@ -24,16 +24,16 @@ class Segmenter(Protocol):
 
 
 Opener = Callable[[str], Segmenter]
-"""Opens a segmenter, given the text behind its name; raises ValueError with what is accepted."""
+"""Opens a segmenter, given the text after its name. Raises ValueError that says what is accepted."""
 SEGMENTERS: Registry[Opener] = Registry("segmenter")
-"""The kinds of segmenters; each registers itself when its module is imported, as `chosen` does."""
+"""The kinds of segmenters. Each registers itself when its module is imported. `chosen` imports the modules."""
 
 
 def opencv() -> ModuleType:
     """The package `cv2`.
 
     Raises:
-        ValueError: where it is not installed.
+        ValueError: if it is not installed.
     """
     try:
         import cv2
@@ -43,10 +43,10 @@ def opencv() -> ModuleType:
 
 
 def chosen(text: str) -> Segmenter:
-    """The segmenter that NAME[:...] is.
+    """The segmenter that the text NAME[:...] selects.
 
     Raises:
-        ValueError: for an unknown name, with all there are; what is wrong with the text behind it.
+        ValueError: for an unknown name, with all known names, or with what is wrong with the text after the name.
     """
     for kind in ("apriltag", "colour", "network"):  # each registers itself
         importlib.import_module(f"{__name__}.{kind}")

@@ -1,4 +1,4 @@
-"""Masks of pads that bear AprilTags (Olson, "AprilTag: A robust and flexible visual fiducial system", 2011)."""
+"""Masks of pads that carry AprilTags (Olson, "AprilTag: A robust and flexible visual fiducial system", 2011)."""
 
 import re
 from dataclasses import dataclass
@@ -9,12 +9,12 @@ import numpy as np
 from e2efly.deploy.sight.segment import SEGMENTERS, opencv
 
 FAMILIES = ("16h5", "25h9", "36h10", "36h11")
-"""The families that OpenCV knows."""
+"""The families that OpenCV supports."""
 LARGEST = 20.0
-"""Most widths of a tag that a pad may be wide."""
+"""The largest width of a pad, in widths of its tag."""
 FORM = "mask:apriltag:FAMILY[:ID[xFACTOR],...]"
 _BEHIND = 1e-3
-"""Corners of a pad whose depth is less than this share of the tag's are at or behind the camera's plane."""
+"""Corners of a pad whose depth is less than this share of the tag's depth are at or behind the camera's plane."""
 
 
 @dataclass(frozen=True)
@@ -22,21 +22,21 @@ class AprilTags:
     """Finds tags of a family, and makes a mask of the pads under them."""
 
     family: str
-    """Of `FAMILIES`."""
+    """One of `FAMILIES`."""
     factors: dict[int, float]
-    """Width of the pad over the width of its tag, by the tag's number; empty: each tag of the family is a pad."""
+    """Width of the pad divided by the width of its tag, by the tag's ID. Empty: each tag of the family is a pad."""
 
     def __post_init__(self) -> None:
         cv2 = opencv()
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR  # best on drawn tags of 24 to 160 pixels
-        parameters.errorCorrectionRate = 1.0  # all bits that the family corrects: a small tag may cover some
+        parameters.errorCorrectionRate = 1.0  # all bits that the family can correct: a small tag may cover some of them
         parameters.minMarkerPerimeterRate = 0.02  # of the longer side: tags of a few pixels are never read
         detector = cv2.aruco.ArucoDetector(_dictionary(cv2, self.family), parameters)
         object.__setattr__(self, "_detector", detector)
 
     def __call__(self, colours: np.ndarray) -> np.ndarray:
-        """The mask of all pads whose tags are seen: see `Segmenter`."""
+        """The mask of all pads whose tags are seen; see `Segmenter`."""
         cv2 = opencv()
         detector: Any = self._detector  # pyright: ignore
         corners, numbers, _ = detector.detectMarkers(cv2.cvtColor(colours, cv2.COLOR_RGB2GRAY))
@@ -50,20 +50,20 @@ class AprilTags:
         return mask
 
     def describe(self) -> str:
-        """Family and numbers."""
+        """The family and the IDs."""
         chosen = ",".join(f"{i}x{factor:g}" for i, factor in self.factors.items()) or "any"
         return f"AprilTag {self.family}, {chosen}"
 
 
 def enlarged(square: np.ndarray, factor: float) -> np.ndarray:
-    """A square in perspective, made wider about its centre in its own plane.
+    """A square in perspective, enlarged about its centre in its own plane.
 
     Args:
-        square: (4, 2) corners in the image, pixels, in turn.
-        factor: new width over old.
+        square: (4, 2) corners in the image, pixels, in order around the square.
+        factor: new width divided by the old width.
 
     Returns:
-        (4, 2) corners of the wider square; the square itself where a corner would lie behind the camera.
+        (4, 2) corners of the larger square. The original square if a corner would lie behind the camera.
     """
     if factor == 1.0:
         return square
@@ -82,7 +82,7 @@ def open_apriltag(text: str) -> AprilTags:
     """Read FAMILY[:ID[xFACTOR],...].
 
     Raises:
-        ValueError: naming what is wrong: the family, an ID that it does not have, a factor.
+        ValueError: naming what is wrong: the family, an ID that it does not have, or a factor.
     """
     family, colon, listed = text.partition(":")
     family = family.removeprefix("tag")

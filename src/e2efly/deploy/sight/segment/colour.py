@@ -1,4 +1,4 @@
-"""Masks of pads that have a colour of their own."""
+"""Masks of pads that have a distinct colour."""
 
 import math
 from dataclasses import dataclass
@@ -15,15 +15,16 @@ FORM = "mask:colour:H,S,V,H,S,V"
 
 @dataclass(frozen=True)
 class Colour:
-    """Finds the largest patch whose colours lie between bounds, and fills its holes: markings are part of a pad."""
+    """Finds the largest patch whose colours are within bounds, and fills its holes: markings are part of a pad."""
 
     low: tuple[float, float, float]
-    """Least hue, degrees, saturation and value, percent (a hexcone: `colorsys.rgb_to_hsv`)."""
+    """Smallest hue, degrees, saturation and value, percent (hexcone model: `colorsys.rgb_to_hsv`)."""
     high: tuple[float, float, float]
-    """Largest. A hue below the least one is reached through 360 degrees: from 340 to 20 is red."""
+    """Largest hue, saturation and value. If the largest hue is below the smallest, the range passes through 360
+    degrees: from 340 to 20 is red."""
 
     def __call__(self, colours: np.ndarray) -> np.ndarray:
-        """The mask of the largest patch: see `Segmenter`."""
+        """The mask of the largest patch; see `Segmenter`."""
         cv2 = opencv()
         patches, _ = cv2.findContours(self.within(colours), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         mask = np.zeros(colours.shape[:2], np.uint8)
@@ -32,7 +33,7 @@ class Colour:
         return mask
 
     def within(self, colours: np.ndarray) -> np.ndarray:
-        """1 where a pixel's colour lies between the bounds, else 0: uint8 (h, w) of uint8 (h, w, 3), red first."""
+        """1 where a pixel's colour is within the bounds, 0 elsewhere: uint8 (h, w), for uint8 (h, w, 3), red first."""
         cv2 = opencv()
         hsv = cv2.cvtColor(colours, cv2.COLOR_RGB2HSV_FULL)  # hue: 256 for 360 degrees
         low = [self.low[0] * 256 / 360, self.low[1] * 2.55, self.low[2] * 2.55]

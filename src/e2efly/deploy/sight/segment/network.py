@@ -1,4 +1,4 @@
-"""Masks by a network that has learned what pads look like."""
+"""Masks from a network that has learned what pads look like."""
 
 from pathlib import Path
 from typing import Any
@@ -9,9 +9,9 @@ import onnxruntime
 from e2efly.deploy.sight.segment import SEGMENTERS, opencv
 
 OWN = Path(__file__).parent / "pad.onnx"
-"""What is loaded where no file is named; `benchmarks/pad_masks.py --train` writes it."""
+"""The network that is loaded if no file is named. `benchmarks/pad_masks.py --train` writes it."""
 LONGER_SIDE, STEP = 64, 16
-"""Of what a network is shown that takes any size: pixels of the longer side; sides are multiples of the step."""
+"""The input size of a network that accepts any size: pixels of the longer side. All sides are multiples of the step."""
 ACCEPTED = (
     "an ONNX file with one input, float32 (n, h, w, 3), red, green, blue in [0, 1], and one output, float32 (n, h, w), "
     "the probability that a pixel shows the pad"
@@ -19,13 +19,13 @@ ACCEPTED = (
 
 
 class Network:
-    """A mask where the probability of a network is more than a half."""
+    """A mask of the pixels for which the network's probability is above one half."""
 
     def __init__(self, path: Path) -> None:
-        """Load it, and try it on a black image.
+        """Load the network, and try it on a black image.
 
         Raises:
-            ValueError: naming the file, and in what it is not as `ACCEPTED` says.
+            ValueError: naming the file, and how it differs from `ACCEPTED`.
         """
         self.path = path
         options = onnxruntime.SessionOptions()
@@ -43,25 +43,25 @@ class Network:
             if len(self._sides) != 2 or channels != 3:
                 raise ValueError(f"its input has the shape {given.shape}")
             self.probability(np.zeros((LONGER_SIDE, LONGER_SIDE, 3), np.uint8))
-        except Exception as error:  # of many kinds: whatever ONNX Runtime refuses, or a number of inputs or outputs
+        except Exception as error:  # any refusal of ONNX Runtime, or a wrong number of inputs or outputs
             said = str(error).strip().partition("\n")[0]
             raise ValueError(f"{path}: {said}; accepted: {ACCEPTED}") from None
 
     def __call__(self, colours: np.ndarray) -> np.ndarray:
-        """The mask: see `Segmenter`."""
+        """The mask; see `Segmenter`."""
         cv2 = opencv()
         height, width, _ = colours.shape
         larger = cv2.resize(self.probability(colours), (width, height), interpolation=cv2.INTER_LINEAR)
         return (larger > 0.5).astype(np.uint8)
 
     def probability(self, colours: np.ndarray) -> np.ndarray:
-        """That a pixel shows the pad, float32, at the size that the network is shown.
+        """The probability that a pixel shows the pad, float32, at the network's input size.
 
         Args:
             colours: uint8 (h, w, 3), red first.
 
         Raises:
-            ValueError: where what the network gives is not of that size.
+            ValueError: if the network's output does not have that size.
         """
         cv2 = opencv()
         longer = max(colours.shape[:2])
@@ -76,12 +76,12 @@ class Network:
         return np.asarray(found[0], np.float32)
 
     def describe(self) -> str:
-        """Which file."""
+        """The name of the network."""
         return "the network of pads of benchmarks/pad_masks.py" if self.path == OWN else f"network {self.path}"
 
 
 def open_onnx(text: str) -> Network:
-    """Load FILE; left out: `OWN`.
+    """Load FILE. If it is omitted, load `OWN`.
 
     Raises:
         ValueError: naming the file and what is accepted.

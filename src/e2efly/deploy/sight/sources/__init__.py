@@ -1,4 +1,6 @@
-"""The kinds of image sources, one file each, and which shows what of a policy's contract: `--image NAME=URI`."""
+"""The kinds of image sources, one file each, and which one serves each image of a policy's contract: `--image
+NAME=URI`.
+"""
 
 import importlib
 import pkgutil
@@ -23,8 +25,8 @@ def open_cameras(texts: Sequence[str], contract: Contract) -> list[ImageSource]:
     """The cameras of a policy, in the order of its contract.
 
     Args:
-        texts: NAME=URI of each of its images.
-        contract: of the policy.
+        texts: NAME=URI for each of its images.
+        contract: the contract of the policy.
 
     Raises:
         ValueError: naming the image or the text and what is accepted.
@@ -48,10 +50,10 @@ def open_cameras(texts: Sequence[str], contract: Contract) -> list[ImageSource]:
 
 
 def by_image(texts: Sequence[str], contract: Contract) -> dict[str, str]:
-    """NAME=URI of each image as URI by name.
+    """The URI of each image by its name, from texts of the form NAME=URI.
 
     Raises:
-        ValueError: naming the text and what is accepted: no such image, or one twice.
+        ValueError: naming the text and what is accepted: an unknown image, or an image that is given twice.
     """
     wanted = [image.name for image in contract.images]
     chosen: dict[str, str] = {}
@@ -70,12 +72,13 @@ def open_image(text: str, image: Image) -> ImageSource:
     """Open an image source.
 
     Args:
-        text: NAME:... of a registered kind (of an installed package, too), written as its form says; or the reference
-            of a class or a function, path/to/file.py:Name or module:Name, and behind another colon what it is given.
+        text: NAME:... of a registered kind, also of an installed package, written as its form says. Or a reference to a
+            class or a function, path/to/file.py:Name or module:Name, optionally followed by another colon and the text
+            that it is given.
         image: the camera of the policy's contract.
 
     Raises:
-        ValueError: naming the text and what is accepted; what the source says of its failure.
+        ValueError: naming the text and what is accepted, or with what the source reports about its failure.
     """
     name, _, where = text.partition(":")
     if name not in SOURCES and name.isidentifier():

@@ -1,4 +1,4 @@
-"""Images of `e2efly hil` on another computer."""
+"""Images from `e2efly hil` on another computer."""
 
 import sys
 
@@ -7,19 +7,19 @@ from e2efly.deploy.sight.capture import Captured, open_captured
 from e2efly.deploy.sight.registry import register
 
 ADVICE = "start e2efly hil with --image IMAGE=tcp:PORT and --host there first"
-"""What to do when it does not open."""
+"""What to do if it does not open."""
 
 
 @register("hil", "hil:HOST:PORT")
 def open_hil(text: str, image: Image) -> Captured:
-    """Receive the stream of a node. Times of exposure are told by this computer's clock.
+    """Receive the image stream of a HIL node. Exposure times are given on this computer's clock.
 
     Args:
         text: HOST:PORT.
         image: the camera of the policy's contract.
 
     Raises:
-        ValueError: for another text, or when nobody serves there.
+        ValueError: for another text, or if no server answers there.
     """
     host, _, port = text.rpartition(":")
     if not host or not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):

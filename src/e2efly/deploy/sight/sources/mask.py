@@ -1,4 +1,4 @@
-"""Masks of what is seen by another source."""
+"""Masks of an object that another source sees."""
 
 import dataclasses
 import json
@@ -19,14 +19,14 @@ def open_mask(text: str, image: Image) -> Captured:
 
     Args:
         text: SEGMENTER@URI, see `e2efly.deploy.sight.mask.FORM`.
-        image: the camera of the policy's contract; it has to be a mask.
+        image: the camera of the policy's contract. It has to be a mask.
 
     Raises:
-        ValueError: for a policy that sees no mask, what is wrong with the segmenter, and what the process says of the
-            other source.
+        ValueError: for a policy that sees no mask, with what is wrong with the segmenter, or with what the process
+            reports about the other source.
     """
     segmenter, uri = parts_of(text)
     colours_for(image)
-    chosen(segmenter)  # what is wrong with it is said before a process starts
+    chosen(segmenter)  # report its problems before a process starts
     where = json.dumps({"segmenter": segmenter, "uri": uri, "image": dataclasses.asdict(image)})
     return open_captured(f"mask:{text}", image, [sys.executable], ADVICE, where, "policy")

@@ -1,4 +1,4 @@
-"""Depth or colours of an Intel RealSense camera, by pyrealsense2."""
+"""Depth or colours of an Intel RealSense camera, through pyrealsense2."""
 
 import sys
 
@@ -7,19 +7,19 @@ from e2efly.deploy.sight.capture import Captured, field_of_view, open_captured
 from e2efly.deploy.sight.registry import register
 
 ADVICE = 'install the package pyrealsense2 (pip install "e2efly[realsense]"; Debian: apt-get install libusb-1.0-0)'
-"""What to do when it cannot be imported."""
+"""What to do if it cannot be imported."""
 
 
 @register("realsense", "realsense:[SERIAL]")
 def open_realsense(text: str, image: Image) -> Captured:
-    """Read the camera with a serial number, or the only one: depth or colours, as the policy sees.
+    """Read the camera with this serial number, or the only camera: depth or colours, depending on what the policy sees.
 
     Args:
         text: the serial number, or nothing.
         image: the camera of the policy's contract.
 
     Raises:
-        ValueError: for a camera that is not there or does not show what the policy sees, a missing package.
+        ValueError: for a camera that is not connected or does not give what the policy sees, or for a missing package.
     """
     serial, fov = field_of_view(text, f"realsense:{text}")
     return open_captured(f"realsense:{serial}", image, [sys.executable], ADVICE, serial, fov)

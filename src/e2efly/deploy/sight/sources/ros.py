@@ -9,35 +9,35 @@ ADVICE = {
     1: "install the package rospy (Debian: apt-get install python3-rospy python3-sensor-msgs) and have roscore running",
     2: 'install the package rclpy (pip install "e2efly[ros2]", or source the ROS 2 installation)',
 }
-"""What to do when it does not open."""
+"""What to do if it does not open."""
 
 
 @register("ros1", "ros1:/topic[?fov=ACROSSxDOWN]")
 def open_ros1(where: str, image: Image) -> Captured:
-    """Subscribe by ROS 1; see `open_ros`."""
+    """Subscribe with ROS 1; see `open_ros`."""
     return open_ros(1, where, image)
 
 
 @register("ros2", "ros2:/topic[?fov=ACROSSxDOWN]")
 def open_ros2(where: str, image: Image) -> Captured:
-    """Subscribe by ROS 2; see `open_ros`."""
+    """Subscribe with ROS 2; see `open_ros`."""
     return open_ros(2, where, image)
 
 
 def open_ros(version: int, where: str, image: Image) -> Captured:
-    """Subscribe to a topic of sensor_msgs/Image; the CameraInfo of the topic beside it tells the field of view.
+    """Subscribe to a topic of sensor_msgs/Image. The CameraInfo topic beside it gives the field of view.
 
-    The capture process runs in whichever of this interpreter and the system's has the ROS asked for, or in the one that
-    `E2EFLY_ROS_PYTHON` names.
+    The capture process runs in this interpreter or in the system's, whichever has the requested ROS version, or in the
+    interpreter that `E2EFLY_ROS_PYTHON` names.
 
     Args:
         version: 1 or 2.
-        where: name of the topic, from the root, and perhaps the field of view: "/camera/image_raw?fov=1.2x0.9".
+        where: absolute name of the topic, optionally with the field of view: "/camera/image_raw?fov=1.2x0.9".
         image: the camera of the policy's contract.
 
     Raises:
-        ValueError: for a topic that is not from the root or of another type, an encoding that does not show what the
-            policy sees, a package that is not installed, a ROS master that does not answer, no image in time.
+        ValueError: for a topic without an absolute name or of another type, an encoding that does not give what the
+            policy sees, a package that is not installed, a ROS master that does not answer, or no image in time.
     """
     topic, fov = field_of_view(where, f"ros{version}:{where}")
     if not topic.startswith("/"):

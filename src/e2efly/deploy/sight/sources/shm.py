@@ -7,5 +7,5 @@ from e2efly.deploy.sight.shared import SharedCamera
 
 @register("shm", "shm:NAME")
 def open_shm(where: str, image: Image) -> SharedCamera:
-    """Read what is published under a name."""
+    """Read the images that are published under a name."""
     return SharedCamera(where, image)

@@ -1,4 +1,4 @@
-"""Colours of a camera or an FPV receiver of Video4Linux, or of a video file, by OpenCV."""
+"""Colours of a Video4Linux camera or FPV receiver, or of a video file, through OpenCV."""
 
 import sys
 
@@ -7,19 +7,19 @@ from e2efly.deploy.sight.capture import Captured, field_of_view, open_captured
 from e2efly.deploy.sight.registry import register
 
 ADVICE = 'install the package OpenCV (pip install "e2efly[video]")'
-"""What to do when it does not open."""
+"""What to do if it does not open."""
 
 
 @register("v4l2", "v4l2:/dev/videoN?fov=ACROSSxDOWN")
 def open_v4l2(text: str, image: Image) -> Captured:
-    """Read a device, or a file at its own rate: its end is like an unplugged camera.
+    """Read a device, or a file at its own frame rate. The end of a file is treated like an unplugged camera.
 
     Args:
-        text: the path, and the field of view in rad, as no device tells it: `/dev/video0?fov=1.2x0.9`.
-        image: the camera of the policy's contract; it has to see colours.
+        text: the path, and the field of view in rad, because no device reports it: `/dev/video0?fov=1.2x0.9`.
+        image: the camera of the policy's contract. It has to see colours.
 
     Raises:
-        ValueError: for a policy that sees something else, no field of view, a device that does not open.
+        ValueError: for a policy that sees something else, a missing field of view, or a device that does not open.
     """
     path, fov = field_of_view(text, f"v4l2:{text}")
     if image.sees != "rgb":
