@@ -206,7 +206,7 @@ def test_an_ablation_counts_where_the_full_reward_learns() -> None:
     assert judge(learned).word == UNMEASURED  # the other one is still to come
     found = judge(learned, lost)
     assert found.word == CONFIRMED
-    assert found.why == "not learned with the full reward either: land by PPO"
+    assert found.why == "not learned in these steps with the full reward either: land by PPO"
     assert judge(row("race", "ppo", 1.0, 1.0), lost).word == REFUTED
     assert judge(row("race", "ppo", 0.4, 0.0), lost).word == UNTESTABLE
     assert missed(row("track", "ppo", 1.0, 0.0), "sparse")  # all crash before an error counts
