@@ -1,8 +1,9 @@
-"""Gauss-Newton multiple shooting: the vehicle's unknowns that explain all windows, each with a start of its own.
+"""Gauss-Newton multiple shooting: finds the vehicle's unknowns that explain all windows, each with its own start.
 
-Every window's start is free, with a prior, and is eliminated by the Schur complement; residuals count by Huber's
-weights (P. J. Huber, "Robust Estimation of a Location Parameter", 1964), and by the spread that each sensor shows.
-Multiple shooting: H. G. Bock, "Numerical treatment of inverse problems in chemical reaction kinetics", 1981.
+The start of every window is free, with a prior, and is eliminated with the Schur complement. Residuals are weighted
+with Huber's weights (P. J. Huber, "Robust Estimation of a Location Parameter", 1964), and with the spread that each
+sensor shows. Multiple shooting: H. G. Bock, "Numerical treatment of inverse problems in chemical reaction kinetics",
+1981.
 """
 
 from collections.abc import Callable
@@ -19,51 +20,51 @@ from e2efly.identification.model import FACTOR, FORCE, GYRO, NUISANCES, START, M
 from e2efly.identification.windows import LENGTH, Windows
 
 HUBER = 2.0
-"""Standard deviations up to which a residual counts by its square."""
+"""Up to this number of standard deviations, a residual counts with its square."""
 NOISE = {
     "body_rate": 0.05, "specific_force": 0.5, "rotor_speed": 20.0, "velocity": 0.05, "quaternion": 0.02,
     "position": 0.01,
 }  # fmt: skip
-"""Spread of each sensor about the model at first, in its unit; then what the residuals show."""
+"""The first value of each sensor's spread about the model, in its unit. Later it is the spread of the residuals."""
 FLOOR = {
     "body_rate": 2e-3, "specific_force": 0.02, "rotor_speed": 0.5, "velocity": 2e-3, "quaternion": 5e-4,
     "position": 2e-4,
 }  # fmt: skip
-"""The least that is believed."""
+"""The smallest spread of each sensor, in its unit."""
 CALM = 0.9
-"""Share of the windows that are closer to the model than the spread that a sensor is given: in calm flight the flight
-controller answers what shakes the vehicle, and only lively windows tell the vehicle from that."""
+"""The spread of a sensor is chosen so that this share of the windows is closer to the model. In calm flight, the flight
+controller mainly reacts to disturbances, and only the lively windows show the vehicle itself."""
 FREE = np.array([0.05] * 3 + [0.5] * 3 + [0.1] * 3 + [0.5] * 3 + [0.3] * 4)
-"""Standard deviation of a window's start about its measured one."""
+"""Standard deviations of a window's start about the measured start."""
 SPUN = 0.003
-"""The same of rotor speeds that follow from the motor outputs before the window. Wider, it would take disturbances for
-rotors that have not come to rest yet, and the lag for as long as they last."""
+"""The same for rotor speeds that follow from the motor outputs before the window. If it were larger, disturbances would
+be explained by rotors that have not settled yet, and the motor lag by the duration of the disturbances."""
 STILL = 0.02
-"""Standard deviations below which a step of all unknowns is the last."""
+"""If a step changes every unknown by less than this number of its standard deviations, it is the last."""
 BATCH = 4
-"""Windows that are computed together: one program for flights of any length. More at once take no less time for each,
-and a short flight has few to fill a batch. One batch after the other: programs that several threads start at once wait
-for each other for ever, as they share XLA's own threads."""
+"""The number of windows that are computed together, so that one compiled program serves flights of any length. A larger
+batch is not faster per window, and a short flight could not fill it. The batches are computed one after the other: if
+several threads start programs at once, they wait for each other for ever, because they share XLA's own threads."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """What the fit found."""
+    """The result of the fit."""
 
     p: np.ndarray
     """(u,) unknowns of the vehicle."""
     q: np.ndarray
-    """(flights, nuisances)."""
+    """(flights, nuisances) nuisance parameters of each flight."""
     covariance: np.ndarray
-    """(u, u) of `p`: the sandwich of windows, which holds where residuals are not white."""
+    """(u, u) covariance of `p`: the sandwich estimate over the windows, which also holds if residuals are not white."""
     assumed: np.ndarray
-    """(u, u) as it would be if they were: Gauss-Newton's."""
+    """(u, u) covariance of `p` for white residuals: that of Gauss-Newton."""
     noise: dict[str, float]
     """Spread of each sensor about the fitted model."""
     cost: float
     iterations: int
     starts: np.ndarray
-    """(n, START) of the windows."""
+    """(n, START) the fitted starts of the windows, as corrections of the measured ones."""
 
 
 def fit(
@@ -77,12 +78,12 @@ def fit(
     """Find the unknowns.
 
     Args:
-        model: the vehicle of the file, and what drives it.
-        windows: of one or several flights.
-        p: where to begin; the file's values when left out.
-        iterations: at most.
-        told: (iteration, cost) after each.
-        fixed: (u,) unknowns that stay as the file has them; left out: none.
+        model: the vehicle of the file, and the signal that drives it.
+        windows: the windows of one or several flights.
+        p: the first values of the unknowns. None: the values of the file.
+        iterations: the largest number of iterations.
+        told: called with (iteration, cost) after each iteration.
+        fixed: (u,) marks the unknowns that keep the values of the file. None: no unknown is fixed.
     """
     with jax.enable_x64(True):
         return _fit(model, windows, p, iterations, told, fixed)
@@ -104,13 +105,13 @@ def _fit(
     prior_q = np.array([sigma for _, sigma in NUISANCES])
     if flights == 1 or model.driver == "rotor_speed":
         prior_q[FACTOR] = 1e-6  # one flight cannot tell its own factor from the vehicle's
-    # without poses, a bias shows by nothing but what the model does wrong
+    # without poses, a bias cannot be distinguished from errors of the model
     if "quaternion" not in windows.measured:
         prior_q[GYRO] = 1e-6
     if "velocity" not in windows.measured and "position" not in windows.measured:
         prior_q[FORCE] = 1e-6
     p = np.zeros(u) if p0 is None else np.array(p0)
-    # motors never answer before their outputs; commands may seem to, which shows clocks that do not fit together
+    # motors never respond before their outputs; if they seem to respond before commands, the clocks do not match
     least = np.full(u, -np.inf)
     if model.driver in ("motor", "motor_and_rate"):
         least[[x.field == "latency" for x in unknowns]] = -float(model.base.latency)
@@ -135,7 +136,7 @@ def _fit(
         H, g = _assembled(terms, windows.flight, flights, u, v)
         H += np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
         g += np.concatenate([p / prior_p**2, (q / prior_q**2).ravel()])
-        held = np.flatnonzero((p <= least) & (g[:u] > 0))  # a delay below zero is none
+        held = np.flatnonzero((p <= least) & (g[:u] > 0))  # a delay below zero is impossible
         H[held, held] *= 1e12
         for _ in range(8):
             step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
@@ -169,7 +170,7 @@ def _fit(
         own = windows.flight == f
         each[np.ix_(own, np.arange(u + f * v, u + (f + 1) * v))] = terms["g"][own, u:]
     each -= each.mean(0)
-    # what disturbs one window disturbs the next, where they are brief
+    # if windows are short, a disturbance affects several neighbouring windows
     group = np.arange(windows.count) // max(round(LENGTH / windows.length), 1)
     groups = np.zeros((group[-1] + 1, len(H)))
     np.add.at(groups, group, each)
@@ -179,7 +180,7 @@ def _fit(
 
 
 def cost(model: Model, windows: Windows, p: np.ndarray) -> float:
-    """How badly windows are explained at `p`, their starts as measured."""
+    """The cost of the windows at `p`, with their measured starts."""
     with jax.enable_x64(True):
         noise = {name: NOISE[name] for name in windows.measured}
         q, starts = np.zeros((int(windows.flight.max()) + 1, len(NUISANCES))), np.zeros((windows.count, START))
@@ -187,14 +188,16 @@ def cost(model: Model, windows: Windows, p: np.ndarray) -> float:
 
 
 def _by_batch(computed: Callable[[Any], Any], data: dict[str, np.ndarray]) -> Any:
-    """A compiled function of a batch of windows, of all of them: leaves (whole batches, ...), NumPy."""
+    """Apply a compiled function of a batch of windows to all windows. Returns NumPy leaves (windows of whole batches,
+    ...).
+    """
     batches = [{k: x[i : i + BATCH] for k, x in data.items()} for i in range(0, len(data["counts"]), BATCH)]
     found = [jax.tree.map(np.asarray, computed(batch)) for batch in batches]
     return jax.tree.map(lambda *parts: np.concatenate(parts), *found)
 
 
 def _data(model: Model, windows: Windows) -> dict[str, np.ndarray]:
-    """Arrays of all windows, filled up to whole batches, with a guess of where each starts."""
+    """The arrays of all windows, padded to whole batches, with a guess of each window's start."""
     n, hover = windows.count, float(model.hover)
     full = -(-n // BATCH) * BATCH
     data: dict[str, Any] = {"driven": windows.driven, "when": windows.when, "flight": windows.flight}
@@ -206,12 +209,12 @@ def _data(model: Model, windows: Windows) -> dict[str, np.ndarray]:
 
 
 def measured_starts(model: Model, windows: Windows) -> dict[str, np.ndarray]:
-    """What `simulate` takes as a window, of each of them: they start as they were measured."""
+    """The `window` argument of `simulate` for each of the windows, with their measured starts."""
     return {"driven": windows.driven, "when": windows.when} | _guesses(windows, float(model.hover))
 
 
 def _guesses(windows: Windows, hover: float) -> dict[str, np.ndarray]:
-    """Where each window starts by its streams; where one is missing, a vehicle that hovers."""
+    """The start of each window from its streams. A missing stream is replaced by the values of a hovering vehicle."""
     n, found = windows.count, {}
     for name, size in (("position", 3), ("velocity", 3), ("quaternion", 4), ("body_rate", 3), ("rotor_speed", 4)):
         default = np.full(size, hover) if name == "rotor_speed" else np.eye(4)[0] if size == 4 else np.zeros(size)
@@ -231,11 +234,14 @@ def _judged(
     noise: dict[str, float],
     free: np.ndarray,
 ) -> tuple[np.ndarray, dict[str, float]]:
-    """The cost of each window, and the spread of each sensor about the model. It needs no slopes, which cost most."""
+    """The cost of each window, and the spread of each sensor about the model.
+
+    It needs no derivatives, which are the most expensive part.
+    """
     found = _by_batch(partial(_costs, model, p, q, noise, free), _begun(data, starts))
     spread = {}
     for name in noise:
-        # of the windows that have this sensor
+        # only windows that have this sensor count
         squares, there = found[f"square/{name}"], found[f"sum/{name}"]
         mean = np.where(there > 0, squares / np.maximum(there, 1), np.nan)
         spread[name] = max(float(np.sqrt(np.nanquantile(mean, CALM))), FLOOR[name])
@@ -251,13 +257,13 @@ def _terms(
     noise: dict[str, float],
     free: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """Gradient and curvature of each window, its start eliminated."""
+    """Gradient and curvature of each window after its start has been eliminated."""
     found = _by_batch(partial(_slopes, model, p, q, noise, free), _begun(data, starts))
     return {k: x[: len(starts)] for k, x in found.items()}
 
 
 def _begun(data: dict[str, Any], starts: np.ndarray) -> dict[str, Any]:
-    """The arrays of all windows, with where each starts."""
+    """The arrays of all windows, with the corrections of their starts."""
     return {**data, "moved": np.concatenate([starts, np.zeros((len(data["counts"]) - len(starts), START))])}
 
 
@@ -287,7 +293,7 @@ def _slopes(
 def _window(
     model: Model, p: Array, q: Array, noise: dict[str, Any], free: Array, data: dict[str, Any]
 ) -> dict[str, Array]:
-    """Gradient and curvature of one window, its start eliminated."""
+    """Gradient and curvature of one window after its start has been eliminated."""
     u, v, start = p.shape[0], q.shape[1], data["moved"]
 
     def residuals(z: Array) -> tuple[Array, Array]:
@@ -310,7 +316,7 @@ def _window(
 def _residuals(
     model: Model, p: Array, q: Array, start: Array, data: dict[str, Any], noise: dict[str, Any]
 ) -> dict[str, Array]:
-    """Simulated less measured, by stream, in its unit; zero where nothing was measured."""
+    """Simulated minus measured values of each stream, in its unit. Zero where nothing was measured."""
     window = {"driven": data["driven"], "when": data["when"]} | {
         name: data[f"start/{name}"] for name in ("position", "velocity", "quaternion", "body_rate", "rotor_speed")
     }
@@ -334,7 +340,7 @@ def _huber(r: Array) -> Array:
 def _assembled(
     terms: dict[str, Any], flight: np.ndarray, flights: int, u: int, v: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Curvature and gradient of all windows in the unknowns and the nuisances of every flight."""
+    """Curvature and gradient of all windows with respect to the unknowns and the nuisances of every flight."""
     size = u + flights * v
     H, g = np.zeros((size, size)), np.zeros(size)
     for f in range(flights):

@@ -1,4 +1,4 @@
-"""What of a flight controller's settings matters to a flight: what it is, what is needed, and what mends it."""
+"""The flight controller's settings that matter to a flight: their values, what is needed, and how to correct them."""
 
 from dataclasses import dataclass
 from math import degrees
@@ -18,37 +18,37 @@ from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 QUADX = 3
 """Betaflight's number of the mixer of a quadrotor in X."""
 ANGLE_AUX = 2
-"""AUX channel, from 0, that the guide gives to ANGLE."""
+"""The AUX channel, from 0, that the guide uses for ANGLE."""
 LARGEST_DEADBAND = 10
-"""Deadband that is still jumped over without harm, us."""
+"""The largest deadband that does no harm, us. Commands jump over it."""
 LARGEST_BOOST = 5
-"""Throttle boost that was flown in rehearsals through the firmware: its default."""
+"""The largest throttle boost that was flown in rehearsals with the firmware. It is the firmware's default."""
 ATTITUDE_FIRST = ("LEGACY", "LINEAR", "DYNAMIC")
 """Mixer types that give up collective thrust before torque. EZLANDING gives up torque while the throttle is low."""
 SPEED_HZ = 50.0
-"""How often the speeds of the rotors are asked for, Hz."""
+"""How often the rotor speeds are requested, Hz."""
 ALWAYS = (1000, 2000)
-"""A mode whose range holds all pulses between these is on wherever its switch is, us."""
+"""A mode whose range contains all pulses between these is always on, whatever the position of its switch, us."""
 NOT_TOLD = "not told by this firmware"
-"""What stands for the value of a setting that cannot be read."""
+"""The value that is shown for a setting that cannot be read."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One setting."""
+    """One setting, as one row of the table."""
 
     setting: str
-    """Its name in the controller's command line, or in words."""
+    """Its name in the controller's command line, or a description."""
     value: str
-    """What it is."""
+    """Its value."""
     needed: str
-    """What the flight needs."""
+    """The value that the flight needs."""
     good: bool
-    """Whether that is so."""
+    """Whether the value is as needed."""
     mend: str = ""
-    """Lines of the controller's command line that mend it."""
+    """Lines for the controller's command line that correct it."""
     told: bool = True
-    """Whether the controller tells it. Where not, nothing is known: the pilot is to type `mend` himself."""
+    """Whether the controller reports the setting. If not, its value is unknown, and the pilot should type `mend`."""
 
     @property
     def problem(self) -> str:
@@ -62,10 +62,10 @@ def examine(
     """The table of `e2efly fly --check`.
 
     Args:
-        info: as read from the controller.
-        vehicle: whose body rates are commanded.
-        settings: with the pilot's channels.
-        contract: of the policy; its body rates count where it commands them.
+        info: the settings as read from the controller.
+        vehicle: the vehicle, whose largest body rates are needed.
+        settings: the settings of the flight, with the pilot's channels.
+        contract: the contract of the policy. If the policy commands body rates, its largest ones are needed instead.
     """
     api = ".".join(map(str, info.api))
     known = f"BTFL, {RELEASES[0].name} to {RELEASES[-1].name}"
@@ -106,20 +106,20 @@ def examine(
 
 
 def hover_schedule(hover: HoverController) -> dict[int, float]:
-    """How often each message is asked for that a hover controller needs besides, Hz."""
+    """The additional messages that a hover controller needs, and how often each is requested, Hz."""
     return {MotorTelemetry.CODE: SPEED_HZ} if ROTOR_SPEED in hover.needs else {}
 
 
 def check_hover(name: str, hover: HoverController, info: ControllerInfo) -> None:
-    """Refuse a hover controller that needs what the flight controller does not tell.
+    """Refuse a hover controller that needs telemetry that the flight controller does not report.
 
     Args:
-        name: of the hover controller.
-        hover: that is to fly.
-        info: of the flight controller.
+        name: the name of the hover controller.
+        hover: the hover controller.
+        info: the settings of the flight controller.
 
     Raises:
-        ValueError: naming what is missing, and what is accepted.
+        ValueError: telemetry is missing. The message names it, and what is accepted.
     """
     if ROTOR_SPEED in hover.needs and not info.motor.tells_speed:
         able = ", ".join(known for known, kind in HOVERS.items() if ROTOR_SPEED not in kind.needs)
@@ -130,7 +130,7 @@ def check_hover(name: str, hover: HoverController, info: ControllerInfo) -> None
 
 
 def problems(rows: tuple[Row, ...]) -> tuple[str, ...]:
-    """What forbids a take-off."""
+    """The problems that forbid a take-off."""
     return tuple(row.problem for row in rows if not row.good)
 
 
@@ -161,9 +161,10 @@ def _throttle(info: ControllerInfo) -> list[Row]:
 
 
 def _mixing(info: ControllerInfo) -> list[Row]:
-    """What stands between throttle and torque and the motors: policies have learned to fly on attitude before thrust.
+    """The settings of the mixing from throttle and torques to the motors.
 
-    Without AIRMODE the firmware scales all torques down while the throttle is below half (4.3: clips each rotor).
+    Policies have learned to fly with a mixing that gives up thrust before torque. Without AIRMODE, the firmware scales
+    all torques down while the throttle is below half (4.3: it clips each rotor).
     """
     air = "AIRMODE" in info.features
     ranges = info.ranges("AIR MODE")
@@ -185,7 +186,7 @@ def _mixing(info: ControllerInfo) -> list[Row]:
 
 
 def _by_name(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
-    """Settings that firmware before 2026.6 tells nobody: there the pilot is to look himself."""
+    """Settings that firmware before 2026.6 does not report over MSP. With such firmware, the pilot must check them."""
     c = settings.channels
     used = max(n for n in (c.mission, c.roll, c.pitch, c.throttle, c.yaw) if n is not None)
     asked = (
@@ -240,7 +241,9 @@ def _where(ranges: tuple[ModeRange, ...]) -> str:
 
 
 def _hand_back(info: ControllerInfo, vehicle: Vehicle) -> list[Row]:
-    """What a dead link leaves: the receiver's sticks, level, and a throttle stick that rests in the middle."""
+    """What acts after the link has failed: the receiver's sticks in a level flight, with the throttle stick in its
+    middle.
+    """
     middle = info.throttle.throttle_of(info.rx.mid)
     share = ThrottleMap.of(vehicle).nominal(middle) / GRAVITY
     verb = "climbs" if share > 1 else "sinks"
@@ -255,7 +258,7 @@ def _hand_back(info: ControllerInfo, vehicle: Vehicle) -> list[Row]:
 
 
 def _channels(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
-    """The channels that the bridge reads must not be those of the controller's own switches."""
+    """The channels that the bridge reads. They must not be used by the controller's own modes."""
     taken = {r.aux + 5: BOXES.get(r.box, str(r.box)) for r in info.modes}
     c = settings.channels
     used = {"mission": c.mission, "roll": c.roll, "pitch": c.pitch, "throttle": c.throttle, "yaw": c.yaw}

@@ -1,7 +1,7 @@
-"""Requests and replies over a link, without ever blocking the control loop.
+"""Requests and replies over a link. The control loop is never blocked.
 
-`poll` reads what has come and sends what is due. Telemetry is asked for on a schedule, but only so much at a time that
-the controller and a slow line keep up: sticks always go first.
+`poll` reads what has come and sends what is due. Telemetry is requested on a schedule, but never so much at a time that
+the controller or a slow line falls behind. Stick frames always have priority.
 """
 
 import math
@@ -26,31 +26,35 @@ MESSAGES: dict[int, Any] = {
         settings.MotorConfig,
     )
 }  # fmt: skip
-"""The messages that are understood, by code."""
+"""The messages that can be parsed, by code."""
 SCHEDULE = {
     messages.StatusEx.CODE: 30.0, messages.Rc.CODE: 50.0, messages.AttitudeReply.CODE: 50.0, messages.RawImu.CODE: 50.0,
     messages.Motor.CODE: 10.0, messages.BatteryState.CODE: 2.0,
 }  # fmt: skip
-"""How often each message is asked for in flight, Hz. Together with the stick frames they must be well below what the
-controller answers, one message at each turn of its serial task: where that is 350 a second, frames soon queue up."""
+"""How often each message is requested in flight, Hz. Together with the stick frames, the number of messages must be
+well below what the controller answers, which is one message per run of its serial task. If it runs 350 times per
+second, frames soon queue up."""
 TIMEOUT = 0.3
 """How long a reply may take, s, before the request counts as lost and may be sent again ..."""
 SHORTEST_TIMEOUT, PATIENCE = 0.08, 4.0
-"""... but, once replies have come, no longer than so many times what the slowest of them took, nor shorter than this:
-on a line that loses frames the controller must not seem lost for the sake of one."""
+"""... Once replies have come, the limit is `PATIENCE` times the time that the slowest of them took, but at least
+`SHORTEST_TIMEOUT`, s, and at most `TIMEOUT`. On a line that loses frames, one lost frame must not make the controller
+seem lost."""
 FORGOTTEN = 1.0
-"""After so long, s, no answer is expected any more: earlier, a late one would be taken for that to a later request."""
+"""After this time, s, a reply is not expected any more. If this were shorter, a late reply would be taken for the reply
+to a later request."""
 MAX_IN_FLIGHT = 256
-"""Bytes of scheduled replies that may be awaited at a time."""
+"""The largest number of bytes of scheduled replies that may be awaited at a time."""
 MAX_BACKLOG = 6
-"""With more stick frames without answer, for longer than the link takes, the controller is behind, or answers were
-lost: it is asked for one message at a time, whose answer tells which."""
+"""If more stick frames than this have waited for their replies for longer than the link takes, the controller is
+behind, or replies were lost. Then only one message is requested at a time, and its reply shows which of the two is
+true."""
 _UNKNOWN_REPLY = 64
-"""Bytes that a reply of unknown length is taken to have."""
+"""The assumed size of a reply whose size is not known yet, bytes."""
 _OVERHEAD = 6
 _STARTS = (b"$M>", b"$X>")
-"""Beginnings of replies. Inside a payload they tell of half a frame run together with the next one, whose checksum, of
-8 bits, happens to fit: it does once in 256."""
+"""Beginnings of replies. If one is found inside a payload, half a frame was joined with the next frame, and the
+checksum fitted by chance. With its 8 bits, this happens once in 256 cases."""
 
 
 class Reply(NamedTuple):
@@ -61,8 +65,8 @@ class Reply(NamedTuple):
     time: float
     """When it came, s on the monotonic clock."""
     latency: float
-    """How long after its request, s. Of two requests, the first of which was given up, the first: where its answer was
-    lost, the next answer to a stick frame has told so already."""
+    """The time from the request to the reply, s. If the first of two requests was given up, the time counts from the
+    first one. If its reply had really been lost, the next reply to a stick frame would already have shown it."""
 
 
 @dataclass
@@ -70,33 +74,33 @@ class Client:
     """The controller at the other end of a link."""
 
     link: Link
-    """The link; the client polls it."""
+    """The link. The client polls it."""
     schedule: dict[int, float] = field(default_factory=dict)
-    """How often to ask for each code, Hz; see `SCHEDULE`."""
+    """How often to request each code, Hz; see `SCHEDULE`."""
     latest: dict[int, Reply] = field(default_factory=dict)
     """The latest reply to each code, on this connection."""
     errors: dict[int, str] = field(default_factory=dict)
-    """What was wrong with the last answer to each code, where something was."""
+    """What was wrong with the last reply to each code, if something was."""
     requests: int = 0
-    """Requests sent, so far; stick frames not counted."""
+    """Number of requests sent so far, without stick frames."""
     replies: int = 0
-    """Replies taken in, so far; those to stick frames not counted."""
+    """Number of replies received so far, without those to stick frames."""
     timeouts: int = 0
-    """Requests that got no answer in time, so far."""
+    """Number of requests so far that got no reply in time."""
     backlog: int = 0
-    """Stick frames whose answers are awaited: the controller has not got to them yet, or the answers are lost."""
+    """Number of stick frames whose replies are awaited. Either the controller has not processed them yet, or the
+    replies are lost."""
     latency: float = 0.0
-    """How long the newest answer took, s; those to stick frames not counted. The controller answers in order, so that
-    stick frames reach it as late."""
-    quickest: float = math.inf
     """How long the newest reply took, s, not counting replies to stick frames. The controller answers in order, so
     stick frames reach it with the same delay."""
+    quickest: float = math.inf
+    """How long the quickest reply on this connection took, s, not counting replies to stick frames."""
     heard: float = -math.inf
-    """When the newest reply came, s on the monotonic clock; those to stick frames not counted."""
+    """When the newest reply came, s on the monotonic clock, not counting replies to stick frames."""
     run_together: int = 0
-    """Replies thrown away because another begins inside, so far."""
+    """Number of replies so far that were dropped because another reply begins inside them."""
     decoder: Decoder = field(default_factory=Decoder)
-    """Counts bad checksums and skipped bytes."""
+    """The decoder of the frames. It counts bad checksums and skipped bytes."""
     _asked: dict[int, float] = field(default_factory=dict)
     _awaited: deque[tuple[int, float]] = field(default_factory=deque)
     _due: dict[int, float] = field(default_factory=dict)
@@ -104,7 +108,7 @@ class Client:
     _connection: int = 0
 
     def poll(self, now: float) -> None:
-        """Read what has come and ask for what is due. `now` is in s on the monotonic clock. Never raises."""
+        """Read what has come and request what is due. `now` is in s on the monotonic clock. Never raises."""
         self.link.poll(now)
         if self.link.connections != self._connection:
             self._forget()
@@ -115,7 +119,7 @@ class Client:
             self._ask_due(now)
 
     def request(self, code: int, now: float, payload: bytes = b"") -> bool:
-        """Ask for a code, unless an answer to it is still awaited or the link is not alive; whether it was sent."""
+        """Request a code, unless its reply is still awaited or the link is not alive. Returns whether it was sent."""
         if code in self._asked or not self.link.alive:
             return False
         self._asked[code] = now
@@ -125,7 +129,7 @@ class Client:
         return True
 
     def set_raw_rc(self, frame: Frame, now: float) -> bool:
-        """Send a stick frame of `messages.set_raw_rc` and await nothing; whether the link is alive."""
+        """Send a stick frame of `messages.set_raw_rc`, without waiting. Returns whether the link is alive."""
         if not self.link.alive:
             return False
         self.backlog += 1
@@ -134,13 +138,13 @@ class Client:
         return self.link.alive
 
     def message(self, code: int, now: float, max_age: float) -> Any:
-        """The latest message of a code, or None where there is none or it is older than `max_age`, s."""
+        """The latest message of a code. None: there is none, or it is older than `max_age`, s."""
         reply = self.latest.get(code)
         return reply.message if reply is not None and now - reply.time <= max_age else None
 
     def _take(self, frame: Frame, now: float) -> None:
         if frame.direction == REQUEST:
-            return  # an echo, as of a line whose two wires touch
+            return  # an echo, for example from a line whose two wires touch
         if any(start in frame.payload for start in _STARTS):
             self.run_together += 1
             return
@@ -164,10 +168,11 @@ class Client:
         self.heard, self.latest[frame.code] = now, Reply(message, now, now - asked)
 
     def _strike_off(self, code: int, now: float) -> float:
-        """A code is answered. The controller answers in order: the answers to what was sent before it are lost.
+        """Remove the request of a reply from the awaited ones. The controller answers in order, so the replies to
+        earlier requests are lost.
 
         Returns:
-            When it was asked for, s; `now` where it was not.
+            When the code was requested, s. If it was not requested, `now`.
         """
         if all(awaited != code for awaited, _ in self._awaited):
             return now
@@ -197,7 +202,7 @@ class Client:
             if code == messages.SET_RAW_RC:
                 self.backlog, self.timeouts = self.backlog - 1, self.timeouts + 1
                 late.append(code)
-        if late and self.decoder.pending:  # what is held back may be no frame at all
+        if late and self.decoder.pending:  # the bytes held back may not be a frame at all
             for frame in self.decoder.flush():
                 self._take(frame, now)
 
@@ -216,12 +221,15 @@ class Client:
             self._due[code] = max(self._due[code] + period, now + 0.5 * period)
 
     def _unanswered(self, now: float) -> int:
-        """Stick frames that wait for longer than the link takes: on a slow radio some are always under way."""
+        """The number of stick frames that have waited for longer than the link takes.
+
+        Younger ones do not count, because on a slow radio some are always under way.
+        """
         longest = 0.0 if math.isinf(self.quickest) else self.quickest
         return sum(code == messages.SET_RAW_RC and now - asked >= longest for code, asked in self._awaited)
 
     def _forget(self) -> None:
-        """A new connection: nothing of the old one is awaited or believed."""
+        """Start with a new connection: nothing from the old one is awaited or used any more."""
         self._connection = self.link.connections
         self._asked.clear()
         self._awaited.clear()
@@ -233,14 +241,14 @@ class Client:
 
 
 def ask(client: Client, code: int, timeout_s: float = 1.0, payload: bytes = b"", clock: Clock = MONOTONIC) -> Any:
-    """Ask and wait: for set-up, not for flight. Asks again when an answer is lost.
+    """Request a message and wait for it. This is for set-up, not for flight. A lost request is repeated.
 
     Returns:
-        The message, an instance of `MESSAGES[code]`, or the payload for other codes.
+        The message, an instance of `MESSAGES[code]`. For other codes, the payload.
 
     Raises:
-        TimeoutError: when no answer comes, with the reason of the link.
-        ValueError: when the controller refuses the code or its answer cannot be read.
+        TimeoutError: no reply came. The message contains the reason that the link gives.
+        ValueError: the controller refuses the code, or its reply cannot be parsed.
     """
     start = now = clock.now()
     client.poll(now)
@@ -260,7 +268,7 @@ def ask(client: Client, code: int, timeout_s: float = 1.0, payload: bytes = b"",
 
 
 def tell(client: Client, frame: Frame, timeout_s: float = 1.0) -> None:
-    """Send a frame that sets something, and wait until the controller has taken it; see `ask`."""
+    """Send a frame that sets something, and wait until the controller has accepted it; see `ask`."""
     ask(client, frame.code, timeout_s, frame.payload)
 
 

@@ -1,8 +1,8 @@
-"""MSP frames to bytes and back: version 1 with jumbo payloads, and version 2 ("native", `$X`). Pure, no transport.
+"""Encodes and decodes MSP frames: version 1 with jumbo payloads, and version 2 ("native", `$X`). Pure, no transport.
 
 Layouts, little endian, after the `$`:
-- version 1: `M`, direction, length u8, code u8, payload, XOR of everything from the length on. A length of 255 is the
-  mark of a jumbo frame, whose real length, u16, follows the code.
+- version 1: `M`, direction, length u8, code u8, payload, XOR of everything from the length on. A length of 255 marks a
+  jumbo frame, whose real length, u16, follows the code.
 - version 2: `X`, direction, flags u8, code u16, length u16, payload, CRC-8/DVB-S2 of everything from the flags on.
 """
 
@@ -15,7 +15,7 @@ from operator import xor
 REQUEST, REPLY, ERROR = "<", ">", "!"
 """Directions: to the controller, from it, and from it when it does not know or refuses the code."""
 MAX_PAYLOAD = 1024
-"""Longest payload that a decoder waits for, bytes, unless told."""
+"""The default of the longest payload that a decoder waits for, bytes."""
 _JUMBO = 255
 _SHORTEST = 6
 _DIRECTIONS = {ord(mark): mark for mark in (REQUEST, REPLY, ERROR)}
@@ -31,9 +31,9 @@ def _crc_of(byte: int) -> int:
 _CRC = bytes(_crc_of(byte) for byte in range(256))
 """CRC-8/DVB-S2 (polynomial 0xD5, from 0, not reflected) of one byte."""
 _PERIOD = 93
-"""Zero bytes after which every CRC state is back where it was."""
+"""The number of zero bytes after which every CRC state repeats."""
 _SHIFTS = tuple(accumulate(range(_PERIOD - 1), lambda table, _: table.translate(_CRC), initial=bytes(range(256))))
-"""`_SHIFTS[n][c]`: the CRC state c after n zero bytes. By it the CRC of any stretch follows from two running CRCs."""
+"""`_SHIFTS[n][c]`: the CRC state c after n zero bytes. It gives the CRC of any section from two running CRCs."""
 
 
 def _crc_step(state: int, byte: int) -> int:
@@ -45,22 +45,22 @@ class Frame:
     """One MSP message."""
 
     code: int
-    """What it is about: 0 to 254 in version 1, to 65535 in version 2."""
+    """The code of the message: 0 to 254 in version 1, 0 to 65535 in version 2."""
     payload: bytes = b""
-    """Its content."""
+    """The content of the message."""
     direction: str = REQUEST
     """`REQUEST`, `REPLY` or `ERROR`."""
     version: int = 1
     """1 or 2."""
     flags: int = 0
-    """Flags byte of version 2; 0 in version 1."""
+    """Flags byte of version 2. 0 in version 1."""
 
 
 def encode(frame: Frame) -> bytes:
     """The bytes of a frame.
 
     Raises:
-        ValueError: naming the field, for what the version cannot carry.
+        ValueError: the version cannot carry a value. The message names the field.
     """
     if frame.version not in (1, 2):
         raise ValueError(f"MSP frame: version is {frame.version!r}; accepted: 1 or 2")
@@ -83,7 +83,7 @@ def encode(frame: Frame) -> bytes:
 
 
 class _Not(Enum):
-    """Why there is no frame at a place."""
+    """Why no frame begins at a position: it is not ONE, it is not COMPLETE, or it is not INTACT."""
 
     ONE = auto()
     COMPLETE = auto()
@@ -94,25 +94,25 @@ class _Not(Enum):
 class Decoder:
     """Finds the frames in a stream of bytes, whatever else is in it.
 
-    A start that turns out to be false costs its first byte only: the search goes on at the next one, so that garbage,
-    a flipped bit or a corrupt length hides no good frame that follows. Nor does half a frame hold up what comes after
-    it: a frame that is whole is taken before one around it that is not. Every start is judged in constant time (running
-    checksums are kept of the stream). Never raises.
+    If a start of a frame turns out to be false, only its first byte is skipped, and the search continues at the next
+    byte. So garbage, a flipped bit or a corrupt length does not hide a good frame that follows. Half a frame does not
+    delay the frames after it either: a complete frame is returned even if it lies inside an incomplete one. Every start
+    is checked in constant time, because running checksums of the stream are kept. Never raises.
     """
 
     max_payload: int = MAX_PAYLOAD
-    """Longest payload that is believed, bytes."""
+    """The longest payload that is accepted, bytes."""
     bad_checksums: int = 0
-    """Frames whose checksum was wrong, so far."""
+    """Number of frames with a wrong checksum so far."""
     skipped: int = 0
-    """Bytes that were no part of a good frame, so far."""
+    """Number of bytes so far that were not part of a good frame."""
     _bytes: bytearray = field(default_factory=bytearray, repr=False)
     _xor: list[int] = field(default_factory=lambda: [0], repr=False)
     _crc: list[int] = field(default_factory=lambda: [0], repr=False)
 
     @property
     def pending(self) -> int:
-        """Bytes held back as the beginning of a frame; never more than `max_payload` and a header."""
+        """Number of bytes held back as the beginning of a frame, at most `max_payload` and a header."""
         return len(self._bytes)
 
     def feed(self, data: bytes) -> list[Frame]:
@@ -123,7 +123,7 @@ class Decoder:
         return self._scan(waiting=True)
 
     def flush(self) -> list[Frame]:
-        """Give up the frame that is incomplete, as when the line has been silent; the good ones inside it, if any."""
+        """Give up the incomplete frame, for example after a silence of the line. Returns the good frames inside it."""
         return self._scan(waiting=False)
 
     def _scan(self, waiting: bool) -> list[Frame]:
@@ -154,14 +154,14 @@ class Decoder:
         return frames
 
     def _whole_after(self, at: int) -> int | None:
-        """Where the next frame begins that is whole, behind an incomplete one."""
+        """Where the next complete frame begins after the start of an incomplete one. None: there is none."""
         while (at := self._bytes.find(_START, at + 1)) > 0:
             if isinstance(self._judge(at), tuple):
                 return at
         return None
 
     def _judge(self, at: int) -> tuple[Frame, int] | _Not:
-        """The frame that starts here and where it ends."""
+        """The frame that starts here and where it ends, or why no frame starts here."""
         data, size = self._bytes, len(self._bytes) - at
         if (size > 1 and data[at + 1] not in (_V1, _V2)) or (size > 2 and data[at + 2] not in _DIRECTIONS):
             return _Not.ONE

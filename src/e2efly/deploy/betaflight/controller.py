@@ -1,4 +1,4 @@
-"""What a flight controller is and how it is set: read once, before flight, into one frozen dataclass."""
+"""The identity and the settings of a flight controller, read once, before flight, into one frozen dataclass."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,7 +12,7 @@ from e2efly.deploy.betaflight.versions import Release, release_of, version_text
 from e2efly.deploy.clock import MONOTONIC, Clock
 
 VARIANT = "BTFL"
-"""The firmware that is known: Betaflight."""
+"""The only accepted firmware: Betaflight."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class ControllerInfo:
     built: str
     """Day and time of the build, and its revision."""
     craft: str
-    """Name of the craft; may be empty."""
+    """Name of the craft. May be empty."""
     features: frozenset[str]
     """Features that are on."""
     rate_profile: int
-    """Which rate profile is active, from 0."""
+    """Index of the active rate profile, from 0."""
     rates: RateProfile
     """The active rate profile."""
     throttle: ThrottleCurve
@@ -50,19 +50,19 @@ class ControllerInfo:
     modes: tuple[settings.ModeRange, ...]
     """Which switches make which modes active."""
     box_ids: tuple[int, ...]
-    """Permanent ids of the modes that it knows, in the order of the bits of `StatusEx.boxes`."""
+    """Permanent ids of the modes that the controller knows, in the order of the bits of `StatusEx.boxes`."""
     motor: settings.MotorConfig
     """Motor outputs."""
     advanced: settings.AdvancedConfig
     """Loop and motor protocol."""
     pid_advanced: settings.PidAdvanced
-    """What stands between throttle and motors."""
+    """Settings that act between throttle and motors."""
     mixer: settings.MixerConfig
     """Kind of vehicle."""
     alignment: settings.BoardAlignment
-    """How it is turned in the airframe."""
+    """How the board is rotated in the airframe."""
     by_name: tuple[tuple[str, str], ...] = ()
-    """(name, value) of the settings of `settings_by_name` that it tells."""
+    """(name, value) of the settings of `settings_by_name` that the controller reports."""
 
     @property
     def release(self) -> Release:
@@ -75,7 +75,7 @@ class ControllerInfo:
         return version_text(self.version)
 
     def named(self, setting: str) -> str | None:
-        """The value of a setting by its name in the command line; None: this controller does not tell it."""
+        """The value of a setting by its name in the command line. None: this controller does not report it."""
         return dict(self.by_name).get(setting)
 
     def ranges(self, mode: str) -> tuple[settings.ModeRange, ...]:
@@ -84,11 +84,11 @@ class ControllerInfo:
 
 
 def identify(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -> ControllerInfo:
-    """Read everything from a controller, waiting for it; not for flight.
+    """Read everything from a controller, and wait for its replies. This is not for flight.
 
     Raises:
-        ValueError: for firmware that is not known, or settings that cannot be read.
-        TimeoutError: when an answer is missing after `timeout_s` seconds.
+        ValueError: the firmware is not known, or its settings cannot be read.
+        TimeoutError: a reply is missing after `timeout_s` seconds.
     """
 
     def get(kind: Any) -> Any:

@@ -1,9 +1,9 @@
-"""What the flight controller says of itself, its pilot and its battery, read at each control step.
+"""What the flight controller reports about itself, its pilot and its battery, read at each control step.
 
-A checksum of 8 bits passes one damaged message in 256, so one message alone must not end or begin a flight. Two in a
-row must agree before the controller counts as armed or disarmed, before the receiver counts as lost, and before the
-mission switch counts as moved. What only takes the vehicle out of the policy's hands or the bridge's is believed at
-once: the override switch, a stick, and the mission switch's leaving of its policy position.
+A checksum of 8 bits accepts one damaged message in 256, so a single message must not end or begin a flight. Two
+messages in a row must agree before the controller counts as armed or disarmed, before the receiver counts as lost, and
+before the mission switch counts as moved. Some changes count at once, because they only end the control by the policy
+or by the bridge: the override switch, a stick, and a mission switch that leaves its policy position.
 """
 
 from dataclasses import dataclass, field
@@ -23,23 +23,23 @@ MEDDLING = {
     ANGLE: "ANGLE", 2: "HORIZON", 3: "ALTHOLD", 6: "HEADFREE", 11: "POS HOLD", 46: "GPS RESCUE", 47: "ACRO TRAINER",
     56: "AUTOPILOT",
 }  # fmt: skip
-"""Modes in which sticks do not mean body rates, by permanent id."""
+"""Modes in which the sticks do not command body rates, by permanent id."""
 RECEIVER_LOST = frozenset({"RXLOSS", "FAILSAFE"})
-"""Reasons against arming by which the controller tells that it does not hear the pilot."""
+"""Reasons against arming with which the controller reports that it does not hear the pilot."""
 VOLTAGE_SHARE = 0.4
-"""Weight of a new battery reading: a moment's sag under full throttle is no empty battery."""
+"""Weight of a new battery reading. A short sag under full throttle does not mean an empty battery."""
 RC_PATIENCE = 1.2
-"""The pilot's channels may be so much older than the link's time-out: a lost link is to be told as one, whichever
-answer came last."""
+"""The largest age of the pilot's channels, as a multiple of the link's time-out. It is larger than 1, so that a lost
+link is reported as a lost link, whichever reply came last."""
 BEHIND = 0.5
-"""Share of the link's time-out. A controller that takes longer to answer is too slow to fly by."""
+"""The longest reply time of a controller, as a share of the link's time-out. A slower one is too slow for flight."""
 BATTERY_PATIENCE_S = 3.0
-"""The battery's voltage may be so old, s."""
+"""The largest age of the battery's voltage, s."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What was known of the flight controller at a control step."""
+    """What is known about the flight controller at a control step."""
 
     link_problem: str | None
     """Why the flight controller is not heard. None: it is."""
@@ -49,16 +49,17 @@ class Reading:
     pilot: Pilot | None
     """What the pilot wants. None: it is not known."""
     failsafe: bool
-    """By its last word it does not hear the receiver: it flies by a failsafe of its own, not by what it is sent."""
+    """According to its last report, the controller does not hear the receiver. It then follows its own failsafe, not
+    the commands that are sent."""
     voltage: float | None
     """Voltage of a cell, V. None: the controller does not know it."""
     meddling: tuple[str, ...]
-    """The modes in which the sticks that are sent would be no body rates, in words."""
+    """The active modes in which the sticks that are sent do not command body rates, in words."""
     channels: Rc | None
     """The channels that the controller uses."""
     attitude: Attitude | None
     fresh: dict[int, Any]
-    """The replies that came since the reading before, by code."""
+    """The replies that came since the previous reading, by code."""
 
 
 T = TypeVar("T")
@@ -66,14 +67,14 @@ T = TypeVar("T")
 
 @dataclass
 class Twice(Generic[T]):
-    """A value that changes when two messages in a row say so."""
+    """A value that changes only when two messages in a row report the same new value."""
 
     held: T
-    """What counts."""
+    """The value that counts."""
     _last: T | None = None
 
     def hear(self, value: T) -> None:
-        """The next message says `value`."""
+        """Process the next message, which reports `value`."""
         if value == self._last:
             self.held = value
         self._last = value
@@ -93,13 +94,13 @@ class Instruments:
     _voltage: float | None = None
 
     def read(self, now: float, info: ControllerInfo, *, land: bool, sends: bool = True) -> Reading:
-        """What the answers say that have come until `now` s.
+        """Evaluate the replies that have come until `now`.
 
         Args:
-            now: on the client's clock, s.
-            info: of the controller: it tells which modes are on.
-            land: the operator asks for a landing, as the pilot does by the mission switch.
-            sends: sticks are sent; without them ANGLE is on, as it is to be.
+            now: s on the client's clock.
+            info: the settings of the controller, which are needed to decode the active modes.
+            land: the operator asks for a landing, as the pilot does with the mission switch.
+            sends: sticks are sent. If they are not, ANGLE is on, as it should be, and is not reported.
         """
         fresh = self._fresh()
         if (battery := fresh.get(BatteryState.CODE)) is not None:
@@ -137,7 +138,7 @@ class Instruments:
         if mission is None or not self._heard.held:
             return None
         if mission is Mission.POLICY and at is not Mission.POLICY:
-            mission = Mission.HOVER  # the policy stops at once; whether to land is told by the next message
+            mission = Mission.HOVER  # the policy stops at once; the next message shows whether to land
         return pilot_of(channels, self.settings.channels, Mission.LAND if land else mission)
 
     def _fresh(self) -> dict[int, Any]:
@@ -166,7 +167,7 @@ class Instruments:
 
 
 def mission_of(rc: Rc, places: PilotChannels) -> Mission | None:
-    """Where the mission switch is; None where the receiver has no such channel: nobody's will is known."""
+    """The position of the mission switch. None: the receiver has no such channel, so the pilot's wish is unknown."""
     if places.mission > len(rc.channels):
         return None
     at = rc.channels[places.mission - 1]
@@ -178,7 +179,7 @@ def pilot_of(rc: Rc, places: PilotChannels, mission: Mission) -> Pilot:
 
     Args:
         rc: the receiver's channels.
-        places: where the copies of the sticks are.
+        places: the channels with the copies of the sticks.
         mission: what the mission switch asks for.
     """
 
@@ -191,30 +192,32 @@ def pilot_of(rc: Rc, places: PilotChannels, mission: Mission) -> Pilot:
 
 
 PROBE = (20, 40, 60)
-"""How far off centre roll, pitch and yaw are sent before arming, to see where each goes, us."""
+"""Before arming, roll, pitch and yaw are sent with these offsets from the centre, to see where each arrives, us."""
 CLOSED = 1000
-"""The throttle channel that lets the controller arm, us."""
+"""The value of the throttle channel with which the controller can be armed, us."""
 PROBE_S = 0.5
-"""So long after the override has come on the sticks must be seen where they were sent, s."""
+"""The longest time after the override is switched on until the sticks must be seen where they were sent, s."""
 
 
 @dataclass
 class ChannelProbe:
-    """Until it is armed, the sticks are sent apart by `PROBE`: does the controller take each for what it is?"""
+    """Checks before arming whether the controller assigns each channel to the right stick. The sticks are sent with the
+    different offsets of `PROBE`.
+    """
 
     seen: bool = False
-    """Whether it does."""
+    """Whether each stick was seen where it was sent."""
     _since: float | None = None
-    """When they were first looked for."""
+    """When the check began, s."""
 
     def look(self, now: float, reading: Reading, sticks: Sticks, *, grounded: bool) -> tuple[str, ...]:
         """What is wrong with the channels, in words.
 
         Args:
             now: s.
-            reading: of this control step.
-            sticks: that were sent.
-            grounded: no flight has begun; the override going off then asks for a new look.
+            reading: the reading of this control step.
+            sticks: the sticks with which the channels are sent.
+            grounded: no flight has begun. When the override is switched off in this state, the check starts again.
         """
         if self.seen or not reading.override:
             self.seen = self.seen and (reading.override or not grounded)

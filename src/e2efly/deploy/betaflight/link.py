@@ -1,7 +1,7 @@
 """Links that carry bytes to a controller and back, over a serial port or TCP. Nothing here blocks or raises in flight.
 
-`poll` connects, and connects again after a failure, waiting longer each time; `send` and `receive` work while the link
-is alive and do nothing otherwise; `reason` says why it is not.
+`poll` connects, and connects again after a failure, with a longer wait each time. `send` and `receive` work while the
+link is alive, and do nothing otherwise. `reason` says why the link is not alive.
 """
 
 import os
@@ -14,15 +14,16 @@ from typing import Any, Protocol
 from urllib.parse import parse_qsl
 
 BAUD = 115200
-"""Baud rate unless told; a USB port has none and takes any."""
+"""The default baud rate. A USB port has no baud rate and accepts any."""
 FIRST_RETRY, LONGEST_RETRY = 0.1, 2.0
-"""The first and the longest wait before another attempt, s."""
+"""The first and the longest wait before another attempt to connect, s."""
 CONNECT_TIMEOUT = 2.0
-"""How long an attempt may take, s."""
+"""How long an attempt to connect may take, s."""
 MAX_UNSENT = 4096
-"""Bytes that may wait to be taken before the link counts as broken."""
+"""If more bytes than this wait to be sent, the link counts as broken."""
 MOST = 4096
-"""Bytes of what has come that are decoded in a control step, the newest: of a flood no more than there is time for."""
+"""The largest number of received bytes that are decoded in a control step. If there are more, only the newest are
+decoded, because there is no time for all."""
 _CHUNK = 65536
 _ACCEPTED = "serial:/dev/ttyACM0?baud=115200, /dev/ttyACM0 or tcp:HOST:PORT"
 
@@ -42,7 +43,7 @@ class Link(Protocol):
 
     @property
     def connections(self) -> int:
-        """How often it has connected; when this changes, whatever was under way is lost."""
+        """How often it has connected. When this changes, everything that was under way is lost."""
         ...
 
     def poll(self, now: float) -> None:
@@ -50,7 +51,7 @@ class Link(Protocol):
         ...
 
     def send(self, data: bytes) -> None:
-        """Send bytes; those for a link that is not alive are dropped."""
+        """Send bytes. If the link is not alive, they are dropped."""
         ...
 
     def receive(self) -> bytes:
@@ -76,13 +77,13 @@ class StreamLink:
     """The link over any port that can be opened again. Make it with `open_link`."""
 
     name: str
-    """As it was asked for."""
+    """The text with which the link was requested."""
     opener: Callable[[], _Port]
-    """Opens the port, or begins to; raises `OSError`."""
+    """Opens the port, or begins to open it. Raises `OSError`."""
     connections: int = 0
     """How often it has connected."""
     reason: str = "not polled yet"
-    """Why it is not alive; empty while it is."""
+    """Why the link is not alive. Empty while it is."""
     _port: _Port | None = None
     _alive: bool = False
     _closed: bool = False
@@ -97,12 +98,12 @@ class StreamLink:
         return self._alive
 
     def poll(self, now: float) -> None:
-        """Connect where need be; one step at a time, never blocking."""
+        """Connect if necessary, one step per call. This never blocks."""
         if self._closed or self._alive:
             return
         try:
             if self._port is None:
-                if self._retry_at is None:  # broken since the last poll; the first attempt is at once
+                if self._retry_at is None:  # broken since the last poll; the very first attempt has no wait
                     self._retry_at = now + (self._wait if self.connections else 0.0)
                 if now < self._retry_at:
                     return
@@ -119,7 +120,10 @@ class StreamLink:
             self._wait = min(2 * self._wait, LONGEST_RETRY)
 
     def send(self, data: bytes) -> None:
-        """Send bytes, keeping what the port does not take at once; those for a link that is not alive are dropped."""
+        """Send bytes. What the port does not accept at once is kept for later.
+
+        If the link is not alive, the bytes are dropped.
+        """
         if not self._alive:
             return
         self._unsent += data
@@ -127,7 +131,7 @@ class StreamLink:
             self._break(TimeoutError(f"it has stalled: {len(self._unsent)} bytes wait to be sent"))
 
     def receive(self) -> bytes:
-        """The bytes that have come, after another attempt at those that wait to be sent."""
+        """The bytes that have come. First, the bytes that wait to be sent are tried again."""
         if not self._alive or self._port is None or not self._flush():
             return b""
         try:
@@ -137,7 +141,7 @@ class StreamLink:
             return b""
 
     def close(self) -> None:
-        """Close for good; more than once does no harm."""
+        """Close for good. A second call does no harm."""
         self._break(OSError("closed"))
         self._closed = True
 
@@ -162,10 +166,10 @@ class StreamLink:
 def open_link(target: str) -> StreamLink:
     """A link from its text: `serial:/dev/ttyACM0?baud=115200`, `/dev/ttyACM0` or `tcp:HOST:PORT`.
 
-    It connects when it is polled first.
+    It connects when it is first polled.
 
     Raises:
-        ValueError: naming the text and what is accepted.
+        ValueError: the text is not valid. The message names it and what is accepted.
     """
     kind, _, rest = target.partition(":")
     if target.startswith("/"):
@@ -188,7 +192,7 @@ def open_link(target: str) -> StreamLink:
 
 
 def _events(descriptor: int, kind: int) -> bool:
-    """Whether anything is there at once: what was asked for, or a failure that the next call will tell of."""
+    """Whether the wanted event is there already, or a failure, which the next call on the port then reports."""
     poller = select.poll()
     poller.register(descriptor, kind)
     return bool(poller.poll(0))
@@ -208,7 +212,7 @@ class _SerialPort:
         return True
 
     def read(self) -> bytes:
-        # on the descriptor, which is non-blocking: pyserial's own write spins while the port takes nothing
+        # uses the descriptor, which is non-blocking: pyserial's own write spins while the port accepts nothing
         if not _events(self._fd, select.POLLIN):
             return b""
         data = os.read(self._fd, _CHUNK)

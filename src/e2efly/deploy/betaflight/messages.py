@@ -1,8 +1,8 @@
-"""MSP messages that tell what a controller is and what it does now: payloads to frozen dataclasses in SI units. Pure.
+"""MSP messages about the identity and the state of a controller. Payloads become frozen dataclasses in SI units.
 
-Each `parse` takes the payload of a reply, accepts the longer ones of later firmware, and raises a `ValueError` that
-names the message for a shorter one. The layouts are Betaflight's, MSP 1.44 to 1.49; `versions` tells where they
-differ.
+Each `parse` takes the payload of a reply. It accepts a longer payload, as later firmware sends it. For a shorter one,
+it raises a `ValueError` that names the message. The layouts are those of Betaflight, MSP 1.44 to 1.49; `versions` lists
+their differences. All functions are pure.
 """
 
 import struct
@@ -16,19 +16,19 @@ from e2efly.deploy.betaflight.codec import Frame
 from e2efly.deploy.betaflight.names import BATTERY_STATES, SENSORS, arming_disabled, bits, named
 
 SET_RAW_RC, EEPROM_WRITE, REBOOT = 200, 250, 68
-"""Codes of what is told to the controller."""
+"""Codes of the messages that tell the controller to do something."""
 CHANNEL_RANGE = (886, 2114)
-"""Channels that are sent, µs: inside the pulses of 885 to 2115 that the controller believes unless set otherwise."""
+"""The range of the channels that are sent, µs. It is inside the default range of valid pulses, 885 to 2115."""
 _GYRO_RANGE = 2000.0
 MAX_CHANNELS = 18
-"""Channels that the controller takes."""
+"""The largest number of channels that the controller accepts."""
 
 
 def unpack(name: str, layout: str, payload: bytes) -> tuple[Any, ...]:
     """Read the beginning of a payload, little endian.
 
     Raises:
-        ValueError: naming the message, for a payload that is too short.
+        ValueError: the payload is too short. The message of the error names the MSP message.
     """
     size = struct.calcsize("<" + layout)
     if len(payload) < size:
@@ -37,7 +37,7 @@ def unpack(name: str, layout: str, payload: bytes) -> tuple[Any, ...]:
 
 
 def text(payload: bytes) -> str:
-    """Bytes up to the first zero as text, with what is no ASCII shown as escapes."""
+    """The bytes up to the first zero as text. Bytes that are not ASCII become escape sequences."""
     return payload.split(b"\0")[0].decode("ascii", "backslashreplace")
 
 
@@ -58,7 +58,7 @@ class ApiVersion:
 
 @dataclass(frozen=True)
 class FcVariant:
-    """Which firmware."""
+    """The firmware."""
 
     CODE: ClassVar[int] = 2
     variant: str
@@ -76,9 +76,9 @@ class FcVersion:
 
     CODE: ClassVar[int] = 3
     version: tuple[int, int, int]
-    """Major, minor, patch; years since 2000, month, patch from 2025.12 on."""
+    """Major, minor and patch. From 2025.12 on: years since 2000, month and patch."""
     text: str = ""
-    """As it writes it, with what marks an early build: 2026.6.0-rc1. Empty up to 4.6."""
+    """The version as the firmware writes it, with the mark of an early build: 2026.6.0-rc1. Empty up to 4.6."""
 
     @staticmethod
     def parse(payload: bytes) -> "FcVersion":
@@ -89,7 +89,7 @@ class FcVersion:
 
 @dataclass(frozen=True)
 class BuildInfo:
-    """Which build of the firmware."""
+    """The build of the firmware."""
 
     CODE: ClassVar[int] = 5
     built: str
@@ -110,7 +110,7 @@ class Name:
 
     CODE: ClassVar[int] = 10
     name: str
-    """As its owner set it; may be empty."""
+    """The name that its owner set. May be empty."""
 
     @staticmethod
     def parse(payload: bytes) -> "Name":
@@ -120,7 +120,7 @@ class Name:
 
 @dataclass(frozen=True)
 class StatusEx:
-    """How the controller is."""
+    """The state of the controller."""
 
     CODE: ClassVar[int] = 150
     cycle_time: float
@@ -130,15 +130,15 @@ class StatusEx:
     boxes: int
     """Bit i: the i-th mode of `BoxIds` is active."""
     cpu_load: float
-    """0 to 1."""
+    """Load of the processor, 0 to 1."""
     pid_profile: int
-    """From 0."""
+    """Index of the active PID profile, from 0."""
     rate_profile: int
-    """From 0."""
+    """Index of the active rate profile, from 0."""
     arming_disabled: tuple[str, ...]
-    """Why it will not arm, most serious first; empty: it would."""
+    """Why it cannot be armed, the most serious reason first. Empty: it can."""
     reboot_required: bool
-    """Settings wait for a reboot."""
+    """Some settings take effect only after a reboot."""
 
     @staticmethod
     def parse(payload: bytes) -> "StatusEx":
@@ -162,10 +162,10 @@ class RawImu:
 
     CODE: ClassVar[int] = 102
     acceleration: tuple[int, int, int]
-    """Specific force in counts: how many make 1 g depends on the sensor and MSP does not tell."""
+    """Specific force in counts. The number of counts for 1 g depends on the sensor, and MSP does not report it."""
     body_rate: tuple[float, float, float]
-    """Body rates, rad/s, if the gyro's full range is 2000 deg/s, as Betaflight sets it: MSP carries counts and does not
-    tell their scale."""
+    """Body rates, rad/s. MSP carries counts and does not report their scale. The scale assumes that the gyro's full
+    range is 2000 deg/s, as Betaflight sets it."""
 
     @staticmethod
     def parse(payload: bytes) -> "RawImu":
@@ -177,11 +177,11 @@ class RawImu:
 
 @dataclass(frozen=True)
 class Motor:
-    """What the motors are told."""
+    """The commands to the motors."""
 
     CODE: ClassVar[int] = 104
     throttle: tuple[float, ...]
-    """Of each motor in use, in the controller's order: 0 stopped (1000 µs) to 1 (2000 µs)."""
+    """Throttle of each motor in use, in the controller's order: 0 is stopped (1000 µs), 1 is full (2000 µs)."""
 
     @staticmethod
     def parse(payload: bytes) -> "Motor":
@@ -195,19 +195,19 @@ class MotorTelemetry:
 
     CODE: ClassVar[int] = 139
     speed: tuple[float, ...]
-    """Of each motor, in the controller's order, rad/s; 0 also of one that is not measured."""
+    """Speed of each motor, in the controller's order, rad/s. It is also 0 for a motor that is not measured."""
 
     @staticmethod
     def parse(payload: bytes) -> "MotorTelemetry":
         """Read a reply."""
         (count,) = unpack("MOTOR_TELEMETRY", "B", payload)
-        each = unpack("MOTOR_TELEMETRY", "B" + "I9x" * count, payload)[1:]  # behind the speed: errors, heat, current
+        each = unpack("MOTOR_TELEMETRY", "B" + "I9x" * count, payload)[1:]  # after the speed: errors, heat, current
         return MotorTelemetry(tuple(turns * 2 * pi / 60 for turns in each))
 
 
 @dataclass(frozen=True)
 class Rc:
-    """The channels as the controller takes them."""
+    """The channels as the controller uses them."""
 
     CODE: ClassVar[int] = 105
     channels: tuple[int, ...]
@@ -222,7 +222,7 @@ class Rc:
 
 @dataclass(frozen=True)
 class AttitudeReply(Attitude):
-    """The controller's own estimate of its attitude, in steps of 0.1 deg; its heading in steps of 1 deg."""
+    """The controller's own estimate of its attitude. Its resolution is 0.1 deg, and 1 deg for the heading."""
 
     CODE: ClassVar[int] = 108
 
@@ -260,9 +260,9 @@ class BatteryState:
 
     CODE: ClassVar[int] = 130
     cells: int
-    """0: no battery found."""
+    """Number of cells. 0: no battery found."""
     capacity_mah: float
-    """As set, mA*h; 0: not set."""
+    """The capacity in the settings, mA*h. 0: not set."""
     drawn_mah: float
     """Charge drawn, mA*h."""
     current: float
@@ -285,7 +285,7 @@ class Debug:
 
     CODE: ClassVar[int] = 254
     values: tuple[int, ...]
-    """As the mode defines them."""
+    """Their meaning depends on the mode."""
 
     @staticmethod
     def parse(payload: bytes) -> "Debug":
@@ -294,13 +294,15 @@ class Debug:
 
 
 def set_raw_rc(channels: Sequence[int]) -> Frame:
-    """Tell the controller the receiver's channels. It takes those that are left out to be 0, which is no valid pulse.
+    """The frame that sends the receiver's channels to the controller.
+
+    The controller sets channels that are left out to 0, which is not a valid pulse.
 
     Args:
-        channels: µs in the receiver's order, which `RxMap` maps: at least 4, at most `MAX_CHANNELS`.
+        channels: µs, in the receiver's order, which `RxMap` maps. At least 4, at most `MAX_CHANNELS`.
 
     Raises:
-        ValueError: naming the channel, its value and what is accepted.
+        ValueError: a channel, or the number of channels, is not valid. The message names it and what is accepted.
     """
     if not 4 <= len(channels) <= MAX_CHANNELS:
         raise ValueError(f"MSP SET_RAW_RC: {len(channels)} channels; accepted: 4 to {MAX_CHANNELS}")

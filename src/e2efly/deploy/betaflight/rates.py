@@ -1,12 +1,12 @@
-"""Betaflight's rate profiles: from stick to body rate, and exactly back.
+"""Betaflight's rate profiles: the curves from stick to body rate, and their exact inverse.
 
 The five published curves are two families. With s(x, n) = (1 - expo) x + expo x^n and a stick x from 0 to 1:
 
 - with a pole (BETAFLIGHT, KISS, QUICK): rate = a s(x, n) / max(1 - b s(x, m), 0.01)
 - with a square (ACTUAL, RACEFLIGHT): rate = a s(x, n) + b x s(x, m)
 
-Each is odd in x and then limited. The curves are documented at betaflight.com ("Rates"); the tests hold them against
-what real firmware reports.
+Each curve is an odd function of x, and its result is then limited. The curves are documented at betaflight.com
+("Rates"). The tests compare them with what real firmware reports.
 """
 
 from bisect import bisect_left
@@ -19,22 +19,22 @@ AXES = ("roll", "pitch", "yaw")
 RATES_TYPES = ("BETAFLIGHT", "RACEFLIGHT", "KISS", "ACTUAL", "QUICK")
 """Types of curve, in the firmware's numbering."""
 HIGHEST_RATE = 1998
-"""No curve commands more, deg/s."""
+"""The highest rate that any curve commands, deg/s."""
 _PIECES = 64
 _SLOWEST = 0.01
-"""The least that a pole's denominator becomes."""
+"""The smallest value of the denominator of a curve with a pole."""
 _POLE = {"BETAFLIGHT": (4, 1), "KISS": (3, 1), "QUICK": (1, 3)}
 _SQUARE = {"ACTUAL": (1, 5), "RACEFLIGHT": (3, 3)}
 
 
 @dataclass(frozen=True)
 class RateProfile:
-    """A controller's rate profile: three curves, in the numbers of its command line."""
+    """A controller's rate profile: three curves, with the numbers as in its command line."""
 
     rates_type: str
     """One of `RATES_TYPES`."""
     rc_rate: tuple[int, int, int]
-    """`roll_rc_rate` and so on, 0 to 255: what it means depends on the type."""
+    """`roll_rc_rate` and so on, 0 to 255. The meaning depends on the type."""
     rate: tuple[int, int, int]
     """`roll_srate` and so on, 0 to 255."""
     expo: tuple[int, int, int]
@@ -42,7 +42,7 @@ class RateProfile:
     rate_limit: tuple[int, int, int] = (HIGHEST_RATE, HIGHEST_RATE, HIGHEST_RATE)
     """`roll_rate_limit` and so on, deg/s."""
     quick_rc_expo: bool = False
-    """`quickrates_rc_expo`: with QUICK rates, expo on the stick rather than on the gain. MSP does not tell it."""
+    """`quickrates_rc_expo`: with QUICK rates, expo acts on the stick instead of the gain. MSP does not report it."""
 
     def __post_init__(self) -> None:
         if self.rates_type not in RATES_TYPES:
@@ -71,15 +71,15 @@ class Curve:
     """One axis of a rate profile: a member of one of the two families."""
 
     pole: bool
-    """Of the family with a pole rather than with a square."""
+    """Whether the curve is of the family with a pole. Otherwise it is of the family with a square."""
     a: float
     """Slope at the centre without expo, deg/s."""
     b: float
-    """Strength of the pole, 1, or of the square, deg/s."""
+    """Strength of the pole, dimensionless, or of the square, deg/s."""
     expo: float
     """0 to 1."""
     powers: tuple[int, int]
-    """n and m."""
+    """The exponents n and m."""
     limit: float
     """Largest rate, deg/s."""
 
@@ -106,7 +106,7 @@ class Curve:
         return [self.at(i / _PIECES)[0] for i in range(_PIECES + 1)]
 
     def stick_for(self, rate: float) -> float:
-        """The stick from 0 to 1 that gives a rate, deg/s; 1 from `highest` on."""
+        """The stick, 0 to 1, that gives a rate, deg/s. It is 1 for a rate of `highest` or more."""
         if rate <= 0 or rate >= self.highest:
             return 0.0 if rate <= 0 else 1.0
         if not self.expo:
@@ -120,7 +120,10 @@ class Curve:
         return x if 1 - self.b * x >= _SLOWEST else _SLOWEST * rate / self.a
 
     def _newton(self, rate: float) -> float:
-        """Newton from just above, whence a convex curve leads it straight in; halving where the bracket says no."""
+        """Newton's method, which starts just above the solution and so converges directly for a convex curve.
+
+        If a step would leave the bracket, the bracket is halved instead.
+        """
         i = bisect_left(self._table, rate)
         low, high = (i - 1) / _PIECES, min(i / _PIECES, 1.0)
         x = high
@@ -138,9 +141,9 @@ def stick_to_rate(profile: RateProfile, axis: int, stick: float) -> float:
     """The rate that a stick commands, rad/s.
 
     Args:
-        profile: the controller's.
+        profile: the rate profile of the controller.
         axis: 0 roll, 1 pitch, 2 yaw.
-        stick: deflection after deadband, -1 to 1.
+        stick: the deflection after the deadband, -1 to 1.
     """
     curve = profile.curves[axis]
     rate = radians(min(curve.at(min(abs(stick), 1.0))[0], curve.limit))
@@ -153,12 +156,12 @@ def rate_to_stick(profile: RateProfile, axis: int, rate: float) -> float:
     A rate of `profile.max_rate[axis]` or more gives full deflection.
 
     Args:
-        profile: the controller's.
+        profile: the rate profile of the controller.
         axis: 0 roll, 1 pitch, 2 yaw.
         rate: rad/s.
 
     Raises:
-        ValueError: for a rate that is not finite.
+        ValueError: the rate is not finite.
     """
     if not isfinite(rate):
         raise ValueError(f"{AXES[axis]} rate is {rate!r}; accepted: a finite number of rad/s")
@@ -168,14 +171,14 @@ def rate_to_stick(profile: RateProfile, axis: int, rate: float) -> float:
 
 
 def channel_to_stick(channel: float, centre: int = 1500, deadband: int = 0) -> float:
-    """The deflection, -1 to 1, that the controller sees in a channel of so many µs."""
+    """The deflection, -1 to 1, that the controller computes from a channel, µs."""
     offset = min(max(channel - centre, -500), 500)
     beyond = max(abs(offset) - deadband, 0) / (500 - deadband)
     return beyond if offset >= 0 else -beyond
 
 
 def stick_to_channel(stick: float, centre: int = 1500, deadband: int = 0) -> int:
-    """The channel, whole µs, whose deflection is nearest to `stick`, -1 to 1."""
+    """The channel, in whole µs, whose deflection is nearest to `stick`, -1 to 1."""
     steps = round(min(abs(stick), 1.0) * (500 - deadband))
     offset = steps + deadband if steps else 0
     return centre + offset if stick >= 0 else centre - offset

@@ -1,4 +1,7 @@
-"""MSP messages that tell how a controller is set: payloads to frozen dataclasses in SI units. Pure; see `messages`."""
+"""MSP messages about the settings of a controller. Payloads become frozen dataclasses in SI units.
+
+Pure functions; see `messages`.
+"""
 
 import struct
 from dataclasses import dataclass
@@ -19,7 +22,8 @@ from e2efly.deploy.betaflight.rates import RATES_TYPES, RateProfile
 from e2efly.deploy.betaflight.throttle_curve import LIMIT_TYPES, ThrottleCurve
 
 FUNCTIONS = "AERT1234"
-"""What the eight mapped channels are for, in the controller's order: roll, pitch, yaw, throttle, AUX1 to AUX4."""
+"""Letters of the functions of the eight mapped channels, in the controller's order: roll (A), pitch (E), yaw (R),
+throttle (T), AUX1 to AUX4."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,7 @@ class ModeRange:
     box: int
     """Permanent id of the mode: a key of `BOXES`."""
     aux: int
-    """Which AUX channel, from 0."""
+    """The AUX channel, from 0."""
     low: int
     """Active from this pulse on, µs."""
     high: int
@@ -42,7 +46,7 @@ class ModeRanges:
 
     CODE: ClassVar[int] = 34
     ranges: tuple[ModeRange, ...]
-    """Those that are in use."""
+    """The ranges that are in use."""
 
     @staticmethod
     def parse(payload: bytes) -> "ModeRanges":
@@ -68,7 +72,7 @@ class FeatureConfig:
 
 @dataclass(frozen=True)
 class BoardAlignment:
-    """How the controller is turned in the airframe."""
+    """How the board is rotated in the airframe."""
 
     CODE: ClassVar[int] = 38
     angles: tuple[float, float, float]
@@ -89,7 +93,7 @@ class MixerConfig:
     mixer: int
     """`QUADX` for a quadrotor in X."""
     yaw_motors_reversed: bool
-    """Props out rather than in."""
+    """Props rotate outwards instead of inwards."""
 
     @staticmethod
     def parse(payload: bytes) -> "MixerConfig":
@@ -104,19 +108,19 @@ class RxConfig:
 
     CODE: ClassVar[int] = 44
     min_check: int
-    """Below it a stick is low, µs."""
+    """A stick below this is low, µs."""
     mid: int
     """Centre of the sticks, µs."""
     max_check: int
-    """Above it a stick is high, µs."""
+    """A stick above this is high, µs."""
     pulse_range: tuple[int, int]
-    """`rx_min_usec` and `rx_max_usec`: pulses outside are invalid, µs."""
+    """`rx_min_usec` and `rx_max_usec`: pulses outside this range are invalid, µs."""
     airmode_threshold: int
     """Throttle at which airmode starts to work, µs."""
     fpv_angle: float
-    """`fpv_mix_degrees`: how far roll and yaw are mixed while FPV ANGLE MIX is on, rad."""
+    """`fpv_mix_degrees`: the angle by which roll and yaw are mixed while FPV ANGLE MIX is on, rad."""
     smoothing: bool
-    """RC smoothing is on: sticks are low-passed before they become rates."""
+    """RC smoothing is on: a low-pass filter acts on the sticks before they become rates."""
 
     @staticmethod
     def parse(payload: bytes) -> "RxConfig":
@@ -128,11 +132,11 @@ class RxConfig:
 
 @dataclass(frozen=True)
 class RxMap:
-    """Which of the receiver's channels is for what."""
+    """The functions of the receiver's channels."""
 
     CODE: ClassVar[int] = 64
     channel: tuple[int, ...]
-    """(8,) index of the receiver's channel for roll, pitch, yaw, throttle, AUX1 to AUX4."""
+    """(8,) the index of the receiver's channel for roll, pitch, yaw, throttle, AUX1 to AUX4."""
 
     @staticmethod
     def parse(payload: bytes) -> "RxMap":
@@ -144,30 +148,30 @@ class RxMap:
 
     @property
     def letters(self) -> str:
-        """As the command line has it: `AETR1234` where roll comes first, pitch next, throttle, then yaw."""
+        """The map in the form of the command line. `AETR1234`: roll comes first, then pitch, throttle and yaw."""
         return "".join(FUNCTIONS[self.channel.index(i)] for i in range(len(FUNCTIONS)))
 
 
 @dataclass(frozen=True)
 class FailsafeConfig:
-    """What the controller does when the receiver falls silent."""
+    """What the controller does when the receiver's signal is lost."""
 
     CODE: ClassVar[int] = 75
     delay: float
-    """How long it holds before stage 2, s."""
+    """How long the controller waits before stage 2, s."""
     throttle: int
-    """Throttle channel while it lands, µs."""
+    """Throttle channel during the failsafe landing, µs."""
     switch: str
-    """What the switch does: one of `FAILSAFE_SWITCHES`."""
+    """What the failsafe switch does: one of `FAILSAFE_SWITCHES`."""
     low_throttle_delay: float
-    """After the throttle was low for so long it disarms instead, s."""
+    """If the throttle was low for this time before, the controller disarms instead, s."""
     procedure: str
     """What stage 2 does: one of `FAILSAFE_PROCEDURES`."""
 
     @staticmethod
     def parse(payload: bytes) -> "FailsafeConfig":
         """Read a reply."""
-        # the second byte, how long it lands, counts 0.1 s in some firmware and 1 s in other, and does not say which
+        # the second byte is the duration of the landing, in units of 0.1 s or 1 s, depending on the firmware
         delay, _, throttle, switch, low, procedure = unpack("FAILSAFE_CONFIG", "BBHBHB", payload)
         names = named(switch, FAILSAFE_SWITCHES), named(procedure, FAILSAFE_PROCEDURES)
         return FailsafeConfig(delay / 10, throttle, names[0], low / 10, names[1])
@@ -175,11 +179,11 @@ class FailsafeConfig:
 
 @dataclass(frozen=True)
 class RxFailConfig:
-    """What each channel becomes when the receiver falls silent."""
+    """What each channel becomes when the receiver's signal is lost."""
 
     CODE: ClassVar[int] = 77
     channels: tuple[tuple[str, int], ...]
-    """One of `RXFAIL_MODES` and, for SET, the pulse, µs: roll, pitch, yaw, throttle, AUX1, ..."""
+    """For roll, pitch, yaw, throttle, AUX1, ...: one of `RXFAIL_MODES`, and the pulse for SET, µs."""
 
     @staticmethod
     def parse(payload: bytes) -> "RxFailConfig":
@@ -194,7 +198,7 @@ class AdvancedConfig:
 
     CODE: ClassVar[int] = 90
     pid_denominator: int
-    """Gyro samples a PID loop."""
+    """Gyro samples per PID loop."""
     motor_protocol: str
     """One of `MOTOR_PROTOCOLS`."""
     motor_idle: float
@@ -209,17 +213,17 @@ class AdvancedConfig:
 
 @dataclass(frozen=True)
 class PidAdvanced:
-    """What stands between the throttle and the motors, in the active PID profile."""
+    """Settings of the active PID profile that act between throttle and motors."""
 
     CODE: ClassVar[int] = 94
     throttle_boost: int
-    """How much a fast change of the throttle is overdone; 0: not at all."""
+    """How much a fast change of the throttle is amplified. 0: not at all."""
     motor_output_limit: int
     """Largest motor output, %."""
     vbat_sag_compensation: int
-    """How much of the battery's sag the controller makes good by itself, %."""
+    """The share of the battery's sag for which the controller compensates, %."""
     thrust_linear: int
-    """How much it bends the motor outputs for a thrust that grows with their square, %."""
+    """How much the controller linearizes the thrust, which grows with the square of the motor outputs, %."""
 
     @staticmethod
     def parse(payload: bytes) -> "PidAdvanced":
@@ -234,9 +238,9 @@ class RcTuning:
 
     CODE: ClassVar[int] = 111
     rates: RateProfile
-    """From stick to body rate."""
+    """The rate profile, from stick to body rate."""
     throttle: ThrottleCurve
-    """From throttle channel to throttle; its `min_check` is `RxConfig`'s to tell."""
+    """The throttle curve, from throttle channel to throttle. Its `min_check` must be taken from `RxConfig`."""
 
     @staticmethod
     def parse(payload: bytes) -> "RcTuning":
@@ -244,7 +248,7 @@ class RcTuning:
         v = unpack("RC_TUNING", "8BxxBBBBBB3HB", payload)
         rc_roll, expo_roll, *rate, _, mid, expo = v[:8]
         expo_yaw, rc_yaw, rc_pitch, expo_pitch, limit_type, limit, *rate_limit, kind = v[8:]
-        hover = payload[23] if len(payload) > 23 else None  # since 1.47, with another curve
+        hover = payload[23] if len(payload) > 23 else None  # since MSP 1.47, which also has another curve
         rates = RateProfile(
             named(kind, RATES_TYPES),
             (rc_roll, rc_pitch, rc_yaw),
@@ -275,9 +279,9 @@ class RcDeadband:
 
     CODE: ClassVar[int] = 125
     deadband: int
-    """Of roll and pitch, µs each side."""
+    """Deadband of roll and pitch on each side of the centre, µs."""
     yaw_deadband: int
-    """Of yaw, µs each side."""
+    """Deadband of yaw on each side of the centre, µs."""
 
     @staticmethod
     def parse(payload: bytes) -> "RcDeadband":
@@ -291,19 +295,19 @@ class MotorConfig:
 
     CODE: ClassVar[int] = 131
     min_throttle: int | None
-    """Output at zero throttle, µs; None: firmware since MSP 1.47, which has `AdvancedConfig.motor_idle` alone."""
+    """Output at zero throttle, µs. None: firmware since MSP 1.47, which has only `AdvancedConfig.motor_idle`."""
     max_throttle: int
     """Output at full throttle, µs."""
     min_command: int
     """Output of a stopped motor, µs."""
     count: int
-    """Motors."""
+    """Number of motors."""
     tells_speed: bool = False
-    """Whether their speeds are measured, by bidirectional DShot or an ESC sensor: then `MotorTelemetry` tells them."""
+    """Whether bidirectional DShot or an ESC sensor measures motor speeds. `MotorTelemetry` then reports them."""
 
     @staticmethod
     def parse(payload: bytes) -> "MotorConfig":
         """Read a reply."""
         least, most, stopped, count = unpack("MOTOR_CONFIG", "HHHB", payload)
-        _, dshot, sensor = (*payload[7:10], 0, 0, 0)[:3]  # the poles, and what there is since MSP 1.42
+        _, dshot, sensor = (*payload[7:10], 0, 0, 0)[:3]  # number of poles, and two flags since MSP 1.42
         return MotorConfig(least or None, most, stopped, count, bool(dshot or sensor))

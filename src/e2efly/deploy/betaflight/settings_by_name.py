@@ -1,7 +1,8 @@
-"""Settings that no message of its own tells: asked for by their names in the command line, where the firmware answers.
+"""Settings that have no message of their own. They are requested by their names in the command line.
 
-A reply is the text `name = value`. The firmware makes it in a buffer as long as the request, so that a request is its
-name and zeros enough for the value. A request that contains `=` would change the setting: a name never does.
+Only some firmware answers such a request. A reply is the text `name = value`. The firmware writes it to a buffer that
+is as long as the request, so a request is the name followed by enough zeros for the value. A request that contains `=`
+would change the setting, but a name never contains it.
 """
 
 from e2efly.deploy.betaflight.client import Client, ask
@@ -11,13 +12,13 @@ from e2efly.deploy.clock import MONOTONIC, Clock
 CODE = 0x3010
 """Code of the message, of MSP version 2."""
 NAMES = ("mixer_type", "msp_override_failsafe", "max_aux_channels", "serial_update_rate_hz")
-"""The settings that matter to a flight and that no other message tells."""
+"""The settings that matter to a flight and that no other message contains."""
 _ROOM = 32
-"""Bytes for ` = ` and the value."""
+"""Number of bytes for ` = ` and the value."""
 
 
 def request(name: str) -> bytes:
-    """The payload that asks for a setting."""
+    """The payload of a request for a setting."""
     return name.encode("ascii") + bytes(_ROOM)
 
 
@@ -25,7 +26,7 @@ def value_of(name: str, payload: bytes) -> str:
     """The value in a reply.
 
     Raises:
-        ValueError: for a reply that is about another setting, or has no value.
+        ValueError: the reply is about another setting, or has no value.
     """
     said, _, value = text(payload).partition(" = ")
     if said != name or not value:
@@ -34,10 +35,10 @@ def value_of(name: str, payload: bytes) -> str:
 
 
 def read(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -> tuple[tuple[str, str], ...]:
-    """(name, value) of each of `NAMES` that the controller knows and tells.
+    """(name, value) of each of `NAMES` that the controller knows and reports.
 
     Raises:
-        TimeoutError: when an answer is missing after `timeout_s` seconds.
+        TimeoutError: a reply is missing after `timeout_s` seconds.
     """
     return tuple(pair for name in NAMES for pair in _told(client, name, timeout_s, clock))
 

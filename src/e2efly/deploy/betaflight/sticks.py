@@ -1,7 +1,7 @@
-"""Collective throttle and body rates to receiver channels, through the controller's own settings, and back.
+"""Conversion of collective throttle and body rates to receiver channels, with the controller's own settings, and back.
 
-Signs, for body FLU: roll rate positive is the roll stick above centre; pitch rate positive (nose down) is the pitch
-stick above centre; yaw rate positive (left) is the yaw stick *below* centre.
+Signs, for body FLU: a positive roll rate is the roll stick above its centre. A positive pitch rate (nose down) is the
+pitch stick above its centre. A positive yaw rate (left) is the yaw stick *below* its centre.
 """
 
 from collections.abc import Sequence
@@ -22,11 +22,11 @@ from e2efly.deploy.betaflight.settings import ModeRange
 from e2efly.deploy.betaflight.throttle_curve import ThrottleCurve
 
 CHANNELS = (1000, 2000)
-"""Sticks stay within these, µs."""
+"""The range of the sticks, µs."""
 RATES_PULSE = 900
-"""What is sent on the AUX channel of ANGLE, µs: sticks are body rates only while the controller takes this."""
+"""The pulse on the AUX channel of ANGLE, µs. Sticks are body rates only while the controller receives this pulse."""
 TRANSMITTER = (988, 2012)
-"""Pulses between which the channels of a transmitter stay, µs."""
+"""The range of the channels of a transmitter, µs."""
 _SIGNS = (1, 1, -1)
 _THROTTLE = 3
 _MAPPED = 8
@@ -34,41 +34,42 @@ _MAPPED = 8
 
 @dataclass(frozen=True)
 class StickCommand:
-    """What to send, and what of the command it cannot carry."""
+    """The channels to send, and the parts of the command that they cannot reach."""
 
     channels: tuple[int, ...]
-    """µs, in the receiver's order: for `messages.set_raw_rc`."""
+    """µs, in the receiver's order, for `messages.set_raw_rc`."""
     saturated: tuple[str, ...]
-    """Which of throttle, roll, pitch, yaw were asked for beyond what the sticks reach."""
+    """Those of throttle, roll, pitch and yaw whose commands are beyond the reach of the sticks."""
 
 
 @dataclass(frozen=True)
 class Sticks:
-    """The way from commands to channels of one controller. Make it with `sticks_of`."""
+    """The conversion from commands to channels for one controller. Make it with `sticks_of`."""
 
     rates: RateProfile
-    """Its rate profile."""
+    """The rate profile of the controller."""
     throttle: ThrottleCurve
-    """Its throttle curve."""
+    """The throttle curve of the controller."""
     channel: tuple[int, ...]
-    """(8,) index of the channel for roll, pitch, yaw, throttle, AUX1 to AUX4."""
+    """(8,) the index of the channel for roll, pitch, yaw, throttle, AUX1 to AUX4."""
     centre: int = 1500
     """Centre of the sticks, µs."""
     deadband: tuple[int, int, int] = (0, 0, 0)
-    """Of roll, pitch and yaw, µs each side."""
+    """Deadbands of roll, pitch and yaw on each side of the centre, µs."""
     angle: int | None = None
-    """AUX channel, from 0, on which `RATES_PULSE` keeps ANGLE off; None: no channel does."""
+    """The AUX channel, from 0, on which `RATES_PULSE` keeps ANGLE off. None: there is no such channel."""
 
     def channels_of(self, throttle: float, body_rate: Sequence[float], aux: Sequence[int]) -> StickCommand:
         """The channels that command a throttle and body rates.
 
         Args:
-            throttle: what the controller's mixer shall get, 0 to 1.
+            throttle: the throttle that the controller's mixer should get, 0 to 1.
             body_rate: about body x, y, z, FLU, rad/s.
-            aux: AUX1, AUX2, ..., µs; of AUX1 to AUX4 those left out are centred, but that `angle` is `RATES_PULSE`.
+            aux: AUX1, AUX2, ..., µs. Those of AUX1 to AUX4 that are left out are centred, but channel `angle` becomes
+                `RATES_PULSE`.
 
         Raises:
-            ValueError: naming the value, for one that is not finite or an AUX channel outside 1000 to 2000.
+            ValueError: a value is not finite, or an AUX channel is outside 1000 to 2000. The message names the value.
         """
         values = (throttle, *body_rate)
         if len(values) != 4 or not all(map(isfinite, values)):
@@ -82,15 +83,15 @@ class Sticks:
         return StickCommand(self.arrange((*pulses, self.throttle.channel_for(throttle)), aux), tuple(saturated))
 
     def pulse(self, axis: int, rate: float) -> int:
-        """The pulse of an axis (0 to 2), µs, that commands a body rate, FLU, rad/s; cut at `CHANNELS`."""
+        """The pulse of an axis (0 to 2), µs, that commands a body rate, FLU, rad/s. It is limited to `CHANNELS`."""
         stick = rate_to_stick(self.rates, axis, rate) * _SIGNS[axis]
         return min(max(stick_to_channel(stick, self.centre, self.deadband[axis]), CHANNELS[0]), CHANNELS[1])
 
     def arrange(self, pulses: Sequence[int], aux: Sequence[int]) -> tuple[int, ...]:
-        """Pulses for roll, pitch, yaw, throttle and AUX1, AUX2, ... in the receiver's order, µs.
+        """Arrange pulses for roll, pitch, yaw, throttle and AUX1, AUX2, ... in the receiver's order, µs.
 
         Raises:
-            ValueError: for an AUX channel that is no whole number from 1000 to 2000.
+            ValueError: an AUX channel is not a whole number from 1000 to 2000.
         """
         for i, value in enumerate(aux):
             if not CHANNELS[0] <= value <= CHANNELS[1] or value != int(value):
@@ -105,11 +106,14 @@ class Sticks:
         return (*channels, *map(int, values[4:]))
 
     def received(self, channels: Sequence[int]) -> tuple[int, ...]:
-        """What `messages.Rc` reports when the controller has got these channels and the map is right, µs."""
+        """What `messages.Rc` reports if the controller has received these channels and the map is right, µs."""
         return (*(channels[index] for index in self.channel), *channels[_MAPPED:])
 
     def command_of(self, channels: Sequence[int]) -> tuple[float, tuple[float, float, float]]:
-        """The throttle, 0 to 1, and the body rates, FLU, rad/s, that channels in the receiver's order command."""
+        """The throttle, 0 to 1, and the body rates, FLU, rad/s, that some channels command.
+
+        The channels are in the receiver's order.
+        """
         pulses = [channels[index] for index in self.channel[:4]]
         roll, pitch, yaw = (self._rate(axis, pulses[axis]) for axis in range(3))
         return self.throttle.throttle_of(pulses[_THROTTLE]), (roll, pitch, yaw)
@@ -123,7 +127,7 @@ def sticks_of(info: ControllerInfo) -> Sticks:
     """The sticks of a controller, from its own settings.
 
     Raises:
-        ValueError: for settings with which sticks do not mean body rates and a throttle.
+        ValueError: with the controller's settings, sticks do not mean body rates and a throttle.
     """
     if "3D" in info.features:
         raise ValueError("controller: feature 3D is on; accepted: off, as the throttle stick would also reverse motors")
@@ -134,10 +138,10 @@ def sticks_of(info: ControllerInfo) -> Sticks:
 
 
 def angle_range(info: ControllerInfo) -> ModeRange | None:
-    """The range by which ANGLE is on wherever the transmitter leaves its channel, and off for `RATES_PULSE`.
+    """The range with which ANGLE is on at any pulse of the transmitter, and off at `RATES_PULSE`. None: there is none.
 
-    With such a channel among the overridden ones, ANGLE is off only while the override counts: whoever takes the
-    sticks back, the pilot or a controller that hears no MSP any more, has a vehicle that levels itself.
+    If the channel of this range is overridden, ANGLE is off only while the override is in effect. When the pilot takes
+    the sticks back, or the controller returns them because it hears no MSP any more, the vehicle levels itself.
     """
     others = {entry.aux for entry in info.modes if BOXES.get(entry.box) != "ANGLE"}
     low, high = TRANSMITTER

@@ -1,9 +1,9 @@
-"""Betaflight's throttle curve, in its own whole-number arithmetic, and exactly back.
+"""Betaflight's throttle curve in the firmware's own integer arithmetic, and its exact inverse.
 
-The stick above `min_check` becomes 0 to 1000, is read off a table of twelve points with straight lines between, and is
-then scaled or clipped. Firmware that tells a hover throttle (MSP 1.47) fills the table by two parabolas that meet in
-(mid, hover); older firmware by two cubics that meet in (mid, mid). The tests hold the first against what real firmware
-reports.
+The stick above `min_check` becomes 0 to 1000. The throttle is interpolated linearly in a table of twelve points, and is
+then scaled or clipped. Firmware that reports a hover throttle (MSP 1.47) fills the table with two parabolas that meet
+in (mid, hover). Older firmware fills it with two cubics that meet in (mid, mid). The tests compare the parabolas with
+what real firmware reports.
 """
 
 from bisect import bisect_left
@@ -14,20 +14,20 @@ from math import isfinite
 LIMIT_TYPES = ("OFF", "SCALE", "CLIP")
 """Types of throttle limit, in the firmware's numbering."""
 LOWEST, HIGHEST = 1000, 2000
-"""Ends of the throttle channel, µs."""
+"""The ends of the throttle channel, µs."""
 _POINTS = 12
 
 
 @dataclass(frozen=True)
 class ThrottleCurve:
-    """From throttle channel to the throttle that the mixer gets, in the numbers of the controller's command line."""
+    """The curve from the throttle channel to the throttle of the mixer, with the numbers as in the command line."""
 
     mid: int = 50
     """`thr_mid`, percent."""
     expo: int = 0
     """`thr_expo`, percent."""
     hover: int | None = None
-    """`thr_hover`, percent; None: firmware older than MSP 1.47, which has none."""
+    """`thr_hover`, percent. None: firmware older than MSP 1.47, which has no such setting."""
     limit_type: str = "OFF"
     """`throttle_limit_type`: one of `LIMIT_TYPES`."""
     limit: int = 100
@@ -51,14 +51,14 @@ class ThrottleCurve:
         return self._throttles[-1]
 
     def throttle_of(self, channel: int) -> float:
-        """The throttle, 0 to 1, of a channel of so many µs."""
+        """The throttle, 0 to 1, of a channel, µs."""
         return self._throttles[min(max(int(channel), LOWEST), HIGHEST) - LOWEST]
 
     def channel_for(self, throttle: float) -> int:
-        """The lowest channel, µs, whose throttle is nearest to the one wanted.
+        """The lowest channel, µs, whose throttle is nearest to the wanted one.
 
         Raises:
-            ValueError: for a throttle that is not finite.
+            ValueError: the throttle is not finite.
         """
         if not isfinite(throttle):
             raise ValueError(f"throttle is {throttle!r}; accepted: a finite number, 0 to 1")
@@ -72,7 +72,7 @@ class ThrottleCurve:
 
     @cached_property
     def _throttles(self) -> list[float]:
-        """The throttle of every µs from `LOWEST` to `HIGHEST`; never falls."""
+        """The throttle at every µs from `LOWEST` to `HIGHEST`. It never decreases."""
         table = [self._cubic(i) if self.hover is None else self._parabolas(i / (_POINTS - 1)) for i in range(_POINTS)]
         factor = self.limit / 100
         throttles = []
@@ -84,7 +84,7 @@ class ThrottleCurve:
         return throttles
 
     def _between(self, table: list[int], stick: int) -> int:
-        if self.hover is None:  # points every 100: the twelfth only helps to interpolate at the top
+        if self.hover is None:  # a point every 100; the twelfth is only needed to interpolate at the end
             i, rest, step = stick // 100, stick % 100, 100
         else:
             i, rest, step = stick * (_POINTS - 1) // 1000, stick * (_POINTS - 1) % 1000, 1000

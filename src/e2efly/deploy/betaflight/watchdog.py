@@ -1,10 +1,11 @@
-"""A process of its own between bridge and flight controller, which lands the vehicle when the bridge dies or hangs.
+"""A separate process between bridge and flight controller, which lands the vehicle when the bridge dies or hangs.
 
-Under MSP override, Betaflight goes on with the last sticks it was sent: for ever, or for 0.3 s, after which the pilot's
-own count, which he may not hold. So the link belongs to this small process. It hands bytes through; when the bridge is
-gone, or silent for `TIMEOUT_S` in flight, it takes over for good: level by the controller's own attitude, a gentle
-descent by the throttle that the bridge had learned, then the throttle closed until the pilot disarms. It imports
-neither NumPy nor ONNX Runtime, and ends only with the bridge: no signal but SIGKILL stops it.
+Under MSP override, Betaflight continues with the last sticks that it received. Some versions do so for ever, others for
+0.3 s. After that the pilot's own sticks are used, but the pilot may not be holding them. So the link belongs to this
+small process, which passes all bytes on. When the bridge has ended, or has been silent for `TIMEOUT_S` in flight, this
+process takes over for good. It levels the vehicle with the controller's own attitude and descends gently with the
+throttle that the bridge had learned. Then it keeps the throttle closed until the pilot disarms. It imports neither
+NumPy nor ONNX Runtime. It ends only with the bridge: no signal but SIGKILL stops it.
 """
 
 import json
@@ -32,11 +33,12 @@ TIMEOUT_S = 0.1
 PERIOD_S = 0.01
 """Time between two frames of a take-over, s."""
 STALL_S = 0.05
-"""A round of this process counts for no longer: if the whole machine stood still, the bridge may speak first, s."""
+"""The longest time that one loop of this process may add to the silence of the bridge, s. If the whole machine stood
+still, the bridge then has the chance to send first."""
 STALE_S = 0.2
 """A controller's attitude that is older than this is not used for levelling, s."""
 DEAF_S = 10.0
-"""A controller that has not said for so long whether it is armed is given up after the descent, s."""
+"""If the controller has not reported for this time whether it is armed, it is given up after the descent, s."""
 ARM = 1
 """Bit of the mode ARM in `StatusEx.boxes`: it is always the first."""
 LEVEL_GAIN = 4.0
@@ -44,33 +46,34 @@ LEVEL_GAIN = 4.0
 LEVEL_RATE = 3.0
 """Largest body rate of levelling, rad/s."""
 BYTES, PLAN, STATUS, TAKEN = b"B", b"P", b"S", b"T"
-"""First byte of a packet: bytes of the link; bridge's plan; state of the link; this process has taken over."""
+"""First byte of a packet: bytes of the link, the plan of the bridge, the state of the link, or the message that this
+process has taken over."""
 PACKETS = 64
-"""Packets that the bridge takes of this process at a time."""
+"""The largest number of packets that the bridge reads from this process at a time."""
 _PACKET = 1 << 17
-"""Longest packet: what a link hands over at a time, and more."""
+"""The longest packet, bytes. It is longer than what a link delivers at a time."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What to do without the bridge, in pulses, so that nothing need be known of controller or vehicle.
+    """What to do without the bridge. It is given in pulses, so nothing about controller or vehicle need be known.
 
     Raises:
-        ValueError: naming the field, for what could not be flown by.
+        ValueError: a field has a value that cannot be used for flight. The message names the field.
     """
 
     flying: bool
-    """Whether silence is to be answered at all."""
+    """The vehicle is in flight, so silence of the bridge leads to a take-over."""
     rates: tuple[float, ...]
-    """Body rates, rad/s, rising: where `pulses` are given."""
+    """Body rates for which `pulses` are given, rad/s, increasing."""
     pulses: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
-    """us of the roll, pitch and yaw sticks at each of `rates`."""
+    """Pulses of the roll, pitch and yaw sticks at each of `rates`, us."""
     places: tuple[int, int, int, int]
-    """Where roll, pitch, yaw and throttle stand in a frame of channels."""
+    """The positions of roll, pitch, yaw and throttle in a frame of channels."""
     throttle: tuple[tuple[float, int], ...]
-    """(s since the take-over, us), rising in time: the descent; the last holds."""
+    """The descent: (time since the take-over, s, throttle pulse, us), with increasing times. The last pulse is held."""
     channels: tuple[int, ...]
-    """A frame to begin from, us."""
+    """The frame whose other channels are kept, us."""
 
     def __post_init__(self) -> None:
         n, count = len(self.rates), len(self.channels)
@@ -93,9 +96,9 @@ def descent(plan: Plan, elapsed: float, attitude: Attitude | None) -> list[int]:
     """The channels of a take-over, us.
 
     Args:
-        plan: the bridge's last.
-        elapsed: since the take-over, s.
-        attitude: the controller's newest; None: its rates are set to zero instead.
+        plan: the last plan of the bridge.
+        elapsed: time since the take-over, s.
+        attitude: the newest attitude of the controller. None: unknown; the body rates are zero.
     """
     wanted = [0.0, 0.0, 0.0]
     if attitude is not None:
@@ -116,30 +119,30 @@ def _interpolate(xs: tuple[float, ...], ys: tuple[int, ...], x: float) -> float:
 
 
 class WatchedLink:
-    """The bridge's end: a `Link` through the watchdog process, for the life of the thread that makes it.
+    """The bridge's side: a `Link` through the watchdog process. It works as long as the thread that creates it lives.
 
     Raises:
-        ValueError: for a target that names no link.
+        ValueError: the target does not name a link.
     """
 
     def __init__(self, target: str, timeout: float = TIMEOUT_S) -> None:
         """Start the process.
 
         Args:
-            target: the link, as `open_link` takes it.
-            timeout: silence of the bridge in flight after which it takes over, s.
+            target: the text of the link, as for `open_link`.
+            timeout: silence of the bridge in flight after which the process takes over, s.
         """
-        open_link(target)  # refuse a bad one here; it opens nothing before it is polled
+        open_link(target)  # raises here for a bad target; nothing is opened before the first poll
         self.connections, self.reason = 0, "not polled yet"
         self.taken_over = ""
-        """Why the watchdog has taken over; empty: it has not."""
+        """Why the watchdog has taken over. Empty: it has not."""
         self._link_alive = False
         mine, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         for end in (mine, other):
             end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 20)
         mine.setblocking(False)
         self._lifeline: Lifeline | None = None
-        with suppress(OSError):  # elsewhere than on Linux the socket tells of the bridge's death, some ms later
+        with suppress(OSError):  # on other systems than Linux, the socket shows the bridge's death some ms later
             self._lifeline = Lifeline()
         given = [other.fileno(), *([self._lifeline.descriptor] if self._lifeline else [])]
         with other:
@@ -147,18 +150,18 @@ class WatchedLink:
                 [sys.executable, "-m", "e2efly.deploy.betaflight.watchdog", target, str(timeout), *map(str, given)],
                 pass_fds=given,
                 stdin=subprocess.DEVNULL,
-                start_new_session=True,  # Ctrl-C is for the bridge
+                start_new_session=True,  # Ctrl-C must reach only the bridge
             )
         self._socket = mine
         self._received = bytearray()
 
     @property
     def alive(self) -> bool:
-        """The controller is connected and the bridge is still in charge."""
+        """Whether the controller is connected and the bridge is still in control."""
         return self._link_alive and not self.taken_over
 
     def poll(self, now: float) -> None:
-        """Take in what the watchdog says; it connects by itself."""
+        """Read what the watchdog reports. It connects by itself."""
         del now
         for _ in range(PACKETS):
             try:
@@ -196,7 +199,9 @@ class WatchedLink:
         self._hand(PLAN + json.dumps(asdict(plan)).encode())
 
     def close(self) -> None:
-        """End the watchdog on the ground; in the air it takes this for the end of the bridge, and lands."""
+        """End the watchdog, if the vehicle is on the ground. In the air, the watchdog treats this as the end of the
+        bridge, and lands.
+        """
         self._socket.close()
         if self._lifeline:
             self._lifeline.close()
@@ -212,16 +217,17 @@ class WatchedLink:
 
 
 def serve(bridge: socket.socket, died: socket.socket | None, link: Link, timeout: float = TIMEOUT_S) -> str:
-    """Hand bytes through until the bridge ends on the ground, or take over and land.
+    """Pass bytes on until the bridge ends on the ground, or take over and land.
 
     Args:
-        bridge: to the bridge; at its end the bridge is gone.
-        died: readable once the bridge has died, which is known before its socket closes (see `lifeline`).
-        link: to the controller.
-        timeout: silence of the bridge in flight after which it is as if gone, s.
+        bridge: the socket to the bridge. When it is closed, the bridge has ended.
+        died: a socket that becomes readable when the bridge has died, earlier than `bridge` closes (see `lifeline`).
+            None: there is none.
+        link: the link to the controller.
+        timeout: silence of the bridge in flight after which it counts as ended, s.
 
     Returns:
-        Why it has landed; empty if the bridge ended on the ground.
+        Why this process has landed the vehicle. Empty: the bridge ended on the ground.
     """
     heard = [bridge] if died is None else [bridge, died]
     plan: Plan | None = None
@@ -275,8 +281,8 @@ def _packets(bridge: socket.socket) -> tuple[list[bytes], bool]:
 def land(link: Link, plan: Plan) -> None:
     """Level, descend, close the throttle, and keep it closed until the pilot has disarmed or nobody answers.
 
-    Where the controller hands an override back that it hears nothing of, the stick, which rests in the middle, would
-    have the motors.
+    The closed throttle must be sent all the time. Some controllers return the control to the receiver when they hear no
+    override any more, and the throttle stick, which rests in its middle, would then control the motors.
     """
     decoder, attitude, heard, disarmed = Decoder(), None, 0.0, 0
     began, down = time.monotonic(), plan.throttle[-1][0]
@@ -285,7 +291,7 @@ def land(link: Link, plan: Plan) -> None:
         link.poll(time.monotonic())
         for frame in decoder.feed(link.receive()[-MOST:]):
             if frame.direction == REPLY and frame.code == AttitudeReply.CODE:
-                with suppress(ValueError):  # one that cannot be read is not heard
+                with suppress(ValueError):  # a reply that cannot be parsed is ignored
                     attitude, heard = AttitudeReply.parse(frame.payload), elapsed
             if frame.direction == REPLY and frame.code == StatusEx.CODE:
                 with suppress(ValueError):
@@ -303,7 +309,7 @@ def land(link: Link, plan: Plan) -> None:
 
 
 def _plan(content: bytes) -> Plan | None:
-    """The plan in a packet; None for what is none: a plan that cannot be read must not end this process."""
+    """The plan in a packet. None: it is not a valid plan, because an unreadable plan must not end this process."""
     try:
         x = json.loads(content)
         roll, pitch, yaw = (tuple(pulses) for pulses in x["pulses"])
@@ -317,22 +323,26 @@ def _plan(content: bytes) -> Plan | None:
 def _hand(bridge: socket.socket, packet: bytes) -> bool:
     try:
         bridge.send(packet)
-    except OSError:  # full or gone: bytes of the controller are lost, as on a bad line
+    except OSError:  # full or closed: bytes of the controller are lost, as on a bad line
         return False
     return True
 
 
 def main() -> None:
-    """Serve the bridge over the link that is named; given are descriptors of its socket and of its lifeline, if any."""
+    """Serve the bridge over a link.
+
+    The arguments of the process are the text of the link, the timeout in s, the file descriptor of the socket to the
+    bridge and, if there is one, that of its lifeline.
+    """
     target, timeout, descriptor, *lifeline = sys.argv[1:]
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    with suppress(OSError, AttributeError):  # where it is not allowed to, it is light enough
+    with suppress(OSError, AttributeError):  # without the permission for it, the process is still light enough
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(20))  # a bridge that spins must not starve it
     with socket.socket(fileno=int(descriptor)) as bridge:
         died = watch(int(lifeline[0])) if lifeline else None
         said = serve(bridge, died, open_link(target), float(timeout))
-    with suppress(OSError):  # perhaps nobody reads it: not before the vehicle has landed
+    with suppress(OSError):  # maybe nobody reads this, so it comes only after the landing
         sys.stderr.write(f"watchdog: {said}\n" if said else "")
 
 

@@ -8,16 +8,20 @@ still or is carried without rotation, no delay is given.
 Its errors in 100 synthetic measurements each (`tests/deploy/test_delay_watch.py`): delays from 0 to 0.3 s, attitudes at
 100 Hz with 1 mrad of noise and a drift, a gyro at 50 Hz with a bias and 0.03 rad/s of noise, dated within 5 ms:
 
-| motion | told | standard deviation | largest error | | --- | --- | --- | --- | | turned by hand, up to 0.4 rad at 0.5
-to 1.5 Hz | 100 | 0.4 ms | 0.9 ms | | the same, attitudes at 30 Hz with 5 mrad of noise | 100 | 0.6 ms | 1.9 ms | | the
-same, 0.3 rad/s of vibration in the gyro | 100 | 2.5 ms | 5.7 ms | | turned gently, up to 0.15 rad at 0.3 to 1 Hz | 100
-| 1.5 ms | 6.1 ms | | the first 1.3 s of a flight, 0.03 rad at 0.8 to 3 Hz | 100 | 2.7 ms | 11.6 ms |
+| motion | delays found | standard deviation | largest error |
+| --- | --- | --- | --- |
+| turned by hand, up to 0.4 rad at 0.5 to 1.5 Hz | 100 | 0.4 ms | 0.9 ms |
+| the same, attitudes at 30 Hz with 5 mrad of noise | 100 | 0.6 ms | 1.9 ms |
+| the same, 0.3 rad/s of vibration in the gyro | 100 | 2.5 ms | 5.7 ms |
+| turned gently, up to 0.15 rad at 0.3 to 1 Hz | 100 | 1.5 ms | 6.1 ms |
+| the first 1.3 s of a flight, 0.03 rad at 0.8 to 3 Hz | 100 | 2.7 ms | 11.6 ms |
 
-On the rig with real firmware, while the pilot moved the hover point: 22 ms told of 20, 79 ms of 80, with standard
-deviations of 4 and 9 ms. A calm take-off turns by less than 0.01 rad/s, and tells nothing: turn the vehicle by hand.
+On the rig with real firmware, while the pilot moved the hover point, 22 ms were measured for a delay of 20 ms, and 79
+ms for 80 ms, with standard deviations of 4 and 9 ms. In a calm take-off the vehicle turns by less than 0.01 rad/s,
+which is too little: turn the vehicle by hand.
 
-What the gyro's own filters delay, some milliseconds, is taken off the odometry's delay; what the times of its readings
-are wrong by on the average is added or taken off.
+The delay of the gyro's own filters, some milliseconds, makes the measured delay smaller by as much. The mean error of
+the times of the gyro's readings shifts the measured delay by as much.
 """
 
 import math
@@ -56,7 +60,7 @@ class Delay:
     seconds: float
     """Time from the motion to the time stamp that the odometry gives for it, s."""
     deviation: float
-    """Standard deviation, estimated from the remaining differences, s."""
+    """Standard deviation of `seconds`, estimated from the remaining differences of the two motions, s."""
     likeness: float
     """Likeness of the two motions at this delay, at most 1."""
 

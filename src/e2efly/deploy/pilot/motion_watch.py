@@ -1,10 +1,11 @@
-"""Whether poses and inertial sensors tell of one motion: the odometry's against accelerometer and gyroscope.
+"""Whether poses and inertial sensors show the same motion: odometry is compared with accelerometer and gyroscope.
 
-Over half a second the accelerometer, turned by the flight controller's attitude, says how the velocity changes, and the
-gyroscope how the attitude does. Odometry that is mirrored, has another frame, a swapped or conjugated quaternion, or a
-velocity that is negated, zero or drifts says something else, as soon as the vehicle moves: carried by hand, or within
-the first decimetres of a climb. How late the poses are is not known, so that the best match of the last moments counts.
-Where they differ in height, and the throttle says what the poses say, it is the accelerometer that is wrong.
+Over half a second, the accelerometer, rotated with the flight controller's attitude, shows how the velocity changes.
+The gyroscope shows how the attitude changes. Wrong odometry differs from both as soon as the vehicle moves, whether it
+is carried by hand or climbs its first decimetres. Such odometry is mirrored, is in another frame, has a swapped or
+conjugated quaternion, or has a velocity that is negated, zero or drifting. The delay of the poses is not known, so the
+best match with the last moments counts. If poses and accelerometer differ vertically, and the throttle agrees with the
+poses, the accelerometer is wrong.
 """
 
 import cmath
@@ -24,42 +25,46 @@ MEMORY_S = 0.5
 LATEST_S = 0.16
 """The largest delay of poses that is considered, s."""
 STEADY_S, LARGEST_STEADY = 4.0, 0.8
-"""What of the difference stays for longer is a tilted sensor, s; its bound, m/s^2."""
+"""A part of the difference that lasts longer than the first value, s, is taken for a tilted sensor. The second value is
+its bound, m/s^2."""
 SPEED, SPEED_SHARE = 0.3, 0.6
-"""Difference of velocity that is accepted in flight: m/s, and share of all that the accelerometer felt."""
+"""Accepted difference of velocity in flight: m/s, plus a share of all that the accelerometer measured."""
 TURN, TURN_SHARE = 0.35, 0.6
-"""The same of the attitude: rad, and share of all that the gyroscope felt."""
+"""Accepted difference of attitude in flight: rad, plus a share of all that the gyroscope measured."""
 TILT = 0.5
-"""Accepted between the controller's tilt and the odometry's, rad."""
+"""Accepted difference between the controller's tilt and the odometry's, rad."""
 BY_HAND, BY_HAND_SHARE = 0.4, 1.2
-"""The same of both while the vehicle is carried, where it may knock against something: only what is opposed is told."""
+"""Accepted difference of velocity, m/s, or of attitude, rad, while the vehicle is carried. It may then knock against
+something, so only opposite motions are reported."""
 CARRIED = 0.25
-"""What the sensors must have felt for that, m/s or rad: poses that jump while nothing moves are another matter."""
+"""While the vehicle is carried, differences are reported only if the sensors have measured more than this, m/s or rad.
+Poses that jump while nothing moves are another problem."""
 ALIKE, MOVED = 0.4, 0.6
-"""Carried so far, m/s, with a difference of less than this share of it, poses and sensors agree."""
+"""Poses and sensors agree if the difference is less than the first value, a share of the measured motion, and this
+motion is more than the second, m/s."""
 LASTING_S, BLAMED_S = 0.03, 0.15
-"""A difference is believed after so long, s; the accelerometer is blamed for it after so long, s."""
+"""Time after which a difference is reported, s, and time after which it is attributed to the accelerometer, s."""
 TELLING, BETTER = 0.4, 0.2
-"""How late poses are can be told while the felt velocity changes by so much within `LATEST_S`, m/s; too late they are
-where that explains them better by so much, m/s."""
+"""The delay of the poses can be measured while the measured velocity changes by more than the first value within
+`LATEST_S`, m/s. The poses are too late if a larger delay than the accepted one fits better by the second value, m/s."""
 LONGEST_STEP = 0.1
-"""Between two measurements; after a longer pause the comparison begins anew, s."""
+"""The longest time between two measurements, s. After a longer pause the comparison starts again."""
 
 
 @dataclass(frozen=True)
 class Felt:
-    """What the inertial sensors felt up to a moment, fading with `MEMORY_S`."""
+    """What the inertial sensors measured up to a moment. Older parts fade with `MEMORY_S`."""
 
     time: float
     """Time, s."""
     speed: np.ndarray
-    """(3,) change of velocity, world, by the heading of the poses, m/s."""
+    """(3,) change of velocity, world, with the heading of the poses, m/s."""
     lift: float
-    """Change of the vertical velocity by the throttle, m/s."""
+    """Change of the vertical velocity according to the throttle, m/s."""
     turn: np.ndarray
     """(3,) angle turned, body FLU, rad."""
     up: np.ndarray
-    """(3,) where up is by the controller's attitude at this moment, body FLU."""
+    """(3,) the upward direction according to the controller's attitude at this moment, body FLU."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,7 @@ class Differs:
     turn: float = 0.0
     """Change of the attitude, rad."""
     tilt: float = 0.0
-    """Tilt, rad."""
+    """Angle between the two upward directions, rad."""
 
 
 NOTHING = Differs(np.zeros(3))
@@ -81,34 +86,34 @@ NOTHING = Differs(np.zeros(3))
 
 @dataclass(frozen=True)
 class MotionWatch:
-    """What was compared so far. `MotionWatch()` before the first measurement."""
+    """The comparison so far. `MotionWatch()` before the first measurement."""
 
     felt: tuple[Felt, ...] = ()
-    """What was felt within the last `LATEST_S`."""
+    """What was measured within the last `LATEST_S`."""
     effort: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """All that was felt, whatever its direction, fading: along the ground and up, m/s, and turned, rad."""
+    """The sum of all measured motion in any direction, fading: horizontal and vertical, m/s, and rotation, rad."""
     doubt: float = 0.0
-    """How far `Felt.lift` may be off, fading, m/s."""
+    """The possible error of `Felt.lift`, fading, m/s."""
     pose: tuple[float, np.ndarray, np.ndarray] | None = None
     """Time, s, velocity (3,), m/s, and quaternion (4,) of the newest odometry."""
     speed: np.ndarray | None = None
-    """(3,) change of velocity that the odometry told, fading, world, m/s."""
+    """(3,) change of velocity according to the odometry, fading, world, m/s."""
     turn: np.ndarray | None = None
-    """(3,) angle turned that the odometry told, fading, body FLU, rad."""
+    """(3,) angle turned according to the odometry, fading, body FLU, rad."""
     steady: np.ndarray | None = None
     """(3,) lasting part of the difference, world, m/s^2."""
     differs: Differs = NOTHING
     """The present differences."""
     lasting: float = 0.0
-    """How long they have differed by too much, s."""
+    """How long the differences have been too large, s."""
     late: float = 0.0
-    """How late the poses were when that could be told last, s; at most `LATEST_S`."""
+    """How late the poses were when this could last be measured, s, at most `LATEST_S`."""
     late_for: float = 0.0
-    """For how long they have been later than is accepted, of the time in which it could be told, s."""
+    """How long the poses have been later than accepted, s. Only time in which this could be measured counts."""
 
     @property
     def problem(self) -> str | None:
-        """How the poses contradict the sensors in flight. None: they do not."""
+        """How the poses contradict the sensors in flight, or how late they are. None: neither."""
         if self.late_for >= LASTING_S and not self._accelerometer:
             return f"poses are {self.late:.2f} s late or more, and the controller's gains are for less (--latency)"
         return self._text if self.lasting >= LASTING_S and not self._accelerometer else None
@@ -138,12 +143,14 @@ class MotionWatch:
 
     @property
     def moved(self) -> float:
-        """All change of velocity that was felt, fading, m/s."""
+        """The sum of all measured changes of velocity, fading, m/s."""
         return math.hypot(*self.effort[:2])
 
     @property
     def _accelerometer(self) -> bool:
-        """Whether the throttle agrees with the poses."""
+        """Whether the accelerometer causes the difference: the throttle agrees with the poses, and only the vertical
+        velocity differs.
+        """
         x, y, z = (abs(float(v)) for v in self.differs.speed)
         return math.hypot(x, y) < z / 2 and abs(self.differs.lift) + self.doubt < z / 2 and not self._turned
 
@@ -169,14 +176,14 @@ def feel(
     thrust: tuple[float, float],
     now: float,
 ) -> MotionWatch:
-    """Take in a measurement of the inertial sensors.
+    """Process a measurement of the inertial sensors.
 
     Args:
         before: the watch so far.
-        attitude: the flight controller's; roll and pitch count.
+        attitude: the flight controller's attitude. Only its roll and pitch are used.
         force: (3,) specific force, body FLU, m/s^2.
         gyro: (3,) body rate, FLU, rad/s.
-        thrust: specific force by the throttle, and how far that may be off, m/s^2.
+        thrust: specific force according to the throttle, and its possible error, m/s^2.
         now: s.
     """
     up = _up(attitude)
@@ -200,12 +207,12 @@ def feel(
 
 
 def see(before: MotionWatch, odometry: Odometry, latest: float = math.inf) -> MotionWatch:
-    """Compare with another odometry that passed the checks.
+    """Compare the sensors with another odometry that passed the checks.
 
     Args:
         before: the watch so far.
-        odometry: the newest.
-        latest: so late poses may be, from the motion to their arrival, s.
+        odometry: the newest odometry.
+        latest: the largest accepted delay of poses, from the motion to their arrival, s.
     """
     velocity, quaternion = odometry.velocity, odometry.quaternion
     pose = (odometry.time, velocity, quaternion)
@@ -243,14 +250,14 @@ def see(before: MotionWatch, odometry: Odometry, latest: float = math.inf) -> Mo
 
 
 def _up(attitude: Attitude) -> np.ndarray:
-    """(3,) world up, body FLU, of R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    """(3,) the upward direction of the world in body FLU, for R = Rz(yaw) Ry(pitch) Rx(roll)."""
     cr, sr = math.cos(attitude.roll), math.sin(attitude.roll)
     cp, sp = math.cos(attitude.pitch), math.sin(attitude.pitch)
     return np.array([-sp, cp * sr, cp * cr])
 
 
 def _angle(up: np.ndarray, quaternion: np.ndarray) -> float:
-    """The angle between up and the up of a quaternion, both body FLU, rad."""
+    """The angle between an upward direction and that of a quaternion, both body FLU, rad."""
     w, x, y, z = (float(q) for q in quaternion)
     seen = (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
     cosine = sum(float(a) * b for a, b in zip(up, seen, strict=True))

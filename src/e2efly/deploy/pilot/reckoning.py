@@ -1,9 +1,10 @@
 """Flight without odometry: the last known velocity, propagated with the accelerometer and with the throttle.
 
-Neither is good for long: an accelerometer that is wrong by 1 % of gravity is off by half a metre a second after five,
-and so is a throttle map. But the map was learned while poses were good, and knows how well. The vertical speed is the
-accelerometer's, no farther from the throttle's than the map may be wrong: an accelerometer that is calibrated badly, or
-broken, then makes the vehicle sink a little slower or faster, and never climb.
+Neither is accurate for long. After five seconds, an accelerometer with an error of 1 % of gravity gives a velocity
+error of half a metre per second, and a throttle map is no better. But the map was learned while poses were good, and
+its possible error is known. So the vertical speed is that of the accelerometer, but it is limited to the range around
+the throttle's vertical speed that the error of the map allows. With a broken or badly calibrated accelerometer, the
+vehicle then sinks a little slower or faster, but never climbs.
 """
 
 import math
@@ -20,29 +21,32 @@ from e2efly.deploy.pilot.hover import LEVEL_GAIN, LEVEL_RATE, SINK_ACCELERATION,
 from e2efly.vehicles.vehicle import GRAVITY
 
 LONGEST_STEP = 0.1
-"""Between two measurements; after a longer pause the velocity is not known any more, s."""
+"""The longest time between two measurements, s. After a longer pause the velocity is not known any more."""
 BRAKE_GAIN, BRAKE_ACCELERATION = 1.5, 3.0
-"""Deceleration over horizontal speed, 1/s, and the largest, m/s^2."""
+"""Deceleration divided by horizontal speed, 1/s, and the largest deceleration, m/s^2."""
 BRAKE_S = 2.0
-"""Horizontal motion is braked for so long, s: then its reckoning is too old, and the vehicle is held level."""
+"""How long horizontal motion is braked, s. After this time the estimate of the horizontal velocity is too old, and the
+vehicle is held level."""
 SINK_GAIN = 3.0
 """Acceleration divided by the error of the vertical speed, 1/s."""
 FASTEST_SINK, LOW_SINK, LOW = 2.0, 1.3, 3.0
-"""The speed of sinking grows up to the first, m/s, and below the height in the last, m, up to the second."""
+"""The sink speed grows up to the first value, m/s. Below the height of the last value, m, it grows only up to the
+second, m/s."""
 SAG, SMOOTH_S, SAG_RATE, SAG_S = 0.02, 0.1, 0.05, 0.3
-"""The thrust follows the force that is felt, as a battery sags: while they are no farther apart than this share,
-smoothed over so long, s; by so much in a second, within so long, s. What is farther off at once is no battery: it is
-the accelerometer."""
+"""The share of the throttle's thrust follows the measured force as the battery sags. SAG: it follows only while the two
+differ by less than this share. SMOOTH_S: time over which the difference is smoothed, s. SAG_RATE: the fastest change,
+1/s. SAG_S: the time constant, s. A larger sudden difference is not the battery but the accelerometer."""
 SLOWER = 0.3
-"""The height is reckoned with a speed that is so much higher, m/s, at most."""
+"""How much faster than `climb` the height may be assumed to rise, m/s."""
 DOUBT = 0.05
-"""Error of the vertical speed from the poses, m/s."""
+"""Possible error of the vertical speed from the poses, m/s."""
 ANCHOR_S, ANCHORS = 0.2, 6
-"""Between two poses from which the velocity is reckoned on, s, and how many there are: those of the last moments may
-have been wrong already when that is found out, and one alone is noisy."""
+"""Time between two poses from which the velocity is propagated, s, and the number of these poses. When poses are found
+to be wrong, the latest ones may already have been wrong for a while, and a single pose is noisy."""
 TRIM_GAIN, TRIM_ERROR, LARGEST_TRIM = 3.0, 0.6, 4.0
-"""Growth of the trim over the error of the vertical speed, 1/s^2; the largest error that counts, m/s, as a motion that
-is being ended is none of the map's; and its bound, m/s^2: a map that is wrong by 30 %."""
+"""TRIM_GAIN: rate of change of the trim divided by the error of the vertical speed, 1/s^2. TRIM_ERROR: the largest
+error that counts, m/s, because a motion that is just being stopped is not an error of the map. LARGEST_TRIM: the bound
+of the trim, m/s^2, for a map that is wrong by 30 %."""
 
 
 @dataclass(frozen=True)
@@ -50,31 +54,35 @@ class Reckoning:
     """The velocity without odometry."""
 
     velocity: tuple[float, float, float]
-    """Forward, left and up along the heading, by the accelerometer, m/s."""
+    """Forward, left and up along the heading, from the accelerometer, m/s."""
     lifted: float
     """Vertical speed from the throttle, m/s."""
     doubt: float
-    """Possible error of that speed, m/s."""
+    """Possible error of `lifted`, m/s."""
     share: float
-    """Of the throttle's thrust that comes, as a battery sags."""
+    """The share of the throttle map's thrust that the rotors really give. It falls as the battery sags."""
     time: float
     """Time up to which it is propagated, s."""
     since: float
     """When the odometry was last seen, s."""
     height: float
-    """Reckoned from the odometry's last, world, m: the largest that is plausible."""
+    """The largest plausible height, propagated from the last odometry, world, m."""
     unlike: float | None = None
-    """By how much more of the thrust is felt than `share`, smoothed; None: nothing was felt yet."""
+    """The measured share of the thrust minus `share`, smoothed. None: nothing was measured yet."""
 
     @property
     def climb(self) -> float:
-        """Vertical speed, m/s: the accelerometer's, as far as the throttle's allows; to sink faster, half as far."""
+        """Vertical speed, m/s: that of the accelerometer, limited to a range around that of the throttle.
+
+        It may be lower than the throttle's by the whole `doubt`, but higher only by half of it, because an estimate
+        that is too high makes the vehicle sink faster.
+        """
         return max(self.lifted - self.doubt, min(self.lifted + self.doubt / 2, self.velocity[2]))
 
 
 @dataclass(frozen=True)
 class Reckonings:
-    """The velocity, reckoned on from several poses. `Reckonings()` before the first."""
+    """The velocity, propagated from several poses. `Reckonings()` before the first pose."""
 
     newest: Reckoning | None = None
     """Propagated from the newest pose."""
@@ -82,22 +90,22 @@ class Reckonings:
     """Propagated from older poses, oldest first."""
 
     def seen(self, newest: Reckoning) -> "Reckonings":
-        """With another pose."""
+        """These reckonings with another pose."""
         if self.anchors and newest.since - self.anchors[-1].since < ANCHOR_S:
             return replace(self, newest=newest)
         return Reckonings(newest, (*self.anchors[-ANCHORS + 1 :], newest))
 
     def on(self, step: Callable[[Reckoning], Reckoning | None]) -> "Reckonings":
-        """All of them carried on; those that cannot be are left out."""
+        """All reckonings after a step. Those that cannot be propagated are left out."""
         anchors = tuple(after for anchor in self.anchors if (after := step(anchor)) is not None)
         return Reckonings(None if self.newest is None else step(self.newest), anchors)
 
     def alone(self, share: float, *, wrong: bool) -> "Reckonings":
-        """From here on without poses: the median of all.
+        """Start a flight without poses, from the median of all reckonings.
 
         Args:
-            share: of the throttle's thrust that comes.
-            wrong: the poses were wrong, perhaps for a while: only the older half counts.
+            share: the share of the throttle map's thrust that the rotors really give.
+            wrong: the poses were wrong, perhaps for a while, so only the older half is used.
         """
         every = (*self.anchors, *([self.newest] if self.newest else []))
         if not every:
@@ -112,7 +120,14 @@ class Reckonings:
 
 
 def seen(odometry: Odometry, now: float, error: float = 0.0, share: float = 1.0) -> Reckoning:
-    """Begin from an odometry at `now`, s, whose heading is wrong by `error`, rad, with a share of the thrust."""
+    """The reckoning that begins with an odometry at `now`, s.
+
+    Args:
+        odometry: the odometry.
+        now: s.
+        error: error of its heading, rad.
+        share: the share of the throttle map's thrust that the rotors really give.
+    """
     x, y, z = (float(v) for v in odometry.velocity)
     yaw = yaw_of(odometry.quaternion) - error
     c, s = math.cos(yaw), math.sin(yaw)
@@ -127,18 +142,18 @@ def reckon(
     thrust: tuple[float, float] | None,
     now: float,
 ) -> Reckoning | None:
-    """Carry the velocity on by one control step; the heading is taken to stay.
+    """Propagate the velocity by one control step. The heading is assumed to be constant.
 
     Args:
-        before: what was reckoned so far.
-        attitude: the flight controller's; None: it is not known, and taken to be level.
-        force: specific force by its accelerometer, body FLU, m/s^2; None: it is not known, and taken to be the thrust.
-        thrust: specific force by the throttle, and how far that may be off, m/s^2; None: it is not known, and taken to
-            be the force.
+        before: the reckoning so far.
+        attitude: the flight controller's attitude. None: not known; a level attitude is assumed.
+        force: specific force from its accelerometer, body FLU, m/s^2. None: not known; the thrust is used instead.
+        thrust: specific force according to the throttle, and its possible error, m/s^2. None: not known; the force is
+            used instead.
         now: s.
 
     Returns:
-        The velocity now; None where it cannot be known: neither force nor thrust, or too long a pause.
+        The reckoning now. None: it is not known, because force and thrust are both missing or the pause was too long.
     """
     dt = now - before.time
     if not 0 <= dt <= LONGEST_STEP or (force is None and thrust is None):
@@ -164,25 +179,25 @@ def reckon(
 
 
 def trimmed(trim: float, reckoned: Reckoning, ground: float, dt: float) -> float:
-    """The trim that makes up for a wrong throttle map, m/s^2, carried on by `dt` s.
+    """The trim that compensates for a wrong throttle map, m/s^2, after another `dt` s.
 
     Args:
-        trim: so far, m/s^2.
+        trim: the trim so far, m/s^2.
         reckoned: the velocity now.
-        ground: its height, world, m.
-        dt: s.
+        ground: the height of the ground, world, m.
+        dt: time since the last control step, s.
     """
     behind = max(-TRIM_ERROR, min(TRIM_ERROR, _climb(reckoned, ground) - reckoned.climb))
     return max(-LARGEST_TRIM, min(LARGEST_TRIM, trim + TRIM_GAIN * behind * dt))
 
 
 def settle(attitude: Attitude | None, reckoned: Reckoning, ground: float, trim: float = 0.0) -> Ctbr:
-    """End the motion, level, and sink; without an attitude the body rates are held at zero.
+    """Stop the horizontal motion, level the vehicle, and sink. Without an attitude, the body rates are zero.
 
     Args:
-        attitude: the flight controller's.
+        attitude: the flight controller's attitude. None: unknown.
         reckoned: the velocity now.
-        ground: its height, world, m.
+        ground: the height of the ground, world, m.
         trim: added to the thrust, m/s^2; see `trimmed`.
     """
     elapsed = reckoned.time - reckoned.since

@@ -1,4 +1,4 @@
-"""Why nothing takes off, and why the policy does not fly: every condition that is not met, in words. Pure."""
+"""Why a take-off is refused, and why the policy may not fly: every condition that is not met, in words. Pure."""
 
 import math
 
@@ -46,7 +46,7 @@ def take_off_refusals(settings: FlightSettings, flight: Flight, inputs: Inputs) 
 
 
 def _standing_refusals(settings: FlightSettings, odometry: Odometry) -> list[str]:
-    """Why a vehicle that is so does not stand ready."""
+    """Why a vehicle with this odometry is not ready for take-off."""
     reasons: list[str] = []
     speed, tilt = float(np.linalg.norm(odometry.velocity)), tilt_of(odometry.quaternion)
     height, fence, (x, y, _) = float(odometry.position[2]) - settings.ground_height, settings.fence, odometry.position
@@ -62,7 +62,7 @@ def _standing_refusals(settings: FlightSettings, odometry: Odometry) -> list[str
 
 
 def battery_refusals(settings: FlightSettings, inputs: Inputs) -> list[str]:
-    """Why the battery lets nothing fly; empty: it does."""
+    """Why the battery does not allow a flight. Empty: it allows one."""
     if inputs.voltage is None:
         return [] if settings.battery_unknown else [Reason.BATTERY_UNKNOWN]
     if not inputs.voltage >= settings.battery_low:
@@ -77,7 +77,7 @@ def _sticks(settings: FlightSettings, pilot: Pilot | None, reason: Reason) -> li
 
 
 def policy_refusals(settings: FlightSettings, flight: Flight, inputs: Inputs, odometry: Odometry) -> tuple[str, ...]:
-    """Why the policy may not fly now; empty: it may."""
+    """Why the policy may not fly now. Empty: it may."""
     reasons: list[str] = [Reason.LOCKED] if flight.lock else []
     if inputs.policy_problem:
         reasons.append(f"{Reason.POLICY}: {inputs.policy_problem}")

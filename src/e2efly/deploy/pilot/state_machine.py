@@ -1,12 +1,12 @@
-"""The flight's modes: a pure function from what is known to who flies, and why.
+"""The modes of a flight: a pure function from what is known to who flies, and why.
 
     INIT -> TAKEOFF -> HOVER <-> POLICY
               |          |          |
               +--------> +-> LAND <-+ -> DONE -> INIT
 
-The pilot's switches and sticks always win: from any mode in the air, the override switch leads to PILOT, and back to
-HOVER (to LAND without odometry, to INIT on the ground); disarming leads to DONE. Each refusal and each change of mode
-carries its reasons.
+The pilot's switches and sticks always have priority. From any mode in the air, the override switch leads to PILOT. From
+there it leads back to HOVER, or to LAND without odometry, or to INIT on the ground. Disarming leads to DONE. Each
+refusal and each change of mode carries its reasons.
 """
 
 import dataclasses
@@ -22,19 +22,20 @@ from e2efly.deploy.pilot.refusals import ON_GROUND, battery_refusals, policy_ref
 from e2efly.deploy.settings import FlightSettings
 
 LONGEST_STEP = 0.1
-"""A step counts for no longer than this, s, whatever the clock does."""
+"""The longest time that one step may count, s, even if the clock jumps."""
 SLOWING = 0.5
 """Deceleration with which a take-off's target nears its height, m/s^2."""
 CLIMB_S = 5.0
-"""A take-off may last so much longer than its target's climb, s."""
+"""How much longer a take-off may last than the climb of its target, s."""
 MISLED = "the vehicle does not go where it is sent (wrong heading?)"
-"""Said of odometry that is not the vehicle's own ..."""
+"""Reported for odometry that is not that of the vehicle ..."""
 TURNED = "its heading is wrong"
-"""... and of odometry whose heading is not."""
+"""... and for odometry whose heading is not that of the vehicle."""
 FALLEN, FALLEN_SPEED, FALLEN_S = math.radians(60), 0.3, 0.5
-"""Nothing flies so far from level, so slowly, m/s, for so long, s: gravity alone would have made it faster."""
+"""A vehicle has fallen if it is tilted by more than the first value, rad, and slower than the second, m/s, for the time
+of the third, s. In the air, gravity alone would have made it faster."""
 NEAR_GROUND = 0.3
-"""In a landing below this height the shock of the ground is not taken for a contradiction of poses and sensors, m."""
+"""In a landing below this height, m, poses and sensors may differ, because the shock of the ground can cause this."""
 
 
 def step(settings: FlightSettings, flight: Flight, inputs: Inputs, now: float) -> Flight:
@@ -42,9 +43,9 @@ def step(settings: FlightSettings, flight: Flight, inputs: Inputs, now: float) -
 
     Args:
         settings: what the flight may do.
-        flight: the state before.
+        flight: the state before the step.
         inputs: what is known now.
-        now: s, never falling; a jump counts as one long step.
+        now: s. It never decreases. After a jump, the step counts as `LONGEST_STEP`.
     """
     passed = now - flight.now if flight.now else 0.0
     dt = min(max(passed, 0.0), LONGEST_STEP)
@@ -78,11 +79,11 @@ def _moved(moment: float | None, jump: float) -> float | None:
 
 
 def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
-    """Whether the odometry is the vehicle's own, and whether the vehicle has fallen over.
+    """Check whether the odometry is that of the vehicle, and whether the vehicle has fallen over.
 
-    With a wrong heading the controller pushes to the wrong side, and the vehicle spirals outwards, ever faster. Nothing
-    on the ground shows it: the flight controller's own heading is not the odometry's. The flight shows it, and where it
-    does not, the distance from the target.
+    With a wrong heading, the controller pushes to the wrong side, and the vehicle spirals outwards, faster and faster.
+    Nothing on the ground shows a wrong heading, because the flight controller's own heading has another origin than the
+    odometry's. In flight, the comparison of headings shows it, or else the growing distance from the target.
     """
     if flight.mode in (Mode.INIT, Mode.DONE):
         return dataclasses.replace(flight, misled=None, turned=None, fallen_since=None)
@@ -104,7 +105,7 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
         return flight
     if error is not None and abs(error) > settings.heading_agreement:
         return dataclasses.replace(flight, misled=TURNED, turned=error)
-    if inputs.silent:  # what is sent may not arrive: where the vehicle goes tells nothing of the odometry
+    if inputs.silent:  # commands may not arrive, so the motion shows nothing about the odometry
         return dataclasses.replace(flight, nearest=math.inf)
     off = math.hypot(*np.subtract(target.position[:2], odometry.position[:2]).tolist())
     rests = math.isfinite(flight.nearest) or float(np.linalg.norm(odometry.velocity)) < SLOW
@@ -124,9 +125,9 @@ def _mission_low(inputs: Inputs) -> bool:
 
 
 def _common(flight: Flight, inputs: Inputs) -> Flight | None:
-    """What holds in every mode: disarming ends a flight, and the override switch is the pilot's."""
+    """The rules of all modes: disarming ends a flight, and the override switch gives the vehicle to the pilot."""
     if inputs.link_problem:
-        return None  # nothing is known of the controller; each mode decides
+        return None  # nothing is known about the controller; each mode decides
     if not inputs.armed:
         return None if flight.mode in (Mode.INIT, Mode.DONE) else to(flight, Mode.DONE, Reason.DISARMED)
     if not inputs.override and (flight.mode in AIRBORNE or _left_the_ground(flight, inputs.seen)):
@@ -137,7 +138,7 @@ def _common(flight: Flight, inputs: Inputs) -> Flight | None:
 
 
 def _left_the_ground(flight: Flight, odometry: Odometry | None) -> bool:
-    """Whether the pilot has taken off by hand: handed over, the vehicle must not be let fall."""
+    """Whether the pilot has taken off manually. When the pilot hands over such a vehicle, it must not fall."""
     grounded = flight.mode in (Mode.INIT, Mode.DONE)
     return grounded and odometry is not None and abs(float(odometry.position[2]) - flight.home) > ON_GROUND
 
@@ -148,7 +149,7 @@ def _init(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -
     if odometry is not None and not inputs.armed:
         flight = dataclasses.replace(flight, home=float(odometry.position[2]))
     if refusals := take_off_refusals(settings, flight, inputs):
-        # what else was wrong may come right by itself: only the mission switch may start a flight
+        # a refusal may disappear by itself, but only a move of the mission switch may start a flight
         return dataclasses.replace(flight, reasons=refusals, rearm=not _mission_low(inputs))
     assert inputs.pilot is not None
     assert odometry is not None
@@ -160,7 +161,7 @@ def _init(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -
 
 
 def _lost(inputs: Inputs) -> tuple[str, ...]:
-    """What is missing that nobody but the pilot flies without."""
+    """What is missing for a flight by anyone but the pilot. Empty: nothing."""
     if inputs.seen is None:
         return (inputs.blindness,)
     if inputs.link_problem:
@@ -169,7 +170,7 @@ def _lost(inputs: Inputs) -> tuple[str, ...]:
 
 
 def _must_land(settings: FlightSettings, inputs: Inputs) -> tuple[str, ...]:
-    """Why the hover controller must land now."""
+    """Why the hover controller must land now. Empty: it need not."""
     if reasons := _lost(inputs):
         return reasons
     if _mission_low(inputs):
@@ -240,7 +241,7 @@ def _policy(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
 
 
 def _with_pilot(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
-    """While the pilot flies, the hover controller stays ready at the place where the vehicle is."""
+    """While the pilot flies, the target of the hover controller follows the vehicle."""
     del dt
     odometry = inputs.seen
     if not inputs.override or inputs.link_problem:

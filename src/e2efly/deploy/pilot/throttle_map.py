@@ -1,10 +1,11 @@
-"""From thrust to throttle: a map that learns in flight.
+"""The throttle map, from thrust to throttle, which is learned in flight.
 
-The vehicle file gives its shape: rotor speed rises linearly with the throttle from idle to full, thrust by the
-vehicle's thrust map. What is learned is a factor on it, and how that falls with the battery's voltage, from the
-specific force along body z that was measured some 40 ms after each throttle (as in px4ctrl, which learns the one factor
-of a straight line by recursive least squares with forgetting). Forgetting would lose the voltage's part, which shows
-over minutes only: here both wander at random, each at its own pace, and a Kalman filter follows them.
+The vehicle file gives the shape of the map: rotor speed rises linearly with the throttle from idle to full, and thrust
+follows from the vehicle's thrust map. Two numbers are learned: a factor on this thrust, and how the factor falls with
+the battery's voltage. They are learned from the specific force along body z that is measured some 40 ms after each
+throttle. px4ctrl does this, too, but it learns only the factor of a straight line, by recursive least squares with
+forgetting. Forgetting would lose the effect of the voltage, which becomes visible only over minutes. So here both
+numbers are modelled as random walks, each with its own speed, and a Kalman filter follows them.
 """
 
 import dataclasses
@@ -23,40 +24,47 @@ from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 SCALE_RANGE = (0.5, 2.0)
 """Bounds of the learned factor."""
 GAIN_RANGE = (0.0, 4.0)
-"""Bounds of its relative change over the relative change of voltage: 2 where rotor speed follows the voltage."""
+"""Bounds of the voltage gain: the relative change of the factor divided by the relative change of the voltage. It is 2
+if rotor speed is proportional to the voltage."""
 SCALE_RATE, GAIN_RATE = 0.25, 0.5
-"""Largest changes of factor and voltage gain that are used, 1/s: they never jump."""
+"""The fastest changes of the factor and of the voltage gain in use, 1/s. They never jump."""
 LOWEST_FORCE = 0.3 * GRAVITY
-"""Measurements below are not learned from: drag and noise outweigh thrust."""
+"""Nothing is learned from a force below this, m/s^2, because drag and noise are then too large compared with thrust."""
 BELIEVED = (0.25, 4.0)
-"""Measured over nominal force, between which a measurement is learned from."""
+"""A measurement is used only if the measured force divided by the nominal force is in this range."""
 VOLTAGE_BELIEVED = (0.6, 1.4)
-"""Voltage over that at which the factor holds, between which it is believed."""
+"""A voltage is trusted only if, divided by the voltage at which the factor holds, it is in this range."""
 NOISE = 0.1
-"""Standard deviation of the accelerometer's noise and of what the map leaves out, gravities."""
+"""Standard deviation of the accelerometer's noise and of the errors of the map's model, in units of gravity."""
 WANDER = np.diag([4e-6, 1e-5])
-"""Variance that factor and voltage gain gain a second: the factor is followed within 7 s, the gain within minutes."""
+"""Growth of the variances of factor and voltage gain, 1/s. The filter follows the factor within 7 s, and the gain
+within minutes."""
 START = ((0.05, 0.0), (0.0, 0.5))
-"""First covariance, and its bound: how far off the vehicle file may be (factor: 20 % rms; voltage gain: 0.7)."""
+"""The first covariance, which is also its bound. It is the possible error of the vehicle file. Its standard deviation
+is 20 % for the factor and 0.7 for the voltage gain."""
 BLOWN = 3.0
-"""Beyond this force across the body, m/s^2, the air pushes so hard that the force along it tells little of thrust."""
+"""With more force than this across the body, m/s^2, the air pushes so hard that the force along the body's z axis shows
+little of the thrust."""
 THRUST_DELAY = (0.015, 0.075)
-"""How long before a measured force its throttle was sent, s: the link, the rate loop and the motors' lag."""
+"""The time between sending a throttle and the measured force that it causes, s: the delays of the link, the rate loop
+and the motors."""
 UNSTEADY = 0.15
-"""A throttle that has changed within so long before a force, s, is not known as well as one that has not."""
+"""If the throttle changed within this time before a force, s, it is less certain which throttle caused the force."""
 _FIELDS = ("vehicle_hash", "voltage", "scale", "gain", "updates", "residual")
 
 
 @dataclass(frozen=True)
 class ThrottleMap:
-    """Throttle (0: idle, 1: full) against specific force along body z, m/s^2. Make it with `ThrottleMap.of`."""
+    """The map between throttle (0: idle, 1: full) and specific force along body z, m/s^2. Make it with
+    `ThrottleMap.of`.
+    """
 
     vehicle_hash: str
     """Hash of the vehicle to which the map belongs."""
     mass: float
     """kg."""
     thrust_map: tuple[float, float, float]
-    """Thrust of a rotor over its speed: k2, k1, k0."""
+    """Thrust of a rotor as a polynomial of its speed: k2, k1, k0."""
     speed: tuple[float, float]
     """Rotor speed at idle and at full throttle, rad/s."""
     voltage: float
@@ -66,7 +74,7 @@ class ThrottleMap:
     gain: float = 2.0
     """The voltage gain in use: it follows `learned` slowly."""
     learned: tuple[float, float] = (1.0, 2.0)
-    """The factor at `voltage`, and its voltage gain, as the filter has them."""
+    """The factor at `voltage` and the voltage gain, as the filter estimates them."""
     covariance: tuple[tuple[float, float], tuple[float, float]] = START
     """Covariance of `learned`."""
     last_voltage: float | None = None
@@ -74,11 +82,11 @@ class ThrottleMap:
     updates: int = 0
     """Number of measurements learned from."""
     residual: float = 0.0
-    """Smoothed root of the squared error of its predictions, m/s^2."""
+    """Smoothed root mean square of the errors of its predictions, m/s^2."""
 
     @staticmethod
     def of(vehicle: Vehicle, voltage: float = 3.9) -> "ThrottleMap":
-        """The vehicle file's map, taken to hold at `voltage` V per cell."""
+        """The map of the vehicle file, which is assumed to hold at `voltage`, V per cell."""
         k2, k1, k0 = (float(k) for k in vehicle.thrust_map)
         top = vehicle.thrust_range[1]
         full = (-k1 + math.sqrt(k1**2 + 4 * k2 * (top - k0))) / (2 * k2)
@@ -87,28 +95,33 @@ class ThrottleMap:
 
     @property
     def doubt(self) -> float:
-        """Share of the force by which the map may be wrong: two standard deviations, and what is not yet in use."""
+        """The possible error of the map, as a share of the force: two standard deviations, plus the part of the learned
+        change that is not yet in use.
+        """
         scale, learned = self.scale, self.learned[0]
         return (2 * math.sqrt(self.covariance[0][0]) + abs(learned - scale)) / scale
 
     def nominal(self, throttle: float) -> float:
-        """Specific force, m/s^2, of a throttle by the vehicle file alone."""
+        """Specific force of a throttle from the vehicle file alone, m/s^2."""
         k2, k1, k0 = self.thrust_map
         idle, full = self.speed
         speed = idle + throttle * (full - idle)
         return 4 * max((k2 * speed + k1) * speed + k0, 0.0) / self.mass
 
     def force(self, throttle: float, voltage: float | None = None) -> float:
-        """Specific force, m/s^2, of a throttle, as learned. `voltage` is per cell. None: the last known voltage."""
+        """Specific force of a throttle from the learned map, m/s^2.
+
+        `voltage` is that of a cell, V. None: the last known voltage is used.
+        """
         return self.nominal(throttle) * self._factor(voltage)
 
     def expected(self, throttle: float, voltage: float | None = None) -> tuple[float, float]:
-        """Specific force of a throttle, and how far it may be off, m/s^2."""
+        """Specific force of a throttle, and its possible error, m/s^2."""
         force = self.force(throttle, voltage)
         return force, force * self.doubt
 
     def throttle(self, force: float, voltage: float | None = None) -> float:
-        """The throttle in [0, 1] that gives a specific force, m/s^2: the inverse of `force`, saturating."""
+        """The throttle that gives a specific force, m/s^2: the inverse of `force`, limited to [0, 1]."""
         k2, k1, k0 = self.thrust_map
         idle, full = self.speed
         thrust = max(force, 0.0) / self._factor(voltage) * self.mass / 4
@@ -117,7 +130,9 @@ class ThrottleMap:
         return min(max((speed - idle) / (full - idle), 0.0), 1.0)
 
     def change(self, voltage: float | None) -> float:
-        """Relative change of the voltage; one that cannot be counts as the last that could."""
+        """Relative difference from the voltage at which the factor holds. If the voltage is not plausible, the last
+        plausible one is used.
+        """
         believed = voltage if _believed(self, voltage) else self.last_voltage
         return 0.0 if believed is None else believed / self.voltage - 1
 
@@ -133,15 +148,15 @@ def _believed(m: ThrottleMap, voltage: float | None) -> bool:
 def update(
     m: ThrottleMap, throttle: float, force: float, voltage: float | None, dt: float, swing: float = 0.0
 ) -> ThrottleMap:
-    """Learn from the specific force, m/s^2, that a throttle gave; what cannot be is not learned from.
+    """Learn from the specific force, m/s^2, that a throttle gave. Nothing is learned from an implausible force.
 
     Args:
         m: the map.
-        throttle: sent one delay before the measurement.
-        force: measured along body z.
-        voltage: of a cell, V; None: unknown, the last known one is taken.
-        dt: since the last update, s.
-        swing: largest less smallest throttle that the force may be due to: which one it is, is not known.
+        throttle: the throttle that was sent one delay before the measurement.
+        force: the force measured along body z, m/s^2.
+        voltage: of a cell, V. None: unknown; the last known voltage is used.
+        dt: time since the last update, s.
+        swing: the range, largest minus smallest, of the throttles that may have caused the force.
     """
     nominal = m.nominal(throttle)
     believed = force >= LOWEST_FORCE <= nominal and BELIEVED[0] * nominal < force < BELIEVED[1] * nominal
@@ -174,7 +189,7 @@ def update(
 def learn(
     m: ThrottleMap, throttle: float, force: np.ndarray, voltage: float | None, dt: float, swing: float = 0.0
 ) -> ThrottleMap:
-    """`update` by a specific force (3,), body FLU, m/s^2, unless the air pushes hard across the body."""
+    """`update` with a specific force (3,), body FLU, m/s^2, unless the air pushes hard across the body."""
     blown = math.hypot(force[0], force[1]) > BLOWN
     return m if blown else update(m, throttle, float(force[2]), voltage, dt, swing)
 
@@ -184,16 +199,17 @@ def _towards(value: float, goal: float, reach: float) -> float:
 
 
 def as_json(m: ThrottleMap) -> str:
-    """What was learned, as JSON, to be saved with the flight and offered to the next."""
+    """What was learned, as JSON. It is saved with the flight, and the next flight can use it."""
     values = (m.vehicle_hash, m.voltage, *m.learned, m.updates, m.residual)
     return json.dumps(finite(dict(zip(_FIELDS, values, strict=True))), indent=2)
 
 
 def from_json(text: str, vehicle: Vehicle) -> ThrottleMap:
-    """The map of a vehicle with what an earlier flight learned, which this flight goes on from.
+    """The map of a vehicle with what an earlier flight learned. This flight continues learning from there.
 
     Raises:
-        ValueError: naming the field, the value and what is accepted; for the map of another vehicle.
+        ValueError: a field is not valid, or the map is that of another vehicle. The message names the field, the value
+            and what is accepted.
     """
     try:
         values = json.loads(text, object_pairs_hook=unique)
@@ -223,7 +239,7 @@ def _refusal(name: str, value: Any, accepted: str) -> ValueError:
 
 
 class ThrottleHistory:
-    """The throttles that were sent, to be matched with the forces that they caused."""
+    """The throttles that were sent. They are matched with the forces that they caused."""
 
     def __init__(self, seconds: float = 5.0) -> None:
         self._sent: deque[tuple[float, float]] = deque()
@@ -236,11 +252,11 @@ class ThrottleHistory:
             self._sent.popleft()
 
     def felt(self, moment: float) -> float | None:
-        """The mean throttle that the force at a moment, s, is due to; None: not known."""
+        """The mean throttle that caused the force at a moment, s. None: not known."""
         return self.between(moment - THRUST_DELAY[1], moment - THRUST_DELAY[0])
 
     def swing(self, moment: float) -> float:
-        """Largest less smallest throttle in force from `UNSTEADY` before a moment, s, up to it."""
+        """The range, largest minus smallest, of the throttles from `UNSTEADY` before a moment, s, up to it."""
         known = []
         for time, throttle in reversed(self._sent):
             if time <= moment:
@@ -250,7 +266,7 @@ class ThrottleHistory:
         return max(known) - min(known) if known else 0.0
 
     def between(self, start: float, end: float) -> float | None:
-        """The mean throttle in force from `start` to `end`, s; None: not known that far back."""
+        """The mean throttle in effect from `start` to `end`, s. None: it is not known that far back."""
         if not self._sent or self._sent[0][0] > start:
             return None
         total, until = 0.0, end

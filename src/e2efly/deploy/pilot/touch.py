@@ -1,4 +1,4 @@
-"""Detects the ground without poses: the ground carries a vehicle whose rotors do not.
+"""Detects the ground without poses: on the ground, something other than the rotors carries the vehicle.
 
 In the air, the force that the accelerometer measures follows the throttle, whatever the scale of either. On the ground
 it stays constant. After a shock, or when the ground is overdue, the thrust is lowered for a moment and the force is
@@ -13,84 +13,88 @@ from e2efly.vehicles.vehicle import GRAVITY
 SHOCK = 3.0
 """Force beyond the thrust that shows a touch of the ground, m/s^2."""
 DIP, DIP_S = 0.15, 0.32
-"""Share of the thrust that is left out for so long, s, to feel whether the ground carries."""
+"""The dip: by this share the thrust is lowered, for this time, s, to test whether the ground carries the vehicle."""
 DELAY_S = 0.12
 """Time from the arrival of a command until the force shows it, s."""
 ENOUGH = 5
-"""Measurements of each kind by which a dip is judged; those of several dips are taken together until there are so
-many, as a bad link lets few through."""
+"""The number of measurements in the dip, and of measurements after it, that are needed to judge. Those of several dips
+are added up until there are so many, because a bad link delivers only few."""
 LASTS_S = DIP_S + DELAY_S + 0.16
-"""A dip ends, and with it the time after it by which it is judged, when the thrust is back, s."""
+"""Duration of a dip and of the time after it that is used to judge it, s."""
 FOLLOWS = 0.5
-"""Share of the thrust's change that the force shows in the air; on the ground it shows none."""
+"""If the force changes by more than this share of the thrust's change, the vehicle is in the air. On the ground the
+force does not change."""
 WEIGHT = (0.75, 1.3)
-"""Force of what stands, gravities, by an accelerometer that is calibrated badly."""
+"""Range of the force of a vehicle that stands, in units of gravity, for a badly calibrated accelerometer."""
 AGAIN_S = 1.0
 """The shortest time between two dips, s."""
 USUAL_S, UNUSUAL = 0.5, 1.5
-"""Over which the difference of force and thrust is smoothed, s; beyond this difference, m/s^2, it is a shock's."""
+"""Time over which the difference of force and thrust is smoothed, s. A measurement that differs from the smoothed value
+by more than the second value, m/s^2, belongs to a shock and is not used for it."""
 FROZEN_S, IGNORED, LONGEST_SAME_S = 0.15, 0.4, 0.4
-"""An accelerometer whose numbers repeat bit for bit for so long, s, while the thrust changes by so much, m/s^2, is
-frozen; so is one that repeats them for as long as the last, s, whatever the thrust: the rotors shake it."""
+"""An accelerometer is frozen if its numbers repeat bit for bit for the first value, s, while the thrust changes by the
+second, m/s^2. It is also frozen if they repeat for the third value, s, whatever the thrust is, because the vibration of
+the rotors always changes them."""
 ALIVE_S, BELIEVED = 0.2, 3.0
-"""An accelerometer whose numbers repeat for so long, s, is frozen; one that is so unlike the thrust as a rule, m/s^2,
-is broken: neither can feel the ground."""
+"""An accelerometer whose numbers repeat for the first value, s, is frozen. One that usually differs from the thrust by
+more than the second, m/s^2, is broken. Neither can detect the ground."""
 SUPPORT, SUPPORT_S = 1.2, 0.3
-"""Force beyond the thrust, m/s^2, for so long, s: something carries the vehicle, by an accelerometer that is right."""
+"""If the force is larger than the thrust by the first value, m/s^2, for the second, s, something carries the vehicle.
+This holds for an accelerometer that works."""
 
 
 @dataclass(frozen=True)
 class Touch:
-    """What was felt so far. `Touch()` at the beginning of a landing."""
+    """What was measured so far. `Touch()` at the beginning of a landing."""
 
     usual: float | None = None
-    """Force minus thrust as a rule, m/s^2."""
+    """The usual force minus thrust, smoothed, m/s^2. None: not known yet."""
     raw: tuple[float, ...] = ()
     """The accelerometer's newest numbers ..."""
     changed: float = -math.inf
     """... and when they last changed, s."""
     same_s: float = 0.0
-    """For how long they have repeated at the newest measurement, s."""
+    """How long these numbers had repeated at the newest measurement, s."""
     then: float | None = None
-    """Thrust at the change, m/s^2; None: not known."""
+    """Thrust when the numbers last changed, m/s^2. None: not known."""
     ignored: float = 0.0
-    """By how much the thrust has changed since, and the numbers not, m/s^2."""
+    """The largest change of the thrust since then, which the numbers did not show, m/s^2."""
     dip: float = -math.inf
     """When the newest dip began, s."""
     low: tuple[float, float, int] = (0.0, 0.0, 0)
-    """Sums of force and thrust, m/s^2, and of how many measurements, in the dip ..."""
+    """Sums of force and of thrust, m/s^2, and the number of measurements, in the dip ..."""
     high: tuple[float, float, int] = (0.0, 0.0, 0)
     """... and after it."""
     carried: bool = False
-    """The ground was felt in a dip."""
+    """The ground was detected in a dip."""
     supported: float = 0.0
-    """For how long the force has been beyond the thrust, s."""
+    """How long the force has been larger than the thrust by `SUPPORT`, s."""
 
     def factor(self, now: float) -> float:
         """The factor by which the thrust is multiplied at `now`, s."""
         return 1 - DIP if now - self.dip < DIP_S else 1.0
 
     def afresh(self) -> "Touch":
-        """Of the ground nothing was felt yet; how long the numbers have repeated is known."""
+        """A new detection of the ground. It keeps how long the numbers have repeated."""
         return Touch(raw=self.raw, changed=self.changed, same_s=self.same_s, then=self.then, ignored=self.ignored)
 
     @property
     def frozen(self) -> bool:
-        """Whether the accelerometer of a flying vehicle repeats itself bit for bit."""
+        """Whether the accelerometer of a flying vehicle repeats its numbers bit for bit."""
         return self.same_s > LONGEST_SAME_S or (self.same_s > FROZEN_S and self.ignored > IGNORED)
 
     def able(self, now: float) -> bool:
-        """Whether this accelerometer can feel the ground at all."""
+        """Whether this accelerometer can detect the ground at all."""
         return now - self.changed < ALIVE_S and self.usual is not None and abs(self.usual) < BELIEVED
 
     @property
     def rests(self) -> bool:
-        """Something has carried the vehicle for a while, by an accelerometer that is right."""
+        """Whether something has carried the vehicle for a while, if the accelerometer works."""
         return self.supported >= SUPPORT_S
 
 
 def seen(before: Touch, raw: tuple[float, ...], thrust: float | None, now: float) -> Touch:
-    """Take in the accelerometer's numbers as they came at `now`, s, and the thrust by the throttle, m/s^2, if known."""
+    """Process the accelerometer's numbers that came at `now`, s, with the thrust of the throttle, m/s^2, if known."""
     if raw != before.raw:
         return replace(before, raw=raw, changed=now, same_s=0.0, then=thrust, ignored=0.0)
     change = 0.0 if thrust is None or before.then is None else abs(thrust - before.then)
@@ -98,14 +102,14 @@ def seen(before: Touch, raw: tuple[float, ...], thrust: float | None, now: float
 
 
 def feel(before: Touch, force: float, thrust: float, now: float, dt: float) -> Touch:
-    """Take in a measurement.
+    """Process a measurement.
 
     Args:
-        before: so far.
+        before: the state so far.
         force: specific force along the body's z axis, m/s^2.
-        thrust: the one that the throttle sent a moment before gives by the map, m/s^2.
-        now: up to when what was sent had arrived as it was taken, s.
-        dt: since the measurement before, s.
+        thrust: the thrust that the map gives for the throttle sent a moment before, m/s^2.
+        now: everything sent before this time had arrived when the measurement was taken, s.
+        dt: time since the previous measurement, s.
     """
     beyond = force - thrust
     after = replace(before, supported=before.supported + dt if beyond > SUPPORT else 0.0)
@@ -118,12 +122,12 @@ def feel(before: Touch, force: float, thrust: float, now: float, dt: float) -> T
 
 
 def dip(before: Touch, now: float, *, overdue: bool, beyond: float) -> Touch:
-    """Begin to feel for the ground, where there is a reason and the last time is long enough ago.
+    """Begin a dip to test for the ground, if there is a reason and the last dip is long enough ago.
 
     Args:
-        before: so far.
+        before: the state so far.
         now: s.
-        overdue: by its height the vehicle ought to stand.
+        overdue: by its height, the vehicle should already stand.
         beyond: force minus thrust of the newest measurement, m/s^2.
     """
     shock = before.usual is not None and beyond - before.usual > SHOCK
@@ -134,7 +138,7 @@ def dip(before: Touch, now: float, *, overdue: bool, beyond: float) -> Touch:
 
 
 def _dipping(before: Touch, force: float, thrust: float, now: float) -> Touch:
-    """The measurements of a dip and of the time after it, judged once enough of both have come."""
+    """Add a measurement in a dip or after it. Once there are enough of both, judge whether the ground carries."""
     since = now - before.dip
     in_dip, after_dip = DELAY_S <= since < DIP_S, since >= DIP_S + DELAY_S
     if not (in_dip or after_dip):

@@ -1,1 +1,3 @@
-"""Scripts that run in processes, and Pythons, of their own: each needs Python 3.8 and the package it speaks for."""
+"""Scripts that run in separate processes, and possibly with another Python. Each needs only Python 3.8 and the package
+that it serves.
+"""

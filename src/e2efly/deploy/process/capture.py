@@ -1,14 +1,15 @@
-"""Takes the images of a camera and publishes them in shared memory: `sight/capture.py` starts it.
+"""Receives the images of a camera and publishes them in shared memory. `sight/capture.py` starts it.
 
-It runs as a script in a process of its own: drivers of cameras block, start threads and can crash, and none of that may
-happen in the control loop. It needs nothing but Python (3.8 or newer) and the package that it speaks for, so that any
-interpreter which has that package can run it, such as the system's for ROS.
+It runs as a script in a separate process, because camera drivers block, start threads and can crash, and none of that
+may happen in the control loop. It needs only Python (3.8 or newer) and the package of its image source. So any
+interpreter that has this package can run it, for example the system's Python for ROS.
 
     capture.py KIND NAME SEES FOV WHERE
 
-NAME is that of the shared memory, SEES what the policy sees, FOV the field of view as `ACROSSxDOWN` in rad, `policy`
-for that of the policy's camera, or empty for what the source says of itself, and WHERE what the kind needs to know. It
-writes the lines of `speech.py`; it is ready when the first image is published.
+KIND is the kind of image source, a key of `KINDS`. NAME is the name of the shared memory. SEES is what the policy sees.
+FOV is the field of view as `ACROSSxDOWN` in rad. If it is `policy`, it is that of the policy's camera; if it is empty,
+it is what the source reports. WHERE is what this kind needs to find its source. The script writes the lines of
+`speech.py`. It reports that it is ready when the first image is published.
 """
 
 from __future__ import annotations
@@ -19,17 +20,17 @@ import time
 from typing import Any
 
 OTHER_CLOCK_S = 10.0
-"""A first image whose stamp is farther from now, s, was stamped by another clock."""
+"""If the stamp of the first image is farther from now than this, s, it comes from another clock."""
 
 
 class Output:
-    """Where a kind puts its images."""
+    """Publishes the images that a kind of source delivers."""
 
     def __init__(self, speech: Any, name: str, sees: str, fov: str) -> None:
-        """Nothing is published until the first image comes, as nothing is known of it."""
+        """Publish nothing until the first image comes, because the layout of the images is not known before."""
         self.speech, self.sees = speech, sees
         self.fov: tuple[float, float] | None = None
-        """What was given; None: that of the source."""
+        """The field of view that was given, rad. Zeros: that of the policy's camera. None: that of the source."""
         if fov:
             across, _, down = (fov if fov != "policy" else "0x0").partition("x")
             self.fov = float(across), float(down)
@@ -40,15 +41,15 @@ class Output:
         """Publish an image.
 
         Args:
-            moment: of the exposure, s on the monotonic clock.
+            moment: the time of the exposure, s on the monotonic clock.
             values: bytes, little-endian, row by row.
             shape: (h, w) or (h, w, 3).
-            kind: of the values: float32, uint8, uint16.
-            fov: what the source says of its field of view, rad; what was given counts.
-            detail: said of the source when the first image is there.
+            kind: the type of the values: float32, uint8, uint16.
+            fov: the field of view that the source reports, rad. It is ignored if one was given at the start.
+            detail: a description of the source, reported with the first image.
 
         Raises:
-            ValueError: when it is not like the first.
+            ValueError: the layout of the image differs from that of the first one.
         """
         shared = importlib.import_module("shared_images")
         layout = shared.Layout.wanted(tuple(shape), kind, self.fov or fov)
@@ -62,28 +63,28 @@ class Output:
         self._publisher.put(moment, values)
 
     def _leave(self) -> None:
-        """Nobody else knows the name."""
+        """Remove the shared memory. No other process knows its name."""
         if self._publisher is not None and self._publisher.path.exists():
             self._publisher.path.unlink()
 
 
 class Stamps:
-    """Stamps of the wall clock as times on the monotonic clock.
+    """Converts stamps of the wall clock to times on the monotonic clock.
 
-    The first decides: one that is none, or far from now, is of another clock, and then the arrival counts. A clock that
-    jumps later is seen as such by who checks the images.
+    The first stamp decides. If it is zero or far from now, it comes from another clock, and the time of arrival is used
+    from then on. If a clock jumps later, the check of the images detects it.
     """
 
     def __init__(self, speech: Any, what: str) -> None:
-        """Nothing is decided yet; `what` is stamped, for people."""
+        """Nothing is decided yet. `what` names the stamped things in messages to people."""
         self._speech, self._what = speech, what
         self._believed: bool | None = None
 
     def moment(self, stamp: float) -> float:
-        """When something was exposed that comes now, s on the monotonic clock.
+        """When an image that arrives now was exposed, s on the monotonic clock.
 
         Args:
-            stamp: on the wall clock, s; 0: there is none.
+            stamp: the stamp on the wall clock, s. 0: there is none.
         """
         age = time.time() - stamp
         if self._believed is None:
@@ -95,7 +96,10 @@ class Stamps:
 
 
 def run(module: str, function: str) -> Any:
-    """A kind: a function of a module, mostly of one beside this one, given an output and where the images are from."""
+    """A kind of source: a function of a module, which is called with an output and with the place of the images.
+
+    Most of these modules are in the same folder.
+    """
 
     def started(speech: Any, name: str, sees: str, fov: str, where: str) -> None:
         getattr(importlib.import_module(module), function)(Output(speech, name, sees, fov), where)

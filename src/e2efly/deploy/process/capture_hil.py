@@ -1,4 +1,6 @@
-"""Receives the images that `e2efly hil` serves over TCP on another computer, and tells their times by the own clock."""
+"""Receives the images that `e2efly hil` serves over TCP on another computer, and converts their times to the local
+clock.
+"""
 
 from __future__ import annotations
 
@@ -9,21 +11,21 @@ import time
 from typing import Any
 
 CONNECT_S = 5.0
-"""Longest time to connect, or until something can be sent, s."""
+"""The longest time for connecting, or for waiting until something can be sent, s."""
 FIRST, OFTEN_S, SELDOM_S = 8, 0.02, 1.0
-"""So many pings go out so often, s, and the others so seldom."""
+"""The number of first pings, the period of these pings, s, and the period of all later pings, s."""
 SILENT_S = 3.5
-"""A server that answers no ping for so long is lost, s."""
+"""A server that answers no ping for this time counts as lost, s."""
 RETRY_S = 0.2
-"""Between two attempts to connect again, s."""
+"""Time between two attempts to connect again, s."""
 
 
 def capture(output: Any, where: str) -> None:
-    """Receive from HOST:PORT. Once an image has come, a connection that is lost is made again, until the end.
+    """Receive images from HOST:PORT. Once an image has come, a lost connection is made again, until the process ends.
 
     Raises:
-        RuntimeError: when nobody serves there, or the stream ends before its first image.
-        ValueError: when it is no such stream.
+        RuntimeError: no server answers there, or the stream ends before its first image.
+        ValueError: it is not a stream of images.
     """
     follower, lost = Follower(output, where), False
     while not output.speech.closing.is_set():
@@ -43,23 +45,23 @@ def capture(output: Any, where: str) -> None:
 
 
 class Follower:
-    """One stream after the other from the same place."""
+    """Follows the streams of one server, one connection after the other."""
 
     def __init__(self, output: Any, where: str) -> None:
         self._output, self._where = output, where
         self.shown = False
         """Whether an image has ever come."""
         self.came = False
-        """Whether one has come over the last connection."""
+        """Whether an image has come over the present connection."""
         self._stream = importlib.import_module("image_stream")
         self._shared = importlib.import_module("shared_images")
 
     def follow(self) -> None:
-        """Connect and receive until the end of this process, with clocks measured anew.
+        """Connect and receive until this process ends. The difference of the clocks is measured again.
 
         Raises:
-            OSError: when there is no connection, or it is lost.
-            ValueError: when it is no such stream.
+            OSError: there is no connection, or it is lost.
+            ValueError: it is not a stream of images.
         """
         self.came = False
         host, _, port = self._where.rpartition(":")
@@ -108,7 +110,7 @@ class Follower:
                     self._show(moment, stream.unpacked(content, layout.bytes), layout, clocks.best)
 
     def _show(self, moment: float, values: bytes, layout: Any, best: Any) -> None:
-        """Publish an image of that time on the server's clock."""
+        """Publish an image that was exposed at `moment`, s on the server's clock."""
         detail = f"clocks agree within {1e3 * best.doubt:.2f} ms"
         self._output.put(moment - best.ahead, values, layout.shape, layout.type, layout.fov, detail)
         if self.shown and not self.came:

@@ -1,4 +1,6 @@
-"""Depth or colours of a RealSense camera, by pyrealsense2: as the sensor gives them, without any of its filters."""
+"""Depth or colours of a RealSense camera, read with pyrealsense2. They are used as the sensor delivers them, without
+any of the package's filters.
+"""
 
 from __future__ import annotations
 
@@ -8,26 +10,26 @@ import time
 from typing import Any
 
 WAIT_MS = 1000
-"""A camera that gives no image for so long is looked for: it may be unplugged."""
+"""If no image comes for this time, it is checked whether the camera is still connected, ms."""
 GLOBAL_CLOCK = ("global_time", "system_time")
-"""Timestamp domains that are this computer's wall clock, in ms; any other is the camera's own clock."""
+"""Timestamp domains that are this computer's wall clock, in ms. Any other domain is the camera's own clock."""
 
 
 def capture(output: Any, serial: str) -> None:
-    """Publish the images of the camera with a serial number, or of the only one.
+    """Publish the images of the camera with a serial number. If the number is empty, it is the only camera.
 
     Raises:
-        RuntimeError: when there is no such camera, it does not show what the policy sees, or it is unplugged.
+        RuntimeError: there is no such camera, it does not show what the policy sees, or it is unplugged.
     """
     rs = importlib.import_module("pyrealsense2")
     follow(output, rs, find(rs, rs.context().query_devices(), serial), None)
 
 
 def find(rs: Any, devices: Any, serial: str) -> Any:
-    """The camera with a serial number, or the only one.
+    """The camera with a serial number. If the number is empty, the only camera.
 
     Raises:
-        RuntimeError: when there is none, or more than one, naming those that there are.
+        RuntimeError: no camera fits, or more than one. The message names the cameras that are connected.
     """
     there = [device.get_info(rs.camera_info.serial_number) for device in devices]
     chosen = [device for device, number in zip(devices, there) if serial in ("", number)]  # noqa: B905  # Python 3.8
@@ -38,18 +40,18 @@ def find(rs: Any, devices: Any, serial: str) -> Any:
 
 
 def follow(output: Any, rs: Any, device: Any, begun: Any) -> None:
-    """Publish the images of a device until it goes.
+    """Publish the images of a device until it is unplugged.
 
-    The frames come from its sensor and not from a pipeline, so that nothing aligns, decimates or fills them.
+    The frames are read from its sensor and not from a pipeline, so nothing aligns, decimates or fills them.
 
     Args:
-        output: of the capture process.
+        output: the output of the capture process.
         rs: the module pyrealsense2.
         device: the camera.
-        begun: called when it streams; None: nothing.
+        begun: called when the camera streams. None: nothing is called.
 
     Raises:
-        RuntimeError: when it does not show what the policy sees, or gives no more images.
+        RuntimeError: the camera does not show what the policy sees, or is unplugged.
     """
     depth = output.sees == "depth"
     if not depth and output.sees != "rgb":
@@ -67,7 +69,7 @@ def follow(output: Any, rs: Any, device: Any, begun: Any) -> None:
     scale = sensor.as_depth_sensor().get_depth_scale() if depth else 1.0
     if sensor.supports(rs.option.global_time_enabled):
         sensor.set_option(rs.option.global_time_enabled, 1.0)  # stamps by this computer's clock
-    queue = rs.frame_queue(1)  # the newest alone
+    queue = rs.frame_queue(1)  # only the newest frame
     sensor.open(profile)
     sensor.start(queue)
     if begun is not None:
@@ -94,19 +96,23 @@ def follow(output: Any, rs: Any, device: Any, begun: Any) -> None:
 
 
 def preference(profile: Any) -> tuple[int, int, int]:
-    """The least is taken: 30 images a second or what is nearest, then 848 columns, of a D435i its widest view."""
+    """The sort key of a stream profile: the profile with the least key is used.
+
+    First comes the rate that is nearest to 30 images per second, then the width nearest to 848 columns, which is the
+    widest view of a D435i, then the height nearest to 480 rows.
+    """
     return abs(profile.fps() - 30), abs(profile.width() - 848), abs(profile.height() - 480)
 
 
 def values_of(data: Any, scale: float | None) -> tuple[bytes, tuple[int, ...], str]:
-    """The values of a frame as shared memory has them.
+    """The values of a frame in the format of the shared memory.
 
     Args:
-        data: (h, w) uint16 depth, 0 a hole, or (h, w, 3) uint8 colours.
-        scale: m of one unit of depth; None: these are colours.
+        data: (h, w) uint16 depth, where 0 is a hole, or (h, w, 3) uint8 colours.
+        scale: the size of one unit of depth, m. None: the values are colours.
 
     Returns:
-        Their bytes, their shape and their type: whole units of 1 mm as they are, other units in m.
+        Their bytes, their shape and their type. Depth in units of 1 mm stays as it is; other units become m.
     """
     np = importlib.import_module("numpy")
     image = np.asanyarray(data)
@@ -116,10 +122,10 @@ def values_of(data: Any, scale: float | None) -> tuple[bytes, tuple[int, ...], s
 
 
 class Clock:
-    """Timestamps of frames as times on the monotonic clock.
+    """Converts the timestamps of frames to times on the monotonic clock.
 
-    Those of the camera's own clock start anywhere: the frame that came soonest after its stamp tells how far the clocks
-    are apart, so that a frame which is held up looks as old as it is. The least delay of all counts as none.
+    The origin of the camera's own clock is not known. The offset between the clocks is taken from the frame that came
+    soonest after its stamp, whose delay counts as zero. So a frame that was held up looks as old as it is.
     """
 
     def __init__(self, speech: Any) -> None:
@@ -129,11 +135,11 @@ class Clock:
         self._apart = math.inf
 
     def moment(self, stamp: float, domain: str) -> float:
-        """When a frame was exposed that comes now, s on the monotonic clock.
+        """When a frame that arrives now was exposed, s on the monotonic clock.
 
         Args:
-            stamp: ms.
-            domain: whose clock: the name of a `rs.timestamp_domain`.
+            stamp: the timestamp of the frame, ms.
+            domain: the clock of the stamp: the name of a `rs.timestamp_domain`.
         """
         if domain in GLOBAL_CLOCK:
             return self._stamps.moment(1e-3 * stamp)

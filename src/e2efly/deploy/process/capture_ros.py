@@ -1,6 +1,6 @@
-"""Images of ROS 1 and ROS 2: sensor_msgs/Image, with the field of view of the CameraInfo beside it.
+"""Images of ROS 1 and ROS 2: sensor_msgs/Image, with the field of view from the CameraInfo of the same camera.
 
-Python's own bytes and arrays do the work: the system's Python that has rospy may lack NumPy.
+Only Python's own bytes and arrays are used, because the system's Python that has rospy may lack NumPy.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ ENCODINGS = {
     "bgr8": ("uint8", 3, ("rgb",)),
     "mono8": ("uint8", 1, ("mask",)),
 }
-"""By name: type of the values, bytes of a pixel, and what a policy may see in it.
+"""By name of the encoding: the type of the values, the bytes of a pixel, and what a policy may see in it.
 
-32FC1 is in m, 16UC1 in mm, and of mono8 255 is 1.
+32FC1 is in m and 16UC1 in mm. In mono8, 255 stands for 1.
 """
 IMAGE, INFO = "sensor_msgs/Image", "sensor_msgs/CameraInfo"
 QUEUE = 1 << 24
-"""Bytes that rospy reads at once: with its 64 KiB an image waits for the next."""
+"""Bytes that rospy reads at once. With its default of 64 KiB, an image would wait for the next one."""
 
 
 def values_of(message: Any, sees: str) -> tuple[bytes, tuple[int, ...], str]:
-    """The values of an image as shared memory has them: little-endian, without padding, red before blue.
+    """The values of an image in the format of the shared memory: little-endian, without padding, red before blue.
 
     Args:
         message: sensor_msgs/Image of ROS 1 or 2.
@@ -39,8 +39,8 @@ def values_of(message: Any, sees: str) -> tuple[bytes, tuple[int, ...], str]:
         Its bytes, its shape and the type of its values.
 
     Raises:
-        ValueError: for an encoding that is unknown or shows what the policy does not see.
-        BrokenImage: for one with fewer bytes than its size says.
+        ValueError: the encoding is unknown, or shows what the policy does not see.
+        BrokenImage: the image has fewer bytes than its size says.
     """
     accepted = [name for name, (_, _, shows) in ENCODINGS.items() if sees in shows]
     if message.encoding not in accepted:
@@ -66,7 +66,7 @@ def values_of(message: Any, sees: str) -> tuple[bytes, tuple[int, ...], str]:
     return data, (height, width) if sees != "rgb" else (height, width, 3), kind
 
 
-class BrokenImage(Exception):  # noqa: N818  # it is no end, but one image that is passed over
+class BrokenImage(Exception):  # noqa: N818  # it does not end the capture: this one image is skipped
     """One image that cannot be read."""
 
 
@@ -75,10 +75,10 @@ def field_of_view(info: Any, rectified: bool) -> tuple[float, float]:
 
     Args:
         info: sensor_msgs/CameraInfo of ROS 1 or 2.
-        rectified: whether its projection matrix P counts, which rectified images have, rather than K.
+        rectified: use its projection matrix P, which is that of rectified images, instead of K.
 
     Raises:
-        ValueError: for a camera that is not calibrated.
+        ValueError: the camera is not calibrated.
     """
     k, p = (info.k, info.p) if hasattr(info, "k") else (info.K, info.P)
     across, down = (p[0], p[5]) if rectified and p[0] > 0 and p[5] > 0 else (k[0], k[4])
@@ -91,15 +91,15 @@ def field_of_view(info: Any, rectified: bool) -> tuple[float, float]:
 
 
 def beside(topic: str) -> str:
-    """The CameraInfo of an image's topic: /camera/image_raw has /camera/camera_info."""
+    """The topic of the CameraInfo that belongs to an image's topic: /camera/camera_info for /camera/image_raw."""
     return topic.rpartition("/")[0] + "/camera_info"
 
 
 class Receiver:
-    """What becomes of the messages of a topic, of either ROS."""
+    """Processes the messages of a topic, for ROS 1 and ROS 2."""
 
     def __init__(self, output: Any, topic: str, detail: str) -> None:
-        """Wait for the first; `detail` is said of the source."""
+        """Wait for the first message. `detail` describes the source."""
         self._output, self._topic, self._detail = output, topic, detail
         self._stamps = importlib.import_module("capture").Stamps(output.speech, topic)
         self._fov: Any = None
@@ -107,7 +107,7 @@ class Receiver:
         self._asked = False
 
     def camera(self, info: Any) -> None:
-        """Take a CameraInfo."""
+        """Process a CameraInfo."""
         try:
             self._fov = field_of_view(info, self._rectified)
         except ValueError as error:
@@ -136,10 +136,10 @@ class Receiver:
 
 
 def capture_ros1(output: Any, topic: str) -> None:
-    """Subscribe by rospy.
+    """Subscribe with rospy.
 
     Raises:
-        RuntimeError: where no master answers.
+        RuntimeError: no master answers.
     """
     output.speech.say("waiting", f"no image came on {topic}")
     rospy, rosgraph = importlib.import_module("rospy"), importlib.import_module("rosgraph")
@@ -163,10 +163,10 @@ def capture_ros1(output: Any, topic: str) -> None:
 
 
 def capture_ros2(output: Any, topic: str) -> None:
-    """Subscribe by rclpy, as soon as somebody publishes.
+    """Subscribe with rclpy, as soon as there is a publisher.
 
     Raises:
-        ValueError: for a topic of another type.
+        ValueError: the topic has another type.
     """
     output.speech.say("waiting", f"no image came on {topic}")
     rclpy, qos = importlib.import_module("rclpy"), importlib.import_module("rclpy.qos")
@@ -177,7 +177,7 @@ def capture_ros2(output: Any, topic: str) -> None:
     executor = executors.SingleThreadedExecutor()
     executor.add_node(node)
     receiver = Receiver(output, topic, f"rclpy of {sys.executable}")
-    newest = qos.QoSProfile(depth=1, reliability=qos.ReliabilityPolicy.BEST_EFFORT)  # agrees with either reliability
+    newest = qos.QoSProfile(depth=1, reliability=qos.ReliabilityPolicy.BEST_EFFORT)  # fits either reliability
     node.create_subscription(messages.CameraInfo, beside(topic), receiver.camera, newest)
     wanted, subscribed = IMAGE.replace("/", "/msg/"), False
     while not output.speech.closing.is_set():

@@ -1,4 +1,4 @@
-"""Colours of a V4L2 device or of a video file, by OpenCV."""
+"""Colours of a V4L2 device or of a video file, read with OpenCV."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ import time
 from typing import Any
 
 RECENT_S = 1.0
-"""A device's stamp that is older, s, is of another clock than the monotonic one."""
+"""If a device's stamp is older than this, s, it does not come from the monotonic clock."""
 
 
 def capture(output: Any, path: str) -> None:
-    """Publish each image; a file's at its own rate, so that its end is like an unplugged camera.
+    """Publish each image. The images of a file are published at the file's rate, and its end counts like an unplugged
+    camera.
 
     Raises:
-        RuntimeError: when the device or the file cannot be opened, or gives no more images.
+        RuntimeError: the device or the file cannot be opened, or gives no more images.
     """
     cv2 = importlib.import_module("cv2")
     device = path.startswith("/dev/")
@@ -22,7 +23,7 @@ def capture(output: Any, path: str) -> None:
     if not video.isOpened():
         raise RuntimeError(f"{path} cannot be opened; accepted: a camera's /dev/videoN or the file of a video")
     if device:
-        video.set(cv2.CAP_PROP_BUFFERSIZE, 1)  # the newest image rather than all
+        video.set(cv2.CAP_PROP_BUFFERSIZE, 1)  # only the newest image
     period = 1.0 / (video.get(cv2.CAP_PROP_FPS) or 30.0)
     began, count = time.monotonic(), 0
     while not output.speech.closing.is_set():

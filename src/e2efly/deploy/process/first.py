@@ -1,8 +1,8 @@
 """The first process of a container: `python -m e2efly.deploy.process.first COMMAND ...`.
 
-A container ends with its first process, and all others with it: the watchdog, too, which lands the vehicle when the
-bridge has died. So this process starts the command, hands signals on to it, and ends when the last of its descendants
-has: with the command's exit status.
+When the first process of a container ends, all others end with it. This includes the watchdog, which lands the vehicle
+when the bridge has died. So this process starts the command and forwards signals to it. It ends only when the last of
+its descendants has ended, with the command's exit status.
 """
 
 import ctypes
@@ -14,13 +14,14 @@ from contextlib import suppress
 from typing import Any
 
 ADOPT = 36
-"""Linux's PR_SET_CHILD_SUBREAPER: orphans become children of this process even where it is not the first."""
+"""Linux's PR_SET_CHILD_SUBREAPER: orphaned processes become children of this process, even if it is not the first one
+of the container."""
 HANDED_ON = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 """Signals that ask the bridge for a landing."""
 
 
 def main(command: list[str]) -> int:
-    """Run a command to its end and to that of all that it leaves behind; returns its exit status."""
+    """Run a command until it and all processes that it leaves behind have ended. Returns its exit status."""
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(ADOPT, 1, 0, 0, 0)
     process = subprocess.Popen(command)

@@ -1,10 +1,11 @@
-"""Gives the images of shared memory to others, in a process of its own: `sight/give.py` starts it.
+"""Serves the images of shared memory to other programs, in a separate process. `sight/give.py` starts it.
 
     give.py KIND NAME SEES REACH FOV WHERE...
 
-NAME is that of the shared memory, SEES what the images show, REACH the largest depth, m, FOV the field of view as
-`ACROSSxDOWN`, rad, and WHERE what the kind needs to know. Whoever reads too slowly misses images; the publisher never
-waits. It writes the lines of `speech.py`.
+KIND is the way in which the images are served, a key of `KINDS`. NAME is the name of the shared memory. SEES is what
+the images show. REACH is the largest depth, m. FOV is the field of view as `ACROSSxDOWN`, rad. WHERE is what this kind
+needs to know about the destination. A reader that is too slow misses images; the publisher never waits. The script
+writes the lines of `speech.py`.
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ from contextlib import suppress
 from typing import Any
 
 LOOK_S = 0.001
-"""Time between two looks for a new image, s."""
+"""Time between two checks for a new image, s."""
 MILLIMETRES = 65.535
 """Largest depth that uint16 holds, m."""
 
 
 class Given:
-    """The images that are given."""
+    """The images that are served."""
 
     _numpy: Any = None
 
@@ -35,10 +36,10 @@ class Given:
         self.fov = float(across), float(down)
         """Horizontal and vertical field of view, rad."""
         self.images = importlib.import_module("shared_reader").Reader(name)
-        """Where they come from: float32."""
+        """The reader of the shared memory, whose values are float32."""
 
     def type(self, exact: bool) -> str:
-        """Of the values that are given: the least that holds them well."""
+        """The type of the values that are served: the smallest type that is precise enough, or float32 if `exact`."""
         if exact or self.sees == "normal":
             return "float32"
         if self.sees in ("depth", "range"):
@@ -46,7 +47,7 @@ class Given:
         return "uint8"
 
     def values(self, raw: bytes, kind: str) -> bytes:
-        """Values of float32 in another type: rounded to mm, or to 1/255."""
+        """Convert values from float32 to another type: rounded to mm for uint16, or to 1/255 for uint8."""
         if kind == "float32":
             return raw
         scale, most = (1000.0, 65535) if kind == "uint16" else (255.0, 255)
@@ -59,7 +60,7 @@ class Given:
 
 
 def run(module: str, function: str) -> Any:
-    """A kind: a function of a module beside this one, given the images and where they go."""
+    """A kind: a function of a module in the same folder, which is called with the images and with their destination."""
 
     def started(speech: Any, name: str, sees: str, reach: str, fov: str, *where: str) -> None:
         getattr(importlib.import_module(module), function)(Given(speech, name, sees, reach, fov), *where)

@@ -11,7 +11,7 @@ from array import array
 from typing import Any
 
 ENCODINGS = {"depth": "32FC1", "range": "32FC1", "normal": "32FC3", "rgb": "rgb8", "mask": "mono8"}
-"""What sensor_msgs/Image calls the values (REP 118: depth in m)."""
+"""Encodings of sensor_msgs/Image by what the images show (REP 118: depth in m)."""
 
 
 def give_ros1(given: Any, topic: str, info_topic: str, frame: str) -> None:
@@ -65,9 +65,9 @@ def _loop(given: Any, frame: str, messages: Any, data: Any, stamp: Any, names: t
         given: the images.
         frame: name of the camera's frame.
         messages: module of the message types.
-        data: makes of bytes what the message takes.
-        stamp: makes of seconds of the wall clock what the header takes.
-        names: of the fields of distortion, intrinsics, rectification and projection.
+        data: converts bytes to the type that the message needs.
+        stamp: converts seconds of the wall clock to the type that the header needs.
+        names: the names of the fields for distortion, intrinsics, rectification and projection.
         send: publishes both messages.
     """
     look, encoding = importlib.import_module("give").LOOK_S, ENCODINGS[given.sees]
@@ -75,7 +75,7 @@ def _loop(given: Any, frame: str, messages: Any, data: Any, stamp: Any, names: t
     kind = "float32" if encoding.startswith("32") else "uint8"
     info = messages.CameraInfo(height=layout.height, width=layout.width, distortion_model="plumb_bob")
     fx, fy = (size / 2 / math.tan(angle / 2) for size, angle in zip((layout.width, layout.height), given.fov))  # noqa: B905
-    cx, cy = layout.width / 2 - 0.5, layout.height / 2 - 0.5  # centres of pixels have whole numbers
+    cx, cy = layout.width / 2 - 0.5, layout.height / 2 - 0.5  # the centres of pixels have integer coordinates
     rectified = [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]
     straight = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
     values = ([0.0] * 5, [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0], straight, rectified)

@@ -1,4 +1,4 @@
-"""Serves images over TCP to any number of readers, each at the pace that it can bear."""
+"""Serves images over TCP to several readers. Each reader gets them as fast as it can take them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from contextlib import suppress
 from typing import Any
 
 READERS = 16
-"""Most readers at once."""
+"""The largest number of readers at the same time."""
 STALLED_S = 2.0
-"""A reader that takes nothing for so long, s, is dropped."""
+"""A reader that takes nothing for this time is disconnected, s."""
 LONGEST = 4096
-"""Most bytes of a reader that are looked at together, and that wait for it beside an image."""
+"""The largest number of bytes that are read from a reader at once. Pings are answered only while fewer bytes than this
+wait to be sent to the reader."""
 
 
 class Peer:
@@ -23,13 +24,13 @@ class Peer:
     def __init__(self, connection: socket.socket, beginning: bytes) -> None:
         self.connection = connection
         self.waiting = bytearray(beginning)
-        """What is still to be sent."""
+        """Bytes that still have to be sent."""
         self.took = time.monotonic()
-        """When it last took something, or had nothing to take, s."""
+        """When the reader last took something, or had nothing to take, s."""
         self._said = b""
 
     def send(self) -> bool:
-        """Send what goes without waiting; whether the reader is still there."""
+        """Send what can be sent without waiting. Returns whether the reader is still there."""
         if self.waiting:
             try:
                 del self.waiting[: self.connection.send(self.waiting)]
@@ -41,7 +42,7 @@ class Peer:
         return True
 
     def hear(self, stream: Any) -> bool:
-        """Answer its pings; whether the reader is still there and says nothing else."""
+        """Answer the reader's pings. Returns whether the reader is still there and sends nothing but pings."""
         try:
             said = self.connection.recv(LONGEST)
         except BlockingIOError:
@@ -56,7 +57,7 @@ class Peer:
             self._said = self._said[stream.PING.size :]
             if magic != stream.PING_MAGIC:
                 return False
-            if len(self.waiting) < LONGEST:  # behind an image an answer would tell nothing
+            if len(self.waiting) < LONGEST:  # an answer that waits behind an image would be useless
                 self.waiting += stream.MESSAGE.pack(stream.ANSWER, 0, number, time.monotonic())
         return True
 
@@ -65,7 +66,7 @@ def serve(given: Any, host: str, port: str, exact: str) -> None:
     """Serve until the node ends.
 
     Raises:
-        OSError: when the port cannot be had.
+        RuntimeError: the port cannot be opened.
     """
     stream, shared = importlib.import_module("image_stream"), importlib.import_module("shared_images")
     look = importlib.import_module("give").LOOK_S
@@ -105,7 +106,7 @@ def serve(given: Any, host: str, port: str, exact: str) -> None:
             number, moment, raw = new
             message = stream.image(number, moment, given.values(raw, kind))
             for peer in peers.values():
-                if not peer.waiting:  # who is not done with the last one misses this one
+                if not peer.waiting:  # a reader that has not taken the last one misses this one
                     peer.waiting += message
         for connection, peer in list(peers.items()):
             if not peer.send():

@@ -1,6 +1,6 @@
-"""The stream of images over TCP between `e2efly hil` and a bridge on another computer; docs/hil.md describes it.
+"""The stream of images over TCP between `e2efly hil` and a bridge on another computer. docs/hil.md describes it.
 
-It needs nothing but Python 3.8.
+It needs only Python 3.8.
 """
 
 from __future__ import annotations
@@ -11,20 +11,20 @@ from dataclasses import dataclass
 from typing import Any
 
 MAGIC = b"E2EHIL01"
-"""What a stream begins with."""
+"""The bytes at the beginning of a stream."""
 MESSAGE = struct.Struct("<2IQd")
-"""Kind, bytes of the content, number, time on the server's monotonic clock, s."""
+"""The header of a message: kind, size of the content in bytes, number, time on the server's monotonic clock, s."""
 IMAGE, ANSWER = 1, 2
-"""Kinds of messages."""
+"""The kinds of messages."""
 PING = struct.Struct("<8sQ")
-"""What a reader sends to learn the server's time: `PING_MAGIC` and a number."""
+"""The ping that a reader sends to learn the server's time: `PING_MAGIC` and a number."""
 PING_MAGIC = b"E2EPING1"
 KEPT_S = 20.0
-"""Answers older than this, s, say nothing of the clocks any more: they drift."""
+"""Answers that are older than this, s, are not used any more, because the clocks drift."""
 
 
 def header(layout: Any) -> bytes:
-    """The beginning of a stream: that of the shared memory, with a magic of its own."""
+    """The header of a stream: the header of the shared memory, but with `MAGIC` at its beginning."""
     return MAGIC + layout.packed()[len(MAGIC) :]
 
 
@@ -38,7 +38,7 @@ def unpacked(content: bytes, size: int) -> bytes:
     """The values of an image.
 
     Raises:
-        ValueError: when they are not so many bytes.
+        ValueError: the content cannot be unpacked, or does not have `size` bytes.
     """
     zipped = zlib.decompressobj()
     try:
@@ -52,18 +52,20 @@ def unpacked(content: bytes, size: int) -> bytes:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a ping has told."""
+    """The result of a ping."""
 
     came: float
-    """s on the own clock."""
+    """When the answer came, s on the local clock."""
     ahead: float
-    """Of the other clock, s."""
+    """How much the other clock is ahead of the local one, s."""
     doubt: float
-    """By which that may be wrong, s: half of the round trip."""
+    """The possible error of `ahead`, s: half of the round trip."""
 
 
 class Clocks:
-    """By how much another computer's clock is ahead: of the last answers that with the least round trip counts."""
+    """Measures how much another computer's clock is ahead. Of the recent answers, the one with the shortest round trip
+    is used.
+    """
 
     def __init__(self) -> None:
         self._sent: dict[int, float] = {}
@@ -72,23 +74,23 @@ class Clocks:
 
     @property
     def best(self) -> Answer | None:
-        """The answer that counts; None: there was none yet."""
+        """The answer that is used. None: no answer has come yet."""
         return min(self._answers, key=lambda answer: answer.doubt, default=None)
 
     def ping(self, now: float) -> bytes:
-        """What to send."""
+        """The bytes of the next ping."""
         self._number += 1
         self._sent = {number: at for number, at in self._sent.items() if now - at < KEPT_S}
         self._sent[self._number] = now
         return PING.pack(PING_MAGIC, self._number)
 
     def answered(self, number: int, theirs: float, now: float) -> None:
-        """Take an answer; one that was not asked for is passed over.
+        """Process an answer. An answer to an unknown ping is ignored.
 
         Args:
-            number: of the ping.
-            theirs: the other clock when it answered, s.
-            now: the own clock, s.
+            number: the number of the ping.
+            theirs: time on the other clock when it answered, s.
+            now: time on the local clock, s.
         """
         sent = self._sent.pop(number, None)
         if sent is not None:

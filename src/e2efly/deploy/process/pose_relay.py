@@ -1,12 +1,12 @@
-"""Passes the poses of ROS 1, ROS 2 or a motion capture system, or commands of ROS, on to the bridge as lines of text.
+"""Passes poses of ROS 1, ROS 2 or a motion capture system, or commands of ROS, to the bridge as lines of text.
 
-It runs as a script in a process of its own: `rospy`, `rclpy` and `motioncapture` block, start threads, handle signals
-and can crash, and none of that may happen in the control loop. It needs nothing but Python (3.8 or newer) and the
-package that it speaks for, so that any interpreter which has that package can run it, such as the system's for ROS.
+It runs as a script in a separate process, because `rospy`, `rclpy` and `motioncapture` block, start threads, handle
+signals and can crash, and none of that may happen in the control loop. It needs only Python (3.8 or newer) and the
+package of its source. So any interpreter that has this package can run it, for example the system's Python for ROS.
 
-It writes the lines of `speech.py`, `problem TEXT` for what is no pose or no command, and for each that is
-`message RECEIVED JSON`, with the time of arrival on the monotonic clock, s, and the message of `docs/pose-sources.md`
-or of `docs/commands.md`.
+It writes the lines of `speech.py`. For each pose or command it writes `message RECEIVED JSON`: the time of arrival on
+the monotonic clock, s, and the message in the format of `docs/pose-sources.md` or `docs/commands.md`. For a message
+that is no valid pose or command it writes `problem TEXT`.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ COMMAND_TYPES = (
 )
 """Message types of ROS that carry a command."""
 LENGTH_ERROR = 0.01
-"""How far the length of a quaternion may be from 1."""
+"""How much the length of a quaternion may differ from 1."""
 
 
 def pose_of(message: Any) -> dict[str, Any]:
-    """One message of ROS 1 or 2, of any of `TYPES`, as a message of the JSON format.
+    """Convert one message of ROS 1 or 2, of any of `TYPES`, to a message of the JSON format.
 
-    ROS is ENU and FLU as we are (REP 103); quaternions are xyzw there. The twist of an Odometry is in the axes of the
-    child frame, the body, so its velocity is turned into the world; a covariance that starts below zero says that there
-    is no twist. A stamp of zero says that there is no stamp.
+    ROS uses ENU and FLU, as e2efly does (REP 103), but its quaternions are xyzw. The twist of an Odometry is in the
+    axes of the child frame, the body, so its velocity is rotated to the world. A covariance that starts below zero
+    means that there is no twist. A stamp of zero means that there is no stamp.
     """
     pose = message.pose.pose if hasattr(message.pose, "pose") else message.pose
     p, q = pose.position, pose.orientation
@@ -50,7 +50,7 @@ def pose_of(message: Any) -> dict[str, Any]:
 
 
 def header_of(message: Any) -> dict[str, Any]:
-    """Stamp, where there is one, and frame of a message of ROS 1 or 2."""
+    """The stamp, if there is one, and the frame of a message of ROS 1 or 2."""
     stamp = message.header.stamp
     seconds, nanoseconds = (stamp.sec, stamp.nanosec) if hasattr(stamp, "sec") else (stamp.secs, stamp.nsecs)
     said = {"stamp": seconds + nanoseconds * 1e-9} if seconds or nanoseconds else {}
@@ -58,20 +58,21 @@ def header_of(message: Any) -> dict[str, Any]:
 
 
 def command_of(message: Any) -> str:
-    """One message of ROS 1 or 2, of any of `COMMAND_TYPES`, as a message of the JSON format of `docs/commands.md`.
+    """Convert one message of ROS 1 or 2, of any of `COMMAND_TYPES`, to a message of the JSON format of
+    `docs/commands.md`.
 
-    A PoseStamped is a position and its yaw, a TwistStamped a velocity and a yaw rate, an AccelStamped an acceleration,
-    in the axes of the world; a String is passed on as it is.
+    A PoseStamped gives a position and its yaw, a TwistStamped a velocity and a yaw rate, and an AccelStamped an
+    acceleration, all in the axes of the world. A String is passed on unchanged.
 
     Raises:
-        ValueError: for what a mode has no use for, where it is not zero.
+        ValueError: a value that the mode cannot use is not zero, or the orientation is no unit quaternion.
     """
     if hasattr(message, "data"):
         return message.data
     if hasattr(message, "pose"):
         p, q = message.pose.position, message.pose.orientation
         length = math.hypot(q.w, q.x, q.y, q.z)
-        if not abs(length - 1) <= LENGTH_ERROR:  # nobody has set it: zeros
+        if not abs(length - 1) <= LENGTH_ERROR:  # zeros if the sender did not set it
             raise ValueError(f"the length of the orientation is {length:.3g}; accepted: 1")
         yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
         content = {"mode": "position", "position": [p.x, p.y, p.z], "yaw": yaw}
@@ -89,7 +90,7 @@ def command_of(message: Any) -> str:
 
 
 def turn(q: list[float], v: list[float]) -> list[float]:
-    """The vector v, (3,), turned by q, (4,) wxyz of any length but 0: v + 2 u x (w v + u x v) / |q|^2, u = xyz."""
+    """The vector v, (3,), rotated by q, (4,) wxyz of any length but 0: v + 2 u x (w v + u x v) / |q|^2, u = xyz."""
     w, u = q[0], q[1:]
     length = sum(x * x for x in q) or 1.0
     inner = [w * a + b for a, b in zip(v, cross(u, v))]  # noqa: B905  # Python 3.8
@@ -102,7 +103,7 @@ def cross(a: list[float], b: list[float]) -> list[float]:
 
 
 def relay_ros1(speech: Any, topic: str, what: str = "pose") -> None:
-    """Subscribe to a topic of ROS 1, whatever its type turns out to be."""
+    """Subscribe to a topic of ROS 1. Its type need not be known in advance."""
     rospy, rosgraph = importlib.import_module("rospy"), importlib.import_module("rosgraph")
     types, text_of = CONTENTS[what]
     classes = {name: ros_class(name, ".msg") for name in types}
@@ -125,7 +126,7 @@ def relay_ros1(speech: Any, topic: str, what: str = "pose") -> None:
 
 
 def relay_ros2(speech: Any, topic: str, what: str = "pose") -> None:
-    """Subscribe to a topic of ROS 2, as soon as somebody publishes it."""
+    """Subscribe to a topic of ROS 2, as soon as it has a publisher."""
     rclpy, qos = importlib.import_module("rclpy"), importlib.import_module("rclpy.qos")
     executors, signals = importlib.import_module("rclpy.executors"), importlib.import_module("rclpy.signals")
     types, text_of = CONTENTS[what]
@@ -146,7 +147,7 @@ def relay_ros2(speech: Any, topic: str, what: str = "pose") -> None:
             kinds = dict(node.get_topic_names_and_types()).get(topic, [])
             known = [kind for kind in kinds if kind in classes]
             if known:
-                # Best effort agrees with publishers of either reliability.
+                # Best effort fits publishers of either reliability.
                 node.create_subscription(classes[known[0]], topic, receive, qos.qos_profile_sensor_data)
                 subscribed = True
             elif kinds and kinds != said:
@@ -159,7 +160,7 @@ def relay_ros2(speech: Any, topic: str, what: str = "pose") -> None:
 
 
 def pass_on(say: Callable[..., None], topic: str, received: float, text_of: Callable[[Any], str], message: Any) -> None:
-    """One message, or what is wrong with it."""
+    """Write one message, or the reason why it is not valid."""
     try:
         text = text_of(message)
     except ValueError as error:
@@ -175,7 +176,7 @@ def ros_class(name: str, module: str) -> Any:
 
 
 def relay_mocap(speech: Any, system: str, host: str, body: str) -> None:
-    """Wait for frames of a motion capture system and pass one rigid body on."""
+    """Wait for frames of a motion capture system and pass on the pose of one rigid body."""
     connection = importlib.import_module("motioncapture").connect(system, {"hostname": host})
     speech.say("ready", f"motioncapture of {sys.executable}")
     warned = float("-inf")
@@ -197,7 +198,7 @@ CONTENTS: dict[str, tuple[tuple[str, ...], Callable[[Any], str]]] = {
     "pose": (TYPES, lambda message: json.dumps(pose_of(message))),
     "command": (COMMAND_TYPES, command_of),
 }
-"""What a topic may carry: the message types, and what makes JSON of them."""
+"""What a topic may carry: the message types, and the function that converts them to JSON."""
 
 
 if __name__ == "__main__":

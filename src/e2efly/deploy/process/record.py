@@ -1,10 +1,11 @@
-"""Records what `e2efly hil` does, with its images, in an MCAP file, in a process of its own.
+"""Records what `e2efly hil` does, and its images, in an MCAP file. It runs in a separate process.
 
     record.py hil FILE SOCKET [NAME IMAGE SEES]...
 
-NAME is the shared memory of an image, IMAGE its name, SEES what it shows. Everything else comes as datagrams of JSON,
-`{"topic": ..., "time": s on the monotonic clock, ...}`, on the socket, a file that this script makes. A disk that
-stalls makes this script miss images and datagrams; the node never waits. It needs the package mcap.
+NAME is the name of an image's shared memory, IMAGE is the name of the image, and SEES is what it shows. Everything else
+comes as datagrams of JSON, `{"topic": ..., "time": s on the monotonic clock, ...}`, on SOCKET, a socket file that this
+script creates. If the disk stalls, this script misses images and datagrams; the node never waits. It needs the package
+mcap.
 """
 
 from __future__ import annotations
@@ -49,7 +50,8 @@ SCHEMAS: dict[str, tuple[str, dict[str, Any]]] = {
         {"time": {"type": "number", "description": "monotonic clock [s]"}, "text": {"type": "string"}},
     ),
 }
-"""Topics but for those of images, and their schemas: names, and properties of JSON objects."""
+"""The schemas of the topics: their names, and the properties of their JSON objects. All images share the schema
+`image`."""
 
 
 def png(values: bytes, height: int, width: int, channels: int, depth: int) -> bytes:
@@ -65,7 +67,7 @@ def png(values: bytes, height: int, width: int, channels: int, depth: int) -> by
 
 
 def encoded(raw: bytes, layout: Any, sees: str) -> bytes:
-    """An image of float32 as a PNG: depth in mm, up to 65.535 m; the rest in 255 for 1."""
+    """Encode a float32 image as a PNG. Depth is in mm, up to 65.535 m. In all other images, 255 stands for 1."""
     numpy = importlib.import_module("numpy")
     scale, most, kind = (1000, 65535, ">u2") if sees in ("depth", "range") else (255, 255, "u1")
     numbers = numpy.frombuffer(raw, "<f4")
@@ -76,7 +78,7 @@ def encoded(raw: bytes, layout: Any, sees: str) -> bytes:
 
 def record(speech: Any, path: str, place: str, *images: str) -> None:
     """Record until the node ends."""
-    importlib.import_module("numpy")  # now rather than at the first image
+    importlib.import_module("numpy")  # import it now, not at the first image
     writers, reader = importlib.import_module("mcap.writer"), importlib.import_module("shared_reader").Reader
     names = [images[i : i + 3] for i in range(0, len(images), 3)]
     cameras = [(name, sees, reader(memory)) for memory, name, sees in names]

@@ -1,6 +1,6 @@
-"""Publishes images in shared memory. It needs nothing but Python 3.8, so that every script which has images can use it.
+"""Publishes images in shared memory. It needs only Python 3.8, so every script that has images can use it.
 
-The layout is in docs/image-sources.md, for publishers in any language.
+docs/image-sources.md describes the layout, for publishers in any language.
 """
 
 from __future__ import annotations
@@ -16,51 +16,52 @@ from pathlib import Path
 
 MAGIC = b"E2EIMG01"
 TYPES = {"float32": 4, "uint8": 1, "uint16": 2}
-"""Bytes of each type of values, in the order of their numbers: the value itself; 255 for 1; millimetres."""
+"""Bytes per value of each type, in the order of the types' numbers. float32 holds the value itself, in uint8 255 stands
+for 1, and uint16 holds millimetres."""
 HEADER, SEQUENCE, SLOT = struct.Struct("<8s4I2d"), struct.Struct("<Q"), struct.Struct("<Qd")
 AT_SEQUENCE, AT_SLOTS = 40, 48
 
 
 @dataclass(frozen=True)
 class Layout:
-    """What all images of a camera are like."""
+    """The layout of all images of a camera."""
 
     height: int
     width: int
     channels: int
     """1 or 3."""
     kind: int
-    """Of `TYPES`, by its number."""
+    """The type of the values: its number in `TYPES`."""
     fov: tuple[float, float]
-    """Horizontal and vertical field of view, rad; zeros: that of the policy's camera."""
+    """Horizontal and vertical field of view, rad. Zeros: that of the policy's camera."""
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of an image."""
+        """The shape of an image: (h, w), or (h, w, 3)."""
         return (self.height, self.width) if self.channels == 1 else (self.height, self.width, self.channels)
 
     @property
     def type(self) -> str:
-        """Of `TYPES`, by its name."""
+        """The type of the values: its name in `TYPES`."""
         return list(TYPES)[self.kind]
 
     @property
     def bytes(self) -> int:
-        """Bytes of an image's values."""
+        """Size of an image's values, bytes."""
         return self.height * self.width * self.channels * TYPES[self.type]
 
     @property
     def slot(self) -> int:
-        """Bytes of one of the two places for images, a multiple of 8."""
+        """Size of one of the two slots for images, bytes, a multiple of 8."""
         return SLOT.size + -(-self.bytes // 8) * 8
 
     @property
     def size(self) -> int:
-        """Bytes of all."""
+        """Size of the shared memory, bytes."""
         return AT_SLOTS + 2 * self.slot
 
     def packed(self) -> bytes:
-        """The header."""
+        """The header of the shared memory."""
         return HEADER.pack(MAGIC, self.height, self.width, self.channels, self.kind, *self.fov)
 
     @staticmethod
@@ -68,7 +69,7 @@ class Layout:
         """Read a header.
 
         Raises:
-            ValueError: naming the file and what is wrong with it.
+            ValueError: the header is not valid. The message names the file and what is wrong with it.
         """
         if len(header) < HEADER.size:
             raise ValueError(f"{where} has {len(header)} bytes; accepted: a header of {HEADER.size}")
@@ -84,10 +85,10 @@ class Layout:
 
     @staticmethod
     def wanted(shape: tuple[int, ...], type_: str, fov: tuple[float, float]) -> Layout:
-        """Of images of a shape, (h, w) or (h, w, 3), a type of `TYPES` and a field of view.
+        """The layout of images with a shape, (h, w) or (h, w, 3), a type of `TYPES` and a field of view, rad.
 
         Raises:
-            ValueError: naming what is wrong with shape, type or field of view.
+            ValueError: the shape, the type or the field of view is not valid. The message says what is wrong.
         """
         if type_ not in TYPES:
             raise ValueError(f"dtype is {type_!r}; accepted: {', '.join(TYPES)}")
@@ -101,7 +102,7 @@ def place(name: str) -> Path:
     """The file of a camera's shared memory.
 
     Raises:
-        ValueError: for a name that is no word.
+        ValueError: the name has other characters than letters, digits, _ and -.
     """
     if not name.replace("-", "_").isidentifier():
         raise ValueError(f"name of shared images is {name!r}; accepted: letters, digits, _ and -")
@@ -110,14 +111,14 @@ def place(name: str) -> Path:
 
 
 class Publisher:
-    """The publisher's end, for images as bytes."""
+    """Publishes images that are given as bytes."""
 
     def __init__(self, name: str, layout: Layout) -> None:
-        """Make room, or take the room of an earlier publisher of the same images.
+        """Create the shared memory, or use that of an earlier publisher of the same images.
 
         Raises:
-            ValueError: for a name that is no word.
-            OSError: where the file cannot be written.
+            ValueError: the name has other characters than letters, digits, _ and -.
+            OSError: the file cannot be written.
         """
         self.layout = layout
         self.path = place(name)
@@ -125,14 +126,17 @@ class Publisher:
         (self._count,) = SEQUENCE.unpack_from(self._memory, AT_SEQUENCE)
 
     def _taken(self) -> mmap.mmap | None:
-        """The room of an earlier publisher, where its images are the same: who reads them goes on."""
+        """The memory of an earlier publisher, if its images have the same layout, so that its readers can continue.
+
+        None: there is no such memory.
+        """
         with suppress(OSError), self.path.open("r+b") as file:
             if os.fstat(file.fileno()).st_size == self.layout.size and file.read(HEADER.size) == self.layout.packed():
                 return mmap.mmap(file.fileno(), self.layout.size)
         return None
 
     def _made(self) -> mmap.mmap:
-        """Room of its own: another file, as a reader of the old one would die were that made shorter."""
+        """New memory in a new file. If the old file were made shorter, its readers would crash."""
         draft = self.path.with_name(f"{self.path.name}.{os.getpid()}")
         with os.fdopen(os.open(str(draft), os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o600), "r+b") as file:
             file.truncate(self.layout.size)
@@ -143,19 +147,19 @@ class Publisher:
         return memory
 
     def put(self, time: float, values: bytes | bytearray | memoryview) -> None:
-        """Make an image the newest.
+        """Publish an image as the newest one.
 
         Args:
             time: when it was exposed, s on this machine's monotonic clock (`time.monotonic()`), not when it arrived.
-            values: little-endian, row by row from the top, `Layout.bytes` of them.
+            values: `Layout.bytes` bytes, little-endian, row by row from the top.
         """
         assert len(values) == self.layout.bytes
         self._count += 1
         at = AT_SLOTS + (self._count % 2) * self.layout.slot
-        SLOT.pack_into(self._memory, at, self._count, time)  # first: who reads the old image sees that it goes
+        SLOT.pack_into(self._memory, at, self._count, time)  # before the values: readers of the old image notice it
         self._memory[at + SLOT.size : at + SLOT.size + len(values)] = values
         SEQUENCE.pack_into(self._memory, AT_SEQUENCE, self._count)
 
     def close(self) -> None:
-        """Let go; what was published stays until the machine restarts, and grows too old to be flown by."""
+        """Close the memory. The published image stays until the machine restarts, but soon it is too old to fly by."""
         self._memory.close()

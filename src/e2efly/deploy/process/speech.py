@@ -1,8 +1,8 @@
-"""What a script of this folder begins with: lines to the process that started it, and an end when that one ends.
+"""The common part of the scripts in this folder: lines to the process that started them, and an end when it ends.
 
-Lines that it writes: `waiting TEXT` for what it waits for, `ready TEXT` once, `failed TEXT` when it cannot go on,
-`problem TEXT` for what it passed over, `solved` when that is over, and what else the script has to tell. It ends when
-its standard input does, however the other process ends.
+A script writes these lines: `waiting TEXT` for what it waits for, `ready TEXT` once, `failed TEXT` when it cannot
+continue, `problem TEXT` for what it skipped, `solved` when the problem is over, and lines of its own. It ends when its
+standard input ends, in whatever way the other process ends.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from typing import Any, Callable, Mapping, Sequence  # noqa: UP035  # Python 3.8
 
 
 class Speech:
-    """The lines, and whether it is time to end."""
+    """Writes the lines, and knows whether the script has to end."""
 
     def __init__(self) -> None:
-        """Take the standard output for the lines; what packages print there goes to the standard error."""
+        """Reserve the standard output for the lines. What packages print there goes to the standard error instead."""
         self.closing = threading.Event()
-        """Set when the other process has ended or wants an end."""
+        """Set when the other process has ended, or has asked this script to end."""
         self.leave: Callable[[], Any] = bool
         """Called at the end."""
         self._lines = os.fdopen(os.dup(1), "w", errors="backslashreplace")
@@ -28,29 +28,29 @@ class Speech:
         self._lock = threading.Lock()
 
     def say(self, *words: str) -> None:
-        """Write a line, from any thread."""
+        """Write a line. Any thread may call this."""
         with self._lock:
             self._lines.write(" ".join(words).replace("\n", " ") + "\n")
             self._lines.flush()
 
     def fail(self, why: str) -> None:
-        """Say why it cannot go on and end, from any thread."""
+        """Report why the script cannot continue, and end it. Any thread may call this."""
         with suppress(BrokenPipeError):
             self.say("failed", why)
         self.end(1)
 
     def end(self, status: int = 0) -> None:
-        """End without the packages' own farewells, which may hang."""
+        """End the process without the packages' own clean-up, which may hang."""
         self.leave()
         os._exit(status)
 
 
 def main(kinds: Mapping[str, Callable[..., None]], arguments: Sequence[str]) -> None:
-    """Run one kind until the standard input ends; never returns.
+    """Run one kind until the standard input ends. Never returns.
 
     Args:
-        kinds: functions by name, each given the speech and the other arguments.
-        arguments: the name of a kind, and what that is given.
+        kinds: functions by name. Each is called with the speech and the other arguments.
+        arguments: the name of a kind, followed by the arguments of its function.
     """
     speech = Speech()
 
@@ -58,7 +58,7 @@ def main(kinds: Mapping[str, Callable[..., None]], arguments: Sequence[str]) -> 
         while os.read(0, 1024):
             pass
         speech.closing.set()
-        time.sleep(1)  # for a clean end; what still blocks then is cut off
+        time.sleep(1)  # time for a clean end; whatever still blocks then is stopped
         speech.end()
 
     threading.Thread(target=watch, daemon=True).start()

@@ -1,1 +1,1 @@
-"""Scripts that run in a process, and perhaps a Python, of their own, and what they share with the package."""
+"""Scripts that run in a separate process, possibly with another Python, and code that the package shares with them."""

@@ -1,13 +1,14 @@
-"""Publishes a flight's records, as they come, to Foxglove, ROS 1, ROS 2, an MCAP file or a bag.
+"""Publishes the records of a flight while they come, to Foxglove, ROS 1, ROS 2, an MCAP file or a bag.
 
-It runs as a script in a process of its own, as what it speaks to may stall, crash, start threads and handle signals,
-and none of that may happen in the control loop. It needs nothing but Python (3.8 or newer) and the package that it
-speaks for, so that any interpreter which has that package can run it, such as the system's for ROS 1.
+It runs as a script in a separate process, because the packages that it uses may stall, crash, start threads and handle
+signals, and none of that may happen in the control loop. It needs only Python (3.8 or newer) and the package of its
+kind. So any interpreter that has this package can run it, for example the system's Python for ROS 1.
 
-Its standard input is a socket of datagrams, each a record in JSON, `[CHANNEL, TIME, VALUES]`, or, where an image has
-come into shared memory, `["image", TIME, {"name": NAME}]`. Lines that it writes: `ready TEXT` once or `failed TEXT`
-instead, `problem TEXT` for what could not be published, and at its end `lost NUMBER`, the records that it had no time
-for. It ends when its input does, that is with the bridge, however that ends, and then closes what it writes in order.
+Its standard input is a socket of datagrams. Each datagram is a record in JSON, `[CHANNEL, TIME, VALUES]`. When an image
+has come into shared memory, it is `["image", TIME, {"name": NAME}]`. The script writes `ready TEXT` once, or
+`failed TEXT` instead. It writes `problem TEXT` for what could not be published, and at its end `lost NUMBER`, the
+number of records for which it had no time. It ends when its input ends, which is when the bridge ends in whatever way.
+It then closes its files and connections properly.
 """
 
 from __future__ import annotations
@@ -25,17 +26,17 @@ import time
 from typing import Any, Callable  # noqa: UP035  # Python 3.8
 
 WAITING = 10_000
-"""Most records that wait for whom they are for."""
+"""The largest number of records that wait to be published. Further records are lost."""
 LONGEST = 1 << 22
-"""Longest record, bytes."""
+"""The longest record, bytes."""
 FLUSH_PERIOD = 0.5
-"""How often files are written out, s."""
+"""Period with which files are flushed, s."""
 PROBLEMS = 20
-"""Most problems that are told; their lines fit into a pipe that nobody reads."""
+"""The largest number of problems that are reported. So many lines fit into a pipe even if nobody reads it."""
 
 
 class SharedImage:
-    """The newest image of a camera in shared memory: docs/image-sources.md."""
+    """Reads the newest image of a camera from shared memory, as described in docs/image-sources.md."""
 
     def __init__(self, layout: dict[str, Any]) -> None:
         self.layout, self._last = layout, 0
@@ -43,7 +44,7 @@ class SharedImage:
             self._memory = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
 
     def read(self) -> tuple[float, bytes] | None:
-        """When it was exposed, s, and its bytes; None: none that is new and whole."""
+        """The time of exposure of the newest image, s, and its bytes. None: there is no new and complete image."""
         for _ in range(3):
             (count,) = struct.unpack_from("<Q", self._memory, self.layout["sequence"])
             if count == self._last:
@@ -58,10 +59,10 @@ class SharedImage:
 
 
 def main(text: str) -> None:
-    """Publish until the input ends; `text` is JSON: what to open, and where the images are."""
+    """Publish until the input ends. `text` is JSON that says what to open and where the images are."""
     config = json.loads(text)
     lines = os.fdopen(os.dup(1), "w", errors="backslashreplace")
-    os.dup2(2, 1)  # the packages print there, too
+    os.dup2(2, 1)  # packages also print to the standard output
     waiting: queue.SimpleQueue[Any] = queue.SimpleQueue()
     lost, told = [0], set()
 
@@ -97,7 +98,7 @@ def main(text: str) -> None:
         images = {name: SharedImage(layout) for name, layout in config["images"].items()}
         peer = make(config, put)
         say("ready", peer.detail)
-        os.nice(10)  # from here on the control loop comes first, where both have one core
+        os.nice(10)  # from here on, the control loop has priority if both share one core
     except Exception as error:
         say("failed", f"{type(error).__name__}: {error}")
         os._exit(1)
@@ -115,7 +116,7 @@ def main(text: str) -> None:
             if time.monotonic() - flushed > FLUSH_PERIOD:
                 flushed = time.monotonic()
                 peer.flush()
-        except Exception as error:  # of one record: the next may do
+        except Exception as error:  # with one record; the next one may succeed
             problem = f"{type(error).__name__}: {error}"
             if problem not in told and len(told) < PROBLEMS:
                 told.add(problem)
@@ -125,11 +126,11 @@ def main(text: str) -> None:
         say("lost", str(lost[0]))
     except Exception as error:
         say("problem", f"at the end: {type(error).__name__}: {error}")
-    os._exit(0)  # without the packages' own farewells, which may hang
+    os._exit(0)  # without the packages' own clean-up, which may hang
 
 
 def make(config: dict[str, Any], put: Callable[[Any], None]) -> Any:
-    """What a kind is published by. Each has `detail`, `write`, `show`, `flush` and `close`."""
+    """The publisher of a kind. Every publisher has `detail`, `write`, `show`, `flush` and `close`."""
     kind = config["kind"]
     if kind == "foxglove":
         return importlib.import_module("live_foxglove").Foxglove(config, put)

@@ -1,4 +1,4 @@
-"""An MCAP file of ROS 2's messages, and a bag of ROS 1, written while the vehicle flies. Neither needs ROS."""
+"""An MCAP file of ROS 2 messages, and a ROS 1 bag, written while the vehicle flies. Neither needs ROS."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Topics: Any = importlib.import_module("live_topics").Topics
 
 
 class Mcap(Topics):
-    """One file, as `ros2 bag play` and Foxglove open it. All but its last half second survives whatever happens."""
+    """One file, which `ros2 bag play` and Foxglove can open. After a crash, all but its last half second is there."""
 
     def __init__(self, config: dict[str, Any]) -> None:
         self._messages = importlib.import_module("ros_messages")
@@ -38,18 +38,18 @@ class Mcap(Topics):
         self._writer.add_message(handle, stamp, data, stamp)
 
     def flush(self) -> None:
-        """Hand what waits to the operating system."""
+        """Pass the buffered data to the operating system."""
         self._writer.flush()
         self._file.flush()
 
     def close(self) -> None:
-        """Write the index and the end."""
+        """Write the index and the end of the file."""
         self._writer.finish()
         self._file.close()
 
 
 class Bag(Topics):
-    """A bag of ROS 1. Its index comes at the end; without it `rosbag reindex` mends the bag."""
+    """A ROS 1 bag. Its index is written at the end. If it is missing, `rosbag reindex` repairs the bag."""
 
     version = 1
 

@@ -1,8 +1,8 @@
-"""A flight's records for Foxglove, by a WebSocket server of the package `foxglove-sdk`.
+"""The records of a flight for Foxglove, from a WebSocket server of the package `foxglove-sdk`.
 
-The channels are those of the flight log, under the same names, so that a layout made for one shows the other. Beside
-them: `/tf`, where the vehicle and its cameras are, for the 3D panel; `/camera/NAME/image`, what the policy sees, and
-`/camera/NAME/camera_info`, by what camera.
+The channels are those of the flight log, under the same names, so a layout that was made for one also shows the other.
+There are three more topics. `/tf` gives the poses of the vehicle and its cameras, for the 3D panel.
+`/camera/NAME/image` gives what the policy sees. `/camera/NAME/camera_info` gives the parameters of that camera.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import json
 from typing import Any, Callable  # noqa: UP035  # Python 3.8
 
 RARE = ("mode", "event", "meta")
-"""Channels whose last message is sent again to whoever subscribes: the next may be long in coming."""
+"""Channels whose last message is sent again to each new subscriber, because the next one may come much later."""
 BACKLOG = 256
-"""Messages that wait for a slow browser; the oldest are thrown away first."""
+"""The largest number of messages that wait for a slow browser. The oldest ones are dropped first."""
 
 
 class Foxglove:
@@ -71,7 +71,7 @@ class Foxglove:
             self._place(stamp, values)
 
     def show(self, name: str, stamp: int, data: bytes) -> None:
-        """Publish an image, and what is known of its camera."""
+        """Publish an image and the parameters of its camera."""
         layout = self._layouts[name]
         if name in self._infos:
             info = self._messages.CameraCalibration(
@@ -84,7 +84,7 @@ class Foxglove:
         self._images[name].log(image, log_time=stamp)
 
     def flush(self) -> None:
-        """Nothing waits."""
+        """Do nothing: no data is buffered here."""
 
     def close(self) -> None:
         """End the server."""

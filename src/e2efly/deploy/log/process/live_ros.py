@@ -11,7 +11,7 @@ from typing import Any
 
 Topics: Any = importlib.import_module("live_topics").Topics
 QUEUE = 20
-"""Messages of a topic that wait for a slow subscriber; the oldest are thrown away first."""
+"""The largest number of messages of a topic that wait for a slow subscriber. The oldest ones are dropped first."""
 
 
 def fill(message: Any, tree: dict[str, Any]) -> Any:
@@ -27,7 +27,7 @@ def fill(message: Any, tree: dict[str, Any]) -> Any:
             fill(known, value)
         elif value and isinstance(value, list) and isinstance(value[0], dict):
             setattr(message, name, [fill(_entry(message, name), entry) for entry in value])
-        elif isinstance(known, array.array):  # ROS 2, which would look at every entry of a list
+        elif isinstance(known, array.array):  # ROS 2: it would check every entry of a list
             setattr(message, name, array.array(known.typecode, value))
         else:
             setattr(message, name, value)
@@ -35,7 +35,7 @@ def fill(message: Any, tree: dict[str, Any]) -> Any:
 
 
 def _entry(message: Any, name: str) -> Any:
-    """An empty message for a list of messages of one type."""
+    """An empty message of the type of the entries of a list field."""
     if hasattr(message, "get_fields_and_field_types"):  # ROS 2: sequence<package/Name>
         kind = message.get_fields_and_field_types()[name].partition("<")[2].rstrip(">")
     else:  # ROS 1: package/Name[]
@@ -50,14 +50,14 @@ def ros_class(kind: str) -> Any:
 
 
 class Ros1(Topics):
-    """Publishes by rospy."""
+    """Publishes with rospy."""
 
     version = 1
     _made: Any = None
 
     def __init__(self, config: dict[str, Any]) -> None:
         self._rospy, rosgraph = importlib.import_module("rospy"), importlib.import_module("rosgraph")
-        ros_class("sensor_msgs/Imu")  # a missing package comes before a missing master
+        ros_class("sensor_msgs/Imu")  # a missing package is reported before a missing master
         if not rosgraph.is_master_online():
             uri = os.environ.get("ROS_MASTER_URI", "not set")
             raise RuntimeError(f"no ROS master answers (ROS_MASTER_URI is {uri}); start roscore")
@@ -70,7 +70,7 @@ class Ros1(Topics):
         return self._rospy.Publisher(topic, self._class(kind), queue_size=QUEUE, latch=latched)
 
     def send(self, handle: Any, kind: str, stamp: int, tree: dict[str, Any]) -> None:
-        """Publish; a thread of rospy waits for the subscribers."""
+        """Publish a message. A thread of rospy waits for the subscribers."""
         handle.publish(fill(self._class(kind)(), tree))
 
     def _class(self, kind: str) -> Any:
@@ -82,16 +82,16 @@ class Ros1(Topics):
         return self._made
 
     def close(self) -> None:
-        """Leave the master."""
-        time.sleep(0.2)  # for rospy's threads to send the last
+        """Unregister from the master."""
+        time.sleep(0.2)  # time for rospy's threads to send the last messages
         self._rospy.signal_shutdown("the flight has ended")
 
 
 class Ros2(Topics):
-    """Publishes by rclpy."""
+    """Publishes with rclpy."""
 
     _without = ""
-    """What is not published, for people."""
+    """What is not published, in words for people."""
 
     def __init__(self, config: dict[str, Any]) -> None:
         self._rclpy, self._qos = importlib.import_module("rclpy"), importlib.import_module("rclpy.qos")
@@ -102,7 +102,7 @@ class Ros2(Topics):
         self.detail = f"topics {config['prefix']}/..., rclpy of {sys.executable}{self._without}"
 
     def advertise(self, topic: str, kind: str, latched: bool) -> Any:
-        """Announce a topic; reliable, so that subscribers of either reliability hear it."""
+        """Announce a topic. It is reliable, so subscribers of either reliability receive it."""
         try:
             known = ros_class(kind)
         except ModuleNotFoundError as error:
@@ -118,10 +118,10 @@ class Ros2(Topics):
         return self._node.create_publisher(known, topic, profile)
 
     def send(self, handle: Any, kind: str, stamp: int, tree: dict[str, Any]) -> None:
-        """Publish."""
+        """Publish a message."""
         handle.publish(fill(ros_class(kind)(), tree))
 
     def close(self) -> None:
-        """Leave."""
+        """Remove the node and shut rclpy down."""
         self._node.destroy_node()
         self._rclpy.shutdown()

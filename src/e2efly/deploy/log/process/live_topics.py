@@ -1,4 +1,4 @@
-"""A flight's records as messages on ROS's topics, whoever carries the messages."""
+"""The records of a flight as messages on ROS topics, independent of what transports or stores the messages."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ class Topics:
     """Advertises all topics at once, so that a subscriber finds them before the first message."""
 
     detail = ""
-    """Where to, and by which package."""
+    """Where the messages go, and with which package."""
     version = 2
-    """Of ROS."""
+    """The version of ROS, 1 or 2."""
 
     def __init__(self, config: dict[str, Any]) -> None:
         self._words = importlib.import_module("ros_topics")
@@ -34,7 +34,7 @@ class Topics:
         self._transforms = self.advertise(words.TRANSFORMS_TOPIC, words.TRANSFORMS_TYPE, False)
 
     def write(self, channel: str, stamp: int, values: dict[str, Any]) -> None:
-        """Publish what a record says."""
+        """Publish the messages of a record."""
         for topic, handle in self._by_channel.get(channel, ()):
             tree = topic.build(values, stamp)
             if tree is not None:
@@ -45,7 +45,7 @@ class Topics:
                 self.send(self._transforms, self._words.TRANSFORMS_TYPE, stamp, self._words.tf_message(found))
 
     def show(self, name: str, stamp: int, data: bytes) -> None:
-        """Publish an image, and what is known of its camera."""
+        """Publish an image and the parameters of its camera."""
         words, layout = self._words, self._layouts[name]
         if name in self._infos:
             info = words.camera_info(layout, stamp, self.version)
@@ -53,15 +53,15 @@ class Topics:
         self.send(self._images[name], words.IMAGE_TYPE, stamp, words.image(layout, stamp, data))
 
     def advertise(self, topic: str, kind: str, latched: bool) -> Any:
-        """Announce a topic; what `send` is to be given, None where its type is not there."""
+        """Announce a topic. Returns the handle for `send`. None: the type of the topic is not installed."""
         raise NotImplementedError
 
     def send(self, handle: Any, kind: str, stamp: int, tree: dict[str, Any]) -> None:
-        """Publish a message of a type from its tree."""
+        """Publish a message of a type, which is given as a tree."""
         raise NotImplementedError
 
     def flush(self) -> None:
-        """Write out what waits."""
+        """Write the buffered data."""
 
     def close(self) -> None:
-        """End in order."""
+        """Close properly."""

@@ -1,4 +1,4 @@
-"""Trees of `ros_topics` as messages of the package `rosbags`, which needs no ROS."""
+"""Converts the trees of `ros_topics` to messages of the package `rosbags`, which does not need ROS."""
 
 from __future__ import annotations
 
@@ -6,38 +6,38 @@ import importlib
 from typing import Any
 
 BASE, NAME, ARRAY = 1, 2, 3
-"""Kinds of fields, as rosbags numbers them; what is left is a sequence."""
+"""Kinds of fields, in the numbering of rosbags. Any other number is a sequence."""
 
 
 def type_store(version: int) -> Any:
     """The message types of ROS 1 or 2.
 
     Raises:
-        ImportError: where rosbags is not there.
+        ImportError: rosbags is not installed.
     """
     typesys = importlib.import_module("rosbags.typesys")
     store = typesys.get_typestore(typesys.Stores.ROS1_NOETIC if version == 1 else typesys.Stores.ROS2_HUMBLE)
     words = importlib.import_module("ros_topics" if __package__ in (None, "") else f"{__package__}.ros_topics")
     kind = full_name(words.TRANSFORMS_TYPE)
-    if kind not in store.fielddefs:  # ROS 1's has it not
+    if kind not in store.fielddefs:  # the store of ROS 1 does not have it
         own = words.TF_DEFINITION.partition("=")[0]
         store.register(typesys.get_types_from_msg(own, kind))
     return store
 
 
 def full_name(kind: str) -> str:
-    """A message type as ROS 2 and rosbags write it: nav_msgs/msg/Odometry."""
+    """The name of a message type in the form of ROS 2 and rosbags: nav_msgs/msg/Odometry."""
     return kind.replace("/", "/msg/")
 
 
 def encoded(store: Any, version: int, kind: str, tree: dict[str, Any]) -> Any:
-    """A message, serialized for ROS 1 or 2; `kind` as ROS 1 writes it."""
+    """A message, serialized for ROS 1 or 2. `kind` is the name of its type in the form of ROS 1."""
     message = made(store, full_name(kind), tree)
     return (store.serialize_ros1 if version == 1 else store.serialize_cdr)(message, full_name(kind))
 
 
 def made(store: Any, kind: str, tree: Any) -> Any:
-    """A message of a type from a tree; what the tree lacks is zero, empty or false."""
+    """A message of a type, made from a tree. A field that is not in the tree becomes zero, empty or false."""
     if kind == "builtin_interfaces/msg/Time":
         return store.types[kind](*divmod(int(tree or 0), 10**9))
     tree = tree or {}

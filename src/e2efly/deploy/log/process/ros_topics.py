@@ -1,11 +1,11 @@
-"""What a flight says in the words of ROS: the topics, their types, and a message for each record of the flight log.
+"""A flight as ROS topics: the topics, their types, and a message for each record of the flight log.
 
-A message is a tree: dictionaries by the names of ROS's fields, without those that keep their defaults. `stamp` is ns
-since 1970, which ROS 1 and ROS 2 write differently; bytes are arrays of uint8. World is the frame `map` (ENU), body is
-`base_link` (FLU), as REP 103 and REP 105 have them; the twist of an odometry is in the body's frame, as nav_msgs has
-it. What is not known is NaN, and a covariance of zeros.
+A message is a tree: nested dictionaries whose keys are the names of the ROS fields. Fields that keep their defaults are
+left out. `stamp` is in ns since 1970, which ROS 1 and ROS 2 write differently. Bytes are arrays of uint8. The world is
+the frame `map` (ENU) and the body is `base_link` (FLU), according to REP 103 and REP 105. The twist of an odometry is
+in the body frame, as nav_msgs defines it. An unknown value is NaN, and an unknown covariance is all zeros.
 
-Whatever Python has ROS must be able to run this: it needs Python 3.8 or newer and nothing else.
+Any Python that has ROS must be able to run this file, so it needs only Python 3.8 or newer.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ import math
 from typing import Any, Callable, Dict, List, NamedTuple, Optional  # noqa: UP035  # Python 3.8
 
 WORLD_FRAME, BODY_FRAME = "map", "base_link"
-"""Names of the frames, by REP 105."""
+"""Names of the frames, according to REP 105."""
 IMAGE_TYPE, INFO_TYPE, TRANSFORMS_TYPE = "sensor_msgs/Image", "sensor_msgs/CameraInfo", "tf2_msgs/TFMessage"
-"""Types of the images, of what is known of their cameras, and of where the frames are."""
+"""Message types of the images, of the parameters of their cameras, and of the poses of the frames."""
 IMAGE_TOPIC, INFO_TOPIC = "/camera/{}/image", "/camera/{}/camera_info"
-"""Names of their topics, by the camera's; rviz looks for the second beside the first."""
+"""Names of the topics of images and camera parameters, with a place for the name of the camera. rviz expects the second
+next to the first."""
 TRANSFORMS_TOPIC = "/tf"
-"""Of the frames, below no prefix."""
+"""Name of the topic of the frames. It gets no prefix."""
 
 TF_DEFINITION = """geometry_msgs/TransformStamped[] transforms
 ================================================================================
@@ -49,7 +50,7 @@ float64 y
 float64 z
 float64 w
 """
-"""Of tf2_msgs/TFMessage, by which ROS 1 makes the type where the package is not there."""
+"""Definition of tf2_msgs/TFMessage. In ROS 1 the type is made from it if the package is not installed."""
 
 Tree = Dict[str, Any]  # noqa: UP006
 Build = Callable[[Dict[str, Any], int], Optional[Tree]]  # noqa: UP006, UP045
@@ -59,25 +60,25 @@ class Topic(NamedTuple):
     """One topic."""
 
     name: str
-    """Its name, below a prefix."""
+    """The name of the topic, to which a prefix is added."""
     kind: str
-    """Its message type, as ROS 1 writes it."""
+    """The message type, in the form of ROS 1."""
     channel: str
-    """The channel of the flight log that it is made of."""
+    """The channel of the flight log from which it is made."""
     build: Build
-    """(values of the record, its time in ns) -> a message, or None where nothing can be told."""
+    """(values of the record, its time in ns) -> a message, or None if the record gives none."""
     latched: bool = False
-    """Whether who comes later hears the last message at once."""
+    """Whether a later subscriber gets the last message at once."""
 
 
 def number(values: dict[str, Any], field: str) -> float:
-    """A field as a number, NaN where there is none."""
+    """A field as a number. NaN if there is none."""
     value = values.get(field)
     return math.nan if value is None else float(value)
 
 
 def numbers(values: dict[str, Any], field: str, size: int | None = None) -> list[float]:
-    """A field as numbers, all NaN where there are none or `size` is another."""
+    """A field as numbers. If there are none, or not `size` of them, `size` NaNs."""
     found = values.get(field)
     if found is None or (size is not None and len(found) != size):
         return [math.nan] * (size or 0)
@@ -90,12 +91,12 @@ def vector(xyz: list[float]) -> Tree:
 
 
 def header(stamp: int, frame: str) -> Tree:
-    """A header."""
+    """A std_msgs/Header."""
     return {"stamp": stamp, "frame_id": frame}
 
 
 def into_body(q: list[float], v: list[float]) -> list[float]:
-    """A vector of the world in the axes of the body: by the transpose of the rotation matrix of q, wxyz."""
+    """A vector of the world in the axes of the body: the transposed rotation matrix of q, wxyz, times the vector."""
     w, x, y, z = q
     a, b, c = v
     return [
@@ -106,7 +107,7 @@ def into_body(q: list[float], v: list[float]) -> list[float]:
 
 
 def odometry(values: dict[str, Any], stamp: int) -> Tree:
-    """Twist in the body's frame, the odometry's child frame; stamped with the time at which it was true."""
+    """An odometry, with the twist in the body frame, its child frame. The stamp is the time at which it was true."""
     age, q = number(values, "age"), numbers(values, "quaternion", 4)
     true = stamp if math.isnan(age) else max(stamp - round(age * 1e9), 0)
     w, x, y, z = q
@@ -120,7 +121,11 @@ def odometry(values: dict[str, Any], stamp: int) -> Tree:
 
 
 def imu(values: dict[str, Any], stamp: int) -> Tree | None:
-    """No orientation (its covariance begins with -1): the controller's yaw has an origin of its own."""
+    """The inertial sensors, without orientation (its covariance begins with -1).
+
+    The orientation is left out because the controller's yaw has another origin than the odometry's. None: the record
+    has neither body rates nor a specific force.
+    """
     gyro, force = numbers(values, "gyro", 3), numbers(values, "specific_force", 3)
     if not any(map(math.isfinite, gyro + force)):  # a record of the attitude only
         return None
@@ -134,14 +139,14 @@ def imu(values: dict[str, Any], stamp: int) -> Tree | None:
 
 
 def command(values: dict[str, Any], stamp: int) -> Tree:
-    """Linear z is thrust over mass, m/s^2; angular is the body rate, rad/s."""
+    """The command as a twist: linear z is thrust over mass, m/s^2, and angular is the body rate, rad/s."""
     linear = vector([0.0, 0.0, number(values, "collective_thrust")])
     twist = {"linear": linear, "angular": vector(numbers(values, "body_rate", 3))}
     return {"header": header(stamp, BODY_FRAME), "twist": twist}
 
 
 def battery(values: dict[str, Any], stamp: int) -> Tree:
-    """A current drawn is negative, as ROS has it; of the cells their number is known, and not their voltages."""
+    """The battery. A drawn current is negative, as in ROS. The number of cells is known, but not their voltages."""
     cells = number(values, "cells")
     unknown = dict.fromkeys(("temperature", "charge", "capacity", "design_capacity", "percentage"), math.nan)
     known = {"voltage": number(values, "voltage"), "current": -number(values, "current")}
@@ -151,45 +156,48 @@ def battery(values: dict[str, Any], stamp: int) -> Tree:
 
 
 def joy(values: dict[str, Any], stamp: int) -> Tree:
-    """Axes are the channels with 1000 to 2000 us as -1 to 1."""
+    """The channels as axes: 1000 to 2000 us become -1 to 1."""
     axes = [(channel - 1500.0) / 500.0 for channel in numbers(values, "channels")]
     return {"header": header(stamp, BODY_FRAME), "axes": axes}
 
 
 def mode(values: dict[str, Any], stamp: int) -> Tree:
-    """`PREVIOUS -> MODE: reason; reason`."""
+    """A change of the mode as text: `PREVIOUS -> MODE: reason; reason`."""
     reasons = "; ".join(values.get("reasons") or [])
     change = f"{values.get('previous') or ''} -> {values.get('mode') or ''}".strip()
     return {"data": f"{change}: {reasons}" if reasons else change}
 
 
 def event(values: dict[str, Any], stamp: int) -> Tree:
-    """`level: text`."""
+    """An event as text: `level: text`."""
     return {"data": f"{values.get('level') or 'info'}: {values.get('text') or ''}"}
 
 
 def observation(values: dict[str, Any], stamp: int) -> Tree:
-    """What the policy saw, as its contract lays it out."""
+    """The observation of the policy, in the order of its contract."""
     return {"data": numbers(values, "observation")}
 
 
 def action(values: dict[str, Any], stamp: int) -> Tree:
-    """What it wants, in [-1, 1]."""
+    """The action of the policy, in [-1, 1]."""
     return {"data": numbers(values, "action")}
 
 
 def image(layout: dict[str, Any], stamp: int, data: bytes) -> Tree:
-    """An image; `layout` has its height, width, encoding and the bytes of a row."""
+    """An image. `layout` has its frame, height, width and encoding, and the bytes of a row."""
     size = {key: layout[key] for key in ("height", "width", "encoding", "step")}
     return {"header": header(stamp, layout["frame"]), **size, "is_bigendian": 0, "data": data}
 
 
 def intrinsics(layout: dict[str, Any]) -> Tree:
-    """Of a pinhole camera without distortion, whose optical axis is in the middle: D, K, R and P by ROS 1's names."""
+    """The intrinsics of a pinhole camera without distortion whose optical axis is in the centre of the image.
+
+    They have the names of ROS 1: D, K, R and P.
+    """
     across, down = layout["fov"]
     height, width = layout["height"], layout["width"]
     fx, fy = width / 2 / math.tan(across / 2), height / 2 / math.tan(down / 2)
-    cx, cy = width / 2 - 0.5, height / 2 - 0.5  # centres of pixels have whole numbers
+    cx, cy = width / 2 - 0.5, height / 2 - 0.5  # the centres of pixels have integer coordinates
     return {
         "D": [0.0] * 5,
         "K": [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
@@ -199,14 +207,14 @@ def intrinsics(layout: dict[str, Any]) -> Tree:
 
 
 def camera_info(layout: dict[str, Any], stamp: int, version: int) -> Tree:
-    """What is known of a camera; ROS 2 writes the names of `intrinsics` small."""
+    """The parameters of a camera. ROS 2 writes the names of `intrinsics` in lower case."""
     known = {name if version == 1 else name.lower(): value for name, value in intrinsics(layout).items()}
     size = {"height": layout["height"], "width": layout["width"], "distortion_model": "plumb_bob"}
     return {"header": header(stamp, layout["frame"]), **size, **known}
 
 
 class Transform(NamedTuple):
-    """Where a frame is in another."""
+    """The pose of a frame in its parent frame."""
 
     stamp: int
     parent: str
@@ -214,12 +222,14 @@ class Transform(NamedTuple):
     position: List[float]  # noqa: UP006
     """m."""
     quaternion: List[float]  # noqa: UP006
-    """wxyz, child to parent."""
+    """The rotation from child to parent, wxyz."""
 
 
 def transforms(values: dict[str, Any], stamp: int, images: dict[str, dict[str, Any]]) -> list[Transform]:
-    """Where the body is in the world by a record of the odometry, and the cameras are on the body; empty where the
-    record does not say it. The cameras are told each time, so that who comes later hears of them, too.
+    """The poses of the body in the world, from a record of the odometry, and of the cameras on the body.
+
+    The list is empty if the record has no pose. The cameras are included each time, so that a later subscriber also
+    gets them.
     """
     age, position, q = number(values, "age"), numbers(values, "position", 3), numbers(values, "quaternion", 4)
     if not all(map(math.isfinite, position + q)):
@@ -233,7 +243,7 @@ def transforms(values: dict[str, Any], stamp: int, images: dict[str, dict[str, A
 
 
 def tf_message(found: list[Transform]) -> Tree:
-    """The same as a message."""
+    """The transforms as a message."""
     return {
         "transforms": [
             {
@@ -261,4 +271,4 @@ TOPICS = (
     Topic("/policy/observation", "std_msgs/Float32MultiArray", "policy", observation),
     Topic("/policy/action", "std_msgs/Float32MultiArray", "policy", action),
 )
-"""The topics, of a bag as of a flight under way."""
+"""The topics. They are the same in a bag and during a flight."""

@@ -1,4 +1,4 @@
-"""Hover controllers: what flies take-off, hover and landing, and what policies are compared with. Imports no JAX."""
+"""Hover controllers. They fly take-off, hover and landing, and policies are compared with them. Imports no JAX."""
 
 from e2efly.deploy.pilot.hovering import geometric, indi, mpc, pid
 from e2efly.deploy.pilot.hovering.registry import HOVERS, ROTOR_SPEED, HoverController, register
@@ -12,19 +12,20 @@ __all__ = [
     "DEFAULT", "HOVERS", "ROTOR_SPEED", "HoverController", "Seen", "UnderWay", "ahead", "hover_controller", "register",
     "sent", "thrust_of",
 ]  # fmt: skip
-_SHIPPED = geometric, indi, mpc, pid  # which register themselves
+_SHIPPED = geometric, indi, mpc, pid  # these modules register their controllers when imported
 
 
 def hover_controller(name: str, vehicle: Vehicle, latency: float, hold: float = 0.0) -> HoverController:
-    """A hover controller for a vehicle.
+    """Make a hover controller for a vehicle.
 
     Args:
-        name: of `HOVERS`, or the reference `path/to/file.py:Name` or `module:Name` of one of the user's own.
-        vehicle: as loaded.
-        latency: from the vehicle's motion to its rate loop, s.
-        hold: for how long a command is held, s, where that counts beside the latency.
+        name: a name in `HOVERS`, or the reference `path/to/file.py:Name` or `module:Name` of the user's own controller.
+        vehicle: the loaded vehicle.
+        latency: the time from the vehicle's motion to its rate loop, s.
+        hold: how long a command is held, s, if this comes in addition to the latency.
 
     Raises:
-        ValueError: for an unknown name, with all there are; naming the package that the machine lacks for it.
+        ValueError: the name is unknown; the message lists all names. Or a package that the controller needs is missing;
+            the message names it.
     """
     return HOVERS.find(name).of(vehicle, latency, hold)

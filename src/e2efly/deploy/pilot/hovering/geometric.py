@@ -1,8 +1,9 @@
-"""`geometric`: tracking control on the rotations themselves, about the motion that the latency leads to.
+"""`geometric`: tracking control directly on the rotation group, for the motion predicted over the latency.
 
 Lee, Leok and McClamroch, Geometric tracking control of a quadrotor UAV on SE(3), 2010, with the integral of Goodarzi,
-Lee and Leok, Geometric nonlinear PID control of a quadrotor UAV on SE(3), 2013. Their moment is here a body rate, which
-the flight controller's own loop follows. The error of the attitude is the sine of its angle, and vanishes upside down.
+Lee and Leok, Geometric nonlinear PID control of a quadrotor UAV on SE(3), 2013. Where they command a moment, this
+controller commands a body rate, which the flight controller's own loop follows. The attitude error is the sine of its
+angle, so it is zero upside down.
 """
 
 from dataclasses import dataclass
@@ -21,25 +22,25 @@ from e2efly.vehicles.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class Learned:
-    """What one flight has shown."""
+    """What was learned in one flight."""
 
     integral: Vec3 = ZERO
-    """Of position and velocity, world, m/s^2."""
+    """The integral of the errors of position and velocity, world, m/s^2."""
     slip: Vec3 = ZERO
-    """By how much the body turns faster than it is told, rad/s: in place of the integral of the attitude."""
+    """How much faster the body turns than commanded, rad/s. It replaces the integral of the attitude error."""
 
 
 @register("geometric")
 @dataclass(frozen=True)
 class Geometric:
-    """Its memory is `Learned`."""
+    """The controller. Its memory is `Learned`."""
 
     needs: ClassVar[tuple[str, ...]] = ()
 
     vehicle: Vehicle
-    """With gains for what the prediction leaves of the latency."""
+    """The vehicle, with gains for the part of the latency that the prediction does not remove."""
     latency: float
-    """From the vehicle's motion to its rate loop, s."""
+    """The time from the vehicle's motion to its rate loop, s."""
 
     @classmethod
     def of(cls, vehicle: Vehicle, latency: float, hold: float = 0.0) -> "Geometric":
@@ -47,7 +48,7 @@ class Geometric:
         return cls(flight_gains(vehicle, residue(latency) + hold / 2), latency)
 
     def begin(self) -> Learned:
-        """No integral."""
+        """The memory without any integral."""
         return Learned()
 
     def step(
@@ -55,7 +56,7 @@ class Geometric:
     ) -> tuple[Learned, Ctbr]:
         """See `HoverController.step`."""
         vehicle, gains = self.vehicle, Vec3.of(self.vehicle.velocity_gain)
-        # the integral learns from what is seen: a prediction is off by what it makes up for
+        # the integral learns from the measured motion: the prediction has the error that the integral compensates
         then = place.after(-seen.age)
         error = approach(vehicle, seen, then) - seen.velocity
         motion, goal = seen, then
@@ -78,10 +79,10 @@ def turning(vehicle: Vehicle, attitude: Quat, force: Vec3, yaw: Array) -> Vec3:
     """The body rates that turn the thrust along a force, rad/s.
 
     Args:
-        vehicle: with the gains.
+        vehicle: the vehicle with the gains.
         attitude: body to world.
-        force: that the rotors are to give, over mass, world, m/s^2.
-        yaw: rad.
+        force: the wanted force of the rotors over mass, world, m/s^2.
+        yaw: the wanted yaw, rad.
     """
     error = attitude_along(force * (1 / force.norm()), yaw).conjugate().compose(attitude)
     tilt, turn = -2 * vehicle.attitude_gain[..., 0] * error.w, -2 * vehicle.attitude_gain[..., 1] * error.w

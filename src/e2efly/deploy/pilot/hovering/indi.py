@@ -2,10 +2,13 @@
 
 Smeur, de Croon and Chu, Cascaded incremental nonlinear dynamic inversion for MAV disturbance rejection, 2018; Tal and
 Karaman, Accurate tracking of aggressive quadrotor trajectories using incremental nonlinear dynamic inversion and
-differential flatness, 2020. What the rotors are to give is what they gave, plus wanted minus felt acceleration, both
-through one filter. That is wanted acceleration less the filtered push of all but the rotors, and needs no mass, drag
-or integral. Their inner increment is one of the moment; the flight controller's rate loop takes body rates, and so it
-is here one of them: what is told, plus wanted minus measured.
+differential flatness, 2020.
+
+The rotors should give what they gave, plus the wanted minus the measured acceleration, where both are filtered alike.
+This equals the wanted acceleration minus the filtered push of everything but the rotors. It needs no mass, no drag and
+no integral. In these papers, the inner increment is an increment of the moment. Here it is an increment of the body
+rates, because the flight controller's rate loop takes body rates: the commanded rate, plus the wanted minus the
+measured rate.
 """
 
 import math
@@ -22,38 +25,38 @@ from e2efly.deploy.pilot.hovering.response import Seen, UnderWay, ahead, residue
 from e2efly.vehicles.vehicle import Vehicle
 
 FILTER_S = 0.2
-"""Time constant of the filter of both, s."""
+"""Time constant of the filter of both accelerations, s."""
 UNITS_S = 0.5
-"""Time constant with which thrust by the rotors' speeds is brought to that of the commands, s: whoever turns commands
-into throttle may have learned mass and battery already, and the increments must not make up for them once more."""
+"""Time constant with which the thrust from the rotor speeds is scaled to that of the commands, s. The throttle map may
+already have learned mass and battery, so the increments must not compensate for them a second time."""
 
 
 @dataclass(frozen=True)
 class Felt:
-    """What is known in one flight."""
+    """What was measured in one flight."""
 
     pushed: Vec3 = ZERO
-    """Of all but the rotors and gravity, world, m/s^2."""
+    """The acceleration caused by everything but the rotors and gravity, filtered, world, m/s^2."""
     slip: Vec3 = ZERO
-    """By how much the body turns faster than it is told, rad/s."""
+    """How much faster the body turns than commanded, rad/s."""
     share: Array | None = None
-    """Commanded thrust over that by the rotors' speeds; None: not known yet."""
+    """The commanded thrust divided by the thrust from the rotor speeds. None: not known yet."""
 
 
 @register("indi")
 @dataclass(frozen=True)
 class Indi:
-    """Its memory is `Felt`.
+    """The controller. Its memory is `Felt`.
 
-    Where the rotors' speeds are not known, the thrust is that of the commands through the motors' lag.
+    If the rotor speeds are not known, the thrust is that of the commands after the lag of the motors.
     """
 
     needs: ClassVar[tuple[str, ...]] = (ROTOR_SPEED,)
 
     vehicle: Vehicle
-    """With gains for what the prediction leaves of the latency."""
+    """The vehicle, with gains for the part of the latency that the prediction does not remove."""
     latency: float
-    """From the vehicle's motion to its rate loop, s."""
+    """The time from the vehicle's motion to its rate loop, s."""
 
     @classmethod
     def of(cls, vehicle: Vehicle, latency: float, hold: float = 0.0) -> "Indi":
@@ -61,7 +64,7 @@ class Indi:
         return cls(flight_gains(vehicle, residue(latency) + hold / 2), latency)
 
     def begin(self) -> Felt:
-        """Nothing pushes."""
+        """The memory without any push."""
         return Felt()
 
     def step(
@@ -79,7 +82,7 @@ class Indi:
 
 
 def felt(before: Felt, seen: Seen, under_way: UnderWay, dt: float) -> Felt:
-    """What is known after a step of dt s."""
+    """The memory after a step of `dt` s."""
     slip = slipped(before.slip, seen, under_way, dt)
     if seen.force is None:
         return Felt(before.pushed, slip, before.share)

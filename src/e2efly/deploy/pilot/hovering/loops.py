@@ -1,4 +1,4 @@
-"""What the hover controllers share: the way to a place, the vehicle's limits, and the integral. Pure."""
+"""The common parts of the hover controllers: the way to a place, the vehicle's limits, and the integral. Pure."""
 
 from e2efly.control import Ctbr, Motion, Quat, Vec3
 from e2efly.control.cascade import accelerate, limited, pull
@@ -7,41 +7,42 @@ from e2efly.control.vectors import Array, namespace
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 SHARE = 0.2
-"""Growth of the integral over the error of the velocity, in squares of the velocity gain: a fifth, so that it follows
-the loops that act at once at a distance."""
+"""Rate of change of the integral divided by the velocity error, in units of the velocity gain squared. It is a fifth,
+so that the integral is clearly slower than the other loops."""
 FASTEST = 0.3
-"""Of a larger error of the velocity the integral learns no more than of this, m/s: it is for what lasts, not for steps
-and stops."""
+"""The largest velocity error from which the integral learns, m/s. Larger errors count as this one, because the integral
+is meant for lasting errors, not for steps and stops."""
 LIMIT = Vec3(0.3 * GRAVITY, 0.3 * GRAVITY, 0.6 * GRAVITY)
-"""Largest acceleration that the integral asks for, m/s^2: up for a quadrotor of 2.5 times its mass."""
+"""The largest acceleration that the integral may command, m/s^2. Vertically, it suffices for a quadrotor with 2.5 times
+its mass."""
 
 
 def approach(vehicle: Vehicle, motion: Motion, place: Place) -> Vec3:
-    """The velocity to a place, and with it where it moves, world, m/s, within the vehicle's `speed_max`."""
+    """The velocity that leads to a place and moves along with it, world, m/s, within the vehicle's `speed_max`."""
     off = (place.position - motion.position).times(Vec3.of(vehicle.position_gain))
     return (off + place.velocity).clip(Vec3.of(vehicle.speed_max))
 
 
 def attainable(vehicle: Vehicle, wanted: Vec3) -> Vec3:
-    """What the limits of the vehicle leave of an acceleration, world, m/s^2."""
+    """The part of an acceleration that the limits of the vehicle allow, world, m/s^2."""
     force, most = pull(vehicle, wanted), vehicle.thrust_to_weight * GRAVITY
     return Vec3(force.x, force.y, namespace(force.z).minimum(force.z, most) - GRAVITY)
 
 
 def lead(attitude: Quat, force: Vec3, jerk: Vec3) -> Vec3:
-    """The body rates of a thrust that goes with a jerk, rad/s.
+    """The body rates with which the thrust direction follows a jerk, rad/s.
 
     Args:
         attitude: body to world.
-        force: that the rotors are to give, over mass, world, m/s^2.
-        jerk: at which it changes, world, m/s^3.
+        force: the wanted force of the rotors over mass, world, m/s^2.
+        jerk: the rate of change of this force, world, m/s^3.
     """
     scale = 1 / force.norm()
     return attitude.unrotate((force * scale).cross(jerk * scale))
 
 
 def steer(vehicle: Vehicle, motion: Motion, wanted: Vec3, goal: Place, slip: Vec3) -> Ctbr:
-    """Towards an acceleration, world, m/s^2, in the heading of a place and with its jerk, less a slip, rad/s."""
+    """The command for an acceleration, world, m/s^2, with the heading and the jerk of a place, minus a slip, rad/s."""
     yaw = motion.attitude.yaw() if goal.yaw is None else goal.yaw
     command = accelerate(vehicle, motion, wanted, yaw)
     goes = lead(motion.attitude, pull(vehicle, wanted), goal.jerk)
@@ -49,17 +50,18 @@ def steer(vehicle: Vehicle, motion: Motion, wanted: Vec3, goal: Place, slip: Vec
 
 
 def grown(before: Vec3, vehicle: Vehicle, error: Vec3, wanted: Vec3, flown: Vec3, dt: float) -> Vec3:
-    """The integral after some time, m/s^2.
+    """The integral after another `dt` s, m/s^2.
 
-    It stands still along each axis on which less is flown than is wanted, unless the error leads back (anti-windup).
+    It does not change along an axis on which the limits cut the wanted acceleration, unless the error leads back
+    (anti-windup).
 
     Args:
-        before: so far.
-        vehicle: with the gains of the flight.
+        before: the integral so far.
+        vehicle: the vehicle with the gains of the flight.
         error: wanted velocity minus velocity, world, m/s.
-        wanted: acceleration, world, m/s^2.
-        flown: what the limits of the vehicle leave of it, world, m/s^2.
-        dt: s.
+        wanted: the wanted acceleration, world, m/s^2.
+        flown: the part of it that the limits of the vehicle allow, world, m/s^2.
+        dt: time since the last control step, s.
     """
     gains, xp = Vec3.of(vehicle.velocity_gain), namespace(error.x, error.z)
     level = FASTEST / xp.maximum(xp.sqrt(error.x**2 + error.y**2), FASTEST)

@@ -1,8 +1,9 @@
-"""`mpc`: linear model predictive control about hover, free of offset by an observer of what else pushes.
+"""`mpc`: linear model predictive control about hover, without steady-state error thanks to a disturbance observer.
 
-Each axis of the world is a mass whose acceleration follows as a lag, and the latency is part of the model: a plan
-begins with the motion in which its first command will find the vehicle. DAQP solves the programs (Arnström, Bemporad
-and Axehill, A dual active-set solver for embedded quadratic programming using recursive LDL' updates, 2022).
+Each axis of the world is modelled as a mass whose acceleration follows with a first-order lag. The latency is part of
+the model: a plan begins with the motion that the vehicle will have when the first command of the plan acts. DAQP solves
+the quadratic programs (Arnström, Bemporad and Axehill, A dual active-set solver for embedded quadratic programming
+using recursive LDL' updates, 2022).
 """
 
 import importlib
@@ -31,28 +32,29 @@ class Observed:
     """The observer of one flight."""
 
     velocity: Vec3 | None = None
-    """By the model, world, m/s; None: at the first step."""
+    """The velocity of the model, world, m/s. None: at the first step."""
     pushed: Vec3 = ZERO
-    """What else than rotors and gravity accelerates the vehicle, world, m/s^2."""
+    """The acceleration caused by everything but the rotors and gravity, world, m/s^2."""
     slip: Vec3 = ZERO
-    """By how much the body turns faster than it is told, rad/s."""
+    """How much faster the body turns than commanded, rad/s."""
 
 
 @register("mpc")
 @dataclass(frozen=True)
 class Mpc:
-    """Its memory is `Observed`."""
+    """The controller. Its memory is `Observed`."""
 
     needs: ClassVar[tuple[str, ...]] = ()
 
     vehicle: Vehicle
-    """With gains for what the prediction leaves of the latency: the attitude is turned by them."""
+    """The vehicle, with gains for the part of the latency that the prediction does not remove. The attitude loop uses
+    them."""
     latency: float
-    """From the vehicle's motion to its rate loop, s."""
+    """The time from the vehicle's motion to its rate loop, s."""
     level: Plan
-    """Of x and of y."""
+    """The plan of x and of y."""
     up: Plan
-    """Of z."""
+    """The plan of z."""
     solve: Solve
     """The solver."""
 
@@ -73,7 +75,7 @@ class Mpc:
         )  # fmt: skip
 
     def begin(self) -> Observed:
-        """Nothing pushes."""
+        """The memory without any push."""
         return Observed()
 
     def step(
@@ -101,13 +103,14 @@ class Mpc:
         return memory, steer(vehicle, motion, wanted + feed, goal, memory.slip)
 
     def _axis(self, plan: Plan, parts: tuple[Array, ...], limits: tuple[float, float]) -> Array:
-        """What to ask for along an axis, over the acceleration of where to be, m/s^2.
+        """The acceleration to command along an axis, relative to that of the goal, m/s^2.
 
         Args:
-            plan: of the axis.
-            parts: off where to be, m; its change, m/s; the acceleration over that of where to be, and that, m/s^2; the
-                velocity of where to be, m/s.
-            limits: largest acceleration, m/s^2, and speed, m/s.
+            plan: the plan of the axis.
+            parts: position minus that of the goal, m; velocity minus that of the goal, m/s; acceleration minus that of
+                the goal, m/s^2; the acceleration of the goal, m/s^2; the velocity of the goal, m/s. Here the
+                acceleration of the goal is what the rotors must give for it, so `Observed.pushed` is subtracted.
+            limits: the largest acceleration, m/s^2, and the largest speed, m/s.
         """
         rows = np.stack(np.broadcast_arrays(*map(np.atleast_1d, parts)), axis=-1)
         (most, fast), feed, moves = limits, rows[:, 3], rows[:, 4]
@@ -117,7 +120,7 @@ class Mpc:
 
 
 def observed(before: Observed, seen: Seen, under_way: UnderWay, dt: float) -> Observed:
-    """The observer after a step of dt s: a model of the velocity, drawn to the one that is seen."""
+    """The observer after a step of `dt` s: a model of the velocity, which is corrected by the measured velocity."""
     if before.velocity is None:
         return Observed(seen.velocity, before.pushed, before.slip)
     gives = seen.attitude.z_axis() * under_way.thrust - Vec3(0.0, 0.0, GRAVITY)

@@ -1,4 +1,4 @@
-"""`pid`: the cascade of proportional loops down to body rates, with an integral of the velocity's error."""
+"""`pid`: the cascade of proportional loops down to body rates, with an integral of the velocity error."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -16,7 +16,7 @@ from e2efly.vehicles.vehicle import Vehicle
 @register("pid")
 @dataclass(frozen=True)
 class Pid:
-    """Position -> velocity -> acceleration -> attitude -> body rates, with gains that the latency allows.
+    """Position -> velocity -> acceleration -> attitude -> body rates, with gains that suit the latency.
 
     Its memory is the integral, world, m/s^2.
     """
@@ -24,7 +24,7 @@ class Pid:
     needs: ClassVar[tuple[str, ...]] = ()
 
     vehicle: Vehicle
-    """With these gains."""
+    """The vehicle with these gains."""
 
     @classmethod
     def of(cls, vehicle: Vehicle, latency: float, hold: float = 0.0) -> "Pid":
@@ -32,7 +32,7 @@ class Pid:
         return cls(flight_gains(vehicle, latency + hold / 2))
 
     def begin(self) -> Vec3:
-        """No integral."""
+        """The memory without any integral."""
         return ZERO
 
     def step(

@@ -7,37 +7,43 @@ from typing import Any
 import numpy as np
 
 STEPS, STEP = 20, 0.05
-"""A plan has so many steps, of so many s each."""
+"""The number of steps of a plan, and the duration of a step, s."""
 DAMPING = 0.9
-"""Of the plan that meets no limit, over that of a motion which just does not swing."""
+"""Damping ratio of the plan that meets no limit: 1 is critical damping."""
 SOFT = 8
-"""The solver's mark of a limit that may be broken where nothing else can be done."""
+"""The solver's mark of a soft limit, which may be broken if there is no other solution."""
 Solve = Callable[..., tuple[np.ndarray, float, int, dict[str, Any]]]
 
 
 @dataclass(frozen=True)
 class Plan:
-    """An axis: (how far off, how fast, acceleration), which follows the wanted acceleration as a lag."""
+    """The program of one axis.
+
+    Its state is (position, velocity, acceleration) relative to the goal. The acceleration follows the wanted
+    acceleration with a first-order lag. A plan is the wanted acceleration at each step.
+    """
 
     free: np.ndarray
-    """(STEPS, 3) the plan that meets no limit, over the state now."""
+    """(STEPS, 3) the matrix from the present state to the plan that meets no limit."""
     speeds: tuple[np.ndarray, np.ndarray]
-    """(STEPS, 3) and (STEPS, STEPS): the speed after each step, over the state now and the plan."""
+    """(STEPS, 3) and (STEPS, STEPS): the matrices from the present state and from the plan to the speed after each
+    step."""
     cost: np.ndarray
-    """(STEPS, STEPS) of a plan."""
+    """(STEPS, STEPS) the quadratic cost of a plan."""
     slope: np.ndarray
-    """(STEPS, 3) its slope at no plan, over the state now."""
+    """(STEPS, 3) the matrix from the present state to the gradient of the cost at the zero plan."""
 
     def best(
         self, solve: Solve, state: np.ndarray, wanted: tuple[np.ndarray, np.ndarray], speed: np.ndarray
     ) -> np.ndarray:
-        """The acceleration to ask for now, over that of where to be, m/s^2, (n,).
+        """(n,) the acceleration to command now, relative to that of the goal, m/s^2.
 
         Args:
             solve: the solver of quadratic programs.
-            state: (n, 3) off where to be, m; its change, m/s; acceleration over that of where to be, m/s^2.
-            wanted: (n,) smallest and largest acceleration that may be asked for, m/s^2.
-            speed: (n, 2) smallest and largest speed, over that of where to be, m/s.
+            state: (n, 3) position, m, velocity, m/s, and acceleration, m/s^2, relative to those of the goal.
+            wanted: (n,) the smallest and (n,) the largest acceleration that may be commanded, relative to that of the
+                goal, m/s^2.
+            speed: (n, 2) the smallest and the largest speed, relative to that of the goal, m/s.
         """
         plan = state @ self.free.T
         goes = state @ self.speeds[0].T + plan @ self.speeds[1].T
@@ -56,11 +62,11 @@ class Plan:
 
 
 def planned(frequency: float, lag: float) -> Plan:
-    """An axis of a vehicle.
+    """The program of an axis of a vehicle.
 
     Args:
-        frequency: of the plan that meets no limit, rad/s.
-        lag: with which the acceleration follows, s.
+        frequency: the natural frequency of the plan that meets no limit, rad/s.
+        lag: the time constant with which the acceleration follows, s.
     """
     A, B = _model(lag)
     Q = np.diag([frequency**4, (4 * DAMPING**2 - 2) * frequency**2, 0.0])
@@ -88,7 +94,7 @@ def _model(lag: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _riccati(A: np.ndarray, B: np.ndarray, Q: np.ndarray) -> np.ndarray:
-    """The cost of going on for ever: the fixed point of the discrete Riccati equation, input cost 1."""
+    """The cost over an infinite horizon: the fixed point of the discrete Riccati equation with input cost 1."""
     P = Q
     for _ in range(2000):
         gain = (P @ B) / (1 + B @ P @ B)

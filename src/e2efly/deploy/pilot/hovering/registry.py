@@ -1,4 +1,6 @@
-"""The hover controllers by name. One registers itself; one of the user's own is a reference to its file."""
+"""The hover controllers by name. The controllers of e2efly register themselves. The user's own are named by a reference
+to their file.
+"""
 
 from collections.abc import Callable
 from typing import Any, ClassVar, Protocol, Self, TypeVar
@@ -10,9 +12,9 @@ from e2efly.registry import Registry, origin
 from e2efly.vehicles.vehicle import Vehicle
 
 METHODS = ("needs", "of", "begin", "step")
-"""What a hover controller must have."""
+"""The attributes that a hover controller must have."""
 ROTOR_SPEED = "rotor_speed"
-"""What a controller needs that is told the speeds of the rotors: `Seen.thrust`."""
+"""The entry of `needs` of a controller that needs measured rotor speeds, from which `Seen.thrust` is computed."""
 
 
 class HoverController(Protocol):
@@ -23,15 +25,15 @@ class HoverController(Protocol):
 
     @classmethod
     def of(cls, vehicle: Vehicle, latency: float, hold: float = 0.0) -> Self:
-        """Make it.
+        """Make a controller.
 
         Args:
-            vehicle: as loaded.
-            latency: from the vehicle's motion to its rate loop, s.
-            hold: for how long a command is held, s, where that counts beside the latency.
+            vehicle: the loaded vehicle.
+            latency: the time from the vehicle's motion to its rate loop, s.
+            hold: how long a command is held, s, if this comes in addition to the latency.
 
         Raises:
-            ValueError: naming what the machine lacks for it.
+            ValueError: something that the controller needs is missing on this machine. The message names it.
         """
         ...
 
@@ -45,15 +47,16 @@ class HoverController(Protocol):
         """One control step.
 
         Args:
-            memory: from `begin` or the last step.
+            memory: the memory from `begin` or the last step.
             seen: the newest motion.
-            under_way: what was sent and does not act yet.
-            place: where to be.
-            dt: since the last step, s.
-            held: it stands on the ground, or may not get what is sent: nothing is learned and nothing predicted.
+            under_way: the commands that were sent but do not act yet.
+            place: where the vehicle should be.
+            dt: time since the last step, s.
+            held: the vehicle stands on the ground, or may not receive the commands. Then nothing is learned and nothing
+                is predicted.
 
         Returns:
-            What the next step is handed, and the command, within the vehicle's limits.
+            The memory for the next step, and the command, within the vehicle's limits.
         """
         ...
 
@@ -68,7 +71,7 @@ def register(name: str) -> Callable[[T], T]:
     """Register a class of hover controllers, for `--hover NAME` and `--baseline NAME`.
 
     Raises:
-        ValueError: for a name that is taken, or a class that lacks a method.
+        ValueError: the name is already used, or the class lacks an attribute of `METHODS`.
     """
 
     def registered(kind: T) -> T:

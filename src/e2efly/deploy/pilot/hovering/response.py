@@ -1,4 +1,7 @@
-"""What is under way to the vehicle, and the motion in which the next command finds it. Pure; for one or many."""
+"""The commands that do not act yet, and the motion that the vehicle will have when the next command acts.
+
+Pure functions, for one vehicle or a batch.
+"""
 
 import math
 from collections.abc import Sequence
@@ -17,7 +20,7 @@ SLIP_S, SLIP = 1.0, Vec3(2.0, 2.0, 2.0)
 
 @dataclass(frozen=True)
 class Seen:
-    """What a hover controller is told of the vehicle. Components are numbers, or arrays of the batch's shape."""
+    """The inputs of a hover controller. Components are numbers, or arrays of the batch's shape."""
 
     position: Vec3
     """World, m."""
@@ -30,7 +33,7 @@ class Seen:
     force: Vec3 | None = None
     """Specific force from the accelerometer, body, m/s^2. None: not known."""
     age: float = 0.0
-    """The age of that motion, s."""
+    """The age of this motion, s."""
     thrust: Array | None = None
     """Collective thrust over mass from the measured rotor speeds, m/s^2. None: they are not measured."""
 
@@ -40,35 +43,38 @@ class UnderWay:
     """The commands that have been sent and do not act yet."""
 
     thrust: Array = GRAVITY
-    """Collective thrust over mass that the rotors give, by the motors' lag, as the oldest of them begins to act, m/s^2;
-    at first that of hovering."""
+    """Collective thrust over mass of the rotors when the oldest of these commands begins to act, m/s^2. It is modelled
+    with the lag of the motors, and begins with that of hovering."""
     rate: Vec3 = ZERO
-    """Body rates then, as the rate loop of the vehicle file follows, rad/s."""
+    """Body rates at that moment, modelled with the rate loop of the vehicle file, rad/s."""
     commands: tuple[tuple[float, Ctbr], ...] = ()
-    """For how long each is held, s, and the command; oldest first. Together no longer than the latency."""
+    """How long each command is held, s, and the command, oldest first. All together last at most for the latency."""
 
 
 def thrust_of(vehicle: Vehicle, speeds: Sequence[float]) -> float | None:
-    """The collective thrust over mass of rotors that turn so fast, rad/s, m/s^2; None: not all of them are measured."""
+    """The collective thrust over mass, m/s^2, of rotors with these speeds, rad/s. None: not all speeds are measured."""
     if len(speeds) != 4 or min(speeds) <= 0:
         return None
     return float(sum(map(vehicle.rotor_thrust, speeds)) / vehicle.mass)
 
 
 def residue(latency: float) -> float:
-    """The latency that gains must allow for where the motion is predicted, s: a third, as a prediction errs."""
+    """The latency for which the gains must be chosen if the motion is predicted, s.
+
+    It is a third of the latency, because a prediction has errors.
+    """
     return latency / 3
 
 
 def sent(before: UnderWay, command: Ctbr, seconds: float, vehicle: Vehicle, latency: float) -> UnderWay:
-    """What is under way after a command was held for some seconds.
+    """The commands under way after a command was held for some time.
 
     Args:
-        before: until then.
-        command: that was sent.
-        seconds: for how long it was the newest.
-        vehicle: with the motors' lag.
-        latency: from the vehicle's motion to its rate loop, s.
+        before: the commands under way before.
+        command: the command that was sent.
+        seconds: how long it was the newest command, s.
+        vehicle: the vehicle, whose motor lag and rate gains are used.
+        latency: the time from the vehicle's motion to its rate loop, s.
     """
     low, high = (4 * float(limit) / float(vehicle.mass) for limit in vehicle.thrust_range)
     given = namespace(command.thrust).clip(command.thrust, low, high)
@@ -86,39 +92,40 @@ def sent(before: UnderWay, command: Ctbr, seconds: float, vehicle: Vehicle, late
 
 
 def slipped(before: Vec3, seen: Seen, under_way: UnderWay, dt: float) -> Vec3:
-    """By how much the body turns faster than it is told, rad/s: what a steady torque does to a rate loop.
+    """How much faster the body turns than commanded, rad/s. A steady torque on a rate loop has this effect.
 
     Args:
-        before: so far.
+        before: the slip so far.
         seen: the motion.
-        under_way: with what it was told.
-        dt: since the last control step, s.
+        under_way: the commands under way, with the expected body rates.
+        dt: time since the last control step, s.
     """
     off = seen.body_rate - under_way.rate
     return (before + (off - before) * (1 - math.exp(-dt / SLIP_S))).clip(SLIP)
 
 
 def _left(vehicle: Vehicle, seconds: float) -> Vec3:
-    """What is left of an error of the body rates after some seconds."""
+    """The share of an error of the body rates that is left after some seconds."""
     return Vec3(*(math.exp(-float(gain) * seconds) for gain in vehicle.rate_gain))
 
 
 def ahead(
     vehicle: Vehicle, seen: Seen, under_way: UnderWay, pushed: Vec3 = ZERO, slip: Vec3 = ZERO
 ) -> tuple[Seen, Array]:
-    """The motion in which the next command will find the vehicle, when all that is under way has acted.
+    """Predict the motion that the vehicle will have when all commands under way have acted and the next one begins to.
 
-    The rate loop follows its setpoint as a lag of its gain, the rotors theirs as a lag of the motors.
+    The body rates follow their setpoint with a first-order lag that is given by the rate gains. The rotors follow
+    theirs with the lag of the motors.
 
     Args:
-        vehicle: as loaded.
-        seen: the motion that is known.
-        under_way: what was sent since.
-        pushed: what else accelerates it, world, m/s^2.
-        slip: by how much it turns faster than it is told, rad/s.
+        vehicle: the loaded vehicle.
+        seen: the measured motion.
+        under_way: the commands that were sent but do not act yet.
+        pushed: acceleration caused by everything but the rotors and gravity, world, m/s^2.
+        slip: how much faster the body turns than commanded, rad/s.
 
     Returns:
-        That motion, and the collective thrust over mass then, m/s^2.
+        The predicted motion, and the collective thrust over mass at that time, m/s^2.
     """
     position, velocity, attitude, rate, thrust = (
         seen.position, seen.velocity, seen.attitude, seen.body_rate, under_way.thrust,
