@@ -103,7 +103,7 @@ def higher(found: Found) -> Verdict:
         right.append(ours > other)
         told.append(f"{task}: {ours:.4f} and {other:.4f}")
     return verdict(
-        right, told, "mean reward of a step at the end of the runs that took all steps, BPTT and PPO", len(TASKS)
+        right, told, "mean reward of a step at the end of all steps, BPTT and PPO", len(TASKS)
     )
 
 
