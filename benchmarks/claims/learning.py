@@ -102,9 +102,7 @@ def higher(found: Found) -> Verdict:
         ours, other = (mean([one["converged"]["reward"] for one in runs]) for runs in (bptt, ppo))
         right.append(ours > other)
         told.append(f"{task}: {ours:.4f} and {other:.4f}")
-    return verdict(
-        right, told, "mean reward of a step at the end of all steps, BPTT and PPO", len(TASKS)
-    )
+    return verdict(right, told, "mean reward of a step at the end of all steps, BPTT and PPO", len(TASKS))
 
 
 def accomplished(algo: str, variant: str) -> Any:
