@@ -18,7 +18,7 @@ from e2efly.deploy.policy.runtime import Runtime, act, begin
 from e2efly.registry import load
 from e2efly.tasks import TASKS
 from e2efly.tasks.route import course_for, route_of
-from tests.learn.test_runner import compile_once
+from tests.learn.one_program import compile_once
 
 pytestmark = pytest.mark.usefixtures("quick")
 

@@ -14,7 +14,7 @@ from e2efly.cli import run
 from e2efly.commands.train import parse
 from e2efly.learn.judge import verdict
 from e2efly.vehicles import vehicle_file
-from tests.learn.test_runner import compile_once
+from tests.learn.one_program import compile_once
 
 pytestmark = pytest.mark.usefixtures("quick")
 

@@ -13,7 +13,8 @@ from e2efly.config import TrainConfig
 from e2efly.learn.ablation import FULL, Kept, ablate
 from e2efly.learn.rundir import RunDirectory
 from e2efly.learn.runner import train
-from tests.learn.test_runner import Silent, compile_once
+from tests.learn.one_program import compile_once
+from tests.learn.test_runner import Silent
 
 
 def small(algo: str, steps: int = 4096) -> TrainConfig:

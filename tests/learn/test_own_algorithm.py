@@ -10,7 +10,7 @@ import e2efly
 from e2efly.cli import run
 from e2efly.config import ALGORITHMS, AlgorithmConfig
 from e2efly.learn.programs import traced_folder
-from tests.learn.test_runner import compile_once
+from tests.learn.one_program import compile_once
 
 pytestmark = pytest.mark.usefixtures("quick")
 

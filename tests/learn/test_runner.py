@@ -21,12 +21,12 @@ from e2efly.config import ALGORITHMS, TrainConfig
 from e2efly.episodes import Episodes
 from e2efly.learn import runner
 from e2efly.learn.checkpoint import read_about
-from e2efly.learn.programs import Programs
 from e2efly.learn.rundir import RunDirectory, from_json, to_json
 from e2efly.learn.runner import NonFiniteError, train
 from e2efly.learn.setup import Setup
 from e2efly.tasks import TASKS
 from tests.conftest import QUICK
+from tests.learn.one_program import compile_once
 
 SMALL = ["--steps", "6144", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16", "--algo.horizon", "16",
          "--network.hidden", "8", "--task.episode-s", "1", "--no-plots"]  # fmt: skip
@@ -56,18 +56,6 @@ class Silent:
     def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
         del total, rate, best
         self.seen.append((steps, success))
-
-
-def compile_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs of a test that differ in numbers alone share the programs of the first."""
-    compiled, programs = Programs.compile, []
-
-    def first(*args: Any) -> Programs:
-        if not programs:
-            programs.append(compiled(*args))
-        return programs[0]
-
-    monkeypatch.setattr(Programs, "compile", staticmethod(first))
 
 
 def small(task: str = "hover", algo: str = "ppo", **changes: Any) -> TrainConfig:

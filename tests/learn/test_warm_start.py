@@ -20,7 +20,7 @@ from e2efly.learn.setup import Setup
 from e2efly.learn.warm_start import started_from
 from e2efly.presets import begun
 from e2efly.zoo import policy_file
-from tests.learn.test_runner import compile_once
+from tests.learn.one_program import compile_once
 
 pytestmark = pytest.mark.usefixtures("quick")
 

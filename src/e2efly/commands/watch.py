@@ -122,13 +122,12 @@ def _logs(what: tuple[str, ...]) -> list[Path]:
     logs = [Path(text) for text in what if Path(text).suffix.lower() in LOGS]
     if len(what) > 1 and len(logs) < len(what):
         raise ValueError(f"WHAT is {' '.join(what)}; accepted: one policy or run, or several flight logs")
-    for path in logs:
-        if not path.exists():
-            raise ValueError(f"flight log {str(path)!r} does not exist")
     for text in what:
-        if (os.sep in text or text.endswith((".onnx", ".json"))) and ":" not in text and not Path(text).exists():
+        path = Path(text)
+        file = path in logs or (":" not in text and (os.sep in text or path.suffix in (".onnx", ".json")))
+        if file and not path.exists():
             accepted = "a task, a policy.onnx, a run's folder, a flight log, a report of `e2efly validate --json`"
-            raise ValueError(f"there is no file or folder {text!r}; accepted: {accepted}")
+            raise ValueError(f"{text!r} does not exist; accepted: {accepted}")
     return logs
 
 

@@ -130,8 +130,9 @@ def _fit(
         return float(np.sum(costs) + 0.5 * np.sum((p / prior_p) ** 2) + 0.5 * np.sum((q / prior_q) ** 2))
 
     damping, i = 1e-3, 0
-    cost = total(p, q, _judged(model, p, q, starts, data, noise, free)[0])
-    terms = _terms(model, p, q, starts, data, noise, free)
+    at = partial(_at, model, data, free)
+    cost = total(p, q, at(_costs, p, q, starts, noise)["cost"])
+    terms = at(_slopes, p, q, starts, noise)
     for i in range(1, iterations + 1):
         H, g = _assembled(terms, windows.flight, flights, u, v)
         H += np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
@@ -143,8 +144,8 @@ def _fit(
             dp, dq = np.maximum(step[:u], least - p), step[u:].reshape(flights, v)
             both = np.concatenate([np.broadcast_to(dp, (windows.count, u)), dq[windows.flight]], 1)
             moved = starts - terms["gain"] - np.einsum("nij,nj->ni", terms["slope"], both)
-            costs, spread = _judged(model, p + dp, q + dq, moved, data, noise, free)
-            now = total(p + dp, q + dq, costs)
+            tried = at(_costs, p + dp, q + dq, moved, noise)
+            now = total(p + dp, q + dq, tried["cost"])
             if np.isfinite(now) and now < cost:
                 break
             damping *= 10
@@ -153,12 +154,13 @@ def _fit(
         gained = cost - now
         p, q, starts, cost, damping = p + dp, q + dq, moved, now, max(damping / 10, 1e-9)
         told(i, cost)
+        spread = _spread(tried, noise)
         settled = all(abs(np.log(spread[name] / noise[name])) < 0.02 for name in noise)
         still = np.abs(dp) < np.maximum(STILL * np.sqrt(np.diag(np.linalg.inv(H)))[:u], 1e-4)
         if not settled:
             noise = spread
-            cost = total(p, q, _judged(model, p, q, starts, data, noise, free)[0])
-        terms = _terms(model, p, q, starts, data, noise, free)
+            cost = total(p, q, at(_costs, p, q, starts, noise)["cost"])
+        terms = at(_slopes, p, q, starts, noise)
         if settled and (gained < 1e-3 or np.all(still)):
             break
     H, _ = _assembled(terms, windows.flight, flights, u, v)
@@ -184,7 +186,7 @@ def cost(model: Model, windows: Windows, p: np.ndarray) -> float:
     with jax.enable_x64(True):
         noise = {name: NOISE[name] for name in windows.measured}
         q, starts = np.zeros((int(windows.flight.max()) + 1, len(NUISANCES))), np.zeros((windows.count, START))
-        return float(np.sum(_judged(model, p, q, starts, _data(model, windows), noise, FREE)[0]))
+        return float(np.sum(_at(model, _data(model, windows), FREE, _costs, p, q, starts, noise)["cost"]))
 
 
 def _by_batch(computed: Callable[[Any], Any], data: dict[str, np.ndarray]) -> Any:
@@ -225,52 +227,40 @@ def _guesses(windows: Windows, hover: float) -> dict[str, np.ndarray]:
     return found
 
 
-def _judged(
+def _at(
     model: Model,
+    data: dict[str, Any],
+    free: np.ndarray,
+    program: Callable[..., dict[str, Array]],
     p: np.ndarray,
     q: np.ndarray,
     starts: np.ndarray,
-    data: dict[str, Any],
     noise: dict[str, float],
-    free: np.ndarray,
-) -> tuple[np.ndarray, dict[str, float]]:
-    """The cost of each window, and the spread of each sensor about the model.
+) -> dict[str, np.ndarray]:
+    """What `_costs` or `_slopes` says of each window at these unknowns, nuisances and starts."""
+    n = len(starts)
+    moved = np.concatenate([starts, np.zeros((len(data["counts"]) - n, START))])
+    found = _by_batch(partial(program, model, p, q, noise, free), {**data, "moved": moved})
+    return {k: x[:n] for k, x in found.items()}
 
-    It needs no derivatives, which are the most expensive part.
-    """
-    found = _by_batch(partial(_costs, model, p, q, noise, free), _begun(data, starts))
+
+def _spread(found: dict[str, np.ndarray], noise: dict[str, float]) -> dict[str, float]:
+    """The spread of each sensor about the model, from what `_costs` says."""
     spread = {}
     for name in noise:
         # only windows that have this sensor count
         squares, there = found[f"square/{name}"], found[f"sum/{name}"]
         mean = np.where(there > 0, squares / np.maximum(there, 1), np.nan)
         spread[name] = max(float(np.sqrt(np.nanquantile(mean, CALM))), FLOOR[name])
-    return found["cost"][: len(starts)], spread
-
-
-def _terms(
-    model: Model,
-    p: np.ndarray,
-    q: np.ndarray,
-    starts: np.ndarray,
-    data: dict[str, Any],
-    noise: dict[str, float],
-    free: np.ndarray,
-) -> dict[str, np.ndarray]:
-    """Gradient and curvature of each window after its start has been eliminated."""
-    found = _by_batch(partial(_slopes, model, p, q, noise, free), _begun(data, starts))
-    return {k: x[: len(starts)] for k, x in found.items()}
-
-
-def _begun(data: dict[str, Any], starts: np.ndarray) -> dict[str, Any]:
-    """The arrays of all windows, with the corrections of their starts."""
-    return {**data, "moved": np.concatenate([starts, np.zeros((len(data["counts"]) - len(starts), START))])}
+    return spread
 
 
 @jax.jit
 def _costs(
     model: Model, p: Array, q: Array, noise: dict[str, Any], free: Array, data: dict[str, Any]
 ) -> dict[str, Array]:
+    """The cost and the squared residuals of each window. It needs no derivatives, which are the most expensive part."""
+
     def one(data: dict[str, Any]) -> dict[str, Array]:
         left = _residuals(model, p, q[data["flight"]], data["moved"], data, noise)
         costs = sum(jnp.sum(_huber(left[name] / noise[name])) for name in noise)
@@ -287,6 +277,7 @@ def _costs(
 def _slopes(
     model: Model, p: Array, q: Array, noise: dict[str, Any], free: Array, data: dict[str, Any]
 ) -> dict[str, Array]:
+    """Gradient and curvature of each window after its start has been eliminated."""
     return jax.vmap(partial(_window, model, p, q, noise, free))(data)
 
 
