@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 import pytest
 
 from e2efly.deploy.betaflight.client import Client, Reply
-from e2efly.deploy.betaflight.instruments import ARM, FAILSAFE, OVERRIDE, Instruments, Reading
+from e2efly.deploy.betaflight.instruments import Instruments, Reading
 from e2efly.deploy.betaflight.messages import Rc, StatusEx
+from e2efly.deploy.betaflight.modes import ARM, FAILSAFE, OVERRIDE
 from e2efly.deploy.pilot.flight_state import Mission
 from e2efly.deploy.settings import FlightSettings
 from tests.deploy.test_msp_client import Wire
@@ -20,6 +21,7 @@ class Info:
     """What `Instruments` needs to know of a controller."""
 
     box_ids: tuple[int, ...] = BOXES
+    api: tuple[int, int] = (1, 46)
 
 
 @dataclass

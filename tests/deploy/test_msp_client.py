@@ -13,6 +13,7 @@ from e2efly.deploy.betaflight.client import FORGOTTEN, MAX_BACKLOG, MAX_IN_FLIGH
 from e2efly.deploy.betaflight.codec import ERROR, REPLY, Decoder, Frame, encode
 from e2efly.deploy.betaflight.controller import identify
 from e2efly.deploy.betaflight.link import MOST, open_link
+from e2efly.deploy.betaflight.modes import ARM, OVERRIDE
 from tests.deploy.msp_golden import REPLIES, payload
 
 STICKS = messages.set_raw_rc([1500] * 8)
@@ -402,8 +403,8 @@ def test_identify_the_recorded_controller() -> None:
     assert info.rates.rates_type == "ACTUAL"
     assert info.throttle.min_check == info.rx.min_check == 1040
     assert info.rx_map.letters == "TAER1234"
-    assert info.ranges("ARM") == (settings.ModeRange(0, 0, 1700, 2100),)
-    assert info.ranges("MSP OVERRIDE") == ()
+    assert info.slots(ARM) == (settings.ModeRange(0, 0, 1700, 2100),)
+    assert info.slots(OVERRIDE) == ()
     assert info.failsafe.delay == pytest.approx(1.2)
 
 

@@ -30,9 +30,9 @@ def test_settings_as_they_were_made() -> None:
     assert rx.smoothing
     assert golden(settings.RxMap).letters == "TAER1234"
     assert golden(settings.FailsafeConfig).delay == pytest.approx(1.2)
-    assert golden(settings.ModeRanges).ranges == (
-        settings.ModeRange(0, 0, 1700, 2100),
-        settings.ModeRange(28, 1, 900, 2100),
+    assert settings.mode_ranges(golden(settings.ModeRanges), golden(settings.ModeLogic)) == (
+        settings.ModeRange(0, 0, 1700, 2100, 0),
+        settings.ModeRange(28, 1, 900, 2100, 1),
     )
     tuning = golden(settings.RcTuning)
     assert tuning.rates == settings.RateProfile("ACTUAL", (7, 7, 7), (67, 67, 67), (0, 0, 0))

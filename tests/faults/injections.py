@@ -9,8 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from e2efly.deploy.betaflight.instruments import FAILSAFE
 from e2efly.deploy.betaflight.messages import RawImu, StatusEx
+from e2efly.deploy.betaflight.modes import FAILSAFE
 from e2efly.deploy.odometry import Sample
 from e2efly.validation.sitl import FirmwareState
 from tests.faults.injected_poses import POSES

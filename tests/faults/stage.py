@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from e2efly.deploy.betaflight.check import examine, problems
+from e2efly.deploy.betaflight.check import examine
 from e2efly.deploy.betaflight.link import open_link
+from e2efly.deploy.betaflight.row import problems
 from e2efly.deploy.odometry import tilt_of
 from e2efly.deploy.pilot.flight_state import Mode, Reason
 from e2efly.deploy.policy.loader import Policy

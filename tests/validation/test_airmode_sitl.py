@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.deploy.betaflight.check import examine, problems
+from e2efly.deploy.betaflight.check import examine
 from e2efly.deploy.betaflight.messages import set_raw_rc
+from e2efly.deploy.betaflight.row import problems
 from e2efly.deploy.betaflight.settings import PidAdvanced
 from e2efly.deploy.pilot.flight_state import Mode
 from e2efly.validation import firmware, rig

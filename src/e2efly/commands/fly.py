@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import tyro
 
 from e2efly import __version__
-from e2efly.commands.fly_check import look, refuse_in_flight, settings_table
+from e2efly.commands.fly_check import look, print_settings, refuse_in_flight
 from e2efly.commands.options import parse as parse_options
-from e2efly.deploy.betaflight.check import Row, check_hover, examine, hover_schedule, problems
+from e2efly.deploy.betaflight.check import check_hover, examine, hover_schedule
 from e2efly.deploy.betaflight.client import SCHEDULE, Client
 from e2efly.deploy.betaflight.controller import ControllerInfo, identify
 from e2efly.deploy.betaflight.link import Link, open_link
+from e2efly.deploy.betaflight.row import Row, problems
 from e2efly.deploy.betaflight.watchdog import WatchedLink
 from e2efly.deploy.bridge import Bridge
 from e2efly.deploy.commander.commander import Commander, CommandSource
@@ -82,8 +83,8 @@ class Fly:
     vehicle: str | None = None
     """A shipped vehicle or a .toml file. If omitted, the policy's vehicle."""
     check: bool = False
-    """Only check, and send no stick commands. Print every relevant setting: its value, the required value, and how to
-    correct it."""
+    """Only check, and send no stick commands. Print every relevant setting, its value and the required value, and the
+    lines that correct them."""
     log: Path | None = None
     """Flight log to write. If omitted, flights/DATE.mcap."""
     live: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
@@ -206,7 +207,7 @@ def run(options: Fly) -> int:
         info = _connect(client, options.link)
         check_hover(options.hover, hover, info)
         rows = examine(info, body, settings, contract)
-        console.print(settings_table(rows))
+        print_settings(console, rows)
         worker = _worker(runtime, commands, body, options)
         if worker is not None:
             stack.callback(worker.close)
@@ -217,7 +218,7 @@ def run(options: Fly) -> int:
         )  # fmt: skip
         source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:
-            return look(bridge, source, console, rows, policy)
+            return look(bridge, source, console, rows, policy, contract)
         refuse_in_flight(bridge)
         service = Service()
         stack.callback(service.close)

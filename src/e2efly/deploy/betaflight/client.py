@@ -20,7 +20,7 @@ MESSAGES: dict[int, Any] = {
         messages.ApiVersion, messages.FcVariant, messages.FcVersion, messages.BuildInfo, messages.Name,
         messages.StatusEx, messages.RawImu, messages.Motor, messages.MotorTelemetry, messages.Rc,
         messages.AttitudeReply, messages.Analog, messages.BatteryState, messages.Debug, settings.ModeRanges,
-        settings.FeatureConfig, settings.BoardAlignment,
+        settings.ModeLogic, settings.FeatureConfig, settings.BoardAlignment,
         settings.MixerConfig, settings.RxConfig, settings.RxMap, settings.FailsafeConfig, settings.RxFailConfig,
         settings.AdvancedConfig, settings.PidAdvanced, settings.RcTuning, settings.BoxIds, settings.RcDeadband,
         settings.MotorConfig,

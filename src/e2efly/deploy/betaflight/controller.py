@@ -5,7 +5,6 @@ from typing import Any
 
 from e2efly.deploy.betaflight import messages, settings, settings_by_name
 from e2efly.deploy.betaflight.client import Client, ask
-from e2efly.deploy.betaflight.names import BOXES
 from e2efly.deploy.betaflight.rates import RateProfile
 from e2efly.deploy.betaflight.throttle_curve import ThrottleCurve
 from e2efly.deploy.betaflight.versions import Release, release_of, version_text
@@ -48,7 +47,7 @@ class ControllerInfo:
     rx_fail: settings.RxFailConfig
     """What each channel becomes in that case."""
     modes: tuple[settings.ModeRange, ...]
-    """Which switches make which modes active."""
+    """Which switches make which modes active: the slots of `aux` that are in use."""
     box_ids: tuple[int, ...]
     """Permanent ids of the modes that the controller knows, in the order of the bits of `StatusEx.boxes`."""
     motor: settings.MotorConfig
@@ -78,9 +77,9 @@ class ControllerInfo:
         """The value of a setting by its name in the command line. None: this controller does not report it."""
         return dict(self.by_name).get(setting)
 
-    def ranges(self, mode: str) -> tuple[settings.ModeRange, ...]:
-        """The switch ranges that make a mode of `BOXES` active, by name."""
-        return tuple(entry for entry in self.modes if BOXES.get(entry.box) == mode)
+    def slots(self, box: int) -> tuple[settings.ModeRange, ...]:
+        """The slots of `aux` that make a mode active, by its permanent id."""
+        return tuple(slot for slot in self.modes if slot.box == box)
 
 
 def identify(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -> ControllerInfo:
@@ -116,7 +115,7 @@ def identify(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -
         deadband=get(settings.RcDeadband),
         failsafe=get(settings.FailsafeConfig),
         rx_fail=get(settings.RxFailConfig),
-        modes=get(settings.ModeRanges).ranges,
+        modes=settings.mode_ranges(get(settings.ModeRanges), get(settings.ModeLogic)),
         box_ids=get(settings.BoxIds).ids,
         motor=get(settings.MotorConfig),
         advanced=get(settings.AdvancedConfig),

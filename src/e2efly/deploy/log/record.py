@@ -7,8 +7,8 @@ from typing import Any, Protocol
 from e2efly.control import Ctbr
 from e2efly.deploy.betaflight.client import Client, Reply
 from e2efly.deploy.betaflight.controller import ControllerInfo
-from e2efly.deploy.betaflight.instruments import ARM
 from e2efly.deploy.betaflight.messages import AttitudeReply, BatteryState, Motor, RawImu, Rc, StatusEx
+from e2efly.deploy.betaflight.modes import ARM
 from e2efly.deploy.commander.commander import Commander
 from e2efly.deploy.filter.guard import Change
 from e2efly.deploy.odometry import Odometry

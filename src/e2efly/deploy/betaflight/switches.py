@@ -1,0 +1,148 @@
+"""The pilot's switches in the table of `e2efly fly --check`: the modes that a flight needs, and those that it forbids.
+
+A mode that is not known to be harmless must be off while MSP OVERRIDE is on and while the vehicle is armed. A slot of
+`aux` that contradicts this is refused. Where a mode has a switch of its own, only the controller's flags tell whether
+it is on: see `instruments`. Slots that act together with others are judged as if each acted alone, so that a mode
+counts as on wherever it may be on.
+"""
+
+from dataclasses import dataclass, field, replace
+
+from e2efly.deploy.betaflight.controller import ControllerInfo
+from e2efly.deploy.betaflight.modes import ANGLE, ARM, OVERRIDE, harmless, named_mode
+from e2efly.deploy.betaflight.names import BOXES
+from e2efly.deploy.betaflight.row import Row
+from e2efly.deploy.betaflight.settings import ModeRange
+from e2efly.deploy.betaflight.sticks import RATES_PULSE, angle_range
+from e2efly.deploy.settings import FlightSettings
+
+SLOTS, AUX_CHANNELS = 20, 14
+"""Number of slots of `aux`, and of AUX channels, that a controller has."""
+GUIDE = {
+    ARM: ModeRange(ARM, 0, 1700, 2100),
+    OVERRIDE: ModeRange(OVERRIDE, 1, 1700, 2100),
+    ANGLE: ModeRange(ANGLE, 2, 925, 2100),
+}
+"""The ranges of the guide. Their channels are proposed where they are free."""
+ALWAYS = (1000, 2000)
+"""A mode whose range contains all pulses between these is on whatever the position of its switch, us."""
+
+
+@dataclass
+class _Plan:
+    """Where the modes that a flight needs can be put."""
+
+    slots: tuple[ModeRange, ...]
+    """The slots that are in use."""
+    taken: set[int]
+    """The AUX channels that are no place for them."""
+    free: list[int] = field(init=False)
+    """The numbers of the slots that are not in use."""
+
+    def __post_init__(self) -> None:
+        self.free = sorted(set(range(SLOTS)) - {slot.slot for slot in self.slots})
+
+    def put(self, box: int, old: ModeRange | None) -> ModeRange | None:
+        """A slot for a mode on a channel of its own, in place of its old slot. None: no slot or no channel is free."""
+        used = self.taken | {slot.aux for slot in self.slots if slot is not old}
+        places = [*([] if old is None or old.linked else [old.aux]), GUIDE[box].aux, *range(AUX_CHANNELS)]
+        aux = next((aux for aux in places if aux not in used), None)
+        if aux is None or (old is None and not self.free):
+            return None
+        self.taken.add(aux)
+        return replace(GUIDE[box], aux=aux, slot=self.free.pop(0) if old is None else old.slot)
+
+
+def switch_rows(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
+    """The rows of ARM, MSP OVERRIDE and ANGLE, and of each slot with a mode that is not known to be harmless."""
+    c = settings.channels
+    read = {"mission": c.mission, "roll": c.roll, "pitch": c.pitch, "throttle": c.throttle, "yaw": c.yaw}
+    bridge = {channel - 5: name for name, channel in read.items() if channel is not None}
+    plan, arm = _Plan(info.modes, set(bridge)), {slot.aux for slot in info.slots(ARM)}
+    rows = [_switch(info, plan, box, others) for box, others in ((ARM, {*bridge}), (OVERRIDE, {*bridge, *arm}))]
+    angle, have = angle_range(info), info.slots(ANGLE)
+    good, old = angle is not None and angle.aux not in bridge, angle or (have[0] if have else None)
+    new = None if good else plan.put(ANGLE, old)
+    rows.append(
+        Row("range of ANGLE", where(*have), "925 to 2100 on a channel of its own: on, but for the "
+            f"{RATES_PULSE} us that the bridge sends there", good, _lines(new, old))
+    )  # fmt: skip
+    rows += _of_angle(info, (angle if good else new) or GUIDE[ANGLE], good=good)
+    for slot in info.modes:
+        if slot is not old and slot.box not in (ARM, OVERRIDE) and not harmless(slot.box, info.api):
+            why = _why_not(slot, info, bridge)
+            rows.append(
+                Row(f"aux {slot.slot}, {named_mode(slot.box)},", where(slot), why or "any: off before take-off",
+                    not why, (_off(slot),) if why else ())
+            )  # fmt: skip
+    return rows
+
+
+def _switch(info: ControllerInfo, plan: _Plan, box: int, others: set[int]) -> Row:
+    """ARM or MSP OVERRIDE. `others` are the channels that it must not have."""
+    have = info.slots(box)
+    wrong = [slot for slot in have if slot.linked or _always(slot) or slot.aux in others]
+    mend = tuple(map(_off, wrong))
+    if len(wrong) == len(have):  # none is left
+        old = wrong[0] if wrong else None
+        mend = _lines(plan.put(box, old), old) + mend[1:]
+    needed = "a switch of the pilot's on a channel of its own, not always on"
+    return Row(f"switch of {BOXES[box]}", where(*have), needed, bool(have) and not wrong, mend)
+
+
+def _of_angle(info: ControllerInfo, angle: ModeRange, *, good: bool) -> list[Row]:
+    """What else the channel of ANGLE needs. `good`: it is what the controller has, and not a proposal."""
+    place = 4 + angle.aux
+    mask = 15 | 1 << (info.rx_map.channel[place] if place < len(info.rx_map.channel) else place)
+    known = OVERRIDE in info.box_ids
+    fail = info.rx_fail.channels[place : place + 1]
+    levels = not fail or (fail[0][0] == "SET" and angle.low <= fail[0][1] < angle.high)
+    return [
+        Row("msp_override_channels_mask", "set" if known else "0", f"{mask}: the sticks and AUX{angle.aux + 1} of "
+            "ANGLE (tried before arming)", known and good, (f"set msp_override_channels_mask={mask}",)),
+        Row(f"rxfail of AUX{angle.aux + 1}", f"{fail[0][0]} {fail[0][1]} us" if fail else "not told",
+            "SET within ANGLE's range: level without the receiver", levels, (f"rxfail {place} s 2000",)),
+    ]  # fmt: skip
+
+
+def _why_not(slot: ModeRange, info: ControllerInfo, bridge: dict[int, str]) -> str:
+    """What is needed of a slot with a mode that may do harm. Empty: it is as needed."""
+    if slot.linked:
+        return "no link: it can be on at any time"
+    if _always(slot):
+        return "a range that a switch can leave: it is always on"
+    for held in (*info.slots(OVERRIDE), *info.slots(ARM)):
+        if slot.overlaps(held):
+            return f"off while {BOXES[held.box]} is on, {where(held)}"
+    if slot.aux in bridge:
+        name = bridge[slot.aux]
+        return f"off, or --flight.channels.{name} other than {slot.aux + 5}: the bridge reads this channel"
+    return ""
+
+
+def _always(slot: ModeRange) -> bool:
+    return slot.low <= ALWAYS[0] and slot.high >= ALWAYS[1]
+
+
+def where(*slots: ModeRange) -> str:
+    """The channels and ranges of slots, in words."""
+    said = (
+        f"linked to {named_mode(slot.linked)}"
+        if slot.linked
+        else f"AUX{slot.aux + 1} {slot.low} to {slot.high}{' together with others' * slot.every}"
+        for slot in slots
+    )
+    return ", ".join(said) or "none"
+
+
+def _lines(new: ModeRange | None, old: ModeRange | None) -> tuple[str, ...]:
+    """The line for the command line that writes a slot, and what it replaces."""
+    if new is None:
+        return ()
+    line = f"aux {new.slot} {new.box} {new.aux} {new.low} {new.high} 0 0"
+    return (line + (f"  # in place of {named_mode(old.box)}, {where(old)}" if old else ""),)
+
+
+def _off(slot: ModeRange) -> str:
+    """The line that empties a slot."""
+    return _lines(ModeRange(0, 0, 900, 900, slot.slot), slot)[0]
