@@ -6,6 +6,7 @@ it is on: see `instruments`. Slots that act together with others are judged as i
 counts as on wherever it may be on.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from e2efly.deploy.betaflight.controller import ControllerInfo
@@ -25,7 +26,7 @@ GUIDE = {
 }
 """The ranges of the guide. Their channels are proposed where they are free."""
 ALWAYS = (1000, 2000)
-"""A mode whose range contains all pulses between these is on whatever the position of its switch, us."""
+"""A mode that all pulses between these make active is on whatever the position of its switch, us."""
 
 
 @dataclass
@@ -68,20 +69,24 @@ def switch_rows(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
             f"{RATES_PULSE} us that the bridge sends there", good, _lines(new, old))
     )  # fmt: skip
     rows += _of_angle(info, (angle if good else new) or GUIDE[ANGLE], good=good)
-    for slot in info.modes:
-        if slot is not old and slot.box not in (ARM, OVERRIDE) and not harmless(slot.box, info.api):
-            why = _why_not(slot, info, bridge)
-            rows.append(
-                Row(f"aux {slot.slot}, {named_mode(slot.box)},", where(slot), why or "any: off before take-off",
-                    not why, (_off(slot),) if why else ())
-            )  # fmt: skip
+    doubtful = [
+        slot
+        for slot in info.modes
+        if slot is not old and slot.box not in (ARM, OVERRIDE) and not harmless(slot.box, info.api)
+    ]
+    for slot in doubtful:
+        why = _why_not(slot, doubtful, info, bridge)
+        rows.append(
+            Row(f"aux {slot.slot}, {named_mode(slot.box)},", where(slot), why or "any: off before take-off", not why,
+                (_off(slot),) if why else ())
+        )  # fmt: skip
     return rows
 
 
 def _switch(info: ControllerInfo, plan: _Plan, box: int, others: set[int]) -> Row:
     """ARM or MSP OVERRIDE. `others` are the channels that it must not have."""
     have = info.slots(box)
-    wrong = [slot for slot in have if slot.linked or _always(slot) or slot.aux in others]
+    wrong = [slot for slot in have if slot.linked or _always(slot, have) or slot.aux in others]
     mend = tuple(map(_off, wrong))
     if len(wrong) == len(have):  # none is left
         old = wrong[0] if wrong else None
@@ -105,12 +110,12 @@ def _of_angle(info: ControllerInfo, angle: ModeRange, *, good: bool) -> list[Row
     ]  # fmt: skip
 
 
-def _why_not(slot: ModeRange, info: ControllerInfo, bridge: dict[int, str]) -> str:
-    """What is needed of a slot with a mode that may do harm. Empty: it is as needed."""
+def _why_not(slot: ModeRange, doubtful: Iterable[ModeRange], info: ControllerInfo, bridge: dict[int, str]) -> str:
+    """What is needed of one of the slots with a mode that may do harm. Empty: it is as needed."""
     if slot.linked:
         return "no link: it can be on at any time"
-    if _always(slot):
-        return "a range that a switch can leave: it is always on"
+    if _always(slot, doubtful):
+        return "off at one position of its switch, and so what else is on this channel"
     for held in (*info.slots(OVERRIDE), *info.slots(ARM)):
         if slot.overlaps(held):
             return f"off while {BOXES[held.box]} is on, {where(held)}"
@@ -120,8 +125,10 @@ def _why_not(slot: ModeRange, info: ControllerInfo, bridge: dict[int, str]) -> s
     return ""
 
 
-def _always(slot: ModeRange) -> bool:
-    return slot.low <= ALWAYS[0] and slot.high >= ALWAYS[1]
+def _always(slot: ModeRange, slots: Iterable[ModeRange]) -> bool:
+    """Whether some of these slots leave no position of the slot's switch at which all of them are off."""
+    same = [other for other in slots if other.aux == slot.aux and not other.linked]
+    return all(any(other.low <= pulse < other.high for other in same) for pulse in range(*ALWAYS, 25))
 
 
 def where(*slots: ModeRange) -> str:
