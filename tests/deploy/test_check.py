@@ -3,11 +3,15 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 from rich.console import Console
+from rich.table import Table
 
-from e2efly.commands.fly_check import print_settings
+from e2efly.commands.fly_check import add_lags, mount, print_settings, print_table
 from e2efly.deploy.betaflight import messages, settings_by_name
 from e2efly.deploy.betaflight.check import NOT_TOLD, examine
 from e2efly.deploy.betaflight.client import MESSAGES, Client
@@ -18,8 +22,12 @@ from e2efly.deploy.betaflight.modes import ANGLE
 from e2efly.deploy.betaflight.row import Row, problems
 from e2efly.deploy.betaflight.settings import ModeRange, RxFailConfig
 from e2efly.deploy.betaflight.sticks import RATES_PULSE, sticks_of
+from e2efly.deploy.odometry import Sample
+from e2efly.deploy.policy.loader import load_policy
+from e2efly.deploy.pose.checks import Checks
 from e2efly.deploy.settings import FlightSettings
 from e2efly.vehicles import load_vehicle
+from e2efly.zoo import policy_file
 
 REPLIES: dict[str, dict[str, str]] = json.loads(
     (Path(__file__).parents[1] / "data" / "msp_releases.json").read_text(encoding="utf-8")
@@ -229,3 +237,28 @@ def test_the_table_says_which_settings_the_pilot_has_to_look_at(capsys: pytest.C
     assert marks["mixer_type"] == "look" and marks["thrust_linear"] == "ok"
     lines = [line for name in settings_by_name.NAMES for line in rows_of(recorded("2025.12.5"))[name].mend]
     assert out[-5:] == [*lines, "save"]
+
+
+@pytest.mark.parametrize("given", [None, np.zeros(3)])
+def test_the_report_says_how_late_the_velocities_are(
+    given: np.ndarray | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table, sample = Table(box=None), Sample(0.0, np.zeros(3), np.array([1.0, 0, 0, 0]), velocity=given)
+    bridge: Any = SimpleNamespace(estimate=SimpleNamespace(checks=Checks(velocity_cutoff=10.0)))
+    contract = load_policy(policy_file(Path("hover"))).contract
+    trained = replace(contract, observation_latency_range_s=(0.0, 0.02), latency_range_s=(0.05, 0.05))
+    add_lags(table, bridge, [sample], trained)
+    print_table(Console(width=30), table)
+    said = capsys.readouterr().out
+    assert ("estimated from the poses, 32 ms later" in said) == (given is None)
+    assert "body rate" in said and "estimated from the poses, 11 ms later" in said
+    assert "states 0 to 20 ms old, and 50 ms from observation to command" in said
+
+
+def test_the_report_says_where_the_camera_of_the_training_is() -> None:
+    (camera,) = load_policy(policy_file(Path("race_clutter"))).contract.images
+    turned = replace(camera, position_m=(0.1, -0.02, 0.03), pitch_rad=-0.35, fov_rad=(1.5, 1.0))
+    assert mount(turned) == (
+        "0.100 m before, -0.020 m left of and 0.030 m above the centre of mass, pitched up by 20.1 deg, "
+        "field of view 85.9 x 57.3 deg (pinhole)"
+    )

@@ -67,7 +67,7 @@ def rows_of(info: ControllerInfo) -> list[Row]:
 def test_turtle_mode_on_the_switch_of_override_is_refused_by_mode_channel_and_range() -> None:
     (problem,) = problems(rows_of(typed(BARE, TURTLE)))
     assert problem == (
-        "aux 3, FLIP OVER AFTER CRASH (mode 35), is AUX2 1700 to 2100; needed: off while MSP OVERRIDE is on, AUX2 1700 "
+        "aux 3: FLIP OVER AFTER CRASH (mode 35) is AUX2 1700 to 2100; needed: off while MSP OVERRIDE is on, AUX2 1700 "
         "to 2100 (aux 3 0 0 900 900 0 0  # in place of FLIP OVER AFTER CRASH (mode 35), AUX2 1700 to 2100)"
     )
 
@@ -78,7 +78,7 @@ def test_proposed_lines_use_free_slots_and_the_modes_own() -> None:
     assert rows["range of ANGLE"].mend == ("aux 3 1 2 925 2100 0 0  # in place of ANGLE (mode 1), AUX3 900 to 1300",)
     assert rows["msp_override_channels_mask"].mend == ("set msp_override_channels_mask=79",)
     assert rows["rxfail of AUX3"].mend == ("rxfail 6 s 2000",)
-    assert rows["aux 1, PARALYZE (mode 45),"].needed.startswith("off, or --flight.channels.roll other than 9: ")
+    assert rows["aux 1: PARALYZE (mode 45)"].needed.startswith("off, or --flight.channels.roll other than 9: ")
 
 
 FIELD = {
@@ -136,6 +136,14 @@ FIELD = {
         "0 0 0 1925 2100; 1 13 5 1850 2100; 2 28 6 1900 2100; 3 35 6 900 1150; 4 50 1 1700 2100; 5 1 2 925 2100",
         set(), {3},
     ),
+    "override at the end of the switch of ARM": (
+        "0 0 0 1300 2100; 1 50 0 1700 2100; 2 1 2 925 2100",
+        {"MSP OVERRIDE"}, set(),
+    ),
+    "a second switch that leaves no position for acro": (
+        "0 0 0 1700 2100; 1 50 1 1700 2100; 2 1 2 925 2100; 3 1 8 900 1300; 4 2 8 1300 2100",
+        set(), {3, 4},
+    ),
 }  # fmt: skip
 """Switches as pilots have them, rebuilt from public documents: the slots of `aux` without logic and link, the modes
 that a flight needs and that are not as needed, and the slots whose modes are refused."""
@@ -148,7 +156,7 @@ def test_switches_of_the_field_are_judged_by_what_they_do(slots: str, wrong: set
     )
     rows = [row for row in rows_of(info) if not row.good]
     assert {row.setting.split(" of ")[1] for row in rows if row.setting.startswith(("switch", "range"))} == wrong
-    assert {int(row.setting.split()[1].rstrip(",")) for row in rows if row.setting.startswith("aux")} == refused
+    assert {int(row.setting.split()[1].rstrip(":")) for row in rows if row.setting.startswith("aux")} == refused
 
 
 def test_a_number_counts_by_the_version_that_has_it() -> None:
@@ -190,7 +198,7 @@ def test_whatever_is_not_known_to_be_harmless_is_refused_where_it_may_be_on(slot
     on = slot.low < where.high and where.low < slot.high
     assert len(found) == (slot.box not in HARMLESS and (on or bool(slot.linked)))
     for text in found:
-        assert f"mode {slot.box})" in text or f"mode {slot.box}," in text
+        assert named_mode(slot.box) in text
         assert "aux 9 0 0 900 900 0 0" in text
 
 

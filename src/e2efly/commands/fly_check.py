@@ -1,6 +1,7 @@
 """What `e2efly fly` shows before a flight: the controller's settings, and with `--check` all that it receives."""
 
 import time
+from collections.abc import Sequence
 from math import degrees
 from pathlib import Path
 
@@ -46,12 +47,11 @@ def print_settings(console: Console, rows: tuple[Row, ...]) -> None:
         mark = Text("ok", "green") if row.good else Text("no", "bold red")
         mark = mark if row.told else Text("look", "yellow")
         table.add_row(mark, *map(_cell, (row.setting, row.value, row.needed)))
-    _print_table(console, table)
+    print_table(console, table)
     unknown = [row for row in rows if not row.told]
-    names = ", ".join(row.setting for row in unknown)
     for heading, lines in (
         ("# no: type these lines into the controller's command line", command_lines(r for r in rows if not r.good)),
-        (f"# look: type `get NAME` for {names}; where it shows another value, type", command_lines(unknown)),
+        ("# look: `get NAME` shows these; type the lines of those that are not as needed", command_lines(unknown)),
     ):
         for line in (heading, *lines, "save") if lines else ():
             console.print(line, markup=False, highlight=False, soft_wrap=True)
@@ -87,7 +87,7 @@ def look(
         time.sleep(0.005)
     table = Table(box=None, show_header=False, pad_edge=False)
     _add_poses(table, bridge, source, poses)
-    _add_lags(table, bridge, poses, contract)
+    add_lags(table, bridge, poses, contract)
     _add_images(table, bridge, [len(taken) / LOOK_S for taken in times], policy)
     if isinstance(bridge.worker, Commander):
         table.add_row("commands", _cell(_commands(bridge.worker, bridge)))
@@ -100,7 +100,7 @@ def look(
     table.add_row("battery", f"{bridge.inputs.voltage:.2f} V per cell" if bridge.inputs.voltage else "unknown")
     error = bridge.inputs.attitude_error
     table.add_row("attitude", "not heard" if error is None else f"controller and poses differ by {error:.3f} rad")
-    _print_table(console, table)
+    print_table(console, table)
     refusals = take_off_refusals(bridge.settings, bridge.flight, bridge.inputs)
     console.print("What stands against a take-off now:" if refusals else "Nothing stands against a take-off.")
     for refusal in refusals:
@@ -147,7 +147,7 @@ def _add_poses(table: Table, bridge: Bridge, source: PoseSource, poses: list[Sam
         table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")
 
 
-def _add_lags(table: Table, bridge: Bridge, poses: list[Sample], contract: Contract | None) -> None:
+def add_lags(table: Table, bridge: Bridge, poses: list[Sample], contract: Contract | None) -> None:
     """How late the velocities are, beyond the poses."""
     checks, newest = bridge.estimate.checks, poses[-1] if poses else None
     for name, given, lag in (
@@ -157,15 +157,21 @@ def _add_lags(table: Table, bridge: Bridge, poses: list[Sample], contract: Contr
         said = f"estimated from the poses, {1e3 * lag:.0f} ms later than they are"
         table.add_row(name, "the source's own: how late it is, only the source knows" if given else said)
     if contract is not None:
-        low, high = (1e3 * x for x in contract.observation_latency_range_s)
-        table.add_row("", f"the policy was trained with states that are {low:.0f} to {high:.0f} ms old")
+        states, delay = map(_milliseconds, (contract.observation_latency_range_s, contract.latency_range_s))
+        table.add_row("", f"the policy was trained with states {states} old, and {delay} from observation to command")
+
+
+def _milliseconds(span: Sequence[float]) -> str:
+    """A range of times, s, in words."""
+    low, high = (f"{1e3 * x:.0f}" for x in span)
+    return f"{low} ms" if low == high else f"{low} to {high} ms"
 
 
 def _add_images(table: Table, bridge: Bridge, rates: list[float], policy: Path | None) -> None:
     now = time.monotonic()
     for camera, seen, rate in zip(bridge.cameras, bridge.seen, rates, strict=True):
         table.add_row("image", _cell(_image(camera, seen, now, rate)))
-        table.add_row("", _cell(f"made for a camera {_mount(seen.camera)}"))
+        table.add_row("", _cell(f"made for a camera {mount(seen.camera)}"))
         if seen.frame is not None:
             pixels, path = colours(seen.frame.image, seen.camera), PICTURES / f"check_{seen.camera.name}.png"
             trained = None if policy is None else read_samples(policy, seen.camera)
@@ -183,19 +189,20 @@ def _image(camera: ImageSource, seen: Seen, now: float, rate: float) -> str:
         return f"not to be flown by, from {camera.describe()}: {said}"
     image, age = seen.frame.image, 1e3 * (now - seen.frame.time)
     values = f"values {image.min():.2f} to {image.max():.2f}, mean {image.mean():.2f}"
-    low, high = (1e3 * x for x in seen.camera.latency_range_s)
-    trained = f"{age:.0f} ms old (trained with {low:.0f} to {high:.0f}), {rate:.0f} Hz ({seen.camera.rate_hz:g})"
+    ages = _milliseconds(seen.camera.latency_range_s)
+    trained = f"{age:.0f} ms old (trained with {ages}), {rate:.0f} Hz ({seen.camera.rate_hz:g})"
     note = f"; {camera.problem}" if camera.problem else ""
     return f"{seen.camera.name} from {camera.describe()}: {values}; {trained}{note}"
 
 
-def _mount(camera: Image) -> str:
+def mount(camera: Image) -> str:
     """Where the camera of the policy's training is, how it is turned, and how much it sees, in words."""
     x, y, z = camera.position_m
     wide, high = map(degrees, camera.fov_rad)
+    turned = f"pitched {'up' if camera.pitch_rad < 0 else 'down'} by {abs(degrees(camera.pitch_rad)):.1f} deg"
     return (
-        f"{x:.3f} m before, {y:.3f} m left of and {z:.3f} m above the centre of mass, pitched down by "
-        f"{degrees(camera.pitch_rad):.1f} deg, field of view {wide:.1f} x {high:.1f} deg ({camera.projection})"
+        f"{x:.3f} m before, {y:.3f} m left of and {z:.3f} m above the centre of mass, {turned}, "
+        f"field of view {wide:.1f} x {high:.1f} deg ({camera.projection})"
     )
 
 
@@ -209,7 +216,7 @@ def _commands(commander: Commander, bridge: Bridge) -> str:
     return f"{counted}{mode}"
 
 
-def _print_table(console: Console, table: Table) -> None:
+def print_table(console: Console, table: Table) -> None:
     """Print a table. Into a file or a pipe its lines are whole, however long they are."""
     if not console.is_terminal:
         table.width = Measurement.get(console, console.options.update(width=WIDEST), table).maximum

@@ -77,7 +77,7 @@ def switch_rows(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
     for slot in doubtful:
         why = _why_not(slot, doubtful, info, bridge)
         rows.append(
-            Row(f"aux {slot.slot}, {named_mode(slot.box)},", where(slot), why or "any: off before take-off", not why,
+            Row(f"aux {slot.slot}: {named_mode(slot.box)}", where(slot), why or "any: off before take-off", not why,
                 (_off(slot),) if why else ())
         )  # fmt: skip
     return rows
@@ -103,8 +103,9 @@ def _of_angle(info: ControllerInfo, angle: ModeRange, *, good: bool) -> list[Row
     fail = info.rx_fail.channels[place : place + 1]
     levels = not fail or (fail[0][0] == "SET" and angle.low <= fail[0][1] < angle.high)
     return [
-        Row("msp_override_channels_mask", "set" if known else "0", f"{mask}: the sticks and AUX{angle.aux + 1} of "
-            "ANGLE (tried before arming)", known and good, (f"set msp_override_channels_mask={mask}",)),
+        Row("msp_override_channels_mask", "set, to what is not told" if known else "0", f"{mask}: the sticks and "
+            f"AUX{angle.aux + 1} of ANGLE (tried before arming)", known and good,
+            (f"set msp_override_channels_mask={mask}",)),
         Row(f"rxfail of AUX{angle.aux + 1}", f"{fail[0][0]} {fail[0][1]} us" if fail else "not told",
             "SET within ANGLE's range: level without the receiver", levels, (f"rxfail {place} s 2000",)),
     ]  # fmt: skip
