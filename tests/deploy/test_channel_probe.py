@@ -67,7 +67,7 @@ def test_angle_meddles_only_while_sticks_are_sent(sends: bool) -> None:
     client: Any = SimpleNamespace(
         latest={}, latency=0.0, link=link, message=lambda code, now, age: status if code == StatusEx.CODE else None
     )
-    info: Any = SimpleNamespace(box_ids=(0, 1, 50), api=(1, 46))
+    info: Any = SimpleNamespace(box_ids=(0, 1, 50), api=(1, 46), rate_profile=0)
     instruments = Instruments(client, FlightSettings())
     said = instruments.read(1.0, info, land=False, sends=sends).meddling
     assert said == ("ANGLE (mode 1) is on; accepted: off while the bridge flies",) * sends

@@ -23,6 +23,7 @@ class Info:
 
     box_ids: tuple[int, ...] = BOXES
     api: tuple[int, int] = (1, 46)
+    rate_profile: int = 0
 
 
 @dataclass
@@ -43,10 +44,11 @@ class Bench:
         channels: int = 12,
         disabled: tuple[str, ...] = (),
         land: bool = False,
+        rates: int = 0,
     ) -> Reading:
         self.now += 0.033
         boxes = sum(1 << BOXES.index(box) for box in on)
-        status = StatusEx(1e-3, frozenset(), boxes, 0.1, 0, 0, disabled, False)
+        status = StatusEx(1e-3, frozenset(), boxes, 0.1, 0, rates, disabled, False)
         sticks = [1500] * 7 + [mission, roll, 1500, 1500, 1500]
         for code, message in ((StatusEx.CODE, status), (Rc.CODE, Rc(tuple(sticks[:channels])))):
             self.client.latest[code] = Reply(message, self.now, 0.005)
@@ -132,6 +134,12 @@ def test_a_mode_that_is_on_and_not_known_to_be_harmless_is_named() -> None:
         for others in ((), (ARM,), (ARM, OVERRIDE)):
             assert bench.read(box, *others).meddling == (f"{name} is on; accepted: off while the bridge flies",)
     assert bench.read(OVERRIDE, ANGLE).meddling == ("ANGLE (mode 1) is on; accepted: off while the bridge flies",)
+
+
+def test_a_rate_profile_whose_rates_were_not_read_is_named() -> None:
+    """A switch of the pilot's may change it at any time, by `adjrange`."""
+    (said,) = Bench().read(OVERRIDE, rates=2).meddling
+    assert said == "rateprofile is 2; accepted: 0, whose rates were read: switch back, or start again"
 
 
 def test_a_vehicle_that_was_armed_in_turtle_mode_must_be_armed_again() -> None:

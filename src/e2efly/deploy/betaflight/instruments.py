@@ -51,7 +51,8 @@ class Reading:
     voltage: float | None
     """Voltage of a cell, V. None: the controller does not know it."""
     meddling: tuple[str, ...]
-    """The active modes that are not known to be harmless while the bridge flies, in words."""
+    """The active modes that are not known to be harmless while the bridge flies, and a rate profile that is not the one
+    whose rates were read, in words."""
     channels: Rc | None
     """The channels that the controller uses."""
     attitude: Attitude | None
@@ -114,6 +115,10 @@ class Instruments:
         channels: Rc | None = self.client.message(Rc.CODE, now, RC_PATIENCE * patience)
         idle = {FAILSAFE} if sends and OVERRIDE in active else {FAILSAFE, ANGLE}  # `failsafe` tells of FAILSAFE
         on = foreign(active - idle, info.api)
+        meddling = [f"{named_mode(box)} is on; accepted: off while the bridge flies" for box in sorted(on)]
+        if status is not None and status.rate_profile != info.rate_profile:
+            read = f"{info.rate_profile}, whose rates were read: switch back, or start again"
+            meddling.append(f"rateprofile is {status.rate_profile}; accepted: {read}")
         if status is not None and StatusEx.CODE in fresh:
             self._armed.hear(ARM in active)
             self._heard.hear(FAILSAFE not in active and not RECEIVER_LOST & set(status.arming_disabled))
@@ -128,7 +133,7 @@ class Instruments:
             pilot=self._pilot(channels, fresh=Rc.CODE in fresh, land=land),
             failsafe=not self._heard.held,
             voltage=self._voltage if battery_known else None,
-            meddling=tuple(f"{named_mode(box)} is on; accepted: off while the bridge flies" for box in sorted(on)),
+            meddling=tuple(meddling),
             armed_with=tuple(
                 f"{named_mode(box)} was on while arming; accepted: disarm, switch it off, arm again"
                 for box in sorted(self._foreign.keys() - on)
