@@ -18,9 +18,10 @@ from e2efly.deploy.betaflight.client import MESSAGES, Client
 from e2efly.deploy.betaflight.codec import ERROR, Decoder, Frame, encode
 from e2efly.deploy.betaflight.controller import ControllerInfo, identify
 from e2efly.deploy.betaflight.messages import MotorTelemetry
+from e2efly.deploy.betaflight.mode_slots import ModeRange
 from e2efly.deploy.betaflight.modes import ANGLE
 from e2efly.deploy.betaflight.row import Row, problems
-from e2efly.deploy.betaflight.settings import ModeRange, RxFailConfig
+from e2efly.deploy.betaflight.settings import RxFailConfig
 from e2efly.deploy.betaflight.sticks import RATES_PULSE, sticks_of
 from e2efly.deploy.odometry import Sample
 from e2efly.deploy.policy.loader import load_policy

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from e2efly.deploy.betaflight import messages, settings
+from e2efly.deploy.betaflight import messages, mode_slots
 from e2efly.deploy.betaflight.client import FORGOTTEN, MAX_BACKLOG, MAX_IN_FLIGHT, SCHEDULE, TIMEOUT, Client, ask
 from e2efly.deploy.betaflight.codec import ERROR, REPLY, Decoder, Frame, encode
 from e2efly.deploy.betaflight.controller import identify
@@ -403,7 +403,7 @@ def test_identify_the_recorded_controller() -> None:
     assert info.rates.rates_type == "ACTUAL"
     assert info.throttle.min_check == info.rx.min_check == 1040
     assert info.rx_map.letters == "TAER1234"
-    assert info.slots(ARM) == (settings.ModeRange(0, 0, 1700, 2100),)
+    assert info.slots(ARM) == (mode_slots.ModeRange(0, 0, 1700, 2100),)
     assert info.slots(OVERRIDE) == ()
     assert info.failsafe.delay == pytest.approx(1.2)
 

@@ -10,10 +10,11 @@ from rich.console import Console
 from e2efly.commands.fly_check import print_settings
 from e2efly.deploy.betaflight.check import examine
 from e2efly.deploy.betaflight.controller import ControllerInfo
+from e2efly.deploy.betaflight.mode_slots import ModeRange
 from e2efly.deploy.betaflight.modes import ARM, HARMLESS, OVERRIDE, foreign, named_mode
 from e2efly.deploy.betaflight.names import BOXES
 from e2efly.deploy.betaflight.row import Row, command_lines, problems
-from e2efly.deploy.betaflight.settings import ModeRange, RxFailConfig
+from e2efly.deploy.betaflight.settings import RxFailConfig
 from e2efly.deploy.betaflight.sticks import RATES_PULSE, angle_range
 from e2efly.deploy.betaflight.switches import switch_rows
 from e2efly.deploy.settings import FlightSettings
@@ -178,6 +179,21 @@ def test_lines_are_whole_and_alone_in_a_pipe(capsys: pytest.CaptureFixture[str])
         "set serial_update_rate_hz=1000", "save",
     ]  # fmt: skip
     assert all(row.setting in line and row.needed in line for row, line in zip(rows, lines[1:], strict=False))
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        [f"aux {i} 13 8 900 1300 0 0" for i in range(20)],
+        [*(f"aux {i} 13 {i} 900 1300 0 0" for i in range(14)), "aux 15 0 2 900 2100 0 0"],
+    ],
+)
+def test_where_there_is_no_place_nothing_is_replaced(lines: list[str]) -> None:
+    rows = rows_of(typed(BARE, "\n".join(lines)))[:3]
+    assert all(
+        not row.good and row.mend == () and row.needed.endswith("first free a slot of aux, or a channel")
+        for row in rows
+    )
 
 
 MODES = st.integers(0, 255)

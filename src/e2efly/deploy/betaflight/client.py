@@ -9,7 +9,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from e2efly.deploy.betaflight import messages, settings
+from e2efly.deploy.betaflight import messages, mode_slots, settings
 from e2efly.deploy.betaflight.codec import ERROR, REQUEST, Decoder, Frame, encode
 from e2efly.deploy.betaflight.link import MOST, Link
 from e2efly.deploy.clock import MONOTONIC, Clock
@@ -19,10 +19,10 @@ MESSAGES: dict[int, Any] = {
     for kind in (
         messages.ApiVersion, messages.FcVariant, messages.FcVersion, messages.BuildInfo, messages.Name,
         messages.StatusEx, messages.RawImu, messages.Motor, messages.MotorTelemetry, messages.Rc,
-        messages.AttitudeReply, messages.Analog, messages.BatteryState, messages.Debug, settings.ModeRanges,
-        settings.ModeLogic, settings.FeatureConfig, settings.BoardAlignment,
+        messages.AttitudeReply, messages.Analog, messages.BatteryState, messages.Debug, mode_slots.ModeRanges,
+        mode_slots.ModeLogic, settings.FeatureConfig, settings.BoardAlignment,
         settings.MixerConfig, settings.RxConfig, settings.RxMap, settings.FailsafeConfig, settings.RxFailConfig,
-        settings.AdvancedConfig, settings.PidAdvanced, settings.RcTuning, settings.BoxIds, settings.RcDeadband,
+        settings.AdvancedConfig, settings.PidAdvanced, settings.RcTuning, mode_slots.BoxIds, settings.RcDeadband,
         settings.MotorConfig,
     )
 }  # fmt: skip

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from e2efly.deploy.betaflight import messages, settings, settings_by_name
+from e2efly.deploy.betaflight import messages, mode_slots, settings, settings_by_name
 from e2efly.deploy.betaflight.client import Client, ask
 from e2efly.deploy.betaflight.rates import RateProfile
 from e2efly.deploy.betaflight.throttle_curve import ThrottleCurve
@@ -46,7 +46,7 @@ class ControllerInfo:
     """What it does when the receiver's signal is lost."""
     rx_fail: settings.RxFailConfig
     """What each channel becomes in that case."""
-    modes: tuple[settings.ModeRange, ...]
+    modes: tuple[mode_slots.ModeRange, ...]
     """Which switches make which modes active: the slots of `aux` that are in use."""
     box_ids: tuple[int, ...]
     """Permanent ids of the modes that the controller knows, in the order of the bits of `StatusEx.boxes`."""
@@ -77,7 +77,7 @@ class ControllerInfo:
         """The value of a setting by its name in the command line. None: this controller does not report it."""
         return dict(self.by_name).get(setting)
 
-    def slots(self, box: int) -> tuple[settings.ModeRange, ...]:
+    def slots(self, box: int) -> tuple[mode_slots.ModeRange, ...]:
         """The slots of `aux` that make a mode active, by its permanent id."""
         return tuple(slot for slot in self.modes if slot.box == box)
 
@@ -115,8 +115,8 @@ def identify(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -
         deadband=get(settings.RcDeadband),
         failsafe=get(settings.FailsafeConfig),
         rx_fail=get(settings.RxFailConfig),
-        modes=settings.mode_ranges(get(settings.ModeRanges), get(settings.ModeLogic)),
-        box_ids=get(settings.BoxIds).ids,
+        modes=mode_slots.mode_ranges(get(mode_slots.ModeRanges), get(mode_slots.ModeLogic)),
+        box_ids=get(mode_slots.BoxIds).ids,
         motor=get(settings.MotorConfig),
         advanced=get(settings.AdvancedConfig),
         pid_advanced=get(settings.PidAdvanced),

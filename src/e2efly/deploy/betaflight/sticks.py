@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 from e2efly.deploy.betaflight.controller import ControllerInfo
+from e2efly.deploy.betaflight.mode_slots import ModeRange
 from e2efly.deploy.betaflight.modes import ANGLE
 from e2efly.deploy.betaflight.rates import (
     AXES,
@@ -18,7 +19,6 @@ from e2efly.deploy.betaflight.rates import (
     stick_to_channel,
     stick_to_rate,
 )
-from e2efly.deploy.betaflight.settings import ModeRange
 from e2efly.deploy.betaflight.throttle_curve import ThrottleCurve
 
 CHANNELS = (1000, 2000)

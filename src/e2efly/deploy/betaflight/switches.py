@@ -10,10 +10,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from e2efly.deploy.betaflight.controller import ControllerInfo
+from e2efly.deploy.betaflight.mode_slots import ModeRange
 from e2efly.deploy.betaflight.modes import ANGLE, ARM, OVERRIDE, harmless, named_mode
 from e2efly.deploy.betaflight.names import BOXES
 from e2efly.deploy.betaflight.row import Row
-from e2efly.deploy.betaflight.settings import ModeRange
 from e2efly.deploy.betaflight.sticks import RATES_PULSE, angle_range
 from e2efly.deploy.settings import FlightSettings
 
@@ -25,6 +25,8 @@ GUIDE = {
     ANGLE: ModeRange(ANGLE, 2, 925, 2100),
 }
 """The ranges of the guide. Their channels are proposed where they are free."""
+FULL = "; first free a slot of aux, or a channel"
+"""What else is needed, where there is no place for a mode."""
 ALWAYS = (1000, 2000)
 """A mode that all pulses between these make active is on whatever the position of its switch, us."""
 
@@ -66,7 +68,7 @@ def switch_rows(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
     new = None if good else plan.put(ANGLE, old)
     rows.append(
         Row("range of ANGLE", where(*have), "925 to 2100 on a channel of its own: on, but for the "
-            f"{RATES_PULSE} us that the bridge sends there", good, _lines(new, old))
+            f"{RATES_PULSE} us that the bridge sends there" + ("" if good or new else FULL), good, _lines(new, old))
     )  # fmt: skip
     rows += _of_angle(info, (angle if good else new) or GUIDE[ANGLE], good=good)
     doubtful = [
@@ -91,8 +93,9 @@ def _switch(info: ControllerInfo, plan: _Plan, box: int, others: set[int]) -> Ro
     if len(wrong) == len(have):  # none is left
         old = wrong[0] if wrong else None
         mend = _lines(plan.put(box, old), old) + mend[1:]
-    needed = "a switch of the pilot's on a channel of its own, not always on"
-    return Row(f"switch of {BOXES[box]}", where(*have), needed, bool(have) and not wrong, mend)
+    good = bool(have) and not wrong
+    needed = "a switch of the pilot's on a channel of its own, not always on" + ("" if good or mend else FULL)
+    return Row(f"switch of {BOXES[box]}", where(*have), needed, good, mend)
 
 
 def _of_angle(info: ControllerInfo, angle: ModeRange, *, good: bool) -> list[Row]:
