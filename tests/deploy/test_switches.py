@@ -69,7 +69,7 @@ def test_turtle_mode_on_the_switch_of_override_is_refused_by_mode_channel_and_ra
     (problem,) = problems(rows_of(typed(BARE, TURTLE)))
     assert problem == (
         "aux 3: FLIP OVER AFTER CRASH (mode 35) is AUX2 1700 to 2100; needed: off while MSP OVERRIDE is on, AUX2 1700 "
-        "to 2100 (aux 3 0 0 900 900 0 0  # in place of FLIP OVER AFTER CRASH (mode 35), AUX2 1700 to 2100)"
+        "to 2100 (aux 3 35 8 1700 2100 0 0  # in place of FLIP OVER AFTER CRASH (mode 35), AUX2 1700 to 2100)"
     )
 
 
@@ -79,7 +79,12 @@ def test_proposed_lines_use_free_slots_and_the_modes_own() -> None:
     assert rows["range of ANGLE"].mend == ("aux 3 1 2 925 2100 0 0  # in place of ANGLE (mode 1), AUX3 900 to 1300",)
     assert rows["msp_override_channels_mask"].mend == ("set msp_override_channels_mask=79",)
     assert rows["rxfail of AUX3"].mend == ("rxfail 6 s 2000",)
-    assert rows["aux 1: PARALYZE (mode 45)"].needed.startswith("off, or --flight.channels.roll other than 9: ")
+    assert [row.mend[0].partition("  #")[0] for row in rows.values() if row.setting.startswith("aux")] == [
+        "aux 1 45 8 1700 2100 0 0", "aux 2 27 9 1700 2100 0 0",
+    ]  # fmt: skip
+    assert rows["aux 1: PARALYZE (mode 45)"].needed.startswith(
+        "another channel, or --flight.channels.roll other than 9: "
+    )
 
 
 FIELD = {
@@ -171,7 +176,7 @@ def test_lines_are_whole_and_alone_in_a_pipe(capsys: pytest.CaptureFixture[str])
     rows = examine(typed(recorded("4.5.5"), TURTLE), load_vehicle("vis_r"), FlightSettings())
     print_settings(Console(width=40), rows)
     lines = capsys.readouterr().out.splitlines()
-    off = "aux 3 0 0 900 900 0 0  # in place of FLIP OVER AFTER CRASH (mode 35), AUX2 1700 to 2100"
+    off = "aux 3 35 8 1700 2100 0 0  # in place of FLIP OVER AFTER CRASH (mode 35), AUX2 1700 to 2100"
     at = lines.index(off)
     assert lines[at - 1].startswith("# no: type") and lines[at + 1] == "save"
     assert lines[-5:] == [
@@ -215,7 +220,8 @@ def test_whatever_is_not_known_to_be_harmless_is_refused_where_it_may_be_on(slot
     assert len(found) == (slot.box not in HARMLESS and (on or bool(slot.linked)))
     for text in found:
         assert named_mode(slot.box) in text
-        assert "aux 9 0 0 900 900 0 0" in text
+        always = slot.linked or (slot.low <= 1000 and slot.high >= 2000)
+        assert f"aux 9 {'0 0 900 900' if always else f'{slot.box} 8 {slot.low} {slot.high}'} " in text
 
 
 @given(st.lists(SLOTS, max_size=19), st.booleans())

@@ -41,19 +41,33 @@ class _Plan:
     """The AUX channels that are no place for them."""
     free: list[int] = field(init=False)
     """The numbers of the slots that are not in use."""
+    moved: dict[int, int] = field(default_factory=dict)
+    """The new channel of each channel whose modes move away together."""
 
     def __post_init__(self) -> None:
         self.free = sorted(set(range(SLOTS)) - {slot.slot for slot in self.slots})
 
     def put(self, box: int, old: ModeRange | None) -> ModeRange | None:
         """A slot for a mode on a channel of its own, in place of its old slot. None: no slot or no channel is free."""
-        used = self.taken | {slot.aux for slot in self.slots if slot is not old}
-        places = [*([] if old is None or old.linked else [old.aux]), GUIDE[box].aux, *range(AUX_CHANNELS)]
-        aux = next((aux for aux in places if aux not in used), None)
-        if aux is None or (old is None and not self.free):
+        if old is None and not self.free:
             return None
-        self.taken.add(aux)
+        aux = self._channel([*([] if old is None or old.linked else [old.aux]), GUIDE[box].aux], old)
+        if aux is None:
+            return None
         return replace(GUIDE[box], aux=aux, slot=self.free.pop(0) if old is None else old.slot)
+
+    def move(self, slot: ModeRange) -> ModeRange | None:
+        """The slot with its switch on another channel. None: no channel is free."""
+        if slot.aux not in self.moved and (aux := self._channel([], None)) is not None:
+            self.moved[slot.aux] = aux
+        return replace(slot, aux=self.moved[slot.aux]) if slot.aux in self.moved else None
+
+    def _channel(self, places: list[int], old: ModeRange | None) -> int | None:
+        """A channel that nothing but `old` uses, one of `places` if possible. It is taken then."""
+        used = self.taken | {slot.aux for slot in self.slots if slot is not old}
+        aux = next((aux for aux in (*places, *range(AUX_CHANNELS)) if aux not in used), None)
+        self.taken |= set() if aux is None else {aux}
+        return aux
 
 
 def switch_rows(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
@@ -77,11 +91,13 @@ def switch_rows(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
         if slot is not old and slot.box not in (ARM, OVERRIDE) and not harmless(slot.box, info.api)
     ]
     for slot in doubtful:
-        why = _why_not(slot, doubtful, info, bridge)
-        rows.append(
-            Row(f"aux {slot.slot}: {named_mode(slot.box)}", where(slot), why or "any: off before take-off", not why,
-                (_off(slot),) if why else ())
-        )  # fmt: skip
+        always = "no link: it can be on at any time" if slot.linked else ""
+        if _always(slot, doubtful):
+            always = "off at one position of its switch, and so what else is on this channel"
+        why = always or _why_not(slot, info, bridge)
+        mend = () if not why else (_off(slot),) if always else _lines(plan.move(slot), slot) or (_off(slot),)
+        needed = why or "any: off before take-off"
+        rows.append(Row(f"aux {slot.slot}: {named_mode(slot.box)}", where(slot), needed, not why, mend))
     return rows
 
 
@@ -114,18 +130,14 @@ def _of_angle(info: ControllerInfo, angle: ModeRange, *, good: bool) -> list[Row
     ]  # fmt: skip
 
 
-def _why_not(slot: ModeRange, doubtful: Iterable[ModeRange], info: ControllerInfo, bridge: dict[int, str]) -> str:
-    """What is needed of one of the slots with a mode that may do harm. Empty: it is as needed."""
-    if slot.linked:
-        return "no link: it can be on at any time"
-    if _always(slot, doubtful):
-        return "off at one position of its switch, and so what else is on this channel"
+def _why_not(slot: ModeRange, info: ControllerInfo, bridge: dict[int, str]) -> str:
+    """What is needed of the channel of a mode that may do harm. Empty: it is as needed."""
     for held in (*info.slots(OVERRIDE), *info.slots(ARM)):
         if slot.overlaps(held):
             return f"off while {BOXES[held.box]} is on, {where(held)}"
     if slot.aux in bridge:
         name = bridge[slot.aux]
-        return f"off, or --flight.channels.{name} other than {slot.aux + 5}: the bridge reads this channel"
+        return f"another channel, or --flight.channels.{name} other than {slot.aux + 5}: the bridge reads this one"
     return ""
 
 
@@ -150,7 +162,7 @@ def _lines(new: ModeRange | None, old: ModeRange | None) -> tuple[str, ...]:
     """The line for the command line that writes a slot, and what it replaces."""
     if new is None:
         return ()
-    line = f"aux {new.slot} {new.box} {new.aux} {new.low} {new.high} 0 0"
+    line = f"aux {new.slot} {new.box} {new.aux} {new.low} {new.high} {int(new.every)} 0"
     return (line + (f"  # in place of {named_mode(old.box)}, {where(old)}" if old else ""),)
 
 
