@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.storage import LOCK, held, write_json
+from e2efly.storage import LOCK, held, read_json, write_json
 
 HOLD = """
 import sys, time
@@ -54,6 +54,11 @@ def test_the_same_process_is_refused_too_and_a_failure_lets_go(tmp_path: Path) -
         pass
     with held(tmp_path):
         pass
+
+
+def test_json_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
+    (tmp_path / "file.json").write_text('{"a": 1}', encoding="utf-8-sig")
+    assert read_json(tmp_path / "file.json") == {"a": 1}
 
 
 def test_json_has_null_where_a_number_is_not_finite(tmp_path: Path) -> None:

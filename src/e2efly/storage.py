@@ -50,7 +50,7 @@ def read_json(path: Path) -> dict[str, Any]:
         ValueError: when the file is missing, is not JSON, or contains something other than an object.
     """
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError) as error:
         raise ValueError(f"{path} cannot be read: {error}") from None
     except RecursionError:

@@ -297,7 +297,7 @@ def _own_vehicle(policy: Path | None, loaded: Policy | None) -> str:
 
 def _read(path: Path, option: str) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise OSError(f"{option} {path}: {error.strerror}") from None
 

@@ -45,7 +45,8 @@ class Identify:
     out: Path = Path("identified")
     """Folder for vehicle.toml, identified.json and the plots."""
     columns: tuple[str, ...] = ()
-    """Maps the column names of a CSV log to ours: OURS=THEIRS or OURS=THEIRS*FACTOR, as in az=acc_z*9.81."""
+    """Maps the column names of CSV logs and of records of thrust stands to ours: OURS=THEIRS or OURS=THEIRS*FACTOR, as
+    in az=acc_z*9.81."""
     mass: tuple[float, float] | None = None
     """Mass of the vehicle and standard deviation of the scale, kg. Flights only give thrust, inertia and drag relative
     to the mass."""
@@ -57,24 +58,29 @@ def run(options: Identify) -> int:
     Raises:
         ValueError: naming the source, what is wrong with it and what is accepted. Nothing is written then.
     """
-    from e2efly.identification import parts, pendulum, stand
+    from e2efly.identification import csv_file, parts, pendulum, stand, stand_file
     from e2efly.identification.correlation import correlation
-    from e2efly.identification.csv_file import column_map
     from e2efly.identification.estimate import Estimate, fuse
     from e2efly.identification.vehicle_file import merged, write_vehicle
 
     began = time.perf_counter()
     files, console = _sources(options.sources), Terminal()
-    base, columns = load_vehicle(options.vehicle), column_map(options.columns)
+    known = {"flight": csv_file.COLUMNS, "step": csv_file.COLUMNS, "stand": tuple(stand_file.COLUMNS)}
+    used = dict.fromkeys(name for kind, names in known.items() if files[kind] for name in names)
+    if options.columns and not used:
+        raise ValueError(f"--columns is {list(options.columns)}; accepted: with a source of {', '.join(known)}")
+    base, columns = load_vehicle(options.vehicle), csv_file.column_map(options.columns, used)
     said: list[Estimate] = []
     if options.mass:
         mass, sigma = options.mass
         if not (mass > 0 and sigma > 0):
             raise ValueError(f"--mass is {mass} {sigma}; accepted: kg and its standard deviation, both above 0")
         said.append(Estimate("mass", np.array(mass), np.array(sigma), "weighed"))
-    for kind, estimates in (("parts", parts.estimates), ("pendulum", pendulum.estimates), ("stand", stand.estimates)):
+    for kind, estimates in (("parts", parts.estimates), ("pendulum", pendulum.estimates)):
         for path in files[kind]:
             said += estimates(path)
+    for path in files["stand"]:
+        said += stand.estimates(path, columns, lambda note: console.print(note, style="dim"))
     found: dict[str, Found] = {}
     for kind in ("flight", "step"):
         if files[kind]:

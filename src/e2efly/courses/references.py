@@ -165,7 +165,7 @@ def read_csv(path: str | Path) -> np.ndarray:
         f"{_CLOSEST:g} s and over at most {LONGEST:g} s, x, y, z at most {LARGEST:g} in size"
     )
     try:
-        with Path(path).open(newline="", encoding="utf-8") as file:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
             lines = list(csv.reader(file))
     except (OSError, ValueError, csv.Error) as error:
         raise ValueError(f"reference {str(path)!r} cannot be read: {error}") from None

@@ -4,7 +4,7 @@ measured.
 
 import csv
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,11 +30,11 @@ class Column(NamedTuple):
     factor: float
 
 
-def column_map(given: Iterable[str]) -> dict[str, Column]:
-    """The columns by their name in `COLUMNS`, from entries `ours=theirs` or `ours=theirs*factor`.
+def column_map(given: Iterable[str], known: Collection[str] = COLUMNS) -> dict[str, Column]:
+    """The columns by their name in `known`, from entries `ours=theirs` or `ours=theirs*factor`.
 
     Raises:
-        ValueError: for an entry of another form, and for a name `ours` that is not in `COLUMNS`.
+        ValueError: for an entry of another form, and for a name `ours` that is not in `known`.
     """
     found: dict[str, Column] = {}
     for entry in given:
@@ -46,8 +46,8 @@ def column_map(given: Iterable[str]) -> dict[str, Column]:
             scale = math.nan
         if not equals or not theirs or not math.isfinite(scale) or scale == 0:
             raise ValueError(f"--columns is {entry!r}; accepted: OURS=THEIRS or OURS=THEIRS*FACTOR, as az=acc_z*9.81")
-        if ours not in COLUMNS:
-            raise ValueError(f"--columns is {entry!r}: {unknown('column', ours, COLUMNS)}")
+        if ours not in known:
+            raise ValueError(f"--columns is {entry!r}: {unknown('column', ours, known)}")
         if ours in found:
             raise ValueError(f"--columns names {ours!r} twice; accepted: once")
         found[ours] = Column(theirs, scale)
