@@ -153,9 +153,9 @@ def _layers(policy: Any) -> tuple[Layers, list[str], float]:
     """
     network, squashed = _network(policy)
     leaves, most = _leaves(network), math.inf
-    if leaves and type(leaves[-1]) is torch.nn.Hardtanh and leaves[-1].min_val == -leaves[-1].max_val:
-        most = leaves.pop().max_val  # gSDE limits the mean before the hyperbolic tangent
-        most = math.tanh(most) if squashed else most
+    if leaves and isinstance(last := leaves[-1], torch.nn.Hardtanh) and last.min_val == -last.max_val:
+        most = math.tanh(last.max_val) if squashed else last.max_val  # gSDE limits the mean, before the tangent
+        leaves.pop()
     layers: Layers = []
     operators: list[str] = []
     for part in leaves:

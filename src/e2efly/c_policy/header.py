@@ -143,6 +143,11 @@ def _about(c: Contract, big: str, digest: str, needs: Sizes) -> str:
         for key, (least, most) in vars(c.vehicle_ranges).items():
             lines.append(f"#define {big}_VEHICLE_{key.upper()}_MIN {number(least)}")
             lines.append(f"#define {big}_VEHICLE_{key.upper()}_MAX {number(most)}")
+    if c.courses:
+        lines.append(comment("The courses and worlds that it was trained for, in SI units:"))
+        for part in c.courses:
+            lines.append(f"#define {big}_COURSE_{part.name.upper()}_MIN {number(part.low)}")
+            lines.append(f"#define {big}_COURSE_{part.name.upper()}_MAX {number(part.high)}")
     return "\n".join(lines) + "\n"
 
 

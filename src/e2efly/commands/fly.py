@@ -43,7 +43,7 @@ from e2efly.deploy.sight.sources import open_cameras
 from e2efly.deploy.terminal import Speaker, Stop
 from e2efly.learn.rundir import run_of
 from e2efly.process import raise_at_interrupt
-from e2efly.tasks.route import Route, course_for, fields_of, route_of
+from e2efly.tasks.route import Route, course_for, fields_of, goal_notes, route_of
 from e2efly.terminal import Terminal
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.zoo import policy_file
@@ -178,6 +178,8 @@ def run(options: Fly) -> int:
         if reasons := check(loaded.contract, body, fields_of(loaded.contract), imu=True, images=True):
             raise ValueError("\n".join(reasons))
         course = course_for(loaded.contract, body, options.goal)
+        for line in goal_notes(loaded.contract, options.goal):
+            console.print(line, style="dim")
         runtime = Runtime.of(loaded, course, body, envelope=options.envelope, imu=True, images=True)
     if excited:
         acts, course = excitation(body, settings, options.excitation, options.latency)

@@ -155,6 +155,8 @@ def run(asked: Asked) -> int:
     compute_at_once()
     prepare("cpu")
     found = candidate(o.policy, o.vehicle, task=asked.task)
+    for note in found.notes:
+        console.print(note, style="dim")
     images = found.policy.contract.images
     if not images:
         raise ValueError(f"policy {o.policy} sees nothing; accepted: a policy with images")
@@ -166,7 +168,8 @@ def run(asked: Asked) -> int:
     assert scenery is not None
     scenery = _where(o, scenery, found.policy.contract.task, float(body.radius), console)
     goal = flags("goal", dataclasses.replace(
-        route_of(found.policy.contract).drawn(scenery.course, o.track), origin=origin.position, origin_yaw=origin.yaw,
+        route_of(found.policy.contract).drawn(scenery.course, o.track),
+        origin=origin.position, origin_yaw=origin.yaw, outside=bool(found.outside),
     ))  # fmt: skip
     with ExitStack() as stack:
         source = open_source(o.pose)

@@ -294,6 +294,8 @@ def _flown(o: Watch, console: Terminal) -> "tuple[Simulation, Progress | None]":
         env, act = progress.setup.judges[name], progress.act
     else:
         progress, found = None, candidate(o.what[0], o.vehicle)
+        for note in found.notes:
+            console.print(note, style="dim")
         suites = found.task.criteria()
         name = _criterion(o.criterion, suites)
         env, act = found.environment(suites[name]), act_of(found.policy)

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Literal
 
 from e2efly.config.algorithms import ALGORITHMS, AlgorithmConfig
 from e2efly.config.vehicle import CameraConfig, EnvConfig
+from e2efly.courses.domain import Domain
 from e2efly.drawing import Thing
 
 
@@ -169,6 +170,10 @@ class TaskConfig:
     def course(self) -> dict[str, Any]:
         """The part of the course that all episodes share, for reports. `Goal.drawn` gives what each episode adds."""
         return {}
+
+    def domain(self) -> Domain | None:
+        """The ranges of the courses and worlds that its episodes draw. A policy is trained for them. None: unknown."""
+        return None
 
     def limits(self) -> dict[str, float]:
         """The largest values, by field of `Episodes`, with which an episode still succeeds, for plots."""

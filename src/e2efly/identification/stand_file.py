@@ -65,7 +65,7 @@ IDLE_PULSE = 1000.0
 class Place(NamedTuple):
     """A column of the file that holds a quantity: factor * entry - offset, in our unit."""
 
-    index: int
+    column: int
     quantity: str
     factor: float
     offset: float = 0.0
@@ -91,8 +91,8 @@ def read_stand(
     found: dict[str, np.ndarray] = {}
     used: dict[str, str] = {}
     for place in _places(path, header, columns or {}):
-        name, quantity = header[place.index], place.quantity
-        values = place.factor * np.array([_number(path, line, name, row[place.index]) for line, row in lines])
+        name, quantity = header[place.column], place.quantity
+        values = place.factor * np.array([_number(path, line, name, row[place.column]) for line, row in lines])
         if not np.nan_to_num(values).any():
             continue  # nothing, or zeros, of a sensor that is not there
         if quantity in found:
@@ -110,7 +110,7 @@ def read_stand(
             )
     if left := [name for name in header if name and name not in used.values()]:
         told(f"{path.name}: columns that are not used: {', '.join(left)}")
-    whole = np.isfinite(np.stack(list(found.values()))).all(axis=0)
+    whole = np.asarray(np.isfinite(np.stack(list(found.values()))).all(axis=0))
     if not whole.all():
         told(f"{path.name}: {int((~whole).sum())} of {len(whole)} lines lack an entry and are left out")
     found = {quantity: values[whole] for quantity, values in found.items()}
@@ -173,7 +173,7 @@ def _places(path: Path, header: list[str], columns: Mapping[str, Column]) -> lis
                     f"*FACTOR', or one of the units {', '.join(UNITS[quantity])}"
                 )
             chosen = _with_unit(index, quantity, unit)
-        places = [*(place for place in others if place.index != index), chosen]
+        places = [*(place for place in others if place.column != index), chosen]
     return places
 
 

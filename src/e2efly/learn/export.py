@@ -76,6 +76,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         memory_size=config.network.recurrent,
         action=Action(mode.name, mode.fields, mode.units, *limits),
         hover_action=_decimals(env.hover),
+        courses=config.task.domain(),
     )
 
 

@@ -94,12 +94,13 @@ def _opened(path: Path, materials: bool) -> Any:
     with needed("mesh"):
         import PIL.Image  # noqa: F401 - without it, trimesh leaves textures out
         import trimesh
+        from trimesh.resolvers import FilePathResolver
     kind = path.suffix.lower()
     options: dict[str, Any] = {} if materials or kind == ".stl" else {"skip_materials": True}
     try:
         if kind == ".obj":  # without a byte-order mark, which would hide its first line
             text = io.BytesIO(path.read_bytes().removeprefix(codecs.BOM_UTF8))
-            options |= {"split_objects": True, "file_type": "obj", "resolver": trimesh.resolvers.FilePathResolver(path)}
+            options |= {"split_objects": True, "file_type": "obj", "resolver": FilePathResolver(str(path))}
             return trimesh.load_scene(text, process=False, **options)
         return trimesh.load_scene(path, process=False, **options)
     except Exception as error:  # any error of a parser in a broken file

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from e2efly.config import AlgorithmConfig, BPTTConfig, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
+from e2efly.courses.domain import Domain, extent
 from e2efly.tasks.registry import register
 
 
@@ -59,6 +60,16 @@ class GapConfig(TaskConfig):
     def criteria(self) -> dict[str, TaskConfig]:
         """Collisions end the episode."""
         return {self.name: dataclasses.replace(self, collisions_end=True)}
+
+    def domain(self) -> Domain:
+        """The slit. It is tilted to either side."""
+        return (
+            extent("slit_distance", "m", self.distance),
+            extent("slit_tilt", "rad", self.roll),
+            extent("slit_length", "m", self.opening[0]),
+            extent("slit_width", "m", self.opening[1]),
+            extent("wall_thickness", "m", self.thickness),
+        )
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:

@@ -9,6 +9,7 @@ import numpy as np
 
 from e2efly.config import BPTTConfig, EnvConfig, Paper, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain
 from e2efly.drawing import INK, Line, Mark, Thing, circle
 from e2efly.tasks.registry import register
 
@@ -80,6 +81,10 @@ class HoverConfig(TaskConfig):
     def criteria(self) -> dict[str, TaskConfig]:
         """Episodes of length `judged_s`, if that is not 0."""
         return {self.name: dataclasses.replace(self, episode_s=self.judged_s or self.episode_s)}
+
+    def domain(self) -> Domain:
+        """Nothing stands in its world, and its goal is one place."""
+        return ()
 
     def limits(self) -> dict[str, float]:
         """The largest distance from the target."""

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from e2efly.config import BPTTConfig, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain, extent
 from e2efly.tasks.registry import register
 
 
@@ -64,6 +65,11 @@ class HoverAwareConfig(TaskConfig):
     def own_worlds(self) -> bool:
         """Each episode has its own object to look at."""
         return True
+
+    def domain(self) -> Domain:
+        """The object to look at. It circles in either direction."""
+        rate = abs(self.turn_rate)
+        return extent("object_distance", "m", self.distance), extent("object_rate", "rad/s", (-rate, rate))
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:

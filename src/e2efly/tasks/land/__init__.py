@@ -17,6 +17,7 @@ from e2efly.config import (
     number,
 )
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain
 from e2efly.drawing import INK, ORANGE, Face, Line, Thing, circle
 from e2efly.tasks.registry import register
 
@@ -73,6 +74,10 @@ class LandConfig(TaskConfig):
     """Success: largest tilt at touchdown, rad."""
     fence: float = number(defaults.LAND_FENCE, above=0, endless=True)
     """The episode fails farther than this from the pad, sideways or upwards, m."""
+
+    def domain(self) -> Domain:
+        """Nothing stands in its world, and its goal is one place."""
+        return ()
 
     def limits(self) -> dict[str, float]:
         """The pad's radius."""

@@ -19,6 +19,7 @@ from e2efly.config import (
     number,
 )
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain, extent
 from e2efly.tasks.registry import register
 
 
@@ -61,6 +62,10 @@ class LandVisualConfig(TaskConfig):
     """Success: largest tilt at touchdown, rad."""
     fence: float = number(defaults.LAND_FENCE, above=0, endless=True)
     """The episode fails farther than this from the pad, sideways or upwards, m."""
+
+    def domain(self) -> Domain:
+        """The pad."""
+        return extent("pad_size", "m", self.pad_size), extent("pad_height", "m", self.pad_height)
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:

@@ -18,6 +18,8 @@ from e2efly.config import (
     shape,
 )
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain
+from e2efly.courses.references import KNOT_PERIOD, Lissajous, motion_domain, read_csv, through_points
 from e2efly.tasks.registry import register
 
 
@@ -105,6 +107,21 @@ class TrackConfig(TaskConfig):
             size = {"half_length_m": float(self.radius), "top_speed_m_s": float(self.lemniscate_speed)}
             return shared | centre | size
         return shared
+
+    def domain(self) -> Domain:
+        """Top speed and acceleration of the reference.
+
+        A piece of a random polynomial lasts four knot periods. It is no faster than a piece of least jerk that begins
+        and ends at rest: 15/8 of its mean speed, and 10/sqrt(3) of that over its duration.
+        """
+        if self.reference == "polynomial":
+            top = self.polynomial_speed
+            return motion_domain(15 / 8 * top, 10 / math.sqrt(3) * top / (4 * KNOT_PERIOD))
+        if self.reference == "circle":
+            return Lissajous.circle(self.radius, self.circle_rate).domain
+        if self.reference == "lemniscate":
+            return Lissajous.lemniscate(self.radius, self.lemniscate_speed).domain
+        return through_points(read_csv(self.reference)).domain
 
     def limits(self) -> dict[str, float]:
         """The mean error."""

@@ -12,6 +12,7 @@ from e2efly.config import number
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain
 from e2efly.courses.references import (
     LONGEST,
     POINTS,
@@ -144,6 +145,10 @@ class TrackRoute(Route):
         memory = Memory(spline, np.zeros(1), np.zeros(1))
         lowest = float(spline.knots[0, :, 0, 2].min())
         return Course(TrackGoal(TrackConfig(), shape), memory, start, duration=spline.duration, lowest=lowest)
+
+    def domain(self) -> Domain:
+        """Top speed and acceleration of the reference."""
+        return self._spline().domain
 
     def unused(self) -> tuple[str, ...]:
         """Options of other kinds of reference."""
