@@ -391,7 +391,7 @@ def test_loading_imports_no_jax_and_no_simulator(path: Path) -> None:
     loaded = out.stdout.split()
     assert "e2efly.deploy.policy.loader" in loaded
     ours = {name.split(".")[1] for name in loaded if name.startswith("e2efly.")}
-    assert ours == {"control", "deploy", "observation", "storage", "vehicles", "zoo"}
+    assert ours == {"control", "courses", "deploy", "observation", "storage", "vehicles", "zoo"}
     assert not {"jax", "jaxlib", "jaxtyping", "onnx", "optax", "scipy", "matplotlib"} & set(loaded)
 
 

@@ -49,7 +49,7 @@ def contracts() -> dict[str, Contract]:
 
 
 def course(contract: Contract, **options: Any) -> Course:
-    return course_for(contract, VEHICLE, route_of(contract)(**options))
+    return course_for(contract, VEHICLE, route_of(contract)(outside=True, **options))
 
 
 def at(position: Any) -> Odometry:
@@ -329,7 +329,7 @@ def test_gates_are_judged_as_in_training(contracts: dict[str, Contract], name: s
         (
             "track",
             {"reference": "nowhere.csv", "phase": 1.0},
-            r"goal\.phase is 1.0, but has no effect here; accepted: origin, origin_yaw, reference",
+            r"goal\.phase is 1.0, but has no effect here; accepted: origin, origin_yaw, outside, reference",
         ),
         ("track", {"lemniscate_speed": 2.0}, r"goal\.lemniscate_speed is 2.0, but has no effect"),
         ("track", {"radius": 0.0}, r"goal\.radius is 0.0; accepted: 0.001 or more"),

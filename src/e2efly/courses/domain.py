@@ -9,6 +9,8 @@ import numpy as np
 PLACING = 0.1
 """A quantity of `PLACED` may lie outside its range by this, in its unit: gates are set up and measured no better."""
 PLACED = frozenset({"gate_distance", "gate_rise", "gate_altitude", "gate_bearing", "gate_turn", "start_distance"})
+FIRST = 0.2 - np.pi
+"""Smallest angle, rad. About as much as a half turn is a positive angle, whichever way gates are placed."""
 _BESIDE = 1e-6
 """Relative rounding error within which a number still counts as inside its range."""
 _OVER = 1.0
@@ -56,7 +58,7 @@ def outside(trained: Domain, flown: Domain) -> tuple[str, ...]:
     """The quantities of the courses to be flown that lie outside those of the training, as text. Empty: none."""
     known = {part.name: part for part in trained}
     return tuple(
-        f"{part.name} is {part.range}; accepted: {known[part.name].range}, as in training"
+        f"{part.name} is {part.range}; trained for {known[part.name].range}"
         for part in flown
         if part.name in known and not known[part.name].holds(part)
     )
@@ -83,7 +85,7 @@ def track_domain(track: Any) -> Domain:
     leg, turn = position[there] - position[here], yaw[there] - yaw[here]
     bearing = np.arctan2(leg[:, 1], leg[:, 0]) - yaw[here]
     bearing = np.where(np.hypot(leg[:, 0], leg[:, 1]) > _OVER, bearing, 0.0)
-    turn, bearing = (np.arctan2(np.sin(x), np.cos(x)) for x in (turn, bearing))
+    turn, bearing = ((x - FIRST) % (2 * np.pi) + FIRST for x in (turn, bearing))
     return (
         extent("gates", "1", len(yaw)),
         extent("gate_width", "m", track.opening[:, 0]),

@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.courses.domain import Domain, Extent
+from e2efly.courses.domain import FIRST, Domain, Extent
 from e2efly.courses.gates import BURIED, Gates, Tracks
 
 FEWEST, MOST = 3, 12
@@ -61,7 +61,7 @@ DOMAIN: Domain = (
     Extent("gate_distance", "m", CLEAR, 50.0),
     Extent("gate_rise", "m", -6.7, 6.7),
     Extent("gate_bearing", "rad", -2.85, 2.85),
-    Extent("gate_turn", "rad", -math.pi, math.pi),
+    Extent("gate_turn", "rad", FIRST, FIRST + 2 * math.pi),
     Extent("start_distance", "m", 2.5, 6.1),
 )
 """The domain of a policy of such tracks. The last of these ranges are those of 200 000 tracks. Of a thousand gates, one

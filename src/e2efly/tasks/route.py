@@ -21,7 +21,7 @@ from e2efly.vehicles import Vehicle
 from e2efly.vehicles.tables import LARGEST
 
 UNDECLARED = "The policy does not say for which courses it was trained."
-ANYWAY = "goal.outside is False; accepted: True (--goal.outside), to fly it all the same"
+ANYWAY = "accepted: a course within these ranges, or goal.outside (--goal.outside), which flies it all the same"
 _ORIGIN = ("origin", "origin_yaw")
 
 
