@@ -104,6 +104,8 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
     else:
         lines.append("| under stress | not measured row by row |")
     lines.append(f"| flies by | {flies_by(load_policy(policy))} |")
+    if courses := load_policy(policy).contract.courses:
+        lines.append(f"| trained for | {', '.join(map(str, courses))} |")
     trained = f"e2efly train {kind}{options}{preset} --seed {about['seed']}"
     lines.append(f"| trained by | `{trained}`, {about['env_steps'] / 1e6:.1f} million steps |")
     lines.append(f"| file | {policy.stat().st_size / 1000:.0f} kB, SHA-256 `{about['sha256'][:16]}...` |")
