@@ -1,11 +1,14 @@
 """Pairs and triples of faults by chance, injected into flights through the real firmware; virtual time.
 
-python benchmarks/fault_campaign.py [--count 240] [--first 0] [--only SEED ...] [--cases] [--processes 2]
-    [--keep FOLDER] [--json FILE]
+python benchmarks/fault_campaign.py [--count 240] [--first 0] [--only SEED ... | --cases | --publish] [--processes 2]
+    [--keep FOLDER]
 
 Each seed is one flight, which is always the same: `--only` flies some again and tells them in full. `--cases` flies the
 named ones instead. Every flight is kept in `--keep` as it ends: a campaign that was killed goes on where it was, as
-long as the package's files are the same. Exit status 1 when a rule is broken that the bridge could have kept.
+long as nothing that flies has changed. Exit status 1 when a rule is broken that the bridge could have kept.
+
+Seeds below 10,000 are for work. `--publish` flies the next block of 500 seeds from there on, and it alone writes
+figures: no change can have been tuned on a block that no other state of the package has flown.
 """
 
 import argparse
@@ -21,12 +24,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from common import table, write
+from common import RESULTS, table, today, write
+from tests.faults import blocks
 from tests.faults.campaign import Scenario, fly
 from tests.faults.scenarios import CASES, drawn
 
 import e2efly
 from e2efly.deploy.policy.loader import load_policy
+from e2efly.device import cores
+from e2efly.storage import read_json, write_json
 from e2efly.validation import firmware
 from e2efly.vehicles import load_vehicle
 
@@ -115,25 +121,37 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def state_of_package() -> str:
-    """A digest of the code that flies: what was flown with other code is not taken for this."""
-    root = Path(e2efly.__file__).parent
-    digest = hashlib.sha256()
-    for file in sorted(root.glob("deploy/**/*.py")) + sorted(root.glob("validate/*.py")):
-        digest.update(file.read_bytes())
+    """A digest of all that flies and judges: what was flown with other files is not taken for this."""
+    package, built = Path(e2efly.__file__).parent, firmware.chosen()
+    folders = [file for folder in (package, Path(blocks.__file__).parent) for file in folder.rglob("*")]
+    parts = sorted(file for file in folders if file.is_file() and "__pycache__" not in file.parts)
+    digest = hashlib.sha256(str(built.release).encode())
+    for file in (*parts, Path(__file__), built.program, built.shim):
+        digest.update(f"{file.name} {file.stat().st_size} ".encode() + file.read_bytes())
     return digest.hexdigest()[:12]
 
 
 def main() -> None:
     """Fly, print a table, write JSON."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, default=None, help="where to write the figures")
     parser.add_argument("--count", type=int, default=240, help="flights")
     parser.add_argument("--first", type=int, default=0, help="first seed")
-    parser.add_argument("--only", type=int, nargs="*", help="these seeds alone, each in full; nothing is written")
-    parser.add_argument("--cases", nargs="?", const="", help="the named flights alone, or those with this text")
-    parser.add_argument("--processes", type=int, choices=(1, 2), default=2)
+    others = parser.add_mutually_exclusive_group()
+    others.add_argument("--only", type=int, nargs="+", help="these seeds alone, each in full")
+    others.add_argument("--cases", nargs="?", const="", help="the named flights alone, or those with this text")
+    others.add_argument("--publish", action="store_true", help="fly the next block of seeds, and write the figures")
+    parser.add_argument("--processes", type=int, choices=range(1, cores() + 1), default=cores(), metavar="N")
     parser.add_argument("--keep", type=Path, default=KEPT, help="where finished flights are kept")
     options = parser.parse_args()
+    results, package = read_json(RESULTS / "fault_campaign.json"), state_of_package()
+    used = blocks.used_in(results)
+    seeds = options.only or range(options.first, options.first + options.count)
+    if options.publish:
+        used, block = blocks.next_of(used, package, today())
+        seeds = block.seeds
+        write_json(RESULTS / "fault_campaign.json", results | blocks.told(used))  # from the first flight on it is known
+    elif problem := blocks.problem_of(seeds, used):
+        parser.error(problem)
     if options.only:
         rows = [flown(drawn(seed)) for seed in options.only]
         print(json.dumps(rows, indent=1))
@@ -141,10 +159,9 @@ def main() -> None:
     if options.cases is not None:
         scenarios = [case for case in CASES if options.cases in case.name]
     else:
-        scenarios = [drawn(seed) for seed in range(options.first, options.first + options.count)]
-    folder = options.keep / state_of_package()
+        scenarios = [drawn(seed) for seed in seeds]
+    folder = options.keep / package
     folder.mkdir(parents=True, exist_ok=True)
-    firmware.chosen()
     with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
         rows = list(pool.imap(kept_flight, [(scenario, folder) for scenario in scenarios]))
     lines = summary(rows)
@@ -153,9 +170,9 @@ def main() -> None:
         print(f"\n{title}:", *(told(row) for row in rows if some(row)), sep="\n")
     took = [row["took_s"] for row in rows]
     print(f"\n{sum(took) / len(took):.1f} s a flight")
-    if options.cases is None:
+    if options.publish:
         flights = [{"seed": row["scenario"]["seed"], "flight": told(row)} for row in rows]
-        write("fault_campaign", options.json, {"table": lines, "flights": flights, "took_s": sum(took)})
+        write("fault_campaign", None, {**blocks.told(used), "table": lines, "flights": flights, "took_s": sum(took)})
     sys.exit(any(map(blamed, rows)))
 
 

@@ -9,10 +9,11 @@ from pathlib import Path
 
 for name in (
     "rates", "time_to_criterion", "success", "runtime_speed", "c_export", "onboard", "msp_fuzz", "sim_to_sim",
-    "firmware_flights",
-    "firmware_faults", "command_flights", "controllers", "fault_campaign", "process_faults", "bridge_loop", "rendering",
+    "firmware_flights", "firmware_faults", "command_flights", "controllers", "fault_campaign --publish",
+    "process_faults", "bridge_loop", "rendering",
     "mesh_rendering", "expert", "visual_tasks", "ablation", "stable_baselines3_ppo", "thrown_starts", "thrown",
     "any_vehicle", "raptor", "identify", "step_response", "paper",
 ):  # fmt: skip
     print(f"== {name}", flush=True)
-    subprocess.run([sys.executable, str(Path(__file__).parent / f"{name}.py")], check=True)
+    script, *options = name.split()
+    subprocess.run([sys.executable, str(Path(__file__).parent / f"{script}.py"), *options], check=True)

@@ -1,5 +1,8 @@
 """Scenarios of a campaign: named ones, and those that chance makes of a seed."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 
 from e2efly.deploy.pilot.flight_state import Mode
@@ -106,5 +109,7 @@ CASES = (
           Strike("accelerometer as told: frozen"), Strike("receiver: silent", 0.0, 0.5)),
     _case("accelerometer frozen in the take-off", Mode.TAKEOFF, 1.5, Strike("accelerometer as told: frozen", 0.3)),
     _case("one motor at 0.85", Mode.HOVER, 1.0, Strike("motor: weak", 0.0, None, {"motor": 1, "share": 0.85})),
+    *map(Scenario.of, json.loads(Path(__file__).with_name("found.json").read_text(encoding="utf-8"))),
 )  # fmt: skip
-"""Single faults, and what an adversary found first."""
+"""Single faults, what an adversary found first, and what chance found: as data, because a seed's flight changes with
+the list of kinds."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from e2efly.deploy.odometry import Sample
+from tests.faults import blocks
 from tests.faults.campaign import STRUCK_IN, Scenario, beyond
 from tests.faults.campaign_rules import Span, judge
 from tests.faults.injected_poses import conjugated, mirrored, north_east_down, scalar_last, velocity_as
@@ -114,6 +115,23 @@ def test_the_campaign_draws_pairs_and_triples_of_every_kind_in_every_mode() -> N
     assert {s.mode for s in scenarios} == {str(mode) for mode in STRUCK_IN}
     assert {strike.kind for s in scenarios for strike in s.strikes} == set(KINDS)
     assert all(list(s.strikes) == sorted(s.strikes, key=lambda strike: strike.at) for s in scenarios)
+
+
+def test_a_block_of_seeds_is_published_by_one_state_of_the_package_alone() -> None:
+    used, first = blocks.next_of((), "aaa", "2026-01-01")
+    assert (first.seeds, used) == (range(10_000, 10_500), (first,))
+    assert blocks.next_of(used, "aaa", "2026-01-02") == (used, first)  # it was killed, and goes on
+    used, second = blocks.next_of(used, "bbb", "2026-01-03")
+    assert second.seeds == range(10_500, 11_000)
+    assert blocks.used_in(json.loads(json.dumps(blocks.told(used)))) == used == (first, second)
+
+
+def test_seeds_that_are_not_published_yet_are_not_for_work() -> None:
+    used, _ = blocks.next_of((), "aaa", "2026-01-01")
+    assert blocks.problem_of(range(9_000, 10_000), ()) is None
+    assert blocks.problem_of([10_499], used) is None
+    for seeds, known in (([3, 10_000], ()), (range(9_999, 10_001), ()), ([10_500], used), ([-1], ())):
+        assert "accepted: 0 to" in str(blocks.problem_of(seeds, known))
 
 
 def test_named_flights_have_names_of_their_own() -> None:
