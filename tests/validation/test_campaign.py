@@ -13,7 +13,7 @@ from tests.faults.campaign import STRUCK_IN, Scenario, beyond
 from tests.faults.campaign_rules import Span, judge
 from tests.faults.injected_poses import conjugated, mirrored, north_east_down, scalar_last, velocity_as
 from tests.faults.injection import Rule
-from tests.faults.injections import KINDS, NO_POWER, Strike
+from tests.faults.injections import FAILSAFE_S, KINDS, NO_POWER, Strike
 from tests.faults.scenarios import CASES, drawn
 from tests.faults.stage import Trace
 
@@ -100,6 +100,31 @@ def test_what_nobody_on_board_can_help_is_told_apart() -> None:
     reboot = Scenario("", "hover", (Strike("controller: reboots", 1.0, 2.0),))
     assert [(s.begin, s.end) for s in beyond(reboot, 10.0)] == [(11.0, math.inf)]
     assert beyond(Scenario("", "hover", (Strike("poses: none"),)), 0.0) == []
+
+
+def test_a_climb_that_goes_on_when_the_bridge_has_the_motors_again_is_its_own() -> None:
+    silent = tuple(beyond(Scenario("", "hover", (Strike("link: silent", 0.0, 2.5),)), 0.0))
+    carried = line(0.0, 2.5, 1.0)
+    assert broken(trace(carried + line(2.5, 0.0, 1.0) + STANDS), silent) == []
+    assert broken(trace(carried + line(2.5, 4.4, 1.0) + line(4.4, 0.0, 1.0) + STANDS), silent) == []
+    assert broken(trace(carried + line(2.5, 4.7, 1.0) + line(4.7, 0.0, 1.0) + STANDS), silent) == ["climb"]
+
+
+def test_the_receivers_silence_excuses_nothing_before_the_firmwares_failsafe() -> None:
+    silent = Scenario("", "hover", (Strike("receiver: silent", 1.0, 2.0),))
+    assert [(s.begin, s.end) for s in beyond(silent, 10.0)] == [(11.0 + FAILSAFE_S, 13.0)]
+
+
+def test_a_second_bridge_is_no_excuse_where_it_was_there_before_the_take_off() -> None:
+    strikes = (Strike("second bridge: waits on the ground", 0.0, 1.0, {"share": 0.1}),)
+    assert beyond(Scenario("", "init", strikes), 0.0) == []
+    assert len(beyond(Scenario("", "hover", strikes), 0.0)) == 1
+
+
+def test_faults_of_two_fliers_cannot_be_flown_together() -> None:
+    strikes = (Strike("images: none"), Strike("commands: jump"))
+    with pytest.raises(ValueError, match="strikes need commands and sight to fly; accepted: one of them"):
+        Scenario("", "policy", strikes)
 
 
 def test_a_seed_is_always_the_same_flight_and_survives_json() -> None:
