@@ -88,7 +88,7 @@ OBEYED = Excuse("the firmware obeys whoever spoke last", unless_grounded=True)
 COMPANION = {
     "clock: the pose source's is set": Kind(lambda stage, step: Injection(pose=stepped(step)), _step),
     "clock: the wall clock jumps to and fro": Kind(_wall),
-    "link: unplugged": Kind(_unplugged, excuse=GONE, limited=(0.1, 5.0)),
+    "link: unplugged": Kind(_unplugged, excuse=GONE, limited=(0.1, 5.0), watched=True),
     "disk: full": Kind(_disk_full, logged=True),
     "bridge: stopped": Kind(_stopped(True, False), limited=STOOD, watched=True),
     "watchdog: stopped": Kind(_stopped(False, True), excuse=STILL, limited=STOOD, watched=True),

@@ -163,6 +163,8 @@ class WatchedLink:
     def poll(self, now: float) -> None:
         """Read what the watchdog reports. It connects by itself."""
         del now
+        if not self._link_alive and not self.taken_over:
+            self._hand(BYTES)  # nothing is sent on a link that is gone, and silence would be the end of the bridge
         for _ in range(PACKETS):
             try:
                 packet = self._socket.recv(_PACKET)
