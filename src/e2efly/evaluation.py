@@ -120,6 +120,11 @@ class Candidate:
         return dataclasses.replace(self, vehicle=self.env.vehicle, controller="policy")
 
     @property
+    def vehicles(self) -> str:
+        """The name of what flies in every episode (`Env.vehicles`)."""
+        return self.environment(next(iter(self.task.criteria().values()))).vehicles
+
+    @property
     def notes(self) -> list[str]:
         """The differences from the run or the contract, in words."""
         contract, notes = self.policy.contract, []
@@ -288,6 +293,7 @@ class Evaluation:
             "task": self.candidate.policy.contract.task,
             "baseline": self.candidate.baseline,
             "vehicle": self.candidate.vehicle,
+            "vehicles": self.candidate.vehicles,
             "controller": self.candidate.controller,
             "changed": {name: value for name, (_, value) in self.candidate.changes.items()},
             "env": dataclasses.asdict(self.candidate.env),

@@ -33,7 +33,7 @@ class Terminal(Console):
             raise SystemExit(128 + signal.SIGPIPE)
 
 
-NARROW = 110
+NARROW = 150
 """Width of a terminal in columns below which the bar is short and shows less. The time left must stay visible."""
 LINES_S = 5.0
 """Interval between two lines if the output is not a terminal, s."""
@@ -46,11 +46,11 @@ class TerminalProgress:
     """
 
     def __init__(self, console: Console, title: str) -> None:
-        self._console, self._title, self._narrow = console, title, console.width < NARROW
+        self._console, self._title, self._narrow = console, title, console.is_terminal and console.width < NARROW
         self._bar = Progress(
             SpinnerColumn("dots" if console.encoding.startswith("utf") else "line"),
             TextColumn("{task.description}", "bold", markup=False),
-            BarColumn(bar_width=8 if self._narrow else 24),
+            BarColumn(bar_width=4 if self._narrow else 24),
             TextColumn("{task.fields[figures]}", markup=False),
             *(() if self._narrow else (TimeElapsedColumn(),)),
             TimeRemainingColumn(),
@@ -77,12 +77,11 @@ class TerminalProgress:
         """Show that programs are being compiled and nothing flies yet."""
         self._say("compiling" if self._narrow else "compiling (seconds; cached for the next run)")
 
-    def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
+    def progress(self, steps: int, total: int, rate: float, success: float, best: float, flown: str) -> None:
         """Move the bar, or print a line."""
-        figures = f"{steps / 1e6:.2f}M steps  {rate / 1e3:.0f}k/s  success {success:.1%}  best {best:.1%}"
+        figures = f"{steps / 1e6:.2f}M steps  {rate / 1e3:.0f}k/s  success {success:.1%}, best {best:.1%} ({flown})"
         if self._narrow:
-            figures = f"{steps / 1e6:.2f}M  success {success:.0%}"
-        figures += f"  {stage}" if stage else ""
+            figures = f"{success:.0%} {flown}"
         self._bar.update(self._task, completed=steps, total=total, figures=figures)
         now = time.monotonic()
         if not self._console.is_terminal and (now - self._told >= LINES_S or steps >= total):

@@ -249,12 +249,12 @@ def a_summary(success: float, reached: dict[str, float]) -> dict[str, Any]:
     ("success", "stop_at", "reached", "said"),
     [
         (0.0, None, {}, "Did not learn track by PPO: no success"),
-        (0.4, None, {}, "Did not learn track by PPO reliably: 40.0% success"),
-        (0.94, None, {}, "Did not learn track by PPO reliably: 94.0% success"),
-        (0.95, None, {}, "Learned track by PPO: 95.0% success"),
-        (0.97, 0.99, {}, "Did not learn track by PPO reliably: 97.0% success"),
-        (0.985, 0.99, {"seconds": 3.0, "steps": 1e6}, "Learned track by PPO: 98.5% success"),
-        (0.8, 0.8, {}, "Learned track by PPO: 80.0% success"),
+        (0.4, None, {}, "Did not learn track by PPO reliably: success 40.0% (vehicle of the file)"),
+        (0.94, None, {}, "Did not learn track by PPO reliably: success 94.0% (vehicle of the file)"),
+        (0.95, None, {}, "Learned track by PPO: success 95.0% (vehicle of the file)"),
+        (0.97, 0.99, {}, "Did not learn track by PPO reliably: success 97.0% (vehicle of the file)"),
+        (0.985, 0.99, {"seconds": 3.0, "steps": 1e6}, "Learned track by PPO: success 98.5% (vehicle of the file)"),
+        (0.8, 0.8, {}, "Learned track by PPO: success 80.0% (vehicle of the file)"),
     ],
 )
 def test_what_was_not_learned_is_not_called_learned(

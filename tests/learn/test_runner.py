@@ -53,7 +53,7 @@ class Silent:
     def judging(self, starts: int) -> None:
         pass
 
-    def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
+    def progress(self, steps: int, total: int, rate: float, success: float, best: float, flown: str) -> None:
         del total, rate, best
         self.seen.append((steps, success))
 

@@ -75,12 +75,14 @@ def _ablate(options: Ablate, configs: dict[tuple[str, str], TrainConfig], consol
         for task in options.tasks:
             began = time.perf_counter()
             curves = known[algo, task] or _curves(options, configs[algo, task], console)
-            panels.append(Panel(task, curves, configs[algo, task].task.shows_error))
-            rows = _rows(curves)
+            rows, vehicles = _rows(curves), _vehicles(configs[algo, task])
+            panels.append(Panel(f"{task}, {vehicles}", curves, configs[algo, task].task.shows_error))
             took = "as found" if known[algo, task] else f"in {time.perf_counter() - began:.0f} s"
-            console.print(f"\n{task} by {algo.upper()}: {len(curves.variants)} rewards, {options.seeds} seeds, {took}")
+            console.print(
+                f"\n{task} by {algo.upper()}: {len(curves.variants)} rewards, {options.seeds} seeds, {vehicles}, {took}"
+            )
             console.print(console_table(rows))
-            lines += [f"## {task} by {algo.upper()}", "", *markdown(rows), ""]
+            lines += [f"## {task} by {algo.upper()}, {vehicles}", "", *markdown(rows), ""]
         path = options.out / f"ablation_{algo}.png"
         plot_ablation(panels, path, f"What each reward term is good for: {algo.upper()}")
         console.print(f"Figure: {path}")
@@ -97,6 +99,13 @@ def _config(options: Ablate, task: str, algo: str) -> TrainConfig:
         config = dataclasses.replace(config, env=dataclasses.replace(config.env, past_actions=options.past_actions))
     presets.check(config)
     return config
+
+
+def _vehicles(config: TrainConfig) -> str:
+    """The name of what flies."""
+    from e2efly.env import Env
+
+    return Env.of(config.task, config.reward, config.env).vehicles
 
 
 def _path(options: Ablate, config: TrainConfig) -> Path:
@@ -143,7 +152,7 @@ def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
             nonlocal best
             best = max(best, success)
             done = share * steps
-            progress.progress(int(done), steps, done / (time.perf_counter() - began), success, best, "")
+            progress.progress(int(done), steps, done / (time.perf_counter() - began), success, best, _vehicles(config))
 
         kept = Kept(_path(options, config).with_suffix(".safetensors"), _about(options, config))
         curves = ablate(config, options.seeds, told, kept, options.by)

@@ -102,6 +102,8 @@ class Robust:
         )
 
 
+LEARNED = 0.95
+"""Success rate of the worst criterion at which a task counts as learned, unless the user asks for another."""
 TIMED = ("duration", "pace")
 """Values of `TaskConfig.precision` for tasks flown against time. For them the distance from the goal has no meaning."""
 
@@ -241,3 +243,8 @@ class TrainConfig:
     """Stages before the task itself."""
     stop_at: float | None = None
     """Stop when the success rate on 1000 starts is at least this. If omitted, use all steps."""
+
+    @property
+    def criterion(self) -> float:
+        """Success rate at which the run counts as having learned its task."""
+        return self.stop_at or LEARNED

@@ -147,6 +147,13 @@ D435I = CameraConfig(fov=(math.radians(87), math.radians(58)), reach=(0.28, 10.0
 """Depth camera of an Intel RealSense D435i."""
 
 
+FILE, RANDOM = "vehicle of the file", "random vehicles"
+"""Names of what flies, wherever a success or an error is told. The vehicle of the file flies with its delay, in still
+air. Random vehicles have what each episode draws: vehicles, delays, air and cameras."""
+STILL, STRESS = f"{RANDOM}, still air", "all stress at once"
+"""The same for the vehicles of a family without anything else that is drawn, and for the stress test's last row."""
+
+
 @dataclass(frozen=True)
 class EnvConfig:
     """The vehicle, its controller, and their random variation."""
