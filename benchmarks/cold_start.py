@@ -22,7 +22,7 @@ from typing import Any
 
 from common import arguments, measured, median, training
 
-from e2efly.learn.judge import rates
+from e2efly.config.vehicle import FILE, RANDOM
 
 PARTS = ("imports", "tracing", "compiling", "learning", "evaluating", "report", "export", "plots", "end")
 """What a training does, one after the other; learning and evaluating take turns."""
@@ -105,6 +105,8 @@ def once(task: str, seed: int, steps: int, cache: Path) -> dict[str, float]:
     """One command in a process of its own: seconds of each part; `end` is what its user waits besides. With the success
     of the policy with each kind of vehicles.
     """
+    from e2efly.learn.judge import rates
+
     with tempfile.TemporaryDirectory() as folder:
         told, out = Path(folder) / "parts.json", Path(folder) / "run"
         command = [sys.executable, __file__, "--watch", str(told), *typed(task, steps).split(), "--seed", str(seed)]
@@ -139,7 +141,9 @@ def rows(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
             parts = {part: f"{median([run[when][part] for run in of]):.1f}" for part in (*PARTS, "whole")}
             success = {
                 f"{kind}, %": " ".join(f"{100 * run[when]['success'][kind]:.1f}" for run in of)
-                for kind in of[0][when]["success"]
+                if kind in of[0][when]["success"]
+                else "-"
+                for kind in (FILE, RANDOM)
             }
             about = {"measured": max(run["date"] for run in of), "configuration": of[0]["configuration"]}
             table.append({"task": of[0]["task"], "when": when, "preset": of[0]["preset"], **parts, **success, **about})

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from e2efly.commands.train import parse
+from e2efly.config import EnvConfig
 from e2efly.device import processor
 from e2efly.learn.rundir import fingerprint
 from e2efly.storage import write_json
@@ -71,8 +72,14 @@ def training(command: str) -> dict[str, str]:
     return {"command": command, **about, "configuration": fingerprint(asked.config)}
 
 
+def is_of_today(run: dict[str, Any]) -> bool:
+    """Whether a figure is of today's integrator and, of a training, of today's configuration."""
+    today = training(run["command"]) if "command" in run else {"integrator": EnvConfig().integrator}
+    return "date" in run and all(run.get(name, value) == value for name, value in today.items())
+
+
 def measured(
-    name: str, path: Path | None, about: dict[str, Any], measure: Callable[[], dict[str, Any]], table: Callable
+    name: str, path: Path | None, about: dict[str, Any], measure: Callable[[], dict[str, Any]], rows: Callable
 ) -> None:
     """Measure what a file of results does not have yet, and write it there, with the table of all that it has.
 
@@ -84,20 +91,15 @@ def measured(
         path: their file, if it is not the usual one.
         about: what is measured, with what `training` gives.
         measure: function that measures it.
-        table: function from all figures to the rows of the table.
+        rows: function from all figures to the rows of the table.
     """
     path = path or RESULTS / f"{name}.json"
     known = json.loads(path.read_text()) if path.exists() else {}
-    here = known.get("machine") == machine()
-    runs = [
-        run
-        for run in known.get("runs", [])
-        if here and "command" in run and training(run["command"]).items() <= run.items()
-    ]
+    runs = [run for run in known.get("runs", []) if known["machine"] == machine() and is_of_today(run)]
     if not any(about.items() <= run.items() for run in runs):
         runs.append({**about, "date": today(), **measure()})
         print(runs[-1], flush=True)
-    write(name, path, {"table": table(runs), "runs": runs})
+    write(name, path, {"table": rows(runs), "runs": runs})
 
 
 def with_earlier(name: str, path: Path | None, part: str, keys: tuple[str, ...], rows: list[Any]) -> list[Any]:

@@ -1,6 +1,7 @@
 """The pages that are made from other files are what these files say today."""
 
 import importlib.util
+import json
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -28,6 +29,36 @@ def script(name: str, folder: Path = DOCS) -> ModuleType:
 
 def test_the_page_of_the_zoo_is_what_the_zoo_says() -> None:
     assert (DOCS / "zoo.md").read_text(encoding="utf-8") == script("zoo_cards").page()
+
+
+def test_the_figures_are_what_was_measured_and_say_by_which_preset() -> None:
+    """Also after a change of a preset: its figures are then marked as earlier, or measured anew."""
+    figures = script("figures")
+    assert (ROOT / "README.md").read_text(encoding="utf-8") == figures.readme()
+    assert (DOCS / "benchmarks.md").read_text(encoding="utf-8") == figures.benchmarks()
+    assert figures.TITLES.keys() == figures.POLICIES.keys()
+
+
+@pytest.mark.parametrize(("digit", "marked"), [("", ""), ("0", ", earlier")])
+def test_a_figure_of_another_configuration_than_todays_is_marked(
+    digit: str, marked: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figures, command = script("figures"), "train land --preset nominal --stop-at 0.99"
+    known = f"{digit}{figures.today(command)}"[:12]
+    table = {"task": "land", "integrator": "rk3", "configuration": known}
+    (tmp_path / "x.json").write_text(
+        json.dumps({"table": [table], "runs": [{"command": command, "configuration": known}]})
+    )
+    monkeypatch.setattr(figures, "RESULTS", tmp_path)
+    assert figures.results("x")["table"][0]["configuration"] == known + marked
+
+
+def test_a_configuration_is_everything_that_defines_a_training_but_its_seed_and_its_cores() -> None:
+    today, hover = script("figures").today, "train hover --algo ppo --preset nominal"
+    assert today(f"{hover} --seed 7 --devices 1") == today(hover)
+    others = ("--env.integrator rk4", "--env.wind 1", "--vehicle vis_h", "--stop-at 0.9", "--task.radius 0.2",
+              "--algo.envs 32", "--reward.weights v 0.1", "--env.randomize mass 0.1", "--steps 10000")  # fmt: skip
+    assert len({today(hover), *(today(f"{hover} {other}") for other in others)}) == 1 + len(others)
 
 
 def test_the_page_of_the_papers_claims_is_what_was_measured() -> None:

@@ -173,7 +173,7 @@ class Env:
         spread = sooner != later and self.family is None
         spread = spread or any(camera != steady(camera) for camera in self.cameras)
         drawn = any(self.randomize.values()) or (self.posterior is not None and np.any(self.posterior.root))
-        return bool(spread or drawn or self.wind or self.disturbance)
+        return bool(spread or drawn or self.wind or (self.disturbance or DisturbanceConfig()) != DisturbanceConfig())
 
     @property
     def vehicles(self) -> str:
