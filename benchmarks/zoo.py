@@ -1,5 +1,5 @@
 """Train the policy zoo: the best preset of each task for each vehicle, kept as package data with its success and the
-curve of its training.
+configuration and the curve of its training.
 
     python benchmarks/zoo.py [--vehicles vis_r ...] [--tasks hover ...] [--seeds 3]
     python benchmarks/zoo.py --digests
@@ -39,11 +39,11 @@ from e2efly.deploy.sight.samples import COUNT, packed, samples_file
 from e2efly.env.stress import ALL
 from e2efly.evaluation import candidate
 from e2efly.learn.judge import worst_success
-from e2efly.learn.rundir import RunDirectory
+from e2efly.learn.rundir import RunDirectory, to_json
 from e2efly.storage import write_json
 from e2efly.tasks import TASKS
 from e2efly.vehicles import family_names, vehicle_names
-from e2efly.zoo import FOLDER, USUAL, contents, curve_file
+from e2efly.zoo import FOLDER, USUAL, config_file, contents, curve_file
 
 VARIANTS = {"race_any": ("race", "any_track")}
 """Policies of a task by a preset of its own: task and preset."""
@@ -130,6 +130,7 @@ def keep(vehicle: str, task: str, policy: Path, about: dict[str, Any]) -> dict[s
     shutil.copy(policy, kept)
     if (seen := samples_file(policy)).is_file():
         shutil.copy(seen, samples_file(kept))
+    write_json(config_file(kept), to_json(RunDirectory(policy.parent).config()), indent=None)
     curve_file(kept).write_text(curve(RunDirectory(policy.parent)), encoding="utf-8")
     zoo = contents() if (FOLDER / "zoo.json").exists() else {}
     zoo.setdefault(vehicle, {})[task] = about

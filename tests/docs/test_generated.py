@@ -1,7 +1,9 @@
 """The pages that are made from other files are what these files say today."""
 
+import dataclasses
 import importlib.util
 import json
+import re
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -10,8 +12,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from e2efly.commands.train import parse
+from e2efly.config import StageConfig
 from e2efly.learn.rundir import RunDirectory
-from e2efly.zoo import FOLDER, USUAL, contents, curve_file
+from e2efly.zoo import FOLDER, USUAL, contents, curve_file, policy_file
 from tests.docs.pages import DOCS, ROOT
 
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
@@ -73,6 +77,28 @@ def test_every_policy_of_the_zoo_has_a_card_and_pictures() -> None:
             assert (DOCS / "zoo" / f"{vehicle}-{task}.png").read_bytes()[1:4] == b"PNG"
             if vehicle == USUAL:
                 assert (DOCS / "zoo" / f"{vehicle}-{task}.webp").read_bytes()[8:12] == b"WEBP"
+
+
+def test_the_command_of_a_card_gives_the_configuration_of_its_policy() -> None:
+    cards, page = script("zoo_cards"), (DOCS / "zoo.md").read_text(encoding="utf-8")
+    commands = re.findall(r"### (\S+)\n(?:(?!###).*\n)*?\| trained by \| `e2efly ([^`]+)`", page)
+    assert [name for name, _ in commands] == re.findall(r"### (\S+)\n", page)
+    for name, command in commands:
+        vehicle, task = name.split("/")
+        config = parse(command.split()[1:]).config
+        assert config == cards.configured(policy_file(name)), name
+        chunk = config.algo.steps * config.chunk
+        assert -(-config.steps // chunk) * chunk == contents()[vehicle][task]["env_steps"], name
+
+
+def test_a_card_says_where_todays_command_makes_another_policy() -> None:
+    made_by, command = script("zoo_cards").made_by, "train hover --seed 0"
+    config = parse(command.split()[1:]).config
+    assert made_by(command, config) == f"`e2efly {command}`"
+    longer = dataclasses.replace(config, steps=3_133_440)
+    assert made_by(command, longer) == f"`e2efly {command} --steps 3133440` (today's preset has steps {config.steps})"
+    other = dataclasses.replace(config, curriculum=(StageConfig({"radius": 1.0}, steps=10),))
+    assert made_by(command, other).startswith("no command of today: it had curriculum (StageConfig(")
 
 
 def test_every_curve_that_ships_stands_on_its_card() -> None:

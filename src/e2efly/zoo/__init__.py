@@ -73,6 +73,11 @@ def curve_file(policy: Path) -> Path:
     return policy.with_suffix(".curve.csv")
 
 
+def config_file(policy: Path) -> Path:
+    """The configuration of a policy's training, as a run's config.json has it: hover.config.json beside hover.onnx."""
+    return policy.with_suffix(".config.json")
+
+
 def _whose(body: Path, having: list[str]) -> str:
     """The shipped vehicle whose policy flies the vehicle of a file, where these have one."""
     if body.parent in (vehicle_file(USUAL).parent, FAMILIES) or load_family(body) is not None:
