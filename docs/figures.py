@@ -32,6 +32,7 @@ GOALS = {
 """Rows of the table of README.md."""
 TITLES = {
     "rates": "Rates",
+    "rate_loop": "What the held rate loop costs",
     "mesh_rendering": "Rendering of mesh scenes",
     "rendering": "Images of the clutter scene: ground, 4 gates, 16 obstacles, another world for each camera",
     "visual_tasks": "Tasks flown by sight: trained, then flown under stress from unseen starts in unseen worlds",
@@ -86,7 +87,7 @@ POLICIES = {
     ),
     **dict.fromkeys(
         (
-            "mesh_rendering", "rendering", "expert", "thrown_starts", "identify", "step_response", "pad_masks",
+            "rate_loop", "mesh_rendering", "rendering", "expert", "thrown_starts", "identify", "step_response", "pad_masks",
             "identify_betaflight", "runtime_speed", "msp_fuzz",
         ),
         NONE,
@@ -123,6 +124,9 @@ it](onboard.md).""",
     "rates": """
 Environment steps have seven sub-steps, and include everything. Training is that of the whole preset, networks and
 evaluations apart.""",
+    "rate_loop": """
+Distance between the positions of the training's physics and of an independent plant in float64, after 2 s of violent
+`ctbr` commands, by the rate loop of the plant. [What it means](physics.md).""",
     "any_track": """
 A specialist begins with the weights of the one policy and learns on one track alone for 2.5 million
 steps. Eight specialists were trained, not fifty. The goals that were missed and what was tried:

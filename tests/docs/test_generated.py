@@ -43,6 +43,15 @@ def test_the_figures_are_what_was_measured_and_say_by_which_preset() -> None:
     assert figures.TITLES.keys() == figures.POLICIES.keys()
 
 
+def test_the_page_of_the_physics_has_what_the_rate_loop_was_measured_to_cost() -> None:
+    page, measured = (DOCS / "physics.md").read_text(encoding="utf-8"), script("figures").results("rate_loop")
+    held, one, four = measured["table"]
+    assert f"{held['mean, mm']} mm off" in page
+    assert f"{one['mean, mm']} mm off" in page and f"{one['largest, mm']} mm at most" in page
+    assert f"4 kHz {four['mean, mm']} mm, at most {four['largest, mm']}" in page
+    assert f"{measured['date']}" in page
+
+
 @pytest.mark.parametrize(("digit", "marked"), [("", ""), ("0", ", earlier")])
 def test_a_figure_of_another_configuration_than_todays_is_marked(
     digit: str, marked: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
