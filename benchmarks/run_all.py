@@ -11,12 +11,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-TIMES = ("time_to_criterion", "cold_start", "success", "rates", "rendering", "mesh_rendering")
+TIMES = ("time_to_criterion", "cold_start", "success", "paper", "rates", "rendering", "mesh_rendering")
 OTHERS = (
     "rate_loop", "runtime_speed", "c_export", "onboard", "msp_fuzz", "sim_to_sim", "firmware_flights",
     "firmware_faults", "command_flights", "controllers", "fault_campaign", "process_faults", "bridge_loop", "expert",
     "visual_tasks", "ablation", "stable_baselines3_ppo", "thrown_starts", "thrown", "any_vehicle", "raptor", "identify",
-    "step_response", "paper",
+    "step_response",
 )  # fmt: skip
 HERE = Path(__file__).parent
 
@@ -24,4 +24,5 @@ asked = sys.argv[1:] or ["times", *OTHERS]
 for name in (name for one in asked for name in (TIMES if one == "times" else (one,))):
     print(f"== {name}", flush=True)
     subprocess.run([sys.executable, str(HERE / f"{name}.py")], check=True)
-subprocess.run([sys.executable, str(HERE.parent / "docs" / "figures.py")], check=True)
+for page in ("figures", "paper_page"):
+    subprocess.run([sys.executable, str(HERE.parent / "docs" / f"{page}.py")], check=True)

@@ -87,8 +87,8 @@ POLICIES = {
     ),
     **dict.fromkeys(
         (
-            "rate_loop", "mesh_rendering", "rendering", "expert", "thrown_starts", "identify", "step_response", "pad_masks",
-            "identify_betaflight", "runtime_speed", "msp_fuzz",
+            "rate_loop", "mesh_rendering", "rendering", "expert", "thrown_starts", "identify", "step_response",
+            "pad_masks", "identify_betaflight", "runtime_speed", "msp_fuzz",
         ),
         NONE,
     ),

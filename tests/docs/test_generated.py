@@ -66,6 +66,29 @@ def test_a_figure_of_another_configuration_than_todays_is_marked(
     assert figures.results("x")["table"][0]["configuration"] == known + marked
 
 
+def test_a_benchmark_goes_on_where_it_was_and_keeps_nothing_of_another_configuration_or_machine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    common, file, done = script("common", ROOT / "benchmarks"), tmp_path / "x.json", []
+
+    def run(seed: int, steps: int = 10_000) -> list[tuple[int, str]]:
+        about = {"seed": seed, **common.training(f"train hover --preset nominal --steps {steps}")}
+        common.measured("x", file, about, lambda: done.append(seed) or {"s": 1.0}, lambda runs: runs)
+        return [(row["seed"], row["preset"]) for row in json.loads(file.read_text())["table"]]
+
+    assert run(0) == [(0, "nominal")]
+    assert run(0) == [(0, "nominal")]
+    assert run(1) == [(0, "nominal"), (1, "nominal")]
+    assert done == [0, 1]
+    content = json.loads(file.read_text())
+    content["runs"][0]["configuration"] = "of another day"
+    file.write_text(json.dumps(content))
+    assert run(2) == [(1, "nominal"), (2, "nominal")]
+    monkeypatch.setattr(common, "machine", lambda: {"cpu": "another"})
+    assert run(3) == [(3, "nominal")]
+
+
 def test_a_configuration_is_everything_that_defines_a_training_but_its_seed_and_its_cores() -> None:
     today, hover = script("figures").today, "train hover --algo ppo --preset nominal"
     assert today(f"{hover} --seed 7 --devices 1") == today(hover)
