@@ -101,7 +101,7 @@ def watched(arguments: list[str]) -> dict[str, float]:
     return seconds
 
 
-def once(task: str, seed: int, steps: int, cache: Path) -> dict[str, float]:
+def once(task: str, seed: int, steps: int, cache: Path) -> dict[str, Any]:
     """One command in a process of its own: seconds of each part; `end` is what its user waits besides. With the success
     of the policy with each kind of vehicles.
     """

@@ -12,6 +12,7 @@ from typing import Any
 from e2efly.commands.train import parse
 from e2efly.config import TrainConfig
 from e2efly.config.changes import differing
+from e2efly.config.vehicle import FILE, STILL
 from e2efly.deploy.policy.loader import Policy, load_policy
 from e2efly.learn.rundir import from_json
 from e2efly.storage import read_json
@@ -51,8 +52,8 @@ package. Every command that takes a policy takes one by the name of its card:
 
 `e2efly fly vis_r/hover --link ... --pose ...` flies it on a real vehicle: read [Hardware](hardware.md) first.
 
-- **Success** is that of 1000 unseen starts of `e2efly eval`, on the vehicle of the file in still air; of *any
-  quadrotor*, of 1000 unseen vehicles. The [tasks](tasks.md) say what counts.
+- **Success** is that of 1000 unseen starts of `e2efly eval`, with the vehicle of the file in still air; of *any
+  quadrotor*, with 1000 random vehicles that the training did not draw. The [tasks](tasks.md) say what counts.
 - **Under stress** the vehicle, the air or the sensors are not those of the file: one difference in each
   [row](robustness.md#stress), and a last row with all of them at once. Each row is of 1000 starts, and of 250 where
   the policy sees. A card names the worst rows; [Benchmarks](benchmarks.md) has all of them.
@@ -129,7 +130,8 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
             lines += ["", f"![{kind_of} of {name}](zoo/{vehicle}-{task}{ending})"]
     lines += ["", f"| {name} | |", "| --- | --- |"]
     for criterion, share in about["success"].items():
-        lines.append(f"| success{'' if criterion in (task, kind) else f': {criterion}'} | {percent(share)} |")
+        which = "" if criterion in (task, kind) else f": {criterion}"
+        lines.append(f"| success, {STILL if load_family(vehicle) else FILE}{which} | {percent(share)} |")
     if "mean_speed_m_s" in about:
         speeds = about["mean_speed_m_s"]
         told = ", ".join(f"{c} {v:.1f}" for c, v in speeds.items()) if isinstance(speeds, dict) else f"{speeds:.1f}"

@@ -13,6 +13,7 @@ from rich.console import Console
 
 from e2efly import presets
 from e2efly.config import TrainConfig
+from e2efly.config.train import LEARNED
 from e2efly.device import prepare
 from e2efly.storage import held, write_atomically, write_json
 from e2efly.terminal import Terminal, TerminalProgress, console_table, markdown
@@ -173,14 +174,14 @@ def _rows(curves: Any) -> list[dict[str, str]]:
     from e2efly.view.ablation import worst
 
     success, error = worst(curves, False), worst(curves, True)
-    reached = [np.flatnonzero(s.mean(axis=0) >= 95.0) for s in success]
+    reached = [np.flatnonzero(s.mean(axis=0) >= 100 * LEARNED) for s in success]
     return [
         {
             "reward": variant if i == 0 else f"without {variant}",
             "success": f"{success[i, :, -1].mean():.1f} %",
             "worst seed": f"{success[i, :, -1].min():.1f} %",
             "error": f"{100 * error[i, :, -1].mean():.1f} cm",
-            "95 % at": f"{curves.steps[reached[i][0]] / 1e6:.2f} M" if len(reached[i]) else "-",
+            f"{100 * LEARNED:g} % at": f"{curves.steps[reached[i][0]] / 1e6:.2f} M" if len(reached[i]) else "-",
         }
         for i, variant in enumerate(curves.variants)
     ]
