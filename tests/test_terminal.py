@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from e2efly.terminal import TerminalProgress
+from e2efly.terminal import Terminal, TerminalProgress, console_table
 
 
 def shown(width: int, terminal: bool) -> str:
@@ -35,3 +35,14 @@ def test_a_pipe_gets_lines() -> None:
     assert "success 98.0%, best 98.0% (vehicle of the file, stage 2 of 2)" in lines[2]
     assert lines[2].endswith(" 0 s left")
     assert lines[3] == "race_clutter by bptt: flying 1000 starts that it never saw"
+
+
+def test_no_table_is_cut(capsys: pytest.CaptureFixture[str]) -> None:
+    row = {"policy": "hover, best, vehicle of the file", **{f"column {i}": "100.0%" for i in range(12)}}
+    Terminal().print(console_table([row]))
+    assert [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()] == [
+        " ".join(row), " ".join(row.values())
+    ]  # fmt: skip
+    narrow = Console(width=80, force_terminal=True, color_system=None)
+    narrow.print(console_table([row]))
+    assert "…" not in capsys.readouterr().out

@@ -21,6 +21,8 @@ class Terminal(Console):
 
     def __init__(self, *, stderr: bool = False, quiet: bool = False) -> None:
         super().__init__(stderr=stderr, quiet=quiet, markup=False, emoji=False, highlight=False, soft_wrap=True)
+        if not self.is_terminal:
+            self.width = WIDE
 
     def on_broken_pipe(self) -> None:
         """End like a process that receives SIGPIPE, if the reader, such as `head`, has stopped.
@@ -33,6 +35,8 @@ class Terminal(Console):
             raise SystemExit(128 + signal.SIGPIPE)
 
 
+WIDE = 1000
+"""Width of what is no terminal in columns: tables in a pipe or a file are whole."""
 NARROW = 150
 """Width of a terminal in columns below which the bar is short and shows less. The time left must stay visible."""
 LINES_S = 5.0
@@ -107,7 +111,7 @@ def console_table(rows: list[dict[str, Any]]) -> Table:
     """A table for `rich`. The keys of the first row are the headings."""
     table = Table(box=None, header_style="bold", pad_edge=False)
     for heading in rows[0]:
-        table.add_column(heading, no_wrap=True)
+        table.add_column(heading, overflow="fold")
     for row in rows:
         table.add_row(*map(str, row.values()))
     return table

@@ -263,6 +263,15 @@ def test_what_was_not_learned_is_not_called_learned(
     assert verdict(a_summary(success, reached), stop_at) == said
 
 
+@pytest.mark.parametrize(
+    ("success", "learned"), [(0.46, "Did not learn track by PPO reliably"), (0.9, "Learned track by PPO")]
+)
+def test_a_policy_for_random_vehicles_is_learned_if_it_flies_them(success: float, learned: str) -> None:
+    summary = a_summary(success, {}) | {"nominal": a_summary(1.0, {})["shipped"]}
+    told = f"{learned}: success 100.0% (vehicle of the file), {success:.1%} (random vehicles)"
+    assert verdict(summary, None) == told
+
+
 def test_train_eval_export_and_plots_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "run"
     flags = ["--algo", "ppo", "--steps", "2048", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16",

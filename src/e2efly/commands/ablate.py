@@ -13,7 +13,7 @@ from rich.console import Console
 
 from e2efly import presets
 from e2efly.config import TrainConfig
-from e2efly.config.train import LEARNED
+from e2efly.config.train import criterion
 from e2efly.device import prepare
 from e2efly.storage import held, write_atomically, write_json
 from e2efly.terminal import Terminal, TerminalProgress, console_table, markdown
@@ -76,7 +76,8 @@ def _ablate(options: Ablate, configs: dict[tuple[str, str], TrainConfig], consol
         for task in options.tasks:
             began = time.perf_counter()
             curves = known[algo, task] or _curves(options, configs[algo, task], console)
-            rows, vehicles = _rows(curves), _vehicles(configs[algo, task])
+            vehicles = _vehicles(configs[algo, task])
+            rows = _rows(curves, 100 * criterion(None, vehicles))
             panels.append(Panel(f"{task}, {vehicles}", curves, configs[algo, task].task.shows_error))
             took = "as found" if known[algo, task] else f"in {time.perf_counter() - began:.0f} s"
             console.print(
@@ -169,19 +170,19 @@ def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
     return curves
 
 
-def _rows(curves: Any) -> list[dict[str, str]]:
-    """One row per variant: its last evaluation, over all seeds."""
+def _rows(curves: Any, learned: float) -> list[dict[str, str]]:
+    """One row per variant: its last evaluation, over all seeds, and when it was learned, at this success, %."""
     from e2efly.view.ablation import worst
 
     success, error = worst(curves, False), worst(curves, True)
-    reached = [np.flatnonzero(s.mean(axis=0) >= 100 * LEARNED) for s in success]
+    reached = [np.flatnonzero(s.mean(axis=0) >= learned) for s in success]
     return [
         {
             "reward": variant if i == 0 else f"without {variant}",
             "success": f"{success[i, :, -1].mean():.1f} %",
             "worst seed": f"{success[i, :, -1].min():.1f} %",
             "error": f"{100 * error[i, :, -1].mean():.1f} cm",
-            f"{100 * LEARNED:g} % at": f"{curves.steps[reached[i][0]] / 1e6:.2f} M" if len(reached[i]) else "-",
+            f"{learned:g} % at": f"{curves.steps[reached[i][0]] / 1e6:.2f} M" if len(reached[i]) else "-",
         }
         for i, variant in enumerate(curves.variants)
     ]

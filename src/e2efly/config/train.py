@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 from e2efly.config.algorithms import ALGORITHMS, AlgorithmConfig
-from e2efly.config.vehicle import CameraConfig, EnvConfig
+from e2efly.config.vehicle import FILE, CameraConfig, EnvConfig
 from e2efly.drawing import Thing
 
 
@@ -102,8 +102,21 @@ class Robust:
         )
 
 
-LEARNED = 0.95
-"""Success rate of the worst criterion at which a task counts as learned, unless the user asks for another."""
+LEARNED, LEARNED_RANDOM = 0.95, 0.9
+"""Success rates of the worst criterion at which a task counts as learned: with the vehicle of the file, and with random
+vehicles, some of which are hardly able to fly it."""
+
+
+def criterion(stop_at: float | None, vehicles: str) -> float:
+    """The success rate at which a task counts as learned: the one that the user asked for, or that of what flies.
+
+    Args:
+        stop_at: what the user asked for, if anything.
+        vehicles: name of what flies (`Env.vehicles`).
+    """
+    return stop_at or (LEARNED if vehicles == FILE else LEARNED_RANDOM)
+
+
 TIMED = ("duration", "pace")
 """Values of `TaskConfig.precision` for tasks flown against time. For them the distance from the goal has no meaning."""
 
@@ -243,8 +256,3 @@ class TrainConfig:
     """Stages before the task itself."""
     stop_at: float | None = None
     """Stop when the success rate on 1000 starts is at least this. If omitted, use all steps."""
-
-    @property
-    def criterion(self) -> float:
-        """Success rate at which the run counts as having learned its task."""
-        return self.stop_at or LEARNED

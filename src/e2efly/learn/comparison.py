@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from e2efly.config.train import criterion
 from e2efly.env import Env
 from e2efly.learn.judge import rates
 from e2efly.learn.rundir import RunDirectory, least_success, to_json
@@ -48,7 +49,8 @@ class Compared:
         steps, seconds = (np.array([row[name] for row in rows], float) for name in ("steps", "seconds"))
         ended = run.read_json("summary.json") if (path / "summary.json").is_file() else None
         success = np.array([least_success(row) for row in rows], float)
-        return Compared(path, options, steps, seconds, success, vehicles, config.criterion, ended)
+        least = criterion(config.stop_at, vehicles)
+        return Compared(path, options, steps, seconds, success, vehicles, least, ended)
 
     @property
     def there(self) -> tuple[float, float] | None:

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from e2efly.config import TaskConfig
-from e2efly.config.train import LEARNED
+from e2efly.config.train import criterion
 from e2efly.config.vehicle import FILE, RANDOM
 from e2efly.device import fast_compile, wide_vectors
 from e2efly.env import Env, random_key
@@ -104,8 +104,8 @@ def rates(summary: dict[str, Any]) -> dict[str, float]:
 
 
 def verdict(summary: dict[str, Any], stop_at: float | None) -> str:
-    """A sentence that says whether a run learned its task. The success rate of the worst criterion must be at least
-    `stop_at` with the vehicles of the training, or `LEARNED` with the vehicle of the file if `stop_at` is not given.
+    """A sentence that says whether a run learned its task: by its `criterion`, with the vehicles of the training, and
+    without `stop_at` also with the vehicle of the file.
 
     Args:
         summary: summary of the run.
@@ -113,9 +113,9 @@ def verdict(summary: dict[str, Any], stop_at: float | None) -> str:
     """
     what, found = f"{summary['task']} by {summary['algorithm'].upper()}", rates(summary)
     told = "success " + ", ".join(f"{rate:.1%} ({name})" for name, rate in found.items())
-    rate = list(found.values())[-1 if stop_at else 0]
-    if summary["reached_criterion"] or rate >= (stop_at or LEARNED):
+    judged = list(found.items())[-1 if stop_at else 0 :]
+    if summary["reached_criterion"] or all(rate >= criterion(stop_at, name) for name, rate in judged):
         return f"Learned {what}: {told}"
-    if rate == 0:
+    if not any(found.values()):
         return f"Did not learn {what}: no success"
     return f"Did not learn {what} reliably: {told}"

@@ -6,6 +6,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from e2efly.config.train import criterion
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.env import UNSEEN, Env, random_key
 from e2efly.episodes import Episodes
@@ -90,4 +91,5 @@ def _learned(run: RunDirectory, folder: Path, title: str) -> None:
         update = shipped.get("update") if isinstance(shipped, dict) else None
         config = run.config(names_vehicle=True)
         vehicles = Env.of(config.task, config.reward, config.env).vehicles
-        plots.plot_learning(rows, folder / "learning.png", title, update, config.criterion, vehicles)
+        least = criterion(config.stop_at, vehicles)
+        plots.plot_learning(rows, folder / "learning.png", title, update, least, vehicles)
