@@ -1,6 +1,6 @@
 """Where `e2efly train TASK`, as typed, spends its time: seconds of each part, from the start of a process to its end.
 
-    python benchmarks/cold_start.py [--tasks hover race race_clutter] [--seeds 3] [--steps N] [--json FILE]
+    python benchmarks/cold_start.py [--tasks hover race] [--seeds 3] [--steps N] [--json FILE]
 
 Cold: an empty compilation cache. Later: the same command with the cache that the cold one left. Each command is a
 process of its own, which this script times from outside, too. A part is the wall-clock time of the main thread:
@@ -155,7 +155,7 @@ def main() -> None:
     if sys.argv[1:2] == ["--watch"]:
         Path(sys.argv[2]).write_text(json.dumps(watched(sys.argv[3:])))
         return
-    options = arguments(__doc__ or "", tasks=["hover", "race", "race_clutter"], seeds=3, steps=0)
+    options = arguments(__doc__ or "", tasks=["hover", "race"], seeds=3, steps=0)
     for task in options.tasks:
         for seed in range(options.seeds):
             about = {"task": task, "seed": seed, **training(typed(task, options.steps))}

@@ -1,6 +1,6 @@
 """Rates of physics, environment and training, with the peers measured in the same run.
 
-    python benchmarks/rates.py [--rounds 5] [--json FILE]
+    python benchmarks/rates.py [--rounds 3] [--json FILE]
 
 Crazyflow, RotorPy, L2F and PyFlyt are installed into virtual environments of their own (`peers.py`). All are timed in
 turn, `rounds` times, on 1024 vehicles where nothing else is said; the table has the medians, and the ratio to the
@@ -84,7 +84,7 @@ def rows(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def main() -> None:
     """Measure, and write JSON."""
-    options = arguments(__doc__ or "", rounds=5)
+    options = arguments(__doc__ or "", rounds=3)
     prepare("cpu")
     for turn in range(options.rounds):
         for name, (about, rate) in quantities().items():

@@ -20,9 +20,13 @@ OTHERS = (
 )  # fmt: skip
 HERE = Path(__file__).parent
 
+failed = []
 asked = sys.argv[1:] or ["times", *OTHERS]
 for name in (name for one in asked for name in (TIMES if one == "times" else (one,))):
     print(f"== {name}", flush=True)
-    subprocess.run([sys.executable, str(HERE / f"{name}.py")], check=True)
+    if subprocess.run([sys.executable, str(HERE / f"{name}.py")], check=False).returncode:
+        failed.append(name)
 for page in ("figures", "paper_page"):
     subprocess.run([sys.executable, str(HERE.parent / "docs" / f"{page}.py")], check=True)
+if failed:
+    sys.exit(f"failed: {', '.join(failed)}")

@@ -6,6 +6,7 @@ Each run is written as it ends, and a script that was stopped goes on where it w
 """
 
 import json
+import math
 import subprocess
 import sys
 import tempfile
@@ -44,7 +45,7 @@ def rows(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
                     "success, every seed": " ".join(f"{100 * d['success']:.1f}" for d in of),
                     "final error, cm": " ".join(f"{100 * d['final_error_m']:.1f}" for d in of),
                     "mean error, cm": " ".join(f"{100 * d['mean_error_m']:.1f}" for d in of),
-                    "time of a success, s": " ".join(f"{d['seconds_of_success']:.2f}" for d in of),
+                    "time of a success, s": " ".join(f"{d['seconds_of_success'] or math.nan:.2f}" for d in of),
                     "top speed, m/s": " ".join(f"{d['top_speed_m_s']:.1f}" for d in of),
                     "trained, s": " ".join(f"{run['seconds_trained_from_process_start']:.0f}" for run in these),
                     "last policy": " ".join(f"{100 * run['last'][criterion]['success']:.1f}" for run in these),

@@ -9,6 +9,7 @@ measured, and a script that was stopped goes on where it was.
 """
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -66,13 +67,18 @@ def both(goal: str, algo: str, seed: int) -> dict[str, dict[str, float]]:
         return {when: run(goal, algo, seed, Path(cache)) for when in ("cold", "warm")}
 
 
+def number(x: float | None) -> float:
+    """A figure as JSON keeps it: null for NaN."""
+    return math.nan if x is None else x
+
+
 def rows(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The table: one row per command."""
     table = []
     for told in dict.fromkeys(run["command"] for run in runs):
         of = [run for run in runs if run["command"] == told]
         algo, goal = of[0]["algo"], of[0]["task"]
-        cold, warm = ([run[when]["seconds"] for run in of] for when in ("cold", "warm"))
+        cold, warm = ([number(run[when]["seconds"]) for run in of] for when in ("cold", "warm"))
         table.append({
             "algorithm": algo,
             "task": f"{goal}, {100 * GOALS[goal][2]:g}%",
@@ -80,7 +86,7 @@ def rows(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
             "cold, s (median)": f"{median(cold):.1f}",
             "cold, s (all)": " ".join(f"{x:.1f}" for x in cold),
             "warm, s (median)": f"{median(warm):.1f}",
-            "million steps": f"{median([run['cold']['steps'] for run in of]) / 1e6:.2f}",
+            "million steps": f"{median([number(run['cold']['steps']) for run in of]) / 1e6:.2f}",
             "memory, GB": f"{max(run['cold']['peak_memory_gb'] for run in of):.2f}",
             "paper, s": PAPER.get(algo, {}).get(goal, "-"),
             "measured": max(run["date"] for run in of),
