@@ -16,6 +16,11 @@ LOCK = ".lock"
 """Name of the file in a folder that tells who writes to it. Only the kernel's lock on this file counts."""
 
 
+def cache_folder() -> Path:
+    """The user's cache folder of this package."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "e2efly"
+
+
 def write_atomically(path: Path, data: bytes) -> None:
     """Write a file so that it is complete at any moment: either the old or the new one.
 

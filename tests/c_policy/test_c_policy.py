@@ -88,10 +88,10 @@ def test_options_of_c_need_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 @pytest.mark.parametrize(
     ("operator", "attributes", "message"),
     [
-        ("Erf", {}, "node 'odd' of the graph is 'Erf', which the export as C does not know; accepted: Add, "),
+        ("Erf", {}, "node 0 of the graph, 'Erf', is no operator of a policy; accepted: Add, "),
         ("Elu", {"alpha": 0.5}, ""),
-        ("Gemm", {"alpha": 2.0}, "node 'odd' of the graph, Gemm, is other than x W + b with constant W"),
-        ("Slice", {}, "node 'odd' of the graph is 'Slice'"),
+        ("Gemm", {"alpha": 2.0}, "node 0 of the graph, 'Gemm', has the attribute 'alpha'; accepted: none"),
+        ("Slice", {}, "node 0 of the graph, 'Slice', is no operator"),
     ],
 )
 def test_an_operator_that_is_not_known_is_named(

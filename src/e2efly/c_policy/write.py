@@ -41,7 +41,8 @@ def write_c(
             raise ValueError(f"--{option} is {limit}; accepted: more than 0 KiB")
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"--c is {str(folder)!r}, a file; accepted: a folder, which is made where it is not there")
-    contract, content = load_policy(file).contract, file.read_bytes()
+    policy = load_policy(file)
+    contract, content = policy.contract, policy.content
     try:
         made = sources(contract, content, name, precision)
     except ValueError as error:
