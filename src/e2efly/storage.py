@@ -1,19 +1,29 @@
 """Files that survive a crash: complete writes, JSON without NaN, folders with only one writing process at a time."""
 
 import fcntl
+import io
 import json
 import math
 import os
 import reprlib
 import socket
+import struct
+import tokenize
+import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 LOCK = ".lock"
 """Name of the file in a folder that tells who writes to it. Only the kernel's lock on this file counts."""
+
+_UNREADABLE = (OSError, EOFError, RuntimeError, struct.error, zipfile.BadZipFile, zlib.error)
+"""What the standard library raises for archives that are damaged or of another kind."""
 
 
 def cache_folder() -> Path:
@@ -63,6 +73,52 @@ def read_json(path: Path) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise ValueError(f"{path} is {reprlib.repr(found)}; accepted: an object")
     return found
+
+
+def read_npz(path: Path, most: int) -> dict[str, np.ndarray]:
+    """The arrays of an .npz file, by name.
+
+    Args:
+        path: the file.
+        most: the largest number of bytes that all arrays together may have.
+
+    Raises:
+        ValueError: without the file's name, for another file, a damaged one, one that unpacks to more than `most`
+            bytes, and one that holds objects.
+    """
+    try:
+        if not path.is_file():
+            raise ValueError("it is no file")
+        with zipfile.ZipFile(path) as archive:
+            if (size := sum(entry.file_size for entry in archive.infolist())) > most:
+                raise ValueError(f"it unpacks to {size} bytes; accepted: at most {most}")
+            return {name.removesuffix(".npy"): array_of(archive.read(name)) for name in archive.namelist()}
+    except (
+        OSError,
+        EOFError,
+        RuntimeError,
+        NotImplementedError,
+        struct.error,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
+        raise ValueError(str(error)) from None
+
+
+def array_of(data: bytes) -> np.ndarray:
+    """The array in the content of an .npy file.
+
+    Raises:
+        ValueError: for other content, objects, and another size than the header says.
+    """
+    file = io.BytesIO(data)
+    if np.lib.format.read_magic(file) != (1, 0):
+        raise ValueError("it is of another version of .npy; accepted: 1.0, as np.save writes it")
+    try:
+        shape, by_columns, kind = np.lib.format.read_array_header_1_0(file)
+    except (SyntaxError, TypeError, MemoryError, RecursionError, tokenize.TokenError) as error:
+        raise ValueError(f"its header is {error}") from None
+    return np.frombuffer(data, kind, offset=file.tell()).reshape(shape, order="F" if by_columns else "C")
 
 
 def finite(value: Any) -> Any:

@@ -23,6 +23,8 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 CONTRACT_VERSION = 2
 """Version of the meaning of these fields; a policy of another version is refused."""
+LARGEST = 1 << 20
+"""Largest length of the JSON. The longest of the zoo has 3050 characters."""
 METADATA_KEY = "contract"
 """Key of the contract in the metadata of the ONNX file."""
 ACTION_SIZE = 4
@@ -160,6 +162,8 @@ class Contract:
         Raises:
             ValueError: naming the field, the value and what is accepted.
         """
+        if len(text) > LARGEST:
+            raise ValueError(f"contract: has {len(text)} characters; accepted: at most {LARGEST}")
         try:
             content = json.loads(text, object_pairs_hook=unique)
         except (ValueError, RecursionError) as error:

@@ -118,8 +118,9 @@ def check(graph: Message, inputs: Mapping[str, Shape], outputs: Mapping[str, Sha
     for name, shape in outputs.items():
         found = known.get(name)
         if found is None or found.value is not None or found.type != FLOAT or found.shape != shape or name in inputs:
-            has = "missing" if found is None else f"of the shape {found.shape}"
-            raise ValueError(f"output {name!r} of the graph is {has}; accepted: computed, of the shape {shape}")
+            has = "missing" if found is None else f"of the shape {found.shape} and of {found.type}"
+            accepted = f"computed, of the shape {shape} and of {FLOAT}"
+            raise ValueError(f"output {name!r} of the graph is {has}; accepted: {accepted}")
 
 
 def constant(name: str, tensor: Message) -> tuple[np.ndarray, str]:
