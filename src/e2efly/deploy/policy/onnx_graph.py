@@ -233,7 +233,7 @@ def _common(node: Node, given: Sequence[Array], chosen: bool = False) -> Shape:
 
 def _clip(node: Node) -> Made:
     low, high = node.constant(1), node.constant(2)
-    node.need(low.shape == high.shape == () and low <= high, "an array and two rising numbers")
+    node.need(low.shape == high.shape == () and bool(low <= high), "an array and two rising numbers")
     return _each(node.computed.shape)
 
 
