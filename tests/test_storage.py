@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from e2efly.storage import LOCK, held, write_json
+from e2efly.view.style import figure
 
 HOLD = """
 import sys, time
@@ -41,6 +42,34 @@ def test_a_held_folder_is_refused_with_who_has_it_until_that_process_is_killed(t
     with held(tmp_path / "run"):
         pass
     assert list((tmp_path / "run").iterdir()) == []
+
+
+def test_what_a_killed_process_had_not_finished_goes_and_what_others_write_stays(tmp_path: Path) -> None:
+    process = holder(tmp_path / "other")
+    dead, alive = (tmp_path / f"vehicle.toml.{number}.part" for number in (2**30, process.pid))
+    for part in (dead, alive):
+        part.touch()
+    with held(tmp_path):
+        assert not dead.exists()
+        assert alive.exists()
+    process.kill()
+    process.communicate()
+
+
+def test_a_picture_on_a_full_disk_is_named_and_the_last_one_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "plot.png"
+    path.write_bytes(b"the last one")
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match=r"cannot write .*plot\.png: No space left on device"), figure(path, "title", 2.0):
+        pass
+    assert path.read_bytes() == b"the last one"
+    assert [file.name for file in tmp_path.iterdir()] == ["plot.png"]
 
 
 def test_a_folder_that_nothing_was_written_to_goes_again(tmp_path: Path) -> None:

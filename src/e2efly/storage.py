@@ -136,7 +136,8 @@ def finite(value: Any) -> Any:
 def held(folder: Path, option: str = "--out") -> Iterator[None]:
     """Keep other processes from writing to a folder. The folder is made if it does not exist.
 
-    The kernel releases the lock when the process ends, however it ends. So no lock outlives its process.
+    The kernel releases the lock when the process ends, however it ends. So no lock outlives its process. What a killed
+    process had not finished writing is removed.
 
     Args:
         folder: the folder to lock.
@@ -161,6 +162,9 @@ def held(folder: Path, option: str = "--out") -> Iterator[None]:
         ) from None
     except OSError as error:
         raise OSError(f"cannot lock {option} {folder}: {error.strerror}") from error
+    for part in folder.glob("*.part"):
+        if not _runs(part.suffixes[-2][1:] if len(part.suffixes) > 1 else ""):
+            part.unlink(missing_ok=True)
     now = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
     about = json.dumps({"process": os.getpid(), "host": socket.gethostname(), "since": now})
     try:
@@ -174,6 +178,17 @@ def held(folder: Path, option: str = "--out") -> Iterator[None]:
         if anew:
             with suppress(OSError):  # the folder is not empty
                 folder.rmdir()
+
+
+def _runs(process: str) -> bool:
+    """Whether a process of this number runs on this machine."""
+    try:
+        os.kill(int(process), 0)
+    except (ValueError, ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        pass
+    return True
 
 
 def is_held(folder: Path) -> bool:

@@ -11,7 +11,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.storage import write_json
+from e2efly.storage import held, write_json
 from e2efly.terminal import Terminal
 from e2efly.vehicles import Vehicle, load_vehicle, unknown
 from e2efly.vehicles.posterior import load_posterior
@@ -55,8 +55,14 @@ def run(options: Identify) -> int:
     """Read all sources and fuse their results. Write the vehicle file, the report and the plots.
 
     Raises:
-        ValueError: naming the source, what is wrong with it and what is accepted. Nothing is written then.
+        ValueError: naming the source, what is wrong with it and what is accepted. Nothing is written then. Also when
+            another process writes to the folder.
     """
+    with held(options.out):
+        return _identify(options)
+
+
+def _identify(options: Identify) -> int:
     from e2efly.identification import parts, pendulum, stand
     from e2efly.identification.correlation import correlation
     from e2efly.identification.csv_file import column_map
@@ -92,7 +98,6 @@ def run(options: Identify) -> int:
 
     outside = {kind: judged(each) for kind, each in found.items()}
     report = _report(options, base, fused, said, found, outside)
-    options.out.mkdir(parents=True, exist_ok=True)
     file = options.out / "vehicle.toml"
     together = correlation(found.values(), fused, _mass_spread(said))
     write_vehicle(file, options.vehicle, base, fused, together)

@@ -1,5 +1,6 @@
 """The style of all plots. They use Matplotlib's objects without pyplot, so there is no global state and no window."""
 
+import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from e2efly.drawing import INK, ORANGE
+from e2efly.storage import write_atomically
 
 BLUE, VERMILLION, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 CYCLE = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY)
@@ -72,7 +74,9 @@ def figure(
             rect = (0.004, 0.0, 0.988, 1 - lines / height)
             fig.set_layout_engine("constrained", rect=rect, w_pad=0.06, h_pad=0.06)
         yield fig
-        fig.savefig(path, format="png")
+        picture = io.BytesIO()
+        fig.savefig(picture, format="png")
+        write_atomically(Path(path), picture.getvalue())
 
 
 def say(ax: Axes, text: str) -> None:
