@@ -91,6 +91,7 @@ def _field(number: int, data: bytes, more: int = 0) -> bytes:
         (b"\x08" + b"\x80" * 20, "a number breaks off or has more than 64 bits"),
         (_field(1, b"\x08\x09"), "the field ir_version of its model has more than one value"),
         (_field(2, b"\xff"), "the field producer_name is no text"),
+        (_field(7, _field(2, b"x" * 1001)), "has the field name of 1001 bytes; accepted: at most 1000"),
         (b"\x38\x01", "the field graph is of another kind"),
         (b"\x3b", "field 7 is of kind 3"),
         (b"\x3a\x05", "its last field breaks off"),

@@ -258,7 +258,7 @@ def _check_interface(
                 for name, kind, axes in has]  # fmt: skip
         said = [(name, FLOAT, ["n", *shape]) for name, shape in wanted.items()]
         if free != said:
-            raise ValueError(f"{side} of the graph is {has}; its contract says {said}; export the policy again")
+            raise ValueError(f"{side} of the graph is {has!r:.500}; its contract says {said}; export the policy again")
     return inputs, outputs
 
 

@@ -21,7 +21,9 @@ LARGEST = 1 << 25
 """Largest size of a file, bytes. The largest policy of the zoo has half a million."""
 FIELDS = 100_000
 """Largest number of fields and of numbers outside of the weights. A policy of the zoo has at most 521."""
-METADATA, DIGEST = "metadata_props", "sha256"
+NAME = 1000
+"""Longest text beside the values of the metadata, bytes."""
+METADATA = "metadata_props"
 _ENTRY = b"\x72\x4a\x0a\x06sha256\x12\x40"
 """Field 14 (metadata) of 74 bytes: field 1 (key) of 6 bytes, followed by field 2 (value) of 64 bytes."""
 _SIZE = len(_ENTRY) + 64
@@ -29,68 +31,41 @@ _INTEGER, _FLOAT, _TEXT, _BYTES, _REMARK = "integer", "float", "text", "bytes", 
 
 SCHEMA: dict[str, dict[int, tuple[str, str, str]]] = {
     "model": {
-        1: ("ir_version", _INTEGER, ""),
-        2: ("producer_name", _TEXT, ""),
-        3: ("producer_version", _TEXT, ""),
-        4: ("domain", _TEXT, ""),
-        5: ("model_version", _INTEGER, ""),
-        6: ("doc_string", _REMARK, ""),
-        7: ("graph", "graph", ""),
-        8: ("opset_import", "operator set", "*"),
-        14: (METADATA, "entry", "*"),
+        1: ("ir_version", _INTEGER, ""), 2: ("producer_name", _TEXT, ""), 3: ("producer_version", _TEXT, ""),
+        4: ("domain", _TEXT, ""), 5: ("model_version", _INTEGER, ""), 6: ("doc_string", _REMARK, ""),
+        7: ("graph", "graph", ""), 8: ("opset_import", "operator set", "*"), 14: (METADATA, "entry", "*"),
     },
     "operator set": {1: ("domain", _TEXT, ""), 2: ("version", _INTEGER, "")},
     "entry": {1: ("key", _TEXT, ""), 2: ("value", _TEXT, "")},
     "graph": {
-        1: ("node", "node", "*"),
-        2: ("name", _TEXT, ""),
-        5: ("initializer", "tensor", "*"),
-        10: ("doc_string", _REMARK, ""),
-        11: ("input", "value", "*"),
-        12: ("output", "value", "*"),
-        13: ("value_info", _REMARK, "*"),
-        16: ("metadata_props", _REMARK, "*"),
+        1: ("node", "node", "*"), 2: ("name", _TEXT, ""), 5: ("initializer", "tensor", "*"),
+        10: ("doc_string", _REMARK, ""), 11: ("input", "value", "*"), 12: ("output", "value", "*"),
+        13: ("value_info", _REMARK, "*"), 16: (METADATA, _REMARK, "*"),
     },
     "node": {
-        1: ("input", _TEXT, "*"),
-        2: ("output", _TEXT, "*"),
-        3: ("name", _TEXT, ""),
-        4: ("op_type", _TEXT, ""),
-        5: ("attribute", "attribute", "*"),
-        6: ("doc_string", _REMARK, ""),
-        7: ("domain", _TEXT, ""),
-        9: ("metadata_props", _REMARK, "*"),
+        1: ("input", _TEXT, "*"), 2: ("output", _TEXT, "*"), 3: ("name", _TEXT, ""), 4: ("op_type", _TEXT, ""),
+        5: ("attribute", "attribute", "*"), 6: ("doc_string", _REMARK, ""), 7: ("domain", _TEXT, ""),
+        9: (METADATA, _REMARK, "*"),
     },
     "attribute": {
-        1: ("name", _TEXT, ""),
-        2: ("f", _FLOAT, ""),
-        3: ("i", _INTEGER, ""),
-        4: ("s", _BYTES, ""),
-        5: ("t", "tensor", ""),
-        7: ("floats", _FLOAT, "*"),
-        8: ("ints", _INTEGER, "*"),
-        13: ("doc_string", _REMARK, ""),
-        20: ("type", _INTEGER, ""),
+        1: ("name", _TEXT, ""), 2: ("f", _FLOAT, ""), 3: ("i", _INTEGER, ""), 4: ("s", _BYTES, ""),
+        5: ("t", "tensor", ""), 7: ("floats", _FLOAT, "*"), 8: ("ints", _INTEGER, "*"),
+        13: ("doc_string", _REMARK, ""), 20: ("type", _INTEGER, ""),
     },
     "tensor": {
-        1: ("dims", _INTEGER, "*"),
-        2: ("data_type", _INTEGER, ""),
-        8: ("name", _TEXT, ""),
-        9: ("raw_data", _BYTES, ""),
-        12: ("doc_string", _REMARK, ""),
-        16: ("metadata_props", _REMARK, "*"),
+        1: ("dims", _INTEGER, "*"), 2: ("data_type", _INTEGER, ""), 8: ("name", _TEXT, ""),
+        9: ("raw_data", _BYTES, ""), 12: ("doc_string", _REMARK, ""), 16: (METADATA, _REMARK, "*"),
     },
     "value": {
-        1: ("name", _TEXT, ""),
-        2: ("type", "type", ""),
-        3: ("doc_string", _REMARK, ""),
-        4: ("metadata_props", _REMARK, "*"),
+        1: ("name", _TEXT, ""), 2: ("type", "type", ""), 3: ("doc_string", _REMARK, ""), 4: (METADATA, _REMARK, "*"),
     },
     "type": {1: ("tensor_type", "tensor type", ""), 6: ("denotation", _REMARK, "")},
     "tensor type": {1: ("elem_type", _INTEGER, ""), 2: ("shape", "shape", "")},
     "shape": {1: ("dim", "axis", "*")},
-    "axis": {1: ("dim_value", _INTEGER, ""), 2: ("dim_param", _TEXT, ""), 3: ("denotation", _REMARK, "")},
-}
+    "axis": {
+        1: ("dim_value", _INTEGER, ""), 2: ("dim_param", _TEXT, ""), 3: ("denotation", _REMARK, ""),
+    },
+}  # fmt: skip
 """For each kind of message the fields that are read: name, kind, and * for one that may occur more than once. Remarks
 are for people: they are passed over, and not written."""
 NAMES = {
@@ -236,6 +211,8 @@ class _Reader:
             raise ValueError(f"not an ONNX file: the field {name} is of another kind")
         if of == _BYTES:
             return [bytes(value)]
+        if of == _TEXT and len(value) > NAME and name != "value":
+            raise ValueError(f"has the field {name} of {len(value)} bytes; accepted: at most {NAME}")
         if of == _TEXT:
             try:
                 return [str(value, "utf-8")]

@@ -110,7 +110,7 @@ def check(graph: Message, inputs: Mapping[str, Shape], outputs: Mapping[str, Sha
         if any(len(array.shape) >= AXES for array in made):
             raise ValueError(f"{where} computes an array of more than {AXES} axes; accepted: at most that")
         if not set(named).isdisjoint(known) or len(set(named)) < len(named) or "" in named:
-            raise ValueError(f"{where} has the outputs {named}; accepted: new names")
+            raise ValueError(f"{where} has the outputs {named!r:.500}; accepted: new names")
         known |= zip(named, made, strict=True)
         held, work = held + sum(math.prod(array.shape) for array in made), work + more
         _few(held, ELEMENTS, "numbers that are held or computed for one observation")
