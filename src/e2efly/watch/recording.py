@@ -162,8 +162,8 @@ class Recording:
                 series[f"{axis} rate (rad/s)"] = (float(command), float(flown))
         mode = next((text for t, text in reversed(told.notes) if t <= i * PERIOD), "")
         tilt = np.degrees(float(Quat.of(now("quaternion")[followed]).tilt()))
-        note = f"**{i * PERIOD:.1f} s** of {self.length * PERIOD:.1f} s, {series['speed (m/s)'][0]:.1f} m/s, "
-        note += f"tilted {tilt:.0f} degrees  \n{told.name} {mode}"
+        note = f"{i * PERIOD:.1f} s of {self.length * PERIOD:.1f} s, {series['speed (m/s)'][0]:.1f} m/s, "
+        note += f"tilted {tilt:.0f} degrees\n{told.name} {mode}"
         return Frame(
             i * PERIOD, now("position"), now("quaternion"), now("velocity"), now("rotor_speed"), now("goal"),
             series=series, fresh=i == 0, note=note,
