@@ -3,24 +3,33 @@
 import signal
 import threading
 import time
+from collections.abc import Iterable
 from types import TracebackType
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.segment import Segment
 from rich.table import Table
 
-from e2efly.process import write_nowhere
+from e2efly.process import printable, write_nowhere
 
 
 class Terminal(Console):
     """A console that prints text unchanged, although paths and messages may contain rich markup or emoji codes.
 
-    Lines are not broken in a narrow terminal, so that commands and paths in them can be copied.
+    Escape sequences in text, which could change the terminal, are shown and not sent. Lines are not broken in a narrow
+    terminal, so that commands and paths in them can be copied.
     """
 
     def __init__(self, *, stderr: bool = False, quiet: bool = False) -> None:
         super().__init__(stderr=stderr, quiet=quiet, markup=False, emoji=False, highlight=False, soft_wrap=True)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Pieces of text, with their styles, and the control codes of rich itself."""
+        for segment in super().render(renderable, options):
+            lines = segment.text.split("\n")
+            yield segment if segment.control else Segment("\n".join(map(printable, lines)), segment.style)
 
     def on_broken_pipe(self) -> None:
         """End like a process that receives SIGPIPE, if the reader, such as `head`, has stopped.

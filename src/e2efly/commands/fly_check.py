@@ -19,7 +19,7 @@ from e2efly.deploy.sight.picture import blocks, colours, sheet, write_png
 from e2efly.deploy.sight.samples import read_samples
 from e2efly.deploy.sight.source import ImageSource
 from e2efly.deploy.sight.watch import Seen
-from e2efly.deploy.terminal import printable
+from e2efly.process import printable
 
 LOOK_S = 1.5
 """How long `--check` watches poses and receiver, s."""

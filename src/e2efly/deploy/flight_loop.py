@@ -21,8 +21,7 @@ from e2efly.deploy.log.record import Log
 from e2efly.deploy.pilot.flight_state import Mode
 from e2efly.deploy.pilot.hover import blind, blind_time, sink_time
 from e2efly.deploy.service import Service
-from e2efly.deploy.terminal import printable
-from e2efly.process import threads
+from e2efly.process import printable, threads
 
 LOWEST_RATE = 100.0
 """The lowest rate of the loop, Hz."""

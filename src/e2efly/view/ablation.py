@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from e2efly.drawing import INK
 from e2efly.learn.ablation import FULL, Curves
-from e2efly.view.style import CYCLE, GREY, figure
+from e2efly.view.style import CYCLE, GREY, figure, label_decades
 
 _DASHES = ("-", (0, (4, 2)), (0, (1, 1.2)))
 
@@ -65,6 +65,7 @@ def _draw(ax: Axes, panel: Panel) -> None:
     if panel.by_error:
         ax.set_ylabel("error (m)")
         ax.set_yscale("log")
+        label_decades(ax.yaxis)
     else:
         ax.set_ylabel("success (%)")
         ax.set_ylim(-4, 104)

@@ -120,6 +120,7 @@ def _terms(ax: Axes, rows: Rows) -> None:
         _curve(ax, rows, "steps", 1e-6, key, color, label=key.removeprefix("reward/"), linestyle=dashes)
     if (largest := max(size.values())) > 0:
         ax.set_yscale("symlog", linthresh=10.0 ** np.floor(np.log10(largest) - 2), linscale=0.6)
+        ax.yaxis.set_major_formatter(FormatStrFormatter("%g"))
     ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
     ax.set_xlim(left=0.0)
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=8, borderpad=0.1)

@@ -7,9 +7,11 @@ from typing import Any
 
 from matplotlib import colormaps, rc_context
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogFormatter
 
 from e2efly.drawing import INK, ORANGE
 
@@ -45,7 +47,7 @@ _STYLE: dict[Any, Any] = {
     "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "axes.axisbelow": True,
     "axes.titlelocation": "left", "axes.facecolor": "white", "figure.facecolor": "white", "savefig.facecolor": "white",
     "grid.color": "#E6E6E6", "grid.linewidth": 0.8, "lines.linewidth": 1.6, "lines.solid_capstyle": "round",
-    "legend.frameon": False, "axes.formatter.useoffset": False, "axes.unicode_minus": True,
+    "legend.frameon": False, "axes.formatter.useoffset": False, "axes.unicode_minus": True, "text.parse_math": False,
 }  # fmt: skip
 
 
@@ -73,6 +75,14 @@ def figure(
             fig.set_layout_engine("constrained", rect=rect, w_pad=0.06, h_pad=0.06)
         yield fig
         fig.savefig(path, format="png")
+
+
+def label_decades(axis: Axis) -> None:
+    """Label a logarithmic axis with plain numbers. Matplotlib's own labels are formulas, but every text of a figure is
+    shown as it is, since it may hold the dollar signs of a name.
+    """
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(LogFormatter())
 
 
 def say(ax: Axes, text: str) -> None:
