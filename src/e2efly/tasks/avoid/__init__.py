@@ -21,6 +21,7 @@ from e2efly.config import (
     TrainConfig,
     number,
 )
+from e2efly.numbers import SPEED
 from e2efly.tasks.registry import register
 
 
@@ -50,7 +51,7 @@ class AvoidConfig(TaskConfig):
     """Length of an episode, s."""
     forest: ForestConfig = ForestConfig()
     """The forest. Its lane is also the fence."""
-    speed: tuple[float, float] = number((3.0, 10.0), rising=True)
+    speed: tuple[float, float] = number((3.0, 10.0), high=SPEED, rising=True)
     """Commanded speed, m/s, uniform per episode."""
     sideways: float = 3.0
     """Largest start distance from the middle of the lane, m."""

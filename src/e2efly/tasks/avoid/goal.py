@@ -11,6 +11,7 @@ import numpy as np
 from e2efly.config import number
 from e2efly.control.vectors import Array, namespace
 from e2efly.goal import Course, Goal, Outcome, Shape
+from e2efly.numbers import SPEED
 from e2efly.observation import Field
 from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.route import Route
@@ -104,7 +105,7 @@ class AvoidRoute(Route):
 
     longest_s: ClassVar = 20.0
 
-    speed: float = number(5.0, above=0)
+    speed: float = number(5.0, above=0, high=SPEED)
     """Commanded speed, m/s."""
 
     @classmethod

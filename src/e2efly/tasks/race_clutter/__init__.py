@@ -23,6 +23,7 @@ from e2efly.config import (
     number,
     shape,
 )
+from e2efly.numbers import ANGLE, SPEED
 from e2efly.tasks.registry import register
 
 
@@ -65,9 +66,9 @@ class RaceClutterConfig(TaskConfig):
     """The obstacles."""
     gate_position: float = 0.3
     """Half-width of each gate's random offset from its place on the track, m per axis."""
-    gate_yaw: float = 0.2
+    gate_yaw: float = number(0.2, high=ANGLE)
     """Half-width of each gate's random rotation, rad."""
-    speed: tuple[float, float] = number((4.0, 12.0), rising=True)
+    speed: tuple[float, float] = number((4.0, 12.0), high=SPEED, rising=True)
     """Commanded speed, m/s, uniform per episode."""
     position: float = 0.5
     """Radius of the ball around the track's start in which episodes start, m."""

@@ -13,6 +13,7 @@ from e2efly.control.vectors import Array, namespace
 from e2efly.courses.gates import Tracks
 from e2efly.courses.tracks import RaceTrack, load_track, track_text
 from e2efly.goal import Course, Goal, Outcome, Shape
+from e2efly.numbers import SPEED
 from e2efly.observation import Field
 from e2efly.storage import write_atomically
 from e2efly.tasks.race import any_goal
@@ -125,7 +126,7 @@ class RaceClutterRoute(Route):
     """Factor by which the ground plan of the track is enlarged."""
     laps: int = number(1, high=LARGEST)
     """Number of laps to fly. 0: without end."""
-    speed: float = number(6.0, above=0)
+    speed: float = number(6.0, above=0, high=SPEED)
     """Commanded speed, m/s."""
 
     @classmethod
