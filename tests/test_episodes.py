@@ -226,7 +226,7 @@ def test_a_broken_configuration(config: dict[str, Any], message: str) -> None:
 
 
 def test_a_broken_task_or_reward() -> None:
-    with pytest.raises(ValueError, match="task.episode_s is 0.0; accepted: a number, 1e-09 to 10000"):
+    with pytest.raises(ValueError, match=r"task\.episode_s is 0\.0; accepted: a number, 1e-09 to 10000"):
         make(HoverConfig(episode_s=0.0))
     with pytest.raises(ValueError, match="unknown reward term 'prog22'; did you mean 'prog2'"):
         make(reward=RewardConfig({"prog22": 1.0}))
