@@ -108,7 +108,7 @@ def _fits(field: dataclasses.Field[Any], rule: Rule, value: Any) -> bool:
     given = value if isinstance(value, tuple) else (value,)
     if not all(_is_number(x) and rule.accepts(x) and (not whole or x % 1 == 0) for x in given):
         return False
-    return not rule.rising or given[0] <= given[1]
+    return not rule.rising or list(given) == sorted(given)
 
 
 def _accepted(field: dataclasses.Field[Any], rule: Rule) -> str:
