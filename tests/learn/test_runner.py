@@ -311,7 +311,7 @@ def test_the_algorithm_left_out_is_the_task_s_best(task: str, algo: str) -> None
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"steps": 0}, "^steps is 0; accepted: a whole number, 1 to 1000000000000$"),
+        ({"steps": 0}, "^steps is 0; accepted: a whole number, 1 to 1000000000000000$"),
         ({"network": NetworkConfig(())}, r"network.hidden is \(\); accepted: one or more sizes"),
         ({"reward": RewardConfig({"v1": 1e300})}, r"reward v1 is 1e\+300; accepted: a number, -10000 to 10000"),
     ],

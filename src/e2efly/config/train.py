@@ -25,20 +25,20 @@ class RewardConfig:
 class NetworkConfig:
     """The policy network, and the critic's network if there is one."""
 
-    hidden: tuple[int, ...] = number((64, 64), low=1, high=65536)
+    hidden: tuple[int, ...] = number((64, 64), low=1, high=10**6)
     """Units of the hidden layers (sets shapes)."""
     activation: Literal["relu", "tanh", "elu"] = "relu"
     """Activation of the hidden layers (sets the program)."""
     pool: tuple[int, int] = number((16, 16), low=1, high=8192)
     """Rows and columns to which an image is reduced. Each cell becomes its mean value, or for depth its nearest value.
     They must divide the camera's rows and columns (sets shapes)."""
-    convolution: tuple[int, ...] = number((), low=1, high=65536)
+    convolution: tuple[int, ...] = number((), low=1, high=10**6)
     """Channels of the convolutions that process an image in place of the reduction by `pool`. Their kernel size
     equals their stride: 4, or 2 where 4 does not divide the image. They can then be computed as matrix products
     (sets shapes)."""
-    encoder: tuple[int, ...] = number((64,), low=1, high=65536)
+    encoder: tuple[int, ...] = number((64,), low=1, high=10**6)
     """Units of the layers that process each image before it joins the other inputs (sets shapes)."""
-    recurrent: int = number(0, high=65536)
+    recurrent: int = number(0, high=10**6)
     """Units of a gated recurrent unit (GRU) before the hidden layers. 0: no GRU (sets shapes)."""
 
 
@@ -51,7 +51,7 @@ class StageConfig:
     are not allowed."""
     success: float | None = number(None, above=0, high=1.0)
     """Promotion: the success rate in an evaluation at which this stage ends."""
-    steps: int | None = number(None, low=1, high=10**12)
+    steps: int | None = number(None, low=1, high=10**15)
     """Promotion at the latest after so many environment steps."""
 
 
@@ -226,7 +226,7 @@ class TrainConfig:
     """The policy whose weights the training starts from: a name of the zoo or a file. If omitted, fresh weights."""
     seed: int = number(0, high=2**32 - 1)
     """Seed of everything random."""
-    steps: int = number(2_000_000, low=1, high=10**12)
+    steps: int = number(2_000_000, low=1, high=10**15)
     """Environment steps of the whole run, rounded up to whole chunks."""
     chunk: int = number(20, low=1)
     """Updates between two evaluations (sets shapes)."""

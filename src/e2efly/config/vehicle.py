@@ -159,9 +159,9 @@ class EnvConfig:
     """What the policy commands: a command mode of `e2efly list` (sets the program)."""
     integrator: str = "rk3"
     """Integrator of the physics: euler, semi_implicit, rk3 or rk4 (sets the program)."""
-    control_rate: float | None = number(None, low=1.0)
+    control_rate: float | None = number(None, low=0.1)
     """Control rate, Hz. If omitted, the vehicle's own rate (sets shapes)."""
-    largest_step: float = number(0.005, low=1e-5, high=1.0)
+    largest_step: float = number(0.005, low=1e-6, high=1.0)
     """Largest physics sub-step, s (sets shapes)."""
     action_latency: tuple[float, float] | None = number(None, high=LATEST, rising=True)
     """Latency from observation to command, s, uniform per episode. If omitted, the vehicle's own (the upper bound sets
