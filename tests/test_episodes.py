@@ -131,7 +131,7 @@ def test_new_starts_differ_from_each_other_and_from_the_first(step: Any) -> None
 @pytest.mark.parametrize(("rate", "seconds"), [(30.0, 12.0), (60.0, 20.0), (100.0, 60.0)])
 def test_an_episode_has_as_many_steps_as_its_seconds_hold(rate: float, seconds: float) -> None:
     """Summed up in single precision, and yet neither a step more nor a step less."""
-    env = make(HoverConfig(episode_s=seconds, fence=1e9, position=0.0), control_rate=rate, largest_step=1.0)
+    env = make(HoverConfig(episode_s=seconds, fence=np.inf, position=0.0), control_rate=rate, largest_step=1.0)
     state, _ = reset(env, 1)
 
     def one(state: EnvState, _: None) -> tuple[EnvState, jax.Array]:
