@@ -12,7 +12,9 @@ import pytest
 
 from e2efly.deploy.log.bags import export_bag
 from e2efly.deploy.log.flight_log import read_log
+from e2efly.deploy.log.mcap_records import MAGIC
 from e2efly.deploy.log.telemetry import Telemetry
+from e2efly.identification.bag_storage import ROS1, SQLITE
 from e2efly.identification.csv_file import column_map, read_csv, write_csv
 from e2efly.identification.readers import read_flights, read_part
 from e2efly.identification.record import Record, Stream, stream_table
@@ -228,11 +230,14 @@ def test_a_px4_log(tmp_path: Path) -> None:
     [
         ("gone.csv", None, "does not exist; accepted: our .mcap"),
         ("empty.csv", lambda p: p.write_bytes(b""), "is empty"),
-        ("photo.jpg", lambda p: p.write_bytes(b"abc"), "of no kind that is known here"),
-        ("a.ulg", lambda p: p.write_bytes(b"ULog, or not"), "no PX4 log that can be read"),
-        ("a.bbl", lambda p: p.write_bytes(b"H nothing\n"), "no blackbox log that can be read"),
-        ("a.mcap", lambda p: p.write_bytes(b"abc"), "no flight log"),
-        ("a.bag", lambda p: p.write_bytes(b"abc"), "no bag that can be read"),
+        ("a.mcap", lambda p: p.write_bytes(b"abc"), "of no kind that is known here"),
+        ("photo.csv", lambda p: p.write_bytes(b"\xff\xd8\xff\0,"), "of no kind that is known here"),
+        ("a.txt", lambda p: p.write_bytes(b"ULog\x01\x12\x35"), "has nothing that is used here"),
+        ("a", lambda p: p.write_bytes(b"H Product:Blackbox\n"), "no blackbox log that can be read"),
+        ("a.b", lambda p: p.write_bytes(MAGIC), "has the topics none; accepted: one of nav_msgs/msg/Odometry"),
+        ("a.db3", lambda p: p.write_bytes(SQLITE + bytes(84)), "a ROS bag that cannot be read"),
+        ("a.bag", lambda p: p.write_bytes(ROS1 + bytes(9)), "has the topics none"),
+        ("a.x", lambda p: p.mkdir(), "is a folder without files of a bag"),
     ],
 )
 def test_what_is_no_log_is_refused_by_name(tmp_path: Path, name: str, make: Callable | None, told: str) -> None:

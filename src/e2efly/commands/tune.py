@@ -10,6 +10,7 @@ import tyro
 from e2efly.commands import eval as evaluation
 from e2efly.commands import identify, train
 from e2efly.commands.identify import Identify
+from e2efly.commands.reading import LogOptions
 from e2efly.storage import write_json
 from e2efly.tasks import TASKS
 from e2efly.terminal import Terminal
@@ -32,8 +33,7 @@ class Tune:
     flights."""
     mass: tuple[float, float] | None = None
     """Mass of the vehicle and standard deviation of the scale, kg."""
-    columns: tuple[str, ...] = ()
-    """Maps the column names of a CSV log to ours, as in `identify`."""
+    read: tyro.conf.OmitArgPrefixes[LogOptions] = LogOptions()
     out: Path = Path("tuned")
     """Folder for identified/ (the vehicle file and its plots), run/ (the training) and policy.onnx."""
     steps: int | None = None
@@ -72,7 +72,7 @@ def run(options: Tune) -> int:
         seconds[what] = time.perf_counter() - began - sum(seconds.values())
 
     console.rule(f"identify {', '.join(path.name for path in o.logs)}")
-    identify.run(Identify(("flight", *map(str, o.logs)), o.vehicle, folder, o.columns, o.mass))
+    identify.run(Identify(("flight", *map(str, o.logs)), o.vehicle, folder, o.read, o.mass))
     did("identify")
     console.rule(f"train {o.task} on what stays uncertain")
     steps = [] if o.steps is None else ["--steps", str(o.steps)]

@@ -111,17 +111,28 @@ def driver_of(records: Sequence[Record], step: bool = False) -> str:
         ValueError: naming the flight that has no such stream.
     """
     wanted = ("command",) if step else ("command", "rotor_speed", "motor")
-    if not step and all(_shows_motors(record) and not record.has("rotor_speed") for record in records):
+    if not step and all(_shows_motors(record) and not _drives(record, "rotor_speed") for record in records):
         wanted = ("motor",)
     for name in wanted:
-        if all(record.has(name) for record in records):
+        if all(_drives(record, name, step) for record in records):
             slow = name == "motor" and any(record.streams[name].rate < TORQUES for record in records)
             return "motor_and_rate" if slow and all(r.has("quaternion", "position") for r in records) else name
-    lacking = next(r for r in records if not any(r.has(name) for name in wanted))
+    lacking = next((r for r in records if not any(_drives(r, name, step) for name in wanted)), records[0])
     raise ValueError(
         f"{lacking.path}: has the streams {', '.join(lacking.streams) or 'none'}; accepted: "
-        f"{' or '.join(wanted)} in every flight, besides body_rate"
+        f"{' or '.join(wanted)} in every flight, besides body_rate (rotor speeds {MOTORS:g} times a second, commands "
+        "whose thrust changes)"
     )
+
+
+def _drives(record: Record, name: str, step: bool = False) -> bool:
+    """Whether a stream can drive a simulation. Where only the rates are fitted, a command need not tell the thrust."""
+    if not record.has(name):
+        return False
+    stream = record.streams[name]
+    if name == "command":
+        return step or bool(np.ptp(stream.values[:, 0]) > 0)
+    return name != "rotor_speed" or stream.rate >= MOTORS
 
 
 def _shows_motors(record: Record) -> bool:
