@@ -137,21 +137,20 @@ def _check_constant(record: Record) -> None:
 def _check_units(record: Record) -> None:
     if record.has("specific_force"):
         size = float(np.median(np.linalg.norm(record.streams["specific_force"].values, axis=1)))
-        shown = _gravity_shown(record) or [(size, float(np.clip(size, GRAVITY, LIVELY * GRAVITY)))]
+        shown = _gravity_shown(record)
+        told = f"rest, hover or the motion of the poses show {shown[0][1]:.3g}" if shown else f"gravity is {GRAVITY}"
+        shown = shown or [(size, float(np.clip(size, GRAVITY, LIVELY * GRAVITY)))]
         off = min((measured / expected for measured, expected in shown), key=lambda x: abs(np.log(max(x, 1e-9))))
         guess = (
-            "values without gravity" if off < 0.04
+            "values without gravity" if abs(_lift(record)) < 0.3 * off * GRAVITY or off < 0.04
+            else "" if 1 / UNIT_OFF < off < UNIT_OFF
             else "g" if off < 0.2
-            else "mm/s^2" if 500 < off < 2000
-            else "another unit" if not 1 / UNIT_OFF < off < UNIT_OFF
-            else "values without gravity" if abs(_lift(record)) < 0.3 * GRAVITY
-            else ""
+            else "another unit"
         )  # fmt: skip
         if guess:
             raise ValueError(
-                f"{record.path}: specific_force has a median size of {size:.3g}, where rest, hover or the motion of "
-                f"the poses show {shown[0][1]:.3g} m/s^2: it looks like {guess}; accepted: m/s^2, with gravity "
-                "(--columns ax=ax*9.81 ay=ay*9.81 az=az*9.81, in a CSV file with its own names behind the =), or a "
+                f"{record.path}: specific_force has a median size of {size:.3g}, where {told} m/s^2: it "
+                f"looks like {guess}; accepted: m/s^2, with gravity (--columns ax=ax*9.81 ay=ay*9.81 az=az*9.81, in a CSV file with its own names behind the =), or a "
                 "flight --without specific_force"
             )
     if record.has("body_rate", "quaternion"):
@@ -204,11 +203,11 @@ def _acceleration(record: Record) -> tuple[np.ndarray, np.ndarray] | None:
 
 def _lift(record: Record) -> float:
     """The mean specific force along the world's z, in the log's unit. It is gravity over any flight that ends about as
-    fast as it begins. Gravity if the log does not show it.
+    fast as it begins. NaN if the log does not show it.
     """
     moved = _acceleration(record) if record.has("quaternion") else None
     if moved is None or len(moved[0]) < 5:
-        return GRAVITY
+        return float("nan")
     time, acceleration = moved
     pose, force = record.streams["quaternion"], record.streams["specific_force"]
     q = np.stack([np.interp(time, pose.time, x) for x in _continuous(pose.values).T])

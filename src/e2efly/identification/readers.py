@@ -14,7 +14,7 @@ from e2efly.deploy.log.mcap_records import MAGIC, McapRecords
 from e2efly.identification import bag_storage, crazyflie, ulog
 from e2efly.identification.bag import read_bag
 from e2efly.identification.csv_file import HEAD, Column, delimiter, encoding, read_csv
-from e2efly.identification.record import KINDS, MOTORS, Record, Stream, Streams, listed
+from e2efly.identification.record import KINDS, MOTORS, Record, Stream, Streams, listed, plain
 from e2efly.vehicles.names import unknown
 from e2efly.vehicles.vehicle import GRAVITY
 
@@ -80,7 +80,7 @@ def read_flights(path: Path, reading: Reading | None = None) -> list[Record]:
     except Exception as error:  # whatever strange content leads to becomes the one error of a reader
         if isinstance(error, ValueError) and str(path) in str(error):
             raise
-        why = f"{type(error).__name__}: {error}"
+        why = plain(f"{type(error).__name__}: {error}")
         raise ValueError(f"{path}: {form.name} that cannot be read ({why:.300}); accepted: {ACCEPTED}") from error
 
 
@@ -112,7 +112,7 @@ def _is_ours(head: bytes) -> bool:
 
 def _is_table(head: bytes) -> bool:
     code = encoding(head)
-    first = head[: -1 if len(head) % 2 else None].decode(code, "replace").splitlines()[0] if code else ""
+    first = head.decode(code, "replace").partition("\n")[0] if code else ""
     return delimiter(first) in first
 
 
@@ -154,7 +154,7 @@ def _finished(record: Record, reading: Reading) -> Record:
         setpoint = streams["setpoint"]
         thrust = np.full((len(setpoint.time), 1), GRAVITY)  # never changes, which says that it is not known
         streams["command"] = Stream(setpoint.time, np.concatenate([thrust, setpoint.values], 1))
-    return replace(record, streams=streams, notes=tuple(notes))
+    return replace(record, streams=streams, notes=tuple(map(plain, notes)))
 
 
 def _mapped(streams: Mapping[str, Stream], columns: Mapping[str, Column], notes: list[str]) -> dict[str, Stream]:
@@ -255,7 +255,9 @@ def _asked(command: Stream, channels: "Series") -> np.ndarray:
         good = (at >= 0) & np.isfinite(x).all(1)
         if good.sum() < 20:
             continue
-        curves = [np.polynomial.Polynomial.fit(x[good, i], command.values[at[good], 1 + i], 3) for i in range(3)]
+        curves = [  # with full=True without a warning: of a stick that rests, any curve will do
+            np.polynomial.Polynomial.fit(x[good, i], command.values[at[good], 1 + i], 3, full=True)[0] for i in range(3)
+        ]
         rates = np.stack([curve(x[:, i]) for i, curve in enumerate(curves)], -1)
         left = float(np.mean((rates[good] - command.values[at[good], 1:]) ** 2))
         if left < least:

@@ -152,10 +152,15 @@ class Streams:
 
 
 def listed(names: Iterable[str], most: int = 12) -> str:
-    """Names for people, the first few of them."""
-    names = list(names)
+    """Names for people, the first few of them, as one plain line."""
+    names = [plain(name) for name in names]
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
+
+
+def plain(text: str) -> str:
+    """A text of somebody else, without the control characters that would move a terminal's cursor."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def percent(share: float) -> str:

@@ -8,7 +8,7 @@ import struct
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -181,7 +181,7 @@ class _Log:
             return {}
         least = max(place + np.dtype(form).itemsize for place, form in places.values())
         whole = [sample[:least] for sample in self.samples[topic, instance] if len(sample) >= least]
-        form = {
+        form: Any = {
             "names": list(places), "offsets": [place for place, _ in places.values()],
             "formats": [form for _, form in places.values()], "itemsize": least,
         }  # fmt: skip

@@ -26,7 +26,7 @@ _REACH = (0.1, 1.0)  # s: change of the shift between pieces; the second if the 
 _AXES = range(3)
 START = b"H Product:Blackbox"
 """First bytes of a session."""
-SESSIONS, FRAMES, FIELDS = 500, 2_000_000, 256
+SESSIONS, FRAMES, FIELDS = 200, 2_000_000, 256
 """Largest numbers of sessions in a file, of frames in a session (16 minutes at 2 kHz), and of fields in a frame. A log
 of Betaflight has some 40 fields."""
 _WORK, _FIELDS_A_BYTE = 500_000, 16  # fields decoded per byte; a whole log has one per byte, a damaged one many
