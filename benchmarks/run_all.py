@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 for name in (
-    "rates", "time_to_criterion", "success", "runtime_speed", "c_export", "onboard", "msp_fuzz", "sim_to_sim",
-    "firmware_flights",
+    "rates", "time_to_criterion", "success", "runtime_speed", "c_export", "onboard", "msp_fuzz", "log_fuzz",
+    "sim_to_sim", "firmware_flights",
     "firmware_faults", "command_flights", "controllers", "fault_campaign", "process_faults", "bridge_loop", "rendering",
     "mesh_rendering", "expert", "visual_tasks", "ablation", "stable_baselines3_ppo", "thrown_starts", "thrown",
     "any_vehicle", "raptor", "identify", "step_response", "paper",

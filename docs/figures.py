@@ -53,6 +53,7 @@ TITLES = {
     "onboard": "The part that flies, beside the whole",
     "c_export": "The zoo's policies as C",
     "msp_fuzz": "MSP codec under fuzzing",
+    "log_fuzz": "Readers of flight logs under fuzzing",
 }
 
 SCRIPTS = {

@@ -40,6 +40,19 @@ def crazyflie(path: Path, samples: int = 5, variables: tuple[str, ...] = (), val
     return path
 
 
+def two_events(path: Path) -> Path:
+    """The same firmware, which logs the battery more rarely than the gyroscope."""
+    data = struct.pack("<BHH", 0xBC, 2, 2)
+    for number, names in ((1, ("gyro.x(f)", "gyro.y(f)", "gyro.z(f)")), (2, ("pm.vbat(f)",))):
+        data += struct.pack("<H", number) + b"event\0" + struct.pack("<H", len(names))
+        data += b"".join(name.encode() + b"\0" for name in names)
+    for i in range(20):
+        data += struct.pack("<HQ3f", 1, 1000 * i, 0.0, 90.0, float(i))
+        data += struct.pack("<HQf", 2, 1000 * i + 500, 3.9) if i % 5 == 0 else b""
+    path.write_bytes(data)
+    return path
+
+
 def ulog(path: Path, formats: dict[str, str] | None = None) -> Path:
     """A PX4 log: format, subscription, data; falling forwards while turning right, nose to the east."""
     formats = formats or {
@@ -152,6 +165,7 @@ SAMPLES: dict[str, Callable[[Path], Path]] = {
     "bag of ROS 2, MCAP": lambda folder: only(bag(folder / "m", storage="MCAP"), ".mcap"),
     "PX4": lambda folder: ulog(folder / "a.ulg"),
     "Crazyflie": lambda folder: crazyflie(folder / "log00"),
+    "Crazyflie, two events": lambda folder: two_events(folder / "log01"),
     "blackbox": lambda folder: blackbox(folder / "a.bbl"),
 }
 """A file of each format, by name."""

@@ -18,7 +18,7 @@ from e2efly.identification.flight import driver_of
 from e2efly.identification.readers import FORMATS, Reading, read_flights
 from e2efly.identification.record import Record, Stream, percent
 from e2efly.vehicles import load_vehicle
-from tests.identification.log_samples import IMU, SAMPLES, bag, crazyflie, odometry, only, ulog
+from tests.identification.log_samples import IMU, SAMPLES, bag, crazyflie, odometry, only, two_events, ulog
 
 POSE = odometry()["pose"]["pose"]
 RATE = 2 * math.pi / 60
@@ -53,7 +53,8 @@ def test_a_bag_says_which_topic_it_takes_and_prefers_the_local_one(tmp_path: Pat
     (other,) = (note for note in found.notes if note.startswith("nothing from"))
     assert f"--topics {earth}" in other
     asked = read(path, topics=(earth,))
-    assert asked.streams["position"].values[0, 0] == 464_998.9
+    assert np.allclose(asked.streams["position"].values, 0)
+    assert f"positions of {earth} are places on the Earth: from the first one" in asked.notes
     with pytest.raises(ValueError, match=rf"b: --topics: unknown topic '/other' \(there are: .*{local}"):
         read(path, topics=("/other",))
 
@@ -156,6 +157,14 @@ def test_attitude_and_voltage_of_a_crazyflie(tmp_path: Path) -> None:
     assert np.allclose(found.streams["quaternion"].values, [0.8, 0.6, 0, 0])
     assert np.allclose(found.streams["voltage"].values, 3.9)
     assert found.notes == ("variables that are not used: ctrl.cmd",)
+
+
+def test_events_of_a_crazyflie_have_their_own_times(tmp_path: Path) -> None:
+    found = read(two_events(tmp_path / "log01"))
+    assert (
+        np.allclose(found.streams["body_rate"].values[:, 1], math.pi / 2) and len(found.streams["body_rate"].time) == 20
+    )
+    assert np.allclose(found.streams["voltage"].time, [0.0005, 0.0055, 0.0105, 0.0155])
 
 
 def test_angles_and_compressed_state_of_a_crazyflie(tmp_path: Path) -> None:

@@ -162,6 +162,9 @@ class _Series:
         for name in self.rows:
             if name not in without:
                 table = self._table(name)
+                if name == "position" and self.far:
+                    table[:, 1:] -= table[0, 1:]
+                    streams.notes.append(f"positions of {self.topic.name} are places on the Earth: from the first one")
                 streams.put(name, table[:, 0], table[:, 1:], self.topic.name)
 
     def _table(self, name: str) -> np.ndarray:
@@ -216,7 +219,8 @@ def read_bag(path: Path, topics: Sequence[str] = ()) -> Record:
     unused = listed(f"{topic.name} ({why})" for topic, why in others.items())
     if not known:
         accepted = ", ".join((*TYPES, *PX4))
-        raise ValueError(f"{path}: has the topics {unused or 'none'}; accepted: one of {accepted}")
+        told = "".join(f"; {note}" for note in streams.notes)
+        raise ValueError(f"{path}: has the topics {unused or 'none'}{told}; accepted: one of {accepted}")
     _choose(list(known.values()), topics, streams)
     if unused:
         streams.notes.append(f"topics that are not used: {unused}")

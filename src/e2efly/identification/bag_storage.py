@@ -59,11 +59,14 @@ class BagFile:
         if data[: len(SQLITE)] == SQLITE:
             found = _sqlite(self.path, data)
         elif data[: len(ROS1)] == ROS1:
-            found = self._ros1(data, expand)
+            found = _ros1(data, expand)
         else:
             found = self._mcap(data)
-        for topic, message in found:
-            yield topic, expand("zstd", message) if message[: len(ZSTD)] == ZSTD else message
+        try:
+            for topic, message in found:
+                yield topic, expand("zstd", message) if message[: len(ZSTD)] == ZSTD else message
+        except (ValueError, KeyError, struct.error, sqlite3.Error) as error:
+            self.cut_off = f"the file is damaged from here on ({error})"
 
     def _mcap(self, data: bytes | mmap) -> Iterator[tuple[Topic, bytes]]:
         records = McapRecords(data)
@@ -75,24 +78,22 @@ class BagFile:
                 yield Topic(channel.topic, _full(channel.kind), versions[channel.encoding], text), record.data
         self.cut_off = records.cut_off
 
-    def _ros1(self, data: bytes | mmap, expand: Expander) -> Iterator[tuple[Topic, bytes]]:
-        topics: dict[bytes, Topic] = {}
-        try:
-            for header, content in _records(data, len(ROS1)):
-                op = header.get(b"op")
-                if op == b"\5":
-                    inner = _records(expand(str(header.get(b"compression", b""), "ascii", "replace"), content), 0)
-                else:
-                    inner = [(header, content)]
-                for head, message in inner:
-                    if head.get(b"op") == b"\7":
-                        about = _fields(message)
-                        kind, text = (str(about[key], "utf-8", "replace") for key in (b"type", b"message_definition"))
-                        topics[head[b"conn"]] = Topic(str(head[b"topic"], "utf-8", "replace"), _full(kind), 1, text)
-                    elif head.get(b"op") == b"\2":
-                        yield topics[head[b"conn"]], message
-        except (ValueError, KeyError, struct.error) as error:
-            self.cut_off = f"the file is damaged from here on ({error})"
+
+def _ros1(data: bytes | mmap, expand: Expander) -> Iterator[tuple[Topic, bytes]]:
+    topics: dict[bytes, Topic] = {}
+    for header, content in _records(data, len(ROS1)):
+        op = header.get(b"op")
+        if op == b"\5":
+            inner = _records(expand(str(header.get(b"compression", b""), "ascii", "replace"), content), 0)
+        else:
+            inner = [(header, content)]
+        for head, message in inner:
+            if head.get(b"op") == b"\7":
+                about = _fields(message)
+                kind, text = (str(about[key], "utf-8", "replace") for key in (b"type", b"message_definition"))
+                topics[head[b"conn"]] = Topic(str(head[b"topic"], "utf-8", "replace"), _full(kind), 1, text)
+            elif head.get(b"op") == b"\2":
+                yield topics[head[b"conn"]], message
 
 
 def _full(kind: str) -> str:
@@ -148,7 +149,7 @@ def _sqlite(path: Path, data: bytes | mmap) -> Iterator[tuple[Topic, bytes]]:
         base.execute("PRAGMA trusted_schema = OFF")
         there = dict(base.execute("SELECT name, type FROM sqlite_master WHERE type IN ('table', 'view')"))
         if missing := [name for name in ("topics", "messages") if there.get(name) != "table"]:
-            raise ValueError(f"{path}: has no table {missing[0]}; accepted: a file that ros2 bag record wrote")
+            raise ValueError(f"has no table {missing[0]}: no file that ros2 bag record wrote")
         columns = {row[1] for row in base.execute("PRAGMA table_info(message_definitions)")}
         known = "topic_type, encoded_message_definition FROM message_definitions WHERE encoding = 'ros2msg'"
         texts = dict(base.execute(f"SELECT {known}")) if "encoding" in columns else {}

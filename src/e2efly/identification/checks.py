@@ -150,8 +150,8 @@ def _check_units(record: Record) -> None:
         if guess:
             raise ValueError(
                 f"{record.path}: specific_force has a median size of {size:.3g}, where {told} m/s^2: it "
-                f"looks like {guess}; accepted: m/s^2, with gravity (--columns ax=ax*9.81 ay=ay*9.81 az=az*9.81, in a CSV file with its own names behind the =), or a "
-                "flight --without specific_force"
+                f"looks like {guess}; accepted: m/s^2, with gravity (--columns ax=ax*9.81 ay=ay*9.81 az=az*9.81, in a "
+                "CSV file with its own names behind the =), or a flight --without specific_force"
             )
     if record.has("body_rate", "quaternion"):
         told, true = _rates(record)

@@ -94,14 +94,24 @@ def format_of(path: Path) -> Format:
         raise ValueError(f"log {str(path)!r} does not exist; accepted: {ACCEPTED}")
     if path.is_dir():
         return _BAG
-    with path.open("rb") as file:
-        head = file.read(HEAD)
-    if not head:
+    if not (head := _head(path)):
         raise ValueError(f"{path}: is empty; accepted: {ACCEPTED}")
     found = next((form for form in FORMATS if form.begins(head)), None)
     if found is None:
         raise ValueError(f"{path}: of no kind that is known here; accepted: {ACCEPTED}")
     return found
+
+
+def is_log(path: Path) -> bool:
+    """Whether a path leads to a log: a file that begins as one, or the folder of a ROS 2 bag."""
+    if path.is_dir():
+        return (path / "metadata.yaml").is_file()
+    return path.is_file() and any(form.begins(_head(path)) for form in FORMATS)
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(HEAD)
 
 
 def _is_ours(head: bytes) -> bool:
@@ -113,7 +123,7 @@ def _is_ours(head: bytes) -> bool:
 def _is_table(head: bytes) -> bool:
     code = encoding(head)
     first = head.decode(code, "replace").partition("\n")[0] if code else ""
-    return delimiter(first) in first
+    return delimiter(first) in first and not first.lstrip().startswith(("{", "["))  # nor JSON
 
 
 _BAG = Format("a ROS bag", lambda head: head.startswith(bag_storage.BEGINNINGS), lambda p, r: [read_bag(p, r.topics)])

@@ -132,7 +132,7 @@ class Streams:
             if count:
                 self.notes.append(f"{count} of {total} samples of {of} are left out: they {why}")
         time, values = time[rising], values[rising]
-        if name == "rotor_speed" and len(time) and not values.any():
+        if name in ("rotor_speed", "quaternion") and len(time) and not values.any():
             self.notes.append(f"{of} is left out: it is always 0, so it was not measured")
         elif len(time):
             self.found[name] = Stream(time, values)
