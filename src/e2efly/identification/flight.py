@@ -32,8 +32,9 @@ SLOW_STRUCTURE = STRUCTURE | {"thrust_map": 0.015, "motor_time_constant": 0.05}
 HELD_OUT = 5
 """One window out of this many is held out of the fit, to judge the result."""
 POSE_DELAY = [name for name, _ in NUISANCES].index("pose_delay")
-LEAST = 4.0
-"""Minimum flight time that a fit needs, s."""
+LEAST = 1.5
+"""Minimum flight time that a fit needs, s: half a lap of a race shows all parameters. What a flight does not show is
+refused by its standard deviation."""
 TORQUES = 200.0
 """Sampling rate of motor outputs from which on they show the torques on the body, Hz."""
 NEAR, REFITS = 1.0, 2
@@ -196,7 +197,8 @@ def identify(
         )
     only = tuple(u.name for u in UNKNOWNS if u.field == "rate_gain" or (u.field == "latency" and delay)) if step else ()
     model = Model.of(vehicle, driver, believed, only)
-    held_out = np.arange(windows.count) % HELD_OUT == HELD_OUT - 1
+    every = min(HELD_OUT, windows.count)
+    held_out = np.arange(windows.count) % every == every - 1
     seen = windows.some(~held_out)
     found = fit(model, seen, begin(model, seen), told=told)
     sigma = sigmas(model, found)
