@@ -1,10 +1,11 @@
-"""Where `e2efly train` spends its time: seconds of each part, from the start of a process to its end.
+"""Where `e2efly train TASK`, as typed, spends its time: seconds of each part, from the start of a process to its end.
 
-    python benchmarks/cold_start.py [--tasks hover race race_clutter] [--seeds 3] [--steps N] [--json FILE]
+    python benchmarks/cold_start.py [--tasks hover race] [--seeds 3] [--steps N] [--json FILE]
 
 Cold: an empty compilation cache. Later: the same command with the cache that the cold one left. Each command is a
 process of its own, which this script times from outside, too. A part is the wall-clock time of the main thread:
-compiling is the wait for XLA beside tracing. Rows that are not measured anew stay.
+compiling is the wait for XLA beside tracing. Each pair is written as it is measured, and a script that was stopped goes
+on where it was.
 """
 
 import json
@@ -15,10 +16,13 @@ import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from common import arguments, median, table, with_earlier, write
+from common import arguments, measured, median, training
+
+from e2efly.config.vehicle import FILE, RANDOM
 
 PARTS = ("imports", "tracing", "compiling", "learning", "evaluating", "report", "export", "plots", "end")
 """What a training does, one after the other; learning and evaluating take turns."""
@@ -97,41 +101,65 @@ def watched(arguments: list[str]) -> dict[str, float]:
     return seconds
 
 
-def once(task: str, seed: int, steps: int, cache: Path) -> dict[str, float]:
-    """One command in a process of its own: seconds of each part; `end` is what its user waits besides."""
+def once(task: str, seed: int, steps: int, cache: Path) -> dict[str, Any]:
+    """One command in a process of its own: seconds of each part; `end` is what its user waits besides. With the success
+    of the policy with each kind of vehicles.
+    """
+    from e2efly.learn.judge import rates
+
     with tempfile.TemporaryDirectory() as folder:
-        told = Path(folder) / "parts.json"
-        more = ["--steps", str(steps)] if steps else []
-        command = [sys.executable, __file__, "--watch", str(told), "train", task, "--seed", str(seed)]
-        command += ["--out", str(Path(folder) / "run"), "--device", "cpu", *more]
+        told, out = Path(folder) / "parts.json", Path(folder) / "run"
+        command = [sys.executable, __file__, "--watch", str(told), *typed(task, steps).split(), "--seed", str(seed)]
         began = time.perf_counter()
-        subprocess.run(command, env={**os.environ, "XDG_CACHE_HOME": str(cache)}, stdout=subprocess.DEVNULL, check=True)
+        subprocess.run(
+            [*command, "--out", str(out), "--device", "cpu"],
+            env={**os.environ, "XDG_CACHE_HOME": str(cache)}, stdout=subprocess.DEVNULL, check=True,
+        )  # fmt: skip
         whole = time.perf_counter() - began
-        seconds = json.loads(told.read_text())
+        seconds, summary = json.loads(told.read_text()), json.loads((out / "summary.json").read_text())
     seconds["end"] = whole - sum(seconds[part] for part in PARTS if part != "end")
-    return {**seconds, "whole": whole}
+    return {**seconds, "whole": whole, "success": rates(summary)}
+
+
+def both(task: str, seed: int, steps: int) -> dict[str, dict[str, Any]]:
+    """The command with an empty cache, and the same again."""
+    with tempfile.TemporaryDirectory() as cache:
+        return {when: once(task, seed, steps, Path(cache)) for when in ("cold", "later")}
+
+
+def typed(task: str, steps: int = 0) -> str:
+    """The command."""
+    return f"train {task}" + (f" --steps {steps}" if steps else "")
+
+
+def rows(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The table: two rows per command."""
+    table = []
+    for told in dict.fromkeys(run["command"] for run in runs):
+        of = [run for run in runs if run["command"] == told]
+        for when in ("cold", "later"):
+            parts = {part: f"{median([run[when][part] for run in of]):.1f}" for part in (*PARTS, "whole")}
+            success = {
+                f"{kind}, %": " ".join(f"{100 * run[when]['success'][kind]:.1f}" for run in of)
+                if kind in of[0][when]["success"]
+                else "-"
+                for kind in (FILE, RANDOM)
+            }
+            about = {"measured": max(run["date"] for run in of), "configuration": of[0]["configuration"]}
+            table.append({"task": of[0]["task"], "when": when, "preset": of[0]["preset"], **parts, **success, **about})
+    return table
 
 
 def main() -> None:
-    """Measure, print a table, write JSON."""
+    """Measure, and write JSON."""
     if sys.argv[1:2] == ["--watch"]:
         Path(sys.argv[2]).write_text(json.dumps(watched(sys.argv[3:])))
         return
-    options = arguments(__doc__ or "", tasks=["hover", "race", "race_clutter"], seeds=3, steps=0)
-    rows: list[dict[str, Any]] = []
+    options = arguments(__doc__ or "", tasks=["hover", "race"], seeds=3, steps=0)
     for task in options.tasks:
-        found: dict[str, list[dict[str, float]]] = {"cold": [], "later": []}
         for seed in range(options.seeds):
-            with tempfile.TemporaryDirectory() as cache:
-                for when in found:
-                    found[when].append(once(task, seed, options.steps, Path(cache)))
-        for when, runs in found.items():
-            parts = {part: f"{median([one[part] for one in runs]):.1f}" for part in (*PARTS, "whole")}
-            rows.append({"task": task, "when": when, **parts})
-            print(rows[-1], flush=True)
-        whole = with_earlier("cold_start", options.json, "table", ("task", "when"), rows)
-        write("cold_start", options.json, {"table": whole})
-    print(table(whole))
+            about = {"task": task, "seed": seed, **training(typed(task, options.steps))}
+            measured("cold_start", options.json, about, partial(both, task, seed, options.steps), rows)
 
 
 if __name__ == "__main__":

@@ -5,14 +5,20 @@ import json
 import math
 import os
 import platform
+import shlex
 import statistics
 import sys
+from collections.abc import Callable
 from datetime import UTC, datetime
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from e2efly.commands.train import parse
+from e2efly.config import EnvConfig
 from e2efly.device import processor
+from e2efly.learn.rundir import fingerprint
 from e2efly.storage import write_json
 from e2efly.terminal import markdown
 
@@ -54,6 +60,46 @@ def write(name: str, path: Path | None, content: dict[str, Any]) -> None:
     path = path or RESULTS / f"{name}.json"
     path.parent.mkdir(parents=True, exist_ok=True)
     write_json(path, {"machine": machine(), "date": today(), **content})
+
+
+@cache
+def training(command: str) -> dict[str, str]:
+    """What stands beside a figure of `e2efly COMMAND`: the command, its preset, its integrator, and the fingerprint of
+    its configuration as it is today.
+    """
+    asked = parse(shlex.split(command)[1:])
+    about = {"preset": asked.preset, "integrator": asked.config.env.integrator}
+    return {"command": command, **about, "configuration": fingerprint(asked.config)}
+
+
+def is_of_today(run: dict[str, Any]) -> bool:
+    """Whether a figure is of today's integrator and, of a training, of today's configuration."""
+    today = training(run["command"]) if "command" in run else {"integrator": EnvConfig().integrator}
+    return "date" in run and all(run.get(name, value) == value for name, value in today.items())
+
+
+def measured(
+    name: str, path: Path | None, about: dict[str, Any], measure: Callable[[], dict[str, Any]], rows: Callable
+) -> None:
+    """Measure what a file of results does not have yet, and write it there, with the table of all that it has.
+
+    A script that was stopped so goes on where it was. Kept are only figures of this machine, and of trainings whose
+    configuration is the one of today.
+
+    Args:
+        name: name of the results.
+        path: their file, if it is not the usual one.
+        about: what is measured, with what `training` gives.
+        measure: function that measures it.
+        rows: function from all figures to the rows of the table.
+    """
+    path = path or RESULTS / f"{name}.json"
+    known = json.loads(path.read_text()) if path.exists() else {}
+    runs = [run for run in known.get("runs", []) if known["machine"] == machine() and is_of_today(run)]
+    if not any(about.items() <= run.items() for run in runs):
+        runs.append({**about, "date": today(), **measure()})
+        print(runs[-1], flush=True)
+    write(name, path, {"table": rows(runs), "runs": runs})
 
 
 def with_earlier(name: str, path: Path | None, part: str, keys: tuple[str, ...], rows: list[Any]) -> list[Any]:

@@ -11,35 +11,22 @@ from collections.abc import Callable
 from pathlib import Path
 
 import common
+from tests.mutations import mutated
 
 from e2efly.deploy.betaflight.client import MESSAGES
 from e2efly.deploy.betaflight.codec import REPLY, Decoder, Frame, encode
 
 GOLDEN = Path(__file__).parents[1] / "tests" / "data" / "msp_golden.json"
-
-
-def mutated(data: bytes, rng: random.Random) -> bytes:
-    """A frame with a flipped bit, cut, stretched, or with bytes replaced."""
-    piece = bytearray(data)
-    for _ in range(rng.randint(1, 4)):
-        at = rng.randrange(len(piece)) if piece else 0
-        kind = rng.randrange(4)
-        if kind == 0 and piece:
-            piece[at] ^= 1 << rng.randrange(8)
-        elif kind == 1:
-            del piece[at:]
-        elif kind == 2:
-            piece[at:at] = rng.randbytes(rng.randint(1, 8))
-        else:
-            piece[at : at + 4] = rng.choice([b"$", b"$M>", b"$X<", b"\xff\xff"])
-    return bytes(piece)
+STARTS = (b"$", b"$M>", b"$X<", b"\xff\xff")
 
 
 def sources(frames: list[bytes], rng: random.Random) -> dict[str, Callable[[], bytes]]:
     """Kinds of fuzz."""
     return {
         "random": lambda: rng.randbytes(rng.randint(1, 4000)),
-        "mutated": lambda: b"".join(mutated(rng.choice(frames), rng) for _ in range(rng.randint(1, 60))),
+        "mutated": lambda: b"".join(
+            mutated(rng.choice(frames), rng, frames, STARTS) for _ in range(rng.randint(1, 60))
+        ),
         "starts": lambda: b"".join(
             rng.choice([b"$", b"$M>", b"$X>", b"$M>\xff\x01", b"$M!", b"\x20", rng.randbytes(2)])
             for _ in range(rng.randint(1, 800))

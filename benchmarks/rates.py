@@ -1,63 +1,95 @@
 """Rates of physics, environment and training, with the peers measured in the same run.
 
-    python benchmarks/rates.py [--rounds 5] [--json FILE]
+    python benchmarks/rates.py [--rounds 3] [--json FILE]
 
 Crazyflow, RotorPy, L2F and PyFlyt are installed into virtual environments of their own (`peers.py`). All are timed in
 turn, `rounds` times, on 1024 vehicles where nothing else is said; the table has the medians, and the ratio to the
-median of the best peer.
+median of the best peer. Each figure is written as it is measured, and a script that was stopped goes on where it was.
 """
 
-from common import arguments, median, table, write
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from common import arguments, measured, median, training
 from peers import PEERS, physics_steps
 
+from e2efly.config import EnvConfig
 from e2efly.device import prepare
 from e2efly.learn.benchmark import environment_steps, physics_substeps, training_steps
 
 WORLDS = 1024
+OWN = ", each with parameters of its own"
+PHYSICS, ENVIRONMENT = f"physics sub-steps, {WORLDS} vehicles", f"environment steps, {WORLDS} environments, hover"
+"""Sub-steps of the default integrator. Environment steps have seven of them, and include everything."""
+WIDE = ", 100 environments, horizon 96, networks 192-96"
+
+
+def what(algo: str) -> str:
+    """The name of a rate of training."""
+    return f"{algo.upper()} training steps, hover"
+
+
+def quantities() -> dict[str, tuple[dict[str, str], Callable[[], float]]]:
+    """What is measured, in turn: what stands beside it, and how."""
+    third = {"integrator": EnvConfig().integrator}
+    found: dict[str, tuple[dict[str, str], Callable[[], float]]] = {
+        f"{name}: physics steps": ({}, partial(physics_steps, name, WORLDS)) for name in PEERS
+    }
+    found[PHYSICS] = third, partial(physics_substeps, WORLDS)
+    found[PHYSICS + OWN] = third, partial(physics_substeps, WORLDS, general=True)
+    found[ENVIRONMENT] = third, partial(environment_steps, "hover", WORLDS)
+    for algo in ("ppo", "bptt"):
+        about = training(f"train hover --algo {algo} --preset nominal")
+        found[what(algo)] = about, partial(training_steps, "hover", algo)
+        found[what(algo) + OWN] = about, partial(training_steps, "hover", algo, general=True)
+        if algo == "bptt":
+            found[what(algo) + WIDE] = about, partial(training_steps, "hover", algo, wide=True)
+    return found
+
+
+def rows(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The table: medians, and ratios of them where both are measured."""
+    of = {name: [run for run in runs if run["what"] == name] for name in dict.fromkeys(run["what"] for run in runs)}
+    rate = {name: median([run["rate"] for run in each]) for name, each in of.items()}
+    table = [
+        {
+            "what": name,
+            "per second": f"{rate[name]:,.0f}",
+            "preset": each[0].get("preset", ""),
+            "integrator": each[0].get("integrator", ""),
+            "measured": max(run["date"] for run in each),
+            "configuration": each[0].get("configuration", ""),
+        }
+        for name, each in of.items()
+    ]
+    best = max((name for name in rate if name.removesuffix(": physics steps") in PEERS), key=rate.__getitem__)
+    ratios = {
+        "physics over the best of the others": (PHYSICS, best),
+        "physics, parameters as constants over each its own": (PHYSICS, PHYSICS + OWN),
+        "PPO training, parameters as constants over each its own": (what("ppo"), what("ppo") + OWN),
+        "BPTT training, parameters as constants over each its own": (what("bptt"), what("bptt") + OWN),
+        "environment over a tenth of Crazyflow's physics steps, one bare control step": (
+            ENVIRONMENT,
+            "Crazyflow 0.4: physics steps",
+        ),
+    }
+    for name, (a, b) in ratios.items():
+        if a in rate and b in rate:
+            ratio = rate[a] / rate[b] * (10 if a == ENVIRONMENT else 1)
+            blank = dict.fromkeys(list(table[0])[2:], "")
+            table.append({"what": f"ratio, {name}", "per second": f"{ratio:.2f}", **blank})
+    return table
 
 
 def main() -> None:
-    """Measure, print a table, write JSON."""
-    options = arguments(__doc__ or "", rounds=5)
+    """Measure, and write JSON."""
+    options = arguments(__doc__ or "", rounds=3)
     prepare("cpu")
-    ours, general, steps = [], [], []
-    theirs: dict[str, list[float]] = {name: [] for name in PEERS}
-    for _ in range(options.rounds):
-        for name, found in theirs.items():
-            found.append(physics_steps(name, WORLDS))
-        ours.append(physics_substeps(WORLDS))
-        general.append(physics_substeps(WORLDS, general=True))
-        steps.append(environment_steps("hover", WORLDS))
-    substeps, own, env = median(ours), median(general), median(steps)
-    peer = max(median(found) for found in theirs.values())
-    bare = median(theirs["Crazyflow 0.4"]) / 10
-    ppo, bptt = ([training_steps("hover", algo, general=own) for own in (False, True)] for algo in ("ppo", "bptt"))
-    figures = {
-        **{f"{name}: physics steps": median(found) for name, found in theirs.items()},
-        "Crazyflow 0.4: control steps (10 physics steps)": bare,
-        f"e2efly physics sub-steps, {WORLDS} vehicles": substeps,
-        f"e2efly physics sub-steps, {WORLDS} vehicles, each with parameters of its own": own,
-        f"e2efly environment steps (7 sub-steps, everything included), {WORLDS} environments, hover": env,
-        "e2efly PPO training steps, hover": ppo[0],
-        "e2efly PPO training steps, hover, each vehicle with parameters of its own": ppo[1],
-        "e2efly BPTT training steps, hover": bptt[0],
-        "e2efly BPTT training steps, hover, each vehicle with parameters of its own": bptt[1],
-        "e2efly BPTT training steps, hover, 100 environments, horizon 96, networks 192-96": training_steps(
-            "hover", "bptt", wide=True
-        ),
-    }
-    rows = [{"what": name, "per second": f"{value:,.0f}"} for name, value in figures.items()]
-    ratios = {
-        "physics over the best of the others": substeps / peer,
-        "physics, parameters as constants over each its own": substeps / own,
-        "PPO training, parameters as constants over each its own": ppo[0] / ppo[1],
-        "BPTT training, parameters as constants over each its own": bptt[0] / bptt[1],
-        "environment over Crazyflow's bare control steps": env / bare,
-    }
-    rows += [{"what": f"ratio, {name}", "per second": f"{value:.2f}"} for name, value in ratios.items()]
-    rounds = {"e2efly": ours, "general": general, "environment": steps, **theirs}
-    write("rates", options.json, {"table": rows, "figures": figures, "ratios": ratios, "rounds": rounds})
-    print(table(rows))
+    for turn in range(options.rounds):
+        for name, (about, rate) in quantities().items():
+            key = {"what": name, "round": turn, **about}
+            measured("rates", options.json, key, lambda rate=rate: {"rate": rate()}, rows)
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ from e2efly.identification.csv_file import column_map
 from e2efly.identification.flight import Found, identify
 from e2efly.identification.judge import judged
 from e2efly.identification.model import FACTOR, GYRO, NUISANCES, START, Model, simulate
-from e2efly.identification.readers import read_part
+from e2efly.identification.readers import Reading, read_part
 from e2efly.identification.record import Record, Stream
 from e2efly.identification.shooting import measured_starts
 from e2efly.identification.vehicle_file import merged
@@ -159,11 +159,11 @@ def own_nuisances(found: Found, q: np.ndarray, windows: Windows) -> np.ndarray:
 
 def nanobench(folder: Path, vehicle: Vehicle) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Positions 0.5, 1 and 2 s ahead of every flight, by the fit of those along other trajectories."""
-    columns = column_map(COLUMNS)
+    reading = Reading(column_map(COLUMNS))
     records, refused = [], ""
     for path in sorted(folder.glob("*.csv")):
         try:
-            records += checked(read_part(path, columns), vehicle)
+            records += checked(read_part(path, reading), vehicle)
         except ValueError as error:
             refused = str(error).removeprefix(f"{path.parent}/")
             if path.stem != CORRUPT:

@@ -1,19 +1,34 @@
-"""Every benchmark, one after the other (about an hour on two cores); figures go to benchmarks/results.
+"""Every benchmark, or those that are named, one after the other; figures go to benchmarks/results and to the pages.
 
-The paper's experiments take hours: they are only judged anew here (`paper.py EXPERIMENT` makes their runs).
+    python benchmarks/run_all.py [NAME ...]
+    python benchmarks/run_all.py times      # the times and rates of the README, and what stands beside them
+
+All of them take most of a day on two cores. Those of trainings go on where they were when they are started again. The
+paper's experiments take hours more: they are only judged anew here (`paper.py EXPERIMENT` makes their runs).
 """
 
 import subprocess
 import sys
 from pathlib import Path
 
-for name in (
-    "rates", "time_to_criterion", "success", "runtime_speed", "c_export", "onboard", "msp_fuzz", "sim_to_sim",
-    "firmware_flights", "firmware_faults", "command_flights", "controllers", "fault_campaign --publish",
-    "process_faults", "bridge_loop", "rendering",
-    "mesh_rendering", "expert", "visual_tasks", "ablation", "stable_baselines3_ppo", "thrown_starts", "thrown",
-    "any_vehicle", "raptor", "identify", "step_response", "paper",
-):  # fmt: skip
+TIMES = ("time_to_criterion", "cold_start", "success", "paper", "rates", "rendering", "mesh_rendering")
+OTHERS = (
+    "rate_loop", "runtime_speed", "c_export", "onboard", "msp_fuzz", "log_fuzz", "policy_fuzz",
+    "sim_to_sim", "firmware_flights",
+    "firmware_faults", "command_flights", "controllers", "fault_campaign --publish", "process_faults", "bridge_loop",
+    "expert", "visual_tasks", "ablation", "stable_baselines3_ppo", "thrown_starts", "thrown", "any_vehicle", "raptor",
+    "identify", "step_response",
+)  # fmt: skip
+HERE = Path(__file__).parent
+
+failed = []
+asked = sys.argv[1:] or ["times", *OTHERS]
+for name in (name for one in asked for name in (TIMES if one == "times" else (one,))):
     print(f"== {name}", flush=True)
     script, *options = name.split()
-    subprocess.run([sys.executable, str(Path(__file__).parent / f"{script}.py"), *options], check=True)
+    if subprocess.run([sys.executable, str(HERE / f"{script}.py"), *options], check=False).returncode:
+        failed.append(name)
+for page in ("figures", "paper_page"):
+    subprocess.run([sys.executable, str(HERE.parent / "docs" / f"{page}.py")], check=True)
+if failed:
+    sys.exit(f"failed: {', '.join(failed)}")

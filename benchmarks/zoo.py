@@ -1,11 +1,12 @@
 """Train the policy zoo: the best preset of each task for each vehicle, kept as package data with its success and the
-curve of its training.
+configuration and the curve of its training.
 
     python benchmarks/zoo.py [--vehicles vis_r ...] [--tasks hover ...] [--seeds 3]
     python benchmarks/zoo.py --digests
     python benchmarks/zoo.py --again
     python benchmarks/zoo.py --runs DIR ...
     python benchmarks/zoo.py --images
+    python benchmarks/zoo.py --domains
 
 The preset is `robust` where the task has it. The best of at most `seeds` runs by each algorithm is kept, if it succeeds
 more often than not; none more is made once one meets 99.5 %, or a robust one 97 % in its worst row of the stress. What
@@ -16,10 +17,13 @@ vehicles in still air. The success that is stated is that of the lone ONNX file,
 `--again` trains nothing: it flies the robust policies that are there in all rows of the stress.
 `--runs` trains nothing: it keeps the policies of finished runs, by the presets that are meant here.
 `--images` trains nothing: it keeps images of the starts of the policies that see, which have none beside them.
+`--domains` trains nothing: it writes into the contract of each file that says nothing of its courses the domain of its
+preset's task, by which it was trained; the graph with its weights stays, byte by byte.
 `--digests` trains nothing: it gives the files that are there their digests, where they have none, and writes the digest
 of each file into zoo.json.
 """
 
+import dataclasses
 import hashlib
 import itertools
 import json
@@ -32,18 +36,22 @@ from typing import Any
 
 import jax
 import numpy as np
+import onnx
 from common import arguments, table
 
+from e2efly import presets
+from e2efly.deploy.policy.loader import load_policy
 from e2efly.deploy.policy.onnx_file import is_sealed
 from e2efly.deploy.sight.samples import COUNT, packed, samples_file
 from e2efly.env.stress import ALL
 from e2efly.evaluation import candidate
+from e2efly.learn.export import write_policy
 from e2efly.learn.judge import worst_success
-from e2efly.learn.rundir import RunDirectory
+from e2efly.learn.rundir import RunDirectory, to_json
 from e2efly.storage import write_json
 from e2efly.tasks import TASKS
 from e2efly.vehicles import family_names, vehicle_names
-from e2efly.zoo import FOLDER, USUAL, contents, curve_file
+from e2efly.zoo import FOLDER, USUAL, config_file, contents, curve_file
 
 VARIANTS = {"race_any": ("race", "any_track")}
 """Policies of a task by a preset of its own: task and preset."""
@@ -130,6 +138,7 @@ def keep(vehicle: str, task: str, policy: Path, about: dict[str, Any]) -> dict[s
     shutil.copy(policy, kept)
     if (seen := samples_file(policy)).is_file():
         shutil.copy(seen, samples_file(kept))
+    write_json(config_file(kept), to_json(RunDirectory(policy.parent).config()), indent=None)
     curve_file(kept).write_text(curve(RunDirectory(policy.parent)), encoding="utf-8")
     zoo = contents() if (FOLDER / "zoo.json").exists() else {}
     zoo.setdefault(vehicle, {})[task] = about
@@ -164,6 +173,17 @@ def starts_of(policy: Path) -> dict[str, np.ndarray]:
     return {image.name: np.asarray(x) for image, x in zip(images, state.images, strict=True)}
 
 
+def declare(file: Path) -> None:
+    """Let the contract of a file say for which courses it was trained, if it does not."""
+    vehicle, task = file.parent.name, file.stem
+    kind, preset = recipe(vehicle, task)
+    contract, graph = load_policy(file).contract, onnx.load(file).graph
+    if contract.courses is None:
+        courses = presets.preset(kind, TASKS[kind].best, preset or presets.NOMINAL).task.domain()
+        write_policy(file, graph, dataclasses.replace(contract, courses=courses))
+        assert onnx.load(file).graph.SerializeToString() == graph.SerializeToString(), file
+
+
 def write(zoo: dict[str, dict[str, dict[str, Any]]]) -> None:
     """zoo.json, with the digest of each file."""
     for vehicle, tasks in zoo.items():
@@ -176,12 +196,25 @@ def main() -> None:
     """Train, keep the policies and zoo.json, print a table."""
     every, policies = [*vehicle_names(), *family_names()], [*TASKS, *VARIANTS]
     options = arguments(
-        __doc__ or "", vehicles=every, tasks=policies, seeds=3, digests=False, again=False, images=False, runs=[]
+        __doc__ or "",
+        vehicles=every,
+        tasks=policies,
+        seeds=3,
+        digests=False,
+        domains=False,
+        again=False,
+        images=False,
+        runs=[],
     )
     if options.digests:
         for file in FOLDER.glob("*/*.onnx"):
             if not is_sealed(file.read_bytes()):
                 run("export", str(file))
+        write(contents())
+        return
+    if options.domains:
+        for file in sorted(FOLDER.glob("*/*.onnx")):
+            declare(file)
         write(contents())
         return
     if options.images:

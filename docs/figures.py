@@ -1,18 +1,38 @@
 """Make the pictures of the README and the tables of docs/benchmarks.md from benchmarks/results: `make docs`."""
 
 import json
+import shlex
 import shutil
 import subprocess
 import sys
 import tempfile
+import textwrap
+from functools import cache
 from pathlib import Path
+from typing import Any
 
+from e2efly.commands.train import parse
+from e2efly.config import EnvConfig
+from e2efly.learn.rundir import fingerprint
 from e2efly.terminal import markdown
 
 DOCS = Path(__file__).parent
 RESULTS = DOCS.parent / "benchmarks" / "results"
+BEGIN, END = "<!-- figures: written by `make docs` -->", "<!-- end of the figures -->"
+EARLIER, EMBREE = "earlier", "of Embree's"
+NOT_TODAY = f" What is marked *{EARLIER}* was measured with another configuration or integrator than today's."
+GOALS = {
+    "hover, 99%": "hover",
+    "land, 99%": "land",
+    "track, 99%": "track",
+    "race, 95%": "race, 95 %",
+    "thrown, 99%": "hover, thrown in any attitude",
+    "land_visual, 99%": "land on a pad that is only seen",
+}
+"""Rows of the table of README.md."""
 TITLES = {
     "rates": "Rates",
+    "rate_loop": "What the held rate loop costs",
     "mesh_rendering": "Rendering of mesh scenes",
     "rendering": "Images of the clutter scene: ground, 4 gates, 16 obstacles, another world for each camera",
     "visual_tasks": "Tasks flown by sight: trained, then flown under stress from unseen starts in unseen worlds",
@@ -53,17 +73,46 @@ TITLES = {
     "onboard": "The part that flies, beside the whole",
     "c_export": "The zoo's policies as C",
     "msp_fuzz": "MSP codec under fuzzing",
+    "log_fuzz": "Readers of flight logs under fuzzing",
 }
 
+ZOO, NONE = "the zoo's policies", "none"
+POLICIES = {
+    **dict.fromkeys(
+        (
+            "zoo_stress_gap_hover_aware", "zoo_stress_by_sight", "any_vehicle", "airsim", "firmware_flights",
+            "controllers", "filter", "plants_by_sight", "image_faults", "hil_rehearsal", "fault_campaign", "onboard",
+            "c_export",
+        ),
+        ZOO,
+    ),
+    **dict.fromkeys(
+        (
+            "rate_loop", "mesh_rendering", "rendering", "expert", "thrown_starts", "identify", "step_response",
+            "pad_masks", "identify_betaflight", "runtime_speed", "msp_fuzz", "log_fuzz",
+        ),
+        NONE,
+    ),
+    **dict.fromkeys(("success", "ablation", "stable_baselines3_ppo", "sim_to_sim", "visual_tasks"), "preset nominal"),
+    **dict.fromkeys(
+        ("cold_start", "robust", "firmware_faults", "process_faults", "watch", "bridge_loop"), "preset robust"
+    ),
+    "rates": "preset nominal", "time_to_criterion": "presets nominal and thrown", "thrown": "preset thrown",
+    "any_track": "preset any_track", "raptor": f"preset rotors and {ZOO}", "tune": "preset identified",
+    "zoo_stress": f"{ZOO}, and preset nominal",
+}  # fmt: skip
+"""The policies of each table: presets by which they were trained, the zoo's, or none."""
 SCRIPTS = {
     "identify_betaflight": "identify.py --plant betaflight", "hil_rehearsal": "hil_rehearsal.py --vehicle vis_h",
     "zoo_stress_by_sight": "zoo_stress.py --by-sight",
 }  # fmt: skip
 """What measured a file of results that has not the name of its script."""
 FIRST = """
-The rates and times below that are older than 2026-11-24 were measured with the first-order integrator,
-which was the default until then. Today's default takes three times as long per physics sub-step
-([physics](physics.md))."""
+Each table names its policies: the presets by which they were trained, or the zoo's. Where a configuration stands, it
+is the fingerprint of everything that defines the training, and the command that it belongs to stands in the file. What
+is marked as earlier was measured with another configuration than that of today. The rates and times below that are
+older than 2026-11-24 were measured with the first-order integrator, which was the default until then. Today's default
+takes three times as long per physics sub-step ([physics](physics.md))."""
 """What stands over all tables."""
 NOTES = {
     "c_export": """
@@ -74,9 +123,11 @@ value of the policy.onnx in double precision, on 200 random inputs; for ONNX Run
 Each flies hover with a controller that gives the answers of recorded firmware. [How to install
 it](onboard.md).""",
     "rates": """
-Third-order sub-steps, today's default. First-order ones (`semi_implicit`) run at 168 M/s on the same
-machine and day. On the 22nd, on a faster machine of the same name, first order gave 453 M/s, 38 times
-the best of the others; Crazyflow gave 11.9 M/s there.""",
+Environment steps have seven sub-steps, and include everything. Training is that of the whole preset, networks and
+evaluations apart.""",
+    "rate_loop": """
+Distance between the positions of the training's physics and of an independent plant in float64, after 2 s of violent
+`ctbr` commands, by the rate loop of the plant. [What it means](physics.md).""",
     "any_track": """
 A specialist begins with the weights of the one policy and learns on one track alone for 2.5 million
 steps. Eight specialists were trained, not fifty. The goals that were missed and what was tried:
@@ -251,11 +302,9 @@ def cold_start() -> None:
     """docs/cold_start.png: where a training spends its time, a stacked bar for each command."""
     from e2efly.view.style import CYCLE, figure
 
-    path = RESULTS / "cold_start.json"
-    if not path.exists():
-        return
-    rows = json.loads(path.read_text())["table"]
-    parts = [part for part in rows[0] if part not in ("task", "when", "whole")]
+    rows = json.loads((RESULTS / "cold_start.json").read_text())["table"]
+    heads = list(rows[0])
+    parts = heads[heads.index("imports") : heads.index("whole")]
     with figure(DOCS / "cold_start.png", "Where a training spends its time", 1.2 + 0.4 * len(rows)) as fig:
         ax = fig.subplots()
         names, begun = [f"{row['task']}, {row['when']}" for row in rows], [0.0] * len(rows)
@@ -313,27 +362,114 @@ def any_track() -> None:
         fig.colorbar(ScalarMappable(height, SPEED), ax=axes, shrink=0.5, aspect=40, label="height of a gate (m)")
 
 
-def main() -> None:
-    """Write docs/benchmarks.md and pictures; with `--noise` draw docs/noise.md, with `--tracks` any_track.png; with
-    `--pictures` the racer, too.
-    """
+@cache
+def today(command: str) -> str:
+    """The fingerprint that the configuration of a command has today."""
+    return fingerprint(parse(shlex.split(command)[1:]).config)
+
+
+def results(name: str) -> dict[str, Any]:
+    """A file of results, in whose table what was measured with another configuration is marked as earlier."""
+    content = json.loads((RESULTS / f"{name}.json").read_text())
+    recorded = {run["configuration"]: run["command"] for run in content.get("runs", []) if "command" in run}
+    content["recorded"] = bool(recorded)
+    for row in content["table"]:
+        known, usual = row.get("configuration"), EnvConfig().integrator
+        if (known in recorded and today(recorded[known]) != known) or (row.get("integrator") or usual) != usual:
+            row["configuration"] = f"{known}, {EARLIER}"
+    return content
+
+
+def place(content: dict[str, Any]) -> str:
+    """What something was measured on."""
+    m = content["machine"]
+    avx512 = {True: " with AVX-512", False: " without AVX-512"}.get(m.get("avx512"), "")
+    return f"{m['cores']} cores of {m['cpu']}{avx512}, JAX {m['jax']}"
+
+
+def integrators(content: dict[str, Any]) -> str:
+    """The integrators by which something was measured."""
+    return " and ".join(sorted({run["integrator"] for run in content.get("runs", []) if "integrator" in run})) or "-"
+
+
+def benchmarks() -> str:
+    """The page of all tables."""
     source = "Written by `make docs` from `benchmarks/results/*.json`; measured by the scripts in `benchmarks/`."
     lines = ["# Benchmarks", "", source, "", FIRST.strip(), ""]
     for name, title in TITLES.items():
-        path = RESULTS / f"{name}.json"
-        if path.exists():
-            content = json.loads(path.read_text())
-            m = content["machine"]
-            avx512 = {True: " with AVX-512", False: " without AVX-512"}.get(m.get("avx512"), "")
-            script = SCRIPTS.get(name, f"{name}.py")
-            about = (
-                f"`benchmarks/{script}`, {content['date']}, {m['cores']} cores of {m['cpu']}{avx512}, JAX {m['jax']}."
-            )
-            note = [NOTES[name].strip(), ""] if name in NOTES else []
-            lines += [f"## {title}", "", about, "", *note, *markdown(content["table"]), ""]
-            for rows in content.get("tables", []):
-                lines += [*markdown(rows), ""]
-    (DOCS / "benchmarks.md").write_text("\n".join(lines))
+        if not (RESULTS / f"{name}.json").exists():
+            continue
+        content, policies = results(name), POLICIES[name]
+        about = f"`benchmarks/{SCRIPTS.get(name, f'{name}.py')}`, {content['date']}, {place(content)}."
+        if policies != NONE:
+            about += f" Policies: {policies}"
+            about += "." if content["recorded"] or policies == ZOO else " of that day; its configuration was not kept."
+        note = [NOTES[name].strip(), ""] if name in NOTES else []
+        lines += [f"## {title}", "", about, "", *note, *markdown(content["table"]), ""]
+        for rows in content.get("tables", []):
+            lines += [*markdown(rows), ""]
+    return "\n".join(lines)
+
+
+def readme() -> str:
+    """README.md with the table of its figures."""
+    text = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    before, rest = text.split(BEGIN)
+    return f"{before}{BEGIN}\n{figures()}\n{END}{rest.split(END)[1]}"
+
+
+def figures() -> str:
+    """The table of README.md."""
+    times, typed, rates, images = map(results, ("time_to_criterion", "cold_start", "rates", "rendering"))
+    by = {(row["algorithm"], row["task"]): row for row in times["table"]}
+
+    def marked(text: str, row: dict[str, Any]) -> str:
+        return text if EARLIER not in row.get("configuration", EARLIER) else f"{text} ({EARLIER})"
+
+    def cell(algo: str, goal: str) -> str:
+        row = by.get((algo, goal))
+        return "-" if row is None else marked(f"{row['cold, s (median)']} / {row['warm, s (median)']} s", row)
+
+    rows = []
+    for goal, title in GOALS.items():
+        paper = [by[algo, goal]["paper, s"] for algo in ("ppo", "bptt") if (algo, goal) in by]
+        theirs = f"{paper[0]} / {paper[1]} s" if len(paper) == 2 and "-" not in paper else "-"
+        preset = next((row["preset"] for row in by.values() if row["task"] == goal and "preset" in row), "-")
+        rows.append((title, preset, cell("ppo", goal), cell("bptt", goal), theirs))
+    for task in ("hover", "race"):
+        first, later = (row for row in typed["table"] if row["task"] == task)
+        told = f"{float(first['whole']):.0f} / {float(later['whole']):.0f} s"
+        kinds = [name for name in first if "vehicle" in name and first[name] != "-"]
+        success = [f"{name.removesuffix(', %')} {min(first[name].split(), key=float)} %" for name in kinds]
+        told = marked("; ".join([told, ", ".join(success)] if success else [told]), first)
+        rows.append((f"`e2efly train {task}` as typed, to its end", first.get("preset", "-"), "-", told, "-"))
+    lines = [
+        "| | preset | PPO, first / later | BPTT, first / later | the paper, RTX 4090, PPO / BPTT |",
+        "| --- | --- | --- | --- | --- |",
+        *(f"| {' | '.join(row)} |" for row in rows),
+    ]
+    rate = {row["what"]: row for row in rates["table"]}
+    physics = next(row for what, row in rate.items() if "physics sub-steps" in what and what.endswith("vehicles"))
+    ratio = rate["ratio, physics over the best of the others"]["per second"]
+    depth = next(row for row in images["table"] if row["image"] == "depth 64x64")
+    fast = f"{float(physics['per second'].replace(',', '')) / 1e6:.0f} million sub-steps per second"
+    notes = [
+        f"Physics: {marked(fast, physics)}, integrator {physics.get('integrator', '-')}, {float(ratio):.1f} times the "
+        f"best of four peers ({rates['date']}, {place(rates)}).",
+        f"Depth images, 64 x 64: {float(depth['frames/s, median']):,.0f} per second, {float(depth[EMBREE]):.0f} times "
+        f"Embree ({images['date']}, {place(images)}).",
+        f"Times: {times['date']}, {place(times)}, integrator {integrators(times)}; as typed: {typed['date']}, "
+        f"{place(typed)}, integrator {integrators(typed)}." + (NOT_TODAY if EARLIER in str(rows) else ""),
+    ]
+    return "\n".join([*lines, *(f"\n{textwrap.fill(note, 120)}" for note in notes)])
+
+
+def main() -> None:
+    """Write docs/benchmarks.md, the table of README.md and pictures; with `--noise` draw docs/noise.md, with
+    `--tracks` any_track.png; with `--pictures` the racer, too.
+    """
+    (DOCS / "benchmarks.md").write_text(benchmarks(), encoding="utf-8")
+    (DOCS.parent / "README.md").write_text(readme(), encoding="utf-8")
     thrown()
     cold_start()
     families()

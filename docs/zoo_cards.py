@@ -3,12 +3,21 @@
 The pictures are those of docs/zoo_pictures.py.
 """
 
+import dataclasses
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
+from e2efly.commands.train import parse
+from e2efly.config import TrainConfig
+from e2efly.config.changes import differing
+from e2efly.config.vehicle import FILE, STILL
 from e2efly.deploy.policy.loader import Policy, load_policy
+from e2efly.learn.rundir import from_json
+from e2efly.storage import read_json
 from e2efly.vehicles import load_family
-from e2efly.zoo import USUAL, contents, policy_file
+from e2efly.zoo import USUAL, config_file, contents, policy_file
 
 DOCS = Path(__file__).parent
 TASKS = {
@@ -43,8 +52,8 @@ package. Every command that takes a policy takes one by the name of its card:
 
 `e2efly fly vis_r/hover --link ... --pose ...` flies it on a real vehicle: read [Hardware](hardware.md) first.
 
-- **Success** is that of 1000 unseen starts of `e2efly eval`, on the vehicle of the file in still air; of *any
-  quadrotor*, of 1000 unseen vehicles. The [tasks](tasks.md) say what counts.
+- **Success** is that of 1000 unseen starts of `e2efly eval`, with the vehicle of the file in still air; of *any
+  quadrotor*, with 1000 random vehicles that the training did not draw. The [tasks](tasks.md) say what counts.
 - **Under stress** the vehicle, the air or the sensors are not those of the file: one difference in each
   [row](robustness.md#stress), and a last row with all of them at once. Each row is of 1000 starts, and of 250 where
   the policy sees. A card names the worst rows; [Benchmarks](benchmarks.md) has all of them.
@@ -53,6 +62,10 @@ package. Every command that takes a policy takes one by the name of its card:
 - **Training curves** show the success of the evaluations on the way, as `TASK.curve.csv` beside the policy has it.
   Policies that were made before these files were kept have none. The command *trained by* makes such a run, with its
   curve in `plots/learning.png`; its result differs a little on another machine.
+- **Configurations**: `TASK.config.json` beside the policy is the configuration of its training, and the command
+  *trained by* gives exactly that. Where the preset differs by now, the card says so. The files of policies that are
+  older than 2026-11-27 were made later, from the source of their day and the steps of their run; each gives the
+  contract that its policy has.
 
 None of these policies has flown a real vehicle yet. All of them were flown in the simulator of the training, and
 many in MuJoCo and through the real firmware ([Validate](validation.md)).
@@ -79,6 +92,30 @@ def flies_by(policy: Policy) -> str:
     return ", ".join([f"{contract.control_rate_hz:g} commands per second", memory, *seen])
 
 
+def configured(policy: Path) -> TrainConfig:
+    """The configuration by which a policy was trained, on any number of devices."""
+    file = config_file(policy)
+    return dataclasses.replace(from_json(read_json(file), str(file)), devices=None)
+
+
+def made_by(command: str, config: TrainConfig) -> str:
+    """How a configuration is trained today: the command, with the options in which the preset differs by now. Where
+    options cannot say it, how the two differ.
+    """
+    others = differing(config, parse(command.split()[1:]).config)
+    now = ", ".join(f"{name} {today}" for name, (_, today) in others.items())
+    options = "".join(f" --{name.replace('_', '-')} {value}" for name, (value, _) in others.items())
+    try:
+        with redirect_stderr(StringIO()):
+            same = parse((command + options).split()[1:]).config == config
+    except (ValueError, SystemExit):  # not everything is an option
+        same = False
+    if same:
+        return f"`e2efly {command}{options}`" + (f" (today's preset has {now})" if others else "")
+    its = ", ".join(f"{name} {value}" for name, (value, _) in others.items())
+    return f"no command of today: it had {its}, where `e2efly {command}` has {now}"
+
+
 def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
     """The lines of one policy's card."""
     name = f"{vehicle}/{task}"
@@ -93,7 +130,8 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
             lines += ["", f"![{kind_of} of {name}](zoo/{vehicle}-{task}{ending})"]
     lines += ["", f"| {name} | |", "| --- | --- |"]
     for criterion, share in about["success"].items():
-        lines.append(f"| success{'' if criterion in (task, kind) else f': {criterion}'} | {percent(share)} |")
+        which = "" if criterion in (task, kind) else f": {criterion}"
+        lines.append(f"| success, {STILL if load_family(vehicle) else FILE}{which} | {percent(share)} |")
     if "mean_speed_m_s" in about:
         speeds = about["mean_speed_m_s"]
         told = ", ".join(f"{c} {v:.1f}" for c, v in speeds.items()) if isinstance(speeds, dict) else f"{speeds:.1f}"
@@ -104,8 +142,10 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
     else:
         lines.append("| under stress | not measured row by row |")
     lines.append(f"| flies by | {flies_by(load_policy(policy))} |")
-    trained = f"e2efly train {kind}{options}{preset} --seed {about['seed']}"
-    lines.append(f"| trained by | `{trained}`, {about['env_steps'] / 1e6:.1f} million steps |")
+    if courses := load_policy(policy).contract.courses:
+        lines.append(f"| trained for | {', '.join(map(str, courses))} |")
+    trained = made_by(f"train {kind}{options}{preset} --seed {about['seed']}", configured(policy))
+    lines.append(f"| trained by | {trained}, {about['env_steps'] / 1e6:.1f} million steps |")
     lines.append(f"| file | {policy.stat().st_size / 1000:.0f} kB, SHA-256 `{about['sha256'][:16]}...` |")
     return [*lines, ""]
 

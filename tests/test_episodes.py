@@ -131,7 +131,7 @@ def test_new_starts_differ_from_each_other_and_from_the_first(step: Any) -> None
 @pytest.mark.parametrize(("rate", "seconds"), [(30.0, 12.0), (60.0, 20.0), (100.0, 60.0)])
 def test_an_episode_has_as_many_steps_as_its_seconds_hold(rate: float, seconds: float) -> None:
     """Summed up in single precision, and yet neither a step more nor a step less."""
-    env = make(HoverConfig(episode_s=seconds, fence=1e9, position=0.0), control_rate=rate, largest_step=1.0)
+    env = make(HoverConfig(episode_s=seconds, fence=np.inf, position=0.0), control_rate=rate, largest_step=1.0)
     state, _ = reset(env, 1)
 
     def one(state: EnvState, _: None) -> tuple[EnvState, jax.Array]:
@@ -209,9 +209,7 @@ BROKEN: list[tuple[dict[str, Any], str]] = [
     ({"command_mode": "ctbt"}, "unknown command mode 'ctbt'; did you mean 'ctbr'"),
     ({"largest_step": -0.01}, "largest_step is -0.01; accepted: a positive number"),
     ({"control_rate": float("nan")}, "control_rate is nan; accepted: a positive number"),
-    ({"wind": float("nan")}, r"env\.wind is nan; accepted: 0 or more"),
-    ({"observation_latency": (0.0, float("nan"))}, r"env\.observation_latency is \(0\.0, nan\); accepted: two rising"),
-    ({"action_latency": (0.0, 2.0)}, r"env\.action_latency is \(0\.0, 2\.0\); accepted: two rising .* in \[0, 1\]"),
+    ({"wind": float("nan")}, r"env\.wind is nan; accepted: a number, 0 to 100"),
     (
         {"latency_spread": (0.0, 0.95)},
         r"latency of vehicle vis_r is 0\.06 s, env\.latency_spread .*at most 1 s together",
@@ -228,9 +226,8 @@ def test_a_broken_configuration(config: dict[str, Any], message: str) -> None:
 
 
 def test_a_broken_task_or_reward() -> None:
-    for bad in (0.0, -1.0, float("nan"), float("inf")):
-        with pytest.raises(ValueError, match=f"task.episode_s is {bad}; accepted: a positive number of seconds"):
-            make(HoverConfig(episode_s=bad))
+    with pytest.raises(ValueError, match=r"task\.episode_s is 0\.0; accepted: a number, 1e-09 to 10000"):
+        make(HoverConfig(episode_s=0.0))
     with pytest.raises(ValueError, match="unknown reward term 'prog22'; did you mean 'prog2'"):
         make(reward=RewardConfig({"prog22": 1.0}))
     with pytest.raises(ValueError, match="unknown reward parameter 'vzmin'; did you mean 'vz_min'"):

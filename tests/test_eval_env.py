@@ -59,7 +59,6 @@ def test_a_later_command_leaves_the_observation_as_it_is() -> None:
         (["--env.control-rate", "50"], "env.control_rate is 50.0; accepted: 30.0"),
         (["--env.command-mode", "attitude"], "env.command_mode is 'attitude'; accepted: 'ctbr'"),
         (["--env.imu.observed"], "env.imu.observed is True; accepted: False"),
-        (["--env.wind", "-1"], "env.wind is -1.0; accepted: 0 or more, m/s"),
         (["--env.randomize", "mas", "0.2"], "unknown vehicle parameter 'mas'; did you mean 'mass'"),
         (["--env.wind", "1", "--stress"], "--env.wind is given with --stress; accepted: one of them"),
     ],

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.storage import LOCK, held, write_json
+from e2efly.storage import LOCK, held, read_json, write_json
+from e2efly.view.style import figure
 
 HOLD = """
 import sys, time
@@ -43,6 +44,34 @@ def test_a_held_folder_is_refused_with_who_has_it_until_that_process_is_killed(t
     assert list((tmp_path / "run").iterdir()) == []
 
 
+def test_what_a_killed_process_had_not_finished_goes_and_what_others_write_stays(tmp_path: Path) -> None:
+    process = holder(tmp_path / "other")
+    dead, alive = (tmp_path / f"vehicle.toml.{number}.part" for number in (2**30, process.pid))
+    for part in (dead, alive):
+        part.touch()
+    with held(tmp_path):
+        assert not dead.exists()
+        assert alive.exists()
+    process.kill()
+    process.communicate()
+
+
+def test_a_picture_on_a_full_disk_is_named_and_the_last_one_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "plot.png"
+    path.write_bytes(b"the last one")
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match=r"cannot write .*plot\.png: No space left on device"), figure(path, "title", 2.0):
+        pass
+    assert path.read_bytes() == b"the last one"
+    assert [file.name for file in tmp_path.iterdir()] == ["plot.png"]
+
+
 def test_a_folder_that_nothing_was_written_to_goes_again(tmp_path: Path) -> None:
     with held(tmp_path / "run"):
         assert (tmp_path / "run").is_dir()
@@ -54,6 +83,11 @@ def test_the_same_process_is_refused_too_and_a_failure_lets_go(tmp_path: Path) -
         pass
     with held(tmp_path):
         pass
+
+
+def test_json_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
+    (tmp_path / "file.json").write_text('{"a": 1}', encoding="utf-8-sig")
+    assert read_json(tmp_path / "file.json") == {"a": 1}
 
 
 def test_json_has_null_where_a_number_is_not_finite(tmp_path: Path) -> None:

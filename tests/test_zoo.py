@@ -14,10 +14,13 @@ import e2efly
 from e2efly import episodes, evaluation
 from e2efly.device import wide_vectors
 from e2efly.env.stress import rows_for
+from e2efly.learn.export import contract_of
+from e2efly.learn.rundir import from_json
+from e2efly.learn.setup import Setup
 from e2efly.stress import stress
 from e2efly.tasks import TASKS
 from e2efly.vehicles import family_names, vehicle_file, vehicle_names
-from e2efly.zoo import FOLDER, USUAL, beside, contents, policy_file
+from e2efly.zoo import FOLDER, USUAL, beside, config_file, contents, policy_file
 from tests.conftest import QUICK, NetworkTrace
 
 USUALLY = {"xla_backend_optimization_level": 3}
@@ -37,6 +40,14 @@ def test_every_policy_succeeds_as_often_as_it_says(vehicle: str, task: str, monk
     for name, stated in about["success"].items():
         chance = 4 * np.sqrt(max(stated * (1 - stated), 0.003) / starts)  # four standard deviations
         assert np.mean(flown[name].success) >= stated - chance
+
+
+@pytest.mark.parametrize(("vehicle", "task"), POLICIES)
+def test_a_policy_is_of_the_configuration_beside_it(vehicle: str, task: str) -> None:
+    """What a training by it would export has the contract that the policy has."""
+    file = policy_file(task, vehicle)
+    config = from_json(json.loads(config_file(file).read_text()), "")
+    assert contract_of(Setup.of(config).env, config) == evaluation.load_policy(file).contract
 
 
 def test_robust_policies_fly_vehicles_that_are_not_theirs() -> None:

@@ -11,10 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-
-def cache_folder() -> Path:
-    """The user's cache folder of this package."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "e2efly"
+from e2efly.storage import cache_folder
 
 
 def programs_folder() -> Path:

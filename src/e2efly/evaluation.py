@@ -25,6 +25,7 @@ from e2efly.episodes import Act, Episodes, rows, run_stepwise, summary
 from e2efly.learn.rundir import RunDirectory, run_of
 from e2efly.observation import PAST_ACTIONS
 from e2efly.physics import State
+from e2efly.tasks.route import UNDECLARED
 from e2efly.vehicles import Controller, Flown, Vehicle, family_names, load_family, load_vehicle, vehicle_names
 from e2efly.zoo import policy_file
 
@@ -119,6 +120,17 @@ class Candidate:
             return self
         return dataclasses.replace(self, vehicle=self.env.vehicle, controller="policy")
 
+    @cached_property
+    def outside(self) -> list[str]:
+        """The quantities in which the courses that are flown lie outside of the training's, in words."""
+        suites = (suite.domain() or () for suite in self.task.criteria().values())
+        return list(dict.fromkeys(text for courses in suites for text in self.policy.contract.outside(courses)))
+
+    @property
+    def vehicles(self) -> str:
+        """The name of what flies in every episode (`Env.vehicles`)."""
+        return self.environment(next(iter(self.task.criteria().values()))).vehicles
+
     @property
     def notes(self) -> list[str]:
         """The differences from the run or the contract, in words."""
@@ -137,7 +149,9 @@ class Candidate:
         if self.changes:
             changes = (f"{name} {value} (not {own})" for name, (own, value) in self.changes.items())
             notes.append(f"Flown under {', '.join(changes)}.")
-        return notes
+        if contract.courses is None:
+            notes.append(UNDECLARED)
+        return [*notes, *(f"Outside of the training: {text}." for text in self.outside)]
 
     def environment(self, suite: TaskConfig) -> Env:
         """The environment of a criterion. Its reward is not used.
@@ -288,8 +302,10 @@ class Evaluation:
             "task": self.candidate.policy.contract.task,
             "baseline": self.candidate.baseline,
             "vehicle": self.candidate.vehicle,
+            "vehicles": self.candidate.vehicles,
             "controller": self.candidate.controller,
             "changed": {name: value for name, (_, value) in self.candidate.changes.items()},
+            "outside_of_training": self.candidate.outside,
             "env": dataclasses.asdict(self.candidate.env),
             "seed": self.seed,
             "units": UNITS,

@@ -6,52 +6,35 @@ import numbers
 from dataclasses import dataclass
 from typing import Any, cast, get_args
 
+from e2efly.vehicles.tables import LARGEST, shown
+
 RULE, SHAPE = "rule", "sets_shapes"
 """Keys of a field's metadata."""
+SMALLEST = 1e-9
+"""By how much a number must be larger than the end that its rule excludes. Products of such numbers are not 0 in
+float32."""
+SPEED, BODY_RATE, ANGLE = 100.0, 100.0, math.pi
+"""Largest speed, m/s, rate of turning, rad/s, and angle, rad, of what a configuration asks for."""
+MOST = 2**31 - 1
+"""The largest whole number, unless a rule says otherwise."""
 
 
 @dataclass(frozen=True)
 class Rule:
-    """The accepted values of a number, or of each of several numbers."""
+    """The accepted values of a number, or of each of several numbers. Both ends are finite, and accepted."""
 
     low: float = 0.0
     """Smallest accepted value."""
-    above: float | None = None
-    """If given, the value must also be larger than this."""
-    high: float = math.inf
+    high: float = LARGEST
     """Largest accepted value."""
     rising: bool = False
     """Whether there are two numbers, the smaller one first."""
     endless: bool = False
     """Whether infinity is accepted, too."""
 
-    @property
-    def _between(self) -> str:
-        most = f"{self.high:g}"
-        return f"{self.low:g} to {most}" if self.above is None else f"above {self.above:g}, at most {most}"
-
-    def problem(self, value: Any) -> str | None:
-        """What is accepted in place of a value. None: the value is accepted."""
-        numbers = value if isinstance(value, tuple) else (value,)
-        if not numbers or any(isinstance(x, bool) or not isinstance(x, int | float) for x in numbers):
-            return None
-        if math.isfinite(self.high):
-            least = self.low if self.above is None else self.above
-            within = all(least <= x <= self.high and x != self.above for x in numbers)  # also false for NaN
-            return None if within else self._between
-        if not all(map(math.isfinite, numbers)) and not (self.endless and value == math.inf):
-            return "finite numbers"
-        if self.above is not None and min(numbers) <= self.above:
-            return f"more than {self.above:g}"
-        if min(numbers) < self.low:
-            return f"{self.low:g} or more"
-        if self.rising and list(numbers) != sorted(numbers):
-            return "two rising numbers"
-        return None
-
-
-NOT_NEGATIVE = Rule()
-"""The rule of fields that give no other rule."""
+    def accepts(self, value: float) -> bool:
+        """Whether a number is accepted. NaN is not."""
+        return self.low <= value <= self.high or (self.endless and value == math.inf)
 
 
 def number(
@@ -65,17 +48,21 @@ def number(
 ) -> Any:
     """A field of one or several numbers, with its default and its rule.
 
-    Without a rule, numbers of at least 0 are accepted.
+    Every number has finite ends. Where they are not given, they are 0 and `LARGEST`, or `MOST` for whole numbers.
 
     Args:
         default: default of the field.
-        low: smallest accepted value; -inf for positions, angles and rates.
+        low: smallest accepted value. -inf for positions, angles and rates: as far down as `high` is by default.
         above: the value must be larger than this.
         high: largest accepted value.
         rising: whether there are two numbers, the smaller one first.
         endless: whether infinity is accepted, too.
     """
-    return dataclasses.field(default=default, metadata={RULE: Rule(low, above, high, rising, endless)})
+    whole = _is_whole(default)
+    largest = MOST if whole else LARGEST
+    least = low if above is None else above + (1 if whole else SMALLEST)
+    rule = Rule(max(least, -largest), high if high < math.inf else largest, rising, endless)
+    return dataclasses.field(default=default, metadata={RULE: rule})
 
 
 def shape(default: Any) -> Any:
@@ -90,30 +77,67 @@ def check_numbers(prefix: str, part: Any) -> None:
         ValueError: naming the field, the value and what is accepted.
     """
     for field in dataclasses.fields(part):
-        name, value = f"{prefix}.{field.name}", getattr(part, field.name)
+        name, value = f"{prefix}.{field.name}" if prefix else field.name, getattr(part, field.name)
         if dataclasses.is_dataclass(value):
             check_numbers(name, value)
-        elif accepted := _kind_problem(field, value):
-            raise ValueError(f"{name} is {value!r}; accepted: {accepted}")
-        elif accepted := field.metadata.get(RULE, NOT_NEGATIVE).problem(value):
-            raise ValueError(f"{name} is {value}; accepted: {accepted}")
+        elif (rule := rule_of(type(part), field)) is not None and not _fits(field, rule, value):
+            raise ValueError(f"{name} is {shown(value)}; accepted: {_accepted(field, rule)}")
 
 
-def _kind_problem(field: dataclasses.Field[Any], value: Any) -> str | None:
-    """What is accepted in place of a value that is not a number although the default is one.
+def rule_of(kind: type, field: dataclasses.Field[Any]) -> Rule | None:
+    """The rule of a field: its own, that of the field which it overrides, or else that of `number` without options.
 
-    None: it has the same kind.
+    None: it is no field of numbers.
     """
+    for parent in kind.__mro__:
+        above = getattr(parent, "__dataclass_fields__", {}).get(field.name)
+        if above is not None and RULE in above.metadata:
+            return above.metadata[RULE]
     default = field.default
-    if value is None and type(None) in get_args(cast(Any, field.type)):
-        return None
-    if isinstance(default, tuple) and default and all(map(_is_number, default)):
-        good = isinstance(value, tuple) and len(value) == len(default) and all(map(_is_number, value))
-        return None if good else f"{len(default)} numbers"
-    whole = isinstance(default, int)
-    if not _is_number(default) or (_is_number(value) and (not whole or value % 1 == 0)):  # type: ignore[operator]
-        return None
-    return "a whole number" if isinstance(default, int) else "a number"
+    given = default if isinstance(default, tuple) and default else (default,)
+    return number(default).metadata[RULE] if all(map(_is_number, given)) else None
+
+
+def _fits(field: dataclasses.Field[Any], rule: Rule, value: Any) -> bool:
+    """Whether a value is accepted."""
+    if value is None:
+        return _optional(field)
+    count, whole = _count(field, rule), _whole(field)
+    if isinstance(value, tuple) != (count is not None) or (count and len(value) != count):
+        return False
+    given = value if isinstance(value, tuple) else (value,)
+    if not all(_is_number(x) and rule.accepts(x) and (not whole or x % 1 == 0) for x in given):
+        return False
+    return not rule.rising or list(given) == sorted(given)
+
+
+def _accepted(field: dataclasses.Field[Any], rule: Rule) -> str:
+    """What is accepted, in words."""
+    count, whole = _count(field, rule), _whole(field)
+    kind = f"{'whole ' * whole}number"
+    low, high = (f"{x:.0f}" if whole else f"{x:g}" for x in (rule.low, rule.high))
+    ends = f"{low} to {high}{', or inf' * rule.endless}{', or none' * _optional(field)}"
+    return f"a {kind}, {ends}" if count is None else f"{count or ''} {'rising ' * rule.rising}{kind}s, {ends}".lstrip()
+
+
+def _optional(field: dataclasses.Field[Any]) -> bool:
+    return field.default is None or type(None) in get_args(cast(Any, field.type))
+
+
+def _count(field: dataclasses.Field[Any], rule: Rule) -> int | None:
+    """How many numbers a field has. None: one, and no tuple. 0: any number of them."""
+    if not isinstance(field.default, tuple):
+        return 2 if rule.rising else None
+    return 0 if ... in get_args(cast(Any, field.type)) else len(field.default)
+
+
+def _whole(field: dataclasses.Field[Any]) -> bool:
+    """Whether a field has whole numbers."""
+    return _is_whole(field.default) or (not field.default and int in get_args(cast(Any, field.type)))
+
+
+def _is_whole(default: Any) -> bool:
+    return isinstance(default[0] if isinstance(default, tuple) and default else default, int)
 
 
 def _is_number(value: Any) -> bool:

@@ -4,8 +4,7 @@ A preset is a `TrainConfig`. A variant of one is made by `dataclasses.replace`.
 """
 
 import dataclasses
-import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 from e2efly import zoo
@@ -22,11 +21,13 @@ from e2efly.config import (
     TrainConfig,
 )
 from e2efly.deploy.policy.loader import load_policy
+from e2efly.numbers import check_numbers
 from e2efly.observation import PAST_ACTIONS
 from e2efly.registry import is_shipped
 from e2efly.tasks import TASKS
 from e2efly.vehicles import load_family, load_vehicle, posterior
 from e2efly.vehicles.names import unknown
+from e2efly.vehicles.tables import LARGEST
 from e2efly.zoo import policy_file
 
 ROBUST, IDENTIFIED, NOMINAL, PAPER = "robust", "identified", "nominal", "paper"
@@ -270,33 +271,12 @@ def check(config: TrainConfig) -> None:
     Raises:
         ValueError: naming the field, the value and what is accepted.
     """
-    for name, value in _whole_numbers("", config):
-        if abs(value) >= (10**300 if name == "steps" else 2**53):  # for steps, another check reports the time
-            raise ValueError(f"{name} is {value}; accepted: whole numbers below 2^53")
-    for name in ("steps", "chunk", "eval_episodes"):
-        if getattr(config, name) <= 0:
-            raise ValueError(f"{name} is {getattr(config, name)}; accepted: more than 0")
+    check_numbers("", config)
     config.algo.check()
-    if not config.network.hidden or min(config.network.hidden) <= 0:
-        raise ValueError(f"network.hidden is {config.network.hidden}; accepted: one or more positive sizes")
-    if not 0 <= config.seed < 2**32:
-        raise ValueError(f"seed is {config.seed}; accepted: 0 to 2^32 - 1")
-    if config.stop_at is not None and not 0 < config.stop_at <= 1:
-        raise ValueError(f"stop_at is {config.stop_at}; accepted: above 0, at most 1")
+    if not config.network.hidden:
+        raise ValueError("network.hidden is (); accepted: one or more sizes")
     for name, value in (*config.reward.weights.items(), *config.reward.parameters.items()):
-        if not math.isfinite(value):
-            raise ValueError(f"reward {name} is {value}; accepted: a finite number")
+        if not abs(value) <= LARGEST:  # true for NaN
+            raise ValueError(f"reward {name} is {value}; accepted: a number, -{LARGEST:g} to {LARGEST:g}")
     if not config.reward.weights:
         raise ValueError("reward.weights is empty; accepted: at least one term (see `e2efly list`)")
-
-
-def _whole_numbers(name: str, value: Any) -> Iterator[tuple[str, int]]:
-    """Every whole number of a configuration, with its name."""
-    if dataclasses.is_dataclass(value):
-        for field in dataclasses.fields(value):
-            yield from _whole_numbers(f"{name}.{field.name}" if name else field.name, getattr(value, field.name))
-    elif isinstance(value, tuple):
-        for i, entry in enumerate(value):
-            yield from _whole_numbers(f"{name}[{i}]", entry)
-    elif isinstance(value, int):
-        yield name, value

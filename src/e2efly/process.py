@@ -35,6 +35,11 @@ def open_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
+def printable(text: str) -> str:
+    """The text on one line. Line ends, escape sequences and lone surrogates are shown as Python's escapes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
 def write_nowhere(number: int = 1) -> None:
     """Release a stream by its number, or standard output. Its buffered content goes to the null device."""
     nowhere = os.open(os.devnull, os.O_WRONLY)

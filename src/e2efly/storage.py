@@ -1,19 +1,34 @@
 """Files that survive a crash: complete writes, JSON without NaN, folders with only one writing process at a time."""
 
 import fcntl
+import io
 import json
 import math
 import os
 import reprlib
 import socket
+import struct
+import tokenize
+import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 LOCK = ".lock"
 """Name of the file in a folder that tells who writes to it. Only the kernel's lock on this file counts."""
+
+_UNREADABLE = (OSError, EOFError, RuntimeError, struct.error, zipfile.BadZipFile, zlib.error)
+"""What the standard library raises for archives that are damaged or of another kind."""
+
+
+def cache_folder() -> Path:
+    """The user's cache folder of this package."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "e2efly"
 
 
 def write_atomically(path: Path, data: bytes) -> None:
@@ -50,7 +65,7 @@ def read_json(path: Path) -> dict[str, Any]:
         ValueError: when the file is missing, is not JSON, or contains something other than an object.
     """
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError) as error:
         raise ValueError(f"{path} cannot be read: {error}") from None
     except RecursionError:
@@ -58,6 +73,52 @@ def read_json(path: Path) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise ValueError(f"{path} is {reprlib.repr(found)}; accepted: an object")
     return found
+
+
+def read_npz(path: Path, most: int) -> dict[str, np.ndarray]:
+    """The arrays of an .npz file, by name.
+
+    Args:
+        path: the file.
+        most: the largest number of bytes that all arrays together may have.
+
+    Raises:
+        ValueError: without the file's name, for another file, a damaged one, one that unpacks to more than `most`
+            bytes, and one that holds objects.
+    """
+    try:
+        if not path.is_file():
+            raise ValueError("it is no file")
+        with zipfile.ZipFile(path) as archive:
+            if (size := sum(entry.file_size for entry in archive.infolist())) > most:
+                raise ValueError(f"it unpacks to {size} bytes; accepted: at most {most}")
+            return {name.removesuffix(".npy"): array_of(archive.read(name)) for name in archive.namelist()}
+    except (
+        OSError,
+        EOFError,
+        RuntimeError,
+        NotImplementedError,
+        struct.error,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
+        raise ValueError(str(error)) from None
+
+
+def array_of(data: bytes) -> np.ndarray:
+    """The array in the content of an .npy file.
+
+    Raises:
+        ValueError: for other content, objects, and another size than the header says.
+    """
+    file = io.BytesIO(data)
+    if np.lib.format.read_magic(file) != (1, 0):
+        raise ValueError("it is of another version of .npy; accepted: 1.0, as np.save writes it")
+    try:
+        shape, by_columns, kind = np.lib.format.read_array_header_1_0(file)
+    except (SyntaxError, TypeError, MemoryError, RecursionError, tokenize.TokenError) as error:
+        raise ValueError(f"its header is {error}") from None
+    return np.frombuffer(data, kind, offset=file.tell()).reshape(shape, order="F" if by_columns else "C")
 
 
 def finite(value: Any) -> Any:
@@ -75,7 +136,8 @@ def finite(value: Any) -> Any:
 def held(folder: Path, option: str = "--out") -> Iterator[None]:
     """Keep other processes from writing to a folder. The folder is made if it does not exist.
 
-    The kernel releases the lock when the process ends, however it ends. So no lock outlives its process.
+    The kernel releases the lock when the process ends, however it ends. So no lock outlives its process. What a killed
+    process had not finished writing is removed.
 
     Args:
         folder: the folder to lock.
@@ -100,6 +162,9 @@ def held(folder: Path, option: str = "--out") -> Iterator[None]:
         ) from None
     except OSError as error:
         raise OSError(f"cannot lock {option} {folder}: {error.strerror}") from error
+    for part in folder.glob("*.part"):
+        if not _runs(part.suffixes[-2][1:] if len(part.suffixes) > 1 else ""):
+            part.unlink(missing_ok=True)
     now = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
     about = json.dumps({"process": os.getpid(), "host": socket.gethostname(), "since": now})
     try:
@@ -113,6 +178,17 @@ def held(folder: Path, option: str = "--out") -> Iterator[None]:
         if anew:
             with suppress(OSError):  # the folder is not empty
                 folder.rmdir()
+
+
+def _runs(process: str) -> bool:
+    """Whether a process of this number runs on this machine."""
+    try:
+        os.kill(int(process), 0)
+    except (ValueError, ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        pass
+    return True
 
 
 def is_held(folder: Path) -> bool:

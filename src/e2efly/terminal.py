@@ -3,24 +3,35 @@
 import signal
 import threading
 import time
+from collections.abc import Iterable
 from types import TracebackType
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.segment import Segment
 from rich.table import Table
 
-from e2efly.process import write_nowhere
+from e2efly.process import printable, write_nowhere
 
 
 class Terminal(Console):
     """A console that prints text unchanged, although paths and messages may contain rich markup or emoji codes.
 
-    Lines are not broken in a narrow terminal, so that commands and paths in them can be copied.
+    Escape sequences in text, which could change the terminal, are shown and not sent. Lines are not broken in a narrow
+    terminal, so that commands and paths in them can be copied.
     """
 
     def __init__(self, *, stderr: bool = False, quiet: bool = False) -> None:
         super().__init__(stderr=stderr, quiet=quiet, markup=False, emoji=False, highlight=False, soft_wrap=True)
+        if not self.is_terminal:
+            self.width = WIDE
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Pieces of text, with their styles, and the control codes of rich itself."""
+        for segment in super().render(renderable, options):
+            lines = segment.text.split("\n")
+            yield segment if segment.control else Segment("\n".join(map(printable, lines)), segment.style)
 
     def on_broken_pipe(self) -> None:
         """End like a process that receives SIGPIPE, if the reader, such as `head`, has stopped.
@@ -33,7 +44,9 @@ class Terminal(Console):
             raise SystemExit(128 + signal.SIGPIPE)
 
 
-NARROW = 110
+WIDE = 1000
+"""Width of what is no terminal in columns: tables in a pipe or a file are whole."""
+NARROW = 150
 """Width of a terminal in columns below which the bar is short and shows less. The time left must stay visible."""
 LINES_S = 5.0
 """Interval between two lines if the output is not a terminal, s."""
@@ -46,11 +59,11 @@ class TerminalProgress:
     """
 
     def __init__(self, console: Console, title: str) -> None:
-        self._console, self._title, self._narrow = console, title, console.width < NARROW
+        self._console, self._title, self._narrow = console, title, console.is_terminal and console.width < NARROW
         self._bar = Progress(
             SpinnerColumn("dots" if console.encoding.startswith("utf") else "line"),
             TextColumn("{task.description}", "bold", markup=False),
-            BarColumn(bar_width=8 if self._narrow else 24),
+            BarColumn(bar_width=4 if self._narrow else 24),
             TextColumn("{task.fields[figures]}", markup=False),
             *(() if self._narrow else (TimeElapsedColumn(),)),
             TimeRemainingColumn(),
@@ -77,12 +90,11 @@ class TerminalProgress:
         """Show that programs are being compiled and nothing flies yet."""
         self._say("compiling" if self._narrow else "compiling (seconds; cached for the next run)")
 
-    def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
+    def progress(self, steps: int, total: int, rate: float, success: float, best: float, flown: str) -> None:
         """Move the bar, or print a line."""
-        figures = f"{steps / 1e6:.2f}M steps  {rate / 1e3:.0f}k/s  success {success:.1%}  best {best:.1%}"
+        figures = f"{steps / 1e6:.2f}M steps  {rate / 1e3:.0f}k/s  success {success:.1%}, best {best:.1%} ({flown})"
         if self._narrow:
-            figures = f"{steps / 1e6:.2f}M  success {success:.0%}"
-        figures += f"  {stage}" if stage else ""
+            figures = f"{success:.0%} {flown}"
         self._bar.update(self._task, completed=steps, total=total, figures=figures)
         now = time.monotonic()
         if not self._console.is_terminal and (now - self._told >= LINES_S or steps >= total):
@@ -108,7 +120,7 @@ def console_table(rows: list[dict[str, Any]]) -> Table:
     """A table for `rich`. The keys of the first row are the headings."""
     table = Table(box=None, header_style="bold", pad_edge=False)
     for heading in rows[0]:
-        table.add_column(heading, no_wrap=True)
+        table.add_column(heading, overflow="fold")
     for row in rows:
         table.add_row(*map(str, row.values()))
     return table

@@ -33,11 +33,23 @@ def agree(path: Path, adapter: Any, wanted: Any) -> None:
     assert np.std(action) > 1e-3
 
 
-@pytest.mark.parametrize("algorithm", [PPO, A2C, SAC, TD3])
-def test_models_of_stable_baselines3(algorithm: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("algorithm", "kind", "sde"),
+    [
+        (PPO, {}, False), (A2C, {"activation_fn": torch.nn.ELU}, False), (SAC, {}, False), (TD3, {}, False),
+        (PPO, {"share_features_extractor": False}, True), (A2C, {"squash_output": True}, True),
+        (SAC, {"clip_mean": 0.7}, True), (SAC, {"clip_mean": 0.0}, True),
+    ],
+)  # fmt: skip
+def test_models_of_stable_baselines3(algorithm: Any, kind: dict[str, Any], sde: bool, tmp_path: Path) -> None:
     env = SB3VecEnv("hover", 4)
-    kind = {"activation_fn": torch.nn.ELU} if algorithm is A2C else {}
-    model = algorithm("MlpPolicy", env, policy_kwargs=NETWORK | kind, seed=0, device="cpu")
+    options = {"use_sde": True} if sde else {}
+    model = algorithm("MlpPolicy", env, policy_kwargs=NETWORK | kind, seed=0, device="cpu", **options)
+    if sde:  # far out, where actions and means are clipped
+        with torch.no_grad():
+            for layer in getattr(model, "actor", model.policy).modules():
+                if isinstance(layer, torch.nn.Linear) and layer.out_features == 4:
+                    layer.weight *= 50
     path = e2efly.export(model, tmp_path / "policy.onnx")  # the model knows its environment
     agree(path, env.envs, lambda shown: model.predict(shown, deterministic=True)[0])
     contract = e2efly.load_policy(path).contract
@@ -59,6 +71,67 @@ def test_a_normalised_environment_and_raw_observations(tmp_path: Path) -> None:
     network = sequence(adapter.stepper.size)
     e2efly.export(network, path, env)
     agree(path, adapter, lambda shown: network(torch.as_tensor(normalize.normalize_obs(shown))).detach().numpy())
+
+
+def test_a_lost_or_wrong_normalisation_is_refused(tmp_path: Path) -> None:
+    env, file = SB3VecEnv("hover", 4), tmp_path / "model.zip"
+
+    def learned(algorithm: Any, under: Any, **more: Any) -> Any:
+        return algorithm("MlpPolicy", under, policy_kwargs=dict(NETWORK), device="cpu", **more).learn(16)
+
+    def refused(model: Any, under: Any, message: str) -> None:
+        with pytest.raises(ValueError, match=message):
+            e2efly.export(model, tmp_path / "policy.onnx", under)
+
+    normalized = VecNormalize(env)
+    model = learned(PPO, normalized, n_steps=4, batch_size=16, n_epochs=1)
+    model.save(file)
+    normalized.save(str(tmp_path / "normalize.pkl"))
+    refused(model, env, "was learned under a VecNormalize, and env has none; accepted: env=VecNormalize.load")
+    loaded = PPO.load(file, device="cpu")
+    refused(loaded, env, "was learned under a VecNormalize, and env has none; accepted: env=VecNormalize.load")
+    refused(loaded, VecNormalize(env), "VecNormalize that has seen no observation; accepted: env=VecNormalize.load")
+    kept = VecNormalize.load(str(tmp_path / "normalize.pkl"), env)
+    e2efly.export(loaded, tmp_path / "policy.onnx", kept)
+    agree(
+        tmp_path / "policy.onnx", env.envs, lambda x: model.predict(normalized.normalize_obs(x), deterministic=True)[0]
+    )
+    kept.obs_rms.mean = kept.obs_rms.mean + 0.1
+    refused(model, kept, "another VecNormalize than policy, with other statistics")
+    off_policy = learned(SAC, VecNormalize(env), learning_starts=100)
+    off_policy.save(file)
+    refused(SAC.load(file, device="cpu"), env, "was learned under a VecNormalize, and env has none")
+    plain = learned(PPO, env, n_steps=4, batch_size=16, n_epochs=1)
+    refused(plain, normalized, "a VecNormalize, without which policy was learned")
+
+
+class Doubled(PPO.policy_aliases["MlpPolicy"]):  # type: ignore[misc]
+    """Acts otherwise than its layers say."""
+
+    def _predict(self, observation: Any, deterministic: bool = False) -> Any:
+        return 2 * super()._predict(observation, deterministic)
+
+
+class VecMonitorOfOurs(VecMonitor):
+    """A wrapper of somebody else."""
+
+
+VecMonitorOfOurs.__name__ = "VecMonitor"
+
+
+def test_what_acts_or_shows_otherwise_is_refused_by_name(tmp_path: Path) -> None:
+    env = SB3VecEnv("hover", 2)
+    for policy, wrapped, message in (
+        (Doubled, env, "policy is a tests.adapters.test_export.Doubled; accepted: PPO, A2C"),
+        ("MlpPolicy", VecMonitorOfOurs(env), "env is <.*VecMonitor.* accepted: an environment of e2efly.adapters"),
+    ):
+        model = PPO(policy, wrapped, policy_kwargs=NETWORK, device="cpu")
+        with pytest.raises(ValueError, match=message):
+            e2efly.export(model, tmp_path / "policy.onnx")
+    model = PPO("MlpPolicy", env, policy_kwargs=NETWORK, device="cpu")
+    model.action_space = gymnasium.spaces.Box(0.0, 1.0, (4,))
+    with pytest.raises(ValueError, match=r"policy acts in Box\(0.0, 1.0, \(4,\), float32\); accepted: \[-1, 1\]"):
+        e2efly.export(model, tmp_path / "policy.onnx")
 
 
 def test_environments_that_stable_baselines3_makes_of_a_gymnasium_id(tmp_path: Path) -> None:
@@ -91,7 +164,7 @@ def test_a_network_of_pytorch(last: tuple[torch.nn.Module, ...], tmp_path: Path)
         (torch.nn.Sequential(torch.nn.Linear(20, 4), torch.nn.ReLU()), "ends with the activation Relu; accepted: Tanh"),
         (torch.nn.Sequential(torch.nn.Conv1d(1, 1, 1)), r"policy has a layer Conv1d.*; accepted: Linear, each with"),
         (torch.nn.LSTM(20, 4), "policy LSTM is recurrent; accepted: networks without memory"),
-        (torch.nn.Linear(20, 4), "policy is a Linear; accepted: PPO, A2C, SAC"),
+        (torch.nn.Linear(20, 4), "policy is a torch.*Linear; accepted: PPO, A2C, TRPO, SAC"),
         (torch.nn.Sequential(), "policy has no linear layer"),
         (torch.nn.Sequential(torch.nn.Linear(20, 4), torch.nn.Dropout(), torch.nn.Softmax()), "a layer Softmax"),
         (torch.nn.Sequential(torch.nn.Linear(20, 9), torch.nn.ELU(0.5), torch.nn.Linear(9, 4)), "default parameters"),

@@ -5,9 +5,11 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
+import onnx
 import pytest
 
 from e2efly.c_policy.exact import Exact
+from e2efly.c_policy.header import Sizes, field_name, header, image_name
 from e2efly.c_policy.source import sources
 from e2efly.c_policy.write import write_c
 from e2efly.cli import run
@@ -22,7 +24,7 @@ from e2efly.learn.export import write_policy
 from e2efly.learn.graph import perceptron_graph
 from e2efly.learn.networks import Features
 from e2efly.zoo import contents, policy_file
-from tests.c_policy.compiled import STRICT, Compiled, build, compiled
+from tests.c_policy.compiled import STRICT, Compiled, build, compiled, compiler
 from tests.learn.test_export_images import CONVOLVED, DEPTH, MASK, POOLED, RGB, exported
 
 KINDS = ("race_any", "hover", "any/race", "avoid", "land_visual", "race_clutter")
@@ -272,6 +274,63 @@ def test_the_words_of_a_contract_cannot_become_code(tmp_path: Path) -> None:
     (tmp_path / "policy.c").write_text(made.source)
     built = build(tmp_path / "policy.o", *STRICT, "-Wtrigraphs", "-c", tmp_path / "policy.c")
     assert "evil" not in subprocess.check_output(["nm", built], text=True)
+
+
+WORDS = (
+    "asm", "typeof", "typeof_unqual", "constexpr", "nullptr", "static_assert", "thread_local", "alignas",
+    "and_eq", "char8_t", "co_await", "requires", "int", "inline", "register", "linux", "unix", "i386", "near",
+    "far", "min", "NULL", "NAN", "INFINITY", "M_PI", "isfinite", "errno", "stdin", "EOF", "i", "s", "q", "a",
+    "low", "span", "real", "state", "seen", "action", "observation", "memory", "scratch", "at", "image_0",
+    "height", "memory_size", "_", "2d", "Größe", "__func__", "field_x",
+)  # fmt: skip
+"""Names of fields and images that mean something to a compiler, a library or the exported code."""
+
+
+LIBRARY = "#include <math.h>\n#include <stdio.h>\n#include <time.h>\n#include <errno.h>\n"
+STANDARDS = ("c c99", "c gnu17", "c gnu2x", "c++ c++98", "c++ gnu++2b")
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_no_name_is_a_word_of_a_compiler_or_a_macro(standard: str, tmp_path: Path) -> None:
+    """A field and an image for each word, and for each macro that there is after the library's headers."""
+    language = ("-x", standard.split()[0], f"-std={standard.split()[1]}")
+    command = [compiler(), *language, "-dM", "-E", "-"]
+    told = subprocess.run(command, input=LIBRARY, capture_output=True, text=True, check=True).stdout
+    words = [*WORDS, *(line.split()[1].partition("(")[0] for line in told.splitlines())]
+    c = load_policy("avoid").contract
+    seen = {field_name(word).upper(): dataclasses.replace(c.observation[0], name=word) for word in words}
+    images = {image_name(word).upper(): dataclasses.replace(c.images[0], name=word) for word in words}
+    attitude = next(field for field in c.observation if field.frame == "world_body")
+    odd = dataclasses.replace(c, observation=(*seen.values(), attitude), images=tuple(images.values()))
+    assert len(odd.images) > 300
+    (tmp_path / "policy.h").write_text(header(odd, "policy", "", Sizes(1, 8, 8, 8), "double"))
+    (tmp_path / "main").write_text(f'{LIBRARY}#include "policy.h"\nint main(void) {{ return 0; }}\n')
+    build(tmp_path / "out", "-Wall", "-Wextra", "-Werror", "-pedantic", "-I", tmp_path, *language, tmp_path / "main")
+
+
+def test_the_code_uses_no_name_of_a_contract(tmp_path: Path) -> None:
+    model, c = onnx.load(policy_file("avoid")), load_policy("avoid").contract
+    for name in ("state", "asm"):
+        for value in model.graph.input:
+            value.name = name if value.name == c.images[0].name else value.name
+        for node in model.graph.node:
+            node.input[:] = [name if value == c.images[0].name else value for value in node.input]
+        fields = tuple(dataclasses.replace(f, name=w) for f, w in zip(c.observation[:-1], WORDS, strict=False))
+        image = dataclasses.replace(c.images[0], name=name)
+        c = dataclasses.replace(c, observation=(*fields, c.observation[-1]), images=(image,))
+        made = sources(c, model.SerializeToString(), "int", "double")
+        (tmp_path / "int.h").write_text(made.header)
+        (tmp_path / "int.c").write_text(made.source)
+        build(tmp_path / "int.o", *STRICT, "-c", tmp_path / "int.c")
+
+
+@pytest.mark.parametrize("names", [("a-b", "a_b"), ("Wheel", "wheel"), ("x__y", "x y")])
+def test_names_that_would_be_one_in_c_are_refused(names: tuple[str, str]) -> None:
+    c = load_policy("race_any").contract
+    first, second = (dataclasses.replace(f, name=n) for f, n in zip(c.observation, names, strict=False))
+    odd = dataclasses.replace(c, observation=(first, second, *c.observation[2:]))
+    with pytest.raises(ValueError, match=f"the fields '{names[0]}' and '{names[1]}' are both field_"):
+        sources(odd, policy_file("race_any").read_bytes(), "policy", "double")
 
 
 def test_fast_math_is_refused_by_the_compiler(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 import e2efly
 from e2efly.cli import run
 from e2efly.identification.csv_file import write_csv
+from e2efly.storage import held
 from e2efly.stress import stress
 from e2efly.validation.excitation import Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
@@ -41,6 +42,16 @@ def test_a_log_becomes_a_policy_for_the_vehicle_that_it_shows(tmp_path: Path, mo
     assert np.mean(alone.flown["hover"].success) > 0.9
     assert set(json.loads((out / "stress.json").read_text())["stress"]) >= {"nominal", "mass x1.25"}
     assert run(asked) == 2  # nothing is lost: the run is there
+
+
+@pytest.mark.parametrize("asked", [["tune", "--task", "hover"], ["identify", "flight"]])
+def test_two_writers_of_a_folder_are_not_let_in(
+    asked: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command, *more = asked
+    with held(tmp_path / "out"):
+        assert run([command, *more, str(tmp_path / "flight.csv"), "--out", str(tmp_path / "out")]) == 2
+    assert "out is in use by process" in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.parametrize(

@@ -147,6 +147,11 @@ def test_a_reference_that_cannot_be_flown_is_refused(rows: str, told: str, tmp_p
         read_csv(tmp_path / "way.csv")
 
 
+def test_a_reference_with_a_byte_order_mark(tmp_path: Path) -> None:
+    (tmp_path / "way.csv").write_text("t,x,y,z\n0,0,0,1\n1,0,0,1\n2,0,0,1\n", encoding="utf-8-sig")
+    assert read_csv(tmp_path / "way.csv").shape == (3, 4)
+
+
 def test_courses_need_no_jax() -> None:
     code = "import sys; from e2efly.courses import defaults, gates, origin, references, tracks; print(*sys.modules)"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}

@@ -3,21 +3,32 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 from rich.console import Console
+from rich.table import Table
 
-from e2efly.commands.fly_check import settings_table
+from e2efly.commands.fly_check import add_lags, mount, print_settings, print_table
 from e2efly.deploy.betaflight import messages, settings_by_name
-from e2efly.deploy.betaflight.check import NOT_TOLD, Row, examine, problems
+from e2efly.deploy.betaflight.check import NOT_TOLD, examine
 from e2efly.deploy.betaflight.client import MESSAGES, Client
 from e2efly.deploy.betaflight.codec import ERROR, Decoder, Frame, encode
 from e2efly.deploy.betaflight.controller import ControllerInfo, identify
 from e2efly.deploy.betaflight.messages import MotorTelemetry
-from e2efly.deploy.betaflight.settings import ModeRange, RxFailConfig
+from e2efly.deploy.betaflight.mode_slots import ModeRange
+from e2efly.deploy.betaflight.modes import ANGLE
+from e2efly.deploy.betaflight.row import Row, problems
+from e2efly.deploy.betaflight.settings import RxFailConfig
 from e2efly.deploy.betaflight.sticks import RATES_PULSE, sticks_of
+from e2efly.deploy.odometry import Sample
+from e2efly.deploy.policy.loader import load_policy
+from e2efly.deploy.pose.checks import Checks
 from e2efly.deploy.settings import FlightSettings
 from e2efly.vehicles import load_vehicle
+from e2efly.zoo import policy_file
 
 REPLIES: dict[str, dict[str, str]] = json.loads(
     (Path(__file__).parents[1] / "data" / "msp_releases.json").read_text(encoding="utf-8")
@@ -94,27 +105,27 @@ def test_it_says_what_becomes_of_an_override_without_msp(version: str, words: st
     "modes",
     [
         (),
-        (ModeRange(1, 1, 900, 1700),),  # on the switch of the override: off while it is high, whoever has the sticks
-        (ModeRange(1, 2, 1700, 2100),),  # a switch of the pilot's, who may have left it off
-        (ModeRange(1, 2, 900, 2100),),  # always on: the bridge could not fly
-        (ModeRange(1, 2, 925, 1700),),
-        (ModeRange(1, 0, 925, 2100),),  # the channel of ARM
+        (ModeRange(1, 1, 900, 1700, 2),),  # on the switch of the override: off while it is high, whoever has the sticks
+        (ModeRange(1, 2, 1700, 2100, 2),),  # a switch of the pilot's, who may have left it off
+        (ModeRange(1, 2, 900, 2100, 2),),  # always on: the bridge could not fly
+        (ModeRange(1, 2, 925, 1700, 2),),
+        (ModeRange(1, 0, 925, 2100, 2),),  # the channel of ARM
     ],
 )
 def test_a_dead_link_must_leave_a_vehicle_that_levels_itself(modes: tuple[ModeRange, ...]) -> None:
     info = recorded(NEWEST)
-    others = tuple(r for r in info.modes if r.box != 1)
+    others = tuple(r for r in info.modes if r.box != ANGLE)
     row = rows_of(replace(info, modes=(*others, *modes)))["range of ANGLE"]
-    assert not row.good and row.mend == "aux 2 1 2 925 2100 0 0"
+    assert not row.good and [line.partition("  #")[0] for line in row.mend] == ["aux 2 1 2 925 2100 0 0"]
 
 
 def test_the_mask_follows_the_channel_of_angle() -> None:
     info = recorded(NEWEST)
-    assert rows_of(info)["msp_override_channels_mask"].mend == "set msp_override_channels_mask=79"
-    modes = tuple(replace(r, aux=9) if r.box == 1 else r for r in info.modes)
+    assert rows_of(info)["msp_override_channels_mask"].mend == ("set msp_override_channels_mask=79",)
+    modes = tuple(replace(r, aux=9) if r.box == ANGLE else r for r in info.modes)
     rows = rows_of(replace(info, modes=modes))
-    assert rows["msp_override_channels_mask"].mend == f"set msp_override_channels_mask={15 + (1 << 13)}"
-    assert rows["rxfail of AUX10"].mend == "rxfail 13 s 2000"
+    assert rows["msp_override_channels_mask"].mend == (f"set msp_override_channels_mask={15 + (1 << 13)}",)
+    assert rows["rxfail of AUX10"].mend == ("rxfail 13 s 2000",)
 
 
 @pytest.mark.parametrize("fail", [("HOLD", 1500), ("SET", 900), ("AUTO", 1500)])
@@ -122,7 +133,7 @@ def test_without_the_receiver_angle_must_be_on(fail: tuple[str, int]) -> None:
     info = recorded(NEWEST)
     channels = (*info.rx_fail.channels[:6], fail, *info.rx_fail.channels[7:])
     row = rows_of(replace(info, rx_fail=RxFailConfig(channels)))["rxfail of AUX3"]
-    assert not row.good and row.mend == "rxfail 6 s 2000"
+    assert not row.good and row.mend == ("rxfail 6 s 2000",)
 
 
 def test_a_throttle_stick_that_climbs_in_its_middle_is_refused_where_it_is_handed_back() -> None:
@@ -169,7 +180,7 @@ def test_settings_that_new_firmware_tells_by_name(name: str, value: str, good: b
     }  # fmt: skip
     row = rows_of(replace(info, by_name=tuple((dict(info.by_name) | {name: value}).items())))[name]
     assert (row.good, row.told, row.value) == (good, True, value)
-    assert row.mend.startswith(f"set {name}=")
+    assert row.mend[0].startswith(f"set {name}=")
 
 
 @pytest.mark.parametrize("version", ["4.5.5", "4.6.0", "2025.12.5"])
@@ -177,7 +188,7 @@ def test_settings_that_older_firmware_does_not_tell_are_the_pilots_to_look_at(ve
     rows = rows_of(recorded(version))
     for name in settings_by_name.NAMES:
         assert (rows[name].value, rows[name].good, rows[name].told) == (NOT_TOLD, True, False)
-    assert rows["mixer_type"].mend == "set mixer_type=LEGACY"
+    assert rows["mixer_type"].mend == ("set mixer_type=LEGACY",)
 
 
 def test_a_firmware_built_without_its_command_line_tells_nothing_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -206,7 +217,7 @@ def test_what_bends_the_throttle_is_refused(field: str, value: int, row: str, me
     info = recorded(NEWEST)
     changed = replace(info, pid_advanced=replace(info.pid_advanced, **{field: value}))
     found = rows_of(changed)[row]
-    assert not found.good and found.mend == mend
+    assert not found.good and found.mend == (mend,)
     assert len(problems(examine(changed, VEHICLE, FlightSettings()))) == 1
 
 
@@ -221,7 +232,34 @@ def test_the_sticks_keep_angle_off_on_its_own_channel() -> None:
 
 
 def test_the_table_says_which_settings_the_pilot_has_to_look_at(capsys: pytest.CaptureFixture[str]) -> None:
-    Console(width=200).print(settings_table(examine(recorded("2025.12.5"), VEHICLE, FlightSettings())))
-    lines = {line.split()[1]: line for line in capsys.readouterr().out.splitlines() if len(line.split()) > 1}
-    assert lines["mixer_type"].startswith("look ") and "set mixer_type=LEGACY" in lines["mixer_type"]
-    assert lines["thrust_linear"].startswith("ok ") and "set " not in lines["thrust_linear"]
+    print_settings(Console(width=60), examine(recorded("2025.12.5"), VEHICLE, FlightSettings()))
+    out = capsys.readouterr().out.splitlines()
+    marks = {line.split()[1]: line.split()[0] for line in out if len(line.split()) > 1}
+    assert marks["mixer_type"] == "look" and marks["thrust_linear"] == "ok"
+    lines = [line for name in settings_by_name.NAMES for line in rows_of(recorded("2025.12.5"))[name].mend]
+    assert out[-5:] == [*lines, "save"]
+
+
+@pytest.mark.parametrize("given", [None, np.zeros(3)])
+def test_the_report_says_how_late_the_velocities_are(
+    given: np.ndarray | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table, sample = Table(box=None), Sample(0.0, np.zeros(3), np.array([1.0, 0, 0, 0]), velocity=given)
+    bridge: Any = SimpleNamespace(estimate=SimpleNamespace(checks=Checks(velocity_cutoff=10.0)))
+    contract = load_policy(policy_file(Path("hover"))).contract
+    trained = replace(contract, observation_latency_range_s=(0.0, 0.02), latency_range_s=(0.05, 0.05))
+    add_lags(table, bridge, [sample], trained)
+    print_table(Console(width=30), table)
+    said = capsys.readouterr().out
+    assert ("estimated from the poses, 32 ms later" in said) == (given is None)
+    assert "body rate" in said and "estimated from the poses, 11 ms later" in said
+    assert "states 0 to 20 ms old, and 50 ms from observation to command" in said
+
+
+def test_the_report_says_where_the_camera_of_the_training_is() -> None:
+    (camera,) = load_policy(policy_file(Path("race_clutter"))).contract.images
+    turned = replace(camera, position_m=(0.1, -0.02, 0.03), pitch_rad=-0.35, fov_rad=(1.5, 1.0))
+    assert mount(turned) == (
+        "0.100 m before, -0.020 m left of and 0.030 m above the centre of mass, pitched up by 20.1 deg, "
+        "field of view 85.9 x 57.3 deg (pinhole)"
+    )

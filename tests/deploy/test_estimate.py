@@ -75,7 +75,7 @@ def odometry(height: float, climb: float = 0.0, x: float = 0.0) -> Odometry:
 def test_a_take_off_does_not_tilt_before_it_has_left_the_ground() -> None:
     target, flight = Target((1.0, 1.0, 0.5), 0.7), Flight(Mode.TAKEOFF)
     standing, _ = hovered(flight, target, odometry(LIFTED - 0.01), 0.0)
-    assert rates_of(standing) == [0.0, 0.0, 0.0]
+    assert rates_of(standing) == (0.0, 0.0, 0.0)
     lifted, _ = hovered(flight, target, odometry(LIFTED + 0.01), 0.0)
     assert all(abs(rate) > 0.1 for rate in rates_of(lifted))
 
@@ -98,4 +98,4 @@ def test_the_trim_grows_while_a_take_off_does_not_climb_and_fades_in_the_air() -
 def test_a_steady_hover_sends_body_rates_of_zero() -> None:
     target = Target((0.001, 0.0, 1.0), 0.0)  # they are held for long should the link fall silent
     command, _ = hovered(HOVER, target, odometry(1.0), 0.0)
-    assert rates_of(command) == [0.0, 0.0, 0.0]
+    assert rates_of(command) == (0.0, 0.0, 0.0)

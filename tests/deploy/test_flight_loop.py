@@ -7,6 +7,7 @@ import pytest
 
 from e2efly.deploy.flight_loop import fly, plan_of
 from e2efly.deploy.pilot.flight_state import Flight, Mode
+from e2efly.deploy.pilot.inertial import Inertial
 from e2efly.deploy.pilot.throttle_map import ThrottleMap
 from e2efly.vehicles import load_vehicle
 from tests.deploy.test_sticks import STICKS
@@ -33,6 +34,7 @@ class Grounded:
     height = 0.0
     client = SimpleNamespace(link=SimpleNamespace(connections=1))
     sent = SimpleNamespace(throttle=0.0)
+    estimate = SimpleNamespace(inertial=Inertial())
     sticks = STICKS
 
     def __init__(self, *reasons: str, mode: Mode = Mode.INIT, armed_steps: int = 0) -> None:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from e2efly.deploy.attitude import Attitude
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.pilot.inertial import BURIED, Inertial, Measurement, alone, carry, measure, see
+from e2efly.deploy.pilot.touch import LAGS
 from e2efly.vehicles.vehicle import GRAVITY
 
 DT = 0.02
@@ -20,13 +22,21 @@ DOUBT = 0.05
 
 
 def measurement(
-    force: float, thrust: float | None = GRAVITY, *, now: float = 0.0, jitter: float = 0.0, climb: float | None = None
+    force: float,
+    thrust: float | None = GRAVITY,
+    *,
+    now: float = 0.0,
+    jitter: float = 0.0,
+    climb: float | None = None,
+    acts: bool = True,
+    delivered: bool = True,
 ) -> Measurement:
     counts = COUNTS * np.array([jitter, 0.0, force])
-    told = None if thrust is None else (thrust, DOUBT)
+    told, thrusts = (None, ()) if thrust is None else ((thrust, DOUBT), (thrust,) * len(LAGS))
     return Measurement(
-        counts, np.zeros(3), LEVEL, told, now, standing=thrust is None, flying=thrust is not None, climb=climb
-    )
+        counts, np.zeros(3), LEVEL, told, thrusts, now, acts=acts, delivered=delivered, standing=thrust is None,
+        flying=thrust is not None, climb=climb,
+    )  # fmt: skip
 
 
 def pose(time: float, height: float = 2.0, climb: float = 0.0) -> Odometry:
@@ -65,8 +75,43 @@ def test_after_a_silence_the_force_tells_whether_the_commands_came(came: bool) -
         inertial = carry(inertial, LEVEL, (low, DOUBT), now, held=(GRAVITY, DOUBT))
     assert climb_of(inertial) == pytest.approx(low - GRAVITY, abs=0.15)  # m/s, after the second
     force = low if came else GRAVITY
-    inertial = measure(inertial, measurement(force, low), now + DT)
-    assert climb_of(inertial) == pytest.approx(low - GRAVITY if came else 0.0, abs=0.15)
+    after = measure(inertial, measurement(force, low, delivered=False), now + DT)
+    assert climb_of(after) == pytest.approx(low - GRAVITY if came else 0.0, abs=0.15)
+    acknowledged = measure(inertial, measurement(force, low), now + DT)
+    assert climb_of(acknowledged) == pytest.approx(low - GRAVITY, abs=0.15)
+
+
+@pytest.mark.parametrize("acts", [False, True])
+def test_a_silence_in_which_the_velocity_changed_teaches_nothing(acts: bool) -> None:
+    """Held at much thrust for a second, it climbs, and then neither its new velocity nor its throttle is a measure."""
+    before = hovering(factor=0.97)
+    inertial, now = before, 3.0 + 1.0
+    for _ in range(40):
+        now += DT
+        thrust = GRAVITY if acts else 0.8 * GRAVITY
+        told = measurement(0.97 * GRAVITY, thrust, now=now, jitter=0.01 * math.sin(now), climb=3.0, acts=acts)
+        inertial = seen(measure(inertial, told, now), now, climb=3.0)
+    assert inertial.scale.value == pytest.approx(before.scale.value, abs=0.01)
+    assert inertial.share == pytest.approx(before.share, abs=0.01)
+    if not acts:
+        assert inertial.share == before.share and inertial.touch.sums == before.touch.sums
+
+
+def test_without_poses_the_share_follows_a_battery_that_sags_but_no_accelerometer_that_jumps() -> None:
+    def share(force: Callable[[float], float], acts: bool = True) -> float:
+        inertial, now = hovering(), 3.0
+        for _ in range(200):
+            now += DT
+            noise = 0.3 * math.sin(40 * now)  # of the rotors
+            told = measurement(GRAVITY * force(now - 3.0) + noise, now=now, jitter=0.01 * math.sin(now), acts=acts)
+            inertial = measure(inertial, told, now)
+        return inertial.share
+
+    assert share(lambda time: 1 - 0.03 * time) == pytest.approx(0.89, abs=0.02)
+    assert share(lambda time: 1 - 0.03 * time, acts=False) == pytest.approx(1.0, abs=0.005)
+    assert share(lambda time: 1.0) == pytest.approx(1.0, abs=0.01)
+    for step in (0.9, 1.1):
+        assert share(lambda time, step=step: 1.0 if time < 1 else step) == pytest.approx(1.0, abs=0.015)
 
 
 def test_a_pause_between_two_measurements_is_no_silence() -> None:
@@ -74,7 +119,7 @@ def test_a_pause_between_two_measurements_is_no_silence() -> None:
     inertial = carry(inertial, LEVEL, (0.8 * GRAVITY, DOUBT), 3.05, held=(GRAVITY, DOUBT))
     by_what_was_sent = climb_of(inertial)
     assert by_what_was_sent < -0.05
-    assert climb_of(measure(inertial, measurement(GRAVITY, 0.8 * GRAVITY), 3.06)) == by_what_was_sent
+    assert climb_of(measure(inertial, measurement(GRAVITY, 0.8 * GRAVITY, delivered=False), 3.06)) == by_what_was_sent
 
 
 def test_poses_that_come_during_a_silence_begin_the_reckoning_of_what_was_held_anew() -> None:
@@ -84,7 +129,7 @@ def test_poses_that_come_during_a_silence_begin_the_reckoning_of_what_was_held_a
         inertial = carry(inertial, LEVEL, (0.8 * GRAVITY, DOUBT), now, held=(GRAVITY, DOUBT))
     inertial = seen(inertial, now, climb=-0.7)
     assert inertial.held is not None and inertial.held.newest == inertial.reckoned
-    after = measure(inertial, measurement(GRAVITY, 0.8 * GRAVITY), now + DT)
+    after = measure(inertial, measurement(GRAVITY, 0.8 * GRAVITY, delivered=False), now + DT)
     assert climb_of(after) == pytest.approx(-0.7, abs=0.05)
 
 
@@ -105,7 +150,7 @@ def test_wrong_poses_teach_no_scale() -> None:
 
 
 @pytest.mark.parametrize("frozen", [True, False])
-def test_under_the_ground_it_surely_stands_where_its_accelerometer_cannot_tell(frozen: bool) -> None:
+def test_what_is_far_under_the_ground_and_was_not_seen_for_long_is_buried(frozen: bool) -> None:
     inertial, now = hovering(), 3.0
     while now < 6.0:
         now += DT
@@ -119,7 +164,7 @@ def test_under_the_ground_it_surely_stands_where_its_accelerometer_cannot_tell(f
     deep = dataclasses.replace(reckoned, height=-BURIED - 0.1)
     inertial = dataclasses.replace(inertial, reckonings=dataclasses.replace(inertial.reckonings, newest=deep))
     assert inertial.frozen is frozen
-    assert inertial.buried(0.0, now) is frozen
+    assert inertial.buried(0.0, now)
     assert not inertial.buried(-0.2, now)
     recent = dataclasses.replace(deep, since=now - 1.0)
     inertial = dataclasses.replace(inertial, reckonings=dataclasses.replace(inertial.reckonings, newest=recent))
@@ -140,4 +185,4 @@ def test_what_a_fall_taught_does_not_outlast_it() -> None:
     assert fallen.scale.value > 1.05 and fallen.watch.moved >= 0.0
     again = fallen.at_rest()
     assert again.scale.value == 1.0 and again.share == 1.0 and not again.learned and not again.frozen
-    assert again.rest_problem is None and again.watch.felt == () and again.touch.usual is None
+    assert again.rest_problem is None and again.watch.felt == () and again.touch.sums == ()

@@ -5,13 +5,15 @@ from dataclasses import dataclass, field
 import pytest
 
 from e2efly.deploy.betaflight.client import Client, Reply
-from e2efly.deploy.betaflight.instruments import ARM, FAILSAFE, OVERRIDE, Instruments, Reading
+from e2efly.deploy.betaflight.instruments import Instruments, Reading
 from e2efly.deploy.betaflight.messages import Rc, StatusEx
+from e2efly.deploy.betaflight.modes import ANGLE, ARM, FAILSAFE, OVERRIDE
 from e2efly.deploy.pilot.flight_state import Mission
 from e2efly.deploy.settings import FlightSettings
 from tests.deploy.test_msp_client import Wire
 
-BOXES = (ARM, OVERRIDE, FAILSAFE)
+TURTLE, BEEPER, FUTURE = 35, 13, 99
+BOXES = (ARM, OVERRIDE, FAILSAFE, ANGLE, TURTLE, BEEPER, FUTURE)
 LOW, MIDDLE, HIGH = 1000, 1500, 2000
 
 
@@ -20,6 +22,8 @@ class Info:
     """What `Instruments` needs to know of a controller."""
 
     box_ids: tuple[int, ...] = BOXES
+    api: tuple[int, int] = (1, 46)
+    rate_profile: int = 0
 
 
 @dataclass
@@ -40,10 +44,11 @@ class Bench:
         channels: int = 12,
         disabled: tuple[str, ...] = (),
         land: bool = False,
+        rates: int = 0,
     ) -> Reading:
         self.now += 0.033
         boxes = sum(1 << BOXES.index(box) for box in on)
-        status = StatusEx(1e-3, frozenset(), boxes, 0.1, 0, 0, disabled, False)
+        status = StatusEx(1e-3, frozenset(), boxes, 0.1, 0, rates, disabled, False)
         sticks = [1500] * 7 + [mission, roll, 1500, 1500, 1500]
         for code, message in ((StatusEx.CODE, status), (Rc.CODE, Rc(tuple(sticks[:channels])))):
             self.client.latest[code] = Reply(message, self.now, 0.005)
@@ -118,3 +123,41 @@ def test_its_failsafe_is_what_it_said_last_and_not_what_a_silent_link_leaves_unk
     assert not heard.failsafe
     silent = flying.instruments.read(flying.now + 5.0, Info(), land=False)  # type: ignore[arg-type]
     assert silent.pilot is None and silent.link_problem and not silent.failsafe
+
+
+def test_a_mode_that_is_on_and_not_known_to_be_harmless_is_named() -> None:
+    bench = Bench()
+    assert bench.read(ARM, OVERRIDE, BEEPER).meddling == ()
+    assert bench.read(ARM, ANGLE).meddling == ()  # the pilot has the sticks
+    named = {TURTLE: "FLIP OVER AFTER CRASH (mode 35)", FUTURE: "mode 99"}
+    for box, name in named.items():
+        for others in ((), (ARM,), (ARM, OVERRIDE)):
+            assert bench.read(box, *others).meddling == (f"{name} is on; accepted: off while the bridge flies",)
+    assert bench.read(OVERRIDE, ANGLE).meddling == ("ANGLE (mode 1) is on; accepted: off while the bridge flies",)
+
+
+def test_a_rate_profile_whose_rates_were_not_read_is_named() -> None:
+    """A switch of the pilot's may change it at any time, by `adjrange`."""
+    (said,) = Bench().read(OVERRIDE, rates=2).meddling
+    assert said == "rateprofile is 2; accepted: 0, whose rates were read: switch back, or start again"
+
+
+def test_a_vehicle_that_was_armed_in_turtle_mode_must_be_armed_again() -> None:
+    """Firmware up to 4.5 keeps the motors reversed after the switch has left the mode."""
+    bench = Bench()
+    for on in ((TURTLE,), (TURTLE,), (OVERRIDE,), (ARM, OVERRIDE), (ARM, OVERRIDE)):
+        reading = bench.read(*on)
+    said = "FLIP OVER AFTER CRASH (mode 35) was on while arming; accepted: disarm, switch it off, arm again"
+    assert (reading.meddling, reading.armed_with) == ((), (said,))
+    for _ in range(90):
+        assert bench.read(ARM, OVERRIDE).armed_with == (said,)
+    for _ in range(90):  # disarmed for three seconds
+        reading = bench.read(OVERRIDE)
+    for _ in range(2):
+        reading = bench.read(ARM, OVERRIDE)
+    assert reading.armed and reading.armed_with == ()
+
+
+def test_one_message_alone_leaves_nothing_behind(flying: Bench) -> None:
+    assert flying.read(ARM, OVERRIDE, TURTLE).meddling
+    assert flying.read(ARM, OVERRIDE).armed_with == ()

@@ -8,11 +8,24 @@ from contextlib import contextmanager
 
 import pytest
 
-from e2efly.deploy.betaflight import messages, settings
-from e2efly.deploy.betaflight.client import FORGOTTEN, MAX_BACKLOG, MAX_IN_FLIGHT, SCHEDULE, TIMEOUT, Client, ask
+from e2efly.deploy.betaflight import messages, mode_slots
+from e2efly.deploy.betaflight.client import (
+    CROWDED,
+    CROWDED_S,
+    FORGOTTEN,
+    LOSSY_S,
+    MAX_BACKLOG,
+    MAX_IN_FLIGHT,
+    PROBE_S,
+    SCHEDULE,
+    TIMEOUT,
+    Client,
+    ask,
+)  # fmt: skip
 from e2efly.deploy.betaflight.codec import ERROR, REPLY, Decoder, Frame, encode
 from e2efly.deploy.betaflight.controller import identify
 from e2efly.deploy.betaflight.link import MOST, open_link
+from e2efly.deploy.betaflight.modes import ARM, OVERRIDE
 from tests.deploy.msp_golden import REPLIES, payload
 
 STICKS = messages.set_raw_rc([1500] * 8)
@@ -194,13 +207,126 @@ def test_sticks_go_first_and_their_replies_are_eaten() -> None:
         assert client.set_raw_rc(STICKS, 0.002 + i * 1e-3)
     assert client.backlog == MAX_BACKLOG + 1
     wire.sent.clear()
-    client.poll(0.07)
+    client.poll(0.001 + PROBE_S - 1e-3)
     assert wire.sent == []  # telemetry waits for a controller that is behind
+    client.poll(0.001 + PROBE_S + 1e-3)
+    client.poll(0.001 + PROBE_S + 2e-3)
+    assert len(wire.sent) == 1  # but for one message, now and then
+    wire.sent.clear()
     wire.inbox = encode(Frame(200, b"", REPLY)) * (MAX_BACKLOG + 1)
     client.poll(0.08)
     assert client.backlog == 0
     assert wire.sent
     assert 200 not in client.latest
+
+
+ACKNOWLEDGED = encode(Frame(messages.SET_RAW_RC, b"", REPLY))
+NOISE = b"$M>\x02\x6cab\x00"
+"""A frame whose checksum is wrong."""
+
+
+def asked_and_told(told: dict[int, float], latency: float = 0.01, frames: int = 40) -> Client:
+    """A client after stick frames at 50 Hz, from 0 s on.
+
+    Args:
+        told: how late, s, the acknowledgement of a frame comes, by the frame's number. The others are never told.
+        latency: of the reply to another request, s, before them.
+        frames: how many.
+    """
+    wire = Wire()
+    client = Client(wire)
+    client.poll(-1.0)
+    client.request(108, -1.0)
+    wire.answer()
+    client.poll(-1.0 + latency)
+    events = sorted([(k * 0.02, False) for k in range(frames)] + [(k * 0.02 + late, True) for k, late in told.items()])
+    for time, tells in events:
+        wire.inbox += ACKNOWLEDGED if tells else b""
+        client.poll(time)
+        if not tells:
+            client.set_raw_rc(STICKS, time)
+    return client
+
+
+def test_stick_frames_that_the_controller_acknowledged_are_known_to_have_arrived() -> None:
+    client = asked_and_told(dict.fromkeys(range(40), 0.012))
+    assert list(client.acknowledged) == pytest.approx([k * 0.02 for k in range(40)])
+    assert client.delivered(0.1, 0.7) and client.delivered(0.0, 0.75)
+    assert client.delivered(0.3, 0.3)
+    assert not client.delivered(0.3, 1.5)  # nothing was sent, or nothing told, at the end of it
+    assert not Client(Wire()).delivered(0.0, 1.0)
+
+
+def test_a_hole_in_the_acknowledgements_is_no_delivery() -> None:
+    """Frames that were sent and not told: 10 to 24, then all are told again."""
+    silent = asked_and_told(dict.fromkeys(range(10), 0.012), frames=25)
+    wire = silent.link
+    assert isinstance(wire, Wire)
+    assert silent.delivered(0.0, 0.18) and not silent.delivered(0.0, 0.48)
+    for k in range(60, 90):  # after the client has forgotten those that were never answered
+        silent.poll(0.02 * k)
+        silent.set_raw_rc(STICKS, 0.02 * k + 0.8)
+        wire.inbox += ACKNOWLEDGED
+        silent.poll(0.02 * k + 0.81)
+    assert not silent.delivered(0.0, 2.5) and not silent.delivered(0.1, 0.6)
+    assert silent.delivered(2.2, 2.5)
+    assert silent.delivered(0.0, 0.18)
+    assert silent.delivered(0.1, 0.6, 2.5)  # a hole that is allowed
+
+
+def test_an_acknowledgement_that_comes_too_late_may_be_another_frames() -> None:
+    assert list(asked_and_told({0: 0.04}, frames=2).acknowledged) == [0.0]
+    assert list(asked_and_told({0: 0.06}, frames=2).acknowledged) == []
+    assert list(asked_and_told({0: 0.06}, latency=0.02, frames=2).acknowledged) == [0.0]  # a slow link
+
+
+def test_a_line_that_spoils_bytes_is_lossy_for_a_while_and_asks_again_soon() -> None:
+    wire, client = acquainted()
+    assert not client.lossy(0.01)
+    client.poll(0.06)
+    wire.sent.clear()
+    wire.inbox = NOISE
+    client.poll(0.07)
+    client.poll(0.08)
+    assert client.lossy(0.08) and client.lossy(0.07 + LOSSY_S - 0.01) and not client.lossy(0.07 + LOSSY_S + 0.01)
+    client.poll(0.06 + 0.05)
+    client.poll(0.06 + 0.06)
+    assert [frame.code for frame in wire.sent] == [108]
+
+
+def test_on_a_lossy_line_an_acknowledgement_is_that_of_the_newest_frame_that_fits() -> None:
+    for spoilt, frame in ((False, 0.1), (True, 0.12)):
+        wire, client = acquainted()
+        client.poll(0.02)
+        client.set_raw_rc(STICKS, 0.1)  # its reply is lost
+        client.set_raw_rc(STICKS, 0.12)
+        client.set_raw_rc(STICKS, 0.139)  # too young: no reply is that quick
+        wire.inbox = NOISE if spoilt else b""
+        client.poll(0.135)
+        wire.inbox = ACKNOWLEDGED
+        client.poll(0.14)
+        assert list(client.acknowledged) == [frame]
+        assert client.backlog == (1 if spoilt else 2)
+
+
+def test_where_another_program_asks_it_is_seen_and_less_is_asked() -> None:
+    def asked(foreign: bool) -> Counter[int]:
+        wire = Wire()
+        client = Client(wire, SCHEDULE)
+
+        def each() -> None:
+            wire.answer()
+            wire.inbox += encode(Frame(messages.Name.CODE, b"x", REPLY)) if foreign else b""
+
+        counts = Counter(run(client, wire, 4.0, each))
+        assert client.crowded(4.0) is foreign
+        assert not client.crowded(4.0 + CROWDED_S + 0.01)
+        return counts
+
+    alone, crowded = asked(foreign=False), asked(foreign=True)
+    for code, rate in SCHEDULE.items():
+        assert crowded[code] == pytest.approx(4 * rate / CROWDED, rel=0.1, abs=2)
+        assert alone[code] == pytest.approx(4 * rate, rel=0.05, abs=1)
 
 
 def test_a_slow_radio_is_no_controller_that_is_behind() -> None:
@@ -402,8 +528,8 @@ def test_identify_the_recorded_controller() -> None:
     assert info.rates.rates_type == "ACTUAL"
     assert info.throttle.min_check == info.rx.min_check == 1040
     assert info.rx_map.letters == "TAER1234"
-    assert info.ranges("ARM") == (settings.ModeRange(0, 0, 1700, 2100),)
-    assert info.ranges("MSP OVERRIDE") == ()
+    assert info.slots(ARM) == (mode_slots.ModeRange(0, 0, 1700, 2100),)
+    assert info.slots(OVERRIDE) == ()
     assert info.failsafe.delay == pytest.approx(1.2)
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from e2efly.deploy.betaflight import messages, settings
+from e2efly.deploy.betaflight import messages, mode_slots, settings
 from e2efly.deploy.betaflight.client import MESSAGES
 from e2efly.deploy.betaflight.names import BOXES, arming_disabled, bits
 from tests.deploy.msp_golden import GOLDEN, REPLIES, payload
@@ -30,9 +30,9 @@ def test_settings_as_they_were_made() -> None:
     assert rx.smoothing
     assert golden(settings.RxMap).letters == "TAER1234"
     assert golden(settings.FailsafeConfig).delay == pytest.approx(1.2)
-    assert golden(settings.ModeRanges).ranges == (
-        settings.ModeRange(0, 0, 1700, 2100),
-        settings.ModeRange(28, 1, 900, 2100),
+    assert mode_slots.mode_ranges(golden(mode_slots.ModeRanges), golden(mode_slots.ModeLogic)) == (
+        mode_slots.ModeRange(0, 0, 1700, 2100, 0),
+        mode_slots.ModeRange(28, 1, 900, 2100, 1),
     )
     tuning = golden(settings.RcTuning)
     assert tuning.rates == settings.RateProfile("ACTUAL", (7, 7, 7), (67, 67, 67), (0, 0, 0))
@@ -41,14 +41,14 @@ def test_settings_as_they_were_made() -> None:
     assert golden(settings.MotorConfig) == settings.MotorConfig(None, 2000, 1000, 4)
     assert golden(settings.AdvancedConfig) == settings.AdvancedConfig(1, "PWM", 0.055)
     assert "RX_MSP" in golden(settings.FeatureConfig).features
-    assert {BOXES[box] for box in golden(settings.BoxIds).ids} >= {"ARM", "ANGLE", "FAILSAFE"}
+    assert {BOXES[box] for box in golden(mode_slots.BoxIds).ids} >= {"ARM", "ANGLE", "FAILSAFE"}
 
 
 def test_state_as_recorded() -> None:
     status = golden(messages.StatusEx)
     assert status.sensors == {"ACC", "BARO", "GYRO"}
     assert 5e-5 < status.cycle_time < 1e-2
-    assert status.active(golden(settings.BoxIds).ids) == frozenset()
+    assert status.active(golden(mode_slots.BoxIds).ids) == frozenset()
     assert golden(messages.Rc).channels[:5] == (1500, 1500, 1500, 1000, 1000)
     assert golden(messages.Motor).throttle == (0.0, 0.0, 0.0, 0.0)
     assert golden(messages.RawImu) == messages.RawImu((0, 0, 256), (0.0, 0.0, 0.0))

@@ -114,14 +114,15 @@ def test_a_policy_of_nan_is_a_problem_and_decides_nothing(policy_file: Path, tmp
     model = onnx.load(str(policy_file))
     node = next(node for node in model.graph.node if "action" in node.output)
     node.output[0] = "before"
-    sizes = [onnx.helper.make_node("ReduceMax", ["observation"], ["largest"], keepdims=1),
-             onnx.helper.make_node("Sub", ["one", "largest"], ["left"]),
-             onnx.helper.make_node("Sqrt", ["left"], ["root"]),
-             onnx.helper.make_node("Mul", ["root", "zero"], ["nothing"]),
+    sizes = [onnx.helper.make_node("Gather", ["observation", "column"], ["away"], axis=1),
+             onnx.helper.make_node("Sub", ["one", "away"], ["left"]),
+             onnx.helper.make_node("Log", ["left"], ["logarithm"]),
+             onnx.helper.make_node("Mul", ["logarithm", "zero"], ["nothing"]),
              onnx.helper.make_node("Add", ["before", "nothing"], ["action"])]  # fmt: skip
     model.graph.node.extend(sizes)
     for name, value in (("one", 1.0), ("zero", 0.0)):
         model.graph.initializer.append(onnx.numpy_helper.from_array(np.array(value, np.float32), name))
+    model.graph.initializer.append(onnx.numpy_helper.from_array(np.array([0]), "column"))
     path = tmp_path / "policy.onnx"
     path.write_bytes(sealed(model.SerializeToString()))
     worker = workers(of=flight(path))

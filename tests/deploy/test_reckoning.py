@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -13,8 +12,8 @@ from e2efly.deploy.pilot.hover import blind_time
 from e2efly.deploy.pilot.reckoning import BRAKE_S, DOUBT, LONGEST_STEP, Reckoning, reckon, seen, settle, trimmed
 from e2efly.vehicles.vehicle import GRAVITY
 
-DT = 0.02
-"""Between two measurements, s."""
+DT, STILL = 0.02, (0.0, 0.0, 0.0)
+"""Between two measurements, s; a body rate, rad/s."""
 
 
 def moving(velocity: complex, yaw: float) -> Odometry:
@@ -40,7 +39,7 @@ def test_it_brakes_whatever_the_error_of_the_heading_once_that_is_known(yaw: flo
         lifted = GRAVITY / (math.cos(roll) * math.cos(pitch))
         velocity += lifted * complex(math.cos(roll) * math.sin(pitch), -math.sin(roll)) * np.exp(1j * yaw) * DT
         now = (k + 1) * DT
-        known = reckon(known, attitude, (0.0, 0.0, lifted), (lifted, 0.0), now)
+        known = reckon(known, attitude, (0.0, 0.0, lifted), (lifted, 0.0), STILL, now)
         if sees:
             known = seen(moving(velocity, yaw + error), now, error)
         assert known is not None
@@ -77,7 +76,7 @@ def descent(
         promised = float(settle(LEVEL, known, 0.0, trim).thrust)
         thrust = wrong * promised
         height, climb = height + climb * DT, climb + (thrust - GRAVITY) * DT
-        known = reckon(known, LEVEL, (0.0, 0.0, scale * thrust), (promised, doubt * promised), (k + 1) * DT)
+        known = reckon(known, LEVEL, (0.0, 0.0, scale * thrust), (promised, doubt * promised), STILL, (k + 1) * DT)
     raise AssertionError(f"still {height:.2f} m high")
 
 
@@ -100,7 +99,7 @@ def test_a_map_that_was_never_learned_leaves_the_word_to_the_accelerometer(wrong
 
 def test_the_speed_is_the_accelerometers_as_far_as_the_throttles_allows() -> None:
     known = seen(moving(0j, 0.0), 0.0)
-    after = reckon(known, LEVEL, (0.0, 0.0, GRAVITY + 1.0), (GRAVITY - 1.0, 0.5), 0.1)
+    after = reckon(known, LEVEL, (0.0, 0.0, GRAVITY + 1.0), (GRAVITY - 1.0, 0.5), STILL, 0.1)
     assert after is not None
     assert after.velocity[2] == pytest.approx(-0.1) and after.lifted == pytest.approx(-0.3)
     assert after.doubt == pytest.approx(DOUBT + 0.05) and after.climb == pytest.approx(-0.3 + (DOUBT + 0.05) / 2)
@@ -109,27 +108,28 @@ def test_the_speed_is_the_accelerometers_as_far_as_the_throttles_allows() -> Non
 
 def test_what_is_not_known_is_taken_from_the_other() -> None:
     known = seen(moving(1 + 0j, 0.0), 5.0)
-    by_force = reckon(known, LEVEL, (0.0, 0.0, GRAVITY - 1.0), None, 5.05)
-    by_thrust = reckon(known, LEVEL, None, (GRAVITY - 1.0, 0.3), 5.05)
+    by_force = reckon(known, LEVEL, (0.0, 0.0, GRAVITY - 1.0), None, STILL, 5.05)
+    by_thrust = reckon(known, LEVEL, None, (GRAVITY - 1.0, 0.3), STILL, 5.05)
     assert by_force is not None and by_thrust is not None
     assert by_force.climb == by_force.lifted == by_thrust.climb == by_thrust.lifted == pytest.approx(-0.25)
-    level = reckon(known, None, (0.0, 0.0, GRAVITY), None, 5.05)
+    level = reckon(known, None, (0.0, 0.0, GRAVITY), None, STILL, 5.05)
     assert level is not None and level.velocity == pytest.approx((1.0, 0.0, -0.2))
-    assert reckon(known, LEVEL, (0.0, 0.0, GRAVITY), None, 5.0 + LONGEST_STEP + 0.01) is None
-    assert reckon(known, LEVEL, None, None, 5.05) is None
+    assert reckon(known, LEVEL, (0.0, 0.0, GRAVITY), None, STILL, 5.0 + LONGEST_STEP + 0.01) is None
+    assert reckon(known, LEVEL, None, None, STILL, 5.05) is None
 
 
-def test_a_force_that_leaves_the_thrust_slowly_is_a_battery_and_one_that_does_so_at_once_is_the_accelerometer() -> None:
-    def share(force: Callable[[float], float]) -> float:
-        known: Reckoning | None = seen(moving(0j, 0.0), 0.0)
-        for k in range(200):
-            now = (k + 1) * DT
-            noise = 0.3 * math.sin(40 * now)  # of the rotors
-            known = reckon(known, LEVEL, (0.0, 0.0, GRAVITY * force(now) + noise), (GRAVITY, 0.05), now)
+@pytest.mark.parametrize("held", [0.2, -0.35])
+def test_a_silence_counts_the_tilt_on_and_does_not_age_the_velocity(held: float) -> None:
+    """Two seconds without a word, while the controller holds a tilt, and then while it turns."""
+    for rate, told in ((0.0, held), (held / 2, 0.0)):
+        known: Reckoning | None = dataclasses.replace(seen(moving(0j, 0.0), 0.0), attitude=Attitude(0.0, told, 0.0))
+        speed, pitch = 0.0, told
+        for k in range(round(2.0 / DT)):
             assert known is not None
-        return known.share
-
-    assert share(lambda now: 1 - 0.03 * now) == pytest.approx(0.89, abs=0.02)
-    assert share(lambda now: 1.0) == pytest.approx(1.0, abs=0.01)
-    for step in (0.9, 1.1):
-        assert share(lambda now, step=step: 1.0 if now < 1 else step) == pytest.approx(1.0, abs=0.015)
+            pitch += rate * DT
+            speed += GRAVITY * math.tan(pitch) * DT
+            known = reckon(known, None, None, (GRAVITY / math.cos(pitch), 0.1), (0.0, rate, 0.0), (k + 1) * DT)
+        assert known is not None
+        assert known.velocity[0] == pytest.approx(speed, rel=0.2) and abs(speed) > 1.5
+        assert known.velocity[1] == pytest.approx(0.0, abs=0.01)
+        assert known.since == pytest.approx(known.time)  # the time to brake begins once the controller is heard

@@ -1,6 +1,8 @@
 """Images of the training beside a policy's file."""
 
 import dataclasses
+import io
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +10,7 @@ import pytest
 
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.deploy.sight.picture import GAP, sheet
-from e2efly.deploy.sight.samples import COUNT, packed, read_samples, samples_file
+from e2efly.deploy.sight.samples import COUNT, LARGEST, packed, read_samples, samples_file
 from e2efly.zoo import policy_file
 
 IMAGE = load_policy(policy_file("avoid")).contract.images[0]
@@ -25,7 +27,30 @@ def test_images_lie_beside_the_policy(tmp_path: Path) -> None:
     assert read_samples(policy, dataclasses.replace(IMAGE, name="other")) is None
 
 
-@pytest.mark.parametrize("content", [b"", b"PK no archive", packed({IMAGE.name: np.zeros((2, 3, 4))})])
+def _archive(name: str, content: bytes) -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(name, content)
+    return file.getvalue()
+
+
+def _array(header: str, content: bytes = b"") -> bytes:
+    """An archive of one array with this header."""
+    text = header.encode().ljust(118) + b"\n"
+    return _archive(f"{IMAGE.name}.npy", b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + content)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"", b"PK no archive", packed({IMAGE.name: np.zeros((2, 3, 4))}),
+        _archive(f"{IMAGE.name}.npy", b"no array"), _archive("bomb.npy", bytes(LARGEST + 1)),
+        _array("{'descr': '<f4', 'fortran_order': False, 'shape': (1000000000000,)}"),
+        _array("{'descr': '|O', 'fortran_order': False, 'shape': (1,)}", bytes(8)),
+        _array("{'descr': '<U1', 'fortran_order': False, 'shape': (1,)}", bytes(4)),
+        _array("[" * 100), _array("{'descr': '<f4'}"), _archive(f"{IMAGE.name}.npy", b"\x93NUMPY\x09\x00"),
+    ],
+)  # fmt: skip
 def test_another_file_in_their_place_is_named(content: bytes, tmp_path: Path) -> None:
     policy = tmp_path / "policy.onnx"
     samples_file(policy).write_bytes(content)

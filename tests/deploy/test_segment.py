@@ -5,7 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from onnx import TensorProto, helper
+from onnx import NodeProto, TensorProto, helper
 
 from e2efly.deploy.sight.segment import chosen
 from e2efly.deploy.sight.segment.apriltag import FAMILIES, enlarged
@@ -125,8 +125,8 @@ def test_bounds_of_saturation_and_value_are_percent() -> None:
     assert np.array_equal(np.flatnonzero(found), np.arange(102, 154))
 
 
-def model(shape: list[int | str], out: list[int | str], axes: list[int]) -> bytes:
-    nodes = [helper.make_node("ReduceMean", ["x"], ["y"], axes=axes, keepdims=0)]
+def model(shape: list[int | str], out: list[int | str], axes: list[int], *more: NodeProto) -> bytes:
+    nodes = [*more, helper.make_node("ReduceMean", ["x"], ["y"], axes=axes, keepdims=0)]
     given, gives = (helper.make_tensor_value_info(n, TensorProto.FLOAT, s) for n, s in (("x", shape), ("y", out)))
     graph = helper.make_graph(nodes, "g", [given], [gives])
     return helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8).SerializeToString()
@@ -140,13 +140,23 @@ def test_a_network_of_the_users_own(tmp_path: Path) -> None:
     assert overlap(chosen(f"onnx:{path}")(picture), (picture[..., 0] > 0).astype(np.uint8)) > 0.95
 
 
+MEAN: tuple[list[int | str], list[int | str], list[int]] = (["n", "h", "w", 3], ["n", "h", "w"], [3])
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (b"no network", "Failed to load|INVALID|Protobuf"),
+        (b"no network", "not an ONNX file: "),
         (model(["n", 3, "h", "w"], ["n", "h", "w"], [1]), "its input has the shape"),
         (model(["n", "h", "w", 3], ["n", 3], [1, 2]), "its output has the shape"),
         (None, "No such file"),
+        (model([1, 10**6, 10**6, 3], [1, 10**6, 10**6], [3]), "its input has the shape"),
+        (
+            model(*MEAN, helper.make_node("RandomNormalLike", ["x"], ["z"])),
+            "'RandomNormalLike' is none of Abs",
+        ),
+        (model(*MEAN, helper.make_node("Tile", ["x", "x"], ["z"])), "its operator 'Tile' is none of Abs, Add"),
+        (model(*MEAN, helper.make_node("Shape", ["x"], ["z"]), helper.make_node("Pad", ["x", "z"], ["w"])), "constant"),
     ],
 )
 def test_a_file_that_is_no_such_network_is_named(tmp_path: Path, content: bytes | None, said: str) -> None:

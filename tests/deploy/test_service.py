@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from e2efly.deploy.betaflight.codec import REPLY, Frame, encode
-from e2efly.deploy.betaflight.instruments import ARM, OVERRIDE
 from e2efly.deploy.betaflight.messages import SET_RAW_RC, StatusEx
-from e2efly.deploy.betaflight.settings import BoxIds
+from e2efly.deploy.betaflight.mode_slots import BoxIds
+from e2efly.deploy.betaflight.modes import ARM, OVERRIDE
 from e2efly.deploy.flight_loop import fly
 from e2efly.deploy.service import Service
 from tests.commands.test_fly import free_port

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from e2efly.deploy.betaflight import settings
+from e2efly.deploy.betaflight import mode_slots, settings
 from e2efly.deploy.betaflight.controller import ControllerInfo
 from e2efly.deploy.betaflight.messages import BuildInfo, Name
 from e2efly.deploy.betaflight.rates import RateProfile
@@ -32,7 +32,8 @@ def recorded() -> ControllerInfo:
         features=read(settings.FeatureConfig).features, rate_profile=0, rates=tuning.rates,
         throttle=replace(tuning.throttle, min_check=rx.min_check), rx=rx, rx_map=read(settings.RxMap),
         deadband=read(settings.RcDeadband), failsafe=read(settings.FailsafeConfig), rx_fail=read(settings.RxFailConfig),
-        modes=read(settings.ModeRanges).ranges, box_ids=read(settings.BoxIds).ids, motor=read(settings.MotorConfig),
+        modes=mode_slots.mode_ranges(read(mode_slots.ModeRanges), read(mode_slots.ModeLogic)),
+        box_ids=read(mode_slots.BoxIds).ids, motor=read(settings.MotorConfig),
         advanced=read(settings.AdvancedConfig), pid_advanced=read(settings.PidAdvanced),
         mixer=read(settings.MixerConfig),
         alignment=read(settings.BoardAlignment),

@@ -10,7 +10,9 @@ from collections.abc import Callable
 
 import pytest
 
-from e2efly.deploy.terminal import LANDING, Speaker, Stop, printable
+from e2efly.deploy.terminal import LANDING, Speaker, Stop
+from e2efly.process import printable
+from e2efly.terminal import Terminal, console_table
 
 FORGED = "\x1b[2K\rPOLICY: all is well\n\ud800\u202e"
 
@@ -25,6 +27,15 @@ def spoken(stream: io.TextIOBase, *lines: str) -> None:
 def test_a_text_from_outside_stays_on_its_line_and_does_nothing() -> None:
     assert printable(FORGED) == r"\x1b[2K\rPOLICY: all is well\n\ud800\u202e"
     assert printable("Größe [bold] 3.5 m") == "Größe [bold] 3.5 m"
+
+
+def test_no_command_sends_escape_sequences_of_its_texts(capsys: pytest.CaptureFixture[str]) -> None:
+    Terminal().print(FORGED[:-2])
+    Terminal().print(console_table([{"name": "\x1b]0;title[red]"}]))
+    shown = capsys.readouterr().out
+    assert "\x1b" not in shown
+    assert r"\x1b[2K" in shown
+    assert r"\x1b]0;" in shown  # cut to the width that it would have had
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii", "latin-1"])

@@ -18,6 +18,7 @@ from contextlib import suppress
 from dataclasses import asdict
 from math import radians
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -26,6 +27,7 @@ from e2efly.deploy.betaflight import watchdog
 from e2efly.deploy.betaflight.codec import REPLY, Decoder, Frame, encode
 from e2efly.deploy.betaflight.messages import SET_RAW_RC, AttitudeReply, StatusEx, set_raw_rc
 from e2efly.deploy.betaflight.watchdog import LEVEL_GAIN, LEVEL_RATE, STALE_S, Plan, WatchedLink, descent
+from tests.faults.virtual_watchdog import VirtualWatchdog
 
 RATES = tuple(0.5 * i for i in range(-8, 9))
 PULSES = tuple(1500 + round(100 * rate) for rate in RATES)
@@ -89,6 +91,24 @@ class TestDescent:
     def test_a_throttle_that_is_no_pulse_is_refused(self) -> None:
         with pytest.raises(ValueError, match="plan: channels"):
             dataclasses.replace(PLAN, throttle=((0.0, 3000),))
+
+
+def test_a_bridge_that_has_no_port_to_send_to_is_not_silent() -> None:
+    now, gone = [0.0], Mock(alive=False, reason="unplugged", connections=1, receive=bytes)
+    dog = VirtualWatchdog(lambda: now[0], gone)
+    try:
+        dog.plan(PLAN)
+        for _ in range(50):
+            now[0] += 0.01
+            dog.poll(now[0])
+        assert dog.taken_over == ""
+        for _ in range(15):
+            now[0] += 0.01
+            dog.step()
+        dog.poll(now[0])
+        assert "the bridge was silent for" in dog.taken_over
+    finally:
+        dog.close()
 
 
 class Controller:
@@ -434,7 +454,7 @@ class Told:
 
     def __init__(self, armed: Callable[[float], bool | None]) -> None:
         self.armed, self.now, self.sticks, self.pending = armed, 0.0, [], b""
-        self.closed = False
+        self.closed, self.alive = False, True
 
     def monotonic(self) -> float:
         return self.now

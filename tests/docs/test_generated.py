@@ -1,6 +1,9 @@
 """The pages that are made from other files are what these files say today."""
 
+import dataclasses
 import importlib.util
+import json
+import re
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -9,8 +12,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from e2efly.commands.train import parse
+from e2efly.config import StageConfig
 from e2efly.learn.rundir import RunDirectory
-from e2efly.zoo import FOLDER, USUAL, contents, curve_file
+from e2efly.zoo import FOLDER, USUAL, contents, curve_file, policy_file
 from tests.docs.pages import DOCS, ROOT
 
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
@@ -30,6 +35,68 @@ def test_the_page_of_the_zoo_is_what_the_zoo_says() -> None:
     assert (DOCS / "zoo.md").read_text(encoding="utf-8") == script("zoo_cards").page()
 
 
+def test_the_figures_are_what_was_measured_and_say_by_which_preset() -> None:
+    """Also after a change of a preset: its figures are then marked as earlier, or measured anew."""
+    figures = script("figures")
+    assert (ROOT / "README.md").read_text(encoding="utf-8") == figures.readme()
+    assert (DOCS / "benchmarks.md").read_text(encoding="utf-8") == figures.benchmarks()
+    assert figures.TITLES.keys() == figures.POLICIES.keys()
+
+
+def test_the_page_of_the_physics_has_what_the_rate_loop_was_measured_to_cost() -> None:
+    page, measured = (DOCS / "physics.md").read_text(encoding="utf-8"), script("figures").results("rate_loop")
+    held, one, four = measured["table"]
+    assert f"{held['mean, mm']} mm off" in page
+    assert f"{one['mean, mm']} mm off" in page and f"{one['largest, mm']} mm at most" in page
+    assert f"4 kHz {four['mean, mm']} mm, at most {four['largest, mm']}" in page
+    assert f"{measured['date']}" in page
+
+
+@pytest.mark.parametrize(("digit", "marked"), [("", ""), ("0", ", earlier")])
+def test_a_figure_of_another_configuration_than_todays_is_marked(
+    digit: str, marked: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figures, command = script("figures"), "train land --preset nominal --stop-at 0.99"
+    known = f"{digit}{figures.today(command)}"[:12]
+    table = {"task": "land", "integrator": "rk3", "configuration": known}
+    (tmp_path / "x.json").write_text(
+        json.dumps({"table": [table], "runs": [{"command": command, "configuration": known}]})
+    )
+    monkeypatch.setattr(figures, "RESULTS", tmp_path)
+    assert figures.results("x")["table"][0]["configuration"] == known + marked
+
+
+def test_a_benchmark_goes_on_where_it_was_and_keeps_nothing_of_another_configuration_or_machine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    common, file, done = script("common", ROOT / "benchmarks"), tmp_path / "x.json", []
+
+    def run(seed: int, steps: int = 10_000) -> list[tuple[int, str]]:
+        about = {"seed": seed, **common.training(f"train hover --preset nominal --steps {steps}")}
+        common.measured("x", file, about, lambda: done.append(seed) or {"s": 1.0}, lambda runs: runs)
+        return [(row["seed"], row["preset"]) for row in json.loads(file.read_text())["table"]]
+
+    assert run(0) == [(0, "nominal")]
+    assert run(0) == [(0, "nominal")]
+    assert run(1) == [(0, "nominal"), (1, "nominal")]
+    assert done == [0, 1]
+    content = json.loads(file.read_text())
+    content["runs"][0]["configuration"] = "of another day"
+    file.write_text(json.dumps(content))
+    assert run(2) == [(1, "nominal"), (2, "nominal")]
+    monkeypatch.setattr(common, "machine", lambda: {"cpu": "another"})
+    assert run(3) == [(3, "nominal")]
+
+
+def test_a_configuration_is_everything_that_defines_a_training_but_its_seed_and_its_cores() -> None:
+    today, hover = script("figures").today, "train hover --algo ppo --preset nominal"
+    assert today(f"{hover} --seed 7 --devices 1") == today(hover)
+    others = ("--env.integrator rk4", "--env.wind 1", "--vehicle vis_h", "--stop-at 0.9", "--task.radius 0.2",
+              "--algo.envs 32", "--reward.weights v 0.1", "--env.randomize mass 0.1", "--steps 10000")  # fmt: skip
+    assert len({today(hover), *(today(f"{hover} {other}") for other in others)}) == 1 + len(others)
+
+
 def test_the_page_of_the_papers_claims_is_what_was_measured() -> None:
     assert (DOCS / "paper.md").read_text(encoding="utf-8") == script("paper_page").page()
 
@@ -42,6 +109,28 @@ def test_every_policy_of_the_zoo_has_a_card_and_pictures() -> None:
             assert (DOCS / "zoo" / f"{vehicle}-{task}.png").read_bytes()[1:4] == b"PNG"
             if vehicle == USUAL:
                 assert (DOCS / "zoo" / f"{vehicle}-{task}.webp").read_bytes()[8:12] == b"WEBP"
+
+
+def test_the_command_of_a_card_gives_the_configuration_of_its_policy() -> None:
+    cards, page = script("zoo_cards"), (DOCS / "zoo.md").read_text(encoding="utf-8")
+    commands = re.findall(r"### (\S+)\n(?:(?!###).*\n)*?\| trained by \| `e2efly ([^`]+)`", page)
+    assert [name for name, _ in commands] == re.findall(r"### (\S+)\n", page)
+    for name, command in commands:
+        vehicle, task = name.split("/")
+        config = parse(command.split()[1:]).config
+        assert config == cards.configured(policy_file(name)), name
+        chunk = config.algo.steps * config.chunk
+        assert -(-config.steps // chunk) * chunk == contents()[vehicle][task]["env_steps"], name
+
+
+def test_a_card_says_where_todays_command_makes_another_policy() -> None:
+    made_by, command = script("zoo_cards").made_by, "train hover --seed 0"
+    config = parse(command.split()[1:]).config
+    assert made_by(command, config) == f"`e2efly {command}`"
+    longer = dataclasses.replace(config, steps=3_133_440)
+    assert made_by(command, longer) == f"`e2efly {command} --steps 3133440` (today's preset has steps {config.steps})"
+    other = dataclasses.replace(config, curriculum=(StageConfig({"radius": 1.0}, steps=10),))
+    assert made_by(command, other).startswith("no command of today: it had curriculum (StageConfig(")
 
 
 def test_every_curve_that_ships_stands_on_its_card() -> None:

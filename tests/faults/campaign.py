@@ -3,7 +3,6 @@
 A scenario is plain data, and its flight is the same whenever it is flown: firmware, world and chance all begin anew.
 """
 
-import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,14 +11,14 @@ from typing import Any
 
 from e2efly.deploy.pilot.flight_state import Mode
 from e2efly.deploy.policy.loader import Policy
-from e2efly.tasks.hover.goal import HoverRoute
-from e2efly.tasks.route import course_for
 from e2efly.validation.firmware import Firmware
 from e2efly.validation.rig import Rig
 from e2efly.vehicles.vehicle import Vehicle
 from tests.faults.campaign_rules import IDLE, LONGEST_ARMED, ON_GROUND, Span, Violation, judge
+from tests.faults.fliers import body_of, flier_of, outfit
+from tests.faults.injection import Flier
 from tests.faults.injections import KINDS, Faults, Strike
-from tests.faults.stage import LATENCY_S, SETTINGS, TARGET, Stage, Trace
+from tests.faults.stage import LATENCY_S, Stage, Trace
 
 STRUCK_IN = (Mode.INIT, Mode.TAKEOFF, Mode.HOVER, Mode.POLICY, Mode.LAND)
 WATCH_S = 4.0
@@ -53,13 +52,14 @@ class Scenario:
             raise ValueError(f"mode is {self.mode!r}; accepted: {', '.join(STRUCK_IN)}")
         if not 0 < self.height < math.inf:
             raise ValueError(f"height is {self.height!r}; accepted: a positive number of metres")
+        flier_of(self.strikes)
 
     @staticmethod
     def of(data: dict[str, Any]) -> "Scenario":
         """From what `dataclasses.asdict` makes of one.
 
         Raises:
-            ValueError: for an unknown mode or kind.
+            ValueError: for an unknown mode or kind, or kinds that cannot be flown together.
         """
         return Scenario(**{**data, "strikes": tuple(Strike(**strike) for strike in data["strikes"])})
 
@@ -108,21 +108,20 @@ def fly(
     Args:
         scenario: what to do.
         policy: one that hovers.
-        vehicle: whose.
+        vehicle: of the bridge's file.
         firmware: built.
         folder: for the firmware's settings; made.
         look: called with the stage before each control step, to watch a flight closely.
     """
-    settings = dataclasses.replace(SETTINGS, takeoff_height=scenario.height)
-    x, y, _ = TARGET
-    goal = course_for(policy.contract, vehicle, HoverRoute(target=(x, y, scenario.height)))
     folder.mkdir(parents=True, exist_ok=True)
-    with Rig(firmware, folder, vehicle, latency=LATENCY_S, seed=scenario.seed) as rig:
-        stage = Stage(rig, policy, goal, scenario.seed, settings)
+    body = body_of(scenario.strikes, vehicle)
+    with Rig(firmware, folder, body, latency=LATENCY_S, seed=scenario.seed) as rig:
+        with_ = outfit(scenario.strikes, scenario.height, scenario.seed, rig, policy, vehicle, folder)
+        stage = Stage(rig, with_.policy, with_.course, scenario.seed, with_.settings, with_.gear)
         try:
             return _flown(scenario, stage, look)
         finally:
-            stage.close()
+            stage.end()
 
 
 def _flown(scenario: Scenario, stage: Stage, look: Callable[[Stage], None]) -> Flown:
@@ -155,6 +154,8 @@ def _flown(scenario: Scenario, stage: Stage, look: Callable[[Stage], None]) -> F
         stage.trace = Trace()
     known = len(stage.session.flown.changes)
     stage.each = each
+    if scenario.mode == Mode.HOVER and flier_of(scenario.strikes) is not Flier.POLICY:
+        rig.set(mission="policy")  # it takes over, or is not let, with the fault there
     planned = scenario.height if scenario.mode in (Mode.INIT, Mode.TAKEOFF) else 0.0
     if ground:
         stage.fly(0.5)
@@ -199,8 +200,10 @@ def beyond(scenario: Scenario, began: float) -> list[Span]:
     spans = []
     for strike in scenario.strikes:
         if (excuse := KINDS[strike.kind].excuse) is not None:
+            if excuse.unless_grounded and scenario.mode == Mode.INIT:
+                continue
             lasts = math.inf if strike.lasts is None or excuse.for_good else strike.lasts
-            spans.append(Span(began + strike.at, began + strike.at + lasts, excuse))
+            spans.append(Span(began + strike.at + excuse.after, began + strike.at + lasts, excuse))
     return spans
 
 
@@ -241,4 +244,5 @@ def _closed(stage: Stage, count: int = 1) -> bool:
     """Whether the throttle is closed, and the firmware knows or the motors are still."""
     trace = stage.trace
     known = not stage.link.silent or max(trace.motor[-count:]) < IDLE
-    return stage.mode in (Mode.DONE, Mode.INIT) and max(trace.throttle[-count:]) <= 0 and known
+    ended = stage.taken_over or stage.mode in (Mode.DONE, Mode.INIT)
+    return ended and max(trace.throttle[-count:]) <= 0 and known

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from e2efly.vehicles.vehicle import GRAVITY
 from tests.faults.injection import Excuse, Rule
 from tests.faults.stage import Trace
 
@@ -83,9 +84,17 @@ def judge(
         why = next((span.excuse.why for span in beyond if span.covers(rule, t)), "")
         broken.append(Violation(rule, value, t - began, why))
 
-    climb = height - start
-    if climb.max() > HIGHEST_CLIMB:
-        breaks(Rule.CLIMB, float(climb.max()), int(np.argmax(climb > HIGHEST_CLIMB)))
+    climb, risen, owned = height - start, np.full(len(time), start), np.ones(len(time), bool)
+    for span in (span for span in beyond if Rule.CLIMB in span.excuse.rules):
+        owned &= (time < span.begin) | (time > span.end)
+        if (back := int(np.searchsorted(time, span.end))) < len(time):  # what it was left with is not the bridge's
+            coasts = max(float(velocity[back, 2]), 0.0) ** 2 / (2 * GRAVITY)
+            risen[back:] = np.maximum(risen[back:], height[back] + coasts)
+    own = np.where(owned, height - risen, 0.0)
+    for above in (own, climb):
+        if above.max() > HIGHEST_CLIMB:
+            breaks(Rule.CLIMB, float(above.max()), int(np.argmax(above > HIGHEST_CLIMB)))
+            break
     off_height, touch = 0.0, (math.nan, math.nan, math.nan)
     for first, end in _runs(~stands):
         running = np.flatnonzero((motor > OFF)[first:end] & ~closed[first:end])

@@ -136,7 +136,7 @@ def _source_clock(sample: Sample) -> Sample:
     return dataclasses.replace(sample, stamp=sample.stamp + 3600.0)
 
 
-def _wall_clock(stage: Stage) -> None:
+def wall_clock(stage: Stage) -> None:
     """The wall clock is set by hours, forth and back, over and over."""
     wall, wall_ns = time.time, time.time_ns
 
@@ -270,7 +270,7 @@ FAULTS = (
     # what the flight takes without a change of mode
     Fault("poses: one outlier", Mode.POLICY, _outlier, End.GOES_ON),
     Fault("clock: the pose source's jumps by an hour", Mode.POLICY, _alter(_source_clock), End.GOES_ON),
-    Fault("clock: the wall clock jumps to and fro", Mode.POLICY, _wall_clock, End.GOES_ON),
+    Fault("clock: the wall clock jumps to and fro", Mode.POLICY, wall_clock, End.GOES_ON),
     Fault("link: garbage between frames", Mode.POLICY, _link(garbage=0.5), End.GOES_ON),
     Fault("link: one frame of five halved", Mode.POLICY, _link(halved=0.2), End.GOES_ON),
     Fault("controller: one message says disarmed", Mode.POLICY, _once(StatusEx.CODE, _disarmed), End.GOES_ON),

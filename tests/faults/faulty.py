@@ -1,6 +1,8 @@
-"""Parts that misbehave on demand: a link, a pose source, a policy's network. Between bridge and real firmware."""
+"""Parts that misbehave on demand: a link, poses, images, a policy's network. Between bridge and real firmware."""
 
 import dataclasses
+import errno
+import os
 import time
 from collections import deque
 from collections.abc import Callable
@@ -9,19 +11,65 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.betaflight.codec import REPLY, Decoder, Frame, encode
-from e2efly.deploy.betaflight.link import Link
+from e2efly.deploy.betaflight.link import StreamLink
+from e2efly.deploy.betaflight.messages import SET_RAW_RC
 from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pose.source import PoseSource
+from e2efly.deploy.sight import source as sight
 
 GARBAGE = 40
 """Longest burst of random bytes, bytes."""
 
 
+THROTTLE = slice(9, 11)
+"""Where the throttle stands in a message of stick channels, in the order AETR."""
+
+
+class Plug:
+    """Opens a link's port, as long as nobody pulls it."""
+
+    def __init__(self, opener: Callable[[], Any]) -> None:
+        """Let all through."""
+        self.pulled = False
+        """The device has gone: what is open fails, and there is nothing to open."""
+        self._opener = opener
+
+    def __call__(self) -> "_Port":
+        """Open."""
+        self.check(errno.ENOENT)
+        return _Port(self, self._opener())
+
+    def check(self, number: int) -> None:
+        """Fail while it is pulled."""
+        if self.pulled:
+            raise OSError(number, os.strerror(number))
+
+
+class _Port:
+    """A port behind a plug."""
+
+    def __init__(self, plug: Plug, inner: Any) -> None:
+        self._plug, self._inner = plug, inner
+        self.close = inner.close
+
+    def connected(self) -> bool:
+        self._plug.check(errno.EIO)
+        return self._inner.connected()
+
+    def read(self) -> bytes:
+        self._plug.check(errno.EIO)
+        return self._inner.read()
+
+    def write(self, data: bytes) -> int:
+        self._plug.check(errno.EIO)
+        return self._inner.write(data)
+
+
 class FaultyLink:
     """A `Link` around another; each attribute below is a fault, and all may be changed at any time."""
 
-    def __init__(self, opened: Callable[[], Link], random: np.random.Generator) -> None:
-        """Open the inner link by `opened`, now and after each `gone`."""
+    def __init__(self, inner: StreamLink, random: np.random.Generator) -> None:
+        """Let all through."""
         self.silent = False
         """The wires are cut: bytes vanish both ways and nothing tells so."""
         self.garbage = 0.0
@@ -32,10 +80,14 @@ class FaultyLink:
         """Share of the controller's frames of which only the first half arrives."""
         self.delay = 0.0
         """By how much frames come late, each way, s."""
+        self.other: Callable[[bytes], bytes] = lambda data: b""
+        """What another program sends after each frame."""
         self.rewrites: dict[int, Callable[[bytes], bytes]] = {}
         """By code: what the payloads of its replies are turned into."""
-        self._opened, self._random = opened, random
-        self._inner, self._gone, self._before = opened(), False, 0
+        self.throttle = 0
+        """The newest throttle that was sent, us."""
+        self._inner, self._random = inner, random
+        self._plug = inner.opener = Plug(inner.opener)
         self._decoder = Decoder()
         self._out: deque[tuple[float, bytes]] = deque()
         self._back: deque[tuple[float, bytes]] = deque()
@@ -44,57 +96,51 @@ class FaultyLink:
     @property
     def gone(self) -> bool:
         """The port has disappeared, as a plug that is pulled."""
-        return self._gone
+        return self._plug.pulled
 
     @gone.setter
     def gone(self, gone: bool) -> None:
-        if gone and not self._gone:
-            self._inner.close()
-        elif self._gone and not gone:
-            self._before += self._inner.connections
-            self._inner, self._decoder = self._opened(), Decoder()
-        self._gone = gone
+        self._plug.pulled = gone
 
     def heal(self) -> None:
         """End all faults."""
         self.gone = self.silent = False
         self.garbage = self.spoilt = self.halved = self.delay = 0.0
         self.rewrites.clear()
+        self.other = lambda data: b""
 
     @property
     def alive(self) -> bool:
         """As the inner link says."""
-        return not self._gone and self._inner.alive
+        return self._inner.alive
 
     @property
     def reason(self) -> str:
         """As the inner link says."""
-        return "the port has gone" if self._gone else self._inner.reason
+        return self._inner.reason
 
     @property
     def connections(self) -> int:
-        """Of all the inner links so far."""
-        return self._before + self._inner.connections
+        """As the inner link says."""
+        return self._inner.connections
 
     def poll(self, now: float) -> None:
         """Poll the inner link, and let go of what was held back."""
         self._now = now
-        if self._gone:
-            return
         self._inner.poll(now)
         while self._out and self._out[0][0] <= now:
             self._inner.send(self._out.popleft()[1])
 
     def send(self, data: bytes) -> None:
         """One frame to the controller."""
-        if not self._gone and not self.silent:
-            self._out.append((self._now + self.delay, self._burst(self.garbage) + data))
+        if sticks(data):
+            self.throttle = int.from_bytes(data[THROTTLE], "little")
+        if not self.silent:
+            self._out.append((self._now + self.delay, self._burst(self.garbage) + data + self.other(data)))
             self.poll(self._now)
 
     def receive(self) -> bytes:
         """The controller's frames, after their treatment."""
-        if self._gone:
-            return b""
         frames = self._decoder.feed(self._inner.receive())
         if not self.silent:
             self._back += [(self._now + self.delay, self._treated(frame)) for frame in frames]
@@ -120,6 +166,11 @@ class FaultyLink:
 
     def _burst(self, share: float) -> bytes:
         return self._random.bytes(int(self._random.integers(1, GARBAGE))) if self._random.random() < share else b""
+
+
+def sticks(data: bytes) -> bool:
+    """Whether a message, or the first of some, is of stick channels."""
+    return data[:3] == b"$M<" and data[4] == SET_RAW_RC
 
 
 class FaultyPoses:
@@ -164,6 +215,37 @@ class FaultyPoses:
     def describe(self) -> str:
         """As the inner source says."""
         return self._inner.describe()
+
+
+class FaultyImages:
+    """An `ImageSource` around another: `alter` turns each image into another, or into none."""
+
+    def __init__(self, inner: sight.ImageSource) -> None:
+        """Let all through."""
+        self.alter: Callable[[sight.Frame], sight.Frame | None] = lambda frame: frame
+        self.delay = 0.0
+        """By how much images come late, s."""
+        self.stamped = True
+        """Whether the source says when a late image was taken; otherwise its delay is unknown to it."""
+        self._inner = inner
+        self._held: deque[tuple[float, sight.Frame]] = deque()
+        self.close, self.describe = inner.close, inner.describe
+
+    @property
+    def problem(self) -> str | None:
+        """As the inner source says."""
+        return self._inner.problem
+
+    def read(self, now: float) -> list[sight.Frame]:
+        """What the inner source has, late and altered."""
+        shift = 0.0 if self.stamped else self.delay
+        self._held += [
+            (now + self.delay, dataclasses.replace(frame, time=frame.time + shift)) for frame in self._inner.read(now)
+        ]
+        frames = []
+        while self._held and self._held[0][0] <= now:
+            frames.append(self._held.popleft()[1])
+        return [altered for frame in frames if (altered := self.alter(frame)) is not None]
 
 
 class FaultyNetwork:

@@ -134,6 +134,11 @@ def _elsewhere(offset: list[float], yaw: float) -> Callable[[Sample], Sample]:
     return restarted
 
 
+def stepped(step: float) -> Callable[[Sample], Sample]:
+    """The source's clock is set, s."""
+    return lambda sample: sample if sample.stamp is None else dataclasses.replace(sample, stamp=sample.stamp + step)
+
+
 def _noisy(stage: Stage, position: float, velocity: float, attitude: float) -> Injection:
     """Standard deviations, m, m/s, rad."""
     random = stage.random

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.odometry import Sample
+from e2efly.deploy.sight.source import Frame
 from e2efly.validation.sitl import FirmwareState
+from e2efly.vehicles import Vehicle
 
 Parameters = dict[str, Any]
 
@@ -28,6 +30,19 @@ class Rule(StrEnum):
     """Landed or not, it goes on for as long as it was watched."""
 
 
+class Flier(StrEnum):
+    """Who flies in mode POLICY."""
+
+    POLICY = "policy"
+    """One that hovers by poses."""
+    SIGHT = "sight"
+    """One that sees."""
+    COMMANDS = "commands"
+    """Another program."""
+    FILTER = "filter"
+    """The policy that hovers, behind the filter, at a target beyond the fence."""
+
+
 @dataclass(frozen=True)
 class Excuse:
     """Which rules nothing on the companion computer can keep while a fault lasts."""
@@ -36,6 +51,10 @@ class Excuse:
     rules: tuple[Rule, ...] = tuple(Rule)
     for_good: bool = False
     """After the fault is over, too."""
+    after: float = 0.0
+    """From so long after the fault's beginning on, s."""
+    unless_grounded: bool = False
+    """Not where it was there before the take-off, which could have been refused."""
 
 
 def _nothing() -> None:
@@ -50,6 +69,8 @@ class Injection:
     """A sample of the pose source, or none."""
     reply: tuple[int, Callable[[bytes], bytes]] | None = None
     """A message's code, and what becomes of the payloads in which the controller reports it."""
+    frame: Callable[[Frame], Frame | None] | None = None
+    """A camera's image, or none."""
     felt: Callable[[FirmwareState], FirmwareState] | None = None
     """What the controller's own sensors feel."""
     each: Callable[[], None] = _nothing
@@ -70,6 +91,14 @@ class Kind:
     """What nothing on the companion computer can help; None: the bridge is to cope with it."""
     limited: tuple[float, float] | None = None
     """Shortest and longest time that it lasts, s; None: it stays."""
+    flier: Flier = Flier.POLICY
+    """Who has to fly for it to matter. A kind of the policy that hovers strikes every flier."""
+    watched: bool = False
+    """Whether the bridge needs its watchdog for it."""
+    logged: bool = False
+    """Whether the bridge needs a flight log for it."""
+    body: Callable[..., Vehicle] | None = None
+    """(vehicle of the bridge's file, **parameters) -> the vehicle that flies. None: that of the file."""
 
 
 def uniform(name: str, low: float, high: float, digits: int = 3) -> Callable[[np.random.Generator], Parameters]:

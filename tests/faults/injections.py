@@ -1,4 +1,4 @@
-"""Faults with parameters that may strike together: of poses, accelerometer, link, receiver and body."""
+"""Faults with parameters that may strike together, by name: of accelerometer, link, receiver and body, and others."""
 
 import dataclasses
 import math
@@ -9,16 +9,21 @@ from functools import partial
 
 import numpy as np
 
-from e2efly.deploy.betaflight.instruments import FAILSAFE
 from e2efly.deploy.betaflight.messages import RawImu, StatusEx
+from e2efly.deploy.betaflight.modes import FAILSAFE
 from e2efly.deploy.odometry import Sample
+from e2efly.deploy.sight.source import Frame
 from e2efly.validation.sitl import FirmwareState
+from tests.faults.injected_companion import COMPANION
+from tests.faults.injected_fliers import FLIERS
 from tests.faults.injected_poses import POSES
 from tests.faults.injection import Excuse, Injection, Kind, Parameters, Rule, one_of, uniform, vector
 from tests.faults.stage import Stage
 
 COUNTS = 256
 """Of the firmware's accelerometer for one gravity."""
+FAILSAFE_S = 0.5
+"""Silence of the receiver after which the rig's firmware begins its failsafe, s: `failsafe_delay`."""
 FLAGS = 6
 """Where a STATUS_EX has its flags of the modes that are on."""
 
@@ -120,8 +125,10 @@ HELD = Excuse("the firmware holds the last command while the link is silent")
 NO_POWER = Excuse(
     "the controller has no power, and starts disarmed", (Rule.OFF, Rule.TOUCH, Rule.ENDLESS), for_good=True
 )
-UNHEARD = Excuse("while its receiver is silent the firmware flies its failsafe, whatever the bridge sends")
-KINDS = POSES | {
+UNHEARD = Excuse(
+    "while its receiver is silent the firmware flies its failsafe, whatever the bridge sends", after=FAILSAFE_S
+)
+KINDS = POSES | COMPANION | FLIERS | {
     "accelerometer as told: z scaled": Kind(
         _told_scaled, one_of("factor", -1.0, 0.0, 0.9, 0.93, 0.95, 0.97, 0.98, 1.03, 1.05, 1.1, 1.15)),
     "accelerometer as told: biased": Kind(
@@ -175,6 +182,8 @@ class Faults:
         for code in (RawImu.CODE, StatusEx.CODE):
             self._stage.link.rewrites[code] = partial(self._reply, code)
         self._stage.rig.felt = self._felt
+        for camera in self._stage.cameras:
+            camera.alter = self._frame
 
     def begin(self, strike: Strike) -> None:
         """Let a fault begin."""
@@ -193,6 +202,13 @@ class Faults:
         for _, injection in self._active:
             if altered is not None and injection.pose is not None:
                 altered = injection.pose(altered)
+        return altered
+
+    def _frame(self, frame: Frame) -> Frame | None:
+        altered: Frame | None = frame
+        for _, injection in self._active:
+            if altered is not None and injection.frame is not None:
+                altered = injection.frame(altered)
         return altered
 
     def _reply(self, code: int, payload: bytes) -> bytes:

@@ -7,7 +7,7 @@ import numpy as np
 
 from e2efly.deploy.pilot.flight_state import Mode
 from tests.faults.campaign import STRUCK_IN, Scenario
-from tests.faults.injection import Parameters
+from tests.faults.injection import Flier, Parameters
 from tests.faults.injections import KINDS, Strike
 
 HEIGHTS = (0.7, 2.5)
@@ -16,15 +16,26 @@ LATER_S = 3.0
 """The second and third fault begin within so long of the one before, s."""
 FIRST_S = {Mode.TAKEOFF: 1.5, Mode.LAND: 1.5}
 """In these modes the first strikes within so long, s; in the others at once."""
+WITH_FLIER = (Mode.HOVER, Mode.POLICY)
+"""Where those strike that need another flier than the policy that hovers."""
 FOR_EVER = 0.1
 """Chance that what usually ends does not."""
+
+
+FLIERS = {Flier.POLICY: 0.8, Flier.SIGHT: 0.08, Flier.COMMANDS: 0.06, Flier.FILTER: 0.06}
+"""Chances of who flies."""
 
 
 def drawn(seed: int) -> Scenario:
     """Two or three kinds of faults, when and how, and a flight for them."""
     random = np.random.default_rng(seed)
-    mode = STRUCK_IN[int(random.integers(len(STRUCK_IN)))]
-    names = random.choice(list(KINDS), int(random.integers(2, 4)), replace=False)
+    flier = list(FLIERS)[int(random.choice(len(FLIERS), p=list(FLIERS.values())))]
+    modes = STRUCK_IN if flier is Flier.POLICY else WITH_FLIER
+    mode = modes[int(random.integers(len(modes)))]
+    own, anybodys = ([name for name, kind in KINDS.items() if kind.flier is who] for who in (flier, Flier.POLICY))
+    first = [] if flier is Flier.POLICY else [str(random.choice(own))]
+    left = [name for name in dict.fromkeys([*own, *anybodys]) if name not in first]
+    names = [*first, *random.choice(left, int(random.integers(2, 4)) - len(first), replace=False)]
     at, strikes = float(random.uniform(0, FIRST_S.get(mode, 0.0))), []
     for name in map(str, names):
         kind = KINDS[name]

@@ -4,21 +4,29 @@ import dataclasses
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from e2efly.deploy.betaflight.check import examine, problems
+from e2efly.deploy.betaflight.check import examine
 from e2efly.deploy.betaflight.link import open_link
+from e2efly.deploy.betaflight.row import problems
+from e2efly.deploy.flight_loop import PLAN_PERIOD, plan_of
+from e2efly.deploy.log.telemetry import Telemetry
 from e2efly.deploy.odometry import tilt_of
 from e2efly.deploy.pilot.flight_state import Mode, Reason
 from e2efly.deploy.policy.loader import Policy
 from e2efly.deploy.pose.source import PlantSource
 from e2efly.deploy.settings import Fence, FlightSettings
+from e2efly.deploy.sight.source import ImageSource
 from e2efly.goal import Course
 from e2efly.validation.rig import Rig
 from e2efly.validation.session import Session, run
-from e2efly.vehicles.vehicle import GRAVITY
-from tests.faults.faulty import FaultyLink, FaultyNetwork, FaultyPoses
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from tests.deploy.command_streams import Loopback, encode
+from tests.faults.faulty import FaultyImages, FaultyLink, FaultyNetwork, FaultyPoses
+from tests.faults.virtual_watchdog import VirtualWatchdog
 
 FENCE = Fence(low=(-3.0, -3.0, 0.1), high=(3.0, 3.0, 3.0))
 """Of all flights with faults."""
@@ -36,6 +44,26 @@ PATIENCE_S = 60.0
 """How long a step waits for the policy, s of real time: how busy the machine is must not matter."""
 SINK_SPEED = 0.5
 """Of a pilot who lands, m/s."""
+CLOSED, RANGE = 1000, 1000
+"""Pulse of a closed throttle, and from there to the full one, us."""
+
+
+@dataclass(frozen=True)
+class Gear:
+    """What a flight has beyond firmware, poses and a policy."""
+
+    cameras: tuple[ImageSource, ...] = ()
+    """What the policy sees."""
+    commands: bool = False
+    """Another program flies in place of the policy."""
+    filtered: bool = False
+    """The filter is on."""
+    believed: Vehicle | None = None
+    """The vehicle whose file the bridge was given. None: that which flies."""
+    watched: bool = False
+    """The link goes through the watchdog."""
+    log: Path | None = None
+    """The file of the flight's log. None: without."""
 
 
 @dataclass
@@ -57,14 +85,28 @@ class Stage:
     """A rig that has been started, and the bridge on it. Close it with `close`."""
 
     def __init__(
-        self, rig: Rig, policy: Policy, course: Course, seed: int = 0, settings: FlightSettings = SETTINGS
+        self,
+        rig: Rig,
+        policy: Policy,
+        course: Course,
+        seed: int = 0,
+        settings: FlightSettings = SETTINGS,
+        gear: Gear = Gear(),
     ) -> None:
-        self.settings = settings
+        self.settings, self.gear = settings, gear
         self.rig, self.random = rig, np.random.default_rng(seed)
         self.network = FaultyNetwork(policy.session)
+        self.cameras = tuple(map(FaultyImages, gear.cameras))
         self.link: FaultyLink
         self.poses: FaultyPoses
+        self.watchdog: VirtualWatchdog | None = None
         self.session: Session
+        self.stopped = False
+        """Whether the bridge's process stands still."""
+        x, y, _ = TARGET
+        self.command: dict[str, Any] = {"mode": "position", "position": [x, y, settings.takeoff_height]}
+        """What another program sends before each control step, if there is one."""
+        self.log: Telemetry | None = None if gear.log is None else Telemetry(gear.log)
         self.pilot: Callable[[], None] | None = None
         """The pilot's hands, before each control step."""
         self.each: Callable[[], None] | None = None
@@ -72,13 +114,16 @@ class Stage:
         self.undo = ExitStack()
         """Ends what a fault has changed elsewhere."""
         self._policy, self._course = dataclasses.replace(policy, session=self.network), course
+        self._commander: Loopback | None = None
+        self._stood, self._planned = 0.0, -np.inf
         self.trace = Trace()
         self.renew()
         self.open()
 
     def renew(self) -> None:
         """New link and pose source, without faults."""
-        self.link = FaultyLink(lambda: open_link(self.rig.sitl.msp), self.random)
+        self.link = FaultyLink(open_link(self.rig.sitl.msp), self.random)
+        self.watchdog = VirtualWatchdog(self.rig.now, self.link) if self.gear.watched else None
         self.poses = FaultyPoses(PlantSource(self.rig.poses, "rig"))
 
     def open(self) -> None:
@@ -87,15 +132,21 @@ class Stage:
         Raises:
             ValueError: for a controller that is refused outright.
         """
+        gear, link = self.gear, self.watchdog or self.link
+        self._commander = Loopback() if gear.commands else None
         try:
             session = Session(
-                self.rig, self.settings, policy=self._policy, course=self._course, link=self.link, source=self.poses
-            )
-        except ValueError:
-            self.link.close()
+                self.rig, self.settings, policy=None if gear.commands else self._policy, course=self._course,
+                link=link, source=self.poses, cameras=self.cameras, commands=self._commander, filtered=gear.filtered,
+                vehicle=gear.believed, log=self.log,
+            )  # fmt: skip
+        except (ValueError, OSError):
+            link.close()
             raise
-        vehicle, contract = self.rig.world.vehicle, self._policy.contract
-        session.bridge.settings_problems = problems(examine(session.info, vehicle, self.settings, contract))
+        contract = None if gear.commands else self._policy.contract
+        session.bridge.settings_problems = problems(
+            examine(session.info, session.bridge.vehicle, self.settings, contract)
+        )
         self.session = session
         self.patience(PATIENCE_S)
 
@@ -108,7 +159,15 @@ class Stage:
         """End the bridge."""
         self.undo.close()
         self.session.close()
+        if self._commander is not None:
+            self._commander.close()
         self.rig.sleep(0.1)  # the firmware takes the next connection once it has seen the end of this one
+
+    def end(self) -> None:
+        """End the bridge and its log for good."""
+        self.close()
+        if self.log is not None:
+            self.log.close()
 
     @property
     def mode(self) -> Mode:
@@ -122,23 +181,50 @@ class Stage:
 
     def patience(self, seconds: float) -> None:
         """How long the bridge waits for the policy, real time."""
-        assert self.session.worker is not None
-        self.session.worker.timeout = seconds
+        if self.session.worker is not None:
+            self.session.worker.timeout = seconds
 
     def step(self) -> None:
         """One control step."""
         for act in (self.pilot, self.each):
             if act is not None:
                 act()
-        self.session.step()
+        self._run()
         state, trace = self.rig.state, self.trace
         trace.time.append(self.rig.now())
         trace.position.append(np.array(state.position))
         trace.velocity.append(np.array(state.velocity))
         trace.tilt.append(tilt_of(state.quaternion))
         trace.armed.append(self.session.bridge.inputs.armed)
-        trace.throttle.append(self.session.bridge.sent.throttle)
+        trace.throttle.append(self.throttle)
         trace.motor.append(float(self.rig.sitl.motors().mean()))
+
+    def _run(self) -> None:
+        """The processes of a control step, as far as they do not stand still."""
+        session, now = self.session, self.rig.now()
+        if self._commander is not None:
+            self._commander.send(encode(stamp=now, **self.command))
+        if self.stopped:
+            self.rig.sleep(session.period)
+            self._stood += session.period
+        else:
+            session.lateness, self._stood = session.lateness + self._stood, 0.0
+            session.step()
+        if self.watchdog is not None:
+            if not self.stopped and now >= self._planned + PLAN_PERIOD:
+                self._planned = now
+                self.watchdog.plan(plan_of(session.bridge))
+            self.watchdog.step()
+
+    @property
+    def taken_over(self) -> bool:
+        """Whether the watchdog flies."""
+        return self.watchdog is not None and self.watchdog.has_taken_over
+
+    @property
+    def throttle(self) -> float:
+        """Sent by whoever flies."""
+        return (self.link.throttle - CLOSED) / RANGE if self.taken_over else self.session.bridge.sent.throttle
 
     def fly(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
         """Control steps for so long, or until something holds; whether it did."""
@@ -156,7 +242,7 @@ class Stage:
         if self.mode is not Mode.HOVER:
             self._take_off()
         self.rig.set(mission="hover")
-        turn = self.random.uniform(-1, 1, 2)
+        turn = self.random.uniform(-1, 1, 2) * (not self.cameras)  # a policy that sees begins where its course does
         self.rig.set(roll=float(turn[0]), pitch=float(turn[1]))
         self.fly(0.6)
         self.rig.set(roll=0.0, pitch=0.0)

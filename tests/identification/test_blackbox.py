@@ -7,7 +7,7 @@ import pytest
 
 from e2efly.deploy.log.blackbox import read_blackbox
 from e2efly.identification.blackbox import setpoint_delay, with_blackboxes
-from e2efly.identification.readers import read_flights
+from e2efly.identification.readers import BLACKBOX, read_flights
 from e2efly.identification.record import Record, Stream
 
 DATA = Path(__file__).parent.parent / "data" / "blackbox"
@@ -49,7 +49,7 @@ def box() -> Record:
         "motor": Stream(OWN, np.tile(np.sin(at)[:, None] ** 2, (1, 4))),
         "setpoint": Stream(OWN, held(at - 0.017, SENT, ORDERS[:, 1:])),
     }
-    return Record(Path("b.bbl"), streams)
+    return Record(Path("b.bbl"), streams, kind=BLACKBOX)
 
 
 def test_a_blackbox_is_laid_over_its_flight_to_half_a_millisecond() -> None:

@@ -1,7 +1,6 @@
 """Logs of many kinds become the same streams: SI units, world ENU, body FLU, the vehicle file's order of rotors."""
 
 import math
-import struct
 import time
 import tracemalloc
 from collections.abc import Callable
@@ -12,12 +11,14 @@ import pytest
 
 from e2efly.deploy.log.bags import export_bag
 from e2efly.deploy.log.flight_log import read_log
+from e2efly.deploy.log.mcap_records import MAGIC
 from e2efly.deploy.log.telemetry import Telemetry
+from e2efly.identification.bag_storage import ROS1, SQLITE
 from e2efly.identification.csv_file import column_map, read_csv, write_csv
 from e2efly.identification.readers import read_flights, read_part
 from e2efly.identification.record import Record, Stream, stream_table
+from tests.identification.log_samples import HALF, crazyflie, ulog
 
-HALF = math.sqrt(0.5)
 BLACKBOX = Path(__file__).parent.parent / "data" / "blackbox"
 
 
@@ -163,19 +164,6 @@ def test_sessions_of_a_blackbox() -> None:
     assert all(record.streams["body_rate"].rate > 100 for record in found)
 
 
-def crazyflie(path: Path, samples: int = 5) -> Path:
-    """As the firmware writes it: header, then blocks of event, time in us and values."""
-    names = [f"{sensor}.{axis}(f)" for sensor in ("acc", "gyro") for axis in "xyz"]
-    names += [f"motor.m{i}(H)" for i in (1, 2, 3, 4)]
-    data = struct.pack("<BHHH", 0xBC, 2, 1, 0xFFFF) + b"fixedFrequency\0" + struct.pack("<H", len(names))
-    data += b"".join(name.encode() + b"\0" for name in names)
-    for i in range(samples):
-        motors = (655, 2 * 655, 3 * 655, 4 * 655)
-        data += struct.pack("<HQ6f4H", 0xFFFF, 1000 * (i + 1), 0.0, 0.1, 1.0, 180.0, 0.0, 90.0, *motors)
-    path.write_bytes(data)
-    return path
-
-
 def test_a_crazyflie_s_log(tmp_path: Path) -> None:
     (found,) = read_flights(crazyflie(tmp_path / "log00"))
     assert np.allclose(found.streams["body_rate"].values, [math.pi, 0, math.pi / 2])
@@ -194,27 +182,6 @@ def test_a_log_that_breaks_off_gives_what_is_whole(tmp_path: Path) -> None:
         read_flights(path)
 
 
-def ulog(path: Path) -> Path:
-    """A PX4 log: format, subscription, data; falling forwards while turning right, nose to the east."""
-    fields = "uint64_t timestamp;float[3] xyz;"
-    attitude = "uint64_t timestamp;float[4] q;"
-
-    def message(kind: bytes, content: bytes) -> bytes:
-        return struct.pack("<Hc", len(content), kind) + content
-
-    data = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
-    data += message(b"B", bytes(40))
-    data += message(b"F", b"vehicle_angular_velocity:" + fields.encode())
-    data += message(b"F", b"vehicle_attitude:" + attitude.encode())
-    data += message(b"A", struct.pack("<BH", 0, 0) + b"vehicle_angular_velocity")
-    data += message(b"A", struct.pack("<BH", 0, 1) + b"vehicle_attitude")
-    for i in range(4):
-        data += message(b"D", struct.pack("<HQ3f", 0, 1000 * (i + 1), 1.0, 2.0, 3.0))
-        data += message(b"D", struct.pack("<HQ4f", 1, 1000 * (i + 1), HALF, 0.0, 0.0, HALF))
-    path.write_bytes(data)
-    return path
-
-
 def test_a_px4_log(tmp_path: Path) -> None:
     (found,) = read_flights(ulog(tmp_path / "a.ulg"))
     assert np.allclose(found.streams["body_rate"].values, [1, -2, -3])
@@ -228,11 +195,18 @@ def test_a_px4_log(tmp_path: Path) -> None:
     [
         ("gone.csv", None, "does not exist; accepted: our .mcap"),
         ("empty.csv", lambda p: p.write_bytes(b""), "is empty"),
-        ("photo.jpg", lambda p: p.write_bytes(b"abc"), "of no kind that is known here"),
-        ("a.ulg", lambda p: p.write_bytes(b"ULog, or not"), "no PX4 log that can be read"),
-        ("a.bbl", lambda p: p.write_bytes(b"H nothing\n"), "no blackbox log that can be read"),
-        ("a.mcap", lambda p: p.write_bytes(b"abc"), "no flight log"),
-        ("a.bag", lambda p: p.write_bytes(b"abc"), "no bag that can be read"),
+        ("a.mcap", lambda p: p.write_bytes(b"abc"), "of no kind that is known here"),
+        ("photo.csv", lambda p: p.write_bytes(b"\xff\xd8\xff\0,"), "of no kind that is known here"),
+        ("a.txt", lambda p: p.write_bytes(b"ULog\x01\x12\x35"), "has nothing that is used here"),
+        ("a", lambda p: p.write_bytes(b"H Product:Blackbox\n"), "no blackbox log that can be read"),
+        (
+            "a.b",
+            lambda p: p.write_bytes(MAGIC),
+            "has the topics none; a.b: the end of the file is missing",
+        ),
+        ("a.db3", lambda p: p.write_bytes(SQLITE + bytes(84)), "has the topics none; a.db3: the file is damaged"),
+        ("a.bag", lambda p: p.write_bytes(ROS1 + bytes(9)), "has the topics none"),
+        ("a.x", lambda p: p.mkdir(), "is a folder without files of a bag"),
     ],
 )
 def test_what_is_no_log_is_refused_by_name(tmp_path: Path, name: str, make: Callable | None, told: str) -> None:

@@ -219,8 +219,7 @@ def test_a_convolution_is_that_of_patches() -> None:
     [
         (NetworkConfig(convolution=(8, 8, 8)), r"network.convolution is \(8, 8, 8\); .*16 rows and 16 columns: 2$"),
         (NetworkConfig(pool=(5, 4)), r"network.pool is \(5, 4\); accepted: divisors of the image's 16 rows"),
-        (NetworkConfig(encoder=()), r"encoder \(\), .*accepted: 1 or more .* one encoder layer"),
-        (NetworkConfig(recurrent=-1), r"recurrent -1; accepted: 1 or more"),
+        (NetworkConfig(encoder=()), r"network.encoder is \(\); accepted: one size or more where"),
     ],
 )
 def test_networks_that_do_not_fit_are_refused(network: NetworkConfig, message: str) -> None:

@@ -44,7 +44,7 @@ def test_it_goes_all_the_way(
     assert traced_folder(config) is None
     assert traced_folder(e2efly.preset("hover", "ppo")) is not None
     assert run([*train[:5], str(tmp_path / "bad"), *train[6:], "--algo.sigma", "-1"]) == 2
-    assert "algo.sigma is -1.0; accepted: more than 0" in capsys.readouterr().err
+    assert "algo.sigma is -1.0; accepted: a number, 1e-09 to 10000" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

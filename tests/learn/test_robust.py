@@ -79,6 +79,9 @@ def test_the_file_s_vehicle_flies_as_in_the_nominal_environment() -> None:
     nominal = Env.of(config.task, config.reward)
     env = setup.nominal["hover"]
     assert set(setup.nominal) == set(setup.judges)
+    assert (setup.env.vehicles, env.vehicles, nominal.vehicles) == ("random vehicles", *["vehicle of the file"] * 2)
+    family = Setup.of(presets.for_vehicle(config, "any"))
+    assert (family.env.vehicles, family.nominal["hover"].vehicles) == ("random vehicles", "random vehicles, still air")
     assert Setup.of(e2efly.preset("hover", "bptt", "nominal")).nominal == {}
     still = jnp.broadcast_to(nominal.hover, (50, 4))
 

@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import math
 import os
 import signal
 import subprocess
@@ -17,13 +16,14 @@ from safetensors.numpy import load_file
 
 from e2efly import presets
 from e2efly.cli import run as command
-from e2efly.config import ALGORITHMS, TrainConfig
+from e2efly.config import ALGORITHMS, NetworkConfig, RewardConfig, TrainConfig
 from e2efly.episodes import Episodes
 from e2efly.learn import runner
 from e2efly.learn.checkpoint import read_about
 from e2efly.learn.rundir import RunDirectory, from_json, to_json
 from e2efly.learn.runner import NonFiniteError, train
 from e2efly.learn.setup import Setup
+from e2efly.numbers import Rule
 from e2efly.tasks import TASKS
 from tests.conftest import QUICK
 from tests.learn.one_program import compile_once
@@ -53,7 +53,7 @@ class Silent:
     def judging(self, starts: int) -> None:
         pass
 
-    def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
+    def progress(self, steps: int, total: int, rate: float, success: float, best: float, flown: str) -> None:
         del total, rate, best
         self.seen.append((steps, success))
 
@@ -215,7 +215,10 @@ def test_a_run_is_one_process_s_and_ctrl_c_saves_and_stops_it(
 
 
 @pytest.mark.usefixtures("quick")
-def test_a_loss_that_is_not_finite_stops_the_run_and_keeps_the_checkpoint(tmp_path: Path) -> None:
+def test_a_loss_that_is_not_finite_stops_the_run_and_keeps_the_checkpoint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Rule, "accepts", lambda *_: True)
     config = small("hover", "ppo")
     config = dataclasses.replace(
         config, algo=dataclasses.replace(config.algo, learning_rate=1e30, learning_rate_end=1e30)
@@ -308,11 +311,9 @@ def test_the_algorithm_left_out_is_the_task_s_best(task: str, algo: str) -> None
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"steps": 0}, "steps is 0; accepted: more than 0"),
-        ({"steps": -5}, "steps is -5"),
-        ({"eval_episodes": 0}, "eval_episodes is 0"),
-        ({"seed": -1}, "seed is -1"),
-        ({"stop_at": 2.0}, "stop_at is 2.0"),
+        ({"steps": 0}, "^steps is 0; accepted: a whole number, 1 to 1000000000000000$"),
+        ({"network": NetworkConfig(())}, r"network.hidden is \(\); accepted: one or more sizes"),
+        ({"reward": RewardConfig({"v1": 1e300})}, r"reward v1 is 1e\+300; accepted: a number, -10000 to 10000"),
     ],
 )
 def test_bad_numbers_are_named(change: dict[str, Any], message: str) -> None:
@@ -323,19 +324,7 @@ def test_bad_numbers_are_named(change: dict[str, Any], message: str) -> None:
 @pytest.mark.parametrize(
     ("algo", "option", "value", "accepted"),
     [
-        ("bptt", "horizon_start", -8, "0 to 64"),
         ("bptt", "horizon_start", 65, "0 to 64"),
-        ("bptt", "gradient_decay", -5.0, "0 or more"),
-        ("bptt", "average", 1.0, "0 to 0.9999"),
-        ("ppo", "gae_lambda", math.nan, "0 to 1"),
-        ("ppo", "log_std", 9.0, "-10 to 2"),
-        ("shac", "target_share", 7.0, "0 to 1"),
-        ("shac", "noise", -1.0, "0 or more"),
-        ("abpt", "fresh_share", 1.5, "0 to 1"),
-        ("foppo", "exact_rate", math.inf, "finite numbers"),
-        ("ppo", "gamma", 1.1, "above 0, at most 1"),
-        ("ppo", "gamma", 0.0, "above 0, at most 1"),
-        ("ppo", "learning_rate", 0.0, "more than 0"),
         ("ppo", "minibatch", 511, r"a divisor of algo.envs \* algo.horizon \(4096\)"),
         ("abpt", "places", 100, "a positive multiple of 64, what an update adds"),
     ],

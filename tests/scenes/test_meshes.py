@@ -22,7 +22,7 @@ from e2efly.scenes.meshes.cast import cast as mesh_cast
 from e2efly.scenes.meshes.distance import DistanceGrid, clearance
 from e2efly.scenes.meshes.load import load_mesh_scene, mesh_scene_names
 from e2efly.scenes.meshes.scene import MeshScene, Part
-from e2efly.scenes.scene import GATE, GROUND, OBSTACLE, SKY, WALL, Scene
+from e2efly.scenes.scene import COLOURS, GATE, GROUND, OBSTACLE, SKY, WALL, Scene
 from e2efly.scenes.shapes import FAR
 from tests.scenes.test_cast import LEVEL, crowd
 
@@ -263,6 +263,41 @@ class TestLoad:
         np.testing.assert_allclose(scene.colour[0, 0], [0.0, 0.2, 1.0], atol=1e-6)
         mesh.export(tmp_path / "wall.ply", encoding="ascii")
         np.testing.assert_allclose(load_mesh_scene(tmp_path / "wall.ply", up="y").bounds[1], 0.5, atol=1e-6)
+
+    @pytest.mark.parametrize("mark", ["", "\ufeff"])
+    def test_geometry_alone_is_read_by_choice(self, tmp_path: Path, mark: str) -> None:
+        path = obj_files(tmp_path)
+        first = f"{mark}v 0 0 0\nmtllib things.mtl\n"
+        path.write_text(OBJ.replace("mtllib things.mtl\nv 0 0 0\n", first), encoding="utf-8")
+        whole = load_mesh_scene(path)
+        (tmp_path / "things.mtl").unlink()
+        with pytest.raises(
+            ValueError, match=r"'things.mtl' is missing; .*; or materials=False \(--no-scene-materials\)"
+        ):
+            load_mesh_scene(path)
+        plain = load_mesh_scene(path, materials=False)
+        assert sorted(map(tuple, plain.triangles.reshape(-1, 9))) == sorted(map(tuple, whole.triangles.reshape(-1, 9)))
+        assert plain.names == whole.names and len(plain.textures) == 1
+        np.testing.assert_allclose(plain.colour, np.repeat(COLOURS[plain.label][:, None], 3, axis=1))
+
+    def test_a_gltf_and_a_ply_whose_textures_were_not_sent_along(self, tmp_path: Path) -> None:
+        files = trimesh.exchange.gltf.export_gltf(glb_scene())
+        header = json.loads(files["model.gltf"])
+        for name, raw in files.items():
+            (tmp_path / name).write_bytes(raw)
+        required = {"images": [{"uri": "grass.png"}], "extensionsRequired": ["KHR_texture_basisu"]}
+        (tmp_path / "model.gltf").write_text(json.dumps(header | required))
+        trimesh.creation.box().export(tmp_path / "wall.ply", encoding="ascii")
+        text = (tmp_path / "wall.ply").read_text()
+        (tmp_path / "wall.ply").write_text(text.replace("element", "comment TextureFile wall.png\nelement", 1))
+        for name, triangles in (("model.gltf", 24), ("wall.ply", 12)):
+            with pytest.raises(ValueError, match=r"or materials=False \(--no-scene-materials\)"):
+                load_mesh_scene(tmp_path / name)
+            scene = load_mesh_scene(tmp_path / name, materials=False)
+            assert len(scene.triangles) == triangles
+            np.testing.assert_allclose(scene.colour, np.repeat(COLOURS[scene.label][:, None], 3, axis=1))
+        with pytest.raises(ValueError, match="mesh scene 'garage' is the package's"):
+            load_mesh_scene("garage", materials=False)
 
     @pytest.mark.parametrize(
         ("before", "after", "told"),

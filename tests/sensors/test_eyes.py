@@ -129,9 +129,7 @@ def test_a_mask_shows_the_pad_and_noise_its_salt() -> None:
     ("camera", "message"),
     [
         (dataclasses.replace(DOWN, rate=7.0), r"camera.rate is 7.0; accepted: the control rate, 30 Hz"),
-        (dataclasses.replace(DOWN, latency=(0.1, 0.05)), r"env.cameras.0.latency is \(0.1, 0.05\)"),
         (dataclasses.replace(DOWN, of="gait", sees="mask"), r"camera.of: unknown class 'gait'.*gate"),
-        (dataclasses.replace(DOWN, noise_share=1.5), "camera.noise_share is 1.5; accepted: 0 to 1"),
         (dataclasses.replace(DOWN, reach=(2.0, 1.0)), r"camera.reach is \(2.0, 1.0\)"),
         (dataclasses.replace(DOWN, noise=ImageNoiseConfig(gaussian=-1.0)), r"camera.noise.gaussian is -1.0"),
     ],

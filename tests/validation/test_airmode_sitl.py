@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.deploy.betaflight.check import examine, problems
+from e2efly.deploy.betaflight.check import examine
 from e2efly.deploy.betaflight.messages import set_raw_rc
+from e2efly.deploy.betaflight.row import problems
 from e2efly.deploy.betaflight.settings import PidAdvanced
 from e2efly.deploy.pilot.flight_state import Mode
 from e2efly.validation import firmware, rig
@@ -44,7 +45,8 @@ def off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
 @pytest.fixture
 def bent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
     lines = ("throttle_boost=7", "motor_output_limit=91", "thrust_linear=21")
-    yield from session_of(tmp_path, monkeypatch, *(f"set {line}" for line in lines))
+    launch = "aux 4 49 10 1400 1600 0 0"  # LAUNCH CONTROL, on a switch of its own, which is on
+    yield from session_of(tmp_path, monkeypatch, *(f"set {line}" for line in lines), launch)
 
 
 def torque_at_low_throttle(session: Session) -> float:
@@ -97,3 +99,5 @@ def test_what_bends_the_throttle_is_read_and_refused(bent: Session) -> None:
     assert bent.info.pid_advanced == PidAdvanced(7, 91, 0, 21)
     named = [problem.split()[0] for problem in bent.bridge.settings_problems]
     assert named == ["motor_output_limit", "throttle_boost", "thrust_linear"]
+    bent.fly(0.5)
+    assert any("LAUNCH CONTROL (mode 49) is on" in reason for reason in bent.bridge.flight.reasons)

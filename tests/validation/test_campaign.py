@@ -3,17 +3,23 @@
 import dataclasses
 import json
 import math
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+from e2efly.deploy.betaflight.link import StreamLink
 from e2efly.deploy.odometry import Sample
+from e2efly.deploy.sight.source import Frame
 from tests.faults import blocks
 from tests.faults.campaign import STRUCK_IN, Scenario, beyond
 from tests.faults.campaign_rules import Span, judge
+from tests.faults.faulty import FaultyImages, FaultyLink
+from tests.faults.injected_fliers import mirrored as mirrored_image
+from tests.faults.injected_fliers import miscalibrated, negative, transposed
 from tests.faults.injected_poses import conjugated, mirrored, north_east_down, scalar_last, velocity_as
 from tests.faults.injection import Rule
-from tests.faults.injections import KINDS, NO_POWER, Strike
+from tests.faults.injections import FAILSAFE_S, KINDS, NO_POWER, Strike
 from tests.faults.scenarios import CASES, drawn
 from tests.faults.stage import Trace
 
@@ -102,6 +108,31 @@ def test_what_nobody_on_board_can_help_is_told_apart() -> None:
     assert beyond(Scenario("", "hover", (Strike("poses: none"),)), 0.0) == []
 
 
+def test_a_climb_that_goes_on_when_the_bridge_has_the_motors_again_is_its_own() -> None:
+    silent = tuple(beyond(Scenario("", "hover", (Strike("link: silent", 0.0, 2.5),)), 0.0))
+    carried = line(0.0, 2.5, 1.0)
+    assert broken(trace(carried + line(2.5, 0.0, 1.0) + STANDS), silent) == []
+    assert broken(trace(carried + line(2.5, 4.4, 1.0) + line(4.4, 0.0, 1.0) + STANDS), silent) == []
+    assert broken(trace(carried + line(2.5, 4.7, 1.0) + line(4.7, 0.0, 1.0) + STANDS), silent) == ["climb"]
+
+
+def test_the_receivers_silence_excuses_nothing_before_the_firmwares_failsafe() -> None:
+    silent = Scenario("", "hover", (Strike("receiver: silent", 1.0, 2.0),))
+    assert [(s.begin, s.end) for s in beyond(silent, 10.0)] == [(11.0 + FAILSAFE_S, 13.0)]
+
+
+def test_a_second_bridge_is_no_excuse_where_it_was_there_before_the_take_off() -> None:
+    strikes = (Strike("second bridge: waits on the ground", 0.0, 1.0, {"share": 0.1}),)
+    assert beyond(Scenario("", "init", strikes), 0.0) == []
+    assert len(beyond(Scenario("", "hover", strikes), 0.0)) == 1
+
+
+def test_faults_of_two_fliers_cannot_be_flown_together() -> None:
+    strikes = (Strike("images: none"), Strike("commands: jump"))
+    with pytest.raises(ValueError, match="strikes need commands and sight to fly; accepted: one of them"):
+        Scenario("", "policy", strikes)
+
+
 def test_a_seed_is_always_the_same_flight_and_survives_json() -> None:
     for seed in SEEDS:
         scenario = drawn(seed)
@@ -179,6 +210,42 @@ def test_velocity_negated_zero_or_absent() -> None:
         changed = velocity_as(how)(SAMPLE)
         assert changed.velocity is not None
         np.testing.assert_allclose(changed.velocity, share * np.array([0.1, 0.2, 0.3]))
+
+
+def test_images_keep_their_shape_and_say_something_else() -> None:
+    image = np.arange(12.0).reshape(3, 4)
+    assert mirrored_image("columns")(image)[0].tolist() == [3, 2, 1, 0]
+    assert mirrored_image("rows")(image)[0].tolist() == [8, 9, 10, 11]
+    assert transposed()(image)[0].tolist() == [0, 4, 4, 8]
+    assert negative()(image)[0].tolist() == [11, 10, 9, 8]
+    np.testing.assert_array_equal(miscalibrated(1.0, 0.0, 1.0)(image), image)
+    assert miscalibrated(2.0, 0.0, 0.5)(image)[1].tolist() == [2.5, 2.5, 3.0, 3.0]
+
+
+def test_late_images_say_when_they_were_taken_or_do_not() -> None:
+    source = Mock(read=lambda now: [Frame(now, np.zeros((2, 2)))] if now < 0.05 else [])
+    for stamped, said in ((True, 0.0), (False, 0.3)):
+        camera = FaultyImages(source)
+        camera.delay, camera.stamped = 0.3, stamped
+        assert camera.read(0.0) == []
+        assert [frame.time for frame in camera.read(0.3)] == [said]
+
+
+def test_a_pulled_plug_breaks_the_link_until_it_is_back() -> None:
+    port = Mock(connected=lambda: True, read=lambda: b"", write=len)
+    link = FaultyLink(StreamLink("port", lambda: port), np.random.default_rng(0))
+    link.poll(0.0)
+    link.gone = True
+    assert link.alive
+    link.receive()
+    assert not link.alive
+    assert link.reason == "port: Input/output error"
+    for now in (1.0, 2.0, 3.0):
+        link.poll(now)
+    assert link.reason == "port: No such file or directory"
+    link.gone = False
+    link.poll(6.0)
+    assert (link.alive, link.connections) == (True, 2)
 
 
 def test_standing_with_the_throttle_that_a_silent_link_left_open_counts_from_its_return() -> None:

@@ -16,7 +16,7 @@ from e2efly.vehicles import load_vehicle
 from tests.faults.campaign import Scenario, fly
 from tests.faults.injections import COUNTS, KINDS, Faults, Strike
 from tests.faults.scenarios import CASES
-from tests.faults.stage import LATENCY_S, TARGET, Stage
+from tests.faults.stage import LATENCY_S, TARGET, Gear, Stage
 
 
 def test_poses_that_end_in_a_take_off_break_no_rule(policy_of: Callable[..., Path], tmp_path: Path) -> None:
@@ -73,7 +73,7 @@ def test_every_kind_can_strike_and_end(policy_of: Callable[..., Path], tmp_path:
     policy, vehicle = load_policy(policy_of("hover")), load_vehicle("vis_r")
     goal = course_for(policy.contract, vehicle, HoverRoute(target=TARGET))
     with Rig(firmware.chosen(), tmp_path, vehicle, latency=LATENCY_S) as rig:
-        stage = Stage(rig, policy, goal)
+        stage = Stage(rig, policy, goal, gear=Gear(watched=True, log=tmp_path / "flight.mcap"))
         stage.fly(0.2)
         gravity = stage.session.client.latest[RawImu.CODE].message.acceleration
         np.testing.assert_allclose(gravity, (0, 0, COUNTS), atol=1)
@@ -85,5 +85,19 @@ def test_every_kind_can_strike_and_end(policy_of: Callable[..., Path], tmp_path:
             stage.fly(0.02)
         stage.fly(0.1)
         assert not stage.link.silent
+        assert not stage.link.gone
+        assert not stage.stopped
         assert rig.heard
-        stage.close()
+        stage.end()
+        assert stage.log is not None
+        assert stage.log.failed
+
+
+def test_a_bridge_that_stands_still_in_hover_is_landed_by_the_watchdog(
+    policy_of: Callable[..., Path], tmp_path: Path
+) -> None:
+    scenario = Scenario("", "hover", (Strike("bridge: stopped", 0.0, 0.5),), 0.7)
+    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware.chosen(), tmp_path)
+    assert flown.violations == ()
+    assert flown.ended
+    assert "the watchdog has taken over" in flown.reasons[0]

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,14 @@ import pytest
 import trimesh
 
 from e2efly.cli import run
+from e2efly.commands import hil
+from e2efly.commands.options import parse
+from e2efly.commands.render import Render
 from e2efly.courses.origin import Origin
 from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pose.source import PlantSource
 from e2efly.deploy.sight.shared import place
+from e2efly.env import random_key
 from e2efly.evaluation import candidate
 from e2efly.scenes.meshes.scene import MeshScene
 from e2efly.scenes.scene import Scene, Solids
@@ -21,6 +26,7 @@ from e2efly.validation.hil_rehearsal import Plan, draw
 from e2efly.validation.plant import RigidState
 from e2efly.validation.scene_files import SceneFile, beside, ground_of, load_world
 from e2efly.validation.scenery import Scenery
+from e2efly.view.places import find_place
 from tests.validation.test_hil_images import Kept
 
 ROOM = "[[solids]]\nkind = 'box'\ncentre = [5, 0, 1.5]\nsize = [0.1, 4, 1.5]\n"
@@ -55,6 +61,24 @@ def drawn() -> Scenery:
 def shown(scenery: Scenery, x: float = 0.0, y: float = 0.0, z: float = UP) -> np.ndarray:
     level = np.array([1.0, 0.0, 0.0, 0.0])
     return scenery.image(0, RigidState(np.array([x, y, z]), np.zeros(3), level, np.zeros(3)), 0.0, 1)
+
+
+def test_a_mesh_without_its_materials_is_shown_by_choice(tmp_path: Path) -> None:
+    path = scan(tmp_path / "scan.obj")
+    path.write_text(f"mtllib of_somebody_else.mtl\n{path.read_text().replace('mtllib', '#')}")
+    with pytest.raises(ValueError, match=r"of_somebody_else.mtl' is missing; .*--no-scene-materials"):
+        load_world(str(path))
+    plain = SceneFile(str(path), materials=False)
+    assert isinstance(load_world(plain.name, materials=plain.materials), MeshScene)
+    assert plain.options == ["--scene", str(path), "--no-scene-materials"]
+    assert not hil.parse(["avoid", "--pose", "udp:1", *plain.options]).options.scene_materials
+    assert not parse(Render, "render", [str(path), "--no-scene-materials"]).scene_materials
+    with pytest.raises(ValueError, match=r"'of_somebody_else.mtl' is missing"):
+        find_place(str(path), random_key(0))
+    assert isinstance(find_place(str(path), random_key(0), materials=False).scene, MeshScene)
+    for other in (str(tmp_path / "room.toml"), "forest"):
+        with pytest.raises(ValueError, match=r"no materials|and materials of its own"):
+            (load_world if other.endswith(".toml") else partial(find_place, key=random_key(0)))(other, materials=False)
 
 
 @pytest.mark.parametrize("form", ["stl", "ply", "obj", "glb"])

@@ -149,10 +149,14 @@ BROKEN: dict[str, tuple[Callable[[dict], Any], tuple[str, ...]]] = {
     "cannot hover": (lambda t: t["mass"].update(value=2.2), ("mass.value is 2.2 kg", "5.12 N", "cannot hover", "1.05")),
     "hovers below idle": (lambda t: t["rotor_speed_min"].update(value=2500.0), ("cannot hover", "less than 1 at idle")),
     "idle without thrust": (
-        lambda t: t["rotor_speed_min"].update(value=200.0), ("rotor_speed_min.value is 200.0", "positive and rising")
+        lambda t: t["rotor_speed_min"].update(value=200.0), ("rotor_speed_min.value is 200;", "positive and rising")
+    ),
+    "idle where the thrust begins": (
+        lambda t: (t["rotor_speed_min"].update(value=0.0), t["thrust_map"].update(value=[1e-6, 0.0, 0.0])),
+        ("rotor_speed_min.value is 0; accepted: 0.1 rad/s or more", "[1e-06, 0.0, 0.0]"),
     ),
     "idle above the top": (
-        lambda t: t["rotor_speed_min"].update(value=5e3), ("rotor_speed_min.value is 5000.0", "below rotor_speed_max")
+        lambda t: t["rotor_speed_min"].update(value=5e3), ("rotor_speed_min.value is 5000;", "below rotor_speed_max")
     ),
     "falling thrust map": (lambda t: t["thrust_map"].update(value=[-1e-7, 1e-3, 0.0]), ("thrust_map.value", "k2 > 0")),
     "three spins alike": (lambda t: t["rotor_spin"].update(value=[1, 1, 1, -1]), ("rotor_spin.value", "two of +1")),
@@ -176,6 +180,21 @@ def test_a_broken_file_says_what_is_wrong(kind: str, load: Callable[[dict], Vehi
         load(table)
     for word in words:
         assert word in str(caught.value)
+    assert "np.float64" not in str(caught.value)
+
+
+@pytest.mark.parametrize("thrust_map", [[1.33e-6, 3.84e-3, -1.77], [1.33e-6, 0.0, 0.0], [1.33e-6, -3e-4, 0.5]])
+def test_the_smallest_idle_that_a_refusal_names_is_accepted(
+    thrust_map: list[float], load: Callable[[dict], Vehicle], table: dict
+) -> None:
+    table["thrust_map"]["value"] = thrust_map
+    table["rotor_speed_min"]["value"] = 0.0
+    with pytest.raises(ValueError, match="positive and rising") as caught:
+        load(table)
+    least = float(str(caught.value).partition("accepted: ")[2].split()[0])
+    assert least == {-1.77: 404.4, 0.0: 0.1, 0.5: 112.8}[thrust_map[2]]
+    table["rotor_speed_min"]["value"] = least
+    assert load(table).thrust_range[0] > 0
 
 
 def test_true_is_no_number(tmp_path: Path) -> None:
@@ -204,6 +223,12 @@ def test_not_a_toml_file(content: bytes, tmp_path: Path) -> None:
     path.write_bytes(content)
     with pytest.raises(ValueError, match=r"bad\.toml: not a TOML file"):
         load_vehicle(path)
+
+
+def test_a_file_with_a_byte_order_mark(tmp_path: Path) -> None:
+    path = tmp_path / "vis_r.toml"
+    path.write_text((Path(module.__file__).parent / "vis_r.toml").read_text(), encoding="utf-8-sig")
+    assert load_vehicle(path).hash == load_vehicle("vis_r").hash
 
 
 def test_unknown_name() -> None:

@@ -12,7 +12,7 @@ from e2efly.drawing import Face, Line, Mark
 from e2efly.env import Env, random_key
 from e2efly.episodes import Act, Episodes, wilson
 from e2efly.tasks import TASKS
-from e2efly.view import plots
+from e2efly.view import plots, style
 from e2efly.view.flights import Flights, fly
 from e2efly.view.scene import scene
 
@@ -73,8 +73,18 @@ def check_png(path: Path, height: tuple[int, int] = (500, 1300)) -> None:
 
 @pytest.mark.parametrize("count", [0, 1, 5, 60])
 def test_learning_of_any_number_of_rows(tmp_path: Path, count: int) -> None:
-    plots.plot_learning(rows(count), tmp_path / "learning.png", "hover", best_update=5)
+    plots.plot_learning(rows(count), tmp_path / "learning.png", r"a $\name{$", best_update=5)
     check_png(tmp_path / "learning.png")
+
+
+def test_a_logarithmic_axis_is_labelled_without_formulas(tmp_path: Path) -> None:
+    with style.figure(tmp_path / "a.png", "title", 3.0) as figure:
+        axes = figure.add_subplot()
+        axes.plot([1, 2], [0.02, 30.0])
+        axes.set_yscale("log")
+    labels = [label.get_text() for axis in (axes.xaxis, axes.yaxis) for label in axis.get_ticklabels(which="both")]
+    assert {"0.1", "1", "10"} <= set(labels)
+    assert "$" not in "".join(labels)
 
 
 def test_learning_without_a_single_reward_term(tmp_path: Path) -> None:

@@ -1,10 +1,12 @@
 """The viewer's page in a real browser: Debian's Chromium, headless."""
 
+import json
 import os
 import re
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +15,7 @@ import numpy as np
 from PIL import Image
 from playwright.sync_api import Page
 
+from e2efly.deploy.log.telemetry import Telemetry
 from tests.browser import chromium
 
 PATIENCE_MS = 120_000
@@ -115,3 +118,23 @@ def test_a_validation_is_watched(tmp_path: Path) -> None:
     assert wrong == []
     picture = np.asarray(Image.open(tmp_path / "page.png").convert("RGB"), float)
     assert picture[:, :500].std() > 5
+
+
+def test_what_a_log_says_is_shown_as_text_and_not_run(tmp_path: Path) -> None:
+    frame = "<iframe srcdoc='<script>parent.ran = true<&#47;script>'>"
+    said = [frame, "<img src=/x onerror='ran = true'>", "{globalThis.ran = true}", "![x](/y) **bold** &lt; a_b_c"]
+    path = tmp_path / f"{frame}.mcap"
+    with Telemetry(path) as log:
+        start = time.monotonic()
+        for i in range(10 * len(said)):
+            pose = {"position": [0.01 * i, 0.0, 1.0], "quaternion": [1.0, 0.0, 0.0, 0.0]}
+            log.record("odometry", start + 0.1 * i, {**pose, "velocity": [0.0] * 3, "body_rate": [0.0] * 3})
+            if i % 10 == 0:
+                mode = said[i // 10]
+                log.record("mode", start + 0.1 * i, {"mode": mode, "previous": mode, "reasons": [mode]})
+    wrong: list[str] = []
+    with served(str(path)) as (_, address), page_of(address, wrong) as page:
+        for mode in said:
+            wait_for(page, f"globalThis.ran || text.includes({json.dumps(f'{path.name} {mode}')})")
+        assert page.evaluate("globalThis.ran") is None
+    assert wrong == []

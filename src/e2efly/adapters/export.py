@@ -5,6 +5,7 @@
 
 import copy
 import dataclasses
+import math
 import os
 import tempfile
 from pathlib import Path
@@ -28,6 +29,16 @@ OPERATORS = {
     torch.nn.Sigmoid: "Sigmoid", torch.nn.Softplus: "Softplus", torch.nn.LeakyReLU: "LeakyRelu",
 }  # fmt: skip
 """ONNX operators for activations with their default parameters."""
+EXTRACTOR = "stable_baselines3.common.torch_layers.FlattenExtractor"
+"""The features extractor that is exported: it hands the observation on."""
+POLICIES = {
+    "stable_baselines3.common.policies.ActorCriticPolicy": "PPO, A2C, TRPO",
+    "stable_baselines3.sac.policies.SACPolicy": "SAC",
+    "stable_baselines3.td3.policies.TD3Policy": "TD3, DDPG",
+    "sb3_contrib.tqc.policies.TQCPolicy": "TQC",
+}
+"""The classes of `MlpPolicy` whose deterministic action is known, and the algorithms that learn them. gSDE
+(`use_sde`) and `squash_output` included."""
 WRAPPERS = (
     "DummyVecEnv", "Monitor", "NormalizeReward", "OrderEnforcing", "PassiveEnvChecker", "RecordEpisodeStatistics",
     "RecordVideo", "SB3VecEnv", "SyncVectorEnv", "TimeLimit", "VecCheckNan", "VecMonitor", "VecNormalize",
@@ -45,12 +56,12 @@ def export(policy: Any, path: str | os.PathLike[str], env: Any = None) -> Path:
     Before the file is written, its actions are compared with those of the policy on 1000 random observations.
 
     Args:
-        policy: a model of Stable-Baselines3 (PPO, A2C, SAC, TD3 or DDPG with MlpPolicy), whose deterministic action is
-            exported, or a `torch.nn.Sequential` of linear layers and activations. Actions are clipped to [-1, 1].
+        policy: a model of Stable-Baselines3 with one of `POLICIES`, whose deterministic action is exported, or a
+            `torch.nn.Sequential` of linear layers and activations. Actions are clipped to [-1, 1].
         path: the file to write.
         env: the environment of `e2efly.adapters` in which the policy was learned, with its wrappers. The normalisation
-            of a `VecNormalize` is exported, too. May be omitted for a model of Stable-Baselines3, which knows its
-            environment.
+            of a `VecNormalize` is exported, too; a model that was learned under one is refused without it. May be
+            omitted for a model of Stable-Baselines3, which knows its environment.
 
     Returns:
         The path.
@@ -63,14 +74,16 @@ def export(policy: Any, path: str | os.PathLike[str], env: Any = None) -> Path:
     stepper, normalize = _stepper(env)
     if stepper.env.cameras:
         raise ValueError("env has cameras; accepted: a task flown by state")
-    layers, operators = _layers(policy)
+    if hasattr(policy, "predict"):
+        _check_model(policy, normalize)
+    layers, operators, most = _layers(policy)
     if (shown := layers[0][0].shape[0]) != stepper.size:
         raise ValueError(f"policy takes {shown} numbers; accepted: {stepper.size}, as its environment shows")
     if (acts := layers[-1][0].shape[1]) != 4:
         raise ValueError(f"policy returns {acts} numbers; accepted: 4, the commands of a quadrotor")
     if not all(np.isfinite(x).all() for layer in layers for x in layer):
         raise ValueError("policy has weights that are not finite; accepted: finite numbers (did the training diverge?)")
-    graph = perceptron_graph(stepper.features, layers, operators, stepper.raw, _normal(normalize))
+    graph = perceptron_graph(stepper.features, layers, operators, stepper.raw, _normal(normalize), most)
     config = dataclasses.replace(stepper.config, network=NetworkConfig())  # the preset's network does not apply
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "policy.onnx"
@@ -85,15 +98,45 @@ def _stepper(env: Any) -> tuple[Stepper, Any]:
     None.
     """
     normalize = None
-    while not hasattr(env, "stepper"):
-        name = type(env).__name__
-        if name not in WRAPPERS:
+    while "stepper" not in getattr(env, "__dict__", ()):  # a wrapper may pass on the attributes of what it wraps
+        name, package = type(env).__name__, type(env).__module__.partition(".")[0]
+        if name not in WRAPPERS or package not in ("e2efly", "gymnasium", "stable_baselines3"):
             accepted = f"an environment of e2efly.adapters, also inside of {', '.join(WRAPPERS)}"
             raise ValueError(f"env is {env!r}; accepted: {accepted}")
         normalize = env if name == "VecNormalize" else normalize
         inner = next(getattr(env, field) for field in ("venv", "envs", "env") if hasattr(env, field))
         env = inner[0] if isinstance(inner, list | tuple) else inner
     return env.stepper, normalize
+
+
+def _check_model(model: Any, normalize: Any) -> None:
+    """Refuse a model of Stable-Baselines3 whose environment acts or shows otherwise than the one that is exported."""
+    low, high = (np.asarray(getattr(model.action_space, end, np.nan)) for end in ("low", "high"))
+    if not (np.all(low == -1) and np.all(high == 1)):
+        raise ValueError(
+            f"policy acts in {model.action_space}; accepted: [-1, 1], as the environments of e2efly.adapters"
+        )
+    own = None
+    if model.get_env() is not None:
+        own = _stepper(model.get_env())[1]
+    # what `VecNormalize` was given stands in the model's file, too
+    learned = model._last_obs is not None
+    under = own is not None or model._last_original_obs is not None
+    pickled = "VecNormalize.load('vecnormalize.pkl', SB3VecEnv(...)), which was saved with the model"
+    if under and normalize is None:
+        raise ValueError(f"policy was learned under a VecNormalize, and env has none; accepted: env={pickled}")
+    if normalize is None or not normalize.norm_obs:
+        return
+    if learned and not under:
+        raise ValueError("env has a VecNormalize, without which policy was learned; accepted: env without it")
+    if learned and normalize.obs_rms.count < 1:
+        raise ValueError(f"env has a VecNormalize that has seen no observation; accepted: env={pickled}")
+    if (
+        own is not None
+        and own.norm_obs
+        and not all(np.array_equal(getattr(own.obs_rms, x), getattr(normalize.obs_rms, x)) for x in ("mean", "var"))
+    ):
+        raise ValueError("env has another VecNormalize than policy, with other statistics; accepted: that of policy")
 
 
 def _normal(normalize: Any) -> tuple[np.ndarray, np.ndarray, float] | None:
@@ -104,19 +147,25 @@ def _normal(normalize: Any) -> tuple[np.ndarray, np.ndarray, float] | None:
     return rms.mean, np.sqrt(rms.var + normalize.epsilon), float(normalize.clip_obs)
 
 
-def _layers(policy: Any) -> tuple[Layers, list[str]]:
-    """Weights and biases of each linear layer, and the operator after it (after the last: Tanh or Identity)."""
+def _layers(policy: Any) -> tuple[Layers, list[str], float]:
+    """Weights and biases of each linear layer, the operator after it (after the last: Tanh or Identity), and the
+    largest action.
+    """
     network, squashed = _network(policy)
+    leaves, most = _leaves(network), math.inf
+    if leaves and isinstance(last := leaves[-1], torch.nn.Hardtanh) and last.min_val == -last.max_val:
+        most = math.tanh(last.max_val) if squashed else last.max_val  # gSDE limits the mean, before the tangent
+        leaves.pop()
     layers: Layers = []
     operators: list[str] = []
-    for part in _leaves(network):
-        if isinstance(part, torch.nn.Linear):
+    for part in leaves:
+        if type(part) is torch.nn.Linear:
             operators += ["Identity"] * (len(layers) - len(operators))
             bias = torch.zeros(part.out_features) if part.bias is None else part.bias
             layers.append((_float32(part.weight.T), _float32(bias)))
         elif type(part) in OPERATORS and len(layers) == len(operators) + 1:
             operators.append(OPERATORS[type(part)])
-        elif not isinstance(part, torch.nn.Identity | torch.nn.Flatten | torch.nn.Dropout):
+        elif type(part) not in (torch.nn.Identity, torch.nn.Flatten, torch.nn.Dropout):
             accepted = ", ".join(kind.__name__ for kind in OPERATORS)
             raise ValueError(f"policy has a layer {part!r}; accepted: Linear, each with one of {accepted}")
     if not layers:
@@ -124,7 +173,7 @@ def _layers(policy: Any) -> tuple[Layers, list[str]]:
     last = operators.pop() if len(operators) == len(layers) else "Identity"
     if last not in ("Tanh", "Identity"):
         raise ValueError(f"policy ends with the activation {last}; accepted: Tanh, or none")
-    return layers, [*operators, "Tanh" if squashed else last]
+    return layers, [*operators, "Tanh" if squashed else last], most
 
 
 def _network(policy: Any) -> tuple[torch.nn.Sequential, bool]:
@@ -133,19 +182,23 @@ def _network(policy: Any) -> tuple[torch.nn.Sequential, bool]:
     actor: Any = getattr(learned, "actor", learned)
     if _is_recurrent(actor):
         raise ValueError(f"policy {type(policy).__name__} is recurrent; accepted: networks without memory")
-    if isinstance(actor, torch.nn.Sequential):
+    if type(actor) is torch.nn.Sequential:
         return actor, False
-    extractor = type(getattr(actor, "features_extractor", None)).__name__
-    if extractor not in ("NoneType", "FlattenExtractor"):
+    if (kind := _kind(learned)) not in POLICIES:
+        raise ValueError(
+            f"policy is a {kind}; accepted: {', '.join(POLICIES.values())} of "
+            "Stable-Baselines3 with MlpPolicy itself, or a torch.nn.Sequential"
+        )
+    if (extractor := _kind(actor.features_extractor)) != EXTRACTOR:
         raise ValueError(f"policy extracts features by {extractor}; accepted: MlpPolicy's FlattenExtractor")
     if hasattr(actor, "action_net"):
         return torch.nn.Sequential(actor.mlp_extractor.policy_net, actor.action_net), actor.squash_output
-    if hasattr(actor, "mu"):
-        return torch.nn.Sequential(getattr(actor, "latent_pi", torch.nn.Identity()), actor.mu), True
-    raise ValueError(
-        f"policy is a {type(policy).__name__}; accepted: PPO, A2C, SAC, TD3 or DDPG of Stable-Baselines3 with "
-        "MlpPolicy, or a torch.nn.Sequential"
-    )
+    return torch.nn.Sequential(getattr(actor, "latent_pi", torch.nn.Identity()), actor.mu), True
+
+
+def _kind(thing: Any) -> str:
+    """Module and name of a class: a class of the same name in another place is another one."""
+    return f"{type(thing).__module__}.{type(thing).__qualname__}"
 
 
 def _is_recurrent(network: Any) -> bool:
@@ -154,7 +207,7 @@ def _is_recurrent(network: Any) -> bool:
 
 
 def _leaves(part: torch.nn.Module) -> list[torch.nn.Module]:
-    if not isinstance(part, torch.nn.Sequential):
+    if type(part) is not torch.nn.Sequential:
         return [part]
     return [leaf for child in part for leaf in _leaves(child)]
 

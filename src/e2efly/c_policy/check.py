@@ -3,7 +3,7 @@
 import numpy as np
 
 from e2efly.c_policy.exact import Exact
-from e2efly.c_policy.header import Precision, image_size, member
+from e2efly.c_policy.header import Precision, image_name, image_size
 from e2efly.c_policy.text import array, comment, number
 from e2efly.deploy.policy.contract import ACTION_SIZE, Contract
 from e2efly.deploy.policy.draws import random_images, random_observations
@@ -31,7 +31,7 @@ def check_source(contract: Contract, content: bytes, name: str, precision: Preci
     memory, actions = np.zeros((1, contract.memory_size)), np.empty((STEPS, ACTION_SIZE))
     for k in range(STEPS):
         actions[k], memory = exact.act(observation[k : k + 1], [x[k : k + 1] for x in images], memory)
-    given = "".join(f" {member(image.name)} + {image_size(image)} * (k % {STEPS})," for image in contract.images)
+    given = "".join(f" {image_name(image.name)} + {image_size(image)} * (k % {STEPS})," for image in contract.images)
     return "\n".join(
         [
             comment(
@@ -40,7 +40,7 @@ def check_source(contract: Contract, content: bytes, name: str, precision: Preci
             f'#include "{name}.h"\n\n#include <math.h>\n#include <stdio.h>\n#include <time.h>\n',
             array("static const float", "observation", map(number, observation.reshape(-1))),
             *(
-                array("static const float", member(i.name), map(number, x.reshape(-1)))
+                array("static const float", image_name(i.name), map(number, x.reshape(-1)))
                 for i, x in zip(contract.images, images, strict=True)
             ),
             array("static const double", "wanted", map(repr, actions.reshape(-1).tolist())),

@@ -17,19 +17,6 @@ BYTES: dict[Precision, int] = {"double": 8, "float": 4}
 """Bytes of a number in each precision."""
 
 
-KEYWORDS = frozenset(
-    {
-        "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum",
-        "extern", "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return",
-        "short", "signed", "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void",
-        "volatile", "while", "class", "delete", "explicit", "export", "false", "friend", "mutable", "namespace",
-        "new", "operator", "private", "protected", "public", "template", "this", "throw", "true", "try",
-        "typename", "using", "virtual", "and", "or", "not", "xor", "bool", "catch",
-    }
-)  # fmt: skip
-"""Words that C or C++ does not accept as a name."""
-
-
 @dataclass(frozen=True)
 class Sizes:
     """The memory that a policy needs."""
@@ -69,10 +56,39 @@ def image_size(image: Image) -> int:
     return height * width * (colours[0] if colours else 1)
 
 
-def member(name: str) -> str:
-    """The name of an observation field or an image as a valid C name."""
-    plain = re.sub(r"\W", "_", name, flags=re.ASCII)
-    return plain if re.match(r"[A-Za-z]", plain) and plain not in KEYWORDS else f"field_{plain}"
+def field_name(name: str) -> str:
+    """The name of an observation field in C. With its prefix, it is no keyword or macro of any version of C or C++."""
+    return f"field_{_plain(name)}"
+
+
+def image_name(name: str) -> str:
+    """The name of an image in C. See `field_name`."""
+    plain = _plain(name)
+    return plain if plain.startswith("image_") else f"image_{plain}"
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[\W_]+", "_", name, flags=re.ASCII)
+
+
+def check_names(contract: Contract) -> None:
+    """Check that the fields and the images have different names in C, where macros have them in capital letters.
+
+    Raises:
+        ValueError: naming both.
+    """
+    for kind, named, names in (
+        ("fields", field_name, [field.name for field in contract.observation]),
+        ("images", image_name, [image.name for image in contract.images]),
+    ):
+        taken: dict[str, str] = {}
+        for name in names:
+            other = taken.setdefault(named(name).upper(), name)
+            if other != name:
+                raise ValueError(
+                    f"the {kind} {other!r} and {name!r} are both {named(name)} in C; accepted: names that differ in "
+                    "their letters and digits, whatever their case"
+                )
 
 
 def header(contract: Contract, name: str, digest: str, needs: Sizes, precision: Precision) -> str:
@@ -143,6 +159,11 @@ def _about(c: Contract, big: str, digest: str, needs: Sizes) -> str:
         for key, (least, most) in vars(c.vehicle_ranges).items():
             lines.append(f"#define {big}_VEHICLE_{key.upper()}_MIN {number(least)}")
             lines.append(f"#define {big}_VEHICLE_{key.upper()}_MAX {number(most)}")
+    if c.courses:
+        lines.append(comment("The courses and worlds that it was trained for, in SI units:"))
+        for part in c.courses:
+            lines.append(f"#define {big}_COURSE_{part.name.upper()}_MIN {number(part.low)}")
+            lines.append(f"#define {big}_COURSE_{part.name.upper()}_MAX {number(part.high)}")
     return "\n".join(lines) + "\n"
 
 
@@ -157,13 +178,13 @@ def _fields(c: Contract, name: str) -> str:
     for part in c.observation:
         if part.name != PAST_ACTIONS:
             about = f"{part.unit}, frame {part.frame}, scale {part.scale:g}: {part.description}"
-            lines += [comment(about, "    "), f"    float {member(part.name)}[{part.size}];"]
+            lines += [comment(about, "    "), f"    float {field_name(part.name)}[{part.size}];"]
     lines.append(f"}} {name}_seen;\n")
     lines.append(comment("Where each field begins in the observation."))
-    starts = [f"    {name.upper()}_AT_{member(n).upper()} = {part.start}" for n, part in c.slices.items()]
+    starts = [f"    {name.upper()}_AT_{_plain(n).upper()} = {part.start}" for n, part in c.slices.items()]
     lines += ["enum {", ",\n".join(starts), "};\n"]
     for image in c.images:
-        big = f"{name.upper()}_{member(image.name).upper()}"
+        big = f"{name.upper()}_{image_name(image.name).upper()}"
         about = (
             f"{image.name}: {image.sees}{'' if image.sees != 'mask' else f' of {image.of}'}, {image.projection}, "
             f"field of view {image.fov_rad[0]:.6g} x {image.fov_rad[1]:.6g} rad; the camera at "
@@ -195,7 +216,7 @@ def _state(c: Contract, name: str, needs: Sizes, precision: Precision) -> str:
 
 
 def _calls(c: Contract, name: str) -> str:
-    big, images = name.upper(), "".join(f" const float *{member(image.name)}," for image in c.images)
+    big, images = name.upper(), "".join(f" const float *{image_name(image.name)}," for image in c.images)
     low, high = c.action.limits
     commands = "; ".join(
         f"{field} {a:g} to {b:g} {unit}"

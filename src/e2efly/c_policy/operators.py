@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import accumulate
 
-import numpy as np
 from onnx import NodeProto
 
 from e2efly.c_policy.program import Operand, Program, Shape
@@ -58,31 +57,22 @@ def _each(node: NodeProto, program: Program, shape: Shape, reads: Given, express
 def _unary(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     (x,) = given
     form, default = SLOPED.get(node.op_type) or (UNARY[node.op_type], None)
-    alpha = default and number(attributes(node, alpha=default)["alpha"])
-    if default is None:
-        attributes(node)
+    alpha = default and number(attributes(node).get("alpha", default))
     return _each(node, program, x.shape, given, form.format(x.at("i"), alpha=alpha))
 
 
 def _binary(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    attributes(node)
-    if len(given) != 2:
-        raise ValueError(f"has {len(given)} inputs; accepted: 2")
     shape = _common(given)
     return _each(node, program, shape, given, BINARY[node.op_type].format(*(x.at("i") for x in given)))
 
 
 def _where(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    attributes(node)
     condition, a, b = given
     expression = f"{condition.at('i')} > 0.0f ? {a.at('i')} : {b.at('i')}"
     return _each(node, program, _common(given), given, expression)
 
 
 def _clip(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    attributes(node)
-    if len(given) != 3 or given[1].size != 1 or given[2].size != 1:
-        raise ValueError("has other inputs than an array and two numbers")
     x = given[0]
     v, a, b = (operand.at("i") for operand in given)
     return _each(node, program, x.shape, given, f"{v} < {a} ? {a} : {v} > {b} ? {b} : {v}")
@@ -102,27 +92,17 @@ def _tight(shape: Shape) -> Shape:
 
 
 def _identity(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    del program
-    attributes(node)
+    del node, program
     return list(given)
 
 
 def _gemm(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    about = attributes(node, alpha=1.0, beta=1.0, transA=0, transB=0)
-    x, weight = given[:2]
-    if about["alpha"] != 1.0 or about["beta"] != 1.0 or about["transA"] or weight.value is None or len(x.shape) != 1:
-        raise ValueError("is other than x W + b with constant W")
-    matrix = weight.value.T if about["transB"] else weight.value
-    bias = given[2].value if len(given) > 2 else np.zeros(1, np.float32)
-    if bias is None or matrix.ndim != 2 or matrix.shape[0] != x.size or bias.size not in (1, matrix.shape[1]):
-        raise ValueError(f"has inputs of the shapes {[x.shape for x in given]}; accepted: (k,), (k, n) and (n,)")
-    return [_linear(node, x, matrix, np.broadcast_to(bias.reshape(-1), matrix.shape[1]), program)]
-
-
-def _linear(node: NodeProto, x: Operand, matrix: np.ndarray, bias: np.ndarray, program: Program) -> Operand:
     """A matrix product, computed row by row of the matrix, so that the compiler can vectorise over the outputs."""
+    x, matrix, bias = given
+    assert matrix.value is not None
+    assert bias.value is not None
     rows, columns = matrix.shape
-    weight, start = program.constant("weight", matrix), program.constant("bias", bias)
+    weight, start = program.constant("weight", matrix.value), program.constant("bias", bias.value)
     out = program.buffer((columns,))
     lines = [f"for (int j = 0; j < {columns}; j++) {out.text}[j] = {start.text}[j];"]
     blocks = rows // BLOCK * BLOCK
@@ -138,14 +118,11 @@ def _linear(node: NodeProto, x: Operand, matrix: np.ndarray, bias: np.ndarray, p
         term = f"{x.text}[{row}] * {weight.text}[j + {row * columns}]"
         lines.append(f"for (int j = 0; j < {columns}; j++) {out.text}[j] += {term};")
     program.step(f"{node.op_type}, {rows} to {columns}", lines, [x], out)
-    return out
+    return [out]
 
 
 def _matmul(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    attributes(node)
     a, b = given
-    if len(a.shape) != 2 or len(b.shape) != 2 or a.shape[1] != b.shape[0]:
-        raise ValueError(f"has inputs of the shapes {a.shape} and {b.shape}; accepted: (m, k) and (k, n)")
     (m, k), n = a.shape, b.shape[1]
     out = program.buffer((m, n))
     terms = " + ".join(f"{a.text}[{k} * i + {q}] * {b.text}[j + {n * q}]" for q in range(k))
@@ -157,13 +134,9 @@ def _matmul(node: NodeProto, given: Given, program: Program) -> list[Operand]:
 
 
 def _gather(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    about = attributes(node, axis=0)
     x, index = given
-    if about["axis"] != 1 or len(x.shape) != 1 or index.value is None or index.value.ndim != 1:
-        raise ValueError("is other than of constant columns")
-    places = [int(i) + (x.size if i < 0 else 0) for i in index.value]
-    if not all(0 <= place < x.size for place in places):
-        raise ValueError(f"has the places {places}; accepted: 0 to {x.size - 1}")
+    assert index.value is not None
+    places = [int(i) for i in index.value]
     out = program.buffer((len(places),))
     if places:
         table = program.table(places)
@@ -173,25 +146,15 @@ def _gather(node: NodeProto, given: Given, program: Program) -> list[Operand]:
 
 
 def _reshape(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    del program
-    about = attributes(node, allowzero=0)
+    del node, program
     x, wanted = given
-    if wanted.value is None or about["allowzero"] or not len(wanted.value) or int(wanted.value[0]) not in (0, 1):
-        raise ValueError("is other than to a constant shape behind the batch axis")
-    shape = [x.shape[i] if n == 0 else int(n) for i, n in enumerate(wanted.value[1:])]
-    if shape.count(-1) == 1:
-        shape[shape.index(-1)] = x.size // -math.prod(shape) if math.prod(shape) else 0
-    if math.prod(shape) != x.size or min(shape, default=1) < 0:
-        raise ValueError(f"is from {x.shape} to {tuple(wanted.value[1:])}; accepted: of as many numbers")
-    return [replace(x, shape=tuple(shape))]
+    assert wanted.value is not None
+    return [replace(x, shape=tuple(x.shape[i] if n == 0 else int(n) for i, n in enumerate(wanted.value[1:])))]
 
 
 def _transpose(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     (x,) = given
-    order = list(attributes(node, perm=())["perm"])
-    if sorted(order) != list(range(len(x.shape) + 1)) or order[0] != 0:
-        raise ValueError(f"has perm {order}; accepted: the batch axis first, then each of the other axes")
-    axes = [axis - 1 for axis in order[1:]]
+    axes = [axis - 1 for axis in attributes(node)["perm"][1:]]
     shape = tuple(x.shape[axis] for axis in axes)
     kept = [axis for axis in axes if x.shape[axis] != 1]
     if kept == sorted(kept):  # the numbers keep their order
@@ -210,8 +173,6 @@ def _strides(shape: Shape) -> list[int]:
 
 
 def _concat(node: NodeProto, given: Given, program: Program) -> list[Operand]:
-    if attributes(node, axis=1)["axis"] != 1 or len({x.shape[1:] for x in given}) != 1:
-        raise ValueError(f"is of the shapes {[x.shape for x in given]}; accepted: along the first axis")
     out = program.buffer((sum(x.shape[0] for x in given), *given[0].shape[1:]))
     starts = accumulate((x.size for x in given), initial=0)
     lines = [
@@ -226,8 +187,6 @@ def _concat(node: NodeProto, given: Given, program: Program) -> list[Operand]:
 def _split(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     del program
     x, count = given[0], len(node.output)
-    if attributes(node, axis=0)["axis"] != 1 or len(given) != 1 or x.shape[0] % count:
-        raise ValueError("is other than into equal parts of the first axis")
     shape = (x.shape[0] // count, *x.shape[1:])
     return [replace(x, text=f"({x.text} + {part * math.prod(shape)})", shape=shape) for part in range(count)]
 

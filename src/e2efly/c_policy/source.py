@@ -8,7 +8,18 @@ from hashlib import sha256
 import numpy as np
 
 from e2efly.c_policy.graph import network
-from e2efly.c_policy.header import BYTES, Precision, Sizes, header, image_size, member, past_actions, sizes
+from e2efly.c_policy.header import (
+    BYTES,
+    Precision,
+    Sizes,
+    check_names,
+    field_name,
+    header,
+    image_name,
+    image_size,
+    past_actions,
+    sizes,
+)
 from e2efly.c_policy.program import Operand, Program, layout
 from e2efly.c_policy.text import array, comment, number
 from e2efly.deploy.policy.contract import ACTION_SIZE, Contract
@@ -36,10 +47,11 @@ def sources(contract: Contract, content: bytes, name: str, precision: Precision)
         precision: the precision in which the network computes.
 
     Raises:
-        ValueError: for a graph that cannot be converted to C.
+        ValueError: for a graph that cannot be converted to C, and for names that would be the same in C.
     """
+    check_names(contract)
     inputs = {INPUT: Operand("observation", (contract.observation_size,))}
-    inputs |= {image.name: Operand(member(image.name), image.shape) for image in contract.images}
+    inputs |= {image.name: Operand(image_name(image.name), image.shape) for image in contract.images}
     if contract.memory_size:
         inputs[MEMORY] = Operand("state->memory", (contract.memory_size,))
     graph = network(content, inputs)
@@ -64,7 +76,7 @@ def sources(contract: Contract, content: bytes, name: str, precision: Precision)
 
 
 def _images(contract: Contract) -> str:
-    return "".join(f" const float *{member(image.name)}," for image in contract.images)
+    return "".join(f" const float *{image_name(image.name)}," for image in contract.images)
 
 
 def _network(c: Contract, name: str, program: Program, places: list[int], outputs: dict[str, Operand]) -> str:
@@ -118,7 +130,7 @@ def _in_range(c: Contract, big: str) -> list[str]:
     lines = []
     for image in c.images:
         low, high = image.limits
-        room, x = IMAGE_ROUNDING * (high - low), f"{member(image.name)}[i]"
+        room, x = IMAGE_ROUNDING * (high - low), f"{image_name(image.name)}[i]"
         lines += [
             f"    for (int i = 0; i < {image_size(image)}; i++)",
             f"        if (!({x} >= {number(low - room)} && {x} <= {number(high + room)})) return {big}_BAD_IMAGE;",
@@ -133,14 +145,14 @@ def _around(c: Contract, name: str) -> str:
     begin += [f"    for (int i = 0; i < {past}; i++) state->past_actions[i] = hover_action[i % 4];"] if past else []
     copies = [
         f"    for (int i = 0; i < {field.size}; i++) state->observation[{c.slices[field.name].start} + i] = "
-        + (f"state->{PAST_ACTIONS}[i];" if field.name == PAST_ACTIONS else f"seen->{member(field.name)}[i];")
+        + (f"state->{PAST_ACTIONS}[i];" if field.name == PAST_ACTIONS else f"seen->{field_name(field.name)}[i];")
         for field in c.observation
     ]
     shift = [
         f"    for (int i = {past - 1}; i >= 4; i--) state->past_actions[i] = state->past_actions[i - 4];",
         "    for (int i = 0; i < 4; i++) state->past_actions[i] = action[i];",
     ]
-    given = "".join(f" {member(image.name)}," for image in c.images)
+    given = "".join(f" {image_name(image.name)}," for image in c.images)
     span = np.asarray(c.action.high) - np.asarray(c.action.low)
     return "\n".join(
         [

@@ -14,24 +14,14 @@ Given = Sequence[Operand]
 """The operands that a node reads."""
 
 
-def attributes(node: NodeProto, **known: Any) -> dict[str, Any]:
-    """The attributes of a node, with defaults.
-
-    Raises:
-        ValueError: for an attribute that is not in `known`.
-    """
-    found = {entry.name: helper.get_attribute_value(entry) for entry in node.attribute}
-    if unknown := sorted(set(found) - set(known)):
-        raise ValueError(f"has the attribute {unknown[0]}; accepted: {', '.join(known) or 'none'}")
-    return known | found
+def attributes(node: NodeProto) -> dict[str, Any]:
+    """The attributes of a node."""
+    return {entry.name: helper.get_attribute_value(entry) for entry in node.attribute}
 
 
 def norm(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     """The square root of the sum of the squares of an image."""
     (x,) = given
-    about = attributes(node, axes=(), keepdims=1)
-    if sorted(about["axes"]) != list(range(1, len(x.shape) + 1)) or not about["keepdims"]:
-        raise ValueError(f"is over the axes {list(about['axes'])}; accepted: all but the batch axis, which stay as 1")
     out = program.buffer((1,) * len(x.shape))
     lines = [
         "real sum = 0.0f;",
@@ -42,15 +32,10 @@ def norm(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     return [out]
 
 
-def _window(node: NodeProto, x: Operand, **more: Any) -> tuple[list[int], list[int], Shape]:
+def _window(node: NodeProto, x: Operand) -> tuple[list[int], list[int], Shape]:
     """The sides and strides of a window that never reaches beyond the rows and columns, and its positions."""
-    plain = {"auto_pad": b"NOTSET", "ceil_mode": 0, "storage_order": 0, "count_include_pad": 0, "group": 1}
-    about = attributes(node, kernel_shape=None, strides=[1, 1], pads=[0] * 4, dilations=[1, 1], **plain, **more)
+    about = attributes(node)
     sides, strides = about["kernel_shape"], list(about["strides"])
-    odd = [key for key, value in plain.items() if about[key] != value]
-    odd += [key for key, value in (("pads", [0] * 4), ("dilations", [1, 1])) if list(about[key]) != value]
-    if odd or len(x.shape) != 3 or sides is None or len(sides) != 2:
-        raise ValueError(f"has {', '.join(odd) or 'no kernel_shape'}; accepted: a window of an image, without padding")
     places = tuple((n - side) // stride + 1 for n, side, stride in zip(x.shape[1:], sides, strides, strict=True))
     return list(sides), strides, places
 
@@ -81,16 +66,13 @@ def pool(node: NodeProto, given: Given, program: Program) -> list[Operand]:
 
 def convolution(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     """Convolution: sums over windows of an image, weighted by filters."""
-    x, kernel = given[:2]
-    if kernel.value is None or kernel.value.ndim != 4 or (len(given) > 2 and given[2].value is None):
-        raise ValueError("is other than with a constant kernel and bias")
+    x, kernel, bias = given
+    assert kernel.value is not None
+    assert bias.value is not None
     (h, w), (down, right), (rows, columns) = _window(node, x)
     filters = kernel.value.shape[0]
-    if kernel.value.shape[1:] != (x.shape[0], h, w):
-        raise ValueError(f"has a kernel of the shape {kernel.shape}; accepted: (n, {x.shape[0]}, {h}, {w})")
-    bias = given[2].value if len(given) > 2 else np.zeros(filters)
     weight = program.constant("kernel", np.moveaxis(kernel.value, 0, -1).reshape(-1, filters))
-    start = program.constant("bias", np.asarray(bias))
+    start = program.constant("bias", bias.value)
     channels, height, width = x.shape
     # the sums of all filters are stored side by side after the output, so that the compiler can vectorise
     both = program.buffer((filters * (rows * columns + 1),))

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from e2efly.c_policy.check import check_source
-from e2efly.c_policy.header import KEYWORDS, Precision, Sizes, image_size
+from e2efly.c_policy.header import Precision, Sizes, image_size
 from e2efly.c_policy.source import sources
 from e2efly.deploy.policy.contract import Contract
 from e2efly.deploy.policy.loader import load_policy
@@ -34,14 +34,15 @@ def write_c(
             graph that cannot be converted to C, and a path that is not a folder.
         OSError: when a file cannot be written.
     """
-    if not re.fullmatch(r"[a-z][a-z0-9_]{0,30}", name) or name in KEYWORDS:
+    if not re.fullmatch(r"[a-z][a-z0-9_]{0,30}", name):
         raise ValueError(f"--name is {name!r}; accepted: a name of C: a to z, then a to z, 0 to 9 and _, 31 at most")
     for option, limit in (("memory", memory), ("flash", flash)):
         if limit is not None and not limit > 0:
             raise ValueError(f"--{option} is {limit}; accepted: more than 0 KiB")
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"--c is {str(folder)!r}, a file; accepted: a folder, which is made where it is not there")
-    contract, content = load_policy(file).contract, file.read_bytes()
+    policy = load_policy(file)
+    contract, content = policy.contract, policy.content
     try:
         made = sources(contract, content, name, precision)
     except ValueError as error:

@@ -13,6 +13,7 @@ from rich.console import Console
 
 from e2efly import presets
 from e2efly.config import TrainConfig
+from e2efly.config.train import criterion
 from e2efly.device import prepare
 from e2efly.storage import held, write_atomically, write_json
 from e2efly.terminal import Terminal, TerminalProgress, console_table, markdown
@@ -75,12 +76,15 @@ def _ablate(options: Ablate, configs: dict[tuple[str, str], TrainConfig], consol
         for task in options.tasks:
             began = time.perf_counter()
             curves = known[algo, task] or _curves(options, configs[algo, task], console)
-            panels.append(Panel(task, curves, configs[algo, task].task.shows_error))
-            rows = _rows(curves)
+            vehicles = _vehicles(configs[algo, task])
+            rows = _rows(curves, 100 * criterion(None, vehicles))
+            panels.append(Panel(f"{task}, {vehicles}", curves, configs[algo, task].task.shows_error))
             took = "as found" if known[algo, task] else f"in {time.perf_counter() - began:.0f} s"
-            console.print(f"\n{task} by {algo.upper()}: {len(curves.variants)} rewards, {options.seeds} seeds, {took}")
+            console.print(
+                f"\n{task} by {algo.upper()}: {len(curves.variants)} rewards, {options.seeds} seeds, {vehicles}, {took}"
+            )
             console.print(console_table(rows))
-            lines += [f"## {task} by {algo.upper()}", "", *markdown(rows), ""]
+            lines += [f"## {task} by {algo.upper()}, {vehicles}", "", *markdown(rows), ""]
         path = options.out / f"ablation_{algo}.png"
         plot_ablation(panels, path, f"What each reward term is good for: {algo.upper()}")
         console.print(f"Figure: {path}")
@@ -97,6 +101,13 @@ def _config(options: Ablate, task: str, algo: str) -> TrainConfig:
         config = dataclasses.replace(config, env=dataclasses.replace(config.env, past_actions=options.past_actions))
     presets.check(config)
     return config
+
+
+def _vehicles(config: TrainConfig) -> str:
+    """The name of what flies."""
+    from e2efly.env import Env
+
+    return Env.of(config.task, config.reward, config.env).vehicles
 
 
 def _path(options: Ablate, config: TrainConfig) -> Path:
@@ -143,7 +154,7 @@ def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
             nonlocal best
             best = max(best, success)
             done = share * steps
-            progress.progress(int(done), steps, done / (time.perf_counter() - began), success, best, "")
+            progress.progress(int(done), steps, done / (time.perf_counter() - began), success, best, _vehicles(config))
 
         kept = Kept(_path(options, config).with_suffix(".safetensors"), _about(options, config))
         curves = ablate(config, options.seeds, told, kept, options.by)
@@ -159,19 +170,19 @@ def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
     return curves
 
 
-def _rows(curves: Any) -> list[dict[str, str]]:
-    """One row per variant: its last evaluation, over all seeds."""
+def _rows(curves: Any, learned: float) -> list[dict[str, str]]:
+    """One row per variant: its last evaluation, over all seeds, and when it was learned, at this success, %."""
     from e2efly.view.ablation import worst
 
     success, error = worst(curves, False), worst(curves, True)
-    reached = [np.flatnonzero(s.mean(axis=0) >= 95.0) for s in success]
+    reached = [np.flatnonzero(s.mean(axis=0) >= learned) for s in success]
     return [
         {
             "reward": variant if i == 0 else f"without {variant}",
             "success": f"{success[i, :, -1].mean():.1f} %",
             "worst seed": f"{success[i, :, -1].min():.1f} %",
             "error": f"{100 * error[i, :, -1].mean():.1f} cm",
-            "95 % at": f"{curves.steps[reached[i][0]] / 1e6:.2f} M" if len(reached[i]) else "-",
+            f"{learned:g} % at": f"{curves.steps[reached[i][0]] / 1e6:.2f} M" if len(reached[i]) else "-",
         }
         for i, variant in enumerate(curves.variants)
     ]

@@ -9,6 +9,7 @@ import numpy as np
 import tyro
 from rich.table import Table
 
+from e2efly.commands.reading import LogOptions, show_notes
 from e2efly.storage import write_json
 from e2efly.terminal import Terminal
 from e2efly.vehicles import Vehicle, load_vehicle
@@ -39,8 +40,7 @@ class Align:
     pose_delay: float | None = None
     """Age of the poses when a command is made from them, s. Commands and body rates do not show this part of the
     vehicle's latency. If omitted, the value in the logs (our .mcap has it), otherwise 0."""
-    columns: tuple[str, ...] = ()
-    """Maps the column names of a CSV log to ours: OURS=THEIRS or OURS=THEIRS*FACTOR, as in wx=gyro_x*0.01745."""
+    read: tyro.conf.OmitArgPrefixes[LogOptions] = LogOptions()
 
 
 def run(options: Align) -> int:
@@ -52,7 +52,6 @@ def run(options: Align) -> int:
     from e2efly.device import prepare
     from e2efly.identification.align import align, refused
     from e2efly.identification.checks import checked
-    from e2efly.identification.csv_file import column_map
     from e2efly.identification.flight import driver_of
     from e2efly.identification.readers import read_flights
     from e2efly.identification.vehicle_file import write_vehicle
@@ -63,14 +62,14 @@ def run(options: Align) -> int:
         raise ValueError("logs are missing; accepted: one flight log or more")
     if options.pose_delay is not None and not 0 <= options.pose_delay <= 1:
         raise ValueError(f"--pose-delay is {options.pose_delay}; accepted: 0 to 1 s")
-    vehicle, columns = load_vehicle(options.vehicle), column_map(options.columns)
-    read = [record for path in options.logs for record in read_flights(path, columns)]
+    vehicle, reading = load_vehicle(options.vehicle), options.read.reading()
+    read = [record for path in options.logs for record in read_flights(path, reading)]
+    show_notes(read, console)
     driver_of(read, step=True)
     records = checked(read, vehicle)
+    show_notes(records, console, read)
     for record in records:
         console.print(f"{record.path.name}: {record.duration:.1f} s")
-        for note in record.notes:
-            console.print(f"  {note}", style="dim")
     pose_delay, how, known = pose_delay_of(options.pose_delay, records)
     console.print(how, style="dim" if known else "bold")
     prepare("cpu")

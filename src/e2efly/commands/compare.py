@@ -10,7 +10,7 @@ from e2efly.terminal import Terminal, console_table
 
 @dataclass(frozen=True)
 class Compare:
-    """Compare runs side by side: the options that differ, when each run reached 99 % success, and its final success.
+    """Compare runs side by side: the options that differ, when each run reached its criterion, and its final success.
 
     Write a table and a plot.
     """

@@ -20,7 +20,7 @@ from e2efly.vehicles import Controller
 from e2efly.zoo import beside
 
 if TYPE_CHECKING:
-    from e2efly.evaluation import Candidate
+    from e2efly.evaluation import Candidate, Evaluation
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def run(asked: Asked) -> int:
     found = evaluate(o.policy, o.episodes, env=asked.env, task=asked.task, **_flies(o), kept=ROW if o.json else 0)
     for note in found.candidate.notes:
         console.print(note, style="dim")
-    console.print(_table(found.flown, o.episodes, found.candidate.task.precision not in TIMED))
+    console.print(_table(found, o.episodes))
     if o.json:
         write_json(o.json, found.as_json())
         console.print(f"Report: {o.json}")
@@ -146,12 +146,15 @@ def _folder(o: Eval, flew: "Candidate") -> Path:
     return o.plots or (flew.run.plots if flew.run else beside(flew.file) / "plots")
 
 
-def _table(flown: dict[str, Any], episodes: int, errs: bool) -> Table:
-    """Success, then failures by cause, then quality. `errs`: whether the distance from the goal is meaningful."""
+def _table(evaluated: "Evaluation", episodes: int) -> Table:
+    """Success, then failures by cause, then quality."""
     from e2efly.episodes import summary
 
-    found = {name: summary(e) for name, e in flown.items()}
-    table = Table(f"of {episodes} starts", *found, box=None, header_style="bold", pad_edge=False)
+    found = {name: summary(e) for name, e in evaluated.flown.items()}
+    errs = evaluated.candidate.task.precision not in TIMED  # the distance from the goal is meaningful
+    table = Table(
+        f"of {episodes} starts, {evaluated.candidate.vehicles}", *found, box=None, header_style="bold", pad_edge=False
+    )
 
     def row(heading: str, show: Callable[[dict[str, Any]], str]) -> None:
         table.add_row(heading, *(show(s) for s in found.values()))

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import tyro
 
 from e2efly import __version__
-from e2efly.commands.fly_check import look, refuse_in_flight, settings_table
+from e2efly.commands.fly_check import look, print_settings, refuse_in_flight
 from e2efly.commands.options import parse as parse_options
-from e2efly.deploy.betaflight.check import Row, check_hover, examine, hover_schedule, problems
+from e2efly.deploy.betaflight.check import check_hover, examine, hover_schedule
 from e2efly.deploy.betaflight.client import SCHEDULE, Client
 from e2efly.deploy.betaflight.controller import ControllerInfo, identify
 from e2efly.deploy.betaflight.link import Link, open_link
+from e2efly.deploy.betaflight.row import Row, problems
 from e2efly.deploy.betaflight.watchdog import WatchedLink
 from e2efly.deploy.bridge import Bridge
 from e2efly.deploy.commander.commander import Commander, CommandSource
@@ -43,7 +44,7 @@ from e2efly.deploy.sight.sources import open_cameras
 from e2efly.deploy.terminal import Speaker, Stop
 from e2efly.learn.rundir import run_of
 from e2efly.process import raise_at_interrupt
-from e2efly.tasks.route import Route, course_for, fields_of, route_of
+from e2efly.tasks.route import Route, course_for, fields_of, goal_notes, route_of
 from e2efly.terminal import Terminal
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.zoo import policy_file
@@ -82,8 +83,8 @@ class Fly:
     vehicle: str | None = None
     """A shipped vehicle or a .toml file. If omitted, the policy's vehicle."""
     check: bool = False
-    """Only check, and send no stick commands. Print every relevant setting: its value, the required value, and how to
-    correct it."""
+    """Only check, and send no stick commands. Print every relevant setting, its value and the required value, and the
+    lines that correct them."""
     log: Path | None = None
     """Flight log to write. If omitted, flights/DATE.mcap."""
     live: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
@@ -178,6 +179,8 @@ def run(options: Fly) -> int:
         if reasons := check(loaded.contract, body, fields_of(loaded.contract), imu=True, images=True):
             raise ValueError("\n".join(reasons))
         course = course_for(loaded.contract, body, options.goal)
+        for line in goal_notes(loaded.contract, options.goal):
+            console.print(line, style="dim")
         runtime = Runtime.of(loaded, course, body, envelope=options.envelope, imu=True, images=True)
     if excited:
         acts, course = excitation(body, settings, options.excitation, options.latency)
@@ -206,7 +209,7 @@ def run(options: Fly) -> int:
         info = _connect(client, options.link)
         check_hover(options.hover, hover, info)
         rows = examine(info, body, settings, contract)
-        console.print(settings_table(rows))
+        print_settings(console, rows)
         worker = _worker(runtime, commands, body, options)
         if worker is not None:
             stack.callback(worker.close)
@@ -217,7 +220,7 @@ def run(options: Fly) -> int:
         )  # fmt: skip
         source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:
-            return look(bridge, source, console, rows, policy)
+            return look(bridge, source, console, rows, policy, contract)
         refuse_in_flight(bridge)
         service = Service()
         stack.callback(service.close)
@@ -297,7 +300,7 @@ def _own_vehicle(policy: Path | None, loaded: Policy | None) -> str:
 
 def _read(path: Path, option: str) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise OSError(f"{option} {path}: {error.strerror}") from None
 

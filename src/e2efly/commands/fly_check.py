@@ -1,26 +1,33 @@
 """What `e2efly fly` shows before a flight: the controller's settings, and with `--check` all that it receives."""
 
 import time
+from collections.abc import Sequence
+from math import degrees
 from pathlib import Path
 
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from e2efly.deploy.betaflight.check import Row, problems
 from e2efly.deploy.betaflight.messages import StatusEx
+from e2efly.deploy.betaflight.row import Row, command_lines, problems
 from e2efly.deploy.bridge import Bridge
 from e2efly.deploy.commander.commander import Commander
 from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pilot.hover import roll_pitch
 from e2efly.deploy.pilot.refusals import take_off_refusals
+from e2efly.deploy.policy.contract import Contract
+from e2efly.deploy.policy.images import Image
 from e2efly.deploy.pose.source import PoseSource
 from e2efly.deploy.sight.picture import blocks, colours, sheet, write_png
 from e2efly.deploy.sight.samples import read_samples
 from e2efly.deploy.sight.source import ImageSource
 from e2efly.deploy.sight.watch import Seen
-from e2efly.deploy.terminal import printable
+from e2efly.process import printable
 
+WIDEST = 10_000
+"""The longest line of a table into a file or a pipe."""
 LOOK_S = 1.5
 """How long `--check` watches poses and receiver, s."""
 STATUS_S, STATUSES = 1.0, 3
@@ -29,21 +36,34 @@ PICTURES = Path("flights")
 """Folder in which `--check` puts pictures of the input images of the network."""
 
 
-def settings_table(rows: tuple[Row, ...]) -> Table:
-    """Each setting of the controller: its value, the required value, and how to correct it."""
+def print_settings(console: Console, rows: tuple[Row, ...]) -> None:
+    """Print each setting of the controller: its value and the required value. Below follow whole lines that can be
+    pasted into the controller's command line, which ignores what begins with `#`.
+    """
     table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in ("", "setting", "is", "needed", "mend with"):
+    for heading in ("", "setting", "is", "needed"):
         table.add_column(heading, overflow="fold")
     for row in rows:
         mark = Text("ok", "green") if row.good else Text("no", "bold red")
         mark = mark if row.told else Text("look", "yellow")
-        mend = "" if row.good and row.told else row.mend
-        table.add_row(mark, *map(_cell, (row.setting, row.value, row.needed, mend)))
-    return table
+        table.add_row(mark, *map(_cell, (row.setting, row.value, row.needed)))
+    print_table(console, table)
+    unknown = [row for row in rows if not row.told]
+    for heading, lines in (
+        ("# no: type these lines into the controller's command line", command_lines(r for r in rows if not r.good)),
+        ("# look: `get NAME` shows these; type the lines of those that are not as needed", command_lines(unknown)),
+    ):
+        for line in (heading, *lines, "save") if lines else ():
+            console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
 def look(
-    bridge: Bridge, source: PoseSource, console: Console, rows: tuple[Row, ...], policy: Path | None = None
+    bridge: Bridge,
+    source: PoseSource,
+    console: Console,
+    rows: tuple[Row, ...],
+    policy: Path | None = None,
+    contract: Contract | None = None,
 ) -> int:
     """Watch poses, images, receiver and attitude for a while, and say what forbids a take-off. Sends no stick commands.
 
@@ -53,6 +73,7 @@ def look(
         console: where the table is printed.
         rows: the controller's settings.
         policy: the file of the policy, beside which images from its training may lie. None: there is no policy.
+        contract: the contract of the policy.
 
     Returns:
         1 when a setting or missing poses forbid a take-off, else 0.
@@ -66,6 +87,7 @@ def look(
         time.sleep(0.005)
     table = Table(box=None, show_header=False, pad_edge=False)
     _add_poses(table, bridge, source, poses)
+    add_lags(table, bridge, poses, contract)
     _add_images(table, bridge, [len(taken) / LOOK_S for taken in times], policy)
     if isinstance(bridge.worker, Commander):
         table.add_row("commands", _cell(_commands(bridge.worker, bridge)))
@@ -78,7 +100,7 @@ def look(
     table.add_row("battery", f"{bridge.inputs.voltage:.2f} V per cell" if bridge.inputs.voltage else "unknown")
     error = bridge.inputs.attitude_error
     table.add_row("attitude", "not heard" if error is None else f"controller and poses differ by {error:.3f} rad")
-    console.print(table)
+    print_table(console, table)
     refusals = take_off_refusals(bridge.settings, bridge.flight, bridge.inputs)
     console.print("What stands against a take-off now:" if refusals else "Nothing stands against a take-off.")
     for refusal in refusals:
@@ -125,10 +147,31 @@ def _add_poses(table: Table, bridge: Bridge, source: PoseSource, poses: list[Sam
         table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")
 
 
+def add_lags(table: Table, bridge: Bridge, poses: list[Sample], contract: Contract | None) -> None:
+    """How late the velocities are, beyond the poses."""
+    checks, newest = bridge.estimate.checks, poses[-1] if poses else None
+    for name, given, lag in (
+        ("velocity", newest is not None and newest.velocity is not None, checks.velocity_lag),
+        ("body rate", newest is not None and newest.body_rate is not None, checks.rate_lag),
+    ):
+        said = f"estimated from the poses, {1e3 * lag:.0f} ms later than they are"
+        table.add_row(name, "the source's own: how late it is, only the source knows" if given else said)
+    if contract is not None:
+        states, delay = map(_milliseconds, (contract.observation_latency_range_s, contract.latency_range_s))
+        table.add_row("", f"the policy was trained with states {states} old, and {delay} from observation to command")
+
+
+def _milliseconds(span: Sequence[float]) -> str:
+    """A range of times, s, in words."""
+    low, high = (f"{1e3 * x:.0f}" for x in span)
+    return f"{low} ms" if low == high else f"{low} to {high} ms"
+
+
 def _add_images(table: Table, bridge: Bridge, rates: list[float], policy: Path | None) -> None:
     now = time.monotonic()
     for camera, seen, rate in zip(bridge.cameras, bridge.seen, rates, strict=True):
         table.add_row("image", _cell(_image(camera, seen, now, rate)))
+        table.add_row("", _cell(f"made for a camera {mount(seen.camera)}"))
         if seen.frame is not None:
             pixels, path = colours(seen.frame.image, seen.camera), PICTURES / f"check_{seen.camera.name}.png"
             trained = None if policy is None else read_samples(policy, seen.camera)
@@ -146,10 +189,21 @@ def _image(camera: ImageSource, seen: Seen, now: float, rate: float) -> str:
         return f"not to be flown by, from {camera.describe()}: {said}"
     image, age = seen.frame.image, 1e3 * (now - seen.frame.time)
     values = f"values {image.min():.2f} to {image.max():.2f}, mean {image.mean():.2f}"
-    low, high = (1e3 * x for x in seen.camera.latency_range_s)
-    trained = f"{age:.0f} ms old (trained with {low:.0f} to {high:.0f}), {rate:.0f} Hz ({seen.camera.rate_hz:g})"
+    ages = _milliseconds(seen.camera.latency_range_s)
+    trained = f"{age:.0f} ms old (trained with {ages}), {rate:.0f} Hz ({seen.camera.rate_hz:g})"
     note = f"; {camera.problem}" if camera.problem else ""
     return f"{seen.camera.name} from {camera.describe()}: {values}; {trained}{note}"
+
+
+def mount(camera: Image) -> str:
+    """Where the camera of the policy's training is, how it is turned, and how much it sees, in words."""
+    x, y, z = camera.position_m
+    wide, high = map(degrees, camera.fov_rad)
+    turned = f"pitched {'up' if camera.pitch_rad < 0 else 'down'} by {abs(degrees(camera.pitch_rad)):.1f} deg"
+    return (
+        f"{x:.3f} m before, {y:.3f} m left of and {z:.3f} m above the centre of mass, {turned}, "
+        f"field of view {wide:.1f} x {high:.1f} deg ({camera.projection})"
+    )
 
 
 def _commands(commander: Commander, bridge: Bridge) -> str:
@@ -160,6 +214,13 @@ def _commands(commander: Commander, bridge: Bridge) -> str:
         return f"{counted}; it could not take over now: {problem}"
     mode = f"; the newest: {stream.command.mode}, {1e3 * stream.age(now):.0f} ms old" if stream.command else ""
     return f"{counted}{mode}"
+
+
+def print_table(console: Console, table: Table) -> None:
+    """Print a table. Into a file or a pipe its lines are whole, however long they are."""
+    if not console.is_terminal:
+        table.width = Measurement.get(console, console.options.update(width=WIDEST), table).maximum
+    console.print(table, soft_wrap=True)
 
 
 def _cell(text: str) -> Text:

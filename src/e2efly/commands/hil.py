@@ -68,6 +68,9 @@ class Hil:
     """Length unit of a scan's file, m (0.001: mm). If omitted, 1."""
     scene_up: Literal["y", "z"] | None = None
     """Axis of a scan's file that points up. If omitted, the one that the file's format defines."""
+    scene_materials: bool = True
+    """Use a scan's colours, materials and textures. Without them every object has the colour of its class, and their
+    files may be missing."""
     beside: bool = False
     """Show the objects of the task's world (gates, trees, a pad) in addition to the scene."""
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -129,6 +132,8 @@ def run(asked: Asked) -> int:
         for option in ("scene_unit", "scene_up", "beside"):
             if value := getattr(o, option):
                 raise ValueError(f"--{option.replace('_', '-')} is {value}; accepted: only with --scene")
+        if not o.scene_materials:
+            raise ValueError("--no-scene-materials is given; accepted: only with --scene")
     if o.rate is not None and not 1 <= o.rate <= FASTEST:
         raise ValueError(f"--rate is {o.rate}; accepted: 1 to {FASTEST:g} Hz")
     if o.seconds is not None and not o.seconds > 0:
@@ -150,6 +155,8 @@ def run(asked: Asked) -> int:
     compute_at_once()
     prepare("cpu")
     found = candidate(o.policy, o.vehicle, task=asked.task)
+    for note in found.notes:
+        console.print(note, style="dim")
     images = found.policy.contract.images
     if not images:
         raise ValueError(f"policy {o.policy} sees nothing; accepted: a policy with images")
@@ -161,7 +168,8 @@ def run(asked: Asked) -> int:
     assert scenery is not None
     scenery = _where(o, scenery, found.policy.contract.task, float(body.radius), console)
     goal = flags("goal", dataclasses.replace(
-        route_of(found.policy.contract).drawn(scenery.course, o.track), origin=origin.position, origin_yaw=origin.yaw,
+        route_of(found.policy.contract).drawn(scenery.course, o.track),
+        origin=origin.position, origin_yaw=origin.yaw, outside=bool(found.outside),
     ))  # fmt: skip
     with ExitStack() as stack:
         source = open_source(o.pose)
@@ -218,7 +226,7 @@ def _where(o: Hil, scenery: "Scenery", task: str, radius: float, console: Termin
     if o.scene is None:
         ground_of(scenery, f"the world of task {task}", radius)
         return scenery
-    scenery = SceneFile(o.scene, o.scene_unit, o.scene_up, o.beside).put(scenery)
+    scenery = SceneFile(o.scene, o.scene_unit, o.scene_up, o.scene_materials, o.beside).put(scenery)
     ground = ground_of(scenery, f"scene {o.scene}", radius)
     console.print(f"Scene {o.scene}: the ground is {ground.depth:.2f} m below the start.")
     if math.isfinite(ground.ends):

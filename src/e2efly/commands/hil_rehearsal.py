@@ -83,10 +83,12 @@ def rehearse(o: "Hil", task: dict[str, Any], origin: Origin) -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the flight's processes end with this one
     prepare("cpu")
     found, console = candidate(o.policy, o.vehicle, task=task), Terminal()
+    for note in found.notes:
+        console.print(note, style="dim")
     world = flags("task", found.task, candidate(o.policy, o.vehicle).task)
     plan = Plan(found, origin, o.rate, o.pose_delay, o.link_delay, world)
     if o.scene is not None:
-        plan = replace(plan, scene=SceneFile(o.scene, o.scene_unit, o.scene_up, o.beside))
+        plan = replace(plan, scene=SceneFile(o.scene, o.scene_unit, o.scene_up, o.scene_materials, o.beside))
     if not plan.found.policy.contract.images:
         raise ValueError(f"policy {o.policy} sees nothing; accepted: a policy with images")
     folder = o.out or Path("rehearsals") / time.strftime("%Y-%m-%d_%H-%M-%S")

@@ -11,7 +11,8 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.storage import write_json
+from e2efly.commands.reading import LogOptions, show_notes
+from e2efly.storage import held, write_json
 from e2efly.terminal import Terminal
 from e2efly.vehicles import Vehicle, load_vehicle, unknown
 from e2efly.vehicles.posterior import load_posterior
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from e2efly.identification.estimate import Estimate
     from e2efly.identification.flight import Found
     from e2efly.identification.judge import Prediction
+    from e2efly.identification.readers import Reading
     from e2efly.identification.record import Record
 
 KINDS = ("parts", "pendulum", "stand", "flight", "step")
@@ -44,8 +46,7 @@ class Identify:
     flight controller is assumed to have been tuned for it in the flights."""
     out: Path = Path("identified")
     """Folder for vehicle.toml, identified.json and the plots."""
-    columns: tuple[str, ...] = ()
-    """Maps the column names of a CSV log to ours: OURS=THEIRS or OURS=THEIRS*FACTOR, as in az=acc_z*9.81."""
+    read: tyro.conf.OmitArgPrefixes[LogOptions] = LogOptions()
     mass: tuple[float, float] | None = None
     """Mass of the vehicle and standard deviation of the scale, kg. Flights only give thrust, inertia and drag relative
     to the mass."""
@@ -55,31 +56,42 @@ def run(options: Identify) -> int:
     """Read all sources and fuse their results. Write the vehicle file, the report and the plots.
 
     Raises:
-        ValueError: naming the source, what is wrong with it and what is accepted. Nothing is written then.
+        ValueError: naming the source, what is wrong with it and what is accepted. Nothing is written then. Also when
+            another process writes to the folder.
     """
-    from e2efly.identification import parts, pendulum, stand
+    with held(options.out):
+        return _identify(options)
+
+
+def _identify(options: Identify) -> int:
+    from e2efly.identification import csv_file, parts, pendulum, stand, stand_file
     from e2efly.identification.correlation import correlation
-    from e2efly.identification.csv_file import column_map
     from e2efly.identification.estimate import Estimate, fuse
     from e2efly.identification.vehicle_file import merged, write_vehicle
 
     began = time.perf_counter()
     files, console = _sources(options.sources), Terminal()
-    base, columns = load_vehicle(options.vehicle), column_map(options.columns)
+    known = {"flight": csv_file.COLUMNS, "step": csv_file.COLUMNS, "stand": tuple(stand_file.COLUMNS)}
+    used = dict.fromkeys(name for kind, names in known.items() if files[kind] for name in names)
+    if options.read.columns and not used:
+        raise ValueError(f"--columns is {list(options.read.columns)}; accepted: with a source of {', '.join(known)}")
+    base, reading = load_vehicle(options.vehicle), options.read.reading(used)
     said: list[Estimate] = []
     if options.mass:
         mass, sigma = options.mass
         if not (mass > 0 and sigma > 0):
             raise ValueError(f"--mass is {mass} {sigma}; accepted: kg and its standard deviation, both above 0")
         said.append(Estimate("mass", np.array(mass), np.array(sigma), "weighed"))
-    for kind, estimates in (("parts", parts.estimates), ("pendulum", pendulum.estimates), ("stand", stand.estimates)):
+    for kind, estimates in (("parts", parts.estimates), ("pendulum", pendulum.estimates)):
         for path in files[kind]:
             said += estimates(path)
+    for path in files["stand"]:
+        said += stand.estimates(path, reading.columns, lambda note: console.print(note, style="dim"))
     found: dict[str, Found] = {}
     for kind in ("flight", "step"):
         if files[kind]:
             known = merged(base, fuse(said))
-            records = _records(files[kind], columns, known, console)
+            records = _records(files[kind], reading, known, console)
             found[kind] = _flown(known, base, records, kind == "step", console)
             said += _with_mass(found[kind].estimates, said)
     fused = fuse(said)
@@ -92,7 +104,6 @@ def run(options: Identify) -> int:
 
     outside = {kind: judged(each) for kind, each in found.items()}
     report = _report(options, base, fused, said, found, outside)
-    options.out.mkdir(parents=True, exist_ok=True)
     file = options.out / "vehicle.toml"
     together = correlation(found.values(), fused, _mass_spread(said))
     write_vehicle(file, options.vehicle, base, fused, together)
@@ -143,18 +154,18 @@ def _sources(words: Sequence[str]) -> dict[str, list[Path]]:
     return files
 
 
-def _records(files: Sequence[Path], columns: Any, vehicle: Vehicle, console: Console) -> "list[Record]":
+def _records(files: Sequence[Path], reading: "Reading", vehicle: Vehicle, console: Console) -> "list[Record]":
     from e2efly.identification.blackbox import with_blackboxes
     from e2efly.identification.checks import checked
     from e2efly.identification.readers import read_part
 
-    read = [record for path in files for record in read_part(path, columns)]
-    records = checked(with_blackboxes(read), vehicle)
+    read = with_blackboxes([record for path in files for record in read_part(path, reading)])
+    show_notes(read, console)
+    records = checked(read, vehicle)
+    show_notes(records, console, read)
     for record in records:
         rates = ", ".join(f"{name} {stream.rate:.0f} Hz" for name, stream in record.streams.items())
         console.print(f"{record.path.name}: {record.duration:.1f} s; {rates}")
-        for note in record.notes:
-            console.print(f"  {note}", style="dim")
     return records
 
 
@@ -243,6 +254,8 @@ def _report(
 
 
 def _table(base: Vehicle, fused: "dict[str, Estimate]") -> Table:
+    from e2efly.identification.record import percent
+
     table = Table("parameter", "file", "identified", "sigma", "source", box=None, header_style="bold", pad_edge=False)
     for name, e in fused.items():
         own = np.atleast_1d(np.asarray(getattr(base, name), float))
@@ -255,7 +268,7 @@ def _table(base: Vehicle, fused: "dict[str, Estimate]") -> Table:
                     label,
                     f"{before:.4g}",
                     f"{value:.4g}",
-                    f"{100 * sigma / abs(value):.2g} %" if value else f"{sigma:.2g}",
+                    percent(sigma / abs(value)) if value else f"{sigma:.2g}",
                     e.source,
                 )
     return table

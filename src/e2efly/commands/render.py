@@ -46,6 +46,13 @@ class Render:
     """Downward pitch for the pictures, degrees."""
     time: float = 0.0
     """Time at which the pictures are taken, s. It determines where moving objects are."""
+    scene_unit: float = 1.0
+    """Length unit of a mesh's file, m (0.001: mm)."""
+    scene_up: Literal["y", "z"] | None = None
+    """Axis of a mesh's file that points up. If omitted, the one that the file's format defines."""
+    scene_materials: bool = True
+    """Use a mesh's colours, materials and textures. Without them every object has the colour of its class, and their
+    files may be missing."""
     seed: int = 0
     """Seed of a random world and of the noise."""
     flight: Path | None = None
@@ -75,7 +82,9 @@ def run(options: Render) -> int:
     from e2efly.view.video import exposure_of, frames, write_video
 
     console = Terminal()
-    place = find_place(options.scene, random_key(options.seed))
+    place = find_place(
+        options.scene, random_key(options.seed), options.scene_unit, options.scene_up, options.scene_materials
+    )
     out = options.out or Path("runs/render") / Path(options.scene).stem
     _make(out)
     with console.status("Planning a flight"):

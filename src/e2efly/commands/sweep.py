@@ -13,7 +13,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -123,7 +123,7 @@ def run(options: Sweep) -> int:
 
 def _sweep(options: Sweep, trials: list[Trial], console: Console) -> int:
     """Run the sweep in a folder that no other process uses."""
-    from e2efly.learn.judge import reported
+    from e2efly.learn.judge import rates
 
     found = {trial.out: summary for trial in trials if (summary := trial.ended())}
     console.print(
@@ -138,8 +138,9 @@ def _sweep(options: Sweep, trials: list[Trial], console: Console) -> int:
             console.print(f"{trial.out.name}: {how}")
             continue
         found[trial.out] = summary
-        rate, seconds = reported(summary), summary["seconds_trained_from_process_start"]
-        console.print(f"{len(found)} of {len(trials)}: {trial.out.name}: {rate:.1%} in {seconds:.0f} s")
+        told = ", ".join(f"{rate:.1%} ({name})" for name, rate in rates(summary).items())
+        seconds = summary["seconds_trained_from_process_start"]
+        console.print(f"{len(found)} of {len(trials)}: {trial.out.name}: success {told} in {seconds:.0f} s")
     _report(options, trials, found, console)
     return 1 if failed else 0
 
@@ -242,21 +243,27 @@ def _last_line(trial: Trial) -> str:
     return lines[-1] if lines else "it said nothing"
 
 
+def _each(success: list[dict[str, float]], of: Callable[[list[float]], Any]) -> str:
+    """A figure of the success rates of several runs, by the name of what flew."""
+    columns = zip(success[0], *(one.values() for one in success), strict=True)
+    return ", ".join(f"{of(rates):.1%} ({name})" for name, *rates in columns)
+
+
 def _report(options: Sweep, trials: list[Trial], found: dict[Path, dict[str, Any]], console: Console) -> None:
     """One row per variant, and a file with every run."""
-    from e2efly.learn.judge import reported
+    from e2efly.learn.judge import rates
 
     rows = []
     for variant in dict.fromkeys(trial.variant for trial in trials):
         of = [found[trial.out] for trial in trials if trial.variant == variant and trial.out in found]
-        success = [reported(summary) for summary in of]
+        success = [rates(summary) for summary in of]
         seconds = [summary["seconds_trained_from_process_start"] for summary in of]
         rows.append(
             {
                 "variant": variant,
                 "runs": len(of),
-                "success": f"{np.mean(success):.1%}" if of else "-",
-                "worst seed": f"{min(success):.1%}" if of else "-",
+                "success": _each(success, np.mean) if of else "-",
+                "worst seed": _each(success, min) if of else "-",
                 "trained": f"{np.median(seconds):.0f} s" if of else "-",
             }
         )

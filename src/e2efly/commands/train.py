@@ -26,8 +26,8 @@ from e2efly.vehicles.posterior import IDENTIFIED, load_posterior
 if TYPE_CHECKING:
     from e2efly.watch.beside import Beside
 
-_FLOWN = {"nominal": "best, nominal", "stress": "best, stress", "shipped": "best", "last": "last"}
-"""Parts of a summary that hold evaluations of a policy, and their names in the table."""
+_FLOWN = {"nominal": "best", "stress": "best", "shipped": "best", "last": "last"}
+"""Parts of a summary that hold evaluations of a policy, and whether it is the best or the last."""
 _POLICY = "a policy: a task of the zoo, a run, or a policy.onnx"
 _OWN = "or one of your own: path/to/file.py:Name"
 
@@ -38,6 +38,8 @@ class Train:
 
     config: TrainConfig
     """Everything that determines the result."""
+    preset: str
+    """Name of the preset that gives the defaults."""
     out: Path
     """The run directory."""
     resume: bool
@@ -89,8 +91,8 @@ def parse(arguments: list[str]) -> Train:
     if parsed.resume and parsed.overwrite:
         raise ValueError("--resume and --overwrite are both given; accepted: one of them")
     return Train(
-        config, parsed.out or run_folder(config), parsed.resume, parsed.overwrite, parsed.device, parsed.plots,
-        parsed.hosts, parsed.watch, arguments,
+        config, parsed.preset, parsed.out or run_folder(config), parsed.resume, parsed.overwrite, parsed.device,
+        parsed.plots, parsed.hosts, parsed.watch, arguments,
     )  # fmt: skip
 
 
@@ -147,9 +149,9 @@ class _Shown(TerminalProgress):
         super().__init__(console, title)
         self._page = page
 
-    def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
+    def progress(self, steps: int, total: int, rate: float, success: float, best: float, flown: str) -> None:
         self._page.begin()
-        super().progress(steps, total, rate, success, best, stage)
+        super().progress(steps, total, rate, success, best, flown)
 
 
 def _tell(o: Train, again: str, console: Console, summary: dict[str, Any], progress: TerminalProgress) -> int:
@@ -175,7 +177,7 @@ def _report(console: Console, summary: dict[str, Any], o: Train) -> None:
 
     rows = [
         {
-            "policy": f"{name}, {called}",
+            "policy": f"{name}, {called}, {summary['vehicles'][which]}",
             "update": summary["last" if which == "last" else "shipped"]["update"],
             "success": f"{d['success']:.1%}",
             "crashed": d["crashed"],

@@ -1,6 +1,5 @@
 """`e2efly tune`."""
 
-import shutil
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,8 @@ import tyro
 from e2efly.commands import eval as evaluation
 from e2efly.commands import identify, train
 from e2efly.commands.identify import Identify
-from e2efly.storage import write_json
+from e2efly.commands.reading import LogOptions
+from e2efly.storage import held, write_atomically, write_json
 from e2efly.tasks import TASKS
 from e2efly.terminal import Terminal
 from e2efly.vehicles.posterior import IDENTIFIED
@@ -32,8 +32,7 @@ class Tune:
     flights."""
     mass: tuple[float, float] | None = None
     """Mass of the vehicle and standard deviation of the scale, kg."""
-    columns: tuple[str, ...] = ()
-    """Maps the column names of a CSV log to ours, as in `identify`."""
+    read: tyro.conf.OmitArgPrefixes[LogOptions] = LogOptions()
     out: Path = Path("tuned")
     """Folder for identified/ (the vehicle file and its plots), run/ (the training) and policy.onnx."""
     steps: int | None = None
@@ -55,8 +54,7 @@ def run(options: Tune) -> int:
     Raises:
         ValueError: naming the option, the log or the parameter. Results of earlier steps stay in the folder.
     """
-    began, console, o = time.perf_counter(), Terminal(), options
-    folder, learned = o.out / "identified", o.out / "run"
+    o, learned = options, options.out / "run"
     kind = TASKS.find(o.task)
     if kind.best not in kind.robust:
         having = ", ".join(name for name, known in TASKS.items() if known.best in known.robust)
@@ -66,13 +64,18 @@ def run(options: Tune) -> int:
             f"--out is {o.out}, which has a run; accepted: another folder, --overwrite, or `e2efly train --resume "
             f"{learned}` to go on with it"
         )
-    seconds = {}
+    with held(o.out):
+        return _tune(o, o.out / "identified", learned)
+
+
+def _tune(o: Tune, folder: Path, learned: Path) -> int:
+    began, console, seconds = time.perf_counter(), Terminal(), {}
 
     def did(what: str) -> None:
         seconds[what] = time.perf_counter() - began - sum(seconds.values())
 
     console.rule(f"identify {', '.join(path.name for path in o.logs)}")
-    identify.run(Identify(("flight", *map(str, o.logs)), o.vehicle, folder, o.columns, o.mass))
+    identify.run(Identify(("flight", *map(str, o.logs)), o.vehicle, folder, o.read, o.mass))
     did("identify")
     console.rule(f"train {o.task} on what stays uncertain")
     steps = [] if o.steps is None else ["--steps", str(o.steps)]
@@ -88,7 +91,7 @@ def run(options: Tune) -> int:
     report = o.out / "stress.json"
     status = evaluation.run(evaluation.parse([str(learned), "--stress", "--json", str(report), *least]))
     did("evaluate")
-    shutil.copy(learned / "policy.onnx", o.out / "policy.onnx")
+    write_atomically(o.out / "policy.onnx", (learned / "policy.onnx").read_bytes())
     write_json(o.out / "tuned.json", {"seconds": seconds, "logs": [str(path) for path in o.logs], "task": o.task})
     took = ", ".join(f"{what} {s:.0f} s" for what, s in seconds.items())
     console.print(f"Policy: {o.out / 'policy.onnx'}; fly it with --vehicle {folder / 'vehicle.toml'}. Took: {took}.")

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 MOST = 1024
 """Largest number of vehicles."""
-LOGS = (".mcap", ".csv", ".bbl", ".bfl", ".bf", ".ulg", ".bag")
-"""File name extensions of flight logs."""
+FILES = (".onnx", ".json", ".mcap", ".csv", ".txt", ".bbl", ".bfl", ".bf", ".ulg", ".bag", ".db3")
+"""Extensions of names that are meant as files: where there is none, nothing else is looked for."""
 WAIT_S = 600.0
 """How long to wait for the first policy of a run, s."""
 USUAL = "vis_r"
@@ -119,12 +119,14 @@ def _logs(what: tuple[str, ...]) -> list[Path]:
     Raises:
         ValueError: for several arguments that are not all logs, and for a path that does not exist.
     """
-    logs = [Path(text) for text in what if Path(text).suffix.lower() in LOGS]
+    from e2efly.identification.readers import is_log
+
+    logs = [Path(text) for text in what if is_log(Path(text))]
     if len(what) > 1 and len(logs) < len(what):
         raise ValueError(f"WHAT is {' '.join(what)}; accepted: one policy or run, or several flight logs")
     for text in what:
         path = Path(text)
-        file = path in logs or (":" not in text and (os.sep in text or path.suffix in (".onnx", ".json")))
+        file = ":" not in text and (os.sep in text or path.suffix.lower() in FILES)
         if file and not path.exists():
             accepted = "a task, a policy.onnx, a run's folder, a flight log, a report of `e2efly validate --json`"
             raise ValueError(f"{text!r} does not exist; accepted: {accepted}")
@@ -294,6 +296,8 @@ def _flown(o: Watch, console: Terminal) -> "tuple[Simulation, Progress | None]":
         env, act = progress.setup.judges[name], progress.act
     else:
         progress, found = None, candidate(o.what[0], o.vehicle)
+        for note in found.notes:
+            console.print(note, style="dim")
         suites = found.task.criteria()
         name = _criterion(o.criterion, suites)
         env, act = found.environment(suites[name]), act_of(found.policy)

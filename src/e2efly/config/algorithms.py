@@ -1,6 +1,5 @@
 """Options of the learning algorithms."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
@@ -90,10 +89,10 @@ class _FirstOrder(AlgorithmConfig):
 
     exact: ClassVar = True
 
-    gradient_decay: float = 0.0
+    gradient_decay: float = number(0.0, high=1e3)
     """Decay of the gradient from step to step through the vehicle's state, 1/s of backward time. The part that passes
     through the policy's observation of the state does not decay. 0: the exact gradient."""
-    horizon_start: int = number(0, low=-math.inf)
+    horizon_start: int = number(0)
     """Number of steps after which the gradient is cut at the start of a run. It grows over the run, up to the horizon.
     0: never cut."""
     term_gradients: bool = False
@@ -117,17 +116,17 @@ class _Proximal(AlgorithmConfig):
     sequence: int = number(16, above=0)
     """Number of steps over which the gradient of a GRU is propagated back; must divide horizon and minibatch (sets
     shapes)."""
-    learning_rate: float = number(3e-3, above=0)
+    learning_rate: float = number(3e-3, above=0, high=1.0)
     """Learning rate of Adam at the start."""
-    learning_rate_end: float = number(3e-4, above=0)
+    learning_rate_end: float = number(3e-4, above=0, high=1.0)
     """Learning rate of Adam at the end. It changes exponentially in between."""
     gae_lambda: float = number(0.95, high=1)
     """Lambda of the generalised advantage estimate."""
-    clip: float = 0.2
+    clip: float = number(0.2, high=10.0)
     """Clipping range of the probability ratio."""
-    value_weight: float = 0.5
+    value_weight: float = number(0.5, high=1e3)
     """Weight of the critic's loss."""
-    entropy_weight: float = 0.0
+    entropy_weight: float = number(0.0, high=1e3)
     """Weight of the entropy bonus."""
     log_std: float = number(-1.0, low=-10, high=2)
     """Initial log standard deviation of the action noise."""
@@ -156,9 +155,9 @@ class BPTTConfig(_FirstOrder):
 
     program: ClassVar = "e2efly.learn.bptt:BPTT"
 
-    learning_rate: float = number(4e-3, above=0)
+    learning_rate: float = number(4e-3, above=0, high=1.0)
     """Learning rate of Adam at the start."""
-    learning_rate_end: float = number(1e-4, above=0)
+    learning_rate_end: float = number(1e-4, above=0, high=1.0)
     """Learning rate of Adam at the end. It changes exponentially in between."""
     gamma: float = number(0.99, above=0, high=1)
     """Discount per step within the window."""
@@ -180,11 +179,11 @@ class SHACConfig(_FirstOrder):
     """Passes of the critic over the samples of a window (sets shapes)."""
     minibatch: int = number(512, above=0)
     """Samples per gradient step of the critic; must divide envs * horizon (sets shapes)."""
-    learning_rate: float = number(4e-3, above=0)
+    learning_rate: float = number(4e-3, above=0, high=1.0)
     """Learning rate of Adam at the start."""
-    learning_rate_end: float = number(1e-4, above=0)
+    learning_rate_end: float = number(1e-4, above=0, high=1.0)
     """Learning rate of Adam at the end. It changes exponentially in between."""
-    critic_rate: float = 0.5
+    critic_rate: float = number(0.5, high=1e3)
     """The critic's learning rate relative to the policy's."""
     gamma: float = number(0.98, above=0, high=1)
     """Discount per step."""
@@ -192,7 +191,7 @@ class SHACConfig(_FirstOrder):
     """Lambda of the returns that the critic learns to predict."""
     target_share: float = number(0.2, high=1)
     """Fraction by which the slow copy of the critic moves towards the critic, per update."""
-    noise: float = 0.0
+    noise: float = number(0.0, high=10.0)
     """Standard deviation of the noise on the action."""
 
     def check(self) -> None:
@@ -222,11 +221,11 @@ class ABPTConfig(_FirstOrder):
     """Samples per gradient step of the critics (sets shapes)."""
     fits: int = number(8, above=0)
     """Gradient steps of the critics per update (sets shapes)."""
-    learning_rate: float = number(4e-3, above=0)
+    learning_rate: float = number(4e-3, above=0, high=1.0)
     """Learning rate of Adam at the start."""
-    learning_rate_end: float = number(1e-4, above=0)
+    learning_rate_end: float = number(1e-4, above=0, high=1.0)
     """Learning rate of Adam at the end. It changes exponentially in between."""
-    critic_rate: float = 0.5
+    critic_rate: float = number(0.5, high=1e3)
     """The critics' learning rate relative to the policy's."""
     gamma: float = number(0.98, above=0, high=1)
     """Discount per step."""
@@ -237,7 +236,7 @@ class ABPTConfig(_FirstOrder):
     at_once: float = number(0.5, high=1)
     """Weight of the critics' value of the first action of a window. The window's own return has the remaining
     weight."""
-    entropy_weight: float = 1e-3
+    entropy_weight: float = number(1e-3, high=1e3)
     """Weight of the entropy bonus."""
     log_std: float = number(-2.0, low=-10, high=2)
     """Initial log standard deviation of the action noise."""
@@ -274,7 +273,7 @@ class FOPPOConfig(_Proximal, _FirstOrder):
     """Steps of a rollout. The rollout is also the window of the exact gradient (sets shapes)."""
     log_std: float = number(-1.5, low=-10, high=2)
     """Initial log standard deviation of the action noise."""
-    exact_rate: float = 3.0
+    exact_rate: float = number(3.0, high=1e3)
     """Learning rate of the step along the exact gradient, relative to that of the epochs."""
     gamma: float = number(0.98, above=0, high=1)
     """Discount per step."""

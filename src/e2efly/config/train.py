@@ -5,8 +5,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 from e2efly.config.algorithms import ALGORITHMS, AlgorithmConfig
-from e2efly.config.vehicle import CameraConfig, EnvConfig
+from e2efly.config.vehicle import FILE, CameraConfig, EnvConfig
+from e2efly.courses.domain import Domain
 from e2efly.drawing import Thing
+from e2efly.numbers import number
 
 
 @dataclass(frozen=True)
@@ -24,20 +26,20 @@ class RewardConfig:
 class NetworkConfig:
     """The policy network, and the critic's network if there is one."""
 
-    hidden: tuple[int, ...] = (64, 64)
+    hidden: tuple[int, ...] = number((64, 64), low=1, high=10**6)
     """Units of the hidden layers (sets shapes)."""
     activation: Literal["relu", "tanh", "elu"] = "relu"
     """Activation of the hidden layers (sets the program)."""
-    pool: tuple[int, int] = (16, 16)
+    pool: tuple[int, int] = number((16, 16), low=1, high=8192)
     """Rows and columns to which an image is reduced. Each cell becomes its mean value, or for depth its nearest value.
     They must divide the camera's rows and columns (sets shapes)."""
-    convolution: tuple[int, ...] = ()
+    convolution: tuple[int, ...] = number((), low=1, high=10**6)
     """Channels of the convolutions that process an image in place of the reduction by `pool`. Their kernel size
     equals their stride: 4, or 2 where 4 does not divide the image. They can then be computed as matrix products
     (sets shapes)."""
-    encoder: tuple[int, ...] = (64,)
+    encoder: tuple[int, ...] = number((64,), low=1, high=10**6)
     """Units of the layers that process each image before it joins the other inputs (sets shapes)."""
-    recurrent: int = 0
+    recurrent: int = number(0, high=10**6)
     """Units of a gated recurrent unit (GRU) before the hidden layers. 0: no GRU (sets shapes)."""
 
 
@@ -48,9 +50,9 @@ class StageConfig:
     changes: dict[str, float | tuple[float, ...]]
     """New values of the task's fields, by dotted path: {"forest.density": 0.0}. Fields that set shapes or the program
     are not allowed."""
-    success: float | None = None
+    success: float | None = number(None, above=0, high=1.0)
     """Promotion: the success rate in an evaluation at which this stage ends."""
-    steps: int | None = None
+    steps: int | None = number(None, low=1, high=10**15)
     """Promotion at the latest after so many environment steps."""
 
 
@@ -100,6 +102,21 @@ class Robust:
             steps=self.steps,
             chunk=self.chunk,
         )
+
+
+LEARNED, LEARNED_RANDOM = 0.95, 0.9
+"""Success rates of the worst criterion at which a task counts as learned: with the vehicle of the file, and with random
+vehicles, some of which are hardly able to fly it."""
+
+
+def criterion(stop_at: float | None, vehicles: str) -> float:
+    """The success rate at which a task counts as learned: the one that the user asked for, or that of what flies.
+
+    Args:
+        stop_at: what the user asked for, if anything.
+        vehicles: name of what flies (`Env.vehicles`).
+    """
+    return stop_at or (LEARNED if vehicles == FILE else LEARNED_RANDOM)
 
 
 TIMED = ("duration", "pace")
@@ -154,7 +171,7 @@ class TaskConfig:
     asked: ClassVar[Mapping[tuple[str, str], str]] = {}
     """Presets of its own that an option value selects when no preset is named."""
 
-    episode_s: float = 10.0
+    episode_s: float = number(10.0, above=0)
     """Length of an episode, s."""
 
     @classmethod
@@ -169,6 +186,10 @@ class TaskConfig:
     def course(self) -> dict[str, Any]:
         """The part of the course that all episodes share, for reports. `Goal.drawn` gives what each episode adds."""
         return {}
+
+    def domain(self) -> Domain | None:
+        """The ranges of the courses and worlds that its episodes draw. A policy is trained for them. None: unknown."""
+        return None
 
     def limits(self) -> dict[str, float]:
         """The largest values, by field of `Episodes`, with which an episode still succeeds, for plots."""
@@ -223,15 +244,15 @@ class TrainConfig:
     """The networks."""
     start_from: str | None = None
     """The policy whose weights the training starts from: a name of the zoo or a file. If omitted, fresh weights."""
-    seed: int = 0
+    seed: int = number(0, high=2**32 - 1)
     """Seed of everything random."""
-    steps: int = 2_000_000
+    steps: int = number(2_000_000, low=1, high=10**15)
     """Environment steps of the whole run, rounded up to whole chunks."""
-    chunk: int = 20
+    chunk: int = number(20, low=1)
     """Updates between two evaluations (sets shapes)."""
-    eval_episodes: int = 250
+    eval_episodes: int = number(250, low=1)
     """Starts of an evaluation while training (sets shapes)."""
-    devices: int | None = None
+    devices: int | None = number(None, low=1)
     """Devices (on a CPU: cores) that share the environments. If omitted, all devices, with at least 32 environments on
     each."""
     fast_compile: bool = True
@@ -239,5 +260,5 @@ class TrainConfig:
     or less."""
     curriculum: tuple[StageConfig, ...] = ()
     """Stages before the task itself."""
-    stop_at: float | None = None
+    stop_at: float | None = number(None, above=0, high=1.0)
     """Stop when the success rate on 1000 starts is at least this. If omitted, use all steps."""

@@ -13,7 +13,7 @@ CLUTTER = ("box", "capsule", "cylinder", "sphere")
 class ForestConfig:
     """Trees at random places of a lane along world x."""
 
-    density: float = 0.1
+    density: float = number(0.1, high=100.0)
     """Number of trees per square metre."""
     length: float = number(40.0, above=0)
     """Length of the lane, measured from the start, m."""
@@ -53,7 +53,7 @@ class ClutterConfig:
     """Half-lengths and radii of the obstacles, m."""
     clear: float = 0.5
     """No obstacle nearer than this to a gate's opening or to the start, m."""
-    moving: float = 0.0
+    moving: float = number(0.0, high=1.0)
     """Share of the obstacles that swing back and forth."""
     swing: float = 1.0
     """Amplitude of the swinging obstacles, m."""
@@ -61,7 +61,7 @@ class ClutterConfig:
     """Largest number of obstacles in a world; a multiple of 4 (sets shapes)."""
 
     def check(self, name: str) -> None:
-        """Check that `room` is large enough for the obstacles, and that the numbers make sense.
+        """Check that `room` is large enough for the obstacles.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.
@@ -70,5 +70,3 @@ class ClutterConfig:
             raise ValueError(f"{name}.room is {self.room}; accepted: a positive multiple of {len(CLUTTER)}")
         if self.obstacles > self.room:
             raise ValueError(f"{name}.obstacles is {self.obstacles}; accepted: at most {name}.room, {self.room}")
-        if self.moving > 1:
-            raise ValueError(f"{name}.moving is {self.moving}; accepted: a share, 0 to 1")

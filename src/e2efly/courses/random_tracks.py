@@ -30,6 +30,7 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.courses.domain import FIRST, Domain, Extent
 from e2efly.courses.gates import BURIED, Gates, Tracks
 
 FEWEST, MOST = 3, 12
@@ -52,6 +53,19 @@ FAR = 1e6
 """Squared distance of gates that do not count, m^2."""
 LOWEST = 0.3
 """Smallest height of the lower edge of an opening above the ground, m."""
+DOMAIN: Domain = (
+    Extent("gates", "1", FEWEST, MOST),
+    Extent("gate_width", "m", *OPENING),
+    Extent("gate_height", "m", *OPENING),
+    Extent("gate_altitude", "m", LOWEST + OPENING[0] / 2, 8.0 - OPENING[0] / 2),
+    Extent("gate_distance", "m", CLEAR, 50.0),
+    Extent("gate_rise", "m", -6.7, 6.7),
+    Extent("gate_bearing", "rad", -2.85, 2.85),
+    Extent("gate_turn", "rad", FIRST, FIRST + 2 * math.pi),
+    Extent("start_distance", "m", 2.5, 6.1),
+)
+"""The domain of a policy of such tracks. The last of these ranges are those of 200 000 tracks. Of a thousand gates, one
+is nearer to the next one than `CLEAR`."""
 
 
 def random_tracks(u: Any) -> Tracks:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.courses.domain import Domain, Extent
 from e2efly.vehicles.tables import LARGEST, shown
 
 KNOT_PERIOD = 0.5
@@ -44,6 +45,12 @@ class Spline:
         """Time after which the position is held, s."""
         return min(self.end, (self.knots.shape[1] - 1) * self.period)
 
+    @property
+    def domain(self) -> "Domain":
+        """Its top speed and acceleration at a knot."""
+        speed, acceleration = (np.linalg.norm(self.knots[:, :, i], axis=-1).max() for i in (1, 2))
+        return motion_domain(float(speed), float(acceleration))
+
     def position(self, time: Any) -> Any:
         """Positions (n, k, 3) at the times (n, k), s, in the arrays' own library. Positions are held at the ends."""
         xp = time.__array_namespace__()
@@ -59,6 +66,14 @@ class Spline:
         u = xp.clip(time, 0.0, self.duration) / self.period
         index = xp.minimum(u.astype(xp.int32), self.knots.shape[1] - 2)
         return index, u - index
+
+
+def motion_domain(speed: float, acceleration: float) -> Domain:
+    """The domain of references up to a speed, m/s, and an acceleration, m/s^2. Slower ones belong to it."""
+    return (
+        Extent("reference_speed", "m/s", 0.0, round(speed, 4)),
+        Extent("reference_acceleration", "m/s^2", 0.0, round(acceleration, 4)),
+    )
 
 
 def _quintic(a: Any, b: Any, h: float) -> tuple[Any, ...]:
@@ -139,6 +154,11 @@ class Lissajous:
         angle = xp.atan2(away[:, 0], xp.where(still, -away[:, 1], turning)) - self.shift
         return xp.atan2(xp.sin(angle), xp.cos(angle))
 
+    @property
+    def domain(self) -> Domain:
+        """Its top speed and acceleration."""
+        return self.spline(np.zeros(3), np.linspace(-np.pi, np.pi, 361), 1).domain
+
     def spline(self, centre: Any, phase: Any, m: int) -> Spline:
         """The curve about `centre` (3,), m, from each phase p (n,), rad, as `m` knots in the library of the phases."""
         xp = phase.__array_namespace__()
@@ -165,7 +185,7 @@ def read_csv(path: str | Path) -> np.ndarray:
         f"{_CLOSEST:g} s and over at most {LONGEST:g} s, x, y, z at most {LARGEST:g} in size"
     )
     try:
-        with Path(path).open(newline="", encoding="utf-8") as file:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
             lines = list(csv.reader(file))
     except (OSError, ValueError, csv.Error) as error:
         raise ValueError(f"reference {str(path)!r} cannot be read: {error}") from None

@@ -1,5 +1,6 @@
 """An attitude as the flight controller estimates it. Apart from odometry, because the watchdog starts without NumPy."""
 
+import math
 from dataclasses import dataclass
 
 
@@ -14,3 +15,16 @@ class Attitude:
     yaw: float
     """Yaw, rad in (-pi, pi]. Positive: to the left. It is counted from the direction in which the controller's heading
     is 0."""
+
+
+def turned(attitude: Attitude, rate: tuple[float, float, float], dt: float) -> Attitude:
+    """The attitude after `dt` s of a body rate, FLU, rad/s: by the kinematics of Euler angles."""
+    p, q, r = rate
+    s, c = math.sin(attitude.roll), math.cos(attitude.roll)
+    lean = math.copysign(max(abs(math.cos(attitude.pitch)), 0.1), math.cos(attitude.pitch))
+    about = (q * s + r * c) / lean
+    return Attitude(
+        attitude.roll + (p + about * math.sin(attitude.pitch)) * dt,
+        attitude.pitch + (q * c - r * s) * dt,
+        attitude.yaw + about * dt,
+    )

@@ -1,12 +1,16 @@
 """The bridge: at each control step, it turns poses and the flight controller's replies into stick commands."""
 
 import dataclasses
+import math
+from collections import deque
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from e2efly.control import Ctbr, Quat, Vec3
-from e2efly.deploy.betaflight.client import Client
+from e2efly.deploy.attitude import Attitude, turned
+from e2efly.deploy.betaflight.client import Client, Reply
 from e2efly.deploy.betaflight.controller import ControllerInfo
 from e2efly.deploy.betaflight.instruments import CLOSED, PROBE, ChannelProbe, Instruments, Reading
 from e2efly.deploy.betaflight.messages import AttitudeReply, MotorTelemetry, RawImu, set_raw_rc
@@ -34,6 +38,7 @@ from e2efly.deploy.pilot.hovering import DEFAULT, HoverController, Seen, UnderWa
 from e2efly.deploy.pilot.inertial import FRESH_S, Measurement
 from e2efly.deploy.pilot.landing import has_stood
 from e2efly.deploy.pilot.throttle_map import ThrottleHistory, ThrottleMap, learn
+from e2efly.deploy.pilot.touch import LAGS
 from e2efly.deploy.policy.runtime import Decision, Imu
 from e2efly.deploy.policy.worker import Worker
 from e2efly.deploy.pose.checks import Checks
@@ -53,8 +58,16 @@ DELAY_STEPS = 50
 SILENT_S = 0.1
 """If the controller has said nothing for this time, it may hold the next command for as long as its silence lasts,
 s."""
+DEAF_S = 0.5
+"""After a silence, the accelerometer has this time to be heard again, s."""
 CUT = Ctbr(0.0, Vec3(0.0, 0.0, 0.0))
 """The command that stands for a closed throttle."""
+ACTING_S = 0.25
+"""A measured force is compared with a throttle only if the commands of this time before it have arrived, s."""
+RARELY_S = 0.3
+"""If a stick frame was acknowledged as often as this in a silence, s, the others have arrived, too."""
+ANEW_S = 1.0
+"""After a silence as long as `link_timeout`, acknowledgements may belong to other frames for this time, s."""
 HISTORY_S = 30.0
 """How long the sent throttles are remembered, s. The link may be silent for a long time."""
 
@@ -126,8 +139,10 @@ class Bridge:
         self.keeper = None if filter is None else Keeper(filter)
         self._hovering, self._under_way = self.hover.begin(), UnderWay()
         self._history = ThrottleHistory(HISTORY_S)
-        self._late: tuple[float, ...] = ()
-        self._ticks, self._last = 0, 0.0
+        self._turns: deque[tuple[float, tuple[float, float, float]]] = deque(maxlen=128)
+        self._overdue: tuple[float, ...] = ()
+        self._ticks, self._last, self._heard_since, self._broken = 0, 0.0, 0.0, -math.inf
+        self._held, self._looked = self.sent, 0.0
 
     def adopt(self, info: ControllerInfo, settings_problems: tuple[str, ...]) -> None:
         """Take over the controller's settings as they were read, and the reasons why they forbid a take-off."""
@@ -141,8 +156,8 @@ class Bridge:
         dt = min(max(now - self._last, 0.0), 0.1) if self._last else 0.0
         self._last, self._ticks = now, self._ticks + 1
         self._under_way = sent(self._under_way, self.sent.command or CUT, dt, self.vehicle, self.latency)
-        late = (*self._late, now) if lateness > self.settings.lateness else self._late
-        self._late = tuple(moment for moment in late if moment >= now - 1.0)
+        late = (*self._overdue, now) if lateness > self.settings.lateness else self._overdue
+        self._overdue = tuple(moment for moment in late if moment >= now - 1.0)
         _, reading = self._perceive(now)
         self._decide(now, slack)
         self.sent = self._send(now, *self._kept(now, *self._command(now, dt)))
@@ -185,6 +200,13 @@ class Bridge:
     def _perceive(self, now: float, *, sends: bool = True) -> tuple[list[Sample], Reading]:
         """Read poses and the controller's replies, and combine them."""
         self.client.poll(now)
+        if now - self.client.heard > SILENT_S:
+            self._heard_since = now
+        if now - self.client.heard > self.settings.link_timeout and not self.client.lossy(now):
+            self._broken = now
+        if self.client.heard >= self._looked:
+            self._held = self.sent  # a controller that is not heard from now on has at least this one
+        self._looked = now
         samples, attitude = self.source.read(now), self.client.message(AttitudeReply.CODE, now, ATTITUDE_S)
         self.estimate = estimate.see(self.estimate, samples, self.flight, attitude, now, self.source.problem or "")
         if self.worker is not None:
@@ -214,17 +236,24 @@ class Bridge:
             override=reading.override,
             pilot=reading.pilot,
             voltage=reading.voltage,
-            settings_problems=self.settings_problems + probed + reading.meddling + ((slow,) if slow else ()),
+            settings_problems=(
+                *self.settings_problems,
+                *probed,
+                *reading.meddling,
+                *reading.armed_with,
+                *((slow,) if slow else ()),
+            ),
             policy_problem=reading.meddling[0] if reading.meddling else self._blindness(now) or self._unfiltered,
             filtered=self.keeper is not None,
             attitude_error=told.attitude_error(reading.attitude),
             heading_error=told.heading_error,
-            missed_deadlines=len(self._late),
+            missed_deadlines=len(self._overdue),
             accelerometer_problem=told.accelerometer_problem(mode),
+            force=told.inertial.force,
             motion_problem=told.motion_problem(mode),
             buried=flight.blind and told.inertial.buried(flight.home, now),
-            touched=told.inertial.touch.carried,
-            supported=told.inertial.touch.rests and now - told.inertial.time < FRESH_S,
+            stands=told.inertial.touch.stands(now),
+            deaf=not told.inertial.touch.able(now) and now - self._heard_since > DEAF_S,
         )
 
     def _blindness(self, now: float) -> str | None:
@@ -243,32 +272,40 @@ class Bridge:
         if (reply := reading.fresh.get(RawImu.CODE)) is not None:
             flying = self.flying and abs(self.height) > LIFTED and inputs.armed
             seen = inputs.seen if flying and not flight.misled else None
-            asked = reply.time - reply.latency
+            late = self._late(reply, now)
+            asked = reply.time - late
+            known = now - self._broken > ANEW_S
+            acts = known and self.client.delivered(asked - ACTING_S, asked) and not reading.failsafe
+            came = known and self.client.delivered(min(self.estimate.inertial.time, asked), asked, RARELY_S)
             sent = None if reading.failsafe else self._history.felt(asked)
+            before = [throttle for lag in LAGS if (throttle := self._history.felt(asked - lag)) is not None]
             measured = Measurement(
                 np.array(reply.message.acceleration, float), np.array(reply.message.body_rate), attitude,
                 None if sent is None else self.map.expected(sent, inputs.voltage),
+                tuple(self.map.force(t, inputs.voltage) for t in before) if len(before) == len(LAGS) else (),
                 asked,
+                acts=acts, delivered=came,
                 standing=flight.mode is Mode.INIT and not inputs.armed,
                 flying=flying and flight.mode is not Mode.TAKEOFF,
                 climb=None if seen is None else float(seen.velocity[2]),
             )  # fmt: skip
             if self.keeper is not None:
                 self.keeper.feel(measured.gyro, asked)
-            self.estimate = estimate.feel(self.estimate, measured, asked + reply.latency / 2, flight.mode, now)
+            self.estimate = estimate.feel(self.estimate, measured, asked + late / 2, flight.mode, now)
             if (force := self.estimate.inertial.force) is not None:
                 self.imu = Imu(measured.gyro, force)
-                if sent is not None and flying and not flight.blind:
+                if sent is not None and acts and flying and not flight.blind:
                     swing = self._history.swing(asked)
                     self.map = learn(self.map, sent, force, inputs.voltage, 0.02, swing)
 
-        def lift(moment: float) -> tuple[float, float] | None:
-            sent = self._history.felt(moment)
+        def lift(throttle: float | None) -> tuple[float, float] | None:
             lifts = flight.mode in (Mode.HOVER, Mode.POLICY, Mode.LAND) and not reading.failsafe
-            return self.map.expected(sent, inputs.voltage) if lifts and sent is not None else None
+            return self.map.expected(throttle, inputs.voltage) if lifts and throttle is not None else None
 
-        held = lift(min(now, self.client.heard))
-        told = inertial.carry(self.estimate.inertial, attitude, lift(now), now, held=held)
+        told = inertial.carry(
+            self.estimate.inertial, self._attitude(now, ATTITUDE_S), lift(self._history.felt(now)), now,
+            rate=self.sent.rate, held=lift(self._held.throttle), held_rate=self._held.rate,
+        )  # fmt: skip
         self.estimate = dataclasses.replace(self.estimate, inertial=told)
 
     def _decide(self, now: float, slack: float) -> None:
@@ -324,7 +361,7 @@ class Bridge:
             assert odometry is not None
             return self.worker.name, controlled(self.vehicle, decision.mode, odometry, decision.command)
         if flight.target is None or odometry is None or flight.blind:
-            attitude = self.client.message(AttitudeReply.CODE, now, BLIND_ATTITUDE_S)
+            attitude = self._attitude(now, BLIND_ATTITUDE_S)
             command, self.trim, told = guidance.descend(flight, self.estimate.inertial, attitude, self.trim, now, dt)
             self.estimate = dataclasses.replace(self.estimate, inertial=told)
             return "blind", command
@@ -336,6 +373,22 @@ class Bridge:
             silent=self.inputs.silent,
         )  # fmt: skip
         return "hover", command
+
+    def _attitude(self, now: float, oldest: float) -> Attitude | None:
+        """The controller's attitude when the next command acts: the newest one, turned by what was sent since. None: it
+        came more than `oldest` s ago.
+        """
+        reply = self.client.latest.get(AttitudeReply.CODE)
+        if reply is None or now - reply.time > oldest:
+            return None
+        attitude, asked = reply.message, reply.time - self._late(reply, now)
+        for (time, rate), (until, _) in pairwise((*self._turns, (now, (0.0, 0.0, 0.0)))):
+            attitude = turned(attitude, rate, until - max(time, asked)) if until > asked else attitude
+        return attitude
+
+    def _late(self, reply: Reply, now: float) -> float:
+        """How long ago a reply was asked for when it came, s."""
+        return min(reply.latency, self.client.quickest) if self.client.lossy(now) else reply.latency
 
     def _motion(self, now: float, odometry: Odometry) -> Seen:
         """The inputs of the hover controller."""
@@ -374,6 +427,7 @@ class Bridge:
             stick = self.sticks.channels_of(min(throttle, self.sticks.throttle.largest), rates_of(command), ())
             sent = Sent(source, command, throttle, stick.channels, stick.saturated)
         self._history.add(now, sent.throttle)
+        self._turns.append((now, sent.rate))
         self.client.set_raw_rc(set_raw_rc(sent.channels), now)
         return sent
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from e2efly.deploy.lines import Lines
-from e2efly.deploy.terminal import printable
+from e2efly.process import printable
 
 SCRIPTS = Path(__file__).parent / "process"
 """Where the scripts are."""

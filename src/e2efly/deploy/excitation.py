@@ -19,7 +19,7 @@ from e2efly.deploy.pilot.hover import FlightMotion, flight_gains
 from e2efly.deploy.policy.contract import CONTRACT_VERSION, Action, Contract
 from e2efly.deploy.settings import FlightSettings
 from e2efly.goal import Course, Goal, Observed, Outcome
-from e2efly.numbers import check_numbers, number
+from e2efly.numbers import SPEED, check_numbers, number
 from e2efly.observation import ATTITUDE, VELOCITY, Field
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
@@ -54,7 +54,7 @@ class ExcitationOptions:
 
     seconds: float = number(DURATION, low=10.0, high=300.0)
     """Duration, s."""
-    speed: float = number(5.0, above=0)
+    speed: float = number(5.0, above=0, high=SPEED)
     """Speed of the fastest line, m/s. The fence's room and its speed may allow less."""
 
 

@@ -10,8 +10,11 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from e2efly.control import Ctbr
 from e2efly.deploy.betaflight.controller import ControllerInfo
+from e2efly.deploy.betaflight.descent import Sense
 from e2efly.deploy.betaflight.instruments import CLOSED
 from e2efly.deploy.betaflight.watchdog import Plan, WatchedLink
 from e2efly.deploy.bridge import Bridge
@@ -21,8 +24,8 @@ from e2efly.deploy.log.record import Log
 from e2efly.deploy.pilot.flight_state import Mode
 from e2efly.deploy.pilot.hover import blind, blind_time, sink_time
 from e2efly.deploy.service import Service
-from e2efly.deploy.terminal import printable
-from e2efly.process import threads
+from e2efly.gravity import GRAVITY
+from e2efly.process import printable, threads
 
 LOWEST_RATE = 100.0
 """The lowest rate of the loop, Hz."""
@@ -30,6 +33,8 @@ PLAN_PERIOD = 0.1
 """The period at which the watchdog is given a new plan, s."""
 PLAN_RATES = tuple(0.5 * i for i in range(-6, 7))
 """Body rates of the watchdog's tables, rad/s."""
+PLAN_FORCES = tuple(float(i) for i in range(26))
+"""Specific forces of the watchdog's table, m/s^2."""
 SWITCH_S = 1e-4
 """The longest time for which another thread of the process may delay the loop, s. Python's default is 5 ms."""
 LOOP_PRIORITY, POLICY_PRIORITY, OTHER_PRIORITY = 10, 9, 8
@@ -165,7 +170,31 @@ def plan_of(bridge: Bridge) -> Plan:
     mid = sticks.centre
     idle = sticks.arrange((mid, mid, mid, CLOSED), ())
     flying = bridge.flying or bridge.flight.mode is Mode.PILOT or bridge.inputs.armed
-    return Plan(flying, PLAN_RATES, (roll, pitch, yaw), (a, b, c, d), steps, idle)
+    sense = None if len(steps) == 1 else _sense(bridge)
+    return Plan(flying, PLAN_RATES, (roll, pitch, yaw), (a, b, c, d), steps, idle, sense)
+
+
+def _sense(bridge: Bridge) -> Sense | None:
+    """What the watchdog's descent by the accelerometer starts from. None: nothing is known of the motion."""
+    told, sticks = bridge.estimate.inertial, bridge.sticks
+    moves = told.reckoned
+    if moves is None:
+        return None
+    table: dict[int, float] = {}  # by pulse, because a throttle has a largest
+    for force in PLAN_FORCES:
+        share = min(bridge.map.throttle(force, bridge.inputs.voltage), sticks.throttle.largest)
+        table.setdefault(sticks.throttle.channel_for(share), force)
+    gravity = 0.0 if told.rest is None or told.frozen else float(np.linalg.norm(told.rest))
+    forward, left, _ = moves.velocity
+    return Sense(
+        unit=told.scale.value * GRAVITY / gravity if gravity > 0 else 0.0,
+        forces=tuple(table.values()),
+        pulses=tuple(table),
+        doubt=bridge.map.doubt,
+        share=told.share,
+        velocity=(forward, left, moves.climb),
+        height=moves.height - bridge.flight.home,
+    )
 
 
 def _say(say: Callable[[str], None], line: str) -> None:

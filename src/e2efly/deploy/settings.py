@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from e2efly.numbers import check_numbers, number
+from e2efly.numbers import ANGLE, SPEED, check_numbers, number
 
 Point = tuple[float, float, float]
 Box = tuple[float, float, float, float, float, float]
@@ -17,14 +17,14 @@ class Fence:
     """Smallest x, y, z."""
     high: Point = number((3.0, 3.0, 4.5), low=-math.inf)
     """Largest x, y, z."""
-    speed: float = number(6.0, above=0)
+    speed: float = number(6.0, above=0, high=SPEED)
     """Largest speed, m/s."""
-    tilt: float = number(1.4, above=0)
+    tilt: float = number(1.4, above=0, high=ANGLE)
     """Largest angle between the body's z axis and the up direction, rad."""
-    braking: float = number(6.0, above=0)
+    braking: float = number(6.0, above=0, high=100.0)
     """Deceleration that the hover controller can rely on, m/s^2. The guard takes over while this can still stop the
     vehicle inside."""
-    reaction: float = number(0.15, above=0)
+    reaction: float = number(0.15, above=0, high=10.0)
     """Time until the braking takes effect, s."""
     solids: tuple[Box, ...] = ()
     """Boxes that `--guard filter` keeps the vehicle out of. Each box is smallest x, y, z, largest x, y, z."""
@@ -53,45 +53,45 @@ class PilotChannels:
 class FlightSettings:
     """How the bridge flies."""
 
-    takeoff_height: float = number(1.0, above=0)
+    takeoff_height: float = number(1.0, above=0, high=100.0)
     """Height of the hover after take-off, above the place of take-off, m."""
-    takeoff_speed: float = number(0.4, above=0)
+    takeoff_speed: float = number(0.4, above=0, high=10.0)
     """Climb speed at take-off, m/s."""
-    land_speed: float = number(0.35, above=0)
+    land_speed: float = number(0.35, above=0, high=10.0)
     """Descent speed when landing, m/s."""
-    reposition_speed: float = number(0.8, above=0)
+    reposition_speed: float = number(0.8, above=0, high=10.0)
     """Speed of the hover point at full stick, m/s."""
-    odometry_timeout: float = number(0.1, above=0)
+    odometry_timeout: float = number(0.1, above=0, high=10.0)
     """Odometry that is older than this counts as lost, s."""
-    link_timeout: float = number(0.25, above=0)
+    link_timeout: float = number(0.25, above=0, high=10.0)
     """The link counts as lost when the flight controller has been silent for this time, s."""
-    policy_timeout: float = number(0.01, above=0)
+    policy_timeout: float = number(0.01, above=0, high=10.0)
     """How long a control step waits for the policy, s."""
     command_timeout: float = number(0.2, above=0, high=1.0)
     """Largest age of commands from another program, s. Older commands end its flight."""
-    missed_deadlines: int = number(3, low=1)
+    missed_deadlines: int = number(3, low=1, high=1000)
     """This number of late control steps within one second ends a policy's flight."""
-    lateness: float = number(0.02, above=0)
+    lateness: float = number(0.02, above=0, high=10.0)
     """A control step that is late by this time has missed its deadline, s."""
-    battery_low: float = number(3.5, above=0)
+    battery_low: float = number(3.5, above=0, high=5.0)
     """Smallest battery voltage, V per cell. Below this, take-off is refused, and a hovering vehicle lands."""
     battery_unknown: bool = False
     """Fly although the flight controller reports no battery voltage."""
     stick_deadband: float = number(0.12, above=0, high=0.99)
     """Stick deflection, from 0 to 1, above which the pilot's input takes effect."""
-    still_speed: float = number(0.1, above=0)
+    still_speed: float = number(0.1, above=0, high=10.0)
     """Largest speed before take-off and after landing, m/s."""
     ground_height: float = number(0.0, low=-math.inf)
     """Height of the ground, world, m."""
-    land_settle: float = number(1.0, above=0)
+    land_settle: float = number(1.0, above=0, high=60.0)
     """The vehicle has landed if it stays still for this time while the target is well below it, s."""
-    attitude_agreement: float = number(0.2, above=0)
+    attitude_agreement: float = number(0.2, above=0, high=ANGLE)
     """Largest difference in roll and in pitch between the flight controller's estimate and the odometry before
     take-off, rad."""
     follow_distance: float = number(1.0, above=0)
     """How much farther from its target than the nearest point that it had reached the vehicle may fly, m. Beyond this,
     the odometry is judged to be wrong: a wrong heading, or the rigid body of another vehicle."""
-    heading_agreement: float = number(0.7, above=0)
+    heading_agreement: float = number(0.7, above=0, high=ANGLE)
     """Largest error of the odometry's heading, as estimated from the flight itself, rad."""
     fence: Fence = Fence()
     """The volume in which policies may fly."""

@@ -11,18 +11,13 @@ import time
 from contextlib import suppress
 from typing import Any, TextIO
 
-from e2efly.process import write_nowhere
+from e2efly.process import printable, write_nowhere
 
 LANDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 """Signals that ask for a landing: Ctrl-C, a normal request to end (SIGTERM), a terminal that lost its connection,
 Ctrl-\\, Ctrl-Z."""
 WAITING = 100
 """The largest number of lines that wait to be printed."""
-
-
-def printable(text: str) -> str:
-    """The text on one line. Line ends, escape sequences and lone surrogates are shown as Python's escapes."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 class Stop:

@@ -26,6 +26,7 @@ from e2efly.config import (
     RewardConfig,
     TaskConfig,
 )
+from e2efly.config.vehicle import FILE, RANDOM, STILL
 from e2efly.control import COMMAND_MODES
 from e2efly.env import disturbance, expert
 from e2efly.env.check import check
@@ -172,7 +173,14 @@ class Env:
         spread = sooner != later and self.family is None
         spread = spread or any(camera != steady(camera) for camera in self.cameras)
         drawn = any(self.randomize.values()) or (self.posterior is not None and np.any(self.posterior.root))
-        return bool(spread or drawn or self.wind or self.disturbance)
+        return bool(spread or drawn or self.wind or (self.disturbance or DisturbanceConfig()) != DisturbanceConfig())
+
+    @property
+    def vehicles(self) -> str:
+        """The name of what flies, for everything that tells a success."""
+        if self.is_disturbed:
+            return RANDOM
+        return FILE if self.family is None else STILL
 
     def undisturbed(self) -> "Env":
         """The environment with the vehicle of the file, its delay, still air, and nominal cameras.

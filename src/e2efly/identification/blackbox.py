@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from e2efly.deploy.log.blackbox import Blackbox, align
-from e2efly.identification.readers import BLACKBOXES
+from e2efly.identification.readers import BLACKBOX
 from e2efly.identification.record import Record, Stream
 
 RATE = 1000.0
@@ -34,7 +34,7 @@ def with_blackboxes(records: Sequence[Record]) -> list[Record]:
         records: the records as read.
     """
     found = dict(enumerate(records))
-    boxes = [i for i, r in found.items() if r.path.suffix.lower() in BLACKBOXES and r.has("body_rate")]
+    boxes = [i for i, r in found.items() if r.kind == BLACKBOX and r.has("body_rate")]
     flights = [i for i, r in found.items() if i not in boxes and r.has("body_rate", "command")]
     for box in boxes:
         laid = ((i, _laid(found[i], found[box])) for i in flights)

@@ -10,9 +10,9 @@ from itertools import permutations
 import numpy as np
 from scipy.signal import lfilter
 
-from e2efly.control import Quat
+from e2efly.control import Quat, Vec3
 from e2efly.deploy.log.blackbox import vertex
-from e2efly.identification.record import KINDS, Record, Stream
+from e2efly.identification.record import KINDS, Record, Stream, percent
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 
@@ -36,6 +36,11 @@ AT_REST, LEVEL = 0.02, 0.2
 is corrected, rad."""
 SEEN = 0.12
 """Lowest correlation between the rotors' torques and the body's angular acceleration that shows the rotor order."""
+UNIT_OFF, LIVELY = 2.0, 3.0
+"""`UNIT_OFF`: ratio to what gravity and motion show from which on a specific force has another unit. `LIVELY`: up to so
+many times gravity is typical of a log that shows neither."""
+CALM_S, CALM_RATE = 0.2, 0.3
+"""Length of a piece, s, and largest body rate in it, rad/s, of a vehicle that is at rest or hovers."""
 _GRID = 0.005
 
 
@@ -88,7 +93,7 @@ def _within_limits(record: Record) -> Record:
             worst = float(np.max(np.abs(stream.values)))
             raise ValueError(
                 f"{record.path}: {name} is up to {worst:.4g}{unit}, and beyond what a quadrotor can do in "
-                f"{100 * bad.mean():.2g} % of its samples; accepted: up to {LIMITS[name]:g}{unit} "
+                f"{percent(bad.mean())} of its samples; accepted: up to {LIMITS[name]:g}{unit} "
                 "(are the units "
                 "right? Splines through gaps overshoot like this, too)"
             )
@@ -124,21 +129,29 @@ def _check_constant(record: Record) -> None:
         if np.any(spread == 0):
             column = KINDS[name].columns[int(np.argmin(spread))]
             raise ValueError(
-                f"{record.path}: {column} of {name} never changes; accepted: what was measured in flight, or a log "
-                "without "
-                f"{name}"
+                f"{record.path}: {column} of {name} never changes; accepted: what was measured in flight, or the log "
+                f"--without {name}"
             )
 
 
 def _check_units(record: Record) -> None:
     if record.has("specific_force"):
         size = float(np.median(np.linalg.norm(record.streams["specific_force"].values, axis=1)))
-        if not 0.5 * GRAVITY < size < 2 * GRAVITY:
-            guess = "g" if 0.5 < size < 2 else "mm/s^2" if size > 2000 else "another unit, or without gravity"
+        shown = _gravity_shown(record)
+        told = f"rest, hover or the motion of the poses show {shown[0][1]:.3g}" if shown else f"gravity is {GRAVITY}"
+        shown = shown or [(size, float(np.clip(size, GRAVITY, LIVELY * GRAVITY)))]
+        off = min((measured / expected for measured, expected in shown), key=lambda x: abs(np.log(max(x, 1e-9))))
+        guess = (
+            "values without gravity" if abs(_lift(record)) < 0.3 * off * GRAVITY or off < 0.04
+            else "" if 1 / UNIT_OFF < off < UNIT_OFF
+            else "g" if off < 0.2
+            else "another unit"
+        )  # fmt: skip
+        if guess:
             raise ValueError(
-                f"{record.path}: specific_force has a median size of {size:.3g}, where gravity is {GRAVITY} m/s^2: it "
-                "looks "
-                f"like {guess}; accepted: m/s^2, with gravity (--columns az=THEIRS*9.81)"
+                f"{record.path}: specific_force has a median size of {size:.3g}, where {told} m/s^2: it "
+                f"looks like {guess}; accepted: m/s^2, with gravity (--columns ax=ax*9.81 ay=ay*9.81 az=az*9.81, in a "
+                "CSV file with its own names behind the =), or a flight --without specific_force"
             )
     if record.has("body_rate", "quaternion"):
         told, true = _rates(record)
@@ -147,8 +160,60 @@ def _check_units(record: Record) -> None:
             unit = "deg/s" if slope > 20 else "another unit"
             raise ValueError(
                 f"{record.path}: body_rate is {slope:.3g} times what the attitude turns by: it looks like {unit}; "
-                "accepted: rad/s"
+                "accepted: rad/s (--columns wx=wx*0.0174533 wy=wy*0.0174533 wz=wz*0.0174533 makes it of deg/s)"
             )
+
+
+def _gravity_shown(record: Record) -> list[tuple[float, float]]:
+    """Where the log shows how large the specific force is: its median there, in the log's unit, and that by gravity and
+    motion, m/s^2. The size of a vector does not depend on the body's axes, nor on exact clocks.
+    """
+    force = record.streams["specific_force"]
+    sizes, shown = np.linalg.norm(force.values, axis=1), []
+    if record.has("body_rate"):  # at rest or in hover: it neither turns nor shakes
+        gyro = record.streams["body_rate"]
+        turn = np.interp(force.time, gyro.time, np.linalg.norm(gyro.values, axis=1))
+        every = max(round(CALM_S * force.rate), 2)
+        count = len(sizes) // every
+        pieces, turns = (x[: count * every].reshape(count, every) for x in (sizes, turn))
+        calm = (turns.max(1, initial=0.0) < CALM_RATE) & (pieces.std(1) < 0.1 * pieces.mean(1))
+        if calm.sum() > 2:
+            shown.append((float(np.median(pieces[calm])), GRAVITY))
+    if (moved := _acceleration(record)) is not None:
+        time, acceleration = moved
+        inside = (force.time >= time[0]) & (force.time <= time[-1])
+        if inside.any():
+            expected = np.linalg.norm(acceleration + np.array([0.0, 0.0, GRAVITY]), axis=1)
+            shown.append((float(np.median(sizes[inside])), max(float(np.median(expected)), 1e-3)))
+    return shown
+
+
+def _acceleration(record: Record) -> tuple[np.ndarray, np.ndarray] | None:
+    """Accelerations of the poses, (n, 3) m/s^2 in the world, and their times. None: there are no poses."""
+    name = "velocity" if record.has("velocity") else "position" if record.has("position") else ""
+    if not name or np.ptp(record.streams[name].time) < 5 * CALM_S:
+        return None
+    stream = record.streams[name]
+    time = np.arange(stream.time[0], stream.time[-1], CALM_S)
+    values = np.stack([np.interp(time, stream.time, x) for x in stream.values.T], -1)
+    if name == "velocity":
+        return 0.5 * (time[1:] + time[:-1]), np.diff(values, axis=0) / CALM_S
+    return time[1:-1], np.diff(values, 2, axis=0) / CALM_S**2
+
+
+def _lift(record: Record) -> float:
+    """The mean specific force along the world's z, in the log's unit. It is gravity over any flight that ends about as
+    fast as it begins. NaN if the log does not show it.
+    """
+    moved = _acceleration(record) if record.has("quaternion") else None
+    if moved is None or len(moved[0]) < 5:
+        return float("nan")
+    time, acceleration = moved
+    pose, force = record.streams["quaternion"], record.streams["specific_force"]
+    q = np.stack([np.interp(time, pose.time, x) for x in _continuous(pose.values).T])
+    f = np.stack([np.interp(time, force.time, x) for x in force.values.T])
+    up = np.asarray(Quat(*q / np.linalg.norm(q, axis=0)).rotate(Vec3(*f)).z)
+    return float(np.mean(up - acceleration[:, 2]))
 
 
 def _levelled(record: Record) -> Record:
@@ -253,11 +318,13 @@ def _check_rotors(record: Record, vehicle: Vehicle) -> None:
     usual = seen((0, 1, 2, 3))
     best = max(permutations(range(4)), key=lambda order: float(seen(order).sum()))
     if np.all(seen(best) > SEEN) and seen(best).sum() > 1.4 * max(float(usual.sum()), 0.0):
-        listed = ", ".join(KINDS[name].columns[i] for i in best)
+        columns = KINDS[name].columns
+        listed = ", ".join(columns[i] for i in best)
+        first, other = next((columns[i], columns[k]) for i, k in enumerate(best) if i != k)
         raise ValueError(
             f"{record.path}: {name} does not turn the vehicle as its geometry says; the columns fit it in the order "
             f"{listed}; "
-            f"accepted: rear right, front right, rear left, front left"
+            f"accepted: rear right, front right, rear left, front left (--columns OURS=THEIRS, as {first}={other})"
         )
 
 

@@ -13,6 +13,8 @@ OVER_MASS = ("thrust_map", "rotor_thrust_max", "inertia", "drag_linear", "drag_q
 """Fields that flights determine only relative to the mass. A relative error of the mass changes all of them by the same
 fraction."""
 MASS = "mass"
+FIRM = 2e-3
+"""Smallest eigenvalue of the matrix, so that it stays positive definite when it is written with four digits."""
 
 
 def entry_of(unknown: Unknown) -> Entry:
@@ -62,6 +64,10 @@ def correlation(
         end = at + len(block)
         matrix[at:end, at:end] = block
         at = end
+    low = float(np.linalg.eigvalsh(matrix)[0]) if names else 1.0
+    if low < FIRM:  # a flight of fewer windows than unknowns leaves directions without a spread
+        own = (FIRM - low) / (1 - low)
+        matrix = (1 - own) * matrix + own * np.eye(len(names))
     return names, matrix
 
 

@@ -32,8 +32,9 @@ SLOW_STRUCTURE = STRUCTURE | {"thrust_map": 0.015, "motor_time_constant": 0.05}
 HELD_OUT = 5
 """One window out of this many is held out of the fit, to judge the result."""
 POSE_DELAY = [name for name, _ in NUISANCES].index("pose_delay")
-LEAST = 4.0
-"""Minimum flight time that a fit needs, s."""
+LEAST = 1.5
+"""Minimum flight time that a fit needs, s: half a lap of a race shows all parameters. What a flight does not show is
+refused by its standard deviation."""
 TORQUES = 200.0
 """Sampling rate of motor outputs from which on they show the torques on the body, Hz."""
 NEAR, REFITS = 1.0, 2
@@ -111,17 +112,28 @@ def driver_of(records: Sequence[Record], step: bool = False) -> str:
         ValueError: naming the flight that has no such stream.
     """
     wanted = ("command",) if step else ("command", "rotor_speed", "motor")
-    if not step and all(_shows_motors(record) and not record.has("rotor_speed") for record in records):
+    if not step and all(_shows_motors(record) and not _drives(record, "rotor_speed") for record in records):
         wanted = ("motor",)
     for name in wanted:
-        if all(record.has(name) for record in records):
+        if all(_drives(record, name, step) for record in records):
             slow = name == "motor" and any(record.streams[name].rate < TORQUES for record in records)
             return "motor_and_rate" if slow and all(r.has("quaternion", "position") for r in records) else name
-    lacking = next(r for r in records if not any(r.has(name) for name in wanted))
+    lacking = next((r for r in records if not any(_drives(r, name, step) for name in wanted)), records[0])
     raise ValueError(
         f"{lacking.path}: has the streams {', '.join(lacking.streams) or 'none'}; accepted: "
-        f"{' or '.join(wanted)} in every flight, besides body_rate"
+        f"{' or '.join(wanted)} in every flight, besides body_rate (rotor speeds {MOTORS:g} times a second, commands "
+        "whose thrust changes)"
     )
+
+
+def _drives(record: Record, name: str, step: bool = False) -> bool:
+    """Whether a stream can drive a simulation. Where only the rates are fitted, a command need not tell the thrust."""
+    if not record.has(name):
+        return False
+    stream = record.streams[name]
+    if name == "command":
+        return step or bool(np.ptp(stream.values[:, 0]) > 0)
+    return name != "rotor_speed" or stream.rate >= MOTORS
 
 
 def _shows_motors(record: Record) -> bool:
@@ -185,7 +197,8 @@ def identify(
         )
     only = tuple(u.name for u in UNKNOWNS if u.field == "rate_gain" or (u.field == "latency" and delay)) if step else ()
     model = Model.of(vehicle, driver, believed, only)
-    held_out = np.arange(windows.count) % HELD_OUT == HELD_OUT - 1
+    every = min(HELD_OUT, windows.count)
+    held_out = np.arange(windows.count) % every == every - 1
     seen = windows.some(~held_out)
     found = fit(model, seen, begin(model, seen), told=told)
     sigma = sigmas(model, found)

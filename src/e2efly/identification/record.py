@@ -1,6 +1,6 @@
 """A recorded flight: streams of numbers, each with its own times. SI units, world ENU, body FLU."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -39,6 +39,8 @@ KINDS: dict[str, Kind] = {
 """All streams, by name."""
 
 
+HUGE = 1e15
+"""Numbers of this size and above are damage, in any unit."""
 MOTORS = 40.0
 """Lowest logging rate at which motor outputs can drive a simulation, Hz."""
 
@@ -75,6 +77,8 @@ class Record:
     """What was left out or changed during reading, in words."""
     pose_age: float | None = None
     """Age of the poses when commands were computed from them, by the gyroscope's clock, s. None: not known."""
+    kind: str = ""
+    """Of which kind the file is, as `readers.FORMATS` names it."""
 
     @property
     def span(self) -> tuple[float, float]:
@@ -95,6 +99,73 @@ class Record:
     def has(self, *names: str) -> bool:
         """Whether all of these streams were recorded, with at least two samples each."""
         return all(name in self.streams and len(self.streams[name].time) > 1 for name in names)
+
+
+class Streams:
+    """The streams of a log as a reader collects them. It notes what is left out."""
+
+    def __init__(self) -> None:
+        self.found: dict[str, Stream] = {}
+        self.notes: list[str] = []
+
+    def put(self, name: str, time: np.ndarray, values: np.ndarray, source: str = "") -> bool:
+        """Keep the samples that are numbers and whose times rise. The first source of a stream is kept.
+
+        Args:
+            name: of the stream.
+            time: (n,) s.
+            values: (n, k).
+            source: where they are from, for the notes.
+
+        Returns:
+            Whether any sample was kept.
+        """
+        if name in self.found:
+            return False
+        of, total = f"{name}{source and f' of {source}'}", len(time)
+        good = (np.abs(time) < HUGE) & (np.abs(values) < HUGE).all(1)
+        time, values = time[good], values[good]
+        latest = np.concatenate([[-np.inf], np.maximum.accumulate(time)[:-1]]) if len(time) else time
+        rising = time > latest
+        lost = {"are no numbers": total - len(time), "have times that do not rise": int((~rising).sum())}
+        for why, count in lost.items():
+            if count:
+                self.notes.append(f"{count} of {total} samples of {of} are left out: they {why}")
+        time, values = time[rising], values[rising]
+        if name in ("rotor_speed", "quaternion") and len(time) and not values.any():
+            self.notes.append(f"{of} is left out: it is always 0, so it was not measured")
+        elif len(time):
+            self.found[name] = Stream(time, values)
+        return name in self.found
+
+    def record(self, path: Path, pose_age: float | None = None) -> Record:
+        """What was collected.
+
+        Raises:
+            ValueError: when that is nothing.
+        """
+        if not self.found:
+            told = "".join(f"; {note}" for note in self.notes)
+            accepted = "body rates, forces, poses, motors or commands"
+            raise ValueError(f"{path}: has nothing that is used here{told}; accepted: {accepted}")
+        return Record(path, self.found, tuple(self.notes), pose_age)
+
+
+def listed(names: Iterable[str], most: int = 12) -> str:
+    """Names for people, the first few of them, as one plain line."""
+    names = [plain(name) for name in names]
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def plain(text: str) -> str:
+    """A text of somebody else, without the control characters that would move a terminal's cursor."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def percent(share: float) -> str:
+    """A share for people, with two digits and no exponent."""
+    return f"{100 * share:.0f} %" if share >= 0.095 else f"{100 * share:.2g} %"
 
 
 def stream_table() -> str:

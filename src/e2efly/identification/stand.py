@@ -1,24 +1,17 @@
 """Thrust map, torque ratio, limits and lag of a rotor, from the record of a thrust stand."""
 
-import csv
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scipy.optimize import curve_fit
 
+from e2efly.identification.csv_file import Column
 from e2efly.identification.estimate import Estimate
+from e2efly.identification.stand_file import read_stand
 
-COLUMNS = {
-    "t": "s, needed for the lag",
-    "throttle": "0 to 1",
-    "voltage": "V",
-    "rpm": "1/min, or rotor_speed in rad/s",
-    "thrust": "N",
-    "torque": "N*m",
-}
-"""The columns that a record may have, with their units."""
 STEP = 0.1
 """Change of the throttle that counts as a step."""
 LONGEST = 0.5
@@ -53,59 +46,16 @@ class Stand:
     """Relative change of the rotor speed divided by the relative change of the voltage, at constant throttle."""
 
 
-def read_stand(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a stand's record (CSV with a header), in SI units.
-
-    Raises:
-        ValueError: naming the file, the column or the line, the value and what is accepted.
-    """
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: {error}; accepted: a CSV file of a thrust stand") from None
-    if len(rows) < 2:
-        raise ValueError(f"{path}: has {len(rows)} lines; accepted: a header and a line a measurement")
-    header = [name.strip() for name in rows[0]]
-    known = {*COLUMNS, "rotor_speed"}
-    if unknown := [name for name in header if name not in known]:
-        accepted = ", ".join(f"{name} ({what})" for name, what in COLUMNS.items())
-        raise ValueError(f"{path}: column {unknown[0]!r} is unknown; accepted: {accepted}")
-    if len(set(header)) < len(header):
-        raise ValueError(f"{path}: the columns are {', '.join(header)}; accepted: each once")
-    table = np.empty((len(rows) - 1, len(header)))
-    for i, row in enumerate(rows[1:]):
-        if len(row) != len(header):
-            raise ValueError(f"{path}: line {i + 2} has {len(row)} entries; accepted: {len(header)}, as the header")
-        for j, entry in enumerate(row):
-            try:
-                table[i, j] = float(entry)
-            except ValueError:
-                table[i, j] = math.nan
-            if not math.isfinite(table[i, j]):
-                raise ValueError(f"{path}: line {i + 2}: {header[j]} is {entry!r}; accepted: a finite number")
-    found = dict(zip(header, table.T, strict=True))
-    if "rpm" in found:
-        found["rotor_speed"] = found.pop("rpm") * (2 * np.pi / 60)
-    for name in ("rotor_speed", "thrust"):
-        if name not in found:
-            raise ValueError(f"{path}: has no column {'rpm' if name == 'rotor_speed' else name!r}; accepted: {COLUMNS}")
-    if "t" in found and np.any(np.diff(found["t"]) <= 0):
-        at = int(np.argmax(np.diff(found["t"]) <= 0)) + 3
-        raise ValueError(f"{path}: line {at}: t does not rise; accepted: rising times, s")
-    if "throttle" in found and not np.all((found["throttle"] >= 0) & (found["throttle"] <= 1)):
-        raise ValueError(f"{path}: throttle is up to {found['throttle'].max():g}; accepted: 0 to 1")
-    return found
-
-
-def evaluate(path: Path) -> Stand:
-    """Fit a stand's record.
+def evaluate(
+    path: Path, columns: Mapping[str, Column] | None = None, told: Callable[[str], None] = lambda _: None
+) -> Stand:
+    """Fit a stand's record. The arguments are those of `read_stand`.
 
     Raises:
         ValueError: as for `read_stand`; when the thrust does not rise with the speed, or when too little of the range
             was measured.
     """
-    data = read_stand(path)
+    data = read_stand(path, columns, told)
     steady = _steady(data)
     speed, thrust = data["rotor_speed"][steady], data["thrust"][steady]
     if len(speed) < 6 or speed.max() < 2 * max(speed.min(), 1e-9):
@@ -134,13 +84,17 @@ def evaluate(path: Path) -> Stand:
     )  # fmt: skip
 
 
-def estimates(path: Path) -> list[Estimate]:
+def estimates(
+    path: Path, columns: Mapping[str, Column] | None = None, told: Callable[[str], None] = lambda _: None
+) -> list[Estimate]:
     """Thrust map, largest thrust and speed, torque ratio and motor lag, as far as the record contains them.
+
+    The arguments are those of `read_stand`.
 
     Raises:
         ValueError: as for `evaluate`.
     """
-    found, source = evaluate(path), f"{path.name}, thrust stand"
+    found, source = evaluate(path, columns, told), f"{path.name}, thrust stand"
     said = [
         Estimate("thrust_map", found.thrust_map, np.sqrt(np.diag(found.covariance)), source),
         Estimate("rotor_thrust_max", np.array(found.thrust_max), np.array(found.thrust_max * FLOOR), source),

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from e2efly.learn.judge import worst_success
-from e2efly.learn.rundir import RunDirectory, to_json
-
-GOOD = 0.99
-"""Success rate of an evaluation at which a run counts as successful."""
+from e2efly.config.train import criterion
+from e2efly.env import Env
+from e2efly.learn.judge import rates
+from e2efly.learn.rundir import RunDirectory, least_success, to_json
 
 
 @dataclass(frozen=True)
@@ -29,6 +28,10 @@ class Compared:
     """Time since the start of the process at each evaluation, s. For a resumed run, summed over all its processes."""
     success: Float[np.ndarray, " t"]
     """Success rate of the worst criterion at each evaluation."""
+    vehicles: str
+    """The name of what flies in training and its evaluations."""
+    criterion: float
+    """Success rate at which the run counts as having learned its task."""
     summary: dict[str, Any] | None
     """The summary that the run wrote at its end. None: it has not ended."""
 
@@ -40,23 +43,32 @@ class Compared:
             ValueError: when the folder holds no run, or a run of another version.
         """
         run = RunDirectory(path)
-        options = dict(_flat(to_json(run.config())))
+        config = run.config()
+        options, vehicles = dict(_flat(to_json(config))), Env.of(config.task, config.reward, config.env).vehicles
         rows = [row for row in run.rows() if "seconds" in row]
-        worst = [min(x for name, x in row.items() if name.endswith("/success")) for row in rows]
         steps, seconds = (np.array([row[name] for row in rows], float) for name in ("steps", "seconds"))
         ended = run.read_json("summary.json") if (path / "summary.json").is_file() else None
-        return Compared(path, options, steps, seconds, np.array(worst, float), ended)
+        success = np.array([least_success(row) for row in rows], float)
+        least = criterion(config.stop_at, vehicles)
+        return Compared(path, options, steps, seconds, success, vehicles, least, ended)
 
     @property
     def there(self) -> tuple[float, float] | None:
-        """Environment steps and seconds at the first evaluation with at least `GOOD`. None: there was none."""
-        found = np.flatnonzero(self.success >= GOOD)
+        """Environment steps and seconds when the run reached its criterion. None: it did not.
+
+        With `stop_at` the run itself confirmed it. Otherwise it is the first evaluation with so much success.
+        """
+        if self.summary and (reached := self.summary.get("reached_criterion")):
+            return reached["steps"], reached["seconds"]
+        found = np.flatnonzero(self.success >= self.criterion)
         return (float(self.steps[found[0]]), float(self.seconds[found[0]])) if len(found) else None
 
     @property
-    def shipped(self) -> float | None:
-        """Success rate of the shipped policy with the vehicles of the training. None: the run has not ended."""
-        return None if self.summary is None else worst_success(self.summary["shipped"])
+    def shipped(self) -> str:
+        """Success rates of the shipped policy, by the name of what flew."""
+        if self.summary is None:
+            return "has not ended"
+        return ", ".join(f"{rate:.1%} ({name})" for name, rate in rates(self.summary).items())
 
 
 def differing(runs: Sequence[Compared]) -> dict[str, list[Any]]:
@@ -79,8 +91,9 @@ def table(runs: Sequence[Compared]) -> list[dict[str, str]]:
             **{name: _text(column[i]) for name, column in different.items()},
             "steps": f"{run.steps[-1] / 1e6:.2f} M" if len(run.steps) else "none",
             "time": f"{run.seconds[-1]:.0f} s" if len(run.seconds) else "none",
-            f"to {GOOD:.0%}": "never" if there is None else f"{there[0] / 1e6:.2f} M, {there[1]:.0f} s",
-            "success": "has not ended" if run.shipped is None else f"{run.shipped:.1%}",
+            "reached": f"{100 * run.criterion:g}% ({run.vehicles}): "
+            + ("never" if there is None else f"{there[0] / 1e6:.2f} M, {there[1]:.0f} s"),
+            "success": run.shipped,
             "update": "" if ended is None else str(ended["shipped"]["update"]),
         })  # fmt: skip
     return rows

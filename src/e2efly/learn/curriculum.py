@@ -7,7 +7,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from e2efly.config import StageConfig, TaskConfig, TrainConfig
+from e2efly.config import StageConfig, TaskConfig, TrainConfig, check_numbers
 from e2efly.env import Env
 
 
@@ -47,10 +47,7 @@ def stages(config: TrainConfig) -> tuple[Stage, ...]:
         where = f"curriculum[{i}]"
         if stage.success is None and stage.steps is None:
             raise ValueError(f"{where} has neither success nor steps; accepted: at least one of them, to end it")
-        if stage.success is not None and not 0 < stage.success <= 1:
-            raise ValueError(f"{where}.success is {stage.success}; accepted: above 0, at most 1")
-        if stage.steps is not None and stage.steps <= 0:
-            raise ValueError(f"{where}.steps is {stage.steps}; accepted: more than 0")
+        check_numbers(where, stage)
         task: Any = config.task
         for path, value in stage.changes.items():
             task = changed(task, path, value, where)

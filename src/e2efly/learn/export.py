@@ -16,6 +16,8 @@ from e2efly.deploy.policy.draws import random_images, random_observations
 from e2efly.deploy.policy.images import NONE, Image
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.deploy.policy.onnx_file import sealed
+from e2efly.deploy.policy.onnx_graph import IR_VERSION, OPSET
+from e2efly.deploy.policy.session import remember
 from e2efly.env import Env
 from e2efly.env.limits import limits_of
 from e2efly.learn.graph import OPERATORS, policy_graph
@@ -24,9 +26,6 @@ from e2efly.storage import write_atomically
 from e2efly.tasks import TASKS
 from e2efly.vehicles import load_family, nominal_vehicle
 from e2efly.vehicles.vehicle import quantities, terms
-
-OPSET, IR_VERSION = 17, 8
-"""Versions that are old enough for the ONNX Runtime of any companion computer in use."""
 
 
 def contract_of(env: Env, config: TrainConfig) -> Contract:
@@ -76,6 +75,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         memory_size=config.network.recurrent,
         action=Action(mode.name, mode.fields, mode.units, *limits),
         hover_action=_decimals(env.hover),
+        courses=config.task.domain(),
     )
 
 
@@ -174,7 +174,9 @@ def write_policy(path: Path, graph: onnx.GraphProto, contract: Contract) -> None
     )
     helper.set_model_props(model, {METADATA_KEY: contract.to_json()})
     onnx.checker.check_model(model, full_check=True)
-    write_atomically(Path(path), sealed(model.SerializeToString()))
+    content = sealed(model.SerializeToString())
+    remember(content)
+    write_atomically(Path(path), content)
 
 
 def parity(path: Path, weights: Weights, actor: Actor, count: int = 10_000, seed: int = 0) -> float:

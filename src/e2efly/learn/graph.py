@@ -86,8 +86,9 @@ def perceptron_graph(
     operators: list[str],
     raw: bool = False,
     normal: tuple[np.ndarray, np.ndarray, float] | None = None,
+    most: float = 1.0,
 ) -> onnx.GraphProto:
-    """The graph of a multi-layer perceptron that another framework has learned. Its actions are clipped to [-1, 1].
+    """The graph of a multi-layer perceptron that another framework has learned.
 
     Args:
         features: the features that it was given in training.
@@ -96,6 +97,7 @@ def perceptron_graph(
         raw: whether it was given the observation itself instead of the features.
         normal: mean and standard deviation with which its input is normalised, and the limit to which the normalised
             input is clipped.
+        most: its actions are clipped to [-most, most], at most to [-1, 1].
     """
     graph, source = _Graph(), INPUT
     if not raw:
@@ -106,7 +108,7 @@ def perceptron_graph(
         centred = graph.node("Sub", [source, graph.constant("mean", mean.astype(np.float32))], "centred")
         scaled = graph.node("Div", [centred, graph.constant("deviation", deviation.astype(np.float32))], "scaled")
         source = graph.clip(scaled, most, "normalised")
-    graph.clip(graph.layers(layers, source, operators, "unclipped"), 1.0, OUTPUT)
+    graph.clip(graph.layers(layers, source, operators, "unclipped"), min(most, 1.0), OUTPUT)
     return graph.whole({INPUT: (sum(field.size for field in features.fields),)}, {OUTPUT: (4,)})
 
 

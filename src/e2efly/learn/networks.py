@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from e2efly.config import CameraConfig, NetworkConfig
+from e2efly.config import CameraConfig, NetworkConfig, check_numbers
 from e2efly.observation import Field
 from e2efly.physics.rotation import unrotate
 
@@ -274,13 +274,9 @@ class Actor:
         Raises:
             ValueError: naming the field, the value and what is accepted.
         """
-        sizes = (*network.convolution, *network.encoder, *network.hidden)
-        if min(sizes, default=1) < 1 or network.recurrent < 0 or (cameras and not network.encoder):
-            raise ValueError(
-                f"network has the sizes convolution {network.convolution}, encoder {network.encoder}, hidden "
-                f"{network.hidden}, recurrent {network.recurrent}; accepted: 1 or more (recurrent: or 0), one encoder "
-                "layer or more where there are cameras"
-            )
+        check_numbers("network", network)
+        if cameras and not network.encoder:
+            raise ValueError("network.encoder is (); accepted: one size or more where there are cameras")
         return Actor(Features(fields, tuple(View.of(camera, network) for camera in cameras)), network)
 
     def init(self, rng: np.random.Generator, hover: np.ndarray) -> Weights:

@@ -25,7 +25,7 @@ from jax import export
 
 from e2efly.compiled import opened, sealed
 from e2efly.config import TrainConfig
-from e2efly.device import cache_folder, fast_compile, wide_vectors
+from e2efly.device import fast_compile, wide_vectors
 from e2efly.env import Env, random_key
 from e2efly.episodes import Act, Episodes, run_episodes
 from e2efly.learn.algorithm import TrainState, begin
@@ -34,7 +34,7 @@ from e2efly.learn.networks import Actor, Weights
 from e2efly.learn.setup import Setup
 from e2efly.registry import is_shipped
 from e2efly.rewards import TERMS
-from e2efly.storage import write_atomically
+from e2efly.storage import cache_folder, write_atomically
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ policy.onnx  summary.json  published/
 import csv
 import dataclasses
 import io
+import json
 import platform
 import reprlib
 import shutil
@@ -260,6 +261,11 @@ class RunDirectory:
             self.metrics.unlink(missing_ok=True)
 
 
+def least_success(row: dict[str, float]) -> float:
+    """The success rate of the worst criterion in a row of the metrics. 0 if it holds no evaluation."""
+    return min((x for key, x in row.items() if key.startswith("eval/") and key.endswith("/success")), default=0.0)
+
+
 def run_folder(config: TrainConfig) -> Path:
     """The default folder of a run: runs/TASK-ALGO-SEED. If the vehicle is not the default one, its name comes before
     the seed.
@@ -295,6 +301,18 @@ def to_json(config: TrainConfig) -> dict[str, Any]:
     """A configuration as JSON, with the names of its task and its algorithm, or references to them."""
     names = {"task_name": TASKS.reference(type(config.task)), "algo_name": ALGORITHMS.reference(type(config.algo))}
     return {**names, **dataclasses.asdict(config)}
+
+
+def fingerprint(config: TrainConfig) -> str:
+    """Twelve digits of the SHA-256 of everything that defines a training: its configuration, the content of its files,
+    and its criteria. Left out are the seed, and the number of devices, which follows from the machine.
+
+    Raises:
+        ValueError: when a file of the configuration cannot be read.
+    """
+    told = to_json(by_content(dataclasses.replace(config, seed=0, devices=None)))
+    criteria = {name: dataclasses.asdict(suite) for name, suite in config.task.criteria().items()}
+    return sha256(json.dumps([told, criteria], sort_keys=True).encode())[:12]
 
 
 def from_json(content: dict[str, Any], where: str) -> TrainConfig:

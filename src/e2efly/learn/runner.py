@@ -19,6 +19,7 @@ import jax
 import numpy as np
 
 from e2efly.config import TrainConfig
+from e2efly.config.vehicle import STRESS
 from e2efly.deploy.policy.contract import Contract
 from e2efly.deploy.sight.samples import packed, samples_file
 from e2efly.env import Env, random_key
@@ -33,7 +34,7 @@ from e2efly.learn.inputs import by_content
 from e2efly.learn.judge import CONFIRMED, REPORTED, WATCHED, judge, score, stressed, success
 from e2efly.learn.networks import Weights
 from e2efly.learn.programs import Programs, start_program
-from e2efly.learn.rundir import RunDirectory, differences, different_values, from_json, to_json, versions
+from e2efly.learn.rundir import RunDirectory, differences, different_values, fingerprint, from_json, to_json, versions
 from e2efly.learn.setup import Setup
 from e2efly.storage import write_atomically
 
@@ -47,7 +48,7 @@ class Reporter(Protocol):
         """The programs are being compiled."""
         ...
 
-    def progress(self, steps: int, total: int, rate: float, success: float, best: float, stage: str) -> None:
+    def progress(self, steps: int, total: int, rate: float, success: float, best: float, flown: str) -> None:
         """Show the progress.
 
         Args:
@@ -56,7 +57,7 @@ class Reporter(Protocol):
             rate: environment steps per second.
             success: success rate of the last evaluation.
             best: success rate of the best evaluation.
-            stage: the stage of the curriculum; empty without a curriculum.
+            flown: what flew in the evaluation (`Env.vehicles`), and the stage of the curriculum, if there is one.
         """
         ...
 
@@ -223,7 +224,7 @@ def _loop(
                 rate,
                 last,
                 progress.best_success,
-                f"stage {progress.stage + 1} of {stages}" if stages > 1 else "",
+                setup.env.vehicles + (f", stage {progress.stage + 1} of {stages}" if stages > 1 else ""),
             )
         return state, best, progress, stopped
 
@@ -274,19 +275,22 @@ def _finish(
         "peak_memory_gb": round(peak_memory() / 1e9, 3),
         "shipped": {"update": progress.best_update, **told(by_best)},
         "last": {"update": progress.update, **told(by_last)},
+        "vehicles": {"shipped": setup.env.vehicles, "last": setup.env.vehicles},
         "episodes": REPORT_EPISODES,
         "versions": versions(),
     }
     if nominal := setup.nominal:
         summary["nominal"] = told(by_best := flown(best, nominal))
+        summary["vehicles"]["nominal"] = setup.env.undisturbed().vehicles
         if setup.env.family is None:  # the rows of the stress test are defined relative to one vehicle
             summary["stress"] = told(stressed(setup, best, REPORT_EPISODES))
+            summary["vehicles"]["stress"] = STRESS
     if hosts.first():
         contract = contract_of(setup.env, config)
         export_policy(run.policy, best, setup.actor, contract)
         if contract.images:
             write_atomically(samples_file(run.policy), packed(_seen(state, contract)))
-        run.write_json("summary.json", summary)
+        run.write_json("summary.json", summary | {"configuration": fingerprint(config)})
     reporter.ended(setup, by_best)
     return summary
 

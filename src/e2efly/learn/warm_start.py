@@ -36,14 +36,15 @@ def started_from(parameters: Any, path: Path, setup: Setup) -> Any:
         ValueError: for a policy that cannot be loaded, that has other observation fields, images or commands, or whose
             network has other sizes, naming the file, what it has and what is accepted.
     """
-    has, wanted = _shape(load_policy(path).contract), _shape(contract_of(setup.env, setup.config))
+    loaded = load_policy(path)
+    has, wanted = _shape(loaded.contract), _shape(contract_of(setup.env, setup.config))
     for name, accepted in wanted.items():
         if (value := has.get(name)) != accepted:
             hint = "; did you mean --preset robust?" if name == "memory_size" and value and not accepted else ""
             raise ValueError(
                 f"start_from {path}: its {name} is {value}; accepted: {accepted}, as this run's policy has{hint}"
             )
-    weights = _weights(path, parameters.policy, setup.actor)
+    weights = _weights(path, loaded.content, parameters.policy, setup.actor)
     copies = {
         field.name: weights
         for field in dataclasses.fields(parameters)
@@ -69,9 +70,9 @@ def _of_run(parameters: Any, path: Path, setup: Setup) -> Any:
     return jax.tree_util.tree_unflatten(structure, [x[0] for x in found if x is not None])  # every device has the same
 
 
-def _weights(path: Path, like: Weights, actor: Actor) -> Weights:
+def _weights(path: Path, content: bytes, like: Weights, actor: Actor) -> Weights:
     """Read the weights that `e2efly.learn.graph.policy_graph` has written."""
-    graph = onnx.load(str(path)).graph
+    graph = onnx.load_model_from_string(content).graph
     constants = {x.name: numpy_helper.to_array(x) for x in graph.initializer}
     operators = {node.output[0]: node.op_type for node in graph.node}
     for output, wanted in (("hidden_1", OPERATORS[actor.network.activation]), (OUTPUT, "Tanh")):

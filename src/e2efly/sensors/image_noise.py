@@ -16,8 +16,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from e2efly.config import CameraConfig, ImageNoiseConfig, check_numbers
+from e2efly.config import CameraConfig, ImageNoiseConfig
 from e2efly.registry import load
+from e2efly.storage import array_of
 
 _STRENGTHS = [field.name for field in dataclasses.fields(ImageNoiseConfig) if field.type == float | None]
 _STATIC = [field.name for field in dataclasses.fields(ImageNoiseConfig) if field.name not in _STRENGTHS]
@@ -87,7 +88,6 @@ def check(config: ImageNoiseConfig, camera: CameraConfig) -> None:
     Raises:
         ValueError: naming the field, the value and what is accepted.
     """
-    check_numbers("camera.noise", config)
     noises = chosen(config)
     if noises and camera.sees in ("normal", "instance"):
         first = next(iter(noises))
@@ -210,11 +210,12 @@ def distortion(name: str) -> Float[np.ndarray, "80 80 5"]:
         return synthetic_distortion()
     accepted = f"accepted: {SYNTHETIC}, or a .npy file of positive numbers, (80, 80, 5)"
     try:
-        table = np.load(Path(name), allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
+        with Path(name).open("rb") as file:
+            table = array_of(file.read(1 << 20))
+    except (OSError, ValueError) as error:
         raise ValueError(f"camera.noise.redwood is {name!r}: {error}; {accepted}") from None
-    if not isinstance(table, np.ndarray) or table.shape != (80, 80, 5) or table.dtype.kind != "f":
-        raise ValueError(f"camera.noise.redwood is {name!r}, of {getattr(table, 'shape', 'arrays')}; {accepted}")
+    if table.shape != (80, 80, 5) or table.dtype.kind != "f":
+        raise ValueError(f"camera.noise.redwood is {name!r}, of {table.shape}; {accepted}")
     if not (np.isfinite(table).all() and (table > 0).all()):
         raise ValueError(f"camera.noise.redwood is {name!r}, with numbers that are not positive; {accepted}")
     return table.astype(np.float32)

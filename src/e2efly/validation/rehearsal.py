@@ -70,9 +70,9 @@ class Rehearsal:
 
 
 def whole_course(policy: Acting, vehicle: Vehicle) -> Course:
-    """The course of a policy in a rehearsal."""
+    """The course of a policy in a rehearsal: the usual one of its task, wherever it was trained."""
     kind = route_of(policy.contract)
-    return course_for(policy.contract, vehicle, kind(**kind.whole))
+    return course_for(policy.contract, vehicle, kind(outside=True, **kind.whole))
 
 
 def rehearse(

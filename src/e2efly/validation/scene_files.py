@@ -44,6 +44,8 @@ class SceneFile:
     """See `load_world`."""
     up: Literal["y", "z"] | None = None
     """See `load_world`."""
+    materials: bool = True
+    """See `load_world`."""
     beside: bool = False
     """Whether the objects of the task's world are shown in addition."""
 
@@ -53,7 +55,7 @@ class SceneFile:
         Raises:
             ValueError: naming the scene, what is wrong and what is accepted.
         """
-        world = load_world(self.name, self.unit, self.up)
+        world = load_world(self.name, self.unit, self.up, self.materials)
         if self.beside:
             assert isinstance(scenery.scene, Scene)
             world = beside(world, scenery.scene)
@@ -64,26 +66,33 @@ class SceneFile:
         """The options of `e2efly hil` that select this scene."""
         more = [("--scene-unit", self.unit), ("--scene-up", self.up)]
         given = [word for option, value in more if value is not None for word in (option, str(value))]
-        return ["--scene", self.name, *given, *(["--beside"] if self.beside else [])]
+        plain = [] if self.materials else ["--no-scene-materials"]
+        return ["--scene", self.name, *given, *plain, *(["--beside"] if self.beside else [])]
 
 
-def load_world(name: str, unit: float | None = None, up: Literal["y", "z"] | None = None) -> World:
+def load_world(
+    name: str, unit: float | None = None, up: Literal["y", "z"] | None = None, materials: bool = True
+) -> World:
     """Load a scene by the path of its file, or one of the package's mesh scenes by name.
 
     Args:
         name: a .toml as in docs/vision.md, a mesh of one of `FORMATS`, or a name.
         unit: length of a mesh file's unit, m. None: 1.
         up: axis of a mesh file that points up. None: the axis that its format defines.
+        materials: whether a mesh file's colours, materials and textures are used.
 
     Raises:
         ValueError: naming the scene, what is wrong and what is accepted.
     """
     if name.endswith(".toml"):
-        if unit is not None or up is not None:
-            raise ValueError(f"scene {name}: is in m with z up; accepted: a unit and an axis for {', '.join(FORMATS)}")
+        if unit is not None or up is not None or not materials:
+            raise ValueError(
+                f"scene {name}: is in m with z up and has no materials; accepted: a unit, an axis and the choice of "
+                f"materials for {', '.join(FORMATS)}"
+            )
         return load_scene(Path(name))
     try:
-        scene = load_mesh_scene(name, up, 1.0 if unit is None else unit)
+        scene = load_mesh_scene(name, up, 1.0 if unit is None else unit, materials)
     except ValueError as error:
         said = f"{error}, or of a .toml of solids" if "unknown mesh scene" in str(error) else str(error)
         raise ValueError(f"scene {said}") from None

@@ -25,6 +25,7 @@ from e2efly.deploy.settings import Fence, FlightSettings
 from e2efly.deploy.sight.source import ImageSource
 from e2efly.goal import Course
 from e2efly.validation.rig import Rig
+from e2efly.vehicles.vehicle import Vehicle
 
 CONTROL_HZ = 100.0
 """Lowest rate of the bridge, Hz."""
@@ -87,8 +88,13 @@ class Session:
         schedule: Mapping[int, float] = SCHEDULE,
         filtered: bool = False,
         hover: HoverController | None = None,
+        vehicle: Vehicle | None = None,
     ) -> None:
-        vehicle = rig.world.vehicle
+        """Identify the controller, and put a bridge on its link.
+
+        `vehicle` is the vehicle that the bridge is told of. None: the vehicle that flies.
+        """
+        vehicle = vehicle or rig.world.vehicle
         self.rig, self.settings = rig, settings
         asked = dict(schedule) | ({} if hover is None else hover_schedule(hover))
         self.client = Client(link or open_link(rig.sitl.msp), asked)

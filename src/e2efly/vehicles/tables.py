@@ -20,7 +20,7 @@ def read_table(path: Path) -> dict[str, Any]:
         ValueError: naming the file, and what is wrong with it.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:  # not text, not TOML, too many digits, or nested too deep
         raise ValueError(f"{path}: not a TOML file: {error}") from None
     except OSError as error:

@@ -6,6 +6,7 @@ Rotor order is Betaflight's: rear right, front right, rear left, front left. Bod
 import dataclasses
 import hashlib
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,14 +14,13 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from e2efly.gravity import GRAVITY
 from e2efly.vehicles.names import nearest, unknown
 from e2efly.vehicles.tables import read_table, shown
 from e2efly.vehicles.terms import check_terms
 
 _LARGEST = 1e6
 """Largest absolute value of a number, in its unit."""
-GRAVITY = 9.81
-"""Standard gravity as in the paper, m/s^2."""
 
 _HERE = Path(__file__).parent
 FAMILIES = _HERE / "families"
@@ -389,24 +389,25 @@ def check(vehicle: Vehicle, where: str = "vehicle") -> None:
             "moment larger than the sum of the other two (the triangle inequality of every rigid body)"
         )
     if sorted(vehicle.rotor_spin) != [-1, -1, 1, 1]:
-        raise ValueError(f"{where}: rotor_spin.value is {list(vehicle.rotor_spin)}; accepted: two of +1 and two of -1")
+        raise ValueError(
+            f"{where}: rotor_spin.value is {vehicle.rotor_spin.tolist()}; accepted: two of +1 and two of -1"
+        )
     if vehicle.tilt_max >= np.pi / 2:
         raise ValueError(f"{where}: tilt_max.value is {vehicle.tilt_max}; accepted: below pi/2 rad")
-    k2 = vehicle.thrust_map[0]
-    if k2 <= 0:
-        raise ValueError(f"{where}: thrust_map.value is {list(vehicle.thrust_map)}; accepted: k2 > 0")
+    thrust_map = np.asarray(vehicle.thrust_map, np.float64).tolist()
+    if thrust_map[0] <= 0:
+        raise ValueError(f"{where}: thrust_map.value is {thrust_map}; accepted: k2 > 0")
     if vehicle.rotor_speed_min >= vehicle.rotor_speed_max:
         raise ValueError(
-            f"{where}: rotor_speed_min.value is {vehicle.rotor_speed_min}; accepted: below rotor_speed_max "
-            f"({vehicle.rotor_speed_max} rad/s)"
+            f"{where}: rotor_speed_min.value is {vehicle.rotor_speed_min:g}; accepted: below rotor_speed_max "
+            f"({vehicle.rotor_speed_max:g} rad/s)"
         )
-    k1, k0 = vehicle.thrust_map[1:]
-    idle_slope = 2 * k2 * vehicle.rotor_speed_min + k1
-    idle_thrust = k2 * vehicle.rotor_speed_min**2 + k1 * vehicle.rotor_speed_min + k0
-    if idle_slope <= 0 or idle_thrust <= 0:
+    least = _slowest(*thrust_map)
+    if vehicle.rotor_speed_min <= least:
         raise ValueError(
-            f"{where}: rotor_speed_min.value is {vehicle.rotor_speed_min}; accepted: a speed at which thrust_map "
-            f"{list(vehicle.thrust_map)} is positive and rising (here {idle_thrust:.3g} N, {idle_slope:.3g} N*s/rad)"
+            f"{where}: rotor_speed_min.value is {vehicle.rotor_speed_min:g}; accepted: "
+            f"{math.floor(10 * max(least, 0.0) + 1) / 10:g} rad/s or more (in tenths), where the thrust by thrust_map "
+            f"{thrust_map} is positive and rising"
         )
     if vehicle.thrust_to_weight <= 1.05 or 4 * vehicle.thrust_range[0] >= vehicle.mass * GRAVITY:
         low, high = vehicle.thrust_range
@@ -424,6 +425,12 @@ def check(vehicle: Vehicle, where: str = "vehicle") -> None:
             "thrust, roll, pitch and yaw"
         )
     check_terms(vehicle, allocation, vehicle.mass * GRAVITY, where)
+
+
+def _slowest(k2: float, k1: float, k0: float) -> float:
+    """The rotor speed, rad/s, above which a thrust map with k2 > 0 is positive and rising."""
+    lowest = -k1 / (2 * k2)  # of the parabola
+    return lowest + math.sqrt(max(lowest**2 - k0 / k2, 0.0))
 
 
 def rotor_arms(vehicle: Vehicle) -> np.ndarray:

@@ -18,7 +18,7 @@ _DASHES = ("-", (0, (4, 2)), (0, (1, 1.2)))
 class Panel:
     """The curves of one task, and which of them to draw."""
 
-    task: str
+    title: str
     curves: Curves
     by_error: bool
     """Draw the error instead of the success rate."""
@@ -59,7 +59,7 @@ def _draw(ax: Axes, panel: Panel) -> None:
             continue
         color, dashes = CYCLE[(i - 1) % len(CYCLE)], _DASHES[(i - 1) // len(CYCLE) % len(_DASHES)]
         ax.plot(steps, mean, color=color, linestyle=dashes, label=f"w/o {variant}")
-    ax.set_title(panel.task)
+    ax.set_title(panel.title)
     ax.set_xlabel("environment steps (million)")
     ax.set_xlim(left=0.0)
     if panel.by_error:

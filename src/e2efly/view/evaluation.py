@@ -6,6 +6,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from e2efly.config.train import criterion
 from e2efly.deploy.policy.loader import load_policy
 from e2efly.env import UNSEEN, Env, random_key
 from e2efly.episodes import Episodes
@@ -35,8 +36,8 @@ def plot_evaluation(found: Evaluation, folder: Path) -> None:
     for name, suite in suites.items():
         env, tag = flew.environment(suite), f"{title}: {name}" if len(suites) > 1 else title
         flights = plots.fly(env, act_of(flew.policy), key, DRAWN, episode_steps(suite, env))
-        _flights(flights, suite, env, key, folder, name, tag, f"seed {found.seed}")
-    plots.plot_errors(found.flown, folder / "errors.png", title, plots.limits(suites))
+        _flights(flights, suite, env, key, folder, name, tag, f"{env.vehicles}, seed {found.seed}")
+    plots.plot_errors(found.flown, folder / "errors.png", f"{title}, {flew.vehicles}", plots.limits(suites))
     if flew.run:
         _learned(flew.run, folder, title)
 
@@ -55,9 +56,10 @@ def plot_run(run: Path, setup: Setup, flown: dict[str, Episodes]) -> None:
         tag = f"{title}: {name}" if len(suites) > 1 else title
         key, steps = random_key(0, REPORTED, 0), episode_steps(suites[name], env)
         flights = plots.fly(env, act, key, DRAWN, steps)
-        note = f"trained by {config.algo.name}, seed {config.seed}"
+        note = f"{env.vehicles}; trained by {config.algo.name}, seed {config.seed}"
         _flights(flights, suites[name], env, key, folder, name, tag, note)
-    plots.plot_errors(flown, folder / "errors.png", title, plots.limits(suites))
+    vehicles = next(iter((setup.nominal or setup.judges).values())).vehicles
+    plots.plot_errors(flown, folder / "errors.png", f"{title}, {vehicles}", plots.limits(suites))
     _learned(RunDirectory(run), folder, title)
 
 
@@ -87,4 +89,7 @@ def _learned(run: RunDirectory, folder: Path, title: str) -> None:
     if rows := run.rows():
         shipped = run.read_json("summary.json").get("shipped") if (run.path / "summary.json").exists() else None
         update = shipped.get("update") if isinstance(shipped, dict) else None
-        plots.plot_learning(rows, folder / "learning.png", title, best_update=update)
+        config = run.config(names_vehicle=True)
+        vehicles = Env.of(config.task, config.reward, config.env).vehicles
+        least = criterion(config.stop_at, vehicles)
+        plots.plot_learning(rows, folder / "learning.png", title, update, least, vehicles)

@@ -1,7 +1,6 @@
 """Flights of a validation, stored next to its report so that they can be viewed: report.flights.npz for report.json."""
 
 import io
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,10 +9,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
+from e2efly.storage import read_npz
 from e2efly.view.flights import Flights
 
 PLACES = ("training", "plant")
 """The two places of the flights: the training simulator and the plant."""
+LARGEST = 1 << 32
+"""Largest size of all flights, bytes."""
 _MOVED = {"position": 3, "velocity": 3, "quaternion": 4, "body_rate": 3, "command": 4, "goal": 3}
 """The quantities that are stored of each flight, and their count of numbers per step."""
 
@@ -55,14 +57,13 @@ def read_flights(path: Path) -> dict[str, Pair]:
     """
     accepted = "accepted: what `e2efly validate --json` has written beside its report"
     try:
-        with np.load(path, allow_pickle=False) as content:
-            arrays = {name: content[name] for name in content.files}
+        arrays = read_npz(path, LARGEST)
         found = {name.removesuffix("/starts"): arrays[name] for name in arrays if name.endswith("/starts")}
         return {
             criterion: Pair(starts, {place: _flights(arrays, f"{criterion}/{place}", len(starts)) for place in PLACES})
             for criterion, starts in found.items()
         }
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
+    except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"{path}: {error}; {accepted}") from None
 
 

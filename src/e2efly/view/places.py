@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import jax
 import jax.numpy as jnp
@@ -70,20 +71,31 @@ def place_names() -> list[str]:
     return [*GENERATED, *track_names(), *mesh_scene_names()]
 
 
-def find_place(name: str, key: PRNGKeyArray) -> Place:
+def find_place(
+    name: str, key: PRNGKeyArray, unit: float = 1.0, up: Literal["y", "z"] | None = None, materials: bool = True
+) -> Place:
     """A place by its name, or by the path of a file: a scene's or a track's .toml, or a mesh.
 
     Args:
         name: a name of `place_names`, or a path.
         key: random key for a random world.
+        unit: length of the unit of a mesh's file, m.
+        up: axis of a mesh's file that points up. None: the axis that its format defines.
+        materials: whether a mesh's colours, materials and textures are used.
 
     Raises:
         ValueError: for an unknown name or a damaged file, naming what is wrong and what is accepted.
     """
+    mesh = name in mesh_scene_names() or name.lower().endswith(FORMATS)
+    if not mesh and (unit, up, materials) != (1.0, None, True):
+        raise ValueError(
+            f"scene {name} has no unit, axis and materials of its own; accepted: --scene-unit, --scene-up and "
+            f"--no-scene-materials for {', '.join(FORMATS)}"
+        )
     if name.endswith(".toml"):
         return _of_track(load_track(name)) if _has_gates(Path(name)) else _of_scene(load_scene(Path(name)))
-    if name in mesh_scene_names() or name.lower().endswith(FORMATS):
-        return _of_mesh(load_mesh_scene(name))
+    if mesh:
+        return _of_mesh(load_mesh_scene(name, up, unit, materials))
     if name in track_names():
         return _of_track(load_track(name))
     if name not in GENERATED:

@@ -12,9 +12,12 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from e2efly.config import TaskConfig
+from e2efly.config.train import LEARNED
+from e2efly.config.vehicle import FILE
 from e2efly.control import COMMAND_MODES
 from e2efly.drawing import INK
 from e2efly.episodes import Episodes, wilson
+from e2efly.learn.rundir import least_success
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 from e2efly.view.flights import Flights, fly
 from e2efly.view.space import plot_flights
@@ -23,8 +26,6 @@ from e2efly.view.style import BLUE, CYCLE, GREEN, GREY, PURPLE, VERMILLION, figu
 Rows = list[dict[str, float]]
 NEARLY = 0.8
 """Fraction of a bound from which on the bound is drawn."""
-LEARNED = 0.99
-"""Success rate. The first time at which it is reached is marked on learning curves."""
 
 _STEPS = "environment steps (million)"
 _DASHED: dict[str, Any] = {"linewidth": 1.2, "linestyle": (0, (4, 2))}
@@ -32,7 +33,14 @@ _DASHED: dict[str, Any] = {"linewidth": 1.2, "linestyle": (0, (4, 2))}
 __all__ = ["Flights", "fly", "limits", "plot_errors", "plot_flights", "plot_learning", "plot_time"]
 
 
-def plot_learning(rows: Rows, path: str | Path, title: str, best_update: int | None = None) -> None:
+def plot_learning(
+    rows: Rows,
+    path: str | Path,
+    title: str,
+    best_update: int | None = None,
+    criterion: float = LEARNED,
+    vehicles: str = FILE,
+) -> None:
     """Draw the learning curves of a run.
 
     Args:
@@ -40,14 +48,16 @@ def plot_learning(rows: Rows, path: str | Path, title: str, best_update: int | N
         path: the PNG file.
         title: title of the figure.
         best_update: the update whose policy was shipped. It is marked in every panel. None: no mark.
+        criterion: success rate. The first evaluation that reaches it is marked.
+        vehicles: the name of what flew in the evaluations.
     """
     evaluated = [row for row in rows if "seconds" in row]
     best = next((row for row in evaluated if row["update"] == best_update), None)
     note = [] if best is None else [f"dashed: update {best['update']:.0f}, whose policy was shipped"]
-    learned = next((row for row in evaluated if _least_success(row) >= LEARNED), None)
+    learned = next((row for row in evaluated if least_success(row) >= criterion), None)
     if learned is not None:
         steps = f"{learned['steps'] / 1e6:.2f} million steps"
-        note.append(f"dotted: {100 * LEARNED:g} % first reached, after {learned['seconds']:.1f} s and {steps}")
+        note.append(f"dotted: {100 * criterion:g} % first reached, after {learned['seconds']:.1f} s and {steps}")
     with figure(path, title, 8.8, note) as fig:
         grid = fig.add_gridspec(3, 2, height_ratios=[1.0, 1.0, 1.2])
         clocks = (("seconds", 1.0, "time since process start, compilation included (s)"), ("steps", 1e-6, _STEPS))
@@ -57,7 +67,7 @@ def plot_learning(rows: Rows, path: str | Path, title: str, best_update: int | N
             below = fig.add_subplot(grid[1, column], sharex=above, sharey=first)
             first = first or below
             _success(above, evaluated, clock, scale)
-            above.set_ylabel("success of evaluation (%)")
+            above.set_ylabel(f"success, {vehicles} (%)")
             above.tick_params(labelbottom=False)
             _curve(below, rows, clock, scale, "reward", INK)
             below.set_ylabel("mean training reward\nof a step")
@@ -94,11 +104,6 @@ def _success(ax: Axes, rows: Rows, x: str, scale: float) -> None:
     ax.set_yticks([0, 25, 50, 75, 100])
 
 
-def _least_success(row: dict[str, float]) -> float:
-    """The lowest success rate over the criteria of an evaluation. 0 if there are none."""
-    return min((x for key, x in row.items() if key.startswith("eval/") and key.endswith("/success")), default=0.0)
-
-
 def _mark(ax: Axes, best: dict[str, float] | None, x: str, scale: float) -> None:
     if best is not None:
         ax.axvline(scale * best[x], color=GREY, zorder=1.5, **_DASHED)
@@ -120,6 +125,7 @@ def _terms(ax: Axes, rows: Rows) -> None:
         _curve(ax, rows, "steps", 1e-6, key, color, label=key.removeprefix("reward/"), linestyle=dashes)
     if (largest := max(size.values())) > 0:
         ax.set_yscale("symlog", linthresh=10.0 ** np.floor(np.log10(largest) - 2), linscale=0.6)
+        ax.yaxis.set_major_formatter(FormatStrFormatter("%g"))
     ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
     ax.set_xlim(left=0.0)
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=8, borderpad=0.1)

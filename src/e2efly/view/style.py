@@ -1,5 +1,6 @@
 """The style of all plots. They use Matplotlib's objects without pyplot, so there is no global state and no window."""
 
+import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -7,11 +8,14 @@ from typing import Any
 
 from matplotlib import colormaps, rc_context
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogFormatter, LogFormatterMathtext
 
 from e2efly.drawing import INK, ORANGE
+from e2efly.storage import write_atomically
 
 BLUE, VERMILLION, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 CYCLE = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY)
@@ -45,7 +49,7 @@ _STYLE: dict[Any, Any] = {
     "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "axes.axisbelow": True,
     "axes.titlelocation": "left", "axes.facecolor": "white", "figure.facecolor": "white", "savefig.facecolor": "white",
     "grid.color": "#E6E6E6", "grid.linewidth": 0.8, "lines.linewidth": 1.6, "lines.solid_capstyle": "round",
-    "legend.frameon": False, "axes.formatter.useoffset": False, "axes.unicode_minus": True,
+    "legend.frameon": False, "axes.formatter.useoffset": False, "axes.unicode_minus": True, "text.parse_math": False,
 }  # fmt: skip
 
 
@@ -72,7 +76,20 @@ def figure(
             rect = (0.004, 0.0, 0.988, 1 - lines / height)
             fig.set_layout_engine("constrained", rect=rect, w_pad=0.06, h_pad=0.06)
         yield fig
-        fig.savefig(path, format="png")
+        for axis in (axis for ax in fig.axes for axis in (ax.xaxis, ax.yaxis)):
+            if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
+                _label_decades(axis)
+        picture = io.BytesIO()
+        fig.savefig(picture, format="png")
+        write_atomically(Path(path), picture.getvalue())
+
+
+def _label_decades(axis: Axis) -> None:
+    """Label a logarithmic axis with plain numbers. Matplotlib's own labels are formulas, but every text of a figure is
+    shown as it is, since it may hold the dollar signs of a name.
+    """
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(LogFormatter())
 
 
 def say(ax: Axes, text: str) -> None:

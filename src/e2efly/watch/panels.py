@@ -28,6 +28,8 @@ LARGEST_WIND = 10.0
 """Largest wind that can be set, m/s per axis."""
 PIXELS = 240
 """Width of an image in the panel, pixels."""
+LONGEST = 2000
+"""The longest text in the panel, characters."""
 
 
 class Panel:
@@ -38,7 +40,8 @@ class Panel:
         self.viewer, self.wishes = viewer, SimpleQueue[Callable[[], Any]]()
         self.paused, self.speed = False, 1.0
         gui = self._gui = viewer.server.gui
-        self._note = gui.add_markdown("Waiting for the first frame")
+        self._tell = self.text()
+        self._tell("Waiting for the first frame")
         self._pause = gui.add_button("Pause")
         self._pause.on_click(lambda _: self.wishes.put(self._toggle))
         speed = gui.add_dropdown("Speed", SPEEDS, initial_value="1")
@@ -54,6 +57,14 @@ class Panel:
         self._plots: dict[str, Any] = {}
         self._past: dict[str, deque[tuple[float, ...]]] = {}
         self._shown = ""
+
+    def text(self) -> Callable[[str], None]:
+        """Add a text, empty at first. Returns the function that changes it.
+
+        The page is given markup here and nowhere else, because viser shows HTML in markdown as HTML.
+        """
+        shown = self._gui.add_markdown("")
+        return lambda text: setattr(shown, "content", as_markdown(text))
 
     def button(self, label: str, wish: Callable[[], Any]) -> None:
         """Add a button."""
@@ -79,7 +90,8 @@ class Panel:
     def show(self, frame: Frame, elapsed: float) -> None:
         """Show the data of a frame other than the positions of the vehicles."""
         if frame.note != self._shown:
-            self._note.content = self._shown = frame.note
+            self._shown = frame.note
+            self._tell(frame.note)
         self._time += elapsed
         if self._frames % IMAGE_EVERY == 0:
             self._show_images(frame)
@@ -127,6 +139,15 @@ class Panel:
                 ),
                 title=title, aspect=2.4, scales={"x": uplot.Scale(time=False, auto=True)},
             )  # fmt: skip
+
+
+def as_markdown(text: str) -> str:
+    """Markdown that shows a text as it is. Each character becomes a reference to its number, which is never markup.
+
+    Line ends stay. A text of more than `LONGEST` characters is cut, and ends with dots.
+    """
+    cut = text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+    return "  \n".join("".join(f"&#{ord(character)};" for character in line) for line in cut.splitlines())
 
 
 def _enlarged(image: np.ndarray) -> np.ndarray:
@@ -197,11 +218,11 @@ def policies_on(panel: Panel, progress: "Progress") -> Callable[[], None]:
     gui = panel.viewer.server.gui
     with panel.folder("Policies of the run"):
         newest = gui.add_checkbox("Newest as it comes", True)
-        told = gui.add_markdown("")
+        told = panel.text()
         slider = gui.add_slider("Policy", min=0, max=max(len(progress.updates) - 1, 1), step=1, initial_value=0)
 
     def tell() -> None:
-        told.content = f"Update {progress.update} of {progress.setup.updates}, {len(progress.updates)} policies"
+        told(f"Update {progress.update} of {progress.setup.updates}, {len(progress.updates)} policies")
 
     def choose(place: float) -> None:
         if progress.newest or not progress.updates:

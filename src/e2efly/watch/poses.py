@@ -66,7 +66,7 @@ class Poses:
         speed = float(np.linalg.norm(o.velocity))
         turning = np.full((1, 4), 0.0 if lost else TURNING)
         place = ", ".join(f"{x:.2f}" for x in o.position)
-        note = f"**{place} m**, {speed:.1f} m/s" + (f"  \n{told}" if lost else "")
+        note = f"{place} m, {speed:.1f} m/s" + (f"\n{told}" if lost else "")
         return Frame(
             now - self._began, o.position[None], o.quaternion[None], o.velocity[None], turning,
             series={"speed (m/s)": (speed,)}, note=note,

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from e2efly.control import Quat
 from e2efly.deploy.log.flight_log import read_log
-from e2efly.identification.readers import read_flights
+from e2efly.identification.readers import OURS, format_of, read_flights
 from e2efly.vehicles import Vehicle, load_vehicle, vehicle_names
 from e2efly.watch.frames import Frame, Stage
 
@@ -65,7 +65,7 @@ def read_flight(path: Path, vehicle: Vehicle) -> Flight:
     if "setpoint" in streams:
         streams["command"] = streams["setpoint"]
     flight = even(path.name, streams)
-    if path.suffix == ".mcap":
+    if found.kind == OURS:
         goal, notes = _told(path, PERIOD * np.arange(len(flight.position)))
         flight = replace(flight, goal=goal, notes=notes)
     return flight
@@ -112,7 +112,7 @@ def _told(path: Path, time: np.ndarray) -> tuple[np.ndarray, list[tuple[float, s
 
 def vehicle_of(path: Path) -> Vehicle | None:
     """The shipped vehicle that a log of e2efly names. None: it names no vehicle, or one that is not shipped."""
-    name = read_log(path).meta.get("vehicle", "").partition(" ")[0] if path.suffix == ".mcap" else ""
+    name = read_log(path).meta.get("vehicle", "").partition(" ")[0] if format_of(path).name == OURS else ""
     return load_vehicle(name) if name in vehicle_names() else None
 
 
@@ -162,8 +162,8 @@ class Recording:
                 series[f"{axis} rate (rad/s)"] = (float(command), float(flown))
         mode = next((text for t, text in reversed(told.notes) if t <= i * PERIOD), "")
         tilt = np.degrees(float(Quat.of(now("quaternion")[followed]).tilt()))
-        note = f"**{i * PERIOD:.1f} s** of {self.length * PERIOD:.1f} s, {series['speed (m/s)'][0]:.1f} m/s, "
-        note += f"tilted {tilt:.0f} degrees  \n{told.name} {mode}"
+        note = f"{i * PERIOD:.1f} s of {self.length * PERIOD:.1f} s, {series['speed (m/s)'][0]:.1f} m/s, "
+        note += f"tilted {tilt:.0f} degrees\n{told.name} {mode}"
         return Frame(
             i * PERIOD, now("position"), now("quaternion"), now("velocity"), now("rotor_speed"), now("goal"),
             series=series, fresh=i == 0, note=note,

@@ -254,14 +254,14 @@ class Simulation:
 
     def _note(self, followed: int, seen: dict[str, np.ndarray]) -> str:
         off = np.linalg.norm(seen["goal"][followed] - seen["position"][followed])
-        told = f"**{seen['time'][followed]:.1f} s**, {np.linalg.norm(seen['velocity'][followed]):.1f} m/s, "
+        told = f"{seen['time'][followed]:.1f} s, {np.linalg.norm(seen['velocity'][followed]):.1f} m/s, "
         told += f"{off:.2f} m from its goal"
         if self._ends:
             share = 100 * float(np.mean(self._ends))
-            told += f"  \n{share:.0f} % of the last {len(self._ends)} episodes succeeded"
+            told += f"\n{share:.0f} % of the last {len(self._ends)} episodes succeeded"
         changed = [
             f"{name} {100 * value:.0f} %"
             for name, value in (("mass", self.hands.mass), ("thrust", self.hands.thrust))
             if np.isfinite(value)
         ]
-        return f"{told}  \nchanged: {', '.join(changed)}" if changed else told
+        return f"{told}\nchanged: {', '.join(changed)}" if changed else told

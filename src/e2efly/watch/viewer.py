@@ -3,12 +3,13 @@
 import contextlib
 import io
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
 
+from e2efly.deploy.log.process.origins import refusal
 from e2efly.drawing import Face, Line, Mark
 from e2efly.scenes.faces import Body
 from e2efly.watch.frames import Frame, Stage
@@ -43,7 +44,7 @@ def serve(host: str, port: int, title: str) -> Any:
     port = free_port(host, port)
     import viser
 
-    with contextlib.redirect_stdout(io.StringIO()):  # it prints a box with its address
+    with _checked(host), contextlib.redirect_stdout(io.StringIO()):  # it prints a box with its address
         server = viser.ViserServer(host, port, title, verbose=False)
     scene, first = server.scene, server.initial_camera
     scene.set_up_direction("+z")
@@ -55,6 +56,38 @@ def serve(host: str, port: int, title: str) -> Any:
     server.gui.main_panel.dock_right()
     first.position, first.look_at = tuple(ANCHOR + BEHIND), tuple(ANCHOR)
     return server
+
+
+@contextlib.contextmanager
+def _checked(host: str) -> Iterator[None]:
+    """Have the server that viser starts within the block refuse what `refusal` refuses.
+
+    viser leaves no room for a check of its requests, so the function that opens its server is replaced meanwhile.
+
+    Raises:
+        ValueError: when viser did not use that function, so that nothing would be checked.
+    """
+    from websockets.asyncio import server as opened
+
+    serve, used = opened.serve, list[str]()
+
+    def checked(*args: Any, process_request: Any, **options: Any) -> Any:
+        def process(connection: Any, request: Any) -> Any:
+            values = request.headers
+            if why := refusal(values.get_all("Host"), values.get_all("Origin"), host):
+                return connection.respond(403, f"{why}\n")
+            return process_request(connection, request)
+
+        used.append(host)
+        return serve(*args, process_request=process, **options)
+
+    opened.serve = checked
+    try:
+        yield
+    finally:
+        opened.serve = serve
+    if not used:
+        raise ValueError("this version of viser opens its page in a way that cannot be checked; accepted: viser 1.1")
 
 
 class Viewer:

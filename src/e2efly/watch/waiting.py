@@ -4,6 +4,8 @@ from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from threading import Event
 
+from e2efly.deploy.log.process.origins import refusal
+
 LOOK_S = 0.2
 """Time between two checks whether to continue waiting, s."""
 MARK = "e2efly-waiting"
@@ -39,6 +41,8 @@ def asked_for(host: str, port: int, over: Callable[[], bool]) -> bool:
         timeout = 1.0
 
         def do_GET(self) -> None:
+            if why := refusal(self.headers.get_all("Host", []), self.headers.get_all("Origin", []), host):
+                return self.send_error(403, explain=why)
             self.send_response(200)
             self.send_header("Content-Type", "text/html; charset=utf-8")
             self.send_header("Content-Length", str(len(PAGE)))

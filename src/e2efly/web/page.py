@@ -12,6 +12,7 @@ import jax
 import numpy as np
 
 from e2efly import __version__
+from e2efly.deploy.policy.loader import load_policy
 from e2efly.device import fast_compile
 from e2efly.env import UNSEEN, Env, EnvState, random_key
 from e2efly.evaluation import SEED, Candidate
@@ -48,7 +49,7 @@ def write_page(folder: Path, found: Candidate) -> None:
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"--web is {str(folder)!r}, a file; accepted: a folder, which is made where it is not there")
     about = flight(found)
-    policy = base64.b64encode(found.file.read_bytes()).decode()
+    policy = base64.b64encode(load_policy(found.file).content).decode()
     runtime = base64.b64encode((ASSETS / RUNTIME).read_bytes()).decode()
     folder.mkdir(parents=True, exist_ok=True)
     for name in COPIED:

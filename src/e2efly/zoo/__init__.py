@@ -66,11 +66,26 @@ def policy_file(policy: str | os.PathLike[str], vehicle: str | Path | None = Non
     return file
 
 
+def is_shipped(content: bytes) -> bool:
+    """Whether these bytes are a policy of the zoo, wherever they were read.
+
+    Raises:
+        ValueError: where the package's file is damaged.
+    """
+    digest = hashlib.sha256(content).hexdigest()
+    return any(about.get("sha256") == digest for tasks in contents().values() for about in tasks.values())
+
+
 def curve_file(policy: Path) -> Path:
     """Where the curve of a policy's training is, where it was kept: hover.curve.csv beside hover.onnx, by evaluation
     the columns `steps`, `seconds` and, by criterion, success.
     """
     return policy.with_suffix(".curve.csv")
+
+
+def config_file(policy: Path) -> Path:
+    """The configuration of a policy's training, as a run's config.json has it: hover.config.json beside hover.onnx."""
+    return policy.with_suffix(".config.json")
 
 
 def _whose(body: Path, having: list[str]) -> str:

@@ -1,5 +1,6 @@
 """Race tracks as data files, and their loader."""
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +32,11 @@ class RaceTrack:
     """(gates,) the direction of flight through each gate, about world z."""
     opening: np.ndarray
     """(gates, 2) inner width and height."""
+
+    def enlarged(self, scale: float) -> "RaceTrack":
+        """The track with its ground plan enlarged. Heights and openings stay the same."""
+        size = np.array([scale, scale, 1.0])
+        return dataclasses.replace(self, start=self.start * size, position=self.position * size)
 
 
 def track_names() -> list[str]:

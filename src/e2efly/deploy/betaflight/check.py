@@ -1,13 +1,15 @@
 """The flight controller's settings that matter to a flight: their values, what is needed, and how to correct them."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 from math import degrees
 
 from e2efly.deploy.betaflight.controller import ControllerInfo
 from e2efly.deploy.betaflight.messages import MotorTelemetry
-from e2efly.deploy.betaflight.names import BOXES
-from e2efly.deploy.betaflight.settings import ModeRange
-from e2efly.deploy.betaflight.sticks import RATES_PULSE, angle_range
+from e2efly.deploy.betaflight.rates import AXES
+from e2efly.deploy.betaflight.row import Row
+from e2efly.deploy.betaflight.sticks import CHANNELS
+from e2efly.deploy.betaflight.switches import switch_rows, where
+from e2efly.deploy.betaflight.throttle_curve import ThrottleCurve
 from e2efly.deploy.betaflight.versions import RELEASES
 from e2efly.deploy.pilot.hovering import HOVERS, ROTOR_SPEED, HoverController
 from e2efly.deploy.pilot.throttle_map import ThrottleMap
@@ -17,8 +19,6 @@ from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 QUADX = 3
 """Betaflight's number of the mixer of a quadrotor in X."""
-ANGLE_AUX = 2
-"""The AUX channel, from 0, that the guide uses for ANGLE."""
 LARGEST_DEADBAND = 10
 """The largest deadband that does no harm, us. Commands jump over it."""
 LARGEST_BOOST = 5
@@ -27,33 +27,12 @@ ATTITUDE_FIRST = ("LEGACY", "LINEAR", "DYNAMIC")
 """Mixer types that give up collective thrust before torque. EZLANDING gives up torque while the throttle is low."""
 SPEED_HZ = 50.0
 """How often the rotor speeds are requested, Hz."""
-ALWAYS = (1000, 2000)
-"""A mode whose range contains all pulses between these is always on, whatever the position of its switch, us."""
+AIR_MODE = 28
+"""Permanent id of the mode AIR MODE."""
+SINKING = 0.97
+"""The share of the weight that a throttle stick in its middle is set to hold, where it would hold more than all."""
 NOT_TOLD = "not told by this firmware"
 """The value that is shown for a setting that cannot be read."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """One setting, as one row of the table."""
-
-    setting: str
-    """Its name in the controller's command line, or a description."""
-    value: str
-    """Its value."""
-    needed: str
-    """The value that the flight needs."""
-    good: bool
-    """Whether the value is as needed."""
-    mend: str = ""
-    """Lines for the controller's command line that correct it."""
-    told: bool = True
-    """Whether the controller reports the setting. If not, its value is unknown, and the pilot should type `mend`."""
-
-    @property
-    def problem(self) -> str:
-        """What is wrong, in words."""
-        return f"{self.setting} is {self.value}; needed: {self.needed}" + (f" ({self.mend})" if self.mend else "")
 
 
 def examine(
@@ -76,29 +55,29 @@ def examine(
         *_rates(info, vehicle, contract),
         *_throttle(info),
         *_mixing(info),
-        *_modes(info),
+        *switch_rows(info, settings),
         *_hand_back(info, vehicle),
-        *_channels(info, settings),
         *_by_name(info, settings),
     ]
     for axis, band in (("deadband", info.deadband.deadband), ("yaw_deadband", info.deadband.yaw_deadband)):
         small = band <= LARGEST_DEADBAND
-        rows.append(Row(axis, f"{band} us", f"at most {LARGEST_DEADBAND} us", small, f"set {axis}=0"))
+        rows.append(Row(axis, f"{band} us", f"at most {LARGEST_DEADBAND} us", small, (f"set {axis}=0",)))
     quad = info.mixer.mixer == QUADX
-    rows.append(Row("mixer", "QUADX" if quad else f"number {info.mixer.mixer}", "QUADX", quad, "mixer QUADX"))
-    rows.append(Row("feature 3D", _on("3D" in info.features), "off", "3D" not in info.features, "feature -3D"))
+    rows.append(Row("mixer", "QUADX" if quad else f"number {info.mixer.mixer}", "QUADX", quad, ("mixer QUADX",)))
+    rows.append(Row("feature 3D", _on("3D" in info.features), "off", "3D" not in info.features, ("feature -3D",)))
     rows.append(
         Row("rc_smoothing", _on(info.rx.smoothing), "off: it delays the policy", not info.rx.smoothing,
-            "set rc_smoothing=OFF")
+            ("set rc_smoothing=OFF",))
     )  # fmt: skip
+    closed = info.failsafe.throttle <= info.rx.min_check
+    mend = ("set failsafe_procedure=" + ("DROP" if closed else "AUTO-LAND"),)
     rows.append(
         Row("failsafe_procedure", info.failsafe.procedure, "DROP or AUTO-LAND", info.failsafe.procedure != "GPS-RESCUE",
-            "set failsafe_procedure=AUTO-LAND")
+            mend)
     )  # fmt: skip
-    falls = info.failsafe.procedure == "AUTO-LAND" and info.failsafe.throttle <= info.rx.min_check
     rows.append(
-        Row("failsafe_throttle", f"{info.failsafe.throttle} us", "with AUTO-LAND: a little under hovering, or it falls",
-            not falls, "set failsafe_throttle=... or set failsafe_procedure=DROP")
+        Row("failsafe_throttle", f"{info.failsafe.throttle} us", "with AUTO-LAND: a little under hovering, or it "
+            "falls: set your own, or DROP", not closed or info.failsafe.procedure != "AUTO-LAND", mend)
     )  # fmt: skip
     turned = [round(degrees(angle)) for angle in info.alignment.angles]
     rows.append(Row("align_board", f"{turned} deg", "any: attitudes are compared before take-off", True))
@@ -129,23 +108,21 @@ def check_hover(name: str, hover: HoverController, info: ControllerInfo) -> None
         )
 
 
-def problems(rows: tuple[Row, ...]) -> tuple[str, ...]:
-    """The problems that forbid a take-off."""
-    return tuple(row.problem for row in rows if not row.good)
-
-
 def _rates(info: ControllerInfo, vehicle: Vehicle, contract: Contract | None) -> list[Row]:
     wanted = [float(rate) for rate in vehicle.body_rate_max]
     if contract is not None and contract.action.mode == "ctbr":
         wanted = [max(abs(a), abs(b)) for a, b in zip(contract.action.low[1:], contract.action.high[1:], strict=True)]
     rows = [Row("rates_type", info.rates.rates_type, "any: its curve is inverted", True)]
-    for axis, have, need in zip(("roll", "pitch", "yaw"), info.rates.max_rate, wanted, strict=True):
-        enough = have >= need * (1 - 1e-6)
-        tens = -(-degrees(need) // 10)
-        mend = f"set rates_type=ACTUAL, set {axis}_rc_rate={tens:.0f}, set {axis}_srate={tens:.0f}, set {axis}_expo=0"
+    tens = {axis: -(-degrees(need) // 10) for axis, need in zip(AXES, wanted, strict=True)}
+    for axis, have, need in zip(AXES, info.rates.max_rate, wanted, strict=True):
+        lines = [  # with another type, the numbers of all axes get another meaning
+            f"set {name}_{part}={value:.0f}"
+            for name in (AXES if info.rates.rates_type != "ACTUAL" else (axis,))
+            for part, value in (("rc_rate", tens[name]), ("srate", tens[name]), ("expo", 0))
+        ]
         rows.append(
             Row(f"{axis} rate at full stick", f"{degrees(have):.0f} deg/s", f"at least {degrees(need):.0f} deg/s",
-                enough, mend)
+                have >= need * (1 - 1e-6), ("set rates_type=ACTUAL", *lines))
         )  # fmt: skip
     return rows
 
@@ -154,9 +131,9 @@ def _throttle(info: ControllerInfo) -> list[Row]:
     largest = info.throttle.largest
     return [
         Row("throttle_limit_type", f"largest throttle {largest:.0%}", "100 %: no limit", largest > 0.999,
-            "set throttle_limit_type=OFF"),
+            ("set throttle_limit_type=OFF",)),
         Row("min_check", f"{info.rx.min_check} us", "1010 to 1100 us: the throttle begins there",
-            1010 <= info.rx.min_check <= 1100, "set min_check=1050"),
+            1010 <= info.rx.min_check <= 1100, ("set min_check=1050",)),
     ]  # fmt: skip
 
 
@@ -167,21 +144,22 @@ def _mixing(info: ControllerInfo) -> list[Row]:
     all torques down while the throttle is below half (4.3: it clips each rotor).
     """
     air = "AIRMODE" in info.features
-    ranges = info.ranges("AIR MODE")
-    always = any(r.low <= ALWAYS[0] and r.high > ALWAYS[1] for r in ranges)
-    value = "on" if air else "off" + (f", mode AIR MODE on {_where(ranges)}" if ranges else "")
+    modes = info.slots(AIR_MODE)
+    value = "on" if air else f"off, mode AIR MODE on {where(*modes)}" if modes else "off"
+    always = any(slot.covers(*CHANNELS) for slot in modes)
     pid = info.pid_advanced
     limit = pid.motor_output_limit
     rows = [
         Row("feature AIRMODE", value, "on: torque goes before thrust at any throttle", air or always,
-            "feature AIRMODE"),
-        Row("motor_output_limit", f"{limit} %", "100 %: no limit", limit == 100, "set motor_output_limit=100"),
+            ("feature AIRMODE",)),
+        Row("motor_output_limit", f"{limit} %", "100 %: no limit", limit == 100,
+            ("set motor_output_limit=100",)),
         Row("throttle_boost", str(pid.throttle_boost), f"at most {LARGEST_BOOST}: it overdoes what the policy commands",
-            pid.throttle_boost <= LARGEST_BOOST, "set throttle_boost=0"),
+            pid.throttle_boost <= LARGEST_BOOST, ("set throttle_boost=0",)),
     ]  # fmt: skip
     for name, have in (("thrust_linear", pid.thrust_linear), ("vbat_sag_compensation", pid.vbat_sag_compensation)):
         needed = "0: the bridge learns the throttle map itself"
-        rows.append(Row(name, str(have), needed, have == 0, f"set {name}=0"))
+        rows.append(Row(name, str(have), needed, have == 0, (f"set {name}=0",)))
     return rows
 
 
@@ -197,7 +175,7 @@ def _by_name(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
     )  # fmt: skip
     rows = []
     for name, needed, good, mend in asked:
-        value, line = info.named(name), f"set {name}={mend}"
+        value, line = info.named(name), (f"set {name}={mend}",)
         if value is None:
             rows.append(Row(name, NOT_TOLD, needed, True, line, told=False))
         else:
@@ -205,68 +183,27 @@ def _by_name(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
     return rows
 
 
-def _modes(info: ControllerInfo) -> list[Row]:
-    rows = []
-    for mode, hint in (("ARM", "aux 0 0 0 1700 2100 0 0"), ("MSP OVERRIDE", "aux 1 50 1 1700 2100 0 0")):
-        ranges = info.ranges(mode)
-        switched = bool(ranges) and all(r.low > 1000 or r.high < 2000 for r in ranges)
-        needed = "a switch of the pilot's, not always on"
-        rows.append(Row(f"switch of {mode}", _where(ranges), needed, switched, hint))
-    angle = angle_range(info)
-    place = ANGLE_AUX if angle is None else angle.aux
-    channel = info.rx_map.channel[4 + place] if 4 + place < len(info.rx_map.channel) else 4 + place
-    needed = f"925 to 2100 on a channel of its own: on, but for the {RATES_PULSE} us that the bridge sends there"
-    rows.append(
-        Row("range of ANGLE", _where(info.ranges("ANGLE")), needed, angle is not None,
-            f"aux 2 1 {ANGLE_AUX} 925 2100 0 0")
-    )  # fmt: skip
-    known = next(number for number, name in BOXES.items() if name == "MSP OVERRIDE") in info.box_ids
-    mask = 15 | 1 << channel
-    rows.append(
-        Row("msp_override_channels_mask", "set" if known else "0", f"{mask}: the sticks and AUX{place + 1} of ANGLE "
-            "(tried before arming)", known, f"set msp_override_channels_mask={mask}")
-    )  # fmt: skip
-    fail = info.rx_fail.channels[4 + place : 5 + place]
-    levels = not fail or (fail[0][0] == "SET" and angle is not None and angle.low <= fail[0][1] < angle.high)
-    value = f"{fail[0][0]} {fail[0][1]} us" if fail else "not told"
-    rows.append(
-        Row(f"rxfail of AUX{place + 1}", value, "SET within ANGLE's range: level without the receiver", levels,
-            f"rxfail {4 + place} s 2000")
-    )  # fmt: skip
-    return rows
-
-
-def _where(ranges: tuple[ModeRange, ...]) -> str:
-    return ", ".join(f"AUX{r.aux + 1} {r.low} to {r.high}" for r in ranges) or "none"
-
-
 def _hand_back(info: ControllerInfo, vehicle: Vehicle) -> list[Row]:
     """What acts after the link has failed: the receiver's sticks in a level flight, with the throttle stick in its
     middle.
     """
-    middle = info.throttle.throttle_of(info.rx.mid)
-    share = ThrottleMap.of(vehicle).nominal(middle) / GRAVITY
+    share, mend = _held(info.throttle, info, vehicle), tuple[str, ...]()
     verb = "climbs" if share > 1 else "sinks"
     taken = info.release.override_timeout is not None
-    mend = "set thr_hover=... (thr_mid before 2025.12) to just under hovering, or weigh the vehicle with its battery"
+    if bad := taken and share > 1:
+        curves = ((h, replace(info.throttle, hover=h)) for h in range(100, -1, -1))
+        mend = (f"set thr_hover={next(h for h, curve in curves if _held(curve, info, vehicle) <= SINKING)}",)
+    weigh = "at most 1, where it is handed back by itself: weigh the vehicle with its battery"
     return [
         Row("override without MSP", info.release.hand_back, "any: docs/hardware.md says what follows", True),
         Row("throttle stick in its middle", f"{share:.2f} of the weight: {verb}",
-            "at most 1, where it is handed back by itself" if taken else "any: only the pilot's switch hands it back",
-            share <= 1 or not taken, mend),
+            weigh if taken else "any: only the pilot's switch hands it back", not bad, mend),
     ]  # fmt: skip
 
 
-def _channels(info: ControllerInfo, settings: FlightSettings) -> list[Row]:
-    """The channels that the bridge reads. They must not be used by the controller's own modes."""
-    taken = {r.aux + 5: BOXES.get(r.box, str(r.box)) for r in info.modes}
-    c = settings.channels
-    used = {"mission": c.mission, "roll": c.roll, "pitch": c.pitch, "throttle": c.throttle, "yaw": c.yaw}
-    return [
-        Row(f"channel {channel} ({name})", taken.get(channel, "free"), "free of the controller's own modes",
-            channel not in taken, f"fly --flight.channels.{name} to another than {sorted(taken)}")
-        for name, channel in used.items() if channel is not None
-    ]  # fmt: skip
+def _held(curve: ThrottleCurve, info: ControllerInfo, vehicle: Vehicle) -> float:
+    """The share of the weight that a throttle stick in its middle holds."""
+    return ThrottleMap.of(vehicle).nominal(curve.throttle_of(info.rx.mid)) / GRAVITY
 
 
 def _least(value: str, least: int) -> bool:

@@ -9,7 +9,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from e2efly.deploy.betaflight import messages, settings
+from e2efly.deploy.betaflight import messages, mode_slots, settings
 from e2efly.deploy.betaflight.codec import ERROR, REQUEST, Decoder, Frame, encode
 from e2efly.deploy.betaflight.link import MOST, Link
 from e2efly.deploy.clock import MONOTONIC, Clock
@@ -19,10 +19,10 @@ MESSAGES: dict[int, Any] = {
     for kind in (
         messages.ApiVersion, messages.FcVariant, messages.FcVersion, messages.BuildInfo, messages.Name,
         messages.StatusEx, messages.RawImu, messages.Motor, messages.MotorTelemetry, messages.Rc,
-        messages.AttitudeReply, messages.Analog, messages.BatteryState, messages.Debug, settings.ModeRanges,
-        settings.FeatureConfig, settings.BoardAlignment,
+        messages.AttitudeReply, messages.Analog, messages.BatteryState, messages.Debug, mode_slots.ModeRanges,
+        mode_slots.ModeLogic, settings.FeatureConfig, settings.BoardAlignment,
         settings.MixerConfig, settings.RxConfig, settings.RxMap, settings.FailsafeConfig, settings.RxFailConfig,
-        settings.AdvancedConfig, settings.PidAdvanced, settings.RcTuning, settings.BoxIds, settings.RcDeadband,
+        settings.AdvancedConfig, settings.PidAdvanced, settings.RcTuning, mode_slots.BoxIds, settings.RcDeadband,
         settings.MotorConfig,
     )
 }  # fmt: skip
@@ -45,10 +45,19 @@ FORGOTTEN = 1.0
 to a later request."""
 MAX_IN_FLIGHT = 256
 """The largest number of bytes of scheduled replies that may be awaited at a time."""
-MAX_BACKLOG = 6
+MAX_BACKLOG, PROBE_S = 6, 0.05
 """If more stick frames than this have waited for their replies for longer than the link takes, the controller is
-behind, or replies were lost. Then only one message is requested at a time, and its reply shows which of the two is
-true."""
+behind, or replies were lost. Unless `lossy` shows the latter, messages are requested at least `PROBE_S` apart, s."""
+LOSSY_S, LOSSY_TIMEOUT = 0.3, 0.03
+"""A line that has carried bytes that are no frame within the first value, s, loses replies. The limit is then
+`PATIENCE` times the quickest reply's time, but at least the second value, s."""
+HOLE = 0.1
+"""Between two acknowledged stick frames that are further apart than this, s, other frames may not have arrived."""
+TOLD_S = 0.03
+"""An acknowledgement that takes longer than twice the newest reply's time plus this, s, may be for a later frame."""
+CROWDED_S, CROWDED = 1.0, 3.0
+"""If replies that nobody here asked for have come within the first value, s, another program asks on this link. The
+controller must have time for the sticks, so messages are then requested less often, by the second value."""
 _UNKNOWN_REPLY = 64
 """The assumed size of a reply whose size is not known yet, bytes."""
 _OVERHEAD = 6
@@ -97,6 +106,8 @@ class Client:
     """How long the quickest reply on this connection took, s, not counting replies to stick frames."""
     heard: float = -math.inf
     """When the newest reply came, s on the monotonic clock, not counting replies to stick frames."""
+    acknowledged: deque[float] = field(default_factory=lambda: deque(maxlen=512))
+    """When the stick frames were sent whose arrival the controller has acknowledged, s, oldest first."""
     run_together: int = 0
     """Number of replies so far that were dropped because another reply begins inside them."""
     decoder: Decoder = field(default_factory=Decoder)
@@ -106,14 +117,20 @@ class Client:
     _due: dict[int, float] = field(default_factory=dict)
     _sizes: dict[int, int] = field(default_factory=dict)
     _connection: int = 0
+    _spoilt: float = -math.inf
+    _foreign: float = -math.inf
+    _last_asked: float = -math.inf
 
     def poll(self, now: float) -> None:
         """Read what has come and request what is due. `now` is in s on the monotonic clock. Never raises."""
         self.link.poll(now)
         if self.link.connections != self._connection:
             self._forget()
+        spoilt = self.decoder.skipped + self.decoder.bad_checksums
         for frame in self.decoder.feed(self.link.receive()[-MOST:]):
             self._take(frame, now)
+        if self.decoder.skipped + self.decoder.bad_checksums > spoilt:
+            self._spoilt = now
         self._expire(now)
         if self.link.alive:
             self._ask_due(now)
@@ -142,6 +159,23 @@ class Client:
         reply = self.latest.get(code)
         return reply.message if reply is not None and now - reply.time <= max_age else None
 
+    def delivered(self, start: float, end: float, hole: float = HOLE) -> bool:
+        """Whether the stick frames sent from `start` to `end`, s, are known to have arrived, `hole` s at most apart."""
+        later = end
+        for time in reversed(self.acknowledged):
+            if time < later - hole or time <= start:
+                break
+            later = min(later, time)
+        return later - start <= hole
+
+    def lossy(self, now: float) -> bool:
+        """Whether the line loses replies, so that `latency` may be counted from a request whose reply was lost."""
+        return now - self._spoilt < LOSSY_S
+
+    def crowded(self, now: float) -> bool:
+        """Whether another program asks on this link."""
+        return now - self._foreign < CROWDED_S
+
     def _take(self, frame: Frame, now: float) -> None:
         if frame.direction == REQUEST:
             return  # an echo, for example from a line whose two wires touch
@@ -150,10 +184,12 @@ class Client:
             return
         asked = self._strike_off(frame.code, now)
         if frame.code == messages.SET_RAW_RC:
+            if now - asked <= 2 * self.latency + TOLD_S:
+                self.acknowledged.append(asked)
             return
         self.replies += 1
         self.latency = now - asked
-        self.quickest = min(self.quickest, self.latency)
+        self.quickest = min(self.quickest, self.latency or math.inf)
         self._sizes[frame.code] = len(frame.payload) + _OVERHEAD
         if frame.direction == ERROR:
             self.errors[frame.code] = "the controller does not know or refuses it"
@@ -169,30 +205,36 @@ class Client:
 
     def _strike_off(self, code: int, now: float) -> float:
         """Remove the request of a reply from the awaited ones. The controller answers in order, so the replies to
-        earlier requests are lost.
+        earlier requests are lost. It is the first request of this code, or on a lossy line the latest that fits.
 
         Returns:
             When the code was requested, s. If it was not requested, `now`.
         """
-        if all(awaited != code for awaited, _ in self._awaited):
+        fitting = [k for k, (awaited, _) in enumerate(self._awaited) if awaited == code]
+        if not fitting:
+            self._foreign = now
             return now
-        while True:
+        chosen = fitting[0]
+        if self.lossy(now):
+            chosen = next((k for k in reversed(fitting) if now - self._awaited[k][1] >= self.quickest), chosen)
+        asked = now
+        for k in range(chosen + 1):
             earlier, asked = self._awaited.popleft()
             self.backlog -= earlier == messages.SET_RAW_RC
             given_up = earlier != messages.SET_RAW_RC and self._asked.get(earlier) != asked
             if not given_up:
                 self._asked.pop(earlier, None)
-            if earlier == code:
-                return asked
-            self.timeouts += not given_up
+            self.timeouts += k < chosen and not given_up
+        return asked
 
-    @property
-    def _timeout(self) -> float:
+    def _timeout(self, now: float) -> float:
+        if self.lossy(now):
+            return min(max(PATIENCE * self.quickest, LOSSY_TIMEOUT), TIMEOUT)
         slowest = max((reply.latency for reply in self.latest.values()), default=TIMEOUT)
         return min(max(PATIENCE * slowest, SHORTEST_TIMEOUT), TIMEOUT)
 
     def _expire(self, now: float) -> None:
-        timeout = self._timeout
+        timeout = self._timeout(now)
         late = [code for code, asked in self._asked.items() if now - asked > timeout]
         for code in late:
             del self._asked[code]
@@ -207,17 +249,18 @@ class Client:
                 self._take(frame, now)
 
     def _ask_due(self, now: float) -> None:
-        behind = self._unanswered(now) > MAX_BACKLOG
+        behind = not self.lossy(now) and self._unanswered(now) > MAX_BACKLOG
         in_flight = sum(self._sizes.get(code, _UNKNOWN_REPLY) for code in self._asked)
         free = (code for code in self.schedule if code not in self._asked)
         overdue = {code: (now - self._due.setdefault(code, now)) * self.schedule[code] for code in free}
         for code in sorted((code for code in overdue if overdue[code] >= 0), key=overdue.__getitem__, reverse=True):
             size = self._sizes.get(code, _UNKNOWN_REPLY)
-            if in_flight and (behind or in_flight + size > MAX_IN_FLIGHT):
+            if in_flight and (now - self._last_asked < PROBE_S if behind else in_flight + size > MAX_IN_FLIGHT):
                 return
             self.request(code, now)
+            self._last_asked = now
             in_flight += size
-            period = 1 / self.schedule[code]
+            period = (CROWDED if self.crowded(now) else 1.0) / self.schedule[code]
             self._due[code] = max(self._due[code] + period, now + 0.5 * period)
 
     def _unanswered(self, now: float) -> int:
@@ -236,6 +279,7 @@ class Client:
         self._due.clear()
         self.latest.clear()
         self.errors.clear()
+        self.acknowledged.clear()
         self.backlog, self.latency, self.quickest = 0, 0.0, math.inf
         self.decoder = Decoder(bad_checksums=self.decoder.bad_checksums, skipped=self.decoder.skipped)
 

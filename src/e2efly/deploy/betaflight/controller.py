@@ -3,9 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from e2efly.deploy.betaflight import messages, settings, settings_by_name
+from e2efly.deploy.betaflight import messages, mode_slots, settings, settings_by_name
 from e2efly.deploy.betaflight.client import Client, ask
-from e2efly.deploy.betaflight.names import BOXES
 from e2efly.deploy.betaflight.rates import RateProfile
 from e2efly.deploy.betaflight.throttle_curve import ThrottleCurve
 from e2efly.deploy.betaflight.versions import Release, release_of, version_text
@@ -47,8 +46,8 @@ class ControllerInfo:
     """What it does when the receiver's signal is lost."""
     rx_fail: settings.RxFailConfig
     """What each channel becomes in that case."""
-    modes: tuple[settings.ModeRange, ...]
-    """Which switches make which modes active."""
+    modes: tuple[mode_slots.ModeRange, ...]
+    """Which switches make which modes active: the slots of `aux` that are in use."""
     box_ids: tuple[int, ...]
     """Permanent ids of the modes that the controller knows, in the order of the bits of `StatusEx.boxes`."""
     motor: settings.MotorConfig
@@ -78,9 +77,9 @@ class ControllerInfo:
         """The value of a setting by its name in the command line. None: this controller does not report it."""
         return dict(self.by_name).get(setting)
 
-    def ranges(self, mode: str) -> tuple[settings.ModeRange, ...]:
-        """The switch ranges that make a mode of `BOXES` active, by name."""
-        return tuple(entry for entry in self.modes if BOXES.get(entry.box) == mode)
+    def slots(self, box: int) -> tuple[mode_slots.ModeRange, ...]:
+        """The slots of `aux` that make a mode active, by its permanent id."""
+        return tuple(slot for slot in self.modes if slot.box == box)
 
 
 def identify(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -> ControllerInfo:
@@ -116,8 +115,8 @@ def identify(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -
         deadband=get(settings.RcDeadband),
         failsafe=get(settings.FailsafeConfig),
         rx_fail=get(settings.RxFailConfig),
-        modes=get(settings.ModeRanges).ranges,
-        box_ids=get(settings.BoxIds).ids,
+        modes=mode_slots.mode_ranges(get(mode_slots.ModeRanges), get(mode_slots.ModeLogic)),
+        box_ids=get(mode_slots.BoxIds).ids,
         motor=get(settings.MotorConfig),
         advanced=get(settings.AdvancedConfig),
         pid_advanced=get(settings.PidAdvanced),

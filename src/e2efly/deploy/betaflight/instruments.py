@@ -13,17 +13,11 @@ from e2efly.deploy.attitude import Attitude
 from e2efly.deploy.betaflight.client import Client
 from e2efly.deploy.betaflight.controller import ControllerInfo
 from e2efly.deploy.betaflight.messages import AttitudeReply, BatteryState, Rc, StatusEx
+from e2efly.deploy.betaflight.modes import ANGLE, ARM, FAILSAFE, OVERRIDE, foreign, named_mode
 from e2efly.deploy.betaflight.sticks import RATES_PULSE, Sticks
 from e2efly.deploy.pilot.flight_state import Mission, Pilot
 from e2efly.deploy.settings import FlightSettings, PilotChannels
 
-ARM, ANGLE, FAILSAFE, OVERRIDE = 0, 1, 27, 50
-"""Permanent ids of Betaflight's modes."""
-MEDDLING = {
-    ANGLE: "ANGLE", 2: "HORIZON", 3: "ALTHOLD", 6: "HEADFREE", 11: "POS HOLD", 46: "GPS RESCUE", 47: "ACRO TRAINER",
-    56: "AUTOPILOT",
-}  # fmt: skip
-"""Modes in which the sticks do not command body rates, by permanent id."""
 RECEIVER_LOST = frozenset({"RXLOSS", "FAILSAFE"})
 """Reasons against arming with which the controller reports that it does not hear the pilot."""
 VOLTAGE_SHARE = 0.4
@@ -33,6 +27,9 @@ RC_PATIENCE = 1.2
 link is reported as a lost link, whichever reply came last."""
 BEHIND = 0.5
 """The longest reply time of a controller, as a share of the link's time-out. A slower one is too slow for flight."""
+ARMING_S = 2.0
+"""A mode that was on up to this time before arming may stay in effect after its switch has left it, s. Betaflight up to
+4.5 keeps its motors reversed until it is disarmed, and delays arming by up to 1.2 s after a beep of the motors."""
 BATTERY_PATIENCE_S = 3.0
 """The largest age of the battery's voltage, s."""
 
@@ -54,12 +51,15 @@ class Reading:
     voltage: float | None
     """Voltage of a cell, V. None: the controller does not know it."""
     meddling: tuple[str, ...]
-    """The active modes in which the sticks that are sent do not command body rates, in words."""
+    """The active modes that are not known to be harmless while the bridge flies, and a rate profile that is not the one
+    whose rates were read, in words."""
     channels: Rc | None
     """The channels that the controller uses."""
     attitude: Attitude | None
     fresh: dict[int, Any]
     """The replies that came since the previous reading, by code."""
+    armed_with: tuple[str, ...] = ()
+    """The modes like `meddling` that were on while the vehicle was armed, and are not on now, in words."""
 
 
 T = TypeVar("T")
@@ -92,6 +92,10 @@ class Instruments:
     _mission: Twice[Mission | None] = field(default_factory=lambda: Twice(None))
     _seen: dict[int, float] = field(default_factory=dict)
     _voltage: float | None = None
+    _foreign: dict[int, float] = field(default_factory=dict)
+    """When each mode that is not known to be harmless was last on, s: since arming, and just before."""
+    _last: frozenset[int] = frozenset()
+    """Those of the last message."""
 
     def read(self, now: float, info: ControllerInfo, *, land: bool, sends: bool = True) -> Reading:
         """Evaluate the replies that have come until `now`.
@@ -100,7 +104,7 @@ class Instruments:
             now: s on the client's clock.
             info: the settings of the controller, which are needed to decode the active modes.
             land: the operator asks for a landing, as the pilot does with the mission switch.
-            sends: sticks are sent. If they are not, ANGLE is on, as it should be, and is not reported.
+            sends: sticks are sent. While they are not, or have no effect, ANGLE is on, as it should be.
         """
         fresh = self._fresh()
         if (battery := fresh.get(BatteryState.CODE)) is not None:
@@ -109,11 +113,18 @@ class Instruments:
         status: StatusEx | None = self.client.message(StatusEx.CODE, now, patience)
         active = status.active(info.box_ids) if status is not None else frozenset()
         channels: Rc | None = self.client.message(Rc.CODE, now, RC_PATIENCE * patience)
-        on = MEDDLING.keys() & active if sends else MEDDLING.keys() & active - {ANGLE}
-        meddling = tuple(f"{MEDDLING[box]} is on: sticks are no body rates" for box in on)
+        idle = {FAILSAFE} if sends and OVERRIDE in active else {FAILSAFE, ANGLE}  # `failsafe` tells of FAILSAFE
+        on = foreign(active - idle, info.api)
+        meddling = [f"{named_mode(box)} is on; accepted: off while the bridge flies" for box in sorted(on)]
+        if status is not None and status.rate_profile != info.rate_profile:
+            read = f"{info.rate_profile}, whose rates were read: switch back, or start again"
+            meddling.append(f"rateprofile is {status.rate_profile}; accepted: {read}")
         if status is not None and StatusEx.CODE in fresh:
             self._armed.hear(ARM in active)
             self._heard.hear(FAILSAFE not in active and not RECEIVER_LOST & set(status.arming_disabled))
+            kept = {box: last for box, last in self._foreign.items() if ARM in active or now - last < ARMING_S}
+            self._foreign = kept | dict.fromkeys(on & self._last - {ANGLE}, now)
+            self._last = on
         battery_known = self.client.message(BatteryState.CODE, now, BATTERY_PATIENCE_S) is not None
         return Reading(
             link_problem=self._link_problem(status),
@@ -122,7 +133,12 @@ class Instruments:
             pilot=self._pilot(channels, fresh=Rc.CODE in fresh, land=land),
             failsafe=not self._heard.held,
             voltage=self._voltage if battery_known else None,
-            meddling=meddling if OVERRIDE in active else (),
+            meddling=tuple(meddling),
+            armed_with=tuple(
+                f"{named_mode(box)} was on while arming; accepted: disarm, switch it off, arm again"
+                for box in sorted(self._foreign.keys() - on)
+                if self._armed.held
+            ),
             channels=channels,
             attitude=self.client.message(AttitudeReply.CODE, now, patience),
             fresh=fresh,

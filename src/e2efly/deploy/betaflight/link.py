@@ -1,7 +1,7 @@
 """Links that carry bytes to a controller and back, over a serial port or TCP. Nothing here blocks or raises in flight.
 
-`poll` connects, and connects again after a failure, with a longer wait each time. `send` and `receive` work while the
-link is alive, and do nothing otherwise. `reason` says why the link is not alive.
+`poll` connects, and connects again after a failure. `send` and `receive` work while the link is alive, and do nothing
+otherwise. `reason` says why the link is not alive.
 """
 
 import os
@@ -15,8 +15,8 @@ from urllib.parse import parse_qsl
 
 BAUD = 115200
 """The default baud rate. A USB port has no baud rate and accepts any."""
-FIRST_RETRY, LONGEST_RETRY = 0.1, 2.0
-"""The first and the longest wait before another attempt to connect, s."""
+RETRY_S = 0.1
+"""The wait before another attempt to connect, s. In flight, the controller holds the last command until then."""
 CONNECT_TIMEOUT = 2.0
 """How long an attempt to connect may take, s."""
 MAX_UNSENT = 4096
@@ -88,7 +88,6 @@ class StreamLink:
     _alive: bool = False
     _closed: bool = False
     _unsent: bytearray = field(default_factory=bytearray)
-    _wait: float = FIRST_RETRY
     _retry_at: float | None = None
     _give_up_at: float = 0.0
 
@@ -104,20 +103,19 @@ class StreamLink:
         try:
             if self._port is None:
                 if self._retry_at is None:  # broken since the last poll; the very first attempt has no wait
-                    self._retry_at = now + (self._wait if self.connections else 0.0)
+                    self._retry_at = now + (RETRY_S if self.connections else 0.0)
                 if now < self._retry_at:
                     return
                 self._port = self.opener()
                 self._give_up_at = now + CONNECT_TIMEOUT
             if self._port.connected():
-                self._alive, self.reason, self._wait, self._retry_at = True, "", FIRST_RETRY, None
+                self._alive, self.reason, self._retry_at = True, "", None
                 self.connections += 1
             elif now > self._give_up_at:
                 raise TimeoutError("no answer to the attempt to connect")
         except OSError as error:
             self._break(error)
-            self._retry_at = now + self._wait
-            self._wait = min(2 * self._wait, LONGEST_RETRY)
+            self._retry_at = now + RETRY_S
 
     def send(self, data: bytes) -> None:
         """Send bytes. What the port does not accept at once is kept for later.

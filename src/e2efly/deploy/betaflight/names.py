@@ -43,8 +43,6 @@ RXFAIL_MODES = ("AUTO", "HOLD", "SET")
 value. SET: a fixed pulse."""
 FAILSAFE_SWITCHES = ("STAGE1", "KILL", "STAGE2")
 """What the failsafe switch does, by number."""
-QUADX = 3
-"""Number of the mixer of a quadrotor in X."""
 
 
 def bits(value: int, names: "dict[int, str] | tuple[str, ...]") -> frozenset[str]:

@@ -27,36 +27,6 @@ throttle (T), AUX1 to AUX4."""
 
 
 @dataclass(frozen=True)
-class ModeRange:
-    """When a switch makes a mode active."""
-
-    box: int
-    """Permanent id of the mode: a key of `BOXES`."""
-    aux: int
-    """The AUX channel, from 0."""
-    low: int
-    """Active from this pulse on, µs."""
-    high: int
-    """Active below this pulse, µs."""
-
-
-@dataclass(frozen=True)
-class ModeRanges:
-    """When switches make modes active."""
-
-    CODE: ClassVar[int] = 34
-    ranges: tuple[ModeRange, ...]
-    """The ranges that are in use."""
-
-    @staticmethod
-    def parse(payload: bytes) -> "ModeRanges":
-        """Read a reply."""
-        entries = (payload[i : i + 4] for i in range(0, len(payload) - 3, 4))
-        used = (ModeRange(box, aux, 900 + 25 * low, 900 + 25 * high) for box, aux, low, high in entries if low < high)
-        return ModeRanges(tuple(used))
-
-
-@dataclass(frozen=True)
 class FeatureConfig:
     """Features that are on."""
 
@@ -257,20 +227,6 @@ class RcTuning:
             (rate_limit[0], rate_limit[1], rate_limit[2]),
         )
         return RcTuning(rates, ThrottleCurve(mid, expo, hover, named(limit_type, LIMIT_TYPES), limit))
-
-
-@dataclass(frozen=True)
-class BoxIds:
-    """The modes that the controller knows."""
-
-    CODE: ClassVar[int] = 119
-    ids: tuple[int, ...]
-    """Permanent ids, in the order of the bits of `StatusEx.boxes`."""
-
-    @staticmethod
-    def parse(payload: bytes) -> "BoxIds":
-        """Read a reply."""
-        return BoxIds(tuple(payload))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from math import isfinite
 
 from e2efly.deploy.betaflight.controller import ControllerInfo
-from e2efly.deploy.betaflight.names import BOXES
+from e2efly.deploy.betaflight.mode_slots import ModeRange
+from e2efly.deploy.betaflight.modes import ANGLE
 from e2efly.deploy.betaflight.rates import (
     AXES,
     RateProfile,
@@ -18,7 +19,6 @@ from e2efly.deploy.betaflight.rates import (
     stick_to_channel,
     stick_to_rate,
 )
-from e2efly.deploy.betaflight.settings import ModeRange
 from e2efly.deploy.betaflight.throttle_curve import ThrottleCurve
 
 CHANNELS = (1000, 2000)
@@ -143,7 +143,6 @@ def angle_range(info: ControllerInfo) -> ModeRange | None:
     If the channel of this range is overridden, ANGLE is off only while the override is in effect. When the pilot takes
     the sticks back, or the controller returns them because it hears no MSP any more, the vehicle levels itself.
     """
-    others = {entry.aux for entry in info.modes if BOXES.get(entry.box) != "ANGLE"}
-    low, high = TRANSMITTER
-    fit = (r for r in info.ranges("ANGLE") if RATES_PULSE < r.low <= low and r.high > high and r.aux not in others)
+    others = {slot.aux for slot in info.modes if slot.box != ANGLE}
+    fit = (r for r in info.slots(ANGLE) if r.low > RATES_PULSE and r.covers(*TRANSMITTER) and r.aux not in others)
     return next(fit, None)

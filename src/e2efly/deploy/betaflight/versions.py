@@ -11,12 +11,14 @@ files:
 | names of settings | `src/main/cli/settings.c` |
 | settings by name over MSP | MSP2_CLI_SETTING in `src/main/msp/msp.c`: since commit eb8c314da3 of 4 April 2026 |
 | what the mixer gives up | `applyMixerAdjustment` and similar functions in `src/main/flight/mixer.c`; the same since 4.4 |
+| modes by number, and what each does | see `modes` |
+| how the slots of `aux` act together | `updateActivatedModes` in `src/main/fc/rc_modes.c` |
 | packets of the SITL | `src/platform/SIMULATOR/sitl.c` (`src/main/target/SITL` up to 4.5): since commit 26524e20db of April 2026 |
 
 The first bytes of each message in `messages` and `settings`, as far as they are read here, are the same in all
 versions. Later versions append to STATUS_EX (1.46, 1.47, 1.48), BUILD_INFO (1.46), RX_CONFIG (1.45, 1.47), RC_TUNING
 (1.47: the hover throttle) and FC_VERSION (1.47: the version as text). Since 1.47, MOTOR_CONFIG has no `min_throttle`.
-ANALOG, BATTERY_STATE, ADVANCED_CONFIG, PID_ADVANCED, MODE_RANGES, BOXIDS, FAILSAFE_CONFIG, RXFAIL_CONFIG,
+ANALOG, BATTERY_STATE, ADVANCED_CONFIG, PID_ADVANCED, MODE_RANGES, MODE_RANGES_EXTRA, BOXIDS, FAILSAFE_CONFIG, RXFAIL_CONFIG,
 MOTOR_TELEMETRY (RPM and ESC) and SET_RAW_RC keep their layouts, and MSP OVERRIDE its permanent id, 50. New modes,
 features, motor protocols and reasons against arming get new numbers, all in `names`.
 """  # noqa: E501

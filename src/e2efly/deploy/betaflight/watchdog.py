@@ -21,12 +21,23 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from itertools import chain, pairwise
 from math import inf
+from typing import Any
 
 from e2efly.deploy.attitude import Attitude
 from e2efly.deploy.betaflight.codec import REPLY, Decoder, Frame, encode
+from e2efly.deploy.betaflight.descent import Descent, Sense, between, command, feel, move, sent
 from e2efly.deploy.betaflight.lifeline import Lifeline, watch
 from e2efly.deploy.betaflight.link import MOST, Link, open_link
-from e2efly.deploy.betaflight.messages import CHANNEL_RANGE, MAX_CHANNELS, AttitudeReply, StatusEx, set_raw_rc
+from e2efly.deploy.betaflight.messages import (
+    CHANNEL_RANGE,
+    MAX_CHANNELS,
+    SET_RAW_RC,
+    AttitudeReply,
+    RawImu,
+    StatusEx,
+    set_raw_rc,
+)
+from e2efly.gravity import GRAVITY
 
 TIMEOUT_S = 0.1
 """Silence of the bridge in flight after which this process takes over, s."""
@@ -38,7 +49,12 @@ still, the bridge then has the chance to send first."""
 STALE_S = 0.2
 """A controller's attitude that is older than this is not used for levelling, s."""
 DEAF_S = 10.0
-"""If the controller has not reported for this time whether it is armed, it is given up after the descent, s."""
+"""If the controller has not reported for this time whether it is armed, it is given up after the descent, s. After such
+a silence the descent goes on, too."""
+ASKED = (StatusEx, *(AttitudeReply, RawImu) * 5)
+"""What the frames of a take-over ask for, in turn, ..."""
+ASKED_AFTER = (StatusEx, AttitudeReply)
+"""... and after it."""
 ARM = 1
 """Bit of the mode ARM in `StatusEx.boxes`: it is always the first."""
 LEVEL_GAIN = 4.0
@@ -74,6 +90,9 @@ class Plan:
     """The descent: (time since the take-over, s, throttle pulse, us), with increasing times. The last pulse is held."""
     channels: tuple[int, ...]
     """The frame whose other channels are kept, us."""
+    sense: Sense | None = None
+    """What a descent by the accelerometer starts from: of `throttle`, only the last time is then used. None: the
+    descent is that of `throttle`."""
 
     def __post_init__(self) -> None:
         n, count = len(self.rates), len(self.channels)
@@ -93,29 +112,30 @@ class Plan:
 
 
 def descent(plan: Plan, elapsed: float, attitude: Attitude | None) -> list[int]:
-    """The channels of a take-over, us.
+    """The channels of a take-over without an accelerometer, us.
 
     Args:
         plan: the last plan of the bridge.
         elapsed: time since the take-over, s.
         attitude: the newest attitude of the controller. None: unknown; the body rates are zero.
     """
+    times = [at for at, _ in plan.throttle]
+    return _channels(plan, plan.throttle[max(bisect_right(times, elapsed) - 1, 0)][1], attitude)
+
+
+def _channels(
+    plan: Plan, throttle: int, attitude: Attitude | None, lean: tuple[float, float] = (0.0, 0.0)
+) -> list[int]:
+    """The channels that turn towards a roll and pitch, rad, with a throttle pulse, us."""
     wanted = [0.0, 0.0, 0.0]
     if attitude is not None:
-        for i, angle in enumerate((attitude.roll, attitude.pitch)):
-            wanted[i] = max(-LEVEL_RATE, min(LEVEL_RATE, -LEVEL_GAIN * angle))
+        for i, angle in enumerate((lean[0] - attitude.roll, lean[1] - attitude.pitch)):
+            wanted[i] = max(-LEVEL_RATE, min(LEVEL_RATE, LEVEL_GAIN * angle))
     channels = list(plan.channels)
     for place, rate, pulses in zip(plan.places, wanted, plan.pulses, strict=False):
-        channels[place] = round(_interpolate(plan.rates, pulses, rate))
-    times = [at for at, _ in plan.throttle]
-    channels[plan.places[3]] = plan.throttle[max(bisect_right(times, elapsed) - 1, 0)][1]
+        channels[place] = round(between(plan.rates, pulses, rate))
+    channels[plan.places[3]] = throttle
     return channels
-
-
-def _interpolate(xs: tuple[float, ...], ys: tuple[int, ...], x: float) -> float:
-    i = min(max(bisect_right(xs, x) - 1, 0), len(xs) - 2)
-    share = min(max((x - xs[i]) / (xs[i + 1] - xs[i]), 0.0), 1.0)
-    return ys[i] + share * (ys[i + 1] - ys[i])
 
 
 class WatchedLink:
@@ -163,6 +183,8 @@ class WatchedLink:
     def poll(self, now: float) -> None:
         """Read what the watchdog reports. It connects by itself."""
         del now
+        if not self._link_alive and not self.taken_over:
+            self._hand(BYTES)  # nothing is sent on a link that is gone, and silence would be the end of the bridge
         for _ in range(PACKETS):
             try:
                 packet = self._socket.recv(_PACKET)
@@ -232,7 +254,8 @@ def serve(bridge: socket.socket, died: socket.socket | None, link: Link, timeout
     heard = [bridge] if died is None else [bridge, died]
     plan: Plan | None = None
     status: tuple[bool, str, int] | None = None
-    silence, before = 0.0, time.monotonic()
+    silence, before, held = 0.0, time.monotonic(), b""
+    planned = before
     bridge.setblocking(False)
     while True:
         ready, _, _ = select.select(heard, [], [], 0.001)
@@ -245,8 +268,9 @@ def serve(bridge: socket.socket, died: socket.socket | None, link: Link, timeout
             silence = 0.0
             if packet[:1] == BYTES:
                 link.send(packet[1:])
+                held = packet[1:] if packet[5:6] == bytes([SET_RAW_RC]) else held
             else:
-                plan = _plan(packet[1:]) or plan
+                plan, planned = _plan(packet[1:]) or plan, now
         flying = plan is not None and plan.flying
         if gone and not flying:
             link.close()
@@ -254,7 +278,7 @@ def serve(bridge: socket.socket, died: socket.socket | None, link: Link, timeout
         if plan is not None and flying and (gone or silence > timeout):
             why = "the bridge has ended" if gone else f"the bridge was silent for {silence:.2f} s"
             _hand(bridge, TAKEN + why.encode())
-            land(link, plan)
+            land(link, plan, held, now - planned)
             return f"{why}: landed"
         if data := link.receive():
             _hand(bridge, BYTES + data)
@@ -278,34 +302,70 @@ def _packets(bridge: socket.socket) -> tuple[list[bytes], bool]:
         packets.append(packet)
 
 
-def land(link: Link, plan: Plan) -> None:
+def land(link: Link, plan: Plan, held: bytes = b"", age: float = 0.0) -> None:
     """Level, descend, close the throttle, and keep it closed until the pilot has disarmed or nobody answers.
 
     The closed throttle must be sent all the time. Some controllers return the control to the receiver when they hear no
     override any more, and the throttle stick, which rests in its middle, would then control the motors.
+
+    While the link is gone, the controller holds what it got last, and the descent does not go on.
+
+    Args:
+        link: the link to the controller.
+        plan: the last plan of the bridge.
+        held: the last stick frame of the bridge, which the controller has held since.
+        age: how old the plan is, s. The first step of the velocity covers this time, too.
     """
-    decoder, attitude, heard, disarmed = Decoder(), None, 0.0, 0
-    began, down = time.monotonic(), plan.throttle[-1][0]
-    end = down + DEAF_S
-    while (elapsed := time.monotonic() - began) < end and (elapsed < down or disarmed < 2):
-        link.poll(time.monotonic())
+    decoder, attitude, levelled, disarmed, rounds = Decoder(), None, time.monotonic(), 0, 0
+    sense, down = plan.sense, plan.throttle[-1][0]
+    before = heard = told = time.monotonic()
+    fall = None if sense is None else Descent.of(sense, down, _thrust(plan, sense, held), before - age)
+    elapsed, thrust, closed_at = 0.0, 0.0, inf
+    while True:
+        link.poll(now := time.monotonic())
         for frame in decoder.feed(link.receive()[-MOST:]):
-            if frame.direction == REPLY and frame.code == AttitudeReply.CODE:
-                with suppress(ValueError):  # a reply that cannot be parsed is ignored
-                    attitude, heard = AttitudeReply.parse(frame.payload), elapsed
-            if frame.direction == REPLY and frame.code == StatusEx.CODE:
-                with suppress(ValueError):
-                    disarmed = 0 if StatusEx.parse(frame.payload).boxes & ARM else disarmed + 1
-                    end = max(down, elapsed) + DEAF_S
-        if elapsed - heard > STALE_S:
-            attitude = None
-        link.send(
-            encode(set_raw_rc(descent(plan, elapsed, attitude)))
-            + encode(Frame(AttitudeReply.CODE))
-            + encode(Frame(StatusEx.CODE))
-        )
+            if frame.direction != REPLY:
+                continue
+            heard = now
+            with suppress(ValueError):  # a reply that cannot be parsed is ignored
+                if frame.code == AttitudeReply.CODE:
+                    attitude, levelled = AttitudeReply.parse(frame.payload), now
+                elif frame.code == StatusEx.CODE:
+                    disarmed, told = 0 if StatusEx.parse(frame.payload).boxes & ARM else disarmed + 1, now
+                elif frame.code == RawImu.CODE and fall is not None and sense is not None:
+                    fall = feel(fall, sense, RawImu.parse(frame.payload), now)
+        attitude = attitude if now - levelled < STALE_S else None
+        acts = link.alive and now - heard < STALE_S
+        goes_on, dt = acts or now - heard > DEAF_S, now - before
+        elapsed, before = elapsed + dt * goes_on, now
+        if fall is None or sense is None:
+            channels = descent(plan, elapsed, attitude)
+            over = elapsed >= down
+        else:
+            if attitude is not None or now - levelled > STALE_S:
+                fall = move(fall, sense, attitude, now, alive=goes_on)
+            fall, wanted, lean = command(fall, attitude, dt)
+            pulse, over = round(between(sense.forces, sense.pulses, wanted)), fall.over
+            channels = _channels(plan, plan.throttle[-1][1] if over else pulse, attitude, lean)
+            thrust = wanted if acts else fall.thrusts[-1][1]
+            fall = sent(fall, thrust, now)
+        closed_at = min(closed_at, now) if over else inf
+        if over and (disarmed >= 2 or now - max(told, closed_at) > DEAF_S):
+            break
+        asked = ASKED_AFTER if over else ASKED
+        link.send(encode(set_raw_rc(channels)) + encode(Frame(asked[rounds % len(asked)].CODE)))
+        rounds += 1
         time.sleep(PERIOD_S)
     link.close()
+
+
+def _thrust(plan: Plan, sense: Sense, frame: bytes) -> float:
+    """The thrust of a stick frame, m/s^2. Without one, that of hover."""
+    for told in Decoder().feed(frame):
+        at = 2 * plan.places[3]
+        if told.code == SET_RAW_RC and len(told.payload) >= at + 2:
+            return between(sense.pulses, sense.forces, int.from_bytes(told.payload[at : at + 2], "little"))
+    return GRAVITY
 
 
 def _plan(content: bytes) -> Plan | None:
@@ -315,8 +375,11 @@ def _plan(content: bytes) -> Plan | None:
         roll, pitch, yaw = (tuple(pulses) for pulses in x["pulses"])
         a, b, c, d = x["places"]
         steps = tuple((at, pulse) for at, pulse in x["throttle"])
-        return Plan(x["flying"], tuple(x["rates"]), (roll, pitch, yaw), (a, b, c, d), steps, tuple(x["channels"]))
-    except (ValueError, TypeError, KeyError):
+        known: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in (x["sense"] or {}).items()}
+        sense = Sense(**known) if known else None
+        channels = tuple(x["channels"])
+        return Plan(x["flying"], tuple(x["rates"]), (roll, pitch, yaw), (a, b, c, d), steps, channels, sense)
+    except (ValueError, TypeError, KeyError, AttributeError):
         return None
 
 

@@ -7,7 +7,10 @@ controller started.
 """
 
 import math
-from dataclasses import dataclass
+from array import array
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +24,18 @@ _RATE = 200.0  # Hz: grid of the tried shifts; parabolas refine them
 _SEEDS = 8  # windows that are searched for in the whole flight
 _REACH = (0.1, 1.0)  # s: change of the shift between pieces; the second if the first finds nothing
 _AXES = range(3)
+START = b"H Product:Blackbox"
+"""First bytes of a session."""
+SESSIONS, FRAMES, FIELDS = 200, 2_000_000, 256
+"""Largest numbers of sessions in a file, of frames in a session (16 minutes at 2 kHz), and of fields in a frame. A log
+of Betaflight has some 40 fields."""
+_WORK, _FIELDS_A_BYTE = 500_000, 16  # fields decoded per byte; a whole log has one per byte, a damaged one many
+_WANTED = (
+    "time", *(f"gyroADC[{i}]" for i in range(3)), *(f"setpoint[{i}]" for i in range(3)),
+    *(f"motor[{i}]" for i in range(4)),
+)  # fmt: skip
+_TOLD = 3  # reasons that an error or a note tells
+_STEP = 1000  # largest denominator of the share of loops that are logged
 
 
 @dataclass(frozen=True)
@@ -42,6 +57,8 @@ class Blackbox:
     reach: tuple[float, float] = (0.0, 1.0)
     """The ESC commands at which `motor` is 0 and 1. Here 0 is 1000 us or DShot's 48, and 1 is 2000 us or DShot's
     2047."""
+    notes: tuple[str, ...] = ()
+    """What was not read, in words."""
 
     @property
     def output(self) -> np.ndarray:
@@ -65,7 +82,7 @@ class Alignment:
 
 
 def read_blackbox(path: str | Path) -> list[Blackbox]:
-    """All sessions of a blackbox log that have frames.
+    """The sessions of a blackbox log that have frames: at most `SESSIONS`, with at most `FRAMES` frames each.
 
     Raises:
         ValueError: if there is no such file, no session with gyro data in it, or no decoder.
@@ -79,39 +96,100 @@ def read_blackbox(path: str | Path) -> list[Blackbox]:
         missing = f"the package betaflight-chirp-core is missing ({error})"
         raise ValueError(f"blackbox log: {missing}; accepted: pip install 'e2efly[blackbox]'") from None
     data = path.read_bytes()
-    sessions, reasons = [], []
-    for number, (start, end) in enumerate(decoder.split_sessions(data), 1):
-        parser: Any = decoder.FlightLogParser(data, start, end)
+    places = decoder.split_sessions(data)
+    sessions: list[Blackbox] = []
+    reasons: list[str] = []
+    for number, (start, end) in enumerate(places[:SESSIONS], 1):
         try:
-            parser.parse_header()
-            parser.parse_data()
-            sessions.append(_session(parser, number))
+            sessions.append(_session(decoder.FlightLogParser(data, start, end), number))
         except Exception as error:  # the decoder trusts its input: one bad session must not affect the others
             reasons.append(f"session {number}: {type(error).__name__}: {error}")
+    told = reasons[:_TOLD] + ([f"{len(reasons) - _TOLD} more without frames"] if len(reasons) > _TOLD else [])
+    if len(places) > SESSIONS:
+        told.append(f"only the first {SESSIONS} of {len(places)} sessions are read")
     if not sessions:
-        why = "; ".join(reasons) or "no session in it"
+        why = "; ".join(told) or "no session in it"
         raise ValueError(f"{path}: no blackbox log that can be read ({why}); accepted: a Betaflight .bbl or .bfl file")
+    sessions[0] = replace(sessions[0], notes=(*sessions[0].notes, *(f"left out: {reason}" for reason in told)))
     return sessions
 
 
+class _Frames:
+    """The wanted fields of the frames of a session."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.fields = [name for name in _WANTED if name in names]
+        self._places, self._numbers = [names.index(name) for name in self.fields], array("d")
+
+    def __len__(self) -> int:
+        return len(self._numbers) // len(self.fields)
+
+    def append(self, frame: Sequence[float]) -> None:
+        if len(self) == FRAMES:
+            raise _EnoughError(f"the first {FRAMES} frames are read, and no more")
+        self._numbers.extend([frame[place] for place in self._places])
+
+    def table(self) -> np.ndarray:
+        return np.array(self._numbers).reshape(-1, len(self.fields))
+
+
+class _EnoughError(Exception):
+    """A session has more frames than are read, or is too badly damaged to be searched further."""
+
+
+def _bounded(stream: Any, fields: int, markers: frozenset[str]) -> Any:
+    """A stream of the decoder that ends the work when much more is decoded than whole frames need."""
+    read, begin, work = stream.read_char, stream.pos, 0
+
+    def read_char() -> Any:
+        nonlocal work
+        char = read()
+        if char in markers:
+            work += fields
+            if work > _WORK + _FIELDS_A_BYTE * (stream.pos - begin):
+                raise _EnoughError("is too badly damaged to be read further")
+        return char
+
+    stream.read_char = read_char
+    return stream
+
+
 def _session(parser: Any, number: int) -> Blackbox:
-    names = {name: i for i, name in enumerate(parser.main_field_names)}
-    if not parser.main_frames:
-        raise ValueError("no frames")
+    parser.parse_header()
+    names, header = parser.main_field_names, parser.sys_config
+    most = max(frame["count"] for frame in parser.frame_defs.values())
+    step = header["frameIntervalPNum"], header["frameIntervalPDenom"]
+    if most > FIELDS:
+        raise ValueError(f"frames of {most} fields; accepted: up to {FIELDS}")
+    if not 1 <= step[0] <= step[1] <= _STEP:
+        raise ValueError(f"P interval is {step[0]}/{step[1]}; accepted: a share of up to 1, as 1/2")
     if missing := [name for name in ("time", *(f"gyroADC[{i}]" for i in _AXES)) if name not in names]:
         raise ValueError(f"field {missing[0]} was not logged")
-    frames = np.asarray(parser.main_frames, np.float64)
-    frames = frames[np.concatenate([[True], np.diff(frames[:, names["time"]]) > 0])]
+    parser.main_frames = kept = _Frames(names)
+    parser.gps_frames, parser.slow_frames, parser.events = deque(maxlen=0), deque(maxlen=0), deque(maxlen=0)
+    parser.stream = _bounded(parser.stream, most, frozenset(parser.frame_defs))
+    notes = ()
+    try:
+        parser.parse_data()
+    except _EnoughError as enough:
+        notes = (str(enough),)
+    if not len(kept):
+        raise ValueError(*(notes or ("no frames",)))
+    frames = kept.table()
+    latest = np.maximum.accumulate(frames[:, 0])
+    rising = np.concatenate([[True], frames[1:, 0] > latest[:-1]])
+    if not rising.all():
+        notes += (f"{int((~rising).sum())} frames out of {len(frames)} whose time does not rise are left out",)
+    frames = frames[rising]
 
     def columns(name: str, count: int) -> np.ndarray:
         keys = [f"{name}[{i}]" for i in range(count)]
-        known = all(key in names for key in keys)
-        return frames[:, [names[key] for key in keys]] if known else np.full((len(frames), count), np.nan)
+        known = all(key in kept.fields for key in keys)
+        return frames[:, [kept.fields.index(key) for key in keys]] if known else np.full((len(frames), count), np.nan)
 
-    header = parser.sys_config
     fine = 0.1 if int(header.get("blackbox_high_resolution", 0)) else 1.0
     low, high = map(float, header["motorOutput"])
-    time = frames[:, names["time"]]
+    time = frames[:, 0]
     least, most = (48.0, 2047.0) if low < 1000 else (1000.0, 2000.0)
     return Blackbox(
         time=(time - time[0]) * 1e-6,
@@ -121,6 +199,7 @@ def _session(parser: Any, number: int) -> Blackbox:
         firmware=str(header.get("Firmware revision") or "unknown"),
         session=number,
         reach=((low - least) / (most - least), (high - least) / (most - least)),
+        notes=notes,
     )
 
 

@@ -1,8 +1,9 @@
 """Reads flight logs, complete or cut off by a crash, a power loss or a full disk."""
 
 import json
-import struct
+import mmap
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from e2efly.deploy.log.channels import CHANNELS
 from e2efly.deploy.log.mcap_file import PROFILE
+from e2efly.deploy.log.mcap_records import McapRecords
 
 
 @dataclass(frozen=True)
@@ -50,9 +52,9 @@ class Series:
                 continue
             try:
                 out[i] = np.array(value, np.float64) if size is None else [np.nan if v is None else v for v in value]
-            except (TypeError, ValueError):
+            except (TypeError, ValueError, OverflowError):
                 kind = "a number" if size is None else f"{size} numbers"
-                raise ValueError(f"flight log: {self.channel}.{field} is {value!r}; accepted: {kind}") from None
+                raise ValueError(f"flight log: {self.channel}.{field} is {value!r:.60}; accepted: {kind}") from None
         return out
 
     def width(self, field: str) -> int:
@@ -110,65 +112,40 @@ def read_log(path: str | Path) -> FlightLog:
         raise ValueError(f"flight log {str(path)!r} does not exist")
     found: dict[str, list[tuple[int, int, dict[str, Any]]]] = {}
     meta: dict[str, str] = {}
-    end = _End()
-    for channel, stamp, number, data in _messages(path, end):
-        try:
-            message = json.loads(data)
-        except ValueError as error:
-            raise ValueError(f"{path}: a message of channel {channel!r} is not JSON: {error}") from None
-        if not isinstance(message, dict):
-            raise ValueError(f"{path}: a message of channel {channel!r} is {message!r}; accepted: an object")
-        found.setdefault(channel, []).append((stamp, number, message))
-        if channel == "meta":
-            meta |= {k: v if isinstance(v, str) else json.dumps(v) for k, v in message.items() if v is not None}
+    with mapped(path) as data:
+        records = McapRecords(data)
+        for name, stamp, number, text in ((r.channel.topic, r.stamp, r.number, r.data) for r in records):
+            if records.profile != PROFILE:
+                break
+            try:
+                message = json.loads(text)
+            except (ValueError, RecursionError) as error:
+                raise ValueError(f"{path}: a message of channel {name!r} is not JSON: {error}") from None
+            if not isinstance(message, dict):
+                raise ValueError(f"{path}: a message of channel {name!r} is {message!r:.60}; accepted: an object")
+            found.setdefault(name, []).append((stamp, number, message))
+            if name == "meta":
+                meta |= {k: v if isinstance(v, str) else json.dumps(v) for k, v in message.items() if v is not None}
+    if records.profile != PROFILE:
+        accepted = f"an MCAP file of profile {PROFILE!r}, as e2efly fly writes it"
+        raise ValueError(f"{path}: no flight log; accepted: {accepted}")
     start = min((stamp for messages in found.values() for stamp, _, _ in messages), default=0)
-    return FlightLog(path, {name: _series(name, found[name], start) for name in found}, meta, end.reason)
+    series = {name: _series(name, found[name], start) for name in found}
+    return FlightLog(path, series, meta, records.cut_off)
+
+
+@contextmanager
+def mapped(path: Path) -> Iterator[bytes | mmap.mmap]:
+    """The bytes of a file, without reading all of them into memory. They are valid inside the `with` block only."""
+    with path.open("rb") as file:
+        if not path.stat().st_size:
+            yield b""
+            return
+        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            yield data
 
 
 def _series(channel: str, messages: list[tuple[int, int, dict[str, Any]]], start: int) -> Series:
     messages.sort(key=lambda m: m[:2])
     stamp = np.array([m[0] for m in messages], np.int64)
     return Series(channel, stamp, (stamp - start) * 1e-9, tuple(m[2] for m in messages))
-
-
-class _End:
-    """Why reading ended early. Empty at the proper end."""
-
-    reason = ""
-
-
-def _messages(path: Path, end: _End) -> Iterator[tuple[str, int, int, bytes]]:
-    """Channel, stamp, number and data of every message, up to the end of the file or of its intact part."""
-    from mcap.exceptions import EndOfFile, McapError
-    from mcap.records import Channel, Chunk, Footer, Header, Message
-    from mcap.stream_reader import StreamReader, breakup_chunk
-
-    names: dict[int, str] = {}
-    header = False
-    with path.open("rb") as file:
-        try:
-            for record in StreamReader(file, emit_chunks=True, record_size_limit=path.stat().st_size).records:
-                if isinstance(record, Header):
-                    header = record.profile == PROFILE
-                    if not header:
-                        break
-                if isinstance(record, Footer):
-                    return
-                if not isinstance(record, Chunk):
-                    continue
-                for inner in breakup_chunk(record, validate_crc=True):
-                    if isinstance(inner, Channel):
-                        names[inner.id] = inner.topic
-                    elif isinstance(inner, Message):
-                        yield names[inner.channel_id], inner.log_time, inner.sequence, inner.data
-        except EndOfFile:
-            end.reason = "the end of the file is missing: it was not closed"
-        except (McapError, struct.error, ValueError, EOFError, MemoryError, KeyError, RuntimeError, OverflowError) as e:
-            end.reason = f"the file breaks off ({type(e).__name__}{f': {e}' if str(e) else ''})"
-        except Exception as error:  # from the decompressor, whose errors have no common class
-            if type(error).__module__.partition(".")[0] not in ("zstandard", "lz4"):
-                raise
-            end.reason = f"the file is damaged from here on ({error})"
-    if not header:
-        accepted = f"an MCAP file of profile {PROFILE!r}, as e2efly fly writes it"
-        raise ValueError(f"{path}: no flight log; accepted: {accepted}")

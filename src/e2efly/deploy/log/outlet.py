@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from e2efly.deploy.child import OPENING
-from e2efly.deploy.terminal import printable
+from e2efly.process import printable
 
 SCRIPT = Path(__file__).parent / "process" / "live.py"
 """The script that runs in the process."""

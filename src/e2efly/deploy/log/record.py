@@ -7,8 +7,8 @@ from typing import Any, Protocol
 from e2efly.control import Ctbr
 from e2efly.deploy.betaflight.client import Client, Reply
 from e2efly.deploy.betaflight.controller import ControllerInfo
-from e2efly.deploy.betaflight.instruments import ARM
 from e2efly.deploy.betaflight.messages import AttitudeReply, BatteryState, Motor, RawImu, Rc, StatusEx
+from e2efly.deploy.betaflight.modes import ARM
 from e2efly.deploy.commander.commander import Commander
 from e2efly.deploy.filter.guard import Change
 from e2efly.deploy.odometry import Odometry
@@ -53,6 +53,11 @@ class Sent:
     channels: tuple[int, ...]
     """Pulse width of each channel, us."""
     saturated: tuple[str, ...] = ()
+
+    @property
+    def rate(self) -> tuple[float, float, float]:
+        """Body rate, FLU, rad/s."""
+        return (0.0, 0.0, 0.0) if self.command is None else rates_of(self.command)
 
 
 def record_mode(log: Log, now: float, before: Flight, flight: Flight) -> None:
@@ -100,7 +105,7 @@ def record_sent(log: Log, now: float, sent: Sent, mode: str, setpoint: list[floa
     log.record("command", now, {
         "source": f"{mode}: {sent.source}",
         "collective_thrust": None if command is None else float(command.thrust),
-        "body_rate": None if command is None else rates_of(command),
+        "body_rate": None if command is None else list(sent.rate),
         "setpoint": setpoint, "yaw": yaw,
     })  # fmt: skip
     log.record("sticks", now, {
@@ -112,7 +117,7 @@ def record_filter(log: Log, now: float, change: Change) -> None:
     """Record how the filter changed a command. The command that was sent is in the channel `command`."""
     log.record("filter", now, {
         "limit": change.limit, "room": change.room, "share": change.share,
-        "wanted_thrust": float(change.wanted.thrust), "wanted_rate": rates_of(change.wanted),
+        "wanted_thrust": float(change.wanted.thrust), "wanted_rate": list(rates_of(change.wanted)),
     })  # fmt: skip
 
 

@@ -6,7 +6,7 @@ measures is gravity plus the change of velocity.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,8 +17,8 @@ COUNTS = (200.0, 9000.0)
 """Counts per gravity that controllers use: 256 to 8192, with a margin for their errors."""
 UPRIGHT = 0.35
 """The largest angle between the force at rest and the body's z axis, rad."""
-MEMORY_S = 1.0
-"""Time over which the scale is learned, s."""
+MEMORY_S, SMOOTH_S = 1.0, 0.1
+"""Time over which the scale is learned, s, and over which the vertical velocity of noisy poses is smoothed, s."""
 RANGE = (0.85, 1.18)
 """Bounds of the scale."""
 
@@ -51,7 +51,8 @@ class Scale:
     flown: float = GRAVITY
     """Vertical force that the poses showed, m/s^2."""
     climb: float | None = None
-    """Vertical velocity of the newest pose, m/s."""
+    """Vertical velocity of the poses, smoothed, m/s. None: nothing is known of the time before, so the next measurement
+    only begins the comparison."""
 
     @property
     def value(self) -> float:
@@ -69,12 +70,14 @@ def learn(before: Scale, attitude: Attitude, force: np.ndarray, climb: float, dt
         climb: vertical velocity of the newest pose, m/s.
         dt: time since the previous measurement, s.
     """
+    if before.climb is None:
+        return replace(before, climb=climb)
     share = -math.expm1(-dt / MEMORY_S)
+    climb = before.climb + (climb - before.climb) * -math.expm1(-dt / SMOOTH_S)
     up = float(level(attitude, force)[2])
-    changed = 0.0 if before.climb is None else climb - before.climb
     return Scale(
         before.felt + share * (up - before.felt),
-        before.flown + share * (GRAVITY - before.flown) + changed / MEMORY_S,
+        before.flown + share * (GRAVITY - before.flown) + (climb - before.climb) / MEMORY_S,
         climb,
     )
 

@@ -20,6 +20,9 @@ RESTART_S = 1.0
 """On the ground, tracking starts again after this time without a good pose, s."""
 OUTLIERS_S = 0.03
 """How long poses may be refused before the odometry counts as lost, s. One or two outliers must not end a flight."""
+CONTINUES = 0.3
+"""In a landing without poses, a pose is not believed if its vertical speed differs by more than this and the doubt,
+m/s."""
 LATE_S = 0.05
 """How much later than the latency assumed by the gains poses may be, s."""
 FROZEN = "its numbers do not change"
@@ -143,12 +146,23 @@ def _accept(
     told = inertial.see(
         before.inertial, odometry, now,
         moved=before.track.same_since == odometry.time,  # otherwise it may be frozen while the motion goes on
-        trusted=not flight.misled or flight.turned is not None, turned=flight.turned or 0.0, latest=before.latest,
+        trusted=(not flight.misled or flight.turned is not None) and _continues(before, odometry, flight),
+        turned=flight.turned or 0.0, latest=before.latest,
     )  # fmt: skip
     return replace(
         before, odometry=odometry, good_at=now, pace=paced(before.pace, odometry.time, received), heading=heading,
         inertial=told, delays=turned(before.delays, odometry) if flight.mode is Mode.INIT else before.delays,
     )  # fmt: skip
+
+
+def _continues(before: Estimate, odometry: Odometry, flight: Flight) -> bool:
+    """Whether an odometry may correct the velocity. In a landing without poses, only one that continues it may: what
+    comes back after a loss may be wrong.
+    """
+    reckoned = before.inertial.reckoned
+    if not flight.blind or flight.turned is not None or reckoned is None:
+        return True
+    return abs(float(odometry.velocity[2]) - reckoned.climb) <= CONTINUES + reckoned.doubt
 
 
 def compare(before: Estimate, mode: Mode, *, measure_delay: bool) -> Estimate:

@@ -4,15 +4,27 @@ import math
 
 import numpy as np
 
+from e2efly.control import Quat, Vec3
 from e2efly.deploy.odometry import Odometry, tilt_of, yaw_of
 from e2efly.deploy.pilot.flight_state import Pilot, Reason, Target
 from e2efly.deploy.settings import Fence, FlightSettings
+from e2efly.vehicles.vehicle import GRAVITY
 
 MARGIN = 0.1
 """How far inside the fence a policy's flight comes to rest, m."""
+RIGHTING = 8.0
+"""How fast a tilted vehicle becomes upright before it can brake, rad/s."""
 
 
-def fence_problem(fence: Fence, odometry: Odometry, floor: bool = True, *, guard: bool = True) -> str | None:
+def fence_problem(
+    fence: Fence,
+    odometry: Odometry,
+    floor: bool = True,
+    *,
+    guard: bool = True,
+    age: float = 0.0,
+    force: np.ndarray | None = None,
+) -> str | None:
     """Why the vehicle is outside the fence, or can no longer stop inside it. None: neither.
 
     Args:
@@ -20,6 +32,8 @@ def fence_problem(fence: Fence, odometry: Odometry, floor: bool = True, *, guard
         odometry: the position and motion of the vehicle.
         floor: whether the lowest height counts.
         guard: whether it counts if the vehicle cannot stop inside.
+        age: how old the odometry is, s.
+        force: (3,) specific force, body FLU, m/s^2. Until the braking takes effect, it may last. None: not known.
     """
     v = odometry.velocity
     speed, tilt = float(np.linalg.norm(v)), tilt_of(odometry.quaternion)
@@ -27,7 +41,7 @@ def fence_problem(fence: Fence, odometry: Odometry, floor: bool = True, *, guard
         return f"{Reason.OUTSIDE_FENCE}: {speed:.1f} m/s; accepted: {fence.speed:g}"
     if tilt > fence.tilt:
         return f"{Reason.OUTSIDE_FENCE}: tilt {math.degrees(tilt):.0f} deg; accepted: {math.degrees(fence.tilt):.0f}"
-    stops = _stop(fence, odometry)
+    stops = _stop(fence, odometry, age, force)
     for axis, at, stop, low, high in zip("xyz", odometry.position, stops, fence.low, fence.high, strict=True):
         low = low if floor or axis != "z" else -math.inf
         if not low <= at <= high:
@@ -44,9 +58,13 @@ def here(odometry: Odometry) -> Target:
 
 
 def stopping(fence: Fence, odometry: Odometry) -> Target:
-    """Where the vehicle can come to rest, limited to the inside of the fence."""
-    inside = np.clip(_stop(fence, odometry), np.add(fence.low, MARGIN), np.subtract(fence.high, MARGIN))
-    x, y, z = (float(value) for value in inside)
+    """Where the vehicle can come to rest. Along an axis on which this is outside the fence, it is sent back by as much
+    as it needs to stop, so that it brakes as hard as it can. The target is always inside the fence.
+    """
+    stops = _stop(fence, odometry)
+    leaves = (stops < fence.low) | (stops > fence.high)
+    place = np.where(leaves, 2 * odometry.position - stops, stops)
+    x, y, z = np.clip(place, np.add(fence.low, MARGIN), np.subtract(fence.high, MARGIN)).tolist()
     return Target((x, y, z), yaw_of(odometry.quaternion))
 
 
@@ -68,9 +86,16 @@ def moved(settings: FlightSettings, target: Target, pilot: Pilot, dt: float) -> 
     return Target((x, y, z), math.remainder(target.yaw - beyond(pilot.yaw) * dt, math.tau))
 
 
-def _stop(fence: Fence, odometry: Odometry) -> np.ndarray:
-    """(3,) m: where the vehicle comes to rest, computed for each axis separately: at its present speed for the reaction
-    time, then braking.
+def _stop(fence: Fence, odometry: Odometry, age: float = 0.0, force: np.ndarray | None = None) -> np.ndarray:
+    """(3,) m: where the vehicle comes to rest, computed for each axis separately: at its present speed until it is
+    upright and the braking takes effect, then braking. A present acceleration that makes it faster lasts until then.
     """
-    v = odometry.velocity
-    return odometry.position + v * fence.reaction + v * np.abs(v) / (2 * fence.braking)
+    v, wait = odometry.velocity, age + fence.reaction + tilt_of(odometry.quaternion) / RIGHTING
+    if force is None:
+        gain = np.zeros(3)
+    else:
+        a = Quat(*odometry.quaternion.tolist()).rotate(Vec3(*force.tolist()))
+        gain = np.array([a.x, a.y, a.z - GRAVITY])
+        gain = wait * np.where(gain * v >= 0, gain, 0.0)
+    then = v + gain
+    return odometry.position + (v + gain / 2) * wait + then * np.abs(then) / (2 * fence.braking)

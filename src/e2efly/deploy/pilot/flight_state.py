@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+import numpy as np
+
 from e2efly.deploy.odometry import Odometry
 
 
@@ -127,15 +129,16 @@ class Inputs:
     not heard."""
     accelerometer_problem: str | None = None
     """Why the controller's accelerometer must not be used for flight. None: it may."""
+    force: np.ndarray | None = None
+    """(3,) newest specific force, body FLU, m/s^2. None: not known."""
     motion_problem: str | None = None
     """How the poses contradict the controller's sensors. None: they agree."""
     buried: bool = False
-    """Without odometry: the estimated height is far under the ground, and no sensor can tell whether the vehicle
-    stands."""
-    touched: bool = False
-    """In a landing without odometry, the ground was felt."""
-    supported: bool = False
-    """Something carries the vehicle: it measures more force than its rotors give."""
+    """Without odometry: the estimated height is far under the ground."""
+    stands: bool | None = None
+    """What the accelerometer tells. True: something carries the vehicle. False: it flies. None: not known."""
+    deaf: bool = False
+    """The controller is heard, but its accelerometer cannot tell flight from standing."""
     heading_error: float | None = None
     """The odometry's heading minus the heading that the flight shows, rad. None: the flight shows none now."""
     policy_problem: str | None = None

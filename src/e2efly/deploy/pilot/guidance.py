@@ -4,20 +4,25 @@ Each function adds a trim to the thrust. The trim compensates for an error of th
 """
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from e2efly.control import Ctbr, Vec3
 from e2efly.control.place import Place
 from e2efly.deploy.attitude import Attitude
-from e2efly.deploy.pilot import inertial, reckoning
+from e2efly.deploy.pilot import reckoning
 from e2efly.deploy.pilot.flight_state import Flight, Mode, Target
 from e2efly.deploy.pilot.hover import LIFTED, blind, rates_of
 from e2efly.deploy.pilot.hovering import HoverController, Seen, UnderWay
 from e2efly.deploy.pilot.inertial import Inertial
+from e2efly.deploy.pilot.touch import LOW, wave
 from e2efly.vehicles.vehicle import GRAVITY
 
 TRIM = (-3.0, 5.0)
 """Bounds of the thrust that a take-off adds while the throttle map is still wrong, m/s^2."""
+LIFT = 1.25
+"""A take-off commands at most this share of the weight, without the trim: the controller may hold the command of a link
+that falls silent now."""
 TRIM_GAIN = 3.0
 """Rate of change of the trim divided by the error of the climb speed, 1/s."""
 TRIM_FADE = 1.0
@@ -26,10 +31,11 @@ STEADY = 0.03
 """Body rates of a hover that are below this are sent as zero, rad/s. If the link falls silent now, they are held for a
 long time."""
 OVERDUE = 0.3
-"""A blind descent whose estimated height is this far under the ground tries to feel the ground, m, ..."""
-WEIGHT, LIGHTER, LIGHTEST = 0.97, 0.04, 0.6
-"""... and commands at most this share of its weight (first value), less for each further metre (second value), but at
-least the last value."""
+"""A blind descent whose estimated height is this far under the ground, m, ..."""
+WEIGHT, LIGHTER, LIGHTEST = (0.985, 0.97), (0.015, 0.04), 0.6
+"""... commands at most this share of its weight (first value), less for each further metre (second value), but at least
+the last value. The second of each pair holds where the accelerometer cannot tell flight from standing: the descent then
+ends after a time, and must be down by then."""
 
 
 def hover(
@@ -74,13 +80,14 @@ def hover(
     place = Place(Vec3(x, y, z), Vec3(0.0, 0.0, target.climb), yaw=target.yaw)
     memory, wanted = controller.step(memory, seen, under_way, place, dt, held=low or silent)
     rates = (0.0 if on_ground or abs(rate) < STEADY else rate for rate in rates_of(wanted))
-    return Ctbr(wanted.thrust + trim, Vec3(*rates)), memory, trim
+    thrust = min(float(wanted.thrust), LIFT * GRAVITY) if taking_off else wanted.thrust
+    return Ctbr(thrust + trim, Vec3(*rates)), memory, trim
 
 
 def descend(
     flight: Flight, told: Inertial, attitude: Attitude | None, trim: float, now: float, dt: float
 ) -> tuple[Ctbr, float, Inertial]:
-    """Descend without odometry, and detect the ground.
+    """Descend without odometry, and feel for the ground; see `touch`.
 
     Args:
         flight: the state of the flight.
@@ -91,18 +98,18 @@ def descend(
         dt: time since the last control step, s.
 
     Returns:
-        The command; the trim, m/s^2; the state of the inertial sensors, including the detection of the ground.
+        The command; the trim, m/s^2; the state of the inertial sensors, for which a weighing may have begun.
     """
-    reckoned, ground, overdue = told.reckoned, flight.home, True
+    reckoned, felt = told.reckoned, told.touch.weigh(now)
     if reckoned is None:
         command = blind(attitude, now - flight.since, 0.0 if flight.lost is None else flight.lost[2])
         thrust = float(command.thrust)
     else:
-        trim = reckoning.trimmed(trim, reckoned, ground, dt)
-        command = reckoning.settle(attitude, reckoned, ground, trim)
-        under = ground - reckoned.height
-        overdue = under > OVERDUE
-        weight = GRAVITY * max(WEIGHT - LIGHTER * under, LIGHTEST)
-        thrust = min(float(command.thrust), weight) if overdue else float(command.thrust)
-    told = inertial.feel_for_ground(told, thrust, now, overdue=overdue)
-    return Ctbr(thrust * told.touch.factor(now), command.rate), trim, told
+        trim = reckoning.trimmed(trim, reckoned, flight.home, dt)
+        command = reckoning.settle(attitude, reckoned, flight.home, trim)
+        under = flight.home - reckoned.height
+        deaf = not felt.able(now)
+        weight = GRAVITY * max(WEIGHT[deaf] - LIGHTER[deaf] * under, LIGHTEST)
+        thrust = min(float(command.thrust), weight) if under > OVERDUE else float(command.thrust)
+    thrust = min(thrust, LOW * GRAVITY) if felt.weighs(now) else thrust * wave(now)
+    return Ctbr(thrust / told.share, command.rate), trim, replace(told, touch=felt)

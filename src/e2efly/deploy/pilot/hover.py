@@ -90,9 +90,9 @@ def blind(attitude: Attitude | None, elapsed: float, climb: float = 0.0) -> Ctbr
     return Ctbr(thrust / tilt, Vec3(_levelling(attitude.roll), _levelling(attitude.pitch), 0.0))
 
 
-def rates_of(command: Ctbr) -> list[float]:
+def rates_of(command: Ctbr) -> tuple[float, float, float]:
     """The body rates of a command, rad/s."""
-    return [float(rate) for rate in (command.rate.x, command.rate.y, command.rate.z)]
+    return float(command.rate.x), float(command.rate.y), float(command.rate.z)
 
 
 def _levelling(angle: float) -> float:

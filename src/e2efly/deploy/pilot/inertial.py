@@ -25,7 +25,11 @@ DELIVERED = 0.3
 """After a silence: how much closer the measured force must be to the sent command than to the held command, m/s^2, to
 show that the sent commands arrived."""
 SHARE_RATE, SHARE_S, SHARE_RANGE = 0.05, 0.3, (0.7, 1.3)
-"""How fast the share of the map's force is followed, 1/s and s, and its bounds."""
+"""How fast the share of the map's force is followed while poses are good, 1/s and s, and its bounds."""
+SAG, SMOOTH_S, SAG_RATE, SAG_S = 0.02, 0.1, 0.1, 0.2
+"""Without poses, the share follows as the battery sags. SAG: it follows only while force and thrust differ by less than
+this share. SMOOTH_S: time over which the difference is smoothed, s. SAG_RATE: the fastest change, 1/s. SAG_S: the time
+constant, s. A larger sudden difference is not the battery but the accelerometer."""
 QUIET = 1.0
 """The accelerometer's scale is learned while the sensors measure less motion than this, m/s within
 `motion_watch.MEMORY_S`. In a fast flight the poses come too late for a comparison."""
@@ -50,9 +54,15 @@ class Measurement:
     attitude: Attitude | None
     """The controller's attitude. None: not known."""
     thrust: tuple[float, float] | None
-    """Specific force from the throttle, and its possible error, m/s^2. None: not known."""
+    """Specific force from the throttle that was sent, and its possible error, m/s^2. None: not known."""
+    thrusts: tuple[float, ...]
+    """The specific forces from the throttles that were sent each of `touch.LAGS` earlier, m/s^2. Empty: not known."""
     asked: float
     """When the measurement was requested, s. Everything sent before that had arrived when it was taken."""
+    acts: bool = True
+    """The commands that can have caused the force are known to have arrived. Nothing is learned from others."""
+    delivered: bool = True
+    """The commands since the previous measurement are known to have arrived."""
     standing: bool = False
     """The vehicle stands on the ground, disarmed."""
     flying: bool = False
@@ -86,10 +96,14 @@ class Inertial:
     time: float = -math.inf
     """Time of the newest measurement, s."""
     share: float = 1.0
-    """The share of the throttle map's force that is measured while poses are good."""
-    learned: tuple[tuple[float, Scale, float], ...] = ()
-    """Scale and share at some moments, s, oldest first. Wrong poses can corrupt the scale and share before they are
-    detected, so older values are kept."""
+    """The share of the throttle map's force that the rotors really give."""
+    unlike: float = 0.0
+    """The measured share minus `share`, smoothed, in a flight without poses."""
+    stepped: bool = False
+    """This has once been larger than `SAG`, and the share is not followed any more in this flight without poses."""
+    learned: tuple[tuple[float, Scale], ...] = ()
+    """The scale at some moments, s, oldest first. Wrong poses can corrupt it before they are detected, so older values
+    are kept. The share changes too slowly for that, and it has to follow the battery."""
     frozen: bool = False
     """The accelerometer repeats its numbers. The thrust is used in its place."""
 
@@ -105,10 +119,9 @@ class Inertial:
         return Inertial(rest=self.rest, reckonings=self.reckonings, force=self.force, gyro=self.gyro, time=self.time)
 
     def buried(self, ground: float, now: float) -> bool:
-        """Whether it must be under the ground, whose height is given, m, and cannot feel that it stands on it."""
+        """Whether it must be under the ground, whose height is given, m."""
         r = self.reckoned
-        deep = r is not None and ground - r.height > BURIED and now - r.since > BURIED_S
-        return deep and not self.touch.able(now)
+        return r is not None and ground - r.height > BURIED and now - r.since > BURIED_S
 
     @property
     def rest_problem(self) -> str | None:
@@ -127,7 +140,10 @@ def measure(before: Inertial, m: Measurement, now: float) -> Inertial:
     dt = min(max(now - before.time, 0.0), FRESH_S)
     plain = m.counts * (GRAVITY / gravity)
     scale, watch, felt = before.scale, before.watch, before.touch
+    if now - before.time > FRESH_S:
+        scale = replace(scale, climb=None)
     before = replace(before, reckonings=_after_silence(before, m, scale.value * plain, now), held=None)
+    m = m if m.acts else replace(m, thrust=None, thrusts=())
     felt = touch.seen(felt, tuple(m.counts.tolist()), None if m.thrust is None else m.thrust[0], now)
     if felt.frozen and not m.standing:
         watch = watch if before.frozen else MotionWatch(pose=watch.pose)  # the poses were compared with wrong numbers
@@ -140,16 +156,21 @@ def measure(before: Inertial, m: Measurement, now: float) -> Inertial:
     thrust = m.thrust or (GRAVITY, GRAVITY)
     if m.attitude is not None:
         watch = motion_watch.feel(watch, m.attitude, force, m.gyro, thrust, now)
-    if m.thrust is not None:
-        felt = touch.feel(felt, float(force[2]), m.thrust[0], m.asked, dt)
-    share = before.share
+    if m.thrusts:
+        felt = touch.feel(felt, float(force[2]), m.thrusts, float(np.linalg.norm(m.gyro)), m.asked, dt)
+    share, unlike, stepped = before.share, before.unlike, before.stepped
     if m.climb is not None and m.thrust is not None and m.thrust[0] > 0 and watch.moved < QUIET:
         off = (float(force[2]) / m.thrust[0] - share) * dt / SHARE_S
         share += min(max(off, -SHARE_RATE * dt), SHARE_RATE * dt)
-        share = min(max(share, SHARE_RANGE[0]), SHARE_RANGE[1])
+        share, unlike, stepped = min(max(share, SHARE_RANGE[0]), SHARE_RANGE[1]), 0.0, False
+    elif m.flying and m.climb is None and m.thrust is not None and m.thrust[0] > 0:
+        unlike += (float(force[2]) / m.thrust[0] - share - unlike) * -math.expm1(-dt / SMOOTH_S)
+        stepped = stepped or abs(unlike) >= SAG
+        if not stepped:
+            share += min(max(unlike * dt / SAG_S, -SAG_RATE * dt), SAG_RATE * dt)
     return replace(
         before, rest=rest, scale=scale, watch=watch, touch=felt, force=force, gyro=m.gyro, time=now, share=share,
-        frozen=False,
+        unlike=unlike, stepped=stepped, frozen=False,
     )  # fmt: skip
 
 
@@ -170,10 +191,10 @@ def see(
     watch = motion_watch.see(before.watch, odometry, latest)
     if not (moved and trusted):
         return replace(before, watch=watch)
-    newest = reckoning.seen(odometry, now, turned, before.share)
+    newest = reckoning.seen(odometry, now, turned)
     learned = before.learned
     if not learned or now - learned[-1][0] >= ANCHOR_S:
-        learned = (*learned[-ANCHORS + 1 :], (now, before.scale, before.share))
+        learned = (*learned[-ANCHORS + 1 :], (now, before.scale))
     held = None if before.held is None else before.held.seen(newest)
     return replace(before, watch=watch, reckonings=before.reckonings.seen(newest), held=held, learned=learned)
 
@@ -184,7 +205,9 @@ def carry(
     thrust: tuple[float, float] | None,
     now: float,
     *,
+    rate: tuple[float, float, float] = (0.0, 0.0, 0.0),
     held: tuple[float, float] | None = None,
+    held_rate: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Inertial:
     """Propagate the velocity to `now`, s; see `reckoning.reckon`.
 
@@ -196,25 +219,32 @@ def carry(
         attitude: the controller's attitude. None: not known.
         thrust: specific force of the throttle that was sent, and its possible error, m/s^2. None: not known.
         now: s.
-        held: the same for the throttle that was sent when the controller was last heard.
+        rate: the body rate that was sent, FLU, rad/s.
+        held: the thrust of the throttle that was sent when the controller was last heard ...
+        held_rate: ... and the body rate.
     """
     force = None if before.force is None or now - before.time > FRESH_S else tuple(before.force.tolist())
 
-    def on(thrust: tuple[float, float] | None) -> Callable[[Reckoning], Reckoning | None]:
+    def on(
+        thrust: tuple[float, float] | None, rate: tuple[float, float, float]
+    ) -> Callable[[Reckoning], Reckoning | None]:
+        thrust = None if thrust is None else (before.share * thrust[0], thrust[1])
         unlike = force is not None and thrust is not None and abs(force[2] - thrust[0]) > BELIEVED * GRAVITY + thrust[1]
         believed = None if unlike else force
-        return lambda r: reckoning.reckon(r, attitude, believed, thrust, now)
+        return lambda r: reckoning.reckon(r, attitude, believed, thrust, rate, now)
 
-    after = replace(before, reckonings=before.reckonings.on(on(thrust)))
+    after = replace(before, reckonings=before.reckonings.on(on(thrust, rate)))
     if now <= before.time:
         return after
     begun = before.reckonings if before.held is None else before.held
-    return replace(after, held=begun.on(on(held)), held_thrust=None if held is None else held[0])
+    return replace(after, held=begun.on(on(held, held_rate)), held_thrust=None if held is None else held[0])
 
 
 def _after_silence(before: Inertial, m: Measurement, force: np.ndarray, now: float) -> Reckonings:
     """The velocity according to the commands that arrived while nothing was heard."""
-    if before.held is None or before.held_thrust is None or m.thrust is None or now - before.time <= FRESH_S:
+    if before.held is None or before.held_thrust is None or now - before.time <= FRESH_S or m.delivered:
+        return before.reckonings
+    if m.thrust is None:
         return before.reckonings
     z = float(force[2])
     came = abs(z - m.thrust[0]) < abs(z - before.held_thrust) - DELIVERED
@@ -224,22 +254,6 @@ def _after_silence(before: Inertial, m: Measurement, force: np.ndarray, now: flo
 def alone(before: Inertial, *, wrong: bool) -> Inertial:
     """Continue without poses; see `Reckonings.alone`."""
     if wrong and before.learned:
-        _, scale, share = before.learned[0]
-        before = replace(before, scale=scale, share=share)
-    held = None if before.held is None else before.held.alone(before.share, wrong=wrong)
-    return replace(before, reckonings=before.reckonings.alone(before.share, wrong=wrong), held=held)
-
-
-def feel_for_ground(before: Inertial, thrust: float, now: float, *, overdue: bool) -> Inertial:
-    """In a landing without poses: begin to test for the ground, if there is a reason.
-
-    Args:
-        before: the state so far.
-        thrust: thrust from the present throttle, m/s^2.
-        now: s.
-        overdue: by its height, the vehicle should already stand.
-    """
-    if before.force is None or now - before.time > FRESH_S:
-        return before
-    beyond = float(before.force[2]) - thrust
-    return replace(before, touch=touch.dip(before.touch, now, overdue=overdue, beyond=beyond))
+        before = replace(before, scale=before.learned[0][1])
+    held = None if before.held is None else before.held.alone(wrong=wrong)
+    return replace(before, reckonings=before.reckonings.alone(wrong=wrong), held=held)

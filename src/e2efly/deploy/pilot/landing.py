@@ -20,6 +20,9 @@ STANDING = 0.1
 """A still vehicle within this distance of the height at which it stood before stands there again, m."""
 SLOW = 0.5
 """Horizontal speed below which a landing sinks, m/s ..."""
+FAST, FASTER, HIGH = 3.0, 0.5, 2.0
+"""A landing from far above the ground sinks faster: by the second value, 1/s, times the height over the third, m, up to
+the first value, m/s."""
 SLOWED_S = 3.0
 """... or after this time, because in a gust the vehicle may never be that slow, s."""
 UNHEARD_SINK = 0.35
@@ -38,6 +41,8 @@ goes must not restart the landing each time."""
 STAYS_S, AWAY_S = 1.0, 3.0
 """A landing has ended when the vehicle has stayed at one place for `STAYS_S` at home, or for `AWAY_S` elsewhere if it
 descends blindly, s."""
+BEYOND_S = 3.0
+"""How much longer than twice its expected time a blind descent waits for an accelerometer that is not sure, s."""
 RECENT_S = 0.5
 """Odometry up to this age still shows that the vehicle stands, s."""
 
@@ -69,7 +74,7 @@ def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
     flight = _looked(flight, inputs)
     if inputs.link_problem and inputs.silent:  # its motion is not known: nothing counts as landed
         return _unheard(settings, flight, inputs, dt)
-    if has_stood(settings, flight, inputs.odometry):
+    if has_stood(settings, flight, inputs.odometry) and inputs.stands is not False:
         assert inputs.odometry is not None
         return dataclasses.replace(to(flight, Mode.DONE, Reason.LANDED), home=float(inputs.odometry.position[2]))
     odometry = inputs.seen
@@ -83,7 +88,7 @@ def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
     height = float(odometry.position[2])
     low = height < flight.home + STANDING
     still = flight.still_since is not None and flight.now - flight.still_since >= settings.land_settle
-    if still and (low or inputs.supported):
+    if still and (inputs.stands or (low and inputs.stands is None)):
         return dataclasses.replace(to(flight, Mode.DONE, Reason.LANDED), home=height)
     return flight
 
@@ -96,7 +101,8 @@ def _lowered(settings: FlightSettings, flight: Flight, odometry: Odometry, dt: f
     x, y, z = flight.target.position
     height = float(odometry.position[2])
     stopped = float(np.linalg.norm(odometry.velocity[:2])) < SLOW or flight.now - flight.since > SLOWED_S
-    sink = settings.land_speed if stopped else 0.0
+    far = min(FAST, FASTER * (height - flight.home - HIGH))
+    sink = max(settings.land_speed, far) if stopped else 0.0
     still_for = 0.0 if flight.still_since is None else flight.now - flight.still_since
     down = max(z - sink * dt, height - LEAD - PRESSING * max(still_for - settings.land_settle, 0.0))
     still = float(np.linalg.norm(odometry.velocity)) < settings.still_speed and height - down > PRESSED
@@ -165,17 +171,19 @@ def _last_seen(settings: FlightSettings, flight: Flight, inputs: Inputs) -> tupl
 
 
 def _sinking(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight:
-    """A landing without odometry ends when the ground is felt, or after a time. A vehicle that has landed must not
-    start up again.
+    """A landing without odometry ends when the ground is felt, or after a time where the accelerometer cannot tell. A
+    vehicle that has landed must not start up again.
     """
     if not flight.blind:
         return _blindly(settings, flight, inputs, inputs.blindness)
-    if inputs.touched:
+    if inputs.stands:
         return to(flight, Mode.DONE, Reason.TOUCHED)
     if inputs.seen is None:
         flight = dataclasses.replace(flight, found_since=None)
     at, height, climb = flight.lost or _last_seen(settings, flight, inputs)
-    if flight.now - at > blind_time(height, climb) or inputs.buried:
+    sinking, expected = flight.now - at, blind_time(height, climb)
+    overdue = inputs.stands is None and sinking > 2 * expected + BEYOND_S
+    if (inputs.deaf and (sinking > expected or inputs.buried)) or overdue:
         return to(flight, Mode.DONE, f"{Reason.LANDED}: without odometry, after {flight.now - at:.0f} s")
     return flight
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from e2efly.control import Ctbr, Vec3
-from e2efly.deploy.attitude import Attitude
+from e2efly.deploy.attitude import Attitude, turned
 from e2efly.deploy.odometry import Odometry, yaw_of
 from e2efly.deploy.pilot.accelerometer import level
 from e2efly.deploy.pilot.hover import LEVEL_GAIN, LEVEL_RATE, SINK_ACCELERATION, SINK_FASTER, SINK_SPEED
@@ -32,10 +32,6 @@ SINK_GAIN = 3.0
 FASTEST_SINK, LOW_SINK, LOW = 2.0, 1.3, 3.0
 """The sink speed grows up to the first value, m/s. Below the height of the last value, m, it grows only up to the
 second, m/s."""
-SAG, SMOOTH_S, SAG_RATE, SAG_S = 0.02, 0.1, 0.05, 0.3
-"""The share of the throttle's thrust follows the measured force as the battery sags. SAG: it follows only while the two
-differ by less than this share. SMOOTH_S: time over which the difference is smoothed, s. SAG_RATE: the fastest change,
-1/s. SAG_S: the time constant, s. A larger sudden difference is not the battery but the accelerometer."""
 SLOWER = 0.3
 """How much faster than `climb` the height may be assumed to rise, m/s."""
 DOUBT = 0.05
@@ -59,16 +55,14 @@ class Reckoning:
     """Vertical speed from the throttle, m/s."""
     doubt: float
     """Possible error of `lifted`, m/s."""
-    share: float
-    """The share of the throttle map's thrust that the rotors really give. It falls as the battery sags."""
     time: float
     """Time up to which it is propagated, s."""
     since: float
-    """When the odometry was last seen, s."""
+    """When the odometry was last seen, s. It moves on while the controller is not heard."""
     height: float
     """The largest plausible height, propagated from the last odometry, world, m."""
-    unlike: float | None = None
-    """The measured share of the thrust minus `share`, smoothed. None: nothing was measured yet."""
+    attitude: Attitude | None = None
+    """The attitude up to which it is propagated. None: not known; a level attitude is assumed."""
 
     @property
     def climb(self) -> float:
@@ -100,11 +94,10 @@ class Reckonings:
         anchors = tuple(after for anchor in self.anchors if (after := step(anchor)) is not None)
         return Reckonings(None if self.newest is None else step(self.newest), anchors)
 
-    def alone(self, share: float, *, wrong: bool) -> "Reckonings":
+    def alone(self, *, wrong: bool) -> "Reckonings":
         """Start a flight without poses, from the median of all reckonings.
 
         Args:
-            share: the share of the throttle map's thrust that the rotors really give.
             wrong: the poses were wrong, perhaps for a while, so only the older half is used.
         """
         every = (*self.anchors, *([self.newest] if self.newest else []))
@@ -115,24 +108,23 @@ class Reckonings:
             float(np.median(values))
             for values in zip(*((*r.velocity, r.lifted, r.height) for r in believed), strict=True)
         )  # fmt: skip
-        begun = replace(every[-1], velocity=(ahead, left, up), lifted=lifted, height=height, doubt=DOUBT, share=share)
+        begun = replace(every[-1], velocity=(ahead, left, up), lifted=lifted, height=height, doubt=DOUBT)
         return Reckonings(begun)
 
 
-def seen(odometry: Odometry, now: float, error: float = 0.0, share: float = 1.0) -> Reckoning:
+def seen(odometry: Odometry, now: float, error: float = 0.0) -> Reckoning:
     """The reckoning that begins with an odometry at `now`, s.
 
     Args:
         odometry: the odometry.
         now: s.
         error: error of its heading, rad.
-        share: the share of the throttle map's thrust that the rotors really give.
     """
     x, y, z = (float(v) for v in odometry.velocity)
     yaw = yaw_of(odometry.quaternion) - error
     c, s = math.cos(yaw), math.sin(yaw)
     height = float(odometry.position[2])
-    return Reckoning((c * x + s * y, c * y - s * x, z), z, DOUBT, share, now, now, height)
+    return Reckoning((c * x + s * y, c * y - s * x, z), z, DOUBT, now, now, height)
 
 
 def reckon(
@@ -140,16 +132,18 @@ def reckon(
     attitude: Attitude | None,
     force: tuple[float, ...] | None,
     thrust: tuple[float, float] | None,
+    rate: tuple[float, float, float],
     now: float,
 ) -> Reckoning | None:
-    """Propagate the velocity by one control step. The heading is assumed to be constant.
+    """Propagate the velocity by one control step.
 
     Args:
         before: the reckoning so far.
-        attitude: the flight controller's attitude. None: not known; a level attitude is assumed.
+        attitude: the flight controller's attitude. None: not known; the last one turns on with `rate`.
         force: specific force from its accelerometer, body FLU, m/s^2. None: not known; the thrust is used instead.
         thrust: specific force according to the throttle, and its possible error, m/s^2. None: not known; the force is
             used instead.
+        rate: the commanded body rate, FLU, rad/s.
         now: s.
 
     Returns:
@@ -158,21 +152,20 @@ def reckon(
     dt = now - before.time
     if not 0 <= dt <= LONGEST_STEP or (force is None and thrust is None):
         return None
-    attitude = attitude or Attitude(0.0, 0.0, 0.0)
+    since = before.since if attitude is not None or force is not None else before.since + dt
+    attitude = attitude or turned(before.attitude or Attitude(0.0, 0.0, 0.0), rate, dt)
     upright = math.cos(attitude.roll) * math.cos(attitude.pitch)
     ahead, aside, above = (float(a) for a in level(attitude, force or (0.0, 0.0, thrust[0] if thrust else GRAVITY)))
-    share, unlike = before.share, before.unlike
-    if thrust is not None and force is not None and thrust[0] > 0:
-        off = force[2] / thrust[0] - share
-        unlike = off if unlike is None else unlike + (off - unlike) * dt / SMOOTH_S
-        follow = max(-SAG_RATE * dt, min(SAG_RATE * dt, unlike * dt / SAG_S))
-        share += follow if abs(unlike) < SAG else 0.0
-    lift, doubt = (above, 0.0) if thrust is None else (share * thrust[0] * upright, thrust[1])
+    lift, doubt = (above, 0.0) if thrust is None else (thrust[0] * upright, thrust[1])
     forward, left, up = before.velocity
+    if before.attitude is not None:
+        about = attitude.yaw - before.attitude.yaw
+        c, s = math.cos(about), math.sin(about)
+        forward, left = c * forward + s * left, c * left - s * forward
     after = replace(
         before, velocity=(forward + ahead * dt, left + aside * dt, up + (above - GRAVITY) * dt),
-        lifted=before.lifted + (lift - GRAVITY) * dt, doubt=before.doubt + doubt * dt, share=share, unlike=unlike,
-        time=now,
+        lifted=before.lifted + (lift - GRAVITY) * dt, doubt=before.doubt + doubt * dt,
+        time=now, since=since, attitude=attitude,
     )  # fmt: skip
     height = before.height + min(after.lifted + after.doubt, after.climb + SLOWER) * dt
     return replace(after, height=height)

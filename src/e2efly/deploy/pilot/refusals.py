@@ -82,7 +82,10 @@ def policy_refusals(settings: FlightSettings, flight: Flight, inputs: Inputs, od
     if inputs.policy_problem:
         reasons.append(f"{Reason.POLICY}: {inputs.policy_problem}")
     reasons += _sticks(settings, inputs.pilot, Reason.STICK_INPUT)
-    if problem := fence_problem(settings.fence, odometry, not inputs.policy_lands, guard=not inputs.filtered):
+    age = max(flight.now - odometry.time, 0.0)
+    if problem := fence_problem(
+        settings.fence, odometry, not inputs.policy_lands, guard=not inputs.filtered, age=age, force=inputs.force
+    ):
         reasons.append(problem)
     if inputs.missed_deadlines >= settings.missed_deadlines:
         reasons.append(f"{Reason.DEADLINES}: {inputs.missed_deadlines} in a second")

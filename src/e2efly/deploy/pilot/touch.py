@@ -1,54 +1,74 @@
-"""Detects the ground without poses: on the ground, something other than the rotors carries the vehicle.
+"""Tells flight from standing without poses: only in the air, the measured force follows the throttle.
 
-In the air, the force that the accelerometer measures follows the throttle, whatever the scale of either. On the ground
-it stays constant. After a shock, or when the ground is overdue, the thrust is lowered for a moment and the force is
-observed.
+A regression of the force on the thrust of the throttle over the last measurements gives a slope. It is near 1 in the
+air, whatever the scale of either, and 0 for a vehicle that something carries. A blind descent waves its thrust a little
+all the time, so that there is something to follow. The force may follow later than it should, so the thrusts of several
+moments are compared with it. Where every slope is that of the ground, the vehicle is weighed: the thrust is lowered far
+for a moment. Only a force that stays as large as the weight then shows the ground.
 """
 
 import math
 from dataclasses import dataclass, replace
 
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.gravity import GRAVITY
 
-SHOCK = 3.0
-"""Force beyond the thrust that shows a touch of the ground, m/s^2."""
-DIP, DIP_S = 0.15, 0.32
-"""The dip: by this share the thrust is lowered, for this time, s, to test whether the ground carries the vehicle."""
-DELAY_S = 0.12
-"""Time from the arrival of a command until the force shows it, s."""
-ENOUGH = 5
-"""The number of measurements in the dip, and of measurements after it, that are needed to judge. Those of several dips
-are added up until there are so many, because a bad link delivers only few."""
-LASTS_S = DIP_S + DELAY_S + 0.16
-"""Duration of a dip and of the time after it that is used to judge it, s."""
-FOLLOWS = 0.5
-"""If the force changes by more than this share of the thrust's change, the vehicle is in the air. On the ground the
-force does not change."""
+WAVE, WAVE_HZ = 0.08, 2.0
+"""The wave on the thrust of a blind descent: its amplitude as a share, and its frequency, Hz. It moves the vehicle by
+some millimetres."""
+LAGS = (0.0, 0.07, 0.14, 0.21)
+"""How much later than usual the force may follow, s: a busy controller takes its commands late."""
+STILL = 0.5
+"""A vehicle that turns faster than this, rad/s, does not stand. Its rotors then give a force that the throttle did not
+ask for."""
+MEMORY, FEWEST = 30, 8
+"""The weight of a measurement falls to 1/e within so many later ones. So many must add up before anything is told."""
+FOLLOWS, SURE = 0.5, 2.0
+"""The slope between standing and flight, and by how many of its standard deviations it must differ from that."""
+FLOOR = 0.15
+"""The smallest standard deviation of a measured force, m/s^2."""
 WEIGHT = (0.75, 1.3)
 """Range of the force of a vehicle that stands, in units of gravity, for a badly calibrated accelerometer."""
-AGAIN_S = 1.0
-"""The shortest time between two dips, s."""
-USUAL_S, UNUSUAL = 0.5, 1.5
-"""Time over which the difference of force and thrust is smoothed, s. A measurement that differs from the smoothed value
-by more than the second value, m/s^2, belongs to a shock and is not used for it."""
+STRUCK_S = 0.1
+"""How soon after a shock a weighing begins, s."""
+LOW, LONGEST_S, AGAIN_S = 0.45, 0.5, 1.0
+"""A weighing lowers the thrust to the first value, in units of gravity, for the second at most, s. The next one begins
+after the third, s."""
+LIGHT, ENOUGH = 0.6, 4
+"""A vehicle is carried if it measures its weight in so many measurements in a row, the second value, while its thrust
+is below the first, in units of gravity."""
+SHOCK, BLOW = 3.0, 1.4
+"""Change of force minus thrust between two measurements that shows a shock, m/s^2. What was measured before it is
+forgotten. With a force above the second value, in units of gravity, it may be the ground's."""
+TOLD_S = 0.5
+"""How long the comparison holds after its newest measurement, s. After a longer pause it begins anew."""
 FROZEN_S, IGNORED, LONGEST_SAME_S = 0.15, 0.4, 0.4
 """An accelerometer is frozen if its numbers repeat bit for bit for the first value, s, while the thrust changes by the
 second, m/s^2. It is also frozen if they repeat for the third value, s, whatever the thrust is, because the vibration of
 the rotors always changes them."""
-ALIVE_S, BELIEVED = 0.2, 3.0
-"""An accelerometer whose numbers repeat for the first value, s, is frozen. One that usually differs from the thrust by
-more than the second, m/s^2, is broken. Neither can detect the ground."""
-SUPPORT, SUPPORT_S = 1.2, 0.3
-"""If the force is larger than the thrust by the first value, m/s^2, for the second, s, something carries the vehicle.
-This holds for an accelerometer that works."""
+ALIVE_S, LEAST, USUAL_S = 0.5, 0.3, 0.3
+"""An accelerometer whose numbers repeat for the first value, s, is frozen. One whose force is below the second, in
+units of gravity, smoothed over the third, s, is broken. Neither can tell flight from standing."""
 
 
 @dataclass(frozen=True)
 class Touch:
-    """What was measured so far. `Touch()` at the beginning of a landing."""
+    """What was measured so far. `Touch()` at the beginning of a flight's phase."""
 
-    usual: float | None = None
-    """The usual force minus thrust, smoothed, m/s^2. None: not known yet."""
+    sums: tuple[tuple[float, ...], ...] = ()
+    """For each lag fading sums of weight, thrust, force, thrust squared, thrust times force and force squared, less
+    gravity."""
+    time: float = -math.inf
+    """When the newest of these measurements was asked for, s."""
+    beyond: float = 0.0
+    """Force minus thrust at the newest measurement, m/s^2."""
+    usual: float = GRAVITY
+    """The force, smoothed, m/s^2."""
+    struck: float = -math.inf
+    """When the newest shock came, s."""
+    weighed: float = -math.inf
+    """When the newest weighing began, s."""
+    carried: int = 0
+    """Measurements in a row that show the weight while the thrust is far below it."""
     raw: tuple[float, ...] = ()
     """The accelerometer's newest numbers ..."""
     changed: float = -math.inf
@@ -59,23 +79,9 @@ class Touch:
     """Thrust when the numbers last changed, m/s^2. None: not known."""
     ignored: float = 0.0
     """The largest change of the thrust since then, which the numbers did not show, m/s^2."""
-    dip: float = -math.inf
-    """When the newest dip began, s."""
-    low: tuple[float, float, int] = (0.0, 0.0, 0)
-    """Sums of force and of thrust, m/s^2, and the number of measurements, in the dip ..."""
-    high: tuple[float, float, int] = (0.0, 0.0, 0)
-    """... and after it."""
-    carried: bool = False
-    """The ground was detected in a dip."""
-    supported: float = 0.0
-    """How long the force has been larger than the thrust by `SUPPORT`, s."""
-
-    def factor(self, now: float) -> float:
-        """The factor by which the thrust is multiplied at `now`, s."""
-        return 1 - DIP if now - self.dip < DIP_S else 1.0
 
     def afresh(self) -> "Touch":
-        """A new detection of the ground. It keeps how long the numbers have repeated."""
+        """A new comparison. It keeps how long the numbers have repeated."""
         return Touch(raw=self.raw, changed=self.changed, same_s=self.same_s, then=self.then, ignored=self.ignored)
 
     @property
@@ -84,13 +90,44 @@ class Touch:
         return self.same_s > LONGEST_SAME_S or (self.same_s > FROZEN_S and self.ignored > IGNORED)
 
     def able(self, now: float) -> bool:
-        """Whether this accelerometer can detect the ground at all."""
-        return now - self.changed < ALIVE_S and self.usual is not None and abs(self.usual) < BELIEVED
+        """Whether this accelerometer can tell flight from standing at all."""
+        return now - self.changed < ALIVE_S and self.usual > LEAST * GRAVITY
 
-    @property
-    def rests(self) -> bool:
-        """Whether something has carried the vehicle for a while, if the accelerometer works."""
-        return self.supported >= SUPPORT_S
+    def stands(self, now: float) -> bool | None:
+        """Whether something carries the vehicle: True; False: it flies; None: not known."""
+        if now - self.time > TOLD_S or not self.able(now):
+            return None
+        if self.carried >= ENOUGH:
+            return True
+        return False if any(map(_follows, self.sums)) else None
+
+    def weighs(self, now: float) -> bool:
+        """Whether the thrust of a blind descent is lowered at `now`, s, to weigh the vehicle."""
+        return now - self.weighed < LONGEST_S
+
+    def weigh(self, now: float) -> "Touch":
+        """Begin to weigh at `now`, s, after a shock or where the slope is that of the ground, but not too often."""
+        ground = bool(self.sums) and all(_follows(sums) is False for sums in self.sums)
+        due = (ground or self.time - self.struck < STRUCK_S) and now - self.time < TOLD_S and self.able(now)
+        return replace(self, weighed=now, carried=0) if due and now - self.weighed > AGAIN_S else self
+
+
+def _follows(sums: tuple[float, ...]) -> bool | None:
+    """Whether the force follows the thrust, by their sums. None: not known."""
+    weight, thrust, force, thrusts, products, forces = sums
+    spread = thrusts - thrust * thrust / weight if weight >= FEWEST else 0.0
+    if spread <= 0:
+        return None
+    shared = products - thrust * force / weight
+    slope = shared / spread
+    rest = max(forces - force * force / weight - slope * shared, 0.0) / (weight - 2)
+    error = SURE * math.sqrt((rest + FLOOR**2) / spread)
+    return None if abs(slope - FOLLOWS) < error else slope > FOLLOWS
+
+
+def wave(now: float) -> float:
+    """The factor by which the thrust of a blind descent is multiplied at `now`, s."""
+    return 1 + WAVE * math.sin(math.tau * WAVE_HZ * now)
 
 
 def seen(before: Touch, raw: tuple[float, ...], thrust: float | None, now: float) -> Touch:
@@ -101,61 +138,32 @@ def seen(before: Touch, raw: tuple[float, ...], thrust: float | None, now: float
     return replace(before, same_s=now - before.changed, ignored=max(before.ignored, change))
 
 
-def feel(before: Touch, force: float, thrust: float, now: float, dt: float) -> Touch:
+def feel(before: Touch, force: float, thrusts: tuple[float, ...], turn: float, now: float, dt: float) -> Touch:
     """Process a measurement.
 
     Args:
         before: the state so far.
         force: specific force along the body's z axis, m/s^2.
-        thrust: the thrust that the map gives for the throttle sent a moment before, m/s^2.
+        thrusts: the thrusts that the map gives for the throttles sent a moment, and each of `LAGS`, before, m/s^2.
+        turn: the body rate, rad/s.
         now: everything sent before this time had arrived when the measurement was taken, s.
         dt: time since the previous measurement, s.
     """
-    beyond = force - thrust
-    after = replace(before, supported=before.supported + dt if beyond > SUPPORT else 0.0)
-    if now - after.dip < LASTS_S:
-        return _dipping(after, force, thrust, now)
-    usual = beyond if after.usual is None else after.usual
-    if abs(beyond - usual) < UNUSUAL:
-        usual += (beyond - usual) * -math.expm1(-dt / USUAL_S)
-    return replace(after, usual=usual)
-
-
-def dip(before: Touch, now: float, *, overdue: bool, beyond: float) -> Touch:
-    """Begin a dip to test for the ground, if there is a reason and the last dip is long enough ago.
-
-    Args:
-        before: the state so far.
-        now: s.
-        overdue: by its height, the vehicle should already stand.
-        beyond: force minus thrust of the newest measurement, m/s^2.
-    """
-    shock = before.usual is not None and beyond - before.usual > SHOCK
-    if not (shock or overdue) or not before.able(now) or now - before.dip < AGAIN_S:
-        return before
-    none = (0.0, 0.0, 0)
-    return replace(before, dip=now, low=none, high=none) if _enough(before) else replace(before, dip=now)
-
-
-def _dipping(before: Touch, force: float, thrust: float, now: float) -> Touch:
-    """Add a measurement in a dip or after it. Once there are enough of both, judge whether the ground carries."""
-    since = now - before.dip
-    in_dip, after_dip = DELAY_S <= since < DIP_S, since >= DIP_S + DELAY_S
-    if not (in_dip or after_dip):
-        return before
-    low, high = before.low, before.high
-    if in_dip:
-        return replace(before, low=(low[0] + force, low[1] + thrust, low[2] + 1))
-    after = replace(before, high=(high[0] + force, high[1] + thrust, high[2] + 1))
-    if not _enough(after):
+    beyond = force - thrusts[0]
+    usual = before.usual + (force - before.usual) * -math.expm1(-dt / USUAL_S)
+    heavy = WEIGHT[0] * GRAVITY < force < WEIGHT[1] * GRAVITY and max(thrusts) < LIGHT * GRAVITY
+    carried = before.carried + (turn < STILL) if heavy else 0
+    after = replace(before, time=now, beyond=beyond, usual=usual, carried=carried)
+    if now - before.time > TOLD_S or abs(beyond - before.beyond) > SHOCK:
+        blow = force > BLOW * GRAVITY and beyond - before.beyond > SHOCK
+        return replace(after, sums=(), struck=now if blow else before.struck)
+    if force < LIGHT * GRAVITY and before.weighs(now):  # it flies
+        after = replace(after, weighed=now - LONGEST_S)
+    if turn > STILL:
         return after
-    (force_low, thrust_low), (force_high, thrust_high) = (
-        (force / count, thrust / count) for force, thrust, count in (low, after.high)
-    )
-    follows = force_high - force_low > FOLLOWS * (thrust_high - thrust_low)
-    stands = WEIGHT[0] * GRAVITY < force_low < WEIGHT[1] * GRAVITY and thrust_high > thrust_low
-    return replace(after, carried=before.carried or (stands and not follows))
-
-
-def _enough(touch: Touch) -> bool:
-    return min(touch.low[2], touch.high[2]) >= ENOUGH
+    y, kept, sums = force - GRAVITY, math.exp(-1 / MEMORY), []
+    for thrust, old in zip(thrusts, before.sums or ((0.0,) * 6,) * len(thrusts), strict=True):
+        x = thrust - GRAVITY
+        new = (1.0, x, y, x * x, x * y, y * y)
+        sums.append(tuple(kept * a + b for a, b in zip(old, new, strict=True)))
+    return replace(after, sums=tuple(sums))

@@ -14,6 +14,7 @@ import numpy as np
 
 from e2efly.control import COMMAND_MODES
 from e2efly.control.modes import THRUST
+from e2efly.courses.domain import Domain, Extent, outside
 from e2efly.deploy.policy import contract_json as read
 from e2efly.deploy.policy.images import Image
 from e2efly.observation import Field
@@ -23,6 +24,8 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 CONTRACT_VERSION = 2
 """Version of the meaning of these fields; a policy of another version is refused."""
+LARGEST = 1 << 20
+"""Largest length of the JSON. The longest of the zoo has 3050 characters."""
 METADATA_KEY = "contract"
 """Key of the contract in the metadata of the ONNX file."""
 ACTION_SIZE = 4
@@ -105,6 +108,14 @@ class Contract:
     vehicle_ranges: Ranges | None = None
     """Ranges of the vehicles that it flies, for a family. None, and no JSON key, for a single vehicle, identified by
     the hash."""
+    courses: Domain | None = None
+    """Ranges of the courses and worlds that it was trained for. None, and no JSON key: not declared."""
+
+    def outside(self, courses: Domain) -> tuple[str, ...]:
+        """The quantities in which courses lie outside of what it was trained for, in words. Empty: in none, or its
+        training is not declared.
+        """
+        return outside(self.courses or (), courses)
 
     def refusals(self, vehicle: Vehicle) -> tuple[str, ...]:
         """The reasons why the policy does not fly a (loaded) vehicle, in words. Empty: it flies it.
@@ -147,8 +158,9 @@ class Contract:
         Raises:
             ValueError: for a contract that `from_json` would refuse.
         """
-        left_out = "vehicle_ranges" if self.vehicle_ranges is None else "vehicle_hash"
-        content = {key: value for key, value in dataclasses.asdict(self).items() if key != left_out}
+        left_out = {"vehicle_ranges" if self.vehicle_ranges is None else "vehicle_hash"}
+        left_out |= {"courses"} if self.courses is None else set()
+        content = {key: value for key, value in dataclasses.asdict(self).items() if key not in left_out}
         text = json.dumps(content, indent=2)
         Contract.from_json(text)
         return text
@@ -160,6 +172,8 @@ class Contract:
         Raises:
             ValueError: naming the field, the value and what is accepted.
         """
+        if len(text) > LARGEST:
+            raise ValueError(f"contract: has {len(text)} characters; accepted: at most {LARGEST}")
         try:
             content = json.loads(text, object_pairs_hook=unique)
         except (ValueError, RecursionError) as error:
@@ -172,7 +186,7 @@ class Contract:
             absent = "vehicle_hash" if "vehicle_ranges" in content else "vehicle_ranges"
             if absent in content:
                 raise read.refusal(absent, content[absent], "one of vehicle_hash and vehicle_ranges, not both")
-            content = content | {absent: None}
+            content = {"courses": None} | content | {absent: None}
         return _contract(read.table(content, "", Contract))
 
 
@@ -206,7 +220,25 @@ def _contract(x: dict[str, Any]) -> Contract:
         action=_action(x["action"]),
         hover_action=hover,
         vehicle_ranges=None if vehicle_hash is not None else _ranges(x["vehicle_ranges"]),
+        courses=None if x["courses"] is None else _courses(x["courses"]),
     )
+
+
+def _courses(value: Any) -> Domain:
+    if not isinstance(value, list):
+        raise read.refusal("courses", value, "a list of ranges, empty for a goal that is one place")
+    found = []
+    for i, entry in enumerate(value):
+        where = f"courses[{i}]"
+        x = read.table(entry, where, Extent)
+        name, unit = (read.text(x[key], f"{where}.{key}") for key in ("name", "unit"))
+        low, high = (read.number(x[key], f"{where}.{key}") for key in ("low", "high"))
+        if not (name.isascii() and name.isidentifier()) or name in (part.name for part in found):
+            raise read.refusal(f"{where}.name", name, "a word of letters, digits and _, each once")
+        if low > high:
+            raise read.refusal(f"{where}.low", low, f"at most {where}.high, {high:g}")
+        found.append(Extent(name, unit, low, high))
+    return tuple(found)
 
 
 def _ranges(value: Any) -> Ranges:

@@ -9,6 +9,8 @@ from e2efly.vehicles.tables import shown
 
 LARGEST = 1e6
 """Largest magnitude of a number, in any unit."""
+LONGEST = 2000
+"""Largest length of a text."""
 LATEST = 1.0
 """Longest delay with which an environment trains, s. No vehicle flies with an older state, or so long after a
 command."""
@@ -24,7 +26,7 @@ def table(value: Any, where: str, kind: type) -> dict[str, Any]:
         if key not in known:
             guess = nearest(key, known)
             hint = f"; did you mean {guess!r}?" if guess else ""
-            raise ValueError(f"contract: unknown key {prefix + key!r}{hint} (accepted: {', '.join(known)})")
+            raise ValueError(f"contract: unknown key {shown(prefix + key)}{hint} (accepted: {', '.join(known)})")
     if missing := [key for key in known if key not in value]:
         raise ValueError(
             f"contract: missing key {', '.join(repr(prefix + key) for key in missing)}; accepted: all of "
@@ -34,9 +36,9 @@ def table(value: Any, where: str, kind: type) -> dict[str, Any]:
 
 
 def text(value: Any, where: str) -> str:
-    """A non-empty text."""
-    if not isinstance(value, str) or not value.strip():
-        raise refusal(where, value, "a text that is not empty")
+    """A text that can be shown and stored: not empty, not longer than `LONGEST`, without control characters."""
+    if not isinstance(value, str) or not value.strip() or not value.isprintable() or len(value) > LONGEST:
+        raise refusal(where, value, f"a text of 1 to {LONGEST} printable characters")
     return value
 
 

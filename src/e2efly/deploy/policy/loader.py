@@ -13,9 +13,11 @@ import numpy as np
 import onnxruntime as ort
 
 from e2efly.deploy.policy.contract import ACTION_LIMITS, ACTION_SIZE, METADATA_KEY, Contract
-from e2efly.deploy.policy.onnx_file import check_file, is_sealed, sealed
+from e2efly.deploy.policy.onnx_file import METADATA, Message, check_seal, file_content, is_sealed, read, sealed, write
+from e2efly.deploy.policy.onnx_graph import FLOAT, IR_VERSION, OPSET, TYPES, check
+from e2efly.deploy.policy.session import open_session
 from e2efly.vehicles import Vehicle, load_vehicle, vehicle_names
-from e2efly.zoo import policy_file
+from e2efly.zoo import is_shipped, policy_file
 
 INPUT, OUTPUT = "observation", "action"
 """Names of the graph's first input and of its output. The inputs for images have the names of the images."""
@@ -36,6 +38,8 @@ class Policy:
     """What it sees and commands."""
     session: ort.InferenceSession
     """The loaded graph."""
+    content: bytes = b""
+    """What was checked and loaded: the file, without remarks. Whatever else reads the graph reads this."""
 
     def act(
         self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: np.ndarray | None = None
@@ -175,34 +179,53 @@ def sealed_policy(path: str | Path) -> bytes:
 
 def _read(path: str | Path) -> bytes:
     try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {error.strerror}; accepted: the path of a policy.onnx") from None
+        return file_content(path)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}; accepted: the path of a policy.onnx") from None
 
 
 def _policy(where: str, content: bytes) -> Policy:
     """The policy of a file, checked against its own contract."""
-    session = _session(where, content)
     try:
-        stored = session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{where}: its metadata is no text (damaged? copy or export it again): {error}") from None
-    if stored is None:
-        raise ValueError(
-            f"{where}: metadata key {METADATA_KEY!r} is missing; accepted: an ONNX file with its contract, as "
-            "`e2efly export` writes it"
-        )
-    try:
-        contract = Contract.from_json(stored)
+        check_seal(content)
+        model = read(content)
+        _check_model(model)
+        contract = _contract(model)
+        inputs, outputs = _check_interface(model["graph"], contract)
+        check(model["graph"], inputs, outputs, contract.control_rate_hz)
+        checked = write(model)
+        level, images = level_and_still(contract), [np.zeros(image.shape, np.float32) for image in contract.images]
+        tried = [level, *images, *([np.zeros(contract.memory_size, np.float32)] if contract.memory_size else [])]
+        session = open_session(checked, [x[None] for x in tried], trusted=is_shipped(content))
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from None
-    _check_graph(where, session, contract)
-    policy = Policy(contract, session)
+    policy = Policy(contract, session, checked)
     try:  # also warms the session up
-        policy.act(level_and_still(contract), [np.zeros(image.shape, np.float32) for image in contract.images])
+        policy.act(level, images)
     except Exception as error:  # ONNX Runtime's errors share no other base
         raise ValueError(f"{where}: does not run on the observation of a level, still vehicle: {error}") from None
     return policy
+
+
+def _check_model(model: Message) -> None:
+    operators = [(entry.get("domain", ""), entry.get("version")) for entry in model.get("opset_import", [])]
+    if operators != [("", OPSET)] or model.get("ir_version") != IR_VERSION:
+        raise ValueError(
+            f"has operators of the versions {operators!r:.200} in the format {model.get('ir_version')}; accepted: "
+            f"operators of ONNX's version {OPSET} in the format {IR_VERSION}, as `e2efly export` writes them"
+        )
+    if "graph" not in model:
+        raise ValueError("not an ONNX file: it has no graph; accepted: a file as `e2efly export` writes it")
+
+
+def _contract(model: Message) -> Contract:
+    found = [entry.get("value", "") for entry in model.get(METADATA, []) if entry.get("key") == METADATA_KEY]
+    if len(found) != 1:
+        raise ValueError(
+            f"metadata key {METADATA_KEY!r} is {'there twice' if found else 'missing'}; accepted: an ONNX file with "
+            "its contract, as `e2efly export` writes it"
+        )
+    return Contract.from_json(found[0])
 
 
 def level_and_still(contract: Contract) -> np.ndarray:
@@ -212,28 +235,16 @@ def level_and_still(contract: Contract) -> np.ndarray:
     return observation
 
 
-def _session(where: str, content: bytes) -> ort.InferenceSession:
-    try:
-        check_file(content)
-    except ValueError as error:
-        raise ValueError(f"{where}: {error}") from None
-    options = ort.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.log_severity_level = 4
-    try:
-        return ort.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # ONNX Runtime's errors share no other base
-        raise ValueError(
-            f"{where}: not an ONNX file that ONNX Runtime {ort.__version__} can load (export it again): {error}"
-        ) from None
-
-
-def _check_graph(where: str, session: ort.InferenceSession, contract: Contract) -> None:
-    """Check for float32 inputs and outputs with the names and sizes of the contract, and a free batch axis."""
-    remembers = next((node.shape[-1] for node in session.get_inputs() if node.name == MEMORY and node.shape), 0)
+def _check_interface(
+    graph: Message, contract: Contract
+) -> tuple[dict[str, tuple[int, ...]], dict[str, tuple[int, ...]]]:
+    """Check for float32 inputs and outputs with the names and sizes of the contract, and a free batch axis. Returns
+    their names and shapes without that axis.
+    """
+    remembers = next((axes[-1] for name, _, axes in _declared(graph, "input") if name == MEMORY and axes), 0)
     if remembers != contract.memory_size:
         raise ValueError(
-            f"{where}: memory_size is {contract.memory_size} in the contract; accepted: {remembers}, the numbers of "
+            f"memory_size is {contract.memory_size} in the contract; accepted: {remembers}, the numbers of "
             "memory that its graph has; export the policy again with this e2efly"
         )
     inputs: dict[str, tuple[int, ...]] = {INPUT: (contract.observation_size,)}
@@ -241,17 +252,26 @@ def _check_graph(where: str, session: ort.InferenceSession, contract: Contract) 
     outputs: dict[str, tuple[int, ...]] = {OUTPUT: (ACTION_SIZE,)}
     if contract.memory_size:
         inputs[MEMORY] = outputs[NEXT_MEMORY] = (contract.memory_size,)
-    for side, nodes, wanted in (("input", session.get_inputs(), inputs), ("output", session.get_outputs(), outputs)):
-        has = [(node.name, node.type, node.shape) for node in nodes]
-        said = [(name, "tensor(float)", ["n", *shape]) for name, shape in wanted.items()]
-        free = [
-            (name, kind, [*(axis if isinstance(axis, int) else "n" for axis in shape[:1]), *shape[1:]])
-            for name, kind, shape in has
-        ]
+    for side, wanted in (("input", inputs), ("output", outputs)):
+        has = _declared(graph, side)
+        free = [(name, kind, [axis if isinstance(axis, int) else "n" for axis in axes[:1]] + axes[1:])
+                for name, kind, axes in has]  # fmt: skip
+        said = [(name, FLOAT, ["n", *shape]) for name, shape in wanted.items()]
         if free != said:
-            raise ValueError(
-                f"{where}: {side} of the graph is {has}; its contract says {said}; export the policy again"
-            )
+            raise ValueError(f"{side} of the graph is {has!r:.500}; its contract says {said}; export the policy again")
+    return inputs, outputs
+
+
+def _declared(graph: Message, side: str) -> list[tuple[str, str, list[int | str]]]:
+    """Name, type and axes of the inputs or outputs that the graph declares."""
+    found = []
+    for value in graph.get(side, []):
+        tensor = value.get("type", {}).get("tensor_type", {})
+        number = tensor.get("elem_type", 0)
+        kind = TYPES.get(number, f"type {number}")
+        axes = [axis.get("dim_value", axis.get("dim_param", "?")) for axis in tensor.get("shape", {}).get("dim", [])]
+        found.append((value.get("name", ""), kind, axes))
+    return found
 
 
 def _check_use(

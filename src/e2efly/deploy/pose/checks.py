@@ -50,11 +50,9 @@ class Checks:
     frozen_after: float = 0.2
     """How long the pose may repeat bit for bit, s. Use infinity for a source without noise."""
     velocity_cutoff: float = 15.0
-    """Cut-off frequency of the low-pass filter of the estimated velocity, Hz. Its delay is 1 / (pi * cutoff): 21 ms at
-    15 Hz."""
+    """Cut-off frequency of the low-pass filter of the estimated velocity, Hz."""
     rate_cutoff: float = 30.0
-    """Cut-off frequency of the low-pass filter of the estimated body rate, Hz. Its delay is 1 / (pi * cutoff): 11 ms at
-    30 Hz."""
+    """Cut-off frequency of the low-pass filter of the estimated body rate, Hz."""
     velocity_mismatch: float = 2.0
     """The largest difference between the source's velocity and the velocity estimated from its positions, m/s. 0.3
     times the speed is added to it. The difference is larger if a source leaves its velocity at zero or gives it in
@@ -84,6 +82,16 @@ class Checks:
                 good, accepted = _number(value) and 0 < value < math.inf, "a positive finite number"
             if not good:
                 raise ValueError(f"checks: {name} is {value!r}; accepted: {accepted}")
+
+    @property
+    def velocity_lag(self) -> float:
+        """How late the estimated velocity is, s: 1 / (pi * cutoff), 21 ms at 15 Hz."""
+        return 1 / (math.pi * self.velocity_cutoff)
+
+    @property
+    def rate_lag(self) -> float:
+        """How late the estimated body rate is, s: 11 ms at 30 Hz."""
+        return 1 / (math.pi * self.rate_cutoff)
 
 
 def _number(value: object) -> bool:

@@ -1,7 +1,6 @@
 """Images that a policy saw in training, kept beside its file. `fly --check` shows them next to a camera's images."""
 
 import io
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,9 +8,12 @@ from typing import Any
 import numpy as np
 
 from e2efly.deploy.policy.images import Image
+from e2efly.storage import read_npz
 
 COUNT = 6
 """How many samples are kept of each image of a policy."""
+LARGEST = 1 << 28
+"""Largest size of all samples, bytes."""
 
 
 def samples_file(policy: Path) -> Path:
@@ -41,10 +43,11 @@ def read_samples(policy: Path, image: Image) -> np.ndarray | None:
     if not path.is_file():
         return None
     try:
-        with np.load(path, allow_pickle=False) as content:
-            found = content[image.name].astype(np.float32) if image.name in content else None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        found = read_npz(path, LARGEST).get(image.name)
+    except ValueError as error:
         raise ValueError(f"{path}: {error}; accepted: what a training has written, or no such file") from None
-    if found is not None and (found.shape[1:] != image.shape or not len(found)):
+    if found is None:
+        return None
+    if found.shape[1:] != image.shape or not len(found) or found.dtype.kind not in "fiu":
         raise ValueError(f"{path}: {image.name} has shape {found.shape}; accepted: images of shape {image.shape}")
-    return found
+    return found.astype(np.float32)

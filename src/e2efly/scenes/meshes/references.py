@@ -12,40 +12,51 @@ from urllib.parse import unquote
 
 from e2efly.vehicles.tables import shown
 
+WITHOUT = "materials=False (--no-scene-materials), which leaves out materials and gives every object its class's colour"
+"""What can be done about a file whose materials are not complete."""
+
 _PLAIN = ("KHR_materials_", "KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "EXT_texture_webp")
 """Beginnings of the names of glTF extensions that a file may require. The triangles are correct without them."""
+_TEXTURES = ("KHR_texture_", "EXT_texture_")
+"""The same for the extensions that matter to textures alone."""
 
 _KINDS = {dict: "an object", list: "a list", str: "a text", int: "a whole number"}
 """Names of these types in JSON."""
 
 
-def textured_materials(path: Path) -> set[str]:
+def textured_materials(path: Path, materials: bool = True) -> set[str]:
     """Names of the materials of a file that have a texture, after a check that everything the file refers to exists.
+
+    Args:
+        path: the file of the mesh.
+        materials: whether materials and textures are used. If not, only what triangles need is looked for.
 
     Raises:
         ValueError: naming the file, the missing item, and what is accepted.
     """
     match path.suffix.lower():
         case ".obj":
-            return _obj(path)
+            return _obj(path) if materials else set()
         case ".ply":
-            return _ply(path)
+            return _ply(path) if materials else set()
         case ".stl":
             return set()  # the file has no materials
         case _:
-            return _gltf(path)
+            return _gltf(path, materials)
 
 
-def _there(path: Path, what: str, name: str) -> Path:
+def _there(path: Path, what: str, name: str, remedy: str = f"; or {WITHOUT}") -> Path:
     folder = path.parent.resolve()
     other = (folder / name.replace("\\", "/")).resolve()
     if not other.is_relative_to(folder) or not other.is_file():
-        raise ValueError(f"{path}: {what} {name!r} is missing; accepted: a file in the folder of the mesh or below it")
+        raise ValueError(
+            f"{path}: {what} {name!r} is missing; accepted: a file in the folder of the mesh or below it{remedy}"
+        )
     return other
 
 
 def _words(path: Path) -> Iterator[tuple[str, str]]:
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+    for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
         word, _, rest = line.strip().partition(" ")
         yield word.lower(), rest.strip()
 
@@ -58,7 +69,7 @@ def _obj(path: Path) -> set[str]:
         elif word == "usemtl":
             used.add(rest)
     if len(libraries) > 1:
-        raise ValueError(f"{path}: mtllib names {libraries}; accepted: one file of materials")
+        raise ValueError(f"{path}: mtllib names {libraries}; accepted: one file of materials; or {WITHOUT}")
     known, textured, name = set(), set(), ""
     for library in libraries:
         for word, rest in _words(_there(path, "the file of materials", library)):
@@ -69,9 +80,8 @@ def _obj(path: Path) -> set[str]:
                 _there(path, f"material {name!r}: the texture", rest)
                 textured.add(name)
     if lost := sorted(used - known):
-        raise ValueError(
-            f"{path}: the material {lost[0]!r} is missing; accepted: {sorted(known) or 'a file, by mtllib'}"
-        )
+        accepted = sorted(known) or "a file, by mtllib"
+        raise ValueError(f"{path}: the material {lost[0]!r} is missing; accepted: {accepted}; or {WITHOUT}")
     return textured & used
 
 
@@ -87,16 +97,19 @@ def _ply(path: Path) -> set[str]:
     return set()
 
 
-def _gltf(path: Path) -> set[str]:
+def _gltf(path: Path, wanted: bool) -> set[str]:
     header = _header(path)
     names = _listed(path, header, "extensionsRequired", str)
-    if required := [name for name in names if not name.startswith(_PLAIN)]:
-        raise ValueError(f"{path}: requires {', '.join(required)}; accepted: files without compression of that kind")
-    for kind in ("buffers", "images"):
+    if required := [name for name in names if not name.startswith(_PLAIN if wanted else (*_PLAIN, *_TEXTURES))]:
+        way = f"; or {WITHOUT}" if all(name.startswith(_TEXTURES) for name in required) else ""
+        raise ValueError(
+            f"{path}: requires {', '.join(required)}; accepted: files without compression of that kind{way}"
+        )
+    for kind in ("buffers", "images") if wanted else ("buffers",):
         for i, entry in enumerate(_listed(path, header, kind)):
             uri = _of_kind(path, f"{kind}[{i}].uri", entry.get("uri", "data:"), str)
             if not uri.startswith("data:"):
-                _there(path, f"the {kind[:-1]}", unquote(uri))
+                _there(path, f"the {kind[:-1]}", unquote(uri), "" if kind == "buffers" else f"; or {WITHOUT}")
     for i, mesh in enumerate(_listed(path, header, "meshes")):
         modes = {
             _of_kind(path, f"meshes[{i}].primitives[{k}].mode", primitive.get("mode", 4), int)
@@ -108,6 +121,8 @@ def _gltf(path: Path) -> set[str]:
                 f"{path}: mesh {name!r} has primitives of mode {sorted(other)}; accepted: 4 (triangles) and 5"
             )
     textured = set()
+    if not wanted:
+        return textured
     for i, material in enumerate(_listed(path, header, "materials")):
         name = _of_kind(path, f"materials[{i}].name", material.get("name", ""), str)
         look = material.get("pbrMetallicRoughness", {})

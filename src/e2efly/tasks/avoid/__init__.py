@@ -21,6 +21,8 @@ from e2efly.config import (
     TrainConfig,
     number,
 )
+from e2efly.courses.domain import Domain, extent
+from e2efly.numbers import SPEED
 from e2efly.tasks.registry import register
 
 
@@ -50,7 +52,7 @@ class AvoidConfig(TaskConfig):
     """Length of an episode, s."""
     forest: ForestConfig = ForestConfig()
     """The forest. Its lane is also the fence."""
-    speed: tuple[float, float] = number((3.0, 10.0), rising=True)
+    speed: tuple[float, float] = number((3.0, 10.0), high=SPEED, rising=True)
     """Commanded speed, m/s, uniform per episode."""
     sideways: float = 3.0
     """Largest start distance from the middle of the lane, m."""
@@ -72,6 +74,14 @@ class AvoidConfig(TaskConfig):
             f"{self.name}_{speed:g}": dataclasses.replace(self, speed=(speed, speed), collisions_end=True)
             for speed in (5.0, 8.0, 10.0)
         }
+
+    def domain(self) -> Domain:
+        """The commanded speed, and a forest up to a density: parts of every forest are thinner."""
+        return (
+            extent("speed", "m/s", self.speed),
+            extent("tree_density", "1/m^2", (0.0, self.forest.density)),
+            extent("trunk_radius", "m", self.forest.radius),
+        )
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:

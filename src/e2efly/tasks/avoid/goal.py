@@ -10,7 +10,9 @@ import numpy as np
 
 from e2efly.config import number
 from e2efly.control.vectors import Array, namespace
+from e2efly.courses.domain import Domain, extent
 from e2efly.goal import Course, Goal, Outcome, Shape
+from e2efly.numbers import SPEED
 from e2efly.observation import Field
 from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.route import Route
@@ -104,7 +106,7 @@ class AvoidRoute(Route):
 
     longest_s: ClassVar = 20.0
 
-    speed: float = number(5.0, above=0)
+    speed: float = number(5.0, above=0, high=SPEED)
     """Commanded speed, m/s."""
 
     @classmethod
@@ -112,6 +114,10 @@ class AvoidRoute(Route):
         """The route with the speed that was drawn."""
         del file
         return cls(speed=float(course.memory.speed[0]))
+
+    def domain(self) -> Domain:
+        """The commanded speed."""
+        return (extent("speed", "m/s", self.speed),)
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course along the lane, with the heading of the lane."""

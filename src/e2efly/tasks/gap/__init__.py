@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from e2efly.config import AlgorithmConfig, BPTTConfig, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
+from e2efly.courses.domain import Domain, extent
+from e2efly.numbers import ANGLE, SPEED
 from e2efly.tasks.registry import register
 
 
@@ -27,15 +29,15 @@ class GapConfig(TaskConfig):
     """Half-width of the slit's random offset from straight ahead, m per axis."""
     altitude: float = 2.0
     """Height of the start, m."""
-    yaw: float = 0.3
+    yaw: float = number(0.3, high=ANGLE)
     """Half-width of the wall's random rotation about the up axis, rad."""
-    roll: tuple[float, float] = number((0.4, 0.8), rising=True)
+    roll: tuple[float, float] = number((0.4, 0.8), high=ANGLE, rising=True)
     """Tilt of the slit to either side, rad, uniform."""
     opening: tuple[float, float] = number((0.7, 0.18), above=0)
     """Long and short side of the slit, m."""
     thickness: float = 0.1
     """Thickness of the wall, m."""
-    approach: float = 1.5
+    approach: float = number(1.5, high=SPEED)
     """The vehicle counts as approaching when it is nearer to the wall than this, m."""
     beyond: float = 2.0
     """Success: distance behind the slit of the point that must be reached, m."""
@@ -59,6 +61,16 @@ class GapConfig(TaskConfig):
     def criteria(self) -> dict[str, TaskConfig]:
         """Collisions end the episode."""
         return {self.name: dataclasses.replace(self, collisions_end=True)}
+
+    def domain(self) -> Domain:
+        """The slit. It is tilted to either side."""
+        return (
+            extent("slit_distance", "m", self.distance),
+            extent("slit_tilt", "rad", self.roll),
+            extent("slit_length", "m", self.opening[0]),
+            extent("slit_width", "m", self.opening[1]),
+            extent("wall_thickness", "m", self.thickness),
+        )
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:

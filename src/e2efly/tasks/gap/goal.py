@@ -15,6 +15,7 @@ import numpy as np
 
 from e2efly.config import number
 from e2efly.control.vectors import Array, Quat, namespace
+from e2efly.courses.domain import Domain, extent
 from e2efly.goal import Course, Goal, Outcome, Shape
 from e2efly.observation import Field
 from e2efly.tasks.gap import GapConfig
@@ -179,6 +180,10 @@ class GapRoute(Route):
     """Roll of the slit about the direction of flight, rad. Positive: its left end is up."""
     before: float = number(3.0, above=0)
     """Distance from the point where the policy takes over to the slit, m."""
+
+    def domain(self) -> Domain:
+        """Distance and tilt of the slit."""
+        return extent("slit_distance", "m", self.before), extent("slit_tilt", "rad", abs(self.slit_roll))
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course from a point straight in front of the slit to the point behind it, flown once."""

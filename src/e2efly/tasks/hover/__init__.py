@@ -9,7 +9,9 @@ import numpy as np
 
 from e2efly.config import BPTTConfig, EnvConfig, Paper, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain
 from e2efly.drawing import INK, Line, Mark, Thing, circle
+from e2efly.numbers import ANGLE, BODY_RATE, SPEED
 from e2efly.tasks.registry import register
 
 
@@ -61,11 +63,11 @@ class HoverConfig(TaskConfig):
     """Where to hover, world, m."""
     position: float = 2.0
     """Largest start distance from the target, m per axis."""
-    velocity: float = 1.0
+    velocity: float = number(1.0, high=SPEED)
     """Largest start velocity, m/s per axis, in either direction; drawn uniformly."""
-    tilt: float = 0.5235987755982988
+    tilt: float = number(0.5235987755982988, high=ANGLE)
     """Largest start roll and pitch, rad, in either direction; drawn uniformly."""
-    body_rate: float = 1.0
+    body_rate: float = number(1.0, high=BODY_RATE)
     """Largest start body rates, rad/s per axis, in either direction; drawn uniformly."""
     radius: float = number(0.1, above=0)
     """Success: largest distance from the target, m."""
@@ -80,6 +82,10 @@ class HoverConfig(TaskConfig):
     def criteria(self) -> dict[str, TaskConfig]:
         """Episodes of length `judged_s`, if that is not 0."""
         return {self.name: dataclasses.replace(self, episode_s=self.judged_s or self.episode_s)}
+
+    def domain(self) -> Domain:
+        """Nothing stands in its world, and its goal is one place."""
+        return ()
 
     def limits(self) -> dict[str, float]:
         """The largest distance from the target."""

@@ -6,6 +6,8 @@ from typing import ClassVar
 
 from e2efly.config import BPTTConfig, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain, extent
+from e2efly.numbers import ANGLE, BODY_RATE, SPEED
 from e2efly.tasks.registry import register
 
 
@@ -32,27 +34,27 @@ class HoverAwareConfig(TaskConfig):
     """The hover point, world frame, m."""
     position: float = 1.5
     """Largest start distance from the hover point, m per axis."""
-    velocity: float = 0.5
+    velocity: float = number(0.5, high=SPEED)
     """Largest start velocity, m/s per axis, in either direction; drawn uniformly."""
-    tilt: float = 0.2617993877991494
+    tilt: float = number(0.2617993877991494, high=ANGLE)
     """Largest start roll and pitch, rad, in either direction; drawn uniformly. The heading is arbitrary."""
     distance: tuple[float, float] = number((4.0, 6.0), rising=True)
     """Distance from the hover point to the object to look at, m, uniform."""
-    elevation: float = 0.2
+    elevation: float = number(0.2, high=ANGLE)
     """Largest height difference between the object and the hover point, m."""
-    turn_rate: float = 0.2
+    turn_rate: float = number(0.2, high=BODY_RATE)
     """Largest rate at which the object circles around the hover point, in either direction, rad/s."""
     size: float = 0.2
     """Radius of the object to look at, m."""
-    fov: tuple[float, float] = number((1.518436449235301, 1.0122909661567112), above=0)
+    fov: tuple[float, float] = number((1.518436449235301, 1.0122909661567112), above=0, high=ANGLE)
     """Horizontal and vertical field of view of the camera, rad."""
     camera_position: tuple[float, float, float] = number((0.0, 0.0, 0.0), low=-math.inf)
     """Position of the camera in the body frame (forward, left, up), m."""
-    camera_pitch: float = number(0.0, low=-math.inf)
+    camera_pitch: float = number(0.0, low=-ANGLE, high=ANGLE)
     """Downward pitch of the camera from straight ahead, rad."""
     radius: float = number(0.1, above=0)
     """Success: largest distance from the hover point, m."""
-    centred: float = 0.25
+    centred: float = number(0.25, high=ANGLE)
     """Success: largest offset of the object from the image centre, horizontally and vertically, as a share of half the
     image."""
     hold_s: float = 1.0
@@ -64,6 +66,11 @@ class HoverAwareConfig(TaskConfig):
     def own_worlds(self) -> bool:
         """Each episode has its own object to look at."""
         return True
+
+    def domain(self) -> Domain:
+        """The object to look at. It circles in either direction."""
+        rate = abs(self.turn_rate)
+        return extent("object_distance", "m", self.distance), extent("object_rate", "rad/s", (-rate, rate))
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:

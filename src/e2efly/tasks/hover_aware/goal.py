@@ -12,6 +12,7 @@ from e2efly.config import number
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, Quat, Vec3, namespace
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain, extent
 from e2efly.goal import Course, Goal, Outcome, Shape
 from e2efly.observation import Field
 from e2efly.tasks.hover_aware import HoverAwareConfig
@@ -135,6 +136,11 @@ class HoverAwareRoute(Route):
     """Rate at which the object circles around the target, rad/s."""
     size: float = number(0.2, above=0)
     """Radius of the object to look at, m."""
+
+    def domain(self) -> Domain:
+        """The object to look at."""
+        x, y, _ = np.subtract(self.look_at, self.target)
+        return extent("object_distance", "m", math.hypot(x, y)), extent("object_rate", "rad/s", self.turn_rate)
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course to the target. It has no end."""

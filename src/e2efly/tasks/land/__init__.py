@@ -17,7 +17,9 @@ from e2efly.config import (
     number,
 )
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain
 from e2efly.drawing import INK, ORANGE, Face, Line, Thing, circle
+from e2efly.numbers import ANGLE, SPEED
 from e2efly.tasks.registry import register
 
 
@@ -61,18 +63,22 @@ class LandConfig(TaskConfig):
     """Largest start distance from the pad's centre, m per axis."""
     height: tuple[float, float] = number((1.0, 3.0), rising=True)
     """Height of the feet at the start, m."""
-    velocity: float = 0.5
+    velocity: float = number(0.5, high=SPEED)
     """Largest start velocity, m/s per axis, in either direction; drawn uniformly."""
     radius: float = number(0.10, above=0)
     """Success: largest horizontal error at touchdown, m."""
     height_error: float = 0.05
     """Success: largest height error at touchdown, m."""
-    speed: float = 0.5
+    speed: float = number(0.5, high=SPEED)
     """Success: largest speed at touchdown, m/s."""
-    tilt: float = 0.2617993877991494
+    tilt: float = number(0.2617993877991494, high=ANGLE)
     """Success: largest tilt at touchdown, rad."""
     fence: float = number(defaults.LAND_FENCE, above=0, endless=True)
     """The episode fails farther than this from the pad, sideways or upwards, m."""
+
+    def domain(self) -> Domain:
+        """Nothing stands in its world, and its goal is one place."""
+        return ()
 
     def limits(self) -> dict[str, float]:
         """The pad's radius."""

@@ -19,6 +19,8 @@ from e2efly.config import (
     number,
 )
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain, extent
+from e2efly.numbers import ANGLE, SPEED
 from e2efly.tasks.registry import register
 
 
@@ -45,7 +47,7 @@ class LandVisualConfig(TaskConfig):
     """Largest start distance from the pad's centre, m per axis."""
     height: tuple[float, float] = number((1.0, 3.0), rising=True)
     """Height of the feet above the pad at the start, m."""
-    velocity: float = 0.5
+    velocity: float = number(0.5, high=SPEED)
     """Largest start velocity, m/s per axis, in either direction; drawn uniformly."""
     pad_size: tuple[float, float] = number((0.4, 0.6), rising=True)
     """Width of the pad, m, uniform. Its shape is a disc, a square or a triangle."""
@@ -55,12 +57,16 @@ class LandVisualConfig(TaskConfig):
     """Success: largest horizontal error at touchdown, m."""
     height_error: float = 0.05
     """Success: largest height error at touchdown, m."""
-    speed: float = 0.5
+    speed: float = number(0.5, high=SPEED)
     """Success: largest speed at touchdown, m/s."""
-    tilt: float = 0.2617993877991494
+    tilt: float = number(0.2617993877991494, high=ANGLE)
     """Success: largest tilt at touchdown, rad."""
     fence: float = number(defaults.LAND_FENCE, above=0, endless=True)
     """The episode fails farther than this from the pad, sideways or upwards, m."""
+
+    def domain(self) -> Domain:
+        """The pad."""
+        return extent("pad_size", "m", self.pad_size), extent("pad_height", "m", self.pad_height)
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:

@@ -21,7 +21,9 @@ from e2efly.config import (
     shape,
 )
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain, track_domain
 from e2efly.courses.gates import FRAME, Gates
+from e2efly.courses.random_tracks import DOMAIN
 from e2efly.courses.tracks import load_track
 from e2efly.drawing import ORANGE, Face, Mark, Thing
 from e2efly.tasks.registry import register
@@ -102,6 +104,10 @@ class RaceConfig(TaskConfig):
     def criteria(self) -> dict[str, TaskConfig]:
         """One lap, or the requested number of laps."""
         return {self.name: dataclasses.replace(self, laps=max(self.laps, 1))}
+
+    def domain(self) -> Domain:
+        """The track, or random tracks."""
+        return DOMAIN if self.track == ANY else track_domain(load_track(self.track))
 
     @property
     def own_worlds(self) -> bool:

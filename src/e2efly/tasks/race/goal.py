@@ -11,6 +11,7 @@ from e2efly.config import number
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain, track_domain
 from e2efly.courses.gates import Gates, Tracks
 from e2efly.courses.tracks import RaceTrack, load_track
 from e2efly.deploy.policy.contract import Contract
@@ -170,6 +171,10 @@ class RaceRoute(Route):
 
         track = self._track()
         return self._placed(AnyRaceGoal(self._options(), shape), Memory(Tracks.of(track), np.zeros(1, int)), track)
+
+    def domain(self) -> Domain:
+        """The track."""
+        return track_domain(self._track())
 
     def _track(self) -> RaceTrack:
         track = load_track(self.track)

@@ -1,6 +1,7 @@
 """Options and recipes: fly through gates in order, among obstacles seen only by a camera."""
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -23,6 +24,9 @@ from e2efly.config import (
     number,
     shape,
 )
+from e2efly.courses.domain import Domain, Extent, extent, track_domain, union
+from e2efly.courses.tracks import load_track
+from e2efly.numbers import ANGLE, SPEED
 from e2efly.tasks.registry import register
 
 
@@ -65,9 +69,9 @@ class RaceClutterConfig(TaskConfig):
     """The obstacles."""
     gate_position: float = 0.3
     """Half-width of each gate's random offset from its place on the track, m per axis."""
-    gate_yaw: float = 0.2
+    gate_yaw: float = number(0.2, high=ANGLE)
     """Half-width of each gate's random rotation, rad."""
-    speed: tuple[float, float] = number((4.0, 12.0), rising=True)
+    speed: tuple[float, float] = number((4.0, 12.0), high=SPEED, rising=True)
     """Commanded speed, m/s, uniform per episode."""
     position: float = 0.5
     """Radius of the ball around the track's start in which episodes start, m."""
@@ -89,6 +93,29 @@ class RaceClutterConfig(TaskConfig):
         if len(self.track) == 1:
             return {self.name: judged}
         return {Path(track).stem: dataclasses.replace(judged, only=float(i)) for i, track in enumerate(self.track)}
+
+    def domain(self) -> Domain:
+        """The tracks with their displaced gates, the commanded speed, and up to so many obstacles."""
+        names = self.track if self.only < 0 else (self.track[int(self.only)],)
+        tracks = union(track_domain(load_track(name).enlarged(self.scale)) for name in names)
+        moved, turned = self.gate_position, self.gate_yaw
+        nearest = next(part.low for part in tracks if part.name == "gate_distance")
+        aside = math.asin(min(2 * math.sqrt(2) * moved / nearest, 1.0))  # by which the way to the next gate turns
+        more = {
+            "gate_altitude": moved, "gate_rise": 2 * moved, "gate_distance": 2 * math.sqrt(3) * moved,
+            "start_distance": math.sqrt(3) * moved, "gate_turn": 2 * turned, "gate_bearing": turned + aside,
+        }  # fmt: skip
+        return (
+            *(
+                Extent(part.name, part.unit, round(part.low - wider, 6), round(part.high + wider, 6))
+                for part in tracks
+                for wider in (more.get(part.name, 0.0),)
+            ),
+            extent("speed", "m/s", self.speed),
+            extent("obstacles", "1", (0.0, self.clutter.obstacles)),
+            extent("obstacle_size", "m", self.clutter.size),
+            extent("obstacles_moving", "1", (0.0, self.clutter.moving)),
+        )
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:

@@ -10,9 +10,11 @@ import numpy as np
 
 from e2efly.config import number
 from e2efly.control.vectors import Array, namespace
+from e2efly.courses.domain import Domain, extent, track_domain
 from e2efly.courses.gates import Tracks
-from e2efly.courses.tracks import RaceTrack, load_track, track_text
+from e2efly.courses.tracks import load_track, track_text
 from e2efly.goal import Course, Goal, Outcome, Shape
+from e2efly.numbers import SPEED
 from e2efly.observation import Field
 from e2efly.storage import write_atomically
 from e2efly.tasks.race import any_goal
@@ -125,7 +127,7 @@ class RaceClutterRoute(Route):
     """Factor by which the ground plan of the track is enlarged."""
     laps: int = number(1, high=LARGEST)
     """Number of laps to fly. 0: without end."""
-    speed: float = number(6.0, above=0)
+    speed: float = number(6.0, above=0, high=SPEED)
     """Commanded speed, m/s."""
 
     @classmethod
@@ -136,19 +138,17 @@ class RaceClutterRoute(Route):
         write_atomically(file, track_text(memory.tracks.track(0)).encode())
         return cls(track=str(file), scale=1.0, laps=int(course.goal.config.laps), speed=float(memory.speed[0]))
 
+    def domain(self) -> Domain:
+        """The track, and the commanded speed."""
+        return *track_domain(load_track(self.track).enlarged(self.scale)), extent("speed", "m/s", self.speed)
+
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course along the track, from its start and with its heading."""
         config = dataclasses.replace(RaceClutterConfig(), laps=self.laps)
-        track = drawn_larger(load_track(self.track), self.scale)
+        track = load_track(self.track).enlarged(self.scale)
         memory = Memory(Tracks.of(track), np.zeros(1, int), np.array([self.speed]))
         lowest = float((track.position[:, 2] - track.opening[:, 1] / 2).min())
         return Course(
             RaceClutterGoal(config, shape, control_period, 1), memory,
             np.asarray(track.start, np.float64), heading=float(track.start_yaw), lowest=lowest, clearance=0.0,
         )  # fmt: skip
-
-
-def drawn_larger(track: RaceTrack, scale: float) -> RaceTrack:
-    """The track with its ground plan enlarged by `scale`. Heights and openings stay the same."""
-    size = np.array([scale, scale, 1.0])
-    return dataclasses.replace(track, start=track.start * size, position=track.position * size)

@@ -21,7 +21,7 @@ from e2efly.scenes.scene import Scene, Solids
 from e2efly.scenes.shapes import FAR
 from e2efly.tasks.race.any_goal import Ahead
 from e2efly.tasks.race_clutter import RaceClutterConfig
-from e2efly.tasks.race_clutter.goal import Memory, RaceClutterGoal, drawn_larger
+from e2efly.tasks.race_clutter.goal import Memory, RaceClutterGoal
 from e2efly.tasks.task import at_rest, into_ball, struck, uniform
 
 APPROACH = 0.7
@@ -71,7 +71,7 @@ class RaceClutter(RaceClutterGoal):
             )
         if config.only not in range(-1, len(names)):
             raise ValueError(f"task.only is {config.only}; accepted: whole numbers from -1 to {len(names) - 1}")
-        tracks = [drawn_larger(load_track(name), config.scale) for name in config.track]
+        tracks = [load_track(name).enlarged(config.scale) for name in config.track]
         room = max(len(track.yaw) for track in tracks)
         given = jax.tree.map(lambda *x: np.concatenate(x), *(Tracks.of(track, room) for track in tracks))
         # the tracks are resolved here, so that they share a compiled program

@@ -18,6 +18,9 @@ from e2efly.config import (
     shape,
 )
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain
+from e2efly.courses.references import KNOT_PERIOD, Lissajous, motion_domain, read_csv, through_points
+from e2efly.numbers import BODY_RATE, SPEED
 from e2efly.tasks.registry import register
 
 
@@ -65,7 +68,7 @@ class TrackConfig(TaskConfig):
     """Centre of the reference, world, m."""
     position: float = 1.0
     """Radius of the ball around the reference in which episodes start, m."""
-    velocity: float = 0.5
+    velocity: float = number(0.5, high=SPEED)
     """Largest start velocity, m/s per axis, in either direction; drawn uniformly."""
     settle_s: float = 2.0
     """Time after which the error counts, s."""
@@ -75,13 +78,13 @@ class TrackConfig(TaskConfig):
     """The episode fails farther than this from the reference, m."""
     radius: float = number(defaults.RADIUS, above=0)
     """Circle: its radius, m. Lemniscate: half its length, m."""
-    circle_rate: float = number(defaults.CIRCLE_RATE, low=-math.inf)
+    circle_rate: float = number(defaults.CIRCLE_RATE, low=-BODY_RATE, high=BODY_RATE)
     """Circle: angular rate, rad/s."""
-    lemniscate_speed: float = defaults.LEMNISCATE_SPEED
+    lemniscate_speed: float = number(defaults.LEMNISCATE_SPEED, high=SPEED)
     """Lemniscate: highest speed, m/s."""
     polynomial_reach: float = 2.0
     """Random polynomial: largest distance of its knots from the centre, m per axis."""
-    polynomial_speed: float = 2.5
+    polynomial_speed: float = number(2.5, high=SPEED)
     """Random polynomial: largest speed at a knot, m/s."""
 
     def criteria(self) -> dict[str, TaskConfig]:
@@ -105,6 +108,21 @@ class TrackConfig(TaskConfig):
             size = {"half_length_m": float(self.radius), "top_speed_m_s": float(self.lemniscate_speed)}
             return shared | centre | size
         return shared
+
+    def domain(self) -> Domain:
+        """Top speed and acceleration of the reference.
+
+        A piece of a random polynomial lasts four knot periods. It is no faster than a piece of least jerk that begins
+        and ends at rest: 15/8 of its mean speed, and 10/sqrt(3) of that over its duration.
+        """
+        if self.reference == "polynomial":
+            top = self.polynomial_speed
+            return motion_domain(15 / 8 * top, 10 / math.sqrt(3) * top / (4 * KNOT_PERIOD))
+        if self.reference == "circle":
+            return Lissajous.circle(self.radius, self.circle_rate).domain
+        if self.reference == "lemniscate":
+            return Lissajous.lemniscate(self.radius, self.lemniscate_speed).domain
+        return through_points(read_csv(self.reference)).domain
 
     def limits(self) -> dict[str, float]:
         """The mean error."""

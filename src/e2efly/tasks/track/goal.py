@@ -12,6 +12,7 @@ from e2efly.config import number
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
+from e2efly.courses.domain import Domain
 from e2efly.courses.references import (
     LONGEST,
     POINTS,
@@ -23,6 +24,7 @@ from e2efly.courses.references import (
     through_points,
 )
 from e2efly.goal import Course, Goal, Outcome, Shape
+from e2efly.numbers import BODY_RATE, SPEED
 from e2efly.observation import Field
 from e2efly.tasks.route import Route, place
 from e2efly.tasks.track import TrackConfig
@@ -127,9 +129,9 @@ class TrackRoute(Route):
     """Centre of the circle or lemniscate, m."""
     radius: float = number(defaults.RADIUS, low=SMALLEST)
     """Radius of the circle, or half the length of the lemniscate, m."""
-    circle_rate: float = place(defaults.CIRCLE_RATE)
+    circle_rate: float = number(defaults.CIRCLE_RATE, low=-BODY_RATE, high=BODY_RATE)
     """Angular rate of the circle, rad/s. Negative: clockwise."""
-    lemniscate_speed: float = number(defaults.LEMNISCATE_SPEED, low=SMALLEST)
+    lemniscate_speed: float = number(defaults.LEMNISCATE_SPEED, low=SMALLEST, high=SPEED)
     """Top speed of the lemniscate, m/s."""
     phase: float = place(0.0)
     """Phase at which the circle or lemniscate begins, rad."""
@@ -144,6 +146,10 @@ class TrackRoute(Route):
         memory = Memory(spline, np.zeros(1), np.zeros(1))
         lowest = float(spline.knots[0, :, 0, 2].min())
         return Course(TrackGoal(TrackConfig(), shape), memory, start, duration=spline.duration, lowest=lowest)
+
+    def domain(self) -> Domain:
+        """Top speed and acceleration of the reference."""
+        return self._spline().domain
 
     def unused(self) -> tuple[str, ...]:
         """Options of other kinds of reference."""

@@ -13,6 +13,9 @@ from typing import Any, Callable  # noqa: UP035  # Python 3.8
 
 RARE = ("mode", "event", "meta")
 """Channels whose last message is sent again to each new subscriber, because the next one may come much later."""
+SITES = ("https://app.foxglove.dev", "file://")
+"""Origins that may look at the flight, besides the pages that this machine serves: Foxglove's site, and the desktop
+programs of Foxglove and Lichtblick, whose pages are files."""
 BACKLOG = 256
 """The largest number of messages that wait for a slow browser. The oldest ones are dropped first."""
 
@@ -51,11 +54,12 @@ class Foxglove:
                 if channel.topic in RARE:
                     put(("again", 0.0, {"channel": channel.topic}))
 
+        self._gate = importlib.import_module("origins").Gate(config["host"], config["port"], SITES)
         self._server = foxglove.start_server(
-            name="e2efly", host=config["host"], port=config["port"], server_listener=Listener(),
-            message_backlog_size=BACKLOG,
-        )  # fmt: skip
-        self.detail = f"ws://{config['host']}:{self._server.port}"
+            name="e2efly", host=self._gate.inside, port=0, server_listener=Listener(), message_backlog_size=BACKLOG
+        )
+        self._gate.begin(self._server.port)
+        self.detail = f"ws://{config['host']}:{self._gate.port}"
 
     def write(self, channel: str, stamp: int, values: dict[str, Any]) -> None:
         """Publish a record."""
@@ -89,6 +93,7 @@ class Foxglove:
     def close(self) -> None:
         """End the server."""
         self._server.stop()
+        self._gate.close(1.0)
 
     def _place(self, stamp: int, values: dict[str, Any]) -> None:
         for each in self._words.transforms(values, stamp, self._layouts):

@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnxruntime
 
+from e2efly.deploy.policy.onnx_file import Message, file_content, read, write
+from e2efly.deploy.policy.session import open_session
 from e2efly.deploy.sight.segment import SEGMENTERS, opencv
 
 OWN = Path(__file__).parent / "pad.onnx"
@@ -16,6 +17,21 @@ ACCEPTED = (
     "an ONNX file with one input, float32 (n, h, w, 3), red, green, blue in [0, 1], and one output, float32 (n, h, w), "
     "the probability that a pixel shows the pad"
 )
+LARGEST_SIDE = 2048
+"""Largest number of rows or columns that a network may ask for."""
+OPSETS = range(11, 25)
+"""Accepted versions of the operators."""
+OPERATORS = frozenset({
+    "Abs", "Add", "AveragePool", "BatchNormalization", "Cast", "Clip", "Concat", "Constant", "Conv", "ConvTranspose",
+    "DepthToSpace", "Div", "Dropout", "Elu", "Erf", "Exp", "Flatten", "Gather", "Gelu", "Gemm", "GlobalAveragePool",
+    "GlobalMaxPool", "GroupNormalization", "HardSigmoid", "HardSwish", "Identity", "InstanceNormalization",
+    "LayerNormalization", "LeakyRelu", "Log", "MatMul", "Max", "MaxPool", "Min", "Mish", "Mul", "Neg", "PRelu", "Pad",
+    "Pow", "ReduceMax", "ReduceMean", "ReduceSum", "Relu", "Reshape", "Resize", "Selu", "Shape", "Sigmoid", "Slice",
+    "Softmax", "Softplus", "SpaceToDepth", "Split", "Sqrt", "Squeeze", "Sub", "Tanh", "Transpose", "Unsqueeze",
+})  # fmt: skip
+"""Accepted operators: of ONNX's own, those whose work depends on nothing but the size of the picture."""
+GROWING = ("Pad", "Resize")
+"""Operators of which all inputs after the first are constants: these say how large the output is."""
 
 
 class Network:
@@ -28,20 +44,17 @@ class Network:
             ValueError: naming the file, and how it differs from `ACCEPTED`.
         """
         self.path = path
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.log_severity_level = 4  # what is wrong is in the exception
         try:
-            content = path.read_bytes()
-        except OSError as error:
-            raise ValueError(f"{path}: {error.strerror}; accepted: {ACCEPTED}") from None
-        try:
-            self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-            (given,), (_,) = self._session.get_inputs(), self._session.get_outputs()
-            self._name, (_, *sides, channels) = given.name, given.shape
-            self._sides = tuple(side if isinstance(side, int) else 0 for side in sides)  # 0: any
-            if len(self._sides) != 2 or channels != 3:
-                raise ValueError(f"its input has the shape {given.shape}")
+            model = read(file_content(path))
+            _check(model)
+            (given,), (_,) = model["graph"].get("input", []), model["graph"].get("output", [])
+            axes = given.get("type", {}).get("tensor_type", {}).get("shape", {}).get("dim", [])
+            shape = [axis.get("dim_value", 0) for axis in axes]  # 0: any
+            if len(shape) != 4 or shape[3] != 3 or not all(0 <= side <= LARGEST_SIDE for side in shape[1:3]):
+                raise ValueError(f"its input has the shape {shape}")
+            self._name, self._sides = given.get("name", ""), (shape[1], shape[2])
+            black = np.zeros((1, *(side or LONGER_SIDE for side in self._sides), 3), np.float32)
+            self._session = open_session(write(model), [black], trusted=path == OWN)
             self.probability(np.zeros((LONGER_SIDE, LONGER_SIDE, 3), np.uint8))
         except Exception as error:  # any refusal of ONNX Runtime, or a wrong number of inputs or outputs
             said = str(error).strip().partition("\n")[0]
@@ -78,6 +91,22 @@ class Network:
     def describe(self) -> str:
         """The name of the network."""
         return "the network of pads of benchmarks/pad_masks.py" if self.path == OWN else f"network {self.path}"
+
+
+def _check(model: Message) -> None:
+    """Refuse operators that are not in `OPERATORS`. The trial of `open_session` finds what takes too long."""
+    versions = [(entry.get("domain", ""), entry.get("version", 0)) for entry in model.get("opset_import", [])]
+    if len(versions) != 1 or versions[0][0] not in ("", "ai.onnx") or versions[0][1] not in OPSETS:
+        raise ValueError(f"its operators have the versions {versions!r:.200}, not one of {OPSETS[0]} to {OPSETS[-1]}")
+    graph = model.get("graph", {})
+    constants = {""} | {tensor.get("name", "") for tensor in graph.get("initializer", [])}
+    for node in graph.get("node", []):
+        kind, inputs = node.get("op_type", ""), node.get("input", [])
+        if node.get("domain", "") not in ("", "ai.onnx") or kind not in OPERATORS:
+            raise ValueError(f"its operator {kind!r:.40} is none of {', '.join(sorted(OPERATORS))}")
+        if kind in GROWING and not constants.issuperset(inputs[1:]):
+            raise ValueError(f"its operator {kind!r} has an output whose size is not constant")
+        constants |= set(node.get("output", [])) if kind == "Constant" else set()
 
 
 def open_onnx(text: str) -> Network:

@@ -1,0 +1,42 @@
+"""Load a network and run it once, within limits of memory and time: `python first_run.py MIB SECONDS < INPUT`.
+
+The input is an .npz: `content`, the bytes of an ONNX file, and `arr_0`, `arr_1`, ... for the inputs of its graph, in
+their order. The exit status is 0 if the network ran. Otherwise the last line of the standard error says why not.
+This script needs NumPy and ONNX Runtime alone.
+"""
+
+import io
+import resource
+import sys
+
+import numpy as np
+import onnxruntime
+
+
+def main(mib: int, seconds: int) -> None:
+    """Load and run the network."""
+    given = np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False)
+    content, inputs = given["content"].tobytes(), [given[f"arr_{i}"] for i in range(len(given.files) - 1)]
+    _limit(resource.RLIMIT_CPU, seconds)  # also where the process that waits for this one is gone
+    if sys.platform == "linux":
+        with open("/proc/self/statm") as file:  # noqa: PTH123
+            _limit(resource.RLIMIT_AS, int(file.read().split()[0]) * resource.getpagesize() + (mib << 20))
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    session.run(None, dict(zip([node.name for node in session.get_inputs()], inputs, strict=True)))
+
+
+def _limit(kind: int, most: int) -> None:
+    """Lower a limit of this process."""
+    _, hard = resource.getrlimit(kind)
+    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    resource.setrlimit(kind, (most, most))
+
+
+if __name__ == "__main__":
+    try:
+        main(*map(int, sys.argv[1:3]))
+    except Exception as error:  # ONNX Runtime's errors share no other base
+        sys.exit(f"{type(error).__name__}: {error}".replace("\n", " "))

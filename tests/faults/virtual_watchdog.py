@@ -1,0 +1,141 @@
+"""The watchdog's own code, both ends of it, in a rig's time: its process is a thread that runs when it is told."""
+
+import socket
+import threading
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+from unittest import mock
+
+from e2efly.deploy.betaflight import watchdog
+from e2efly.deploy.betaflight.link import Link
+from e2efly.deploy.betaflight.watchdog import Plan, WatchedLink
+
+UNUSED = "tcp:127.0.0.1:1"
+"""The link that a process would open; the thread is given one."""
+
+
+class _Ended(BaseException):
+    """The thread is to end wherever it is: nobody kills a thread."""
+
+
+class VirtualWatchdog:
+    """A bridge's link through a watchdog. One at a time: the module's clock is the rig's while it lives."""
+
+    def __init__(self, now: Callable[[], float], link: Link) -> None:
+        """Start it.
+
+        Args:
+            now: the rig's time, s.
+            link: to the controller.
+        """
+        self.stopped = False
+        """Whether its process stands still."""
+        self._link, self._ending = link, False
+        self._problem: BaseException | None = None
+        self._go, self._back = threading.Semaphore(0), threading.Semaphore(0)
+        self._taken, really = False, watchdog.land
+
+        def land(*what: Any) -> None:
+            self._taken = True
+            really(*what)
+
+        fakes = {
+            "land": land,
+            "time": SimpleNamespace(monotonic=now, sleep=lambda seconds: self._wait()),
+            "select": SimpleNamespace(select=lambda *_: (self._wait(), ([], [], []))[1]),
+            "subprocess": SimpleNamespace(Popen=self._start, DEVNULL=None, TimeoutExpired=TimeoutError),
+            "Lifeline": mock.Mock(side_effect=OSError),  # it tells of a death, and nobody dies here
+        }
+        self._patches = [mock.patch.object(watchdog, name, fake) for name, fake in fakes.items()]
+        for patch in self._patches:
+            patch.start()
+        self._watched = WatchedLink(UNUSED)
+
+    @property
+    def alive(self) -> bool:
+        """As the bridge's end says."""
+        return self._watched.alive
+
+    @property
+    def reason(self) -> str:
+        """As the bridge's end says."""
+        return self._watched.reason
+
+    @property
+    def connections(self) -> int:
+        """As the bridge's end says."""
+        return self._watched.connections
+
+    @property
+    def has_taken_over(self) -> bool:
+        """Whether it has the controller. The bridge may not know yet, and never does if it stands still for good."""
+        return self._taken
+
+    @property
+    def taken_over(self) -> str:
+        """As the bridge's end says."""
+        return self._watched.taken_over
+
+    def poll(self, now: float) -> None:
+        """One round of it, then what the bridge's end does."""
+        self.step()
+        self._watched.poll(now)
+
+    def send(self, data: bytes) -> None:
+        """To the controller."""
+        self._watched.send(data)
+
+    def receive(self) -> bytes:
+        """From the controller."""
+        return self._watched.receive()
+
+    def plan(self, plan: Plan) -> None:
+        """What it has to do without the bridge."""
+        self._watched.plan(plan)
+
+    def step(self) -> None:
+        """Let it run until it waits, unless it stands still or has ended.
+
+        Raises:
+            BaseException: whatever ended it.
+        """
+        if not self.stopped and self._thread.is_alive():
+            self._go.release()
+            self._back.acquire()
+        if self._problem is not None:
+            raise self._problem
+
+    def close(self) -> None:
+        """End it, wherever it is."""
+        self.stopped, self._ending = False, True
+        self._watched.close()
+        for patch in self._patches:
+            patch.stop()
+        self._link.close()
+
+    def _start(self, command: list[str], pass_fds: list[int], **_: Any) -> SimpleNamespace:
+        """In place of a process."""
+        timeout = float(command[4])
+        mine = socket.socket(fileno=socket.dup(pass_fds[0]))
+        self._thread = threading.Thread(target=self._serve, args=(mine, timeout), daemon=True)
+        self._thread.start()
+        return SimpleNamespace(wait=lambda seconds: self.step(), poll=lambda: None)
+
+    def _serve(self, mine: socket.socket, timeout: float) -> None:
+        self._go.acquire()
+        try:
+            with mine:
+                watchdog.serve(mine, None, self._link, timeout)
+        except _Ended:
+            pass
+        except BaseException as problem:  # told to whoever waits
+            self._problem = problem
+        self._back.release()
+
+    def _wait(self) -> None:
+        """Until it is told to go on."""
+        self._back.release()
+        self._go.acquire()
+        if self._ending:
+            raise _Ended
