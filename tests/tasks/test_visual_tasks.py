@@ -19,7 +19,6 @@ from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.land_visual import LandVisualConfig
 from e2efly.tasks.race.any_goal import Ahead
 from e2efly.tasks.race_clutter import RaceClutterConfig
-from e2efly.tasks.race_clutter.goal import drawn_larger
 from e2efly.tasks.race_clutter.world import World, _path
 from e2efly.tasks.task import Outcome, Shape, at_rest, make_task, struck
 
@@ -151,8 +150,8 @@ def test_one_of_several_tracks_is_the_track_alone(track: str) -> None:
     """Worlds with room for more gates than the track has differ in nothing that is seen, asked for or judged."""
     alone = make_task(RaceClutterConfig(track=(track,)), SHAPE, PERIOD, 7)
     among = make_task(RaceClutterConfig(only=TRACKS.index(track)), SHAPE, PERIOD, 7)
-    own = Tracks.of(drawn_larger(load_track(track), 2.0))
-    wide = Tracks.of(drawn_larger(load_track(track), 2.0), 6)
+    own = Tracks.of(load_track(track).enlarged(2.0))
+    wide = Tracks.of(load_track(track).enlarged(2.0), 6)
     place = at(own.gates.start[0] + np.array([1.0, 0.5, 0.0]), (3.0, 0.0, 0.0))
     count = int(own.count[0])
     for passed in range(count):

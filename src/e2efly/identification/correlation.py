@@ -64,8 +64,9 @@ def correlation(
         end = at + len(block)
         matrix[at:end, at:end] = block
         at = end
-    low = float(np.linalg.eigvalsh(matrix)[0]) if names else 1.0
-    if low < FIRM:  # a flight of fewer windows than unknowns leaves directions without a spread
+    # a flight of fewer windows than unknowns leaves directions without a spread
+    if names and np.linalg.eigvalsh(np.round(matrix, 4))[0] <= 0:
+        low = float(np.linalg.eigvalsh(matrix)[0])
         own = (FIRM - low) / (1 - low)
         matrix = (1 - own) * matrix + own * np.eye(len(names))
     return names, matrix

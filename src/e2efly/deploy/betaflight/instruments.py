@@ -167,9 +167,12 @@ class Instruments:
 
     def _link_problem(self, status: StatusEx | None) -> str | None:
         patience, link = self.settings.link_timeout, self.client.link
+        late = self.client.latency > BEHIND * patience
+        if (status is None or late) and not link.alive:
+            return link.reason
         if status is None:
-            return link.reason if not link.alive else f"no answer within {patience:g} s"
-        if self.client.latency > BEHIND * patience:
+            return f"no answer within {patience:g} s"
+        if late:
             return f"it answers {1e3 * self.client.latency:.0f} ms late (set serial_update_rate_hz=1000)"
         return None
 
