@@ -79,6 +79,8 @@ def strike(stage: Stage, fault: Fault, log: Path) -> Outcome:
                 settled = stage.rig.now() + fault.watch
         changes = tuple((t - at, mode, why) for t, mode, why in session.flown.changes[known:])
         reaction = at + changes[0][0] - begun if changes else math.nan
+        if changes and math.isnan(begun):
+            reaction = 0.0  # before it had to
         trace, mode = stage.trace, stage.mode
         bridge.log = None
     stage.heal()
