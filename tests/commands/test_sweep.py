@@ -138,11 +138,11 @@ def test_a_run_that_was_cut_goes_on_and_a_lost_worker_is_replaced(tmp_path: Path
 
 
 def test_a_run_that_fails_is_told_and_the_others_end(tmp_path: Path) -> None:
-    process = sweep(tmp_path, "--seeds", "1", "--vary", *SMALL, "algo.learning-rate=1,1e-3")
+    process = sweep(tmp_path, "--seeds", "1", "--vary", *SMALL, "env.vehicle=nowhere.toml,vis_r")
     told, _ = process.communicate()
     assert process.returncode == 1
-    assert "failed: algo.learning-rate-1_seed-0: status 2: error:" in " ".join(told.split())
-    assert (tmp_path / "sweep/algo.learning-rate-1e-3_seed-0/policy.onnx").exists()
+    assert "failed: env.vehicle-nowhere.toml_seed-0: status 2: error:" in " ".join(told.split())
+    assert (tmp_path / "sweep/env.vehicle-vis_r_seed-0/policy.onnx").exists()
 
 
 def _updates(folder: Path) -> int:
