@@ -394,13 +394,13 @@ def test_loading_imports_no_jax_and_no_simulator(path: Path) -> None:
     loaded = out.stdout.split()
     assert "e2efly.deploy.policy.loader" in loaded
     ours = {name.split(".")[1] for name in loaded if name.startswith("e2efly.")}
-    assert ours == {"control", "courses", "deploy", "observation", "storage", "vehicles", "zoo"}
+    assert ours == {"control", "courses", "deploy", "gravity", "observation", "storage", "vehicles", "zoo"}
     assert not {"jax", "jaxlib", "jaxtyping", "onnx", "optax", "scipy", "matplotlib"} & set(loaded)
 
 
 OURS = (
-    "__version__", "control", "courses", "deploy", "goal", "numbers", "observation", "process", "registry", "solids",
-    "storage", "vehicles", "zoo",
+    "__version__", "control", "courses", "deploy", "goal", "gravity", "numbers", "observation", "process", "registry",
+    "solids", "storage", "vehicles", "zoo",
 )  # fmt: skip
 """Parts of the package that flight may import."""
 
