@@ -186,3 +186,13 @@ def test_what_a_fall_taught_does_not_outlast_it() -> None:
     again = fallen.at_rest()
     assert again.scale.value == 1.0 and again.share == 1.0 and not again.learned and not again.frozen
     assert again.rest_problem is None and again.watch.felt == () and again.touch.sums == ()
+
+
+def test_a_pause_of_the_poses_in_which_the_velocity_changed_teaches_no_scale() -> None:
+    inertial, now = hovering(factor=0.97), 3.0
+    before = inertial.scale.value
+    for k in range(80):
+        now += DT
+        told = measurement(0.97 * GRAVITY, now=now, jitter=0.01 * math.sin(now), climb=None if k < 40 else 2.0)
+        inertial = measure(inertial, told, now)
+    assert inertial.scale.value == pytest.approx(before, abs=0.01)

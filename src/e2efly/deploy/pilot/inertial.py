@@ -152,6 +152,8 @@ def measure(before: Inertial, m: Measurement, now: float) -> Inertial:
         return replace(before, rest=rest, watch=watch, touch=felt, force=None, gyro=m.gyro, time=now, frozen=True)
     if m.climb is not None and m.attitude is not None and watch.moved < QUIET:
         scale = learn(scale, m.attitude, plain, m.climb, dt)
+    else:
+        scale = replace(scale, climb=None)  # what happens in the meantime is not compared
     force = scale.value * plain
     thrust = m.thrust or (GRAVITY, GRAVITY)
     if m.attitude is not None:
