@@ -274,7 +274,7 @@ class Bridge:
             seen = inputs.seen if flying and not flight.misled else None
             late = self._late(reply, now)
             asked = reply.time - late
-            known = now - self._broken > ANEW_S
+            known = now - self._broken > ANEW_S and not self.client.steered(now)
             acts = known and self.client.delivered(asked - ACTING_S, asked) and not reading.failsafe
             came = known and self.client.delivered(min(self.estimate.inertial.time, asked), asked, RARELY_S)
             sent = None if reading.failsafe else self._history.felt(asked)
@@ -299,7 +299,7 @@ class Bridge:
                     self.map = learn(self.map, sent, force, inputs.voltage, 0.02, swing)
 
         def lift(throttle: float | None) -> tuple[float, float] | None:
-            lifts = flight.mode in (Mode.HOVER, Mode.POLICY, Mode.LAND) and not reading.failsafe
+            lifts = self.flying and not reading.failsafe
             return self.map.expected(throttle, inputs.voltage) if lifts and throttle is not None else None
 
         told = inertial.carry(
@@ -426,9 +426,9 @@ class Bridge:
             throttle = self.map.throttle(float(command.thrust), self.inputs.voltage)
             stick = self.sticks.channels_of(min(throttle, self.sticks.throttle.largest), rates_of(command), ())
             sent = Sent(source, command, throttle, stick.channels, stick.saturated)
-        self._history.add(now, sent.throttle)
-        self._turns.append((now, sent.rate))
-        self.client.set_raw_rc(set_raw_rc(sent.channels), now)
+        acts = sent if self.client.set_raw_rc(set_raw_rc(sent.channels), now) else self._held
+        self._history.add(now, acts.throttle)
+        self._turns.append((now, acts.rate))
         return sent
 
     def _closed(self) -> tuple[int, ...]:

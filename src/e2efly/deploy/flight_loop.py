@@ -186,6 +186,7 @@ def _sense(bridge: Bridge) -> Sense | None:
         table.setdefault(sticks.throttle.channel_for(share), force)
     gravity = 0.0 if told.rest is None or told.frozen else float(np.linalg.norm(told.rest))
     forward, left, _ = moves.velocity
+    attitude = moves.attitude
     return Sense(
         unit=told.scale.value * GRAVITY / gravity if gravity > 0 else 0.0,
         forces=tuple(table.values()),
@@ -193,6 +194,7 @@ def _sense(bridge: Bridge) -> Sense | None:
         doubt=bridge.map.doubt,
         share=told.share,
         velocity=(forward, left, moves.climb),
+        upright=1.0 if attitude is None else math.cos(attitude.roll) * math.cos(attitude.pitch),
         height=moves.height - bridge.flight.home,
     )
 

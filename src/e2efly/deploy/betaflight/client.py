@@ -119,6 +119,7 @@ class Client:
     _connection: int = 0
     _spoilt: float = -math.inf
     _foreign: float = -math.inf
+    _steered: float = -math.inf
     _last_asked: float = -math.inf
 
     def poll(self, now: float) -> None:
@@ -176,6 +177,10 @@ class Client:
         """Whether another program asks on this link."""
         return now - self._foreign < CROWDED_S
 
+    def steered(self, now: float) -> bool:
+        """Whether another program sends sticks on this link."""
+        return now - self._steered < CROWDED_S
+
     def _take(self, frame: Frame, now: float) -> None:
         if frame.direction == REQUEST:
             return  # an echo, for example from a line whose two wires touch
@@ -213,6 +218,7 @@ class Client:
         fitting = [k for k, (awaited, _) in enumerate(self._awaited) if awaited == code]
         if not fitting:
             self._foreign = now
+            self._steered = now if code == messages.SET_RAW_RC else self._steered
             return now
         chosen = fitting[0]
         if self.lossy(now):

@@ -73,6 +73,8 @@ class Sense:
     """The share of these forces that the rotors really give."""
     velocity: tuple[float, float, float]
     """Forward, left and up along the heading, m/s."""
+    upright: float
+    """Cosine of the tilt."""
     height: float
     """The largest plausible height over the ground, m."""
 
@@ -84,7 +86,7 @@ class Sense:
             "unit": self.unit >= 0,
             "share": 0 < self.share < math.inf,
         }
-        numbers = (self.unit, self.doubt, self.height, *self.velocity, *self.forces)
+        numbers = (self.unit, self.doubt, self.upright, self.height, *self.velocity, *self.forces)
         good["unit"] = good["unit"] and all(map(math.isfinite, numbers))
         for name, fine in good.items():
             if not fine:
@@ -127,10 +129,15 @@ class Descent:
     """It stands, or must be standing: the throttle is closed for good."""
 
     @staticmethod
-    def of(sense: Sense, expected: float, held: float, now: float) -> "Descent":
-        """Begin at `now`, s, with a controller that has held the thrust `held`, m/s^2. `expected`: see there."""
-        velocity, thrusts = sense.velocity, ((now - KEPT_S, held),)
-        return Descent(velocity, velocity[2], DOUBT, sense.height, sense.share, expected, now, thrusts=thrusts)
+    def of(sense: Sense, expected: float, held: float, now: float, age: float) -> "Descent":
+        """Begin at `now`, s, `age` s after `sense`, with a controller that has held the thrust `held`, m/s^2, since.
+        `expected`: see there.
+        """
+        forward, left, climb = sense.velocity if age <= STEP_S else (0.0, 0.0, sense.velocity[2])
+        up = climb + (sense.share * held * sense.upright - GRAVITY) * age
+        doubt, height = DOUBT + sense.doubt * held * age, sense.height + max(climb, up) * age
+        thrusts = ((now - KEPT_S, held),)
+        return Descent((forward, left, up), up, doubt, height, sense.share, expected, now, thrusts=thrusts)
 
     @property
     def climb(self) -> float:

@@ -314,12 +314,12 @@ def land(link: Link, plan: Plan, held: bytes = b"", age: float = 0.0) -> None:
         link: the link to the controller.
         plan: the last plan of the bridge.
         held: the last stick frame of the bridge, which the controller has held since.
-        age: how old the plan is, s. The first step of the velocity covers this time, too.
+        age: how old the plan is, s.
     """
     decoder, attitude, levelled, disarmed, rounds = Decoder(), None, time.monotonic(), 0, 0
     sense, down = plan.sense, plan.throttle[-1][0]
     before = heard = told = time.monotonic()
-    fall = None if sense is None else Descent.of(sense, down, _thrust(plan, sense, held), before - age)
+    fall = None if sense is None else Descent.of(sense, down, _thrust(plan, sense, held), before, age)
     elapsed, thrust, closed_at = 0.0, 0.0, inf
     while True:
         link.poll(now := time.monotonic())

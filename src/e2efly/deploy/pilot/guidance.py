@@ -20,7 +20,7 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 TRIM = (-3.0, 5.0)
 """Bounds of the thrust that a take-off adds while the throttle map is still wrong, m/s^2."""
-LIFT = 1.25
+LIFT = 1.08
 """A take-off commands at most this share of the weight, without the trim: the controller may hold the command of a link
 that falls silent now."""
 TRIM_GAIN = 3.0

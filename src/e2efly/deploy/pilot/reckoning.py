@@ -20,8 +20,9 @@ from e2efly.deploy.pilot.accelerometer import level
 from e2efly.deploy.pilot.hover import LEVEL_GAIN, LEVEL_RATE, SINK_ACCELERATION, SINK_FASTER, SINK_SPEED
 from e2efly.vehicles.vehicle import GRAVITY
 
-LONGEST_STEP = 0.1
-"""The longest time between two measurements, s. After a longer pause the velocity is not known any more."""
+LONGEST_STEP = 2.5
+"""The longest step, s: a bridge that was stopped goes on with what the controller has held meanwhile. After a longer
+pause the velocity is not known any more."""
 BRAKE_GAIN, BRAKE_ACCELERATION = 1.5, 3.0
 """Deceleration divided by horizontal speed, 1/s, and the largest deceleration, m/s^2."""
 BRAKE_S = 2.0

@@ -25,6 +25,9 @@ LONGEST_STEP = 0.1
 """The longest time that one step may count, s, even if the clock jumps."""
 SLOWING = 0.5
 """Deceleration with which a take-off's target nears its height, m/s^2."""
+AHEAD = 0.15
+"""How far the target of a take-off may be over the vehicle, m. A vehicle that lags behind must not catch up fast: the
+controller may hold the command of a link that falls silent now."""
 CLIMB_S = 5.0
 """How much longer a take-off may last than the climb of its target, s."""
 MISLED = "the vehicle does not go where it is sent (wrong heading?)"
@@ -196,7 +199,7 @@ def _take_off(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: floa
     x, y, z = flight.target.position
     goal = flight.home + settings.takeoff_height
     climb = min(settings.takeoff_speed, math.sqrt(2 * SLOWING * max(goal - z, 0.0)) + 0.02)
-    up = min(z + climb * dt, goal)
+    up = min(z + climb * dt, goal, max(z, height + flight.home + AHEAD))
     target = Target((x, y, up), flight.target.yaw, climb if up < goal else 0.0)
     if settings.takeoff_height - height < 0.1 and up == goal:
         return to(flight, Mode.HOVER, Reason.REACHED, target=target)

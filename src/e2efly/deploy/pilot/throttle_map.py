@@ -45,6 +45,8 @@ is 20 % for the factor and 0.7 for the voltage gain."""
 BLOWN = 3.0
 """With more force than this across the body, m/s^2, the air pushes so hard that the force along the body's z axis shows
 little of the thrust."""
+SATURATED = 0.9
+"""Nothing is learned from a throttle above this: where motors reach their ends, the mixer takes thrust away."""
 THRUST_DELAY = (0.015, 0.075)
 """The time between sending a throttle and the measured force that it causes, s: the delays of the link, the rate loop
 and the motors."""
@@ -191,7 +193,7 @@ def learn(
 ) -> ThrottleMap:
     """`update` with a specific force (3,), body FLU, m/s^2, unless the air pushes hard across the body."""
     blown = math.hypot(force[0], force[1]) > BLOWN
-    return m if blown else update(m, throttle, float(force[2]), voltage, dt, swing)
+    return m if blown or throttle + swing / 2 > SATURATED else update(m, throttle, float(force[2]), voltage, dt, swing)
 
 
 def _towards(value: float, goal: float, reach: float) -> float:
