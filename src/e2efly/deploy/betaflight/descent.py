@@ -203,7 +203,7 @@ def move(before: Descent, sense: Sense, attitude: Attitude | None, now: float, *
 
 def command(before: Descent, attitude: Attitude | None, dt: float) -> tuple[Descent, float, tuple[float, float]]:
     """The descent after another `dt` s, the thrust to send, m/s^2, and the roll and pitch to turn to, rad."""
-    now, felt = before.now, before.touch.weigh(before.now)
+    now, felt = before.now, before.touch.weigh(before.now, low=-before.height > OVERDUE)
     error = before.sink - before.climb
     trim = before.trim + TRIM_GAIN * max(-TRIM_ERROR, min(TRIM_ERROR, error)) * dt
     trim = max(-LARGEST_TRIM, min(LARGEST_TRIM, trim))

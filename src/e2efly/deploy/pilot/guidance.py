@@ -100,14 +100,15 @@ def descend(
     Returns:
         The command; the trim, m/s^2; the state of the inertial sensors, for which a weighing may have begun.
     """
-    reckoned, felt = told.reckoned, told.touch.weigh(now)
+    reckoned = told.reckoned
+    under = -math.inf if reckoned is None else flight.home - reckoned.height
+    felt = told.touch.weigh(now, low=under > OVERDUE)
     if reckoned is None:
         command = blind(attitude, now - flight.since, 0.0 if flight.lost is None else flight.lost[2])
         thrust = float(command.thrust)
     else:
         trim = reckoning.trimmed(trim, reckoned, flight.home, dt)
         command = reckoning.settle(attitude, reckoned, flight.home, trim)
-        under = flight.home - reckoned.height
         deaf = not felt.able(now)
         weight = GRAVITY * max(WEIGHT[deaf] - LIGHTER[deaf] * under, LIGHTEST)
         thrust = min(float(command.thrust), weight) if under > OVERDUE else float(command.thrust)

@@ -21,9 +21,6 @@ from e2efly.vehicles.vehicle import GRAVITY
 
 FRESH_S = 0.1
 """How long a measured force is used, s."""
-DELIVERED = 0.3
-"""After a silence: how much closer the measured force must be to the sent command than to the held command, m/s^2, to
-show that the sent commands arrived."""
 SHARE_RATE, SHARE_S, SHARE_RANGE = 0.05, 0.3, (0.7, 1.3)
 """How fast the share of the map's force is followed while poses are good, 1/s and s, and its bounds."""
 SAG, SMOOTH_S, SAG_RATE, SAG_S = 0.02, 0.1, 0.1, 0.2
@@ -84,9 +81,7 @@ class Inertial:
     reckonings: Reckonings = Reckonings()
     """The velocity, propagated from the poses with what was sent."""
     held: Reckonings | None = None
-    """The same since the newest measurement, if the controller has held the command of that time ever since ..."""
-    held_thrust: float | None = None
-    """... and the specific force of that command, m/s^2."""
+    """The same since the newest measurement, if the controller has held the command of that time ever since."""
     touch: Touch = Touch()
     """Detection of the ground."""
     force: np.ndarray | None = None
@@ -142,7 +137,8 @@ def measure(before: Inertial, m: Measurement, now: float) -> Inertial:
     scale, watch, felt = before.scale, before.watch, before.touch
     if now - before.time > FRESH_S:
         scale = replace(scale, climb=None)
-    before = replace(before, reckonings=_after_silence(before, m, scale.value * plain, now), held=None)
+    held = before.held if now - before.time > FRESH_S and not m.delivered else None
+    before = replace(before, reckonings=held or before.reckonings, held=None)
     m = m if m.acts else replace(m, thrust=None, thrusts=())
     felt = touch.seen(felt, tuple(m.counts.tolist()), None if m.thrust is None else m.thrust[0], now)
     if felt.frozen and not m.standing:
@@ -213,8 +209,8 @@ def carry(
 ) -> Inertial:
     """Propagate the velocity to `now`, s; see `reckoning.reckon`.
 
-    A controller that is not heard may receive the commands, or may hold the last one. Both cases are computed, and the
-    first measurement afterwards shows which one is true.
+    A controller that is not heard may receive the commands, or may hold the last one. Both cases are computed. The
+    first measurement afterwards chooses: the commands arrived only if that is known.
 
     Args:
         before: the state so far.
@@ -239,18 +235,7 @@ def carry(
     if now <= before.time:
         return after
     begun = before.reckonings if before.held is None else before.held
-    return replace(after, held=begun.on(on(held, held_rate)), held_thrust=None if held is None else held[0])
-
-
-def _after_silence(before: Inertial, m: Measurement, force: np.ndarray, now: float) -> Reckonings:
-    """The velocity according to the commands that arrived while nothing was heard."""
-    if before.held is None or before.held_thrust is None or now - before.time <= FRESH_S or m.delivered:
-        return before.reckonings
-    if m.thrust is None:
-        return before.reckonings
-    z = float(force[2])
-    came = abs(z - m.thrust[0]) < abs(z - before.held_thrust) - DELIVERED
-    return before.reckonings if came else before.held
+    return replace(after, held=begun.on(on(held, held_rate)))
 
 
 def alone(before: Inertial, *, wrong: bool) -> Inertial:

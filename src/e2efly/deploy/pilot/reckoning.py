@@ -58,8 +58,10 @@ class Reckoning:
     """Possible error of `lifted`, m/s."""
     time: float
     """Time up to which it is propagated, s."""
+    begun: float
+    """When the odometry was last seen, s."""
     since: float
-    """When the odometry was last seen, s. It moves on while the controller is not heard."""
+    """The same, but it moves on while the controller is not heard, s."""
     height: float
     """The largest plausible height, propagated from the last odometry, world, m."""
     attitude: Attitude | None = None
@@ -86,7 +88,7 @@ class Reckonings:
 
     def seen(self, newest: Reckoning) -> "Reckonings":
         """These reckonings with another pose."""
-        if self.anchors and newest.since - self.anchors[-1].since < ANCHOR_S:
+        if self.anchors and newest.begun - self.anchors[-1].begun < ANCHOR_S:
             return replace(self, newest=newest)
         return Reckonings(newest, (*self.anchors[-ANCHORS + 1 :], newest))
 
@@ -125,7 +127,7 @@ def seen(odometry: Odometry, now: float, error: float = 0.0) -> Reckoning:
     yaw = yaw_of(odometry.quaternion) - error
     c, s = math.cos(yaw), math.sin(yaw)
     height = float(odometry.position[2])
-    return Reckoning((c * x + s * y, c * y - s * x, z), z, DOUBT, now, now, height)
+    return Reckoning((c * x + s * y, c * y - s * x, z), z, DOUBT, now, now, now, height)
 
 
 def reckon(

@@ -105,9 +105,12 @@ class Touch:
         """Whether the thrust of a blind descent is lowered at `now`, s, to weigh the vehicle."""
         return now - self.weighed < LONGEST_S
 
-    def weigh(self, now: float) -> "Touch":
-        """Begin to weigh at `now`, s, after a shock or where the slope is that of the ground, but not too often."""
+    def weigh(self, now: float, *, low: bool) -> "Touch":
+        """Begin to weigh at `now`, s, but not too often: after a shock, where the slope is that of the ground, or where
+        the height is (`low`) and the slope is not that of flight.
+        """
         ground = bool(self.sums) and all(_follows(sums) is False for sums in self.sums)
+        ground = ground or (low and self.stands(now) is None)
         due = (ground or self.time - self.struck < STRUCK_S) and now - self.time < TOLD_S and self.able(now)
         return replace(self, weighed=now, carried=0) if due and now - self.weighed > AGAIN_S else self
 
