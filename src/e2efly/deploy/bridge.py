@@ -48,7 +48,7 @@ from e2efly.deploy.settings import FlightSettings
 from e2efly.deploy.sight import watch
 from e2efly.deploy.sight.source import ImageSource
 from e2efly.deploy.sight.watch import Seen as Watched
-from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 
 ATTITUDE_S, BLIND_ATTITUDE_S = 0.1, 0.5
 """Largest age of the controller's attitude, s: for the estimates of heading and velocity, and for a descent without
@@ -253,7 +253,7 @@ class Bridge:
             motion_problem=told.motion_problem(mode),
             buried=flight.blind and told.inertial.buried(flight.home, now),
             stands=told.inertial.touch.stands(now),
-            deaf=not told.inertial.touch.able(now) and now - self._heard_since > DEAF_S,
+            deaf=not told.inertial.touch.tells(now) and now - self._heard_since > DEAF_S,
         )
 
     def _blindness(self, now: float) -> str | None:
@@ -299,8 +299,11 @@ class Bridge:
                     self.map = learn(self.map, sent, force, inputs.voltage, 0.02, swing)
 
         def lift(throttle: float | None) -> tuple[float, float] | None:
-            lifts = self.flying and not reading.failsafe
-            return self.map.expected(throttle, inputs.voltage) if lifts and throttle is not None else None
+            if throttle is None or not self.flying or reading.failsafe or self.client.steered(now):
+                return None
+            thrust, doubt = self.map.expected(throttle, inputs.voltage)
+            stood = flight.mode is Mode.TAKEOFF and self.height < LIFTED
+            return (max(thrust, GRAVITY) if stood else thrust), doubt  # what is missing, the ground gives
 
         told = inertial.carry(
             self.estimate.inertial, self._attitude(now, ATTITUDE_S), lift(self._history.felt(now)), now,

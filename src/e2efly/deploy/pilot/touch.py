@@ -41,6 +41,8 @@ SHOCK, BLOW = 3.0, 1.4
 forgotten. With a force above the second value, in units of gravity, it may be the ground's."""
 TOLD_S = 0.5
 """How long the comparison holds after its newest measurement, s. After a longer pause it begins anew."""
+UNTOLD_S = 1.0
+"""Without a comparison for this time, s, an accelerometer does not tell anything."""
 FROZEN_S, IGNORED, LONGEST_SAME_S = 0.15, 0.4, 0.4
 """An accelerometer is frozen if its numbers repeat bit for bit for the first value, s, while the thrust changes by the
 second, m/s^2. It is also frozen if they repeat for the third value, s, whatever the thrust is, because the vibration of
@@ -92,6 +94,10 @@ class Touch:
     def able(self, now: float) -> bool:
         """Whether this accelerometer can tell flight from standing at all."""
         return now - self.changed < ALIVE_S and self.usual > LEAST * GRAVITY
+
+    def tells(self, now: float) -> bool:
+        """Whether it can, and its force was compared with the thrust lately."""
+        return self.able(now) and now - self.time < UNTOLD_S
 
     def stands(self, now: float) -> bool | None:
         """Whether something carries the vehicle: True; False: it flies; None: not known."""
