@@ -120,3 +120,17 @@ def test_a_silence_in_which_the_controller_held_a_command_teaches_nothing() -> N
     assert after.share == pytest.approx(told.share, abs=0.01)
     assert after.scale.value == pytest.approx(told.scale.value, abs=0.02)
     assert world.bridge.map.learned[0] == pytest.approx(before.learned[0], abs=0.01)
+
+
+@pytest.mark.parametrize("received", [True, False])
+def test_a_command_to_a_port_that_is_gone_did_not_act(received: bool) -> None:
+    """The motion is propagated with what the controller has held since."""
+    world = hovering()
+    held = world.bridge.sent.throttle
+    world.throttle = held
+    world.hears = world.answers = False
+    world.wire.alive = received
+    world.fly(0.6)
+    sent = world.bridge._history.between(world.now - 0.2, world.now)
+    assert sent is not None
+    assert (abs(sent - held) < 0.01) is not received

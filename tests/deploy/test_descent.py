@@ -1,5 +1,7 @@
 """The watchdog's descent by the accelerometer, on a vehicle that falls and stands in plain arithmetic."""
 
+from dataclasses import replace
+
 import pytest
 
 from e2efly.deploy.attitude import Attitude
@@ -8,8 +10,9 @@ from e2efly.deploy.betaflight.messages import RawImu
 from e2efly.gravity import GRAVITY
 
 SENSE = Sense(
-    GRAVITY / 2048, (0.0, 10.0, 20.0), (1000, 1500, 2000), doubt=0.05, share=1.0, velocity=(0.0, 0.0, 0.0), height=2.0
-)
+    GRAVITY / 2048, (0.0, 10.0, 20.0), (1000, 1500, 2000), doubt=0.05, share=1.0, velocity=(0.0, 0.0, 0.0),
+    upright=1.0, height=2.0,
+)  # fmt: skip
 LEVEL = Attitude(0.0, 0.0, 0.0)
 DT = 0.01
 
@@ -18,7 +21,7 @@ def flown(
     height: float, strength: float = 1.0, gone: tuple[float, float] = (9.0, 9.0), held: float = GRAVITY
 ) -> tuple[float, float, float]:
     """Height when the descent is over, m, speed of the touch, m/s, and when it is over, s."""
-    fall, z, v, touch, acts, now = Descent.of(SENSE, 5.0, held, 0.0), height, 0.0, 0.0, held, 0.0
+    fall, z, v, touch, acts, now = Descent.of(SENSE, 5.0, held, 0.0, 0.0), height, 0.0, 0.0, held, 0.0
     for i in range(3000):
         now, alive = DT * i, not gone[0] <= DT * i < gone[1]
         fall = move(fall, SENSE, LEVEL, now, alive=alive)
@@ -45,6 +48,16 @@ def test_it_touches_gently_and_ends_soon_after(strength: float) -> None:
 def test_a_vehicle_that_climbed_while_the_link_was_gone_is_not_dropped() -> None:
     z, _, over = flown(0.1, gone=(0.0, 3.0), held=1.2 * GRAVITY)
     assert z == 0.0 and over > 6.0
+
+
+def test_it_begins_with_the_motion_that_the_held_thrust_has_given_since_the_plan() -> None:
+    """A bridge that is stopped while it pulls up leaves a vehicle that climbs."""
+    tilted = replace(SENSE, upright=0.8)
+    for sense, climb in ((SENSE, 0.2 * 0.5 * GRAVITY), (tilted, (0.8 * 1.5 - 1) * 0.2 * GRAVITY)):
+        fall = Descent.of(sense, 5.0, 1.5 * GRAVITY, 0.0, 0.2)
+        assert fall.climb == pytest.approx(climb)
+        assert fall.height == pytest.approx(2.0 + 0.2 * climb)
+        assert fall.doubt > 0.2 * 0.05 * GRAVITY
 
 
 @pytest.mark.parametrize(("name", "value"), [("unit", -1.0), ("share", 0.0), ("pulses", (1, 2)), ("forces", (1.0,))])

@@ -329,6 +329,18 @@ def test_where_another_program_asks_it_is_seen_and_less_is_asked() -> None:
         assert alone[code] == pytest.approx(4 * rate, rel=0.05, abs=1)
 
 
+@pytest.mark.parametrize(("code", "steered"), [(messages.SET_RAW_RC, True), (messages.Name.CODE, False)])
+def test_sticks_of_another_program_are_told_from_its_questions(code: int, steered: bool) -> None:
+    wire = Wire()
+    client = Client(wire, {})
+    client.poll(0.0)
+    wire.inbox += encode(Frame(code, b"", REPLY))
+    client.poll(0.1)
+    assert client.crowded(0.2)
+    assert client.steered(0.2) is steered
+    assert not client.steered(0.1 + CROWDED_S + 0.01)
+
+
 def test_a_slow_radio_is_no_controller_that_is_behind() -> None:
     wire = Wire()
     client = Client(wire, SCHEDULE)

@@ -9,7 +9,19 @@ import pytest
 from e2efly.deploy.attitude import Attitude
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.pilot.hover import blind_time
-from e2efly.deploy.pilot.reckoning import BRAKE_S, DOUBT, LONGEST_STEP, Reckoning, reckon, seen, settle, trimmed
+from e2efly.deploy.pilot.reckoning import (
+    ANCHOR_S,
+    ANCHORS,
+    BRAKE_S,
+    DOUBT,
+    LONGEST_STEP,
+    Reckoning,
+    Reckonings,
+    reckon,
+    seen,
+    settle,
+    trimmed,
+)
 from e2efly.vehicles.vehicle import GRAVITY
 
 DT, STILL = 0.02, (0.0, 0.0, 0.0)
@@ -133,3 +145,18 @@ def test_a_silence_counts_the_tilt_on_and_does_not_age_the_velocity(held: float)
         assert known.velocity[0] == pytest.approx(speed, rel=0.2) and abs(speed) > 1.5
         assert known.velocity[1] == pytest.approx(0.0, abs=0.01)
         assert known.since == pytest.approx(known.time)  # the time to brake begins once the controller is heard
+
+
+def test_poses_that_go_on_through_a_silence_replace_the_older_ones() -> None:
+    """Meanwhile the velocity that began with an old one was propagated with commands that may never have arrived."""
+    reckonings = Reckonings()
+    for k in range(round(3.0 / DT)):
+        now = k * DT
+        if now < 1.0 or k % 2:
+            odometry = moving(0j, 0.0)
+            reckonings = reckonings.seen(seen(odometry, now))
+        reckonings = reckonings.on(lambda r, now=now: reckon(r, None, None, (0.5 * GRAVITY, 0.1), STILL, now + DT))
+    oldest = reckonings.anchors[0]
+    assert oldest.begun > 3.0 - (ANCHORS + 1) * ANCHOR_S - DT
+    assert reckonings.alone(wrong=True).newest is not None
+    assert oldest.climb > -0.5 * GRAVITY * (ANCHORS + 1) * ANCHOR_S

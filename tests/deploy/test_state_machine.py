@@ -17,7 +17,7 @@ from e2efly.deploy.pilot.fence import fence_problem, moved, stopping
 from e2efly.deploy.pilot.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Pilot, Reason, Target
 from e2efly.deploy.pilot.hover import blind_time
 from e2efly.deploy.pilot.landing import BEYOND_S, FAST, FOUND_S, SLOWED_S, has_stood
-from e2efly.deploy.pilot.state_machine import FALLEN_S, LONGEST_STEP, NEAR_GROUND, step
+from e2efly.deploy.pilot.state_machine import AHEAD, FALLEN_S, LONGEST_STEP, NEAR_GROUND, step
 from e2efly.deploy.settings import Fence, FlightSettings
 from e2efly.vehicles.vehicle import GRAVITY
 
@@ -294,6 +294,12 @@ def test_a_take_off_to_the_policy_position_hovers_until_asked_again() -> None:
     assert flight.mode is Mode.HOVER and said(flight, Reason.LOCKED)
     flight = flown(flight, UP)
     assert flown(flight, AWAY).mode is Mode.POLICY
+
+
+def test_the_target_waits_for_a_vehicle_that_stays_behind() -> None:
+    """To catch up, it would climb fast, and a controller that is not reached from then on would go on with it."""
+    flight = flown(taking_off(), having(pilot=HOVER, odometry=at(0.05)), 3.0)
+    assert flight.target is not None and flight.target.position[2] == pytest.approx(0.05 + AHEAD)
 
 
 def test_the_target_rises_to_the_height_and_slows_down_before() -> None:

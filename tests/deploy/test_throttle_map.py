@@ -20,6 +20,7 @@ from e2efly.deploy.pilot.throttle_map import (
     ThrottleMap,
     as_json,
     from_json,
+    learn,
     update,
 )
 from e2efly.vehicles import load_vehicle
@@ -269,3 +270,11 @@ def test_a_hard_second_after_a_hover_does_little_harm(harder: float) -> None:
             force = NEW.nominal(rotor) + NOISE * noise.normal()
             m = update(m, met, force, 3.9, 0.02, history.swing(t))
     assert m.scale == pytest.approx(before, rel=0.006)  # without it 1.7 %
+
+
+@pytest.mark.parametrize(("throttle", "swing"), [(0.95, 0.0), (0.7, 0.5)])
+def test_where_motors_may_be_at_their_ends_nothing_is_learned(throttle: float, swing: float) -> None:
+    """The mixer then gives thrust away for the body rates: half of it came in a policy's oscillation."""
+    m = ThrottleMap.of(VEHICLE)
+    assert learn(m, throttle, np.array([0.0, 0.0, 0.5 * m.force(throttle)]), 3.9, 0.02, swing) == m
+    assert learn(m, 0.6, np.array([0.0, 0.0, 0.9 * m.force(0.6)]), 3.9, 0.02, 0.1) != m

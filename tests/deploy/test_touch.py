@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from e2efly.deploy.pilot.touch import AGAIN_S, LAGS, LONGEST_S, LOW, STILL, Touch, feel, seen, wave
+from e2efly.deploy.pilot.touch import AGAIN_S, LAGS, LONGEST_S, LOW, STILL, UNTOLD_S, Touch, feel, seen, wave
 from e2efly.vehicles.vehicle import GRAVITY
 
 DT = 0.02
@@ -122,6 +122,16 @@ def test_a_broken_accelerometer_never_says_that_it_stands_and_is_found_unable(ki
     rows = descend(BROKEN[kind], ground_at, 10.0)
     assert when(rows) == math.inf
     assert rows[-1][1] is None
+
+
+def test_where_the_height_is_that_of_the_ground_it_is_weighed_without_knowing_the_slope() -> None:
+    touch = Touch()
+    for k in range(3):  # too few for a slope
+        touch = feel(seen(touch, (float(k), 0.0, 0.0), GRAVITY, k * DT), GRAVITY, (GRAVITY,) * 4, 0.0, k * DT, DT)
+    assert touch.stands(2 * DT) is None
+    assert not touch.weigh(3 * DT).weighs(3 * DT)
+    assert touch.weigh(3 * DT, low=True).weighs(3 * DT)
+    assert touch.tells(3 * DT) and not touch.tells(2 * DT + UNTOLD_S + DT)
 
 
 def test_what_turns_is_not_said_to_stand_though_its_force_does_not_follow() -> None:

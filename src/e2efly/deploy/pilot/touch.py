@@ -111,7 +111,7 @@ class Touch:
         """Whether the thrust of a blind descent is lowered at `now`, s, to weigh the vehicle."""
         return now - self.weighed < LONGEST_S
 
-    def weigh(self, now: float, *, low: bool) -> "Touch":
+    def weigh(self, now: float, *, low: bool = False) -> "Touch":
         """Begin to weigh at `now`, s, but not too often: after a shock, where the slope is that of the ground, or where
         the height is (`low`) and the slope is not that of flight.
         """
