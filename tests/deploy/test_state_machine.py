@@ -924,3 +924,29 @@ def test_a_jump_of_the_clock_neither_ends_a_landing_nor_a_take_off() -> None:
         jumped = step(SETTINGS, lost, DEAF, lost.now + jump)
         assert jumped.mode is Mode.LAND
         assert flown(jumped, DEAF, blind_time(1.1)).mode is Mode.DONE
+
+
+def seen_at(flight: Flight, seconds: float, where: Odometry, **changes: Any) -> Flight:
+    """The flight after this time, with poses that go on."""
+    for _ in range(round(seconds / DT)):
+        now = flight.now + DT
+        inputs = having(UP, odometry=dataclasses.replace(where, time=now), **changes)
+        flight = step(SETTINGS, flight, inputs, now)
+    return flight
+
+
+@pytest.mark.parametrize(("stands", "ends"), [(None, True), (True, True), (False, False)])
+def test_a_hover_that_stands_where_it_took_off_lands(stands: bool | None, ends: bool) -> None:
+    """Its battery is too weak to lift it again: it would stand with open throttle."""
+    flight = seen_at(hovering(), 1.5, at(0.06), stands=stands)
+    assert (flight.mode in (Mode.LAND, Mode.DONE)) is ends
+    assert seen_at(flight, 0.1, at(0.06), stands=stands).mode is (Mode.DONE if ends else Mode.HOVER)
+    assert seen_at(hovering(), 5.0, at(0.3), stands=stands).mode is Mode.HOVER
+
+
+@pytest.mark.parametrize("stands", [True, None])
+def test_a_landing_ends_where_it_is_felt_to_stand_though_the_poses_drift(stands: bool | None) -> None:
+    flight = landing()
+    for k in range(round(1.5 / DT)):
+        flight = seen_at(flight, DT, at(0.4 + 0.002 * k, velocity=(0.15, 0.0, 0.2)), pilot=LAND, stands=stands)
+    assert (flight.mode is Mode.DONE) is (stands is True)

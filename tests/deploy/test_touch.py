@@ -154,7 +154,7 @@ def test_a_weighing_of_what_flies_is_broken_off_and_one_of_what_stands_ends_in_t
 
 
 def test_what_was_told_does_not_outlast_the_measurements() -> None:
-    touch = Touch(time=1.0, changed=1.0, carried=9)
+    touch = Touch(time=1.0, changed=1.0, carried=1.0)
     assert touch.stands(1.1) is True
     assert touch.stands(1.6) is None
     assert Touch().stands(0.0) is None
@@ -190,5 +190,15 @@ def test_numbers_that_repeat_are_frozen_at_once_under_another_thrust_and_after_a
         assert not after(0.3, lambda now, thrust=thrust: thrust).frozen
         assert after(0.5, lambda now, thrust=thrust: thrust).frozen
     again = after(0.5, lambda now: None).afresh()
-    assert again.frozen and again.carried == 0 and again.sums == ()
+    assert again.frozen and again.carried == 0.0 and again.sums == ()
     assert not seen(again, (1.0, 2.0, 501.0), None, 0.6).frozen
+
+
+@pytest.mark.parametrize(("rate", "enough"), [(50.0, 4), (10.0, 2), (4.0, 2)])
+def test_a_slow_link_needs_fewer_measurements_to_show_the_weight(rate: float, enough: int) -> None:
+    touch, low = Touch(), (LOW * GRAVITY,) * 4
+    for k in range(enough):
+        assert touch.stands(k / rate) is None
+        touch = seen(touch, (float(k), 0.0, 0.0), low[0], k / rate)
+        touch = feel(touch, GRAVITY, low, 0.0, k / rate, min(1 / rate, 0.1))
+    assert touch.stands((enough - 1) / rate) is True

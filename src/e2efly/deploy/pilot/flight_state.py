@@ -194,9 +194,9 @@ class Flight:
     found_since: float | None = None
     """In a landing without odometry: time since which it has been good again, s."""
     standing_since: float | None = None
-    """In a landing: time since which the newest odometry, good or just lost, has stayed at one place, s ..."""
+    """In a hover or a landing: time since which the newest odometry, good or just lost, has stayed at one place ..."""
     stood_at: tuple[float, float, float] | None = None
-    """... and this place, m."""
+    """... and this place; s and m."""
     now: float = 0.0
     """Time of the last step, s."""
     reasons: tuple[str, ...] = ()

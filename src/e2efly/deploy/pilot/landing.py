@@ -71,7 +71,7 @@ def _down_from(settings: FlightSettings, odometry: Odometry) -> Target:
 
 def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
     """A landing after another control step of `dt` s."""
-    flight = _looked(flight, inputs)
+    flight = looked(flight, inputs)
     if inputs.link_problem and inputs.silent:  # its motion is not known: nothing counts as landed
         return _unheard(settings, flight, inputs, dt)
     if has_stood(settings, flight, inputs.odometry) and inputs.stands is not False:
@@ -84,7 +84,7 @@ def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
         found = flight.now if flight.found_since is None else flight.found_since
         flight = dataclasses.replace(flight, found_since=found, lost=_last_seen(settings, flight, inputs))
         return _sinking(settings, flight, inputs) if flight.now - found < FOUND_S else _see(settings, flight, odometry)
-    flight = _lowered(settings, flight, odometry, dt)
+    flight = _lowered(settings, flight, odometry, dt, stands=bool(inputs.stands))
     height = float(odometry.position[2])
     low = height < flight.home + STANDING
     still = flight.still_since is not None and flight.now - flight.still_since >= settings.land_settle
@@ -93,9 +93,9 @@ def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
     return flight
 
 
-def _lowered(settings: FlightSettings, flight: Flight, odometry: Odometry, dt: float) -> Flight:
+def _lowered(settings: FlightSettings, flight: Flight, odometry: Odometry, dt: float, *, stands: bool) -> Flight:
     """Lower the target by one control step, but never far under the vehicle. Also note since when the vehicle has been
-    still.
+    still. If it is felt to stand, the poses may be noisy.
     """
     assert flight.target is not None
     x, y, z = flight.target.position
@@ -105,7 +105,8 @@ def _lowered(settings: FlightSettings, flight: Flight, odometry: Odometry, dt: f
     sink = max(settings.land_speed, far) if stopped else 0.0
     still_for = 0.0 if flight.still_since is None else flight.now - flight.still_since
     down = max(z - sink * dt, height - LEAD - PRESSING * max(still_for - settings.land_settle, 0.0))
-    still = float(np.linalg.norm(odometry.velocity)) < settings.still_speed and height - down > PRESSED
+    speed = float(np.linalg.norm(odometry.velocity))
+    still = (speed < settings.still_speed and height - down > PRESSED) or (stands and speed < SLOW)
     since = (flight.now if flight.still_since is None else flight.still_since) if still else None
     return dataclasses.replace(flight, target=Target((x, y, down), flight.target.yaw, -sink), still_since=since)
 
@@ -136,8 +137,8 @@ def _unheard(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float
     return dataclasses.replace(flight, target=target, since=flight.since + dt)
 
 
-def _looked(flight: Flight, inputs: Inputs) -> Flight:
-    """In a landing: note since when the newest odometry, good or just lost, has stayed at one place."""
+def looked(flight: Flight, inputs: Inputs) -> Flight:
+    """In a hover or a landing: note since when the newest odometry, good or just lost, has stayed at one place."""
     odometry = inputs.odometry
     if odometry is None or flight.misled or flight.now - odometry.time > RECENT_S:
         return dataclasses.replace(flight, standing_since=None, stood_at=None)
@@ -150,7 +151,9 @@ def _looked(flight: Flight, inputs: Inputs) -> Flight:
 
 
 def has_stood(settings: FlightSettings, flight: Flight, odometry: Odometry | None) -> bool:
-    """Whether a landing has stayed at one place long enough to have ended there, according to the newest odometry."""
+    """Whether a hover or a landing has stayed at one place long enough to have ended there, according to the newest
+    odometry.
+    """
     if odometry is None or flight.standing_since is None:
         return False
     stayed = flight.now - flight.standing_since

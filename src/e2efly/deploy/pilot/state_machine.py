@@ -17,7 +17,7 @@ import numpy as np
 from e2efly.deploy.odometry import Odometry, tilt_of
 from e2efly.deploy.pilot.fence import here, moved, stopping
 from e2efly.deploy.pilot.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Reason, Target, to
-from e2efly.deploy.pilot.landing import SLOW, land, landing, stands
+from e2efly.deploy.pilot.landing import SLOW, has_stood, land, landing, looked, stands
 from e2efly.deploy.pilot.refusals import ON_GROUND, battery_refusals, policy_refusals, take_off_refusals
 from e2efly.deploy.settings import FlightSettings
 
@@ -212,6 +212,9 @@ def _hover(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) 
     assert flight.target is not None
     assert inputs.odometry is not None
     assert inputs.pilot is not None
+    flight = looked(flight, inputs)
+    if has_stood(settings, flight, inputs.odometry) and inputs.stands is not False:
+        return land(settings, flight, inputs, f"{Reason.NOT_CLIMBING}: it stands where it took off")
     if inputs.pilot.mission is Mission.POLICY:
         refusals = policy_refusals(settings, flight, inputs, inputs.odometry)
         if not refusals:

@@ -33,9 +33,9 @@ STRUCK_S = 0.1
 LOW, LONGEST_S, AGAIN_S = 0.45, 0.5, 1.0
 """A weighing lowers the thrust to the first value, in units of gravity, for the second at most, s. The next one begins
 after the third, s."""
-LIGHT, ENOUGH = 0.6, 4
-"""A vehicle is carried if it measures its weight in so many measurements in a row, the second value, while its thrust
-is below the first, in units of gravity."""
+LIGHT, ENOUGH_S, MOST_S = 0.6, 0.07, 0.05
+"""A vehicle is carried if it measures its weight for the second value, s, while its thrust is below the first, in units
+of gravity. A measurement counts for the time since the one before, but at most for the third value, s."""
 SHOCK, BLOW = 3.0, 1.4
 """Change of force minus thrust between two measurements that shows a shock, m/s^2. What was measured before it is
 forgotten. With a force above the second value, in units of gravity, it may be the ground's."""
@@ -69,8 +69,8 @@ class Touch:
     """When the newest shock came, s."""
     weighed: float = -math.inf
     """When the newest weighing began, s."""
-    carried: int = 0
-    """Measurements in a row that show the weight while the thrust is far below it."""
+    carried: float = 0.0
+    """For how long the measurements have shown the weight while the thrust is far below it, s."""
     raw: tuple[float, ...] = ()
     """The accelerometer's newest numbers ..."""
     changed: float = -math.inf
@@ -103,7 +103,7 @@ class Touch:
         """Whether something carries the vehicle: True; False: it flies; None: not known."""
         if now - self.time > TOLD_S or not self.able(now):
             return None
-        if self.carried >= ENOUGH:
+        if self.carried >= ENOUGH_S:
             return True
         return False if any(map(_follows, self.sums)) else None
 
@@ -118,7 +118,7 @@ class Touch:
         ground = bool(self.sums) and all(_follows(sums) is False for sums in self.sums)
         ground = ground or (low and self.stands(now) is None)
         due = (ground or self.time - self.struck < STRUCK_S) and now - self.time < TOLD_S and self.able(now)
-        return replace(self, weighed=now, carried=0) if due and now - self.weighed > AGAIN_S else self
+        return replace(self, weighed=now, carried=0.0) if due and now - self.weighed > AGAIN_S else self
 
 
 def _follows(sums: tuple[float, ...]) -> bool | None:
@@ -161,7 +161,7 @@ def feel(before: Touch, force: float, thrusts: tuple[float, ...], turn: float, n
     beyond = force - thrusts[0]
     usual = before.usual + (force - before.usual) * -math.expm1(-dt / USUAL_S)
     heavy = WEIGHT[0] * GRAVITY < force < WEIGHT[1] * GRAVITY and max(thrusts) < LIGHT * GRAVITY
-    carried = before.carried + (turn < STILL) if heavy else 0
+    carried = before.carried + min(dt, MOST_S) * (turn < STILL) if heavy else 0.0
     after = replace(before, time=now, beyond=beyond, usual=usual, carried=carried)
     if now - before.time > TOLD_S or abs(beyond - before.beyond) > SHOCK:
         blow = force > BLOW * GRAVITY and beyond - before.beyond > SHOCK
