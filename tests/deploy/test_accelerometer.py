@@ -43,11 +43,24 @@ def test_the_scale_is_learned_from_poses_whatever_the_motion(true: float) -> Non
     assert scale.value == pytest.approx(true, abs=0.01)
 
 
-def test_the_scale_stays_within_bounds() -> None:
+@pytest.mark.parametrize(("told", "value"), [(0.78, RANGE[1]), (1.23, RANGE[0]), (-1.0, 1.0), (0.0, 1.0)])
+def test_the_scale_stays_within_bounds_and_is_not_learned_from_what_is_broken(told: float, value: float) -> None:
     scale = Scale()
     for _ in range(500):
-        scale = learn(scale, Attitude(0.0, 0.0, 0.0), np.array([0.0, 0.0, -GRAVITY]), 0.0, DT)
-    assert scale.value == RANGE[1]
+        scale = learn(scale, Attitude(0.0, 0.0, 0.0), np.array([0.0, 0.0, told * GRAVITY]), 0.0, DT)
+    assert scale.value == value
+
+
+@pytest.mark.parametrize("push", [-8.0, -2.4, 2.4, 8.0])
+@pytest.mark.parametrize("late", [0, 2, 4])
+def test_a_hard_brake_or_pull_leaves_the_scale_though_the_poses_are_late(push: float, late: int) -> None:
+    """After a silence, a vehicle that climbs is stopped with all that it has."""
+    scale, climb = Scale(), [0.0] * (late + 1)
+    for k in range(round(1.5 / DT)):
+        pushed = push if 0.5 <= k * DT < 0.8 else 0.0
+        climb.append(climb[-1] + pushed * DT)
+        scale = learn(scale, Attitude(0.0, 0.0, 0.0), np.array([0.0, 0.0, GRAVITY + pushed]), climb[-1 - late], DT)
+        assert scale.value == pytest.approx(1.0, abs=0.025)
 
 
 @pytest.mark.parametrize(("roll", "pitch"), [(0.0, 0.0), (0.4, -0.3), (-1.2, 0.9)])

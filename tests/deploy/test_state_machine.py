@@ -940,7 +940,7 @@ def test_a_hover_that_stands_where_it_took_off_lands(stands: bool | None, ends: 
     """Its battery is too weak to lift it again: it would stand with open throttle."""
     flight = seen_at(hovering(), 1.5, at(0.06), stands=stands)
     assert (flight.mode in (Mode.LAND, Mode.DONE)) is ends
-    assert seen_at(flight, 0.1, at(0.06), stands=stands).mode is (Mode.DONE if ends else Mode.HOVER)
+    assert seen_at(flight, 1.2, at(0.06), stands=stands).mode is (Mode.DONE if ends else Mode.HOVER)
     assert seen_at(hovering(), 5.0, at(0.3), stands=stands).mode is Mode.HOVER
 
 
@@ -950,3 +950,9 @@ def test_a_landing_ends_where_it_is_felt_to_stand_though_the_poses_drift(stands:
     for k in range(round(1.5 / DT)):
         flight = seen_at(flight, DT, at(0.4 + 0.002 * k, velocity=(0.15, 0.0, 0.2)), pilot=LAND, stands=stands)
     assert (flight.mode is Mode.DONE) is (stands is True)
+
+
+def test_the_time_that_a_hover_stayed_at_its_place_is_not_that_of_the_landing() -> None:
+    flight = seen_at(hovering(), 5.0, at(2.0))
+    lost = having(UP, odometry=dataclasses.replace(at(2.0), time=flight.now), odometry_problem="jump")
+    assert flown(flight, lost, 1.0).mode is Mode.LAND

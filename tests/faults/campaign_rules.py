@@ -79,21 +79,22 @@ def judge(
     start = max(float(height[0]), planned)
     broken: list[Violation] = []
 
-    def breaks(rule: Rule, value: float, index: int) -> None:
+    def breaks(rule: Rule, value: float, index: int, why: str = "") -> None:
         t = float(time[index])
-        why = next((span.excuse.why for span in beyond if span.covers(rule, t)), "")
+        why = why or next((span.excuse.why for span in beyond if span.covers(rule, t)), "")
         broken.append(Violation(rule, value, t - began, why))
 
     climb, risen, owned = height - start, np.full(len(time), start), np.ones(len(time), bool)
-    for span in (span for span in beyond if Rule.CLIMB in span.excuse.rules):
+    carried = [span for span in beyond if Rule.CLIMB in span.excuse.rules]
+    for span in carried:
         owned &= (time < span.begin) | (time > span.end)
         if (back := int(np.searchsorted(time, span.end))) < len(time):  # what it was left with is not the bridge's
             coasts = max(float(velocity[back, 2]), 0.0) ** 2 / (2 * GRAVITY)
             risen[back:] = np.maximum(risen[back:], height[back] + coasts)
     own = np.where(owned, height - risen, 0.0)
-    for above in (own, climb):
+    for above, why in ((own, ""), (climb, carried[-1].excuse.why if carried else "")):
         if above.max() > HIGHEST_CLIMB:
-            breaks(Rule.CLIMB, float(above.max()), int(np.argmax(above > HIGHEST_CLIMB)))
+            breaks(Rule.CLIMB, float(above.max()), int(np.argmax(above > HIGHEST_CLIMB)), why)
             break
     off_height, touch = 0.0, (math.nan, math.nan, math.nan)
     for first, end in _runs(~stands):

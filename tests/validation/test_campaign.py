@@ -113,6 +113,9 @@ def test_a_climb_that_goes_on_when_the_bridge_has_the_motors_again_is_its_own() 
     carried = line(0.0, 2.5, 1.0)
     assert broken(trace(carried + line(2.5, 0.0, 1.0) + STANDS), silent) == []
     assert broken(trace(carried + line(2.5, 4.4, 1.0) + line(4.4, 0.0, 1.0) + STANDS), silent) == []
+    short = line(0.0, 1.9, 1.0) + line(1.9, 2.3, 1.0)  # what passes the limit after it is not the bridge's alone
+    begun = tuple(beyond(Scenario("", "hover", (Strike("link: silent", 0.0, 1.9),)), 0.0))
+    assert broken(trace(short + line(2.3, 0.0, 1.0) + STANDS), begun) == []
     assert broken(trace(carried + line(2.5, 4.7, 1.0) + line(4.7, 0.0, 1.0) + STANDS), silent) == ["climb"]
 
 

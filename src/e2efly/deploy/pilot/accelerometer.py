@@ -18,7 +18,10 @@ COUNTS = (200.0, 9000.0)
 UPRIGHT = 0.35
 """The largest angle between the force at rest and the body's z axis, rad."""
 MEMORY_S, SMOOTH_S = 1.0, 0.1
-"""Time over which the scale is learned, s, and over which the vertical velocity of noisy poses is smoothed, s."""
+"""Time over which the scale is learned, s, and over which the vertical velocity of noisy poses is smoothed, s. The
+force is smoothed in the same way, or it would be ahead of the velocity."""
+CALM = 2.5
+"""Nothing is learned from a force that differs from gravity by more than this, m/s^2. The poses come too late for it."""
 RANGE = (0.85, 1.18)
 """Bounds of the scale."""
 
@@ -50,6 +53,8 @@ class Scale:
     """Vertical force that the accelerometer measured, smoothed over `MEMORY_S`, m/s^2."""
     flown: float = GRAVITY
     """Vertical force that the poses showed, m/s^2."""
+    up: float = GRAVITY
+    """The newest vertical forces, smoothed over `SMOOTH_S`, m/s^2."""
     climb: float | None = None
     """Vertical velocity of the poses, smoothed, m/s. None: nothing is known of the time before, so the next measurement
     only begins the comparison."""
@@ -70,14 +75,18 @@ def learn(before: Scale, attitude: Attitude, force: np.ndarray, climb: float, dt
         climb: vertical velocity of the newest pose, m/s.
         dt: time since the previous measurement, s.
     """
-    if before.climb is None:
-        return replace(before, climb=climb)
-    share = -math.expm1(-dt / MEMORY_S)
-    climb = before.climb + (climb - before.climb) * -math.expm1(-dt / SMOOTH_S)
     up = float(level(attitude, force)[2])
+    if abs(up * before.value - GRAVITY) > CALM:
+        return replace(before, climb=None)
+    if before.climb is None:
+        return replace(before, up=up, climb=climb)
+    share, smoothed = -math.expm1(-dt / MEMORY_S), -math.expm1(-dt / SMOOTH_S)
+    climb = before.climb + (climb - before.climb) * smoothed
+    up = before.up + (up - before.up) * smoothed
     return Scale(
         before.felt + share * (up - before.felt),
         before.flown + share * (GRAVITY - before.flown) + (climb - before.climb) / MEMORY_S,
+        up,
         climb,
     )
 

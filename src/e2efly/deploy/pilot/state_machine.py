@@ -74,6 +74,8 @@ def step(settings: FlightSettings, flight: Flight, inputs: Inputs, now: float) -
     following = _common(flight, inputs) or _STEPS[flight.mode](settings, flight, inputs, dt)
     if (following.mode, following.blind) == (flight.mode, flight.blind):
         return following
+    if following.mode is not flight.mode:  # a hover that stays at its place has not landed there
+        following = dataclasses.replace(following, standing_since=None, stood_at=None)
     return dataclasses.replace(following, since=now, still_since=None, fallen_since=None, nearest=math.inf)
 
 
