@@ -299,7 +299,7 @@ class Bridge:
                     self.map = learn(self.map, sent, force, inputs.voltage, 0.02, swing)
 
         def lift(throttle: float | None) -> tuple[float, float] | None:
-            if throttle is None or not self.flying or reading.failsafe or self.client.steered(now):
+            if throttle is None or not self.flying or reading.failsafe:
                 return None
             thrust, doubt = self.map.expected(throttle, inputs.voltage)
             stood = flight.mode is Mode.TAKEOFF and self.height < LIFTED

@@ -20,8 +20,9 @@ UPRIGHT = 0.35
 MEMORY_S, SMOOTH_S = 1.0, 0.1
 """Time over which the scale is learned, s, and over which the vertical velocity of noisy poses is smoothed, s. The
 force is smoothed in the same way, or it would be ahead of the velocity."""
-CALM = 2.5
-"""Nothing is learned from a force that differs from gravity by more than this, m/s^2. The poses come too late for it."""
+CALM, CALM_S = 2.5, 0.15
+"""Nothing is learned from a force that differs from gravity by more than the first value, m/s^2, nor for the second, s,
+after it. The poses are too late for it."""
 RANGE = (0.85, 1.18)
 """Bounds of the scale."""
 
@@ -55,6 +56,8 @@ class Scale:
     """Vertical force that the poses showed, m/s^2."""
     up: float = GRAVITY
     """The newest vertical forces, smoothed over `SMOOTH_S`, m/s^2."""
+    wait: float = 0.0
+    """For how long nothing is learned, s."""
     climb: float | None = None
     """Vertical velocity of the poses, smoothed, m/s. None: nothing is known of the time before, so the next measurement
     only begins the comparison."""
@@ -76,8 +79,9 @@ def learn(before: Scale, attitude: Attitude, force: np.ndarray, climb: float, dt
         dt: time since the previous measurement, s.
     """
     up = float(level(attitude, force)[2])
-    if abs(up * before.value - GRAVITY) > CALM:
-        return replace(before, climb=None)
+    wait = CALM_S if abs(up * before.value - GRAVITY) > CALM else before.wait - dt
+    if wait > 0:
+        return replace(before, wait=wait, climb=None)
     if before.climb is None:
         return replace(before, up=up, climb=climb)
     share, smoothed = -math.expm1(-dt / MEMORY_S), -math.expm1(-dt / SMOOTH_S)
@@ -87,7 +91,7 @@ def learn(before: Scale, attitude: Attitude, force: np.ndarray, climb: float, dt
         before.felt + share * (up - before.felt),
         before.flown + share * (GRAVITY - before.flown) + (climb - before.climb) / MEMORY_S,
         up,
-        climb,
+        climb=climb,
     )
 
 
