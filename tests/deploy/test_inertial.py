@@ -194,3 +194,28 @@ def test_a_pause_of_the_poses_in_which_the_velocity_changed_teaches_no_scale() -
         told = measurement(0.97 * GRAVITY, now=now, jitter=0.01 * math.sin(now), climb=None if k < 40 else 2.0)
         inertial = measure(inertial, told, now)
     assert inertial.scale.value == pytest.approx(before, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("scale", "accelerometer", "throttle", "told"),
+    [
+        (1.0, 1.0, 1.0, False), (1.0, 1.1, 1.0, False), (1.0, 1.0, 1.15, False), (1.0, 0.9, 1.1, False),
+        (0.5, 1.0, 1.0, True), (0.3, 1.0, 1.0, True), (0.01, 1.05, 1.05, True),
+    ],
+)  # fmt: skip
+def test_scaled_poses_are_told_in_a_take_off_from_one_wrong_sensor(
+    scale: float, accelerometer: float, throttle: float, told: bool
+) -> None:
+    """The vehicle climbs faster and faster, until its poses show the wanted speed."""
+    inertial, climb, problems = hovering().at_rest(), 0.0, []
+    for k in range(100):
+        now = 3.0 + (k + 1) * DT
+        thrust = GRAVITY + min(1.5, 1.5 * k * DT)
+        climb += (thrust - GRAVITY) * DT
+        inertial = carry(inertial, LEVEL, (throttle * thrust, DOUBT), now)
+        inertial = measure(inertial, measurement(accelerometer * thrust, throttle * thrust), now)
+        inertial = seen(inertial, now, climb=scale * climb)
+        problems.append(inertial.climbs_otherwise)
+    assert any(problems) is told
+    begun = alone(inertial, wrong=True)
+    assert climb_of(begun) == pytest.approx(climb, abs=0.1) or not told or accelerometer != 1.0

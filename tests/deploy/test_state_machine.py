@@ -919,7 +919,7 @@ def test_a_jump_of_the_clock_neither_ends_a_landing_nor_a_take_off() -> None:
         assert flown(jumped, having(odometry=at()), 2.0).mode is Mode.DONE
         jumped = step(SETTINGS, taking_off(), having(pilot=HOVER), START + jump)
         assert jumped.mode is Mode.TAKEOFF
-        assert flown(jumped, having(pilot=HOVER), 8.0).mode is Mode.LAND
+        assert flown(jumped, having(pilot=HOVER), 8.0).mode in (Mode.LAND, Mode.DONE)
         lost = sinking()
         jumped = step(SETTINGS, lost, DEAF, lost.now + jump)
         assert jumped.mode is Mode.LAND
@@ -956,3 +956,24 @@ def test_the_time_that_a_hover_stayed_at_its_place_is_not_that_of_the_landing() 
     flight = seen_at(hovering(), 5.0, at(2.0))
     lost = having(UP, odometry=dataclasses.replace(at(2.0), time=flight.now), odometry_problem="jump")
     assert flown(flight, lost, 1.0).mode is Mode.LAND
+
+
+@pytest.mark.parametrize(("stands", "ends"), [(None, True), (False, False)])
+def test_a_take_off_that_does_not_lift_ends_soon(stands: bool | None, ends: bool) -> None:
+    """It would stand with open throttle. Poses that hardly move are no ground if the vehicle is felt to fly."""
+    flight = taking_off()
+    for k in range(round(2.7 / DT)):
+        inputs = having(pilot=HOVER, odometry=dataclasses.replace(at(), time=flight.now + DT), stands=stands)
+        flight = step(SETTINGS, flight, inputs, flight.now + DT)
+        assert flight.mode is Mode.TAKEOFF or k * DT > 2.3
+    assert (flight.mode is Mode.DONE) is ends
+    assert not ends or said(flight, Reason.NOT_CLIMBING)
+
+
+@pytest.mark.parametrize("deaf", [True, False])
+def test_the_clock_of_a_blind_landing_stands_while_the_controller_flies_its_failsafe(deaf: bool) -> None:
+    """It may climb: motors that stop when its receiver comes back would stop high above the ground."""
+    flight = flown(sinking(), having(DEAF if deaf else BLIND, failsafe=True), 30.0)
+    assert flight.mode is Mode.LAND
+    assert flown(flight, having(DEAF), 0.5).mode is Mode.LAND
+    assert flown(flight, having(DEAF), 20.0).mode is Mode.DONE

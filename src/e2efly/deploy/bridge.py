@@ -232,6 +232,7 @@ class Bridge:
             odometry_problem=told.pose_problem,
             link_problem=reading.link_problem,
             silent=now - self.client.heard > SILENT_S,
+            failsafe=reading.failsafe,
             armed=reading.armed,
             override=reading.override,
             pilot=reading.pilot,

@@ -115,6 +115,8 @@ class Inputs:
     """Why there is no working link to the flight controller. None: there is."""
     silent: bool = False
     """The controller sends nothing at all. It may hold the last command and receive nothing."""
+    failsafe: bool = False
+    """The controller flies its own failsafe, whatever it is sent."""
     armed: bool = False
     override: bool = False
     """The controller takes its stick inputs from this program."""

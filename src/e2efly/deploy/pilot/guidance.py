@@ -30,6 +30,9 @@ TRIM_FADE = 1.0
 STEADY = 0.03
 """Body rates of a hover that are below this are sent as zero, rad/s. If the link falls silent now, they are held for a
 long time."""
+UNDER = 0.1
+"""A blind descent whose estimated height is this far under the ground, m, weighs the vehicle, unless it is felt to fly.
+"""
 OVERDUE = 0.3
 """A blind descent whose estimated height is this far under the ground, m, ..."""
 WEIGHT, LIGHTER, LIGHTEST = (0.985, 0.97), (0.015, 0.04), 0.6
@@ -102,7 +105,7 @@ def descend(
     """
     reckoned = told.reckoned
     under = -math.inf if reckoned is None else flight.home - reckoned.height
-    felt = told.touch.weigh(now, low=under > OVERDUE)
+    felt = told.touch.weigh(now, low=under > UNDER)
     if reckoned is None:
         command = blind(attitude, now - flight.since, 0.0 if flight.lost is None else flight.lost[2])
         thrust = float(command.thrust)

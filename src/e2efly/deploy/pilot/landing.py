@@ -78,6 +78,8 @@ def landing(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
         assert inputs.odometry is not None
         return dataclasses.replace(to(flight, Mode.DONE, Reason.LANDED), home=float(inputs.odometry.position[2]))
     odometry = inputs.seen
+    if flight.blind and flight.lost is not None and inputs.failsafe:  # nothing of this descent happens
+        flight = dataclasses.replace(flight, lost=(flight.lost[0] + dt, *flight.lost[1:]))
     if odometry is None:
         return _sinking(settings, flight, inputs)
     if flight.blind:
@@ -150,15 +152,15 @@ def looked(flight: Flight, inputs: Inputs) -> Flight:
     return flight
 
 
-def has_stood(settings: FlightSettings, flight: Flight, odometry: Odometry | None) -> bool:
-    """Whether a hover or a landing has stayed at one place long enough to have ended there, according to the newest
-    odometry.
+def has_stood(settings: FlightSettings, flight: Flight, odometry: Odometry | None, at_least: float = STAYS_S) -> bool:
+    """Whether a flight has stayed at one place long enough to have ended there, according to the newest odometry.
+    `at_least`: at home, s.
     """
     if odometry is None or flight.standing_since is None:
         return False
     stayed = flight.now - flight.standing_since
     if abs(float(odometry.position[2]) - flight.home) < STANDING:
-        return stayed >= max(settings.land_settle, STAYS_S)
+        return stayed >= max(settings.land_settle, at_least)
     return flight.blind and stayed >= AWAY_S
 
 
@@ -185,8 +187,8 @@ def _sinking(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
         flight = dataclasses.replace(flight, found_since=None)
     at, height, climb = flight.lost or _last_seen(settings, flight, inputs)
     sinking, expected = flight.now - at, blind_time(height, climb)
-    overdue = inputs.stands is None and sinking > 2 * expected + BEYOND_S
-    if (inputs.deaf and (sinking > expected or inputs.buried)) or overdue:
+    overdue = inputs.stands is None and not inputs.failsafe and sinking > 2 * expected + BEYOND_S
+    if (inputs.deaf and not inputs.failsafe and (sinking > expected or inputs.buried)) or overdue:
         return to(flight, Mode.DONE, f"{Reason.LANDED}: without odometry, after {flight.now - at:.0f} s")
     return flight
 

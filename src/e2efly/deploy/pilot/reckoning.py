@@ -85,24 +85,35 @@ class Reckonings:
     """Propagated from the newest pose."""
     anchors: tuple[Reckoning, ...] = ()
     """Propagated from older poses, oldest first."""
+    rest: Reckoning | None = None
+    """In a take-off: propagated from the ground, where the velocity is zero, however the poses are scaled."""
 
     def seen(self, newest: Reckoning) -> "Reckonings":
         """These reckonings with another pose."""
         if self.anchors and newest.begun - self.anchors[-1].begun < ANCHOR_S:
             return replace(self, newest=newest)
-        return Reckonings(newest, (*self.anchors[-ANCHORS + 1 :], newest))
+        return Reckonings(newest, (*self.anchors[-ANCHORS + 1 :], newest), self.rest)
+
+    def from_rest(self) -> "Reckonings":
+        """Begin a take-off: nothing moves yet."""
+        rest = self.newest and replace(self.newest, velocity=(0.0, 0.0, 0.0), lifted=0.0)
+        return Reckonings(self.newest, rest=rest)
 
     def on(self, step: Callable[[Reckoning], Reckoning | None]) -> "Reckonings":
         """All reckonings after a step. Those that cannot be propagated are left out."""
         anchors = tuple(after for anchor in self.anchors if (after := step(anchor)) is not None)
-        return Reckonings(None if self.newest is None else step(self.newest), anchors)
+        newest, rest = (None if r is None else step(r) for r in (self.newest, self.rest))
+        return Reckonings(newest, anchors, rest)
 
     def alone(self, *, wrong: bool) -> "Reckonings":
         """Start a flight without poses, from the median of all reckonings.
 
         Args:
-            wrong: the poses were wrong, perhaps for a while, so only the older half is used.
+            wrong: the poses were wrong, perhaps for a while, so only the older half is used, or in a take-off what
+                was propagated from the ground.
         """
+        if wrong and self.rest is not None:
+            return Reckonings(self.rest)
         every = (*self.anchors, *([self.newest] if self.newest else []))
         if not every:
             return self

@@ -30,6 +30,8 @@ AHEAD = 0.15
 controller may hold the command of a link that falls silent now."""
 CLIMB_S = 5.0
 """How much longer a take-off may last than the climb of its target, s."""
+LIFTS_S = 2.5
+"""A take-off that has stood for this time without being felt to fly ends, s."""
 MISLED = "the vehicle does not go where it is sent (wrong heading?)"
 """Reported for odometry that is not that of the vehicle ..."""
 TURNED = "its heading is wrong"
@@ -196,6 +198,9 @@ def _take_off(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: floa
     assert inputs.odometry is not None
     height = float(inputs.odometry.position[2]) - flight.home
     elapsed = flight.now - flight.since
+    flight = looked(flight, inputs)
+    if inputs.stands is not False and has_stood(settings, flight, inputs.odometry, LIFTS_S):
+        return to(flight, Mode.DONE, f"{Reason.NOT_CLIMBING}: {height:.2f} m after {elapsed:.0f} s")
     if elapsed > settings.takeoff_height / settings.takeoff_speed + CLIMB_S:
         return land(settings, flight, inputs, f"{Reason.NOT_CLIMBING}: {height:.2f} m after {elapsed:.0f} s")
     x, y, z = flight.target.position
