@@ -97,7 +97,7 @@ def _throwing(
     visible: Bool[Array, "n t k"],
     hollow: Bool[np.ndarray, " k"],
 ) -> Bool[Array, "n t k"]:
-    """Whether shadows of the solids' balls may fall on objects in the tiles: on the ground, or on another solid's ball."""
+    """Whether shadows of the solids' balls may fall on objects in the tiles: on the ground or another solid's ball."""
     steep = jnp.maximum(sun.z, 1e-3)
     on_ground = seen_by_tiles(pattern, matrix, away - sun * ((away.z + height) / steep), reach / steep)
     apart = Vec3(*(jnp.expand_dims(x, 1) - jnp.expand_dims(x, 2) for x in (away.x, away.y, away.z)))  # (n, onto, from)
