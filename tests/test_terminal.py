@@ -46,3 +46,16 @@ def test_no_table_is_cut(capsys: pytest.CaptureFixture[str]) -> None:
     narrow = Console(width=80, force_terminal=True, color_system=None)
     narrow.print(console_table([row]))
     assert "…" not in capsys.readouterr().out
+
+
+def test_what_was_compiled_says_nothing_about_the_time_left(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A minute of compilation, and then a million steps a second."""
+    clock = iter([100.0, 106.0, 112.0])
+    monkeypatch.setattr("e2efly.terminal.time.monotonic", lambda: next(clock))
+    told = TerminalProgress(Terminal(), "hover")
+    for steps in (0, 6_000_000, 12_000_000):
+        told.progress(steps, 20_000_000, 1e6, 0.5, 0.5, "hover")
+    lines = capsys.readouterr().out.splitlines()
+    assert "left" not in lines[0] and lines[1].endswith("  14 s left") and lines[2].endswith("  8 s left")

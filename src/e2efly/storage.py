@@ -211,11 +211,7 @@ def is_held(folder: Path) -> bool:
 
 
 def _locked(path: Path) -> int:
-    """A descriptor of the file, with the lock on it.
-
-    Raises:
-        BlockingIOError: when another process has it.
-    """
+    """A descriptor of the file, with the lock on it."""
     while True:
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         try:

@@ -216,11 +216,7 @@ def run(asked: Asked) -> int:
 
 
 def _where(o: Hil, scenery: "Scenery", task: str, radius: float, console: Terminal) -> "Scenery":
-    """The scenery in the world that the options name, with ground below its course.
-
-    Raises:
-        ValueError: naming the world, what is wrong with it and what is accepted.
-    """
+    """The scenery in the world that the options name, with ground below its course."""
     from e2efly.validation.scene_files import SceneFile, ground_of
 
     if o.scene is None:
@@ -302,11 +298,7 @@ def _reached(host: str) -> str:
 
 
 def _measured(path: Path) -> Origin:
-    """The origin from measured points.
-
-    Raises:
-        ValueError: naming the file and what is wrong with it.
-    """
+    """The origin from measured points."""
     try:
         rows = np.loadtxt(path, delimiter=",", ndmin=2)
     except (OSError, ValueError) as error:

@@ -130,11 +130,7 @@ def _train(o: Train, again: str, console: Console) -> int:
 
 
 def _page(o: Train) -> "Beside | None":
-    """The page of `--watch`.
-
-    Raises:
-        ValueError: for a port that is invalid or in use, or when viser is not installed.
-    """
+    """The page of `--watch`."""
     if o.watch is None or o.hosts.index > 0:
         return None
     from e2efly.watch.beside import Beside
@@ -334,11 +330,7 @@ def _with_folder(arguments: list[str]) -> list[str]:
 
 
 def _parsed_of_run(arguments: list[str]) -> tuple[Any, TrainConfig]:
-    """The same as `_parsed`, for a run that continues and no named task: everything comes from the run.
-
-    Raises:
-        ValueError: when there is no such run, or when an option contradicts it.
-    """
+    """The same as `_parsed`, for a run that continues and no named task: everything comes from the run."""
     from e2efly.learn.rundir import RunDirectory
 
     out = peek(arguments, "--out", "")

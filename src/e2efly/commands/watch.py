@@ -114,11 +114,7 @@ def run(options: Watch) -> int:
 
 
 def _logs(what: tuple[str, ...]) -> list[Path]:
-    """The flight logs, if flight logs are to be watched; otherwise none.
-
-    Raises:
-        ValueError: for several arguments that are not all logs, and for a path that does not exist.
-    """
+    """The flight logs, if flight logs are to be watched; otherwise none."""
     from e2efly.identification.readers import is_log
 
     logs = [Path(text) for text in what if is_log(Path(text))]
@@ -252,11 +248,7 @@ def _report(what: tuple[str, ...]) -> Path | None:
 
 
 def _reported(o: Watch, report: Path) -> "tuple[Recording, list[Shown]]":
-    """The first start of a report in the requested criterion, and all starts.
-
-    Raises:
-        ValueError: for a given vehicle, which the report determines, and for a criterion that the report does not have.
-    """
+    """The first start of a report in the requested criterion, and all starts."""
     if o.vehicle is not None:
         raise ValueError(f"--vehicle is {o.vehicle!r}; accepted: left out, as {report} says what flew")
     from e2efly.watch.recording import Recording
@@ -270,11 +262,7 @@ def _reported(o: Watch, report: Path) -> "tuple[Recording, list[Shown]]":
 
 
 def _flown(o: Watch, console: Terminal) -> "tuple[Simulation, Progress | None]":
-    """The simulation of a policy, and the progress of its run if it belongs to one.
-
-    Raises:
-        ValueError: for a policy or a criterion that does not exist, and for a run that has no policy within `WAIT_S`.
-    """
+    """The simulation of a policy, and the progress of its run if it belongs to one."""
     from e2efly.device import prepare
 
     prepare("cpu")
@@ -305,11 +293,7 @@ def _flown(o: Watch, console: Terminal) -> "tuple[Simulation, Progress | None]":
 
 
 def _criterion(asked: str | None, there: Any) -> str:
-    """The criterion that is flown.
-
-    Raises:
-        ValueError: for a criterion that the task does not have.
-    """
+    """The criterion that is flown."""
     if asked is not None and asked not in there:
         raise ValueError(f"--criterion is {asked!r}; accepted: {', '.join(there)}")
     return asked or next(iter(there))
