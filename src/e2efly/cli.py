@@ -20,8 +20,6 @@ _EXAMPLES = {
     "train race --algo bptt": "another task, another algorithm",
     "eval runs/hover-bptt-0": "fly a policy from 1000 unseen starts, draw plots",
     "watch hover": "fly a policy in a browser: drag its goal, throw it, change the wind",
-    "compare RUN RUN": "runs side by side: a table and a plot",
-    "publish RUN --to wandb": "a run's metrics on an experiment tracker, also while it goes on",
     "ablate hover": "what each reward term is good for: a figure and a table",
     "sweep hover --seeds 5": "over seeds and options, side by side on Ray",
     "export RUN": "write policy.onnx from a checkpoint again",

@@ -19,6 +19,8 @@ from typing import Any, Generic, TypeVar
 from e2efly.vehicles.names import unknown
 
 T = TypeVar("T")
+F = TypeVar("F", bound=Callable[..., Any])
+C = TypeVar("C", bound=type)
 _REFERENCE = re.compile(r"(?P<reference>(?:.+\.py|[\w.]+):[A-Za-z_]\w*)(?::(?P<where>.*))?")
 
 
@@ -52,6 +54,33 @@ class Registry(Generic[T], Mapping[str, T]):
             raise ValueError(f"{self.kind} {name!r} of {new} is also the name of {known}; accepted: another name")
         self._known[name] = thing
         return thing
+
+    def adding(self, name: str, made: Callable[[F], T]) -> Callable[[F], F]:
+        """A decorator that registers, under a name, what `made` gives for the decorated function or class."""
+
+        def registered(thing: F) -> F:
+            self.add(name, made(thing))
+            return thing
+
+        return registered
+
+    def extending(self, base: type, name: str) -> Callable[[C], C]:
+        """A decorator that registers a complete subclass of `base` under a name, and gives it this name as `name`.
+
+        The decorator raises a ValueError for any other object, naming its origin and what it lacks.
+        """
+        needed = ", ".join(sorted(getattr(base, "__abstractmethods__", ())))
+        accepted = f"accepted: a class that extends {origin(base)}" + (f" and has {needed}" if needed else "")
+
+        def checked(kind: Any) -> Any:
+            if not (isinstance(kind, type) and issubclass(kind, base)):
+                raise ValueError(f"{self.kind} {name!r} is {origin(kind)}; {accepted}")
+            if missing := sorted(getattr(kind, "__abstractmethods__", ())):
+                raise ValueError(f"{self.kind} {name!r} of {origin(kind)} lacks {', '.join(missing)}; {accepted}")
+            kind.name = name  # type: ignore[attr-defined]
+            return kind
+
+        return self.adding(name, checked)
 
     def find(self, name: str) -> T:
         """The object for a name or a reference.
@@ -134,7 +163,8 @@ def check_methods(thing: Any, methods: Sequence[str]) -> None:
         ValueError: naming its origin, what it lacks and what it must have.
     """
     if lacking := [name for name in methods if not hasattr(thing, name)]:
-        raise ValueError(f"{origin(type(thing))} has no {', '.join(lacking)}; accepted: all of {', '.join(methods)}")
+        of = origin(thing if isinstance(thing, type) else type(thing))
+        raise ValueError(f"{of} has no {', '.join(lacking)}; accepted: all of {', '.join(methods)}")
 
 
 def origin(thing: Any) -> str:

@@ -67,15 +67,7 @@ def register(name: str) -> Callable[[C], C]:
     Raises:
         ValueError: for a name that is already used, or a class that is not an `AlgorithmConfig`.
     """
-
-    def registered(options: C) -> C:
-        if not (isinstance(options, type) and issubclass(options, AlgorithmConfig)):
-            raise ValueError(f"algorithm {name!r} is {options!r}; accepted: a dataclass that extends AlgorithmConfig")
-        options.name = name
-        ALGORITHMS.add(name, options)
-        return options
-
-    return registered
+    return ALGORITHMS.extending(AlgorithmConfig, name)
 
 
 def _check_minibatch(steps: int, minibatch: int) -> None:
