@@ -79,12 +79,12 @@ def test_a_task_is_the_name_of_its_policy(tmp_path: Path) -> None:
     assert policy_file("hover") == FOLDER / USUAL / "hover.onnx"
     assert policy_file("hover", "crazyflie") == FOLDER / "crazyflie" / "hover.onnx"
     assert policy_file(tmp_path) == tmp_path / "policy.onnx"
-    assert policy_file("runs/mine") == Path("runs/mine")
     for whatever in (None, "vis_r", "any"):  # a policy of any vehicle goes by its family's name
         assert policy_file("any/hover", whatever) == FOLDER / "any" / "hover.onnx"
     assert policy_file("hover", "any") == FOLDER / "any" / "hover.onnx"
-    with pytest.raises(ValueError, match=r"unknown policy 'hovr'.*hover"):
-        policy_file("hovr")
+    for wrong in ("hovr", "any/hovr", "runs/hover", "hovr.onnx"):
+        with pytest.raises(ValueError, match=rf"unknown policy '{wrong}'; did you mean '.*hover'.*any/race, .*path"):
+            policy_file(wrong)
     with pytest.raises(ValueError, match=r"no policy 'avoid' of vehicle 'crazyflie'; accepted: vis_h, vis_r"):
         policy_file("avoid", "crazyflie")
     for own, values, whose in (

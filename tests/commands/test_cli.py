@@ -96,10 +96,10 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         ),
         (["eval", "nowhere.onnx"], "nowhere.onnx"),
         (["eval", "nowhere.onnx", "--episodes", "0"], "--episodes is 0; accepted: more than 0"),
-        (["export", "nowhere"], "nowhere holds no run"),
+        (["export", "nowhere"], "unknown policy 'nowhere' (there are: any/hover, any/land"),
         (
             ["render", "forst"],
-            "unknown scene 'forst'; did you mean 'forest'? (there are: circle_3d, clutter, corridor,",
+            "unknown scene or policy 'forst'; did you mean 'forest'? (there are: any/hover, any/land,",
         ),
         (["render", "nowhere.toml"], "nowhere.toml: No such file or directory; accepted: the path of a .toml file"),
         (["render", "forest", "--width", "4"], "--width is 4; accepted: 8 to 4096 pixels"),
@@ -202,7 +202,7 @@ def test_help_imports_no_jax(arguments: list[str]) -> None:
 
 def test_every_option_of_train_has_help() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "e2efly", "train", "race", "--help"], capture_output=True, check=True, text=True
+        [sys.executable, "-m", "e2efly", "train", "race", "--help-all"], capture_output=True, check=True, text=True
     )
     for flag in ("TASK", "--algo ", "--vehicle", "--seed", "--out", "--resume", "--algo.gamma", "--task.laps",
                  "--env.noise.position", "--env.imu.observed", "--reward.weights", "--network.hidden"):  # fmt: skip

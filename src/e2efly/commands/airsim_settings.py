@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 from rich.table import Table
@@ -14,7 +15,7 @@ from e2efly.terminal import Terminal
 class AirsimSettings:
     """Write AirSim's settings.json for a vehicle, and list what these settings cannot express about the vehicle."""
 
-    vehicle: tyro.conf.Positional[str] = "vis_r"
+    vehicle: tyro.conf.Positional[Annotated[str, tyro.conf.arg(metavar="[VEHICLE]")]] = "vis_r"
     """Name of a vehicle, or a .toml file."""
     policy: Path | None = None
     """A run directory, a policy.onnx, or a task of the zoo. The cameras of this policy are written, too."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import tyro
 
@@ -18,7 +18,7 @@ class Publish:
     See docs/network.md for what leaves the machine.
     """
 
-    run: tyro.conf.Positional[Path]
+    run: tyro.conf.Positional[Annotated[Path, tyro.conf.arg(metavar="RUN")]]
     """Run directory. The run may be finished, interrupted, or in progress."""
     to: Literal["trackio", "wandb"]
     """The tracker: Trackio (pip install 'e2efly[trackio]') or Weights & Biases (pip install 'e2efly[wandb]')."""

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from rich.console import Console
@@ -33,7 +33,7 @@ WHOLE_S = 1.0
 class Validate:
     """Fly a policy on another plant, from the starts of `eval`. The exit status is 1 if success drops too far."""
 
-    policy: tyro.conf.Positional[Path]
+    policy: tyro.conf.Positional[Annotated[Path, tyro.conf.arg(metavar="POLICY")]]
     """A run directory, a policy.onnx, or a task. A task selects its policy in the zoo: the one for --vehicle if the zoo
     has that vehicle, otherwise the one for VIS-R. `any/hover` is the policy for any vehicle."""
     plant: str = "mujoco"

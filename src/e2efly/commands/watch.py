@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import tyro
@@ -44,7 +44,7 @@ class Watch:
     docs/watch.md.
     """
 
-    what: tyro.conf.Positional[tuple[str, ...]]
+    what: tyro.conf.Positional[Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY|FILE ...")]]
     """One of: a task (the zoo's policy for it), a policy.onnx, or a run directory. One or more flight logs: the first
     is followed, the others are shown as its ghosts. A report of `e2efly validate --json`, or its folder: it shows the
     policy on the plant, with its flight in the training simulator as a ghost. A pose source, as in `e2efly fly`:
