@@ -96,7 +96,7 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         ),
         (["eval", "nowhere.onnx"], "nowhere.onnx"),
         (["eval", "nowhere.onnx", "--episodes", "0"], "--episodes is 0; accepted: more than 0"),
-        (["export", "nowhere"], "unknown policy 'nowhere' (there are: any/hover, any/land"),
+        (["export", "nowhere"], "unknown policy 'nowhere'; did you mean 'hover'? (there are: any/hover, any/land"),
         (
             ["render", "forst"],
             "unknown scene or policy 'forst'; did you mean 'forest'? (there are: any/hover, any/land,",

@@ -37,7 +37,7 @@ def names() -> list[str]:
         ValueError: where the package's file is damaged.
     """
     zoo = contents()
-    return [*zoo[USUAL], *(f"{whose}/{task}" for whose, tasks in zoo.items() if whose != USUAL for task in tasks)]
+    return [*zoo[USUAL], *(f"{whose}/{task}" for whose, tasks in zoo.items() for task in tasks)]
 
 
 def is_policy(text: str | os.PathLike[str]) -> bool:
