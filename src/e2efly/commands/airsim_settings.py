@@ -47,9 +47,8 @@ def run(options: AirsimSettings) -> int:
     console.print(f"Settings: {options.out}")
     for option in named(images):
         console.print(f"Its camera in `e2efly validate --plant airsim`: {option}")
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in ("what settings.json cannot say", vehicle.name, "where AirSim has it"):
-        table.add_column(heading, overflow="fold")
+    headings = "what settings.json cannot say", vehicle.name, "where AirSim has it"
+    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
     for row in unsaid(vehicle, images):
         table.add_row(*row)
     console.print(table)

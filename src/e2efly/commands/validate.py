@@ -210,9 +210,7 @@ def _table(found: "Validation") -> Table:
     from e2efly.episodes import summary
 
     headings = "criterion", "flown in", "success", "95 %", "end error", "mean", "time", "drop"
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in headings:
-        table.add_column(heading, no_wrap=True)
+    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
     for name, v in found.criteria.items():
         for place, e, drop in (("training", v.trained, ""), (found.plant.name, v.flown, f"{v.drop:+.1f}")):
             s = summary(e)
