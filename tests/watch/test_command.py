@@ -17,6 +17,7 @@ from e2efly.watch.waiting import MARK, asked_for
 
 
 @pytest.mark.parametrize(("arguments", "told"), [
+    ([], "WHAT is empty; accepted: one or more"),
     (["hover", "--count", "0"], "--count is 0; accepted: 1 to 1024"),
     (["hover", "--port", "70000"], "--port is 70000; accepted: 0 to 65535"),
     (["hover", "race"], "accepted: one policy or run, or several flight logs"),

@@ -34,7 +34,7 @@ class Ablate:
     algos: tuple[str, ...] = ("ppo", "bptt")
     """Learning algorithms. One figure is drawn per algorithm."""
     preset: str = "nominal"
-    """Preset of the rewards and sizes; see `e2efly train --help`. Its curriculum is not used."""
+    """Preset of the rewards and sizes; see `e2efly list presets`. Its curriculum is not used."""
     seeds: int = 3
     """Number of runs per variant."""
     by: Literal["term", "group"] = "term"

@@ -35,8 +35,6 @@ def run(options: Compare) -> int:
     from e2efly.storage import write_json
     from e2efly.view.comparison import plot_runs
 
-    if not options.runs:
-        raise ValueError("RUNS is empty; accepted: folders of runs")
     found = [Compared.of(path) for path in options.runs]
     rows, console = table(found), Terminal()
     console.print(console_table(rows))

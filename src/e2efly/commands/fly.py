@@ -66,7 +66,7 @@ class Fly:
     policy: tyro.conf.Positional[Annotated[Path | None, tyro.conf.arg(metavar="[POLICY]")]] = None
     """A policy.onnx, a run directory, or a task (the zoo's policy). `excitation` flies the manoeuvres that
     identification needs, in place of a policy. If omitted: take-off, hover and landing only.
-    `e2efly fly POLICY --help` also lists the options of the policy's goal."""
+    `e2efly fly POLICY --help-all` also lists the options of the policy's goal."""
     link: str = "/dev/ttyACM0"
     """Connection to the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT."""
     pose: str = "udp:9870"

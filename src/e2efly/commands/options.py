@@ -3,10 +3,11 @@
 import io
 import sys
 from contextlib import redirect_stderr
+from dataclasses import MISSING, fields
 from decimal import Decimal
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import tyro
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
@@ -70,7 +71,10 @@ def parse(options: type[T], command: str, arguments: list[str], **default: Any) 
     if left:
         refuse_unknown(left, command, accepted(options, given))
         raise ValueError(f"{left[0]!r} is one argument too many for `e2efly {command}`; accepted: see its --help")
+    required = {field.name for field in fields(cast(Any, options)) if field.default is MISSING}
     for name, value in vars(found).items():
+        if value == () and name in required:
+            raise ValueError(f"{name.upper()} is empty; accepted: one or more (see `e2efly {command} --help`)")
         if isinstance(value, Path) and value.exists() and not (value.is_file() or value.is_dir()):
             raise ValueError(f"{name} is {value}; accepted: the path of a file or of a folder")
     return found

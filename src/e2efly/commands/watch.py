@@ -5,7 +5,7 @@ import os
 import select
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -115,7 +115,7 @@ def run(options: Watch) -> int:
     return 0
 
 
-def _logs(what: tuple[str, ...], vehicle: str | None) -> list[Path]:
+def _logs(what: Sequence[str], vehicle: str | None) -> list[Path]:
     """The flight logs, if flight logs are to be watched; otherwise none.
 
     Raises:
@@ -126,9 +126,9 @@ def _logs(what: tuple[str, ...], vehicle: str | None) -> list[Path]:
     logs = [Path(text) for text in what if is_log(Path(text))]
     if len(what) > 1 and len(logs) < len(what):
         raise ValueError(f"WHAT is {' '.join(what)}; accepted: one policy or run, or several flight logs")
-    if not logs and not _is_source(what[0]):
+    if not logs and not _is_source(first := what[0]):
         try:
-            policy_file(what[0], vehicle)
+            policy_file(first, vehicle)
         except ValueError as error:
             raise ValueError(f"{error}, a flight log, or a report of `e2efly validate --json`") from None
     return logs
