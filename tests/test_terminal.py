@@ -4,6 +4,7 @@ import io
 
 import pytest
 from rich.console import Console
+from rich.table import Table
 
 from e2efly.terminal import Terminal, TerminalProgress, console_table
 
@@ -37,14 +38,20 @@ def test_a_pipe_gets_lines() -> None:
     assert lines[3] == "race_clutter by bptt: flying 1000 starts that it never saw"
 
 
-def test_no_table_is_cut(capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_table_is_cut(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     row = {"policy": "hover, best, vehicle of the file", **{f"column {i}": "100.0%" for i in range(12)}}
     Terminal().print(console_table([row]))
     assert [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()] == [
         " ".join(row), " ".join(row.values())
     ]  # fmt: skip
-    narrow = Console(width=80, force_terminal=True, color_system=None)
-    narrow.print(console_table([row]))
+    for option in ("FORCE_COLOR", "TTY_COMPATIBLE"):  # makes rich take a pipe for a terminal
+        monkeypatch.setenv(option, "1")
+        monkeypatch.setenv("COLUMNS", "60")
+        Terminal().print(console_table([row]))
+        assert len(capsys.readouterr().out.splitlines()) == 2
+    narrow = Terminal()
+    narrow.width = 80
+    narrow.print(Table(*row, *row))
     assert "…" not in capsys.readouterr().out
 
 

@@ -279,4 +279,4 @@ def check(config: TrainConfig) -> None:
         if not abs(value) <= LARGEST:  # true for NaN
             raise ValueError(f"reward {name} is {value}; accepted: a number, -{LARGEST:g} to {LARGEST:g}")
     if not config.reward.weights:
-        raise ValueError("reward.weights is empty; accepted: at least one term (see `e2efly list`)")
+        raise ValueError("reward.weights is empty; accepted: at least one term (see `e2efly list rewards`)")

@@ -95,14 +95,14 @@ class Registry(Generic[T], Mapping[str, T]):
             return self._known[name]
         if ":" not in name:
             raise ValueError(unknown(self.kind, name, self._known) + ", or path/to/file.py:Name, or module:Name")
-        where, _, attribute = name.rpartition(":")
-        whole = f"{Path(where).expanduser().absolute()}:{attribute}" if where.endswith(".py") else name
-        if (here := next((known for known in self._known.values() if origin(known) == whole), None)) is not None:
+        whole = absolute(name)
+        if (here := next((t for t in self._known.values() if origin(self._source(t)) == whole), None)) is not None:
             return here
         thing = load(name)
-        if not any(thing is known for known in self._known.values()):
+        found = next((t for t in self._known.values() if thing is t or thing is self._source(t)), None)
+        if found is None:
             raise ValueError(f"{name} is {thing!r}; accepted: what its file registers as {self.kind}")
-        return thing
+        return found
 
     def reference(self, thing: T) -> str:
         """The text with which `find` finds an object in another process.
@@ -116,6 +116,12 @@ class Registry(Generic[T], Mapping[str, T]):
         if name is None:
             raise ValueError(f"{origin(thing)} is no registered {self.kind}; accepted: {', '.join(self._known)}")
         return name if is_shipped(thing) else origin(thing)
+
+
+def absolute(name: str) -> str:
+    """A name, or a reference whose file is found from every folder."""
+    where, _, attribute = name.rpartition(":")
+    return f"{Path(where).expanduser().absolute()}:{attribute}" if where.endswith(".py") else name
 
 
 def load_installed() -> None:

@@ -25,11 +25,13 @@ class Terminal(Console):
 
     def __init__(self, *, stderr: bool = False, quiet: bool = False) -> None:
         super().__init__(stderr=stderr, quiet=quiet, markup=False, emoji=False, highlight=False, soft_wrap=True)
-        if not self.is_terminal:
+        if not self.file.isatty():  # also where FORCE_COLOR makes rich believe that it is a terminal
             self.width = WIDE
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Pieces of text, with their styles, and the control codes of rich itself."""
+        """Pieces of text, with their styles, and the control codes of rich itself. No cell of a table is cut."""
+        for column in renderable.columns if isinstance(renderable, Table) else ():
+            column.overflow = "fold"
         for segment in super().render(renderable, options):
             lines = segment.text.split("\n")
             yield segment if segment.control else Segment("\n".join(map(printable, lines)), segment.style)
@@ -130,9 +132,7 @@ class TerminalProgress:
 
 def console_table(rows: list[dict[str, Any]]) -> Table:
     """A table for `rich`. The keys of the first row are the headings."""
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in rows[0]:
-        table.add_column(heading, overflow="fold")
+    table = Table(*rows[0], box=None, header_style="bold", pad_edge=False)
     for row in rows:
         table.add_row(*map(str, row.values()))
     return table

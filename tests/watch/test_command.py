@@ -17,24 +17,30 @@ from e2efly.watch.waiting import MARK, asked_for
 
 
 @pytest.mark.parametrize(("arguments", "told"), [
+    ([], "WHAT is empty; accepted: one or more"),
     (["hover", "--count", "0"], "--count is 0; accepted: 1 to 1024"),
     (["hover", "--port", "70000"], "--port is 70000; accepted: 0 to 65535"),
     (["hover", "race"], "accepted: one policy or run, or several flight logs"),
-    (["nowhere.mcap"], "'nowhere.mcap' does not exist"),
-    (["runs/nothing"], "'runs/nothing' does not exist; accepted: a task, "),
-    (["nothing.onnx"], "'nothing.onnx' does not exist; accepted: a task, "),
+    (["nowhere.mcap"], "unknown policy 'nowhere.mcap'"),
+    (["runs/nothing"], "a run directory, or the path of a policy.onnx, a flight log, or a report of `e2efly validate"),
+    (["any/hovr"], "unknown policy 'any/hovr'; did you mean 'any/hover'?"),
+    (["hover", "--vehicle", "vis_x"], "unknown vehicle 'vis_x'"),
+    (["hover", "--video", "x.mp4"], "needs the program ffmpeg; accepted: that, or a name that ends in .webm or .gif"),
     (["hover", "--criterion", "x"], "--criterion is 'x'; accepted: hover"),
     (["hover", "--video", "x.avi"], "accepted: a name that ends in .gif, .mp4, .webm, .png"),
 ])  # fmt: skip
-def test_bad_input_is_named(arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_input_is_named_before_there_is_a_page(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     from e2efly.cli import run
+
+    monkeypatch.setenv("PATH", "")  # without ffmpeg
 
     port = [] if "--port" in arguments else ["--port", "0"]
     assert run(["watch", *arguments, *port]) == 2
     said = capsys.readouterr()
     assert told in said.err
-    if "does not exist" in told:  # told before there is a page that goes away at once
-        assert "Look at" not in said.out
+    assert "Look at" not in said.out
 
 
 def test_a_port_in_use_is_named(capsys: pytest.CaptureFixture[str]) -> None:

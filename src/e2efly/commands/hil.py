@@ -8,7 +8,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import tyro
@@ -45,7 +45,7 @@ class Hil:
     docs/hil.md.
     """
 
-    policy: tyro.conf.Positional[Path]
+    policy: tyro.conf.Positional[Annotated[Path, tyro.conf.arg(metavar="POLICY")]]
     """The policy whose cameras and world are rendered: a policy.onnx, a run directory, or a task of the zoo."""
     pose: str = "udp:9870"
     """Pose source, as in `e2efly fly`."""
