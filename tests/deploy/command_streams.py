@@ -13,6 +13,7 @@ import numpy as np
 
 from e2efly.deploy.commander.command import Command
 from e2efly.deploy.commander.sources import open_commands
+from tests.waiting import free_port
 
 PUBLISHED = """
 import math
@@ -57,9 +58,7 @@ class Loopback:
     """A real UDP source and its sender; what has arrived counts as arrived at the time of the next `read`."""
 
     def __init__(self) -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
+        self.port = free_port(udp=True)
         self.source = open_commands(f"udp:{self.port}")
         self.sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
