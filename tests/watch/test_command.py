@@ -7,13 +7,12 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 import urllib.request
-from pathlib import Path
 
 import pytest
 
 from e2efly.watch.waiting import MARK, asked_for
+from tests.waiting import free_port, running, until
 
 
 @pytest.mark.parametrize(("arguments", "told"), [
@@ -55,9 +54,7 @@ def test_a_port_in_use_is_named(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_nothing_is_computed_until_a_browser_asks_for_the_page() -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     asked: list[bool] = []
     over = threading.Event()
     waiting = threading.Thread(target=lambda: asked.append(asked_for("127.0.0.1", port, over.is_set)))
@@ -82,11 +79,7 @@ def test_a_viewer_beside_a_program_ends_with_it() -> None:
         viewer = int(program.stdout.readline())
         program.kill()
     try:
-        for _ in range(600):
-            if not Path(f"/proc/{viewer}").exists() or "Z" in Path(f"/proc/{viewer}/stat").read_text().split()[2]:
-                return
-            time.sleep(0.1)
-        raise AssertionError("the viewer goes on")
+        until(lambda: not running(viewer), 60.0)
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.kill(viewer, signal.SIGKILL)

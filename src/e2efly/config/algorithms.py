@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
-from e2efly.numbers import check_numbers, number
+from e2efly.numbers import check_fields, number
 from e2efly.registry import Registry
 
 
@@ -43,7 +43,7 @@ class AlgorithmConfig:
         Raises:
             ValueError: naming the field, the value and what is accepted.
         """
-        check_numbers("algo", self)
+        check_fields("algo", self)
 
     def kept(self) -> dict[str, tuple[int, str]]:
         """What it keeps of earlier steps. For each option: how many, and whether they are `transition` or `state`."""
