@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -87,7 +87,7 @@ class Goal:
     """The options of the task."""
 
     @classmethod
-    def of(cls, config: Any, shape: "Shape", control_period: float, checks: int = 1) -> Self:
+    def of(cls, config: Any, shape: "Shape", control_period: float, checks: int = 1) -> Any:
         """Make the goal from its options, with those of the other arguments for which it has a field.
 
         Args:
