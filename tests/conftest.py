@@ -35,6 +35,8 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402
 
+from e2efly.vehicles import Vehicle, load_vehicle  # noqa: E402
+
 settings.register_profile("suite", deadline=None)  # how busy the machine is says nothing of the code
 settings.load_profile("suite")
 
@@ -63,6 +65,11 @@ def _programs_go() -> Iterator[None]:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """No options for single programs: QUICK compiles sooner than `fast_compile` does. For runs of a few updates."""
     monkeypatch.setattr(device, "FAST_COMPILE", {})
+
+
+@pytest.fixture(scope="session")
+def vis_r() -> Vehicle:
+    return load_vehicle("vis_r")
 
 
 @pytest.fixture

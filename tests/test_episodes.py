@@ -213,6 +213,9 @@ BROKEN: list[tuple[dict[str, Any], str]] = [
         {"latency_spread": (0.0, 0.95)},
         r"latency of vehicle vis_r is 0\.06 s, env\.latency_spread .*at most 1 s together",
     ),
+    ({"integrator": "rk5"}, "unknown integrator 'rk5'; did you mean 'rk4'"),
+    ({"randomize": {"mas": 0.1}}, "unknown vehicle parameter 'mas'; did you mean 'mass'"),
+    ({"randomize": {"mass": 1.5}}, "randomize.mass is 1.5; accepted: at least 0 and below 1"),
     ({"randomize": {"mass": float("nan")}}, r"env\.randomize\.mass is nan; accepted: at least 0 and below 1"),
     ({"randomize": {"name": 0.1}}, "unknown vehicle parameter 'name'"),
 ]

@@ -23,7 +23,7 @@ from e2efly.validation.plant import RigidState
 from e2efly.validation.plants import find_plant
 from e2efly.validation.plants.airsim import AirsimPlant
 from e2efly.validation.plants.mujoco import MujocoPlant
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 from tests.validation.airsim_client import Tap, published
 from tests.validation.airsim_server import FLIP, PERIOD, TURN, Server, World, settings
@@ -33,11 +33,6 @@ DRONE = "vis_r"
 TILTED = RigidState(
     np.array([1.0, 2.0, 5.0]), np.array([0.5, -1.0, 0.3]), np.array([0.9, 0.1, 0.3, 0.3]), np.array([0.5, -0.3, 0.8])
 )
-
-
-@pytest.fixture(scope="module")
-def vis_r() -> Vehicle:
-    return load_vehicle("vis_r")
 
 
 @pytest.fixture
