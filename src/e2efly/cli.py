@@ -49,7 +49,8 @@ _MEANT = {
     "render": ("draw", "picture"),
 }
 """Words that other programs use for a command."""
-_COMMANDS = dict.fromkeys(example.split()[0] for example in _EXAMPLES)
+COMMANDS = dict.fromkeys(example.split()[0] for example in _EXAMPLES)
+"""The names of all commands."""
 
 
 def main() -> NoReturn:
@@ -103,7 +104,7 @@ def run(arguments: list[str]) -> int:
 
 
 def _command(name: str, arguments: list[str]) -> int:
-    if name not in _COMMANDS:
+    if name not in COMMANDS:
         raise ValueError(_unknown(name))
     module = importlib.import_module(f"e2efly.commands.{name.replace('-', '_')}")
     if hasattr(module, "parse"):  # its options depend on the arguments
@@ -116,10 +117,10 @@ def _command(name: str, arguments: list[str]) -> int:
 def _unknown(name: str) -> str:
     """The error text for a command that does not exist. It never suggests one that moves a real vehicle."""
     words = {word: command for command, others in _MEANT.items() for word in (command, *others)}
-    words |= {command: command for command in _COMMANDS if command not in _MOVES}
+    words |= {command: command for command in COMMANDS if command not in _MOVES}
     guess = nearest(name, words)
     hint = f"; did you mean {words[guess]!r}?" if guess else ""
-    return f"unknown command {name!r}{hint} (there are: {', '.join(sorted(_COMMANDS))})"
+    return f"unknown command {name!r}{hint} (there are: {', '.join(sorted(COMMANDS))})"
 
 
 def _about() -> str:
