@@ -10,8 +10,8 @@ from e2efly import cli
 PAGE = Path(__file__).parent / "reference" / "command-line.md"
 ABOUT = """# Command line
 
-`e2efly COMMAND --help` is one screen: the texts below. `e2efly COMMAND --help-all` lists every option in full, with its default. Options of tasks, environments and algorithms
-are those of the [configuration](configuration.md).
+`e2efly COMMAND --help` is one screen: the texts below. `e2efly COMMAND --help-all` lists every option in full, with its
+default. Options of tasks, environments and algorithms are those of the [configuration](configuration.md).
 """
 
 
