@@ -91,6 +91,8 @@ def test_every_field_of_numbers_has_a_rule_with_finite_ends_that_accepts_its_def
     assert {name.partition(".")[2] for name, (_, _, rule) in RULES.items() if rule.low < 0} == SIGNED
     flight = {name for name in RULES if name.startswith("FlightSettings.")} - {"FlightSettings.ground_height"}
     assert [name for name in POSITIVE | flight if RULES[name][2].low <= 0] == []
+    shares = ("StageConfig.success", "EnvConfig.latency_spread")
+    assert [RULES[name][2].high for name in shares] == [1.0, 1.0]
     for name, (part, _, rule) in RULES.items():
         assert -math.inf < rule.low < rule.high < math.inf, name
         assert np.isfinite(np.float32([rule.low, rule.high])).all()
