@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import e2efly
-from e2efly.cli import _COMMANDS, run
+from e2efly.cli import COMMANDS, run
 from e2efly.commands.train import parse
 from e2efly.learn.judge import verdict
 from e2efly.vehicles import vehicle_file
@@ -208,7 +208,7 @@ def test_help_imports_no_jax(arguments: list[str]) -> None:
     assert b"e2efly" in done.stdout or b"0." in done.stdout
 
 
-@pytest.mark.parametrize("command", _COMMANDS)
+@pytest.mark.parametrize("command", COMMANDS)
 def test_help_is_one_screen_and_names_its_arguments(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         run([command, "--help"])

@@ -17,11 +17,10 @@ from e2efly.deploy.betaflight.mode_slots import BoxIds
 from e2efly.deploy.betaflight.modes import ARM, OVERRIDE
 from e2efly.deploy.flight_loop import fly
 from e2efly.deploy.service import Service
-from tests.commands.test_fly import free_port
 from tests.deploy.msp_golden import REPLIES, payload
 from tests.deploy.test_flight_loop import Clock, Grounded
 from tests.deploy.test_msp_client import controller, recorded
-from tests.waiting import until
+from tests.waiting import free_port, until
 
 
 @pytest.fixture
