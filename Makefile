@@ -7,7 +7,7 @@ TEST_READY := $(VENV)/.test-ready
 DOCS_READY := $(VENV)/.docs-ready
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint bench zoo docs site web clean
+.PHONY: demo test test-all lint bench zoo docs site web clean
 
 demo: $(READY)
 	@rm -rf runs/demo
@@ -25,10 +25,17 @@ FIRMWARE := case ",$$E2EFLY_WITHOUT," in *,sitl,*) ;; *) $(BIN)/e2efly firmware 
 # What runs in real time, in several processes, has both cores to itself.
 REAL_TIME := tests/validation/test_process_faults_sitl.py tests/validation/test_hil_rehearsal_sitl.py
 
+PYTEST := $(BIN)/python -m pytest -n 2 --max-worker-restart 0 --durations 25 --no-loadscope-reorder $(REAL_TIME:%=--ignore=%)
+
+# What each of the two covers: docs/architecture.md.
 test: $(TEST_READY)
 	@$(FIRMWARE) & $(MAKE) --no-print-directory lint && wait
-	$(BIN)/python -m pytest -n 2 --max-worker-restart 0 --durations 25 --dist loadfile --no-loadscope-reorder $(REAL_TIME:%=--ignore=%)
-	$(BIN)/python -m pytest $(REAL_TIME)
+	$(PYTEST) --dist loadfile
+
+test-all: $(TEST_READY)
+	@$(FIRMWARE)
+	$(PYTEST) --dist loadfile --whole
+	$(BIN)/python -m pytest --whole $(REAL_TIME)
 
 lint: $(TEST_READY)
 	$(BIN)/ruff check .
@@ -47,6 +54,7 @@ docs: $(DOCS_READY)
 	$(BIN)/python docs/figures.py
 	$(BIN)/python docs/paper_page.py
 	$(BIN)/python docs/zoo_cards.py
+	$(BIN)/python docs/command_line.py
 	$(BIN)/python docs/notebook_pages.py
 	@$(MAKE) --no-print-directory site
 

@@ -4,6 +4,7 @@ import os
 import shutil
 import signal
 import subprocess
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +35,8 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402
 
+from e2efly.vehicles import Vehicle, load_vehicle  # noqa: E402
+
 settings.register_profile("suite", deadline=None)  # how busy the machine is says nothing of the code
 settings.load_profile("suite")
 
@@ -62,6 +65,11 @@ def _programs_go() -> Iterator[None]:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """No options for single programs: QUICK compiles sooner than `fast_compile` does. For runs of a few updates."""
     monkeypatch.setattr(device, "FAST_COMPILE", {})
+
+
+@pytest.fixture(scope="session")
+def vis_r() -> Vehicle:
+    return load_vehicle("vis_r")
 
 
 @pytest.fixture
@@ -108,6 +116,10 @@ def network(network_library: Path | None, tmp_path: Path, monkeypatch: pytest.Mo
     return trace
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--whole", action="store_true", help="all tests, also those of `make test-all` alone")
+
+
 def pytest_configure(config: pytest.Config) -> None:
     del config
     if wrong := set(WITHOUT) - set(PARTS):
@@ -115,13 +127,31 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    out = [item for item in items if item.path.stem.endswith(tuple(f"_{part}" for part in WITHOUT))]
-    if out:
-        config.hook.pytest_deselected(items=out)
-        items[:] = [item for item in items if item not in out]
     here = Path(__file__).parent
+    named = any((config.rootpath / argument).resolve() != here for argument in config.args)  # and these are run
+    later = [] if named or config.getoption("--whole") else _of_the_whole(items)
+    folders = [{item.path.parent for item in items if item not in of} for of in (set(), set(later))]
+    if alone := folders[0] - folders[1]:
+        raise pytest.UsageError(f"every test is `whole` in {', '.join(map(str, alone))}; accepted: one that is not")
+    out = {item for item in items if item.path.stem.endswith(tuple(f"_{part}" for part in WITHOUT))} | set(later)
+    if out:
+        config.hook.pytest_deselected(items=[*out])
+        items[:] = [item for item in items if item not in out]
     place = {here / name: i for i, name in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.path, len(LONGEST)))
+
+
+def _of_the_whole(items: list[pytest.Item]) -> list[pytest.Item]:
+    """The tests that the short suite leaves out: those marked `whole`, but for their first cases."""
+    seen, later = Counter[str](), []
+    for item in items:
+        if (mark := item.get_closest_marker("whole")) is None:
+            continue
+        test = item.nodeid.partition("[")[0]
+        seen[test] += 1
+        if seen[test] > mark.kwargs.get("but", 0):
+            later.append(item)
+    return later
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

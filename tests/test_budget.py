@@ -52,7 +52,6 @@ SMALL = presets.preset("hover", "ppo")
         ),
         ("train avoid --task.forest.room 1000000000", "task.forest.room 1000000000, images of 32 x 12: about"),
         ("train avoid --network.convolution 1000000", "convolution (1000000,), with 30 observed numbers"),
-        ("train race --task.laps 1000000000000000000", "task.laps is 1000000000000000000; accepted: a whole number,"),
         ("eval hover --episodes 10000000000", "--episodes is 10000000000: about 2 TB of memory; accepted: what fits"),
         ("validate hover --episodes 10000000000", "--episodes is 10000000000: about 358 TB of memory; accepted: what"),
         ("validate hover --flights 1000000000", "--flights is 1000000000: about 31.7 years, at 1 s each; accepted: "),

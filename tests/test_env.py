@@ -277,23 +277,6 @@ def test_imu_noise_and_bias_grow_as_their_densities_say() -> None:
     np.testing.assert_allclose(np.mean(end.accelerometer, axis=0), [0, 0, 9.81], atol=0.01)
 
 
-@pytest.mark.parametrize(
-    ("config", "message"),
-    [
-        ({"randomize": {"mas": 0.1}}, "unknown vehicle parameter 'mas'; did you mean 'mass'"),
-        ({"randomize": {"mass": 1.5}}, "randomize.mass is 1.5; accepted: at least 0 and below 1"),
-        ({"action_latency": (0.1, 0.0)}, "action_latency is"),
-        ({"wind": -1.0}, "wind is -1.0"),
-        ({"past_actions": -1}, "past_actions is -1"),
-        ({"control_rate": 0.0}, "control_rate is 0.0"),
-        ({"integrator": "rk5"}, "unknown integrator 'rk5'; did you mean 'rk4'"),
-    ],
-)
-def test_bad_configurations_are_named(config: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        make(**config)
-
-
 def test_a_run_and_what_is_flown_for_a_purpose_draw_from_different_keys() -> None:
     streams = (WATCHED, CONFIRMED, REPORTED, UNSEEN)
     seeds = [(seed,) for seed in range(9)]

@@ -20,8 +20,8 @@ from e2efly.cli import WHOLE
 from e2efly.commands.fly import parse
 from e2efly.deploy.log.flight_log import read_log
 from e2efly.deploy.service import PERIOD_S
-from tests.commands.test_fly import free_port
 from tests.deploy.test_msp_client import controller, recorded
+from tests.waiting import free_port
 
 ROOT = Path(__file__).parents[1]
 ALONE = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}

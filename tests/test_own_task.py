@@ -99,8 +99,11 @@ def test_the_python_face_takes_a_name_a_class_or_options() -> None:
         e2efly.make_env("hover", wind=-1.0)
 
 
-def test_a_reward_term_of_ones_own_is_learned_by_and_never_from_an_old_program(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reward_term_of_ones_own_is_learned_by_and_never_from_an_old_program(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     from e2efly import rewards
+    from e2efly.commands.train import parse
     from e2efly.env import Env
     from e2efly.learn.programs import traced_folder
 
@@ -119,6 +122,20 @@ def test_a_reward_term_of_ones_own_is_learned_by_and_never_from_an_old_program(m
     state, _ = jax.eval_shape(lambda key: env.reset(key, 4), jax.random.key(0))
     _, out = jax.eval_shape(env.step, state, jnp.zeros((4, 4)))
     assert set(out.terms) == {"near", "low"}
+    file = tmp_path / "terms.py"
+    file.write_text(
+        "import e2efly\n\n@e2efly.register_reward('differentiable')\ndef high(height):\n    return height\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    asked = parse(["hover", "--reward.weights", "terms.py:high", "0.5"]).config
+    assert asked.reward.weights[f"{file}:high"] == 0.5  # found from every folder, as by --resume
+    assert traced_folder(asked) is None
+    _, out = jax.eval_shape(Env.of(asked.task, asked.reward, asked.env).step, state, jnp.zeros((4, 4)))
+    assert "high" in out.terms
+    with pytest.raises(ValueError, match=r"'high' is given by two names, .*terms.py:high, high; accepted: one weight"):
+        rewards.check({**asked.reward.weights, "high": 1.0}, {})
+    with pytest.raises(ValueError, match=r"unknown name in .*terms.py 'hihg'; did you mean 'high'"):
+        rewards.check({f"{file}:hihg": 1.0}, {})
     with pytest.raises(ValueError, match=r"'near' of .*<locals>.near is also the name of e2efly.rewards:near"):
 
         @e2efly.register_reward("differentiable")

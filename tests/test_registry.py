@@ -71,12 +71,14 @@ def test_a_file_of_ones_own_is_found_again_by_its_reference(file: Path) -> None:
         ),
         ("{folder}/word.py:Mine", r"task 'my task' of .*word.py:Mine; accepted: a name of letters, digits and _"),
         ("{folder}/circle.py:Mine", r"circle.py has no Mine yet: it imports itself"),
+        ("{folder}/plain.py:Mine", r"task 'plain' is .*plain.py:Mine; accepted: a class that extends .*:TaskConfig"),
     ],
 )
 def test_what_leads_nowhere_is_named(reference: str, message: str, file: Path, tmp_path: Path) -> None:
     (tmp_path / "broken.py").write_text("1 / 0")
     (tmp_path / "taken.py").write_text(TASK.format(name="hover"))
     (tmp_path / "word.py").write_text(TASK.format(name="my task"))
+    (tmp_path / "plain.py").write_text(TASK.format(name="plain").replace("class Mine(TaskConfig)", "class Mine"))
     (tmp_path / "circle.py").write_text(f"from e2efly.registry import load\nload({str(tmp_path / 'circle.py:Mine')!r})")
     with pytest.raises(ValueError, match=message):
         TASKS.find(reference.format(file=file, folder=tmp_path))

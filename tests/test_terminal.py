@@ -4,6 +4,7 @@ import io
 
 import pytest
 from rich.console import Console
+from rich.table import Table
 
 from e2efly.terminal import Terminal, TerminalProgress, console_table
 
@@ -37,12 +38,31 @@ def test_a_pipe_gets_lines() -> None:
     assert lines[3] == "race_clutter by bptt: flying 1000 starts that it never saw"
 
 
-def test_no_table_is_cut(capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_table_is_cut(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     row = {"policy": "hover, best, vehicle of the file", **{f"column {i}": "100.0%" for i in range(12)}}
     Terminal().print(console_table([row]))
     assert [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()] == [
         " ".join(row), " ".join(row.values())
     ]  # fmt: skip
-    narrow = Console(width=80, force_terminal=True, color_system=None)
-    narrow.print(console_table([row]))
+    for option in ("FORCE_COLOR", "TTY_COMPATIBLE"):  # makes rich take a pipe for a terminal
+        monkeypatch.setenv(option, "1")
+        monkeypatch.setenv("COLUMNS", "60")
+        Terminal().print(console_table([row]))
+        assert len(capsys.readouterr().out.splitlines()) == 2
+    narrow = Terminal()
+    narrow.width = 80
+    narrow.print(Table(*row, *row))
     assert "…" not in capsys.readouterr().out
+
+
+def test_what_was_compiled_says_nothing_about_the_time_left(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A minute of compilation, and then a million steps a second."""
+    clock = iter([100.0, 106.0, 112.0])
+    monkeypatch.setattr("e2efly.terminal.time.monotonic", lambda: next(clock))
+    told = TerminalProgress(Terminal(), "hover")
+    for steps in (0, 6_000_000, 12_000_000):
+        told.progress(steps, 20_000_000, 1e6, 0.5, 0.5, "hover")
+    lines = capsys.readouterr().out.splitlines()
+    assert "left" not in lines[0] and lines[1].endswith("  14 s left") and lines[2].endswith("  8 s left")

@@ -12,6 +12,7 @@ import pytest
 
 import e2efly
 from e2efly import episodes, evaluation
+from e2efly.cli import run
 from e2efly.device import wide_vectors
 from e2efly.env.stress import rows_for
 from e2efly.learn.export import contract_of
@@ -20,7 +21,7 @@ from e2efly.learn.setup import Setup
 from e2efly.stress import stress
 from e2efly.tasks import TASKS
 from e2efly.vehicles import family_names, vehicle_file, vehicle_names
-from e2efly.zoo import FOLDER, USUAL, beside, config_file, contents, policy_file
+from e2efly.zoo import FOLDER, USUAL, beside, config_file, contents, is_policy, names, policy_file
 from tests.conftest import QUICK, NetworkTrace
 
 USUALLY = {"xla_backend_optimization_level": 3}
@@ -79,12 +80,12 @@ def test_a_task_is_the_name_of_its_policy(tmp_path: Path) -> None:
     assert policy_file("hover") == FOLDER / USUAL / "hover.onnx"
     assert policy_file("hover", "crazyflie") == FOLDER / "crazyflie" / "hover.onnx"
     assert policy_file(tmp_path) == tmp_path / "policy.onnx"
-    assert policy_file("runs/mine") == Path("runs/mine")
     for whatever in (None, "vis_r", "any"):  # a policy of any vehicle goes by its family's name
         assert policy_file("any/hover", whatever) == FOLDER / "any" / "hover.onnx"
     assert policy_file("hover", "any") == FOLDER / "any" / "hover.onnx"
-    with pytest.raises(ValueError, match=r"unknown policy 'hovr'.*hover"):
-        policy_file("hovr")
+    for wrong in ("hovr", "any/hovr", "runs/hover", "hovr.onnx"):
+        with pytest.raises(ValueError, match=rf"unknown policy '{wrong}'; did you mean '.*hover'.*any/race, .*path"):
+            policy_file(wrong)
     with pytest.raises(ValueError, match=r"no policy 'avoid' of vehicle 'crazyflie'; accepted: vis_h, vis_r"):
         policy_file("avoid", "crazyflie")
     for own, values, whose in (
@@ -101,6 +102,21 @@ def test_a_task_is_the_name_of_its_policy(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"unknown vehicle 'vis_x'; did you mean 'vis_r'"):
         policy_file("hover", "vis_x")
     assert beside(FOLDER / USUAL / "hover.onnx") == Path("runs/zoo-hover-vis_r")
+
+
+def test_every_command_takes_every_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in names():
+        assert is_policy(name)
+        assert policy_file(name).is_file()
+    assert not is_policy("forest")
+    assert run(["export", "hover"]) == 0
+    assert run(["export", "any/hover", "--out", "any.onnx"]) == 0
+    assert Path("runs/zoo-hover-vis_r/policy.onnx").read_bytes() == policy_file("hover").read_bytes()
+    assert Path("any.onnx").read_bytes() == policy_file("any/hover").read_bytes()
+    assert run(["export", "hover", "--which", "last"]) == 2
+    monkeypatch.setattr("e2efly.commands.watch.run", lambda watched: len(watched.what[0]))
+    assert run(["render", "any/hover"]) == len("any/hover")  # it films the policy
 
 
 def test_a_policy_is_loaded_by_what_the_command_line_takes(tmp_path: Path) -> None:

@@ -46,9 +46,9 @@ __all__ = [
 
 __version__ = "0.1.0"
 
-_SILENT = {"ORT_DISABLE_TELEMETRY": "1", "RAY_USAGE_STATS_ENABLED": "0", "WANDB_ERROR_REPORTING": "false"}
-"""Environment variables that stop ONNX Runtime, Ray and W&B from sending usage reports. Processes started from here
-inherit them."""
+_SILENT = {"ORT_DISABLE_TELEMETRY": "1", "RAY_USAGE_STATS_ENABLED": "0"}
+"""Environment variables that stop ONNX Runtime and Ray from sending usage reports. Processes started from here inherit
+them."""
 
 _too_late = "onnxruntime" in sys.modules and not os.environ.get("ORT_DISABLE_TELEMETRY")
 for _name, _value in _SILENT.items():
@@ -82,4 +82,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_FACE})
+    return sorted({*(name for name in globals() if name.startswith("__")), *_FACE})

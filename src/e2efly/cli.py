@@ -13,15 +13,13 @@ from typing import NoReturn, get_type_hints
 from e2efly import __version__
 from e2efly.process import write_nowhere
 from e2efly.terminal import Terminal
-from e2efly.vehicles.names import unknown
+from e2efly.vehicles.names import nearest
 
 _EXAMPLES = {
     "train hover": "learn to hover, evaluate, export policy.onnx",
     "train race --algo bptt": "another task, another algorithm",
     "eval runs/hover-bptt-0": "fly a policy from 1000 unseen starts, draw plots",
     "watch hover": "fly a policy in a browser: drag its goal, throw it, change the wind",
-    "compare RUN RUN": "runs side by side: a table and a plot",
-    "publish RUN --to wandb": "a run's metrics on an experiment tracker, also while it goes on",
     "ablate hover": "what each reward term is good for: a figure and a table",
     "sweep hover --seeds 5": "over seeds and options, side by side on Ray",
     "export RUN": "write policy.onnx from a checkpoint again",
@@ -38,11 +36,21 @@ _EXAMPLES = {
     "firmware": "build the real Betaflight firmware for this machine",
     "airsim-settings VEHICLE": "AirSim's settings.json for a vehicle",
     "bench": "how fast this machine simulates and learns",
-    "list": "tasks, algorithms, vehicles, tracks, plants, reward terms",
+    "list": "tasks, vehicles, presets, algorithms; `list zoo`, `list rewards`, ... in full",
 }
 WHOLE = ("jax", "jaxlib", "jaxtyping", "matplotlib", "onnx", "optax", "safetensors", "scipy", "tensorboardX")
 """Packages that the distribution `e2efly` needs, but `e2efly-fly` (the part that flies, see onboard/) does not need."""
-_COMMANDS = dict.fromkeys(example.split()[0] for example in _EXAMPLES)
+_MOVES = ("fly", "hil")
+"""Commands that move a real vehicle."""
+_MEANT = {
+    "watch": ("play", "show", "view", "demo", "run", "simulate", "visualize"),
+    "eval": ("test", "evaluate", "score"),
+    "train": ("learn", "fit"),
+    "render": ("draw", "picture"),
+}
+"""Words that other programs use for a command."""
+COMMANDS = dict.fromkeys(example.split()[0] for example in _EXAMPLES)
+"""The names of all commands."""
 
 
 def main() -> NoReturn:
@@ -96,8 +104,8 @@ def run(arguments: list[str]) -> int:
 
 
 def _command(name: str, arguments: list[str]) -> int:
-    if name not in _COMMANDS:
-        raise ValueError(unknown("command", name, _COMMANDS))
+    if name not in COMMANDS:
+        raise ValueError(_unknown(name))
     module = importlib.import_module(f"e2efly.commands.{name.replace('-', '_')}")
     if hasattr(module, "parse"):  # its options depend on the arguments
         return module.run(module.parse(arguments))
@@ -106,9 +114,18 @@ def _command(name: str, arguments: list[str]) -> int:
     return module.run(parse(get_type_hints(module.run)["options"], name, arguments))
 
 
+def _unknown(name: str) -> str:
+    """The error text for a command that does not exist. It never suggests one that moves a real vehicle."""
+    words = {word: command for command, others in _MEANT.items() for word in (command, *others)}
+    words |= {command: command for command in COMMANDS if command not in _MOVES}
+    guess = nearest(name, words)
+    hint = f"; did you mean {words[guess]!r}?" if guess else ""
+    return f"unknown command {name!r}{hint} (there are: {', '.join(sorted(COMMANDS))})"
+
+
 def _about() -> str:
     lines = "\n".join(f"  e2efly {example:<24} {what}" for example, what in _EXAMPLES.items())
     return (
         f"e2efly {__version__}: train an end-to-end quadrotor policy in seconds, check it, and fly it.\n\n{lines}\n\n"
-        "`e2efly COMMAND --help` lists every option of a command."
+        "`e2efly COMMAND --help` tells what a command does; `--help-all` lists every option of it."
     )

@@ -86,11 +86,7 @@ def set_xla_options() -> None:
 
 @cache
 def _check_flags(flags: str) -> None:
-    """Refuse flags for which XLA would abort the process, by a test in another process.
-
-    Raises:
-        ValueError: naming the variable, its value and the message of XLA.
-    """
+    """Refuse flags for which XLA would abort the process, by a test in another process."""
     code = "from jaxlib import xla_client; xla_client.CompileOptions()"  # reads the flags, and takes no device
     tried = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     if tried.returncode:
@@ -200,11 +196,7 @@ class Hosts:
 
 
 def _check_configuration() -> None:
-    """Refuse settings of JAX with which the programs here cannot compute.
-
-    Raises:
-        ValueError: naming the variable, its value and what is accepted.
-    """
+    """Refuse settings of JAX with which the programs here cannot compute."""
     import jax
 
     for name, wanted in _USUAL.items():

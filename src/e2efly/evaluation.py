@@ -82,6 +82,21 @@ class Candidate:
     baseline: str | None = None
     """Name of the hover controller that flies in place of the policy; None: the policy flies."""
 
+    def as_json(self) -> dict[str, Any]:
+        """What a report says of what flew."""
+        return {
+            "policy": str(self.file),
+            "task": self.policy.contract.task,
+            "baseline": self.baseline,
+            "vehicle": self.vehicle,
+            "controller": self.controller,
+        }
+
+    @property
+    def changed(self) -> dict[str, Any]:
+        """The new values of `changes`, by dotted name."""
+        return {name: value for name, (_, value) in self.changes.items()}
+
     @property
     def draws(self) -> bool:
         """Whether every episode flies a different vehicle of the family that the policy was trained on."""
@@ -298,13 +313,9 @@ class Evaluation:
     def as_json(self) -> dict[str, Any]:
         """The report that `e2efly eval --json` writes: a summary for each criterion, and a row for every start."""
         return {
-            "policy": str(self.candidate.file),
-            "task": self.candidate.policy.contract.task,
-            "baseline": self.candidate.baseline,
-            "vehicle": self.candidate.vehicle,
+            **self.candidate.as_json(),
             "vehicles": self.candidate.vehicles,
-            "controller": self.candidate.controller,
-            "changed": {name: value for name, (_, value) in self.candidate.changes.items()},
+            "changed": self.candidate.changed,
             "outside_of_training": self.candidate.outside,
             "env": dataclasses.asdict(self.candidate.env),
             "seed": self.seed,

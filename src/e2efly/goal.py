@@ -1,5 +1,6 @@
 """What a task shows to a policy, and how it judges it: the same code in training (JAX) and in flight (NumPy)."""
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
@@ -84,6 +85,19 @@ class Goal:
 
     config: Any
     """The options of the task."""
+
+    @classmethod
+    def of(cls, config: Any, shape: "Shape", control_period: float, checks: int = 1) -> Any:
+        """Make the goal from its options, with those of the other arguments for which it has a field.
+
+        Args:
+            config: the options of the task.
+            shape: the collision shape of the vehicle.
+            control_period: control period, s.
+            checks: number of collision checks per control step.
+        """
+        given = {"config": config, "shape": shape, "control_period": control_period, "checks": checks}
+        return cls(**{name: given[name] for f in dataclasses.fields(cls) if (name := f.name) in given})  # type: ignore[arg-type]
 
     @property
     def episode_s(self) -> Any:

@@ -4,7 +4,7 @@ import dataclasses
 import math
 import numbers
 from dataclasses import dataclass
-from typing import Any, cast, get_args
+from typing import Any, Literal, cast, get_args, get_origin
 
 from e2efly.vehicles.tables import LARGEST, shown
 
@@ -70,8 +70,10 @@ def shape(default: Any) -> Any:
     return dataclasses.field(default=default, metadata={SHAPE: True})
 
 
-def check_numbers(prefix: str, part: Any) -> None:
-    """Check every number of a configuration, and of its parts, by the rules of their fields.
+def check_fields(prefix: str, part: Any) -> None:
+    """Check every number and every choice of a configuration, and of its parts, by the rules of their fields.
+
+    The rule of a choice is its type, a `Literal`.
 
     Raises:
         ValueError: naming the field, the value and what is accepted.
@@ -79,9 +81,11 @@ def check_numbers(prefix: str, part: Any) -> None:
     for field in dataclasses.fields(part):
         name, value = f"{prefix}.{field.name}" if prefix else field.name, getattr(part, field.name)
         if dataclasses.is_dataclass(value):
-            check_numbers(name, value)
+            check_fields(name, value)
         elif (rule := rule_of(type(part), field)) is not None and not _fits(field, rule, value):
             raise ValueError(f"{name} is {shown(value)}; accepted: {_accepted(field, rule)}")
+        elif get_origin(field.type) is Literal and value not in (words := get_args(field.type)):
+            raise ValueError(f"{name} is {shown(value)}; accepted: {', '.join(map(repr, words))}")
 
 
 def rule_of(kind: type, field: dataclasses.Field[Any]) -> Rule | None:

@@ -21,7 +21,7 @@ from e2efly.config import (
     TrainConfig,
 )
 from e2efly.deploy.policy.loader import load_policy
-from e2efly.numbers import check_numbers
+from e2efly.numbers import check_fields
 from e2efly.observation import PAST_ACTIONS
 from e2efly.registry import is_shipped
 from e2efly.tasks import TASKS
@@ -271,7 +271,7 @@ def check(config: TrainConfig) -> None:
     Raises:
         ValueError: naming the field, the value and what is accepted.
     """
-    check_numbers("", config)
+    check_fields("", config)
     config.algo.check()
     if not config.network.hidden:
         raise ValueError("network.hidden is (); accepted: one or more sizes")
@@ -279,4 +279,4 @@ def check(config: TrainConfig) -> None:
         if not abs(value) <= LARGEST:  # true for NaN
             raise ValueError(f"reward {name} is {value}; accepted: a number, -{LARGEST:g} to {LARGEST:g}")
     if not config.reward.weights:
-        raise ValueError("reward.weights is empty; accepted: at least one term (see `e2efly list`)")
+        raise ValueError("reward.weights is empty; accepted: at least one term (see `e2efly list rewards`)")

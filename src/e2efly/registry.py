@@ -19,6 +19,8 @@ from typing import Any, Generic, TypeVar
 from e2efly.vehicles.names import unknown
 
 T = TypeVar("T")
+F = TypeVar("F", bound=Callable[..., Any])
+C = TypeVar("C", bound=type)
 _REFERENCE = re.compile(r"(?P<reference>(?:.+\.py|[\w.]+):[A-Za-z_]\w*)(?::(?P<where>.*))?")
 
 
@@ -53,6 +55,33 @@ class Registry(Generic[T], Mapping[str, T]):
         self._known[name] = thing
         return thing
 
+    def adding(self, name: str, made: Callable[[F], T]) -> Callable[[F], F]:
+        """A decorator that registers, under a name, what `made` gives for the decorated function or class."""
+
+        def registered(thing: F) -> F:
+            self.add(name, made(thing))
+            return thing
+
+        return registered
+
+    def extending(self, base: type, name: str) -> Callable[[C], C]:
+        """A decorator that registers a complete subclass of `base` under a name, and gives it this name as `name`.
+
+        The decorator raises a ValueError for any other object, naming its origin and what it lacks.
+        """
+        needed = ", ".join(sorted(getattr(base, "__abstractmethods__", ())))
+        accepted = f"accepted: a class that extends {origin(base)}" + (f" and has {needed}" if needed else "")
+
+        def checked(kind: Any) -> Any:
+            if not (isinstance(kind, type) and issubclass(kind, base)):
+                raise ValueError(f"{self.kind} {name!r} is {origin(kind)}; {accepted}")
+            if missing := sorted(getattr(kind, "__abstractmethods__", ())):
+                raise ValueError(f"{self.kind} {name!r} of {origin(kind)} lacks {', '.join(missing)}; {accepted}")
+            kind.name = name  # type: ignore[attr-defined]
+            return kind
+
+        return self.adding(name, checked)
+
     def find(self, name: str) -> T:
         """The object for a name or a reference.
 
@@ -66,14 +95,14 @@ class Registry(Generic[T], Mapping[str, T]):
             return self._known[name]
         if ":" not in name:
             raise ValueError(unknown(self.kind, name, self._known) + ", or path/to/file.py:Name, or module:Name")
-        where, _, attribute = name.rpartition(":")
-        whole = f"{Path(where).expanduser().absolute()}:{attribute}" if where.endswith(".py") else name
-        if (here := next((known for known in self._known.values() if origin(known) == whole), None)) is not None:
+        whole = absolute(name)
+        if (here := next((t for t in self._known.values() if origin(self._source(t)) == whole), None)) is not None:
             return here
         thing = load(name)
-        if not any(thing is known for known in self._known.values()):
+        found = next((t for t in self._known.values() if thing is t or thing is self._source(t)), None)
+        if found is None:
             raise ValueError(f"{name} is {thing!r}; accepted: what its file registers as {self.kind}")
-        return thing
+        return found
 
     def reference(self, thing: T) -> str:
         """The text with which `find` finds an object in another process.
@@ -87,6 +116,12 @@ class Registry(Generic[T], Mapping[str, T]):
         if name is None:
             raise ValueError(f"{origin(thing)} is no registered {self.kind}; accepted: {', '.join(self._known)}")
         return name if is_shipped(thing) else origin(thing)
+
+
+def absolute(name: str) -> str:
+    """A name, or a reference whose file is found from every folder."""
+    where, _, attribute = name.rpartition(":")
+    return f"{Path(where).expanduser().absolute()}:{attribute}" if where.endswith(".py") else name
 
 
 def load_installed() -> None:
@@ -134,7 +169,8 @@ def check_methods(thing: Any, methods: Sequence[str]) -> None:
         ValueError: naming its origin, what it lacks and what it must have.
     """
     if lacking := [name for name in methods if not hasattr(thing, name)]:
-        raise ValueError(f"{origin(type(thing))} has no {', '.join(lacking)}; accepted: all of {', '.join(methods)}")
+        of = origin(thing if isinstance(thing, type) else type(thing))
+        raise ValueError(f"{of} has no {', '.join(lacking)}; accepted: all of {', '.join(methods)}")
 
 
 def origin(thing: Any) -> str:

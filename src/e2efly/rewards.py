@@ -19,7 +19,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from e2efly.control.vectors import safe_sqrt
-from e2efly.registry import Registry, load_installed
+from e2efly.registry import Registry
 from e2efly.vehicles.names import unknown
 
 F = TypeVar("F", bound=Callable[..., Array])
@@ -368,13 +368,12 @@ def check(weights: Mapping[str, float], parameters: Mapping[str, float]) -> None
     """Check the names of a reward's terms and parameters.
 
     Raises:
-        ValueError: naming the unknown name, the nearest name and all known names.
+        ValueError: naming the unknown name, the nearest name and all known names. A term of the user's own may be a
+            reference, `path/to/file.py:Name`. Also for two names of one term.
     """
-    for name in weights:
-        if name not in TERMS:
-            load_installed()
-        if name not in TERMS:
-            raise ValueError(unknown("reward term", name, TERMS))
+    functions = [TERMS.find(name).function for name in weights]
+    if twice := next((f.__name__ for f in functions if functions.count(f) > 1), None):
+        raise ValueError(f"reward term {twice!r} is given by two names, {', '.join(weights)}; accepted: one weight")
     for name in parameters:
         if name not in (known := constants()):
             raise ValueError(unknown("reward parameter", name, known))
@@ -395,11 +394,11 @@ def reward(
     """
     terms = {}
     for name, weight in weights.items():
-        term = TERMS[name]
+        term = TERMS.find(name)
         if missing := [i for i in term.inputs if i not in signals]:
             raise ValueError(f"reward term {name!r} needs {', '.join(missing)}, which this task does not have")
         given = {**parameters, **signals}
         constants = {p: given[p] for p in term.parameters if p in given}
         value = term.function(**{i: signals[i] for i in term.inputs}, **constants)
-        terms[name] = weight * (jax.lax.stop_gradient(value) if term.kind == "sparse" else value)
+        terms[term.function.__name__] = weight * (jax.lax.stop_gradient(value) if term.kind == "sparse" else value)
     return jnp.sum(jnp.stack(list(terms.values())), axis=0), terms

@@ -191,31 +191,8 @@ def _runs(process: str) -> bool:
     return True
 
 
-def is_held(folder: Path) -> bool:
-    """Whether another process, or this one, holds a folder by `held`. A file left by a killed process does not count.
-
-    Raises:
-        OSError: when the lock file cannot be read.
-    """
-    try:
-        file = os.open(folder / LOCK, os.O_RDONLY | os.O_CLOEXEC)
-    except (FileNotFoundError, NotADirectoryError):
-        return False
-    try:
-        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(file)
-    return False
-
-
 def _locked(path: Path) -> int:
-    """A descriptor of the file, with the lock on it.
-
-    Raises:
-        BlockingIOError: when another process has it.
-    """
+    """A descriptor of the file, with the lock on it."""
     while True:
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         try:

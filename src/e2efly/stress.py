@@ -44,11 +44,7 @@ class Report:
     def as_json(self) -> dict[str, Any]:
         """The report that `--stress --json` writes: a summary by row and criterion."""
         return {
-            "policy": str(self.candidate.file),
-            "task": self.candidate.policy.contract.task,
-            "baseline": self.candidate.baseline,
-            "vehicle": self.candidate.vehicle,
-            "controller": self.candidate.controller,
+            **self.candidate.as_json(),
             "plant": self.plant,
             "seed": self.seed,
             "left_out": dict(self.left_out),

@@ -8,9 +8,10 @@ from types import TracebackType
 from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, Task, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.segment import Segment
 from rich.table import Table
+from rich.text import Text
 
 from e2efly.process import printable, write_nowhere
 
@@ -24,11 +25,13 @@ class Terminal(Console):
 
     def __init__(self, *, stderr: bool = False, quiet: bool = False) -> None:
         super().__init__(stderr=stderr, quiet=quiet, markup=False, emoji=False, highlight=False, soft_wrap=True)
-        if not self.is_terminal:
+        if not self.file.isatty():  # also where FORCE_COLOR makes rich believe that it is a terminal
             self.width = WIDE
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Pieces of text, with their styles, and the control codes of rich itself."""
+        """Pieces of text, with their styles, and the control codes of rich itself. No cell of a table is cut."""
+        for column in renderable.columns if isinstance(renderable, Table) else ():
+            column.overflow = "fold"
         for segment in super().render(renderable, options):
             lines = segment.text.split("\n")
             yield segment if segment.control else Segment("\n".join(map(printable, lines)), segment.style)
@@ -52,6 +55,15 @@ LINES_S = 5.0
 """Interval between two lines if the output is not a terminal, s."""
 
 
+class _TimeLeft(TimeRemainingColumn):
+    """The time left. Until something has flown, the time that has passed: compilation says nothing about the rest."""
+
+    def render(self, task: Task) -> Text:
+        if not task.completed:
+            return TimeElapsedColumn().render(task)
+        return super().render(task).append(" left")
+
+
 class TerminalProgress:
     """A progress bar with the rate, the time left and the success of the last and the best evaluation.
 
@@ -66,14 +78,15 @@ class TerminalProgress:
             BarColumn(bar_width=4 if self._narrow else 24),
             TextColumn("{task.fields[figures]}", markup=False),
             *(() if self._narrow else (TimeElapsedColumn(),)),
-            TimeRemainingColumn(),
-            TextColumn("left"),
+            _TimeLeft(),
             console=console,
             transient=False,
             disable=not console.is_terminal,
         )
         self._task = self._bar.add_task(title, total=None, figures="")
-        self._began, self._told = time.monotonic(), -LINES_S
+        self._begun: tuple[float, int] | None = None
+        """When the first progress was told, s, and how many steps were done: what came before was compilation."""
+        self._told = -LINES_S
         self.end: tuple[Any, ...] = ()
         """The arguments of `ended`."""
 
@@ -97,9 +110,10 @@ class TerminalProgress:
             figures = f"{success:.0%} {flown}"
         self._bar.update(self._task, completed=steps, total=total, figures=figures)
         now = time.monotonic()
+        self._begun = began, done = self._begun or (now, steps)
         if not self._console.is_terminal and (now - self._told >= LINES_S or steps >= total):
-            left = (now - self._began) * (total - steps) / max(steps, 1)
-            self._console.print(f"{self._title}: {figures}  {left:.0f} s left")
+            left = f"  {(now - began) * (total - steps) / (steps - done):.0f} s left" if steps > done else ""
+            self._console.print(f"{self._title}: {figures}{left}")
             self._told = now
 
     def judging(self, starts: int) -> None:
@@ -118,9 +132,7 @@ class TerminalProgress:
 
 def console_table(rows: list[dict[str, Any]]) -> Table:
     """A table for `rich`. The keys of the first row are the headings."""
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in rows[0]:
-        table.add_column(heading, overflow="fold")
+    table = Table(*rows[0], box=None, header_style="bold", pad_edge=False)
     for row in rows:
         table.add_row(*map(str, row.values()))
     return table

@@ -1,6 +1,8 @@
 """The environment behind Gymnasium's interfaces."""
 
 import dataclasses
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +47,9 @@ def test_gymnasiums_checker_accepts_it(task: str, monkeypatch: pytest.MonkeyPatc
 def test_every_task_is_registered_both_ways() -> None:
     for task in TASKS:
         assert f"e2efly/{task}-v0" in gymnasium.registry
+    told = "import gymnasium as g; print(g.make('e2efly.adapters.gym:e2efly/hover-v0').spec.id)"
+    alone = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=False)
+    assert alone.stdout.strip() == "e2efly/hover-v0", alone.stderr  # without another import
     envs = gymnasium.make_vec("e2efly/land-v0", num_envs=3, vectorization_mode="vector_entry_point")
     observations, _ = envs.reset(seed=0)
     assert observations.shape == (3, envs.single_observation_space.shape[0])  # type: ignore[index]

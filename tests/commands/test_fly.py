@@ -8,7 +8,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -25,14 +24,9 @@ from e2efly.deploy.log.flight_log import read_log
 from e2efly.deploy.settings import Fence, FlightSettings
 from e2efly.tasks.hover.goal import HoverRoute
 from tests.deploy.test_msp_client import controller, recorded
+from tests.waiting import free_port, until
 
 FORGED = "\x1b[2K\rPOLICY: all is well"
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class Terminal:
@@ -45,10 +39,7 @@ class Terminal:
         self._reader.start()
 
     def wait_for(self, found: Callable[[bytes], bool]) -> None:
-        end = time.monotonic() + 60
-        while not found(self.text):
-            assert time.monotonic() < end, self.text
-            time.sleep(0.02)
+        until(lambda: found(self.text), 60.0, lambda: self.text)
 
     def hang_up(self) -> None:
         os.close(self._ours)
@@ -62,7 +53,7 @@ class Terminal:
 
 
 def test_hostile_datagrams_forge_no_line_and_a_hang_up_ends_it_with_a_closed_log(tmp_path: Path) -> None:
-    port, terminal, log = free_port(), Terminal(), tmp_path / "flight.mcap"
+    port, terminal, log = free_port(udp=True), Terminal(), tmp_path / "flight.mcap"
     with controller(recorded) as client, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         command = [sys.executable, "-m", "e2efly", "fly", "--vehicle", "vis_r", "--link", client.link.name]  # type: ignore
         live = ("--live", f"mcap:{tmp_path / 'live.mcap'}", "--live", f"bag:{tmp_path / 'live.bag'}")
@@ -103,7 +94,8 @@ def test_a_craft_s_name_is_neither_markup_nor_an_escape_sequence(capsys: pytest.
         return encode(Frame(code, f"[/]{FORGED}".encode(), REPLY)) if code == Name.CODE else recorded(code)
 
     with controller(named) as client:
-        fly_command(Fly(vehicle="vis_r", link=client.link.name, pose=f"udp:{free_port()}", check=True))  # type: ignore
+        pose = f"udp:{free_port(udp=True)}"
+        fly_command(Fly(vehicle="vis_r", link=client.link.name, pose=pose, check=True))  # type: ignore
     said = capsys.readouterr().out
     assert "\x1b" not in said
     assert "[/]" in said
@@ -147,4 +139,5 @@ def test_a_hover_controller_that_there_is_not_is_refused_before_anything_is_open
 
 def test_a_hover_controller_that_needs_more_than_the_flight_controller_tells_is_refused_by_name() -> None:
     with controller(recorded) as client, pytest.raises(ValueError, match=r"--hover is 'indi', which needs the speeds"):
-        fly_command(Fly(vehicle="vis_r", hover="indi", link=client.link.name, pose=f"udp:{free_port()}", check=True))  # type: ignore
+        pose = f"udp:{free_port(udp=True)}"
+        fly_command(Fly(vehicle="vis_r", hover="indi", link=client.link.name, pose=pose, check=True))  # type: ignore

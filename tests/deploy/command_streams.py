@@ -13,6 +13,41 @@ import numpy as np
 
 from e2efly.deploy.commander.command import Command
 from e2efly.deploy.commander.sources import open_commands
+from tests.waiting import free_port
+
+PUBLISHED = """
+import math
+from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, Vector3
+from std_msgs.msg import String
+KINDS = {"/position": PoseStamped, "/velocity": TwistStamped, "/acceleration": AccelStamped, "/json": String,
+         "/body": TwistStamped, "/rolling": TwistStamped, "/unset": PoseStamped, "/vector": Vector3}
+def message_of(topic, stamp):
+    kind = KINDS[topic]
+    message = kind()
+    if hasattr(message, "header"):
+        message.header.frame_id = "base_link" if topic == "/body" else "map"
+        message.header.stamp = stamp
+    if topic == "/position":
+        message.pose.position.x, message.pose.position.z = 1.0, 1.5
+        message.pose.orientation.w = message.pose.orientation.z = math.sqrt(0.5)  # a quarter turn to the left
+    elif topic == "/unset":
+        message.pose.orientation.w = 0.0
+    elif kind is TwistStamped:
+        message.twist.linear.x, message.twist.angular.z = 0.5, -0.25
+        message.twist.angular.x = 0.1 if topic == "/rolling" else 0.0
+    elif kind is AccelStamped:
+        message.accel.linear.y = 2.0
+    elif kind is String:
+        message.data = '{"mode": "ctbr", "thrust": 9.5, "body_rate": [0, 0.5, 0], "stamp": 4.25}'
+    return message
+"""
+"""What the publishers of ROS 1 and ROS 2 send, as their script begins."""
+REFUSED = {
+    "/body": "frame is 'base_link'; accepted: map, odom, world or none",
+    "/rolling": "twist.angular is 0.1, 0 about x and y; accepted: 0",
+    "/unset": "the length of the orientation is 0; accepted: 1",
+}
+"""The topics of those publishers that are no commands, and what is said of each."""
 
 
 def encode(**content: Any) -> bytes:
@@ -23,9 +58,7 @@ class Loopback:
     """A real UDP source and its sender; what has arrived counts as arrived at the time of the next `read`."""
 
     def __init__(self) -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
+        self.port = free_port(udp=True)
         self.source = open_commands(f"udp:{self.port}")
         self.sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 

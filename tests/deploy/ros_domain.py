@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import IO
 
 import pytest
 
@@ -26,9 +27,9 @@ def ros_domain() -> Iterator[pytest.MonkeyPatch]:
 
 
 @contextmanager
-def publisher(script: str) -> Iterator[None]:
-    """A process that runs a script of rclpy."""
-    process = subprocess.Popen([sys.executable, "-c", script], start_new_session=True)
+def publisher(script: str, python: str = sys.executable, output: IO[str] | None = None) -> Iterator[None]:
+    """A process that runs a script of rclpy, or of rospy with another interpreter."""
+    process = subprocess.Popen([python, "-c", script], stdout=output, stderr=output, start_new_session=True)
     try:
         yield
     finally:

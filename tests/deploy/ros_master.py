@@ -3,7 +3,6 @@
 import shutil
 import socket
 import subprocess
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from e2efly.deploy.child import SYSTEM_PYTHON
+from tests.waiting import free_port, until
 
 PACKAGES = (
     "apt-get install python3-roslaunch python3-rosmaster python3-rospy python3-nav-msgs python3-geometry-msgs "
@@ -24,9 +24,7 @@ def ros_master(folder: Path) -> Iterator[Path]:
     roscore = shutil.which("roscore")
     if roscore is None or not Path(SYSTEM_PYTHON).exists():
         pytest.fail(f"needs ROS 1: {PACKAGES}; or E2EFLY_WITHOUT=ros1 to go without these tests")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     settings = {"ROS_MASTER_URI": f"http://127.0.0.1:{port}", "ROS_IP": "127.0.0.1"}
     settings |= {"ROS_HOME": str(folder), "ROS_LOG_DIR": str(folder)}
     said = folder / "output"
@@ -35,10 +33,7 @@ def ros_master(folder: Path) -> Iterator[Path]:
             patch.setenv(key, value)
         core = subprocess.Popen([roscore, "-p", str(port)], stdout=output, stderr=output, start_new_session=True)
         try:
-            deadline = time.monotonic() + 30
-            while not _answers(port):
-                assert time.monotonic() < deadline, f"roscore did not start: {said.read_text()}"
-                time.sleep(0.05)
+            until(lambda: _answers(port), 30.0, lambda: f"(roscore): {said.read_text()}")
             yield said
         finally:
             core.terminate()

@@ -8,6 +8,26 @@ from e2efly.deploy.odometry import Sample
 from e2efly.deploy.pose.source import PoseSource
 
 PATIENCE_S = 20.0
+PUBLISHED = """
+import math
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from std_msgs.msg import String
+KINDS = {"/odometry": Odometry, "/pose": PoseStamped, "/estimate": PoseWithCovarianceStamped, "/text": String}
+def message_of(topic, stamp):
+    kind = KINDS[topic]
+    message = kind()
+    if kind is not String:
+        message.header.frame_id, message.header.stamp = "map", stamp
+        pose = message.pose if kind is PoseStamped else message.pose.pose
+        pose.position.x, pose.position.y, pose.position.z = 1.0, 2.0, 3.0
+        pose.orientation.w = pose.orientation.z = math.sqrt(0.5)  # a quarter turn to the left
+    if kind is Odometry:
+        message.twist.twist.linear.x = 0.5  # forward
+        message.twist.twist.angular.y = 0.25
+    return message
+"""
+"""What the publishers of ROS 1 and ROS 2 send, as their script begins."""
 TOPICS = ("/odometry", "/pose", "/estimate")
 """One for each type of message; `/text` has another type."""
 

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -20,6 +19,7 @@ from e2efly.deploy.sight.shared import place
 from e2efly.deploy.sight.source import Frame
 from e2efly.deploy.sight.sources import open_image
 from e2efly.deploy.sight.watch import Seen, see
+from tests.waiting import running, until
 
 DEPTH = e2efly.load_policy("avoid").contract.images[0]
 COLOURS = dataclasses.replace(
@@ -39,13 +39,6 @@ def write_video(path: Path, seconds: float) -> str:
         writer.write(picture)
     writer.release()
     return f"v4l2:{path}?fov=1.0x0.8"
-
-
-def until(ready: Callable[[], bool], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not ready():
-        assert time.monotonic() < end
-        time.sleep(0.005)
 
 
 def memories() -> list[Path]:
@@ -104,7 +97,7 @@ def test_the_process_ends_with_the_bridge_however_that_ends(tmp_path: Path) -> N
     root = Path(__file__).parents[2]
     done = subprocess.run([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, cwd=root, timeout=60)
     pid, memory = done.stdout.split()
-    until(lambda: not Path(f"/proc/{pid}").exists() or "Z" in Path(f"/proc/{pid}/stat").read_text().split()[2])
+    until(lambda: not running(int(pid)))
     assert not Path(memory).exists()
 
 

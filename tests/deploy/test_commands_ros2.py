@@ -12,37 +12,18 @@ from e2efly.deploy.commander.sources import open_commands
 from e2efly.deploy.odometry import Odometry
 from e2efly.deploy.settings import FlightSettings
 from e2efly.vehicles import load_vehicle
-from tests.deploy.command_streams import TOPICS, first, refused
+from tests.deploy.command_streams import PUBLISHED, REFUSED, TOPICS, first, refused
 from tests.deploy.ros_domain import publisher, ros_domain
 
-PUBLISHER = """
-import math, time, rclpy
-from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, Vector3
-from std_msgs.msg import String
+PUBLISHER = f"""{PUBLISHED}
+import time, rclpy
+from builtin_interfaces.msg import Time
 rclpy.init()
 node = rclpy.create_node("commander")
-kinds = {"/position": PoseStamped, "/velocity": TwistStamped, "/acceleration": AccelStamped, "/json": String,
-         "/body": TwistStamped, "/rolling": TwistStamped, "/unset": PoseStamped, "/vector": Vector3}
-publishers = {topic: node.create_publisher(kind, topic, 1) for topic, kind in kinds.items()}
+publishers = {{topic: node.create_publisher(kind, topic, 1) for topic, kind in KINDS.items()}}
 while True:
-    for topic, kind in kinds.items():
-        message = kind()
-        if hasattr(message, "header"):
-            message.header.frame_id = "base_link" if topic == "/body" else "map"
-            message.header.stamp.sec, message.header.stamp.nanosec = 1700000000, 500000000
-        if topic == "/position":
-            message.pose.position.x, message.pose.position.z = 1.0, 1.5
-            message.pose.orientation.w = message.pose.orientation.z = math.sqrt(0.5)  # a quarter turn to the left
-        elif topic == "/unset":
-            message.pose.orientation.w = 0.0
-        elif kind is TwistStamped:
-            message.twist.linear.x, message.twist.angular.z = 0.5, -0.25
-            message.twist.angular.x = 0.1 if topic == "/rolling" else 0.0
-        elif kind is AccelStamped:
-            message.accel.linear.y = 2.0
-        elif kind is String:
-            message.data = '{"mode": "ctbr", "thrust": 9.5, "body_rate": [0, 0.5, 0], "stamp": 4.25}'
-        publishers[topic].publish(message)
+    for topic in KINDS:
+        publishers[topic].publish(message_of(topic, Time(sec=1700000000, nanosec=500000000)))
     time.sleep(0.02)
 """
 
@@ -60,15 +41,7 @@ def test_each_type_is_a_command_of_its_mode(ros: None, topic: str) -> None:
     TOPICS[topic](command)
 
 
-@pytest.mark.parametrize(
-    ("topic", "problem"),
-    [
-        ("/body", "frame is 'base_link'; accepted: map, odom, world or none"),
-        ("/rolling", "twist.angular is 0.1, 0 about x and y; accepted: 0"),
-        ("/unset", "the length of the orientation is 0; accepted: 1"),
-        ("/vector", "geometry_msgs/msg/Vector3"),
-    ],
-)
+@pytest.mark.parametrize(("topic", "problem"), [*REFUSED.items(), ("/vector", "geometry_msgs/msg/Vector3")])
 def test_what_is_no_command_is_refused_by_name(ros: None, topic: str, problem: str) -> None:
     said = refused(f"ros2:{topic}")
     assert problem in said

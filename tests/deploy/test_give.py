@@ -17,16 +17,11 @@ from e2efly.deploy.sight.shared import SharedImages, place
 from e2efly.deploy.sight.source import Frame, ImageSource
 from e2efly.deploy.sight.sources import open_image
 from e2efly.zoo import policy_file
+from tests.waiting import free_port
 
 CONTRACT = load_policy(policy_file("avoid")).contract
 CAMERA = CONTRACT.images[0]
 NAME = "e2efly-test-give"
-
-
-def free_port() -> int:
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return found.getsockname()[1]
 
 
 @pytest.fixture

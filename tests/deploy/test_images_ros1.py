@@ -1,7 +1,6 @@
 """Image topics of ROS 1: a real roscore, a real rospy publisher in a process of its own."""
 
 import os
-import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,6 +9,7 @@ import pytest
 
 from e2efly.deploy.child import ROS_PYTHON, SYSTEM_PYTHON
 from e2efly.deploy.sight.sources import open_image
+from tests.deploy.ros_domain import publisher
 from tests.deploy.ros_images import (
     DEPTH,
     PUBLISHED,
@@ -46,7 +46,7 @@ while True:
 
 
 @pytest.fixture(scope="module")
-def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[subprocess.Popen]:
+def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """A ROS master, and a publisher."""
     with (
         ros_master(tmp_path_factory.mktemp("ros1")) as said,
@@ -54,34 +54,28 @@ def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[subprocess.Popen]:
         pytest.MonkeyPatch.context() as patch,
     ):
         patch.setenv(ROS_PYTHON, SYSTEM_PYTHON)
-        publisher = subprocess.Popen(
-            [SYSTEM_PYTHON, "-c", PUBLISHER], stdout=output, stderr=output, start_new_session=True
-        )
-        try:
-            yield publisher
-        finally:
-            publisher.terminate()
-            publisher.wait(10)
+        with publisher(PUBLISHER, SYSTEM_PYTHON, output):
+            yield
 
 
 @pytest.mark.parametrize(("topic", "sees"), TOPICS)
-def test_a_topic_is_read_whatever_its_encoding(ros: subprocess.Popen, topic: str, sees: str) -> None:
+def test_a_topic_is_read_whatever_its_encoding(ros: None, topic: str, sees: str) -> None:
     check_topic("ros1", topic, sees)
 
 
-def test_what_is_no_image_of_the_policy_is_named(ros: subprocess.Popen) -> None:
+def test_what_is_no_image_of_the_policy_is_named(ros: None) -> None:
     check_refusals("ros1")
 
 
-def test_what_does_not_come_is_named(ros: subprocess.Popen, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_does_not_come_is_named(ros: None, monkeypatch: pytest.MonkeyPatch) -> None:
     check_silence("ros1", monkeypatch)
 
 
-def test_stamps_of_another_clock_are_said(ros: subprocess.Popen) -> None:
+def test_stamps_of_another_clock_are_said(ros: None) -> None:
     check_stamps("ros1")
 
 
-def test_it_is_read_without_numpy_and_closed(ros: subprocess.Popen, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_is_read_without_numpy_and_closed(ros: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """The system's Python, told to find none."""
     source = open_image("ros1:/mm/image_raw", DEPTH)
     assert source.describe() == f"ros1:/mm/image_raw, 48 rows, 96 columns (rospy of {SYSTEM_PYTHON})"

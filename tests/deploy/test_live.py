@@ -33,6 +33,7 @@ from e2efly.deploy.sight.watch import Seen
 from tests.conftest import NetworkTrace
 from tests.deploy.foxglove_client import FoxgloveClient
 from tests.deploy.live_ros import check_info, check_transforms
+from tests.waiting import running, until
 
 CONTRACT: Contract = e2efly.load_policy("avoid").contract
 CAMERA = CONTRACT.images[0]
@@ -287,10 +288,7 @@ def test_a_bridge_that_is_killed_leaves_a_whole_file_and_no_process(tmp_path: Pa
         assert bridge.stdout is not None
         child = int(bridge.stdout.readline())
         bridge.kill()
-    end = time.monotonic() + 20
-    while Path(f"/proc/{child}").exists() and (Path(f"/proc/{child}/stat").read_text().split(")")[1].split()[0] != "Z"):
-        assert time.monotonic() < end
-        time.sleep(0.02)
+    until(lambda: not running(child))
     with path.open("rb") as file:
         reader = make_reader(file)
         assert reader.get_summary() is not None

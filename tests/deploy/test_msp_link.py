@@ -3,20 +3,13 @@
 import itertools
 import os
 import socket
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from e2efly.deploy.betaflight.link import MAX_UNSENT, RETRY_S, StreamLink, open_link
-
-
-def until(done: Callable[[], object], seconds: float = 10.0) -> None:
-    end = time.monotonic() + seconds
-    while not done():
-        assert time.monotonic() < end, "it did not happen in time"
-        time.sleep(0.002)
+from tests.waiting import until
 
 
 def gather(link: StreamLink, size: int) -> bytes:

@@ -28,6 +28,7 @@ from e2efly.learn.export import contract_of, export_policy
 from e2efly.learn.networks import Actor, Weights, init_mlp
 from e2efly.tasks.route import course_for
 from e2efly.vehicles import load_vehicle
+from tests.waiting import until
 
 VEHICLE = load_vehicle("vis_r")
 START = 5000.0
@@ -191,10 +192,7 @@ def test_a_slow_policy_is_late_then_busy_and_never_holds_up_the_loop(
     assert worker.readiness(STILL, START) == "it is still busy with an earlier question"
     worker.stop()
     go_on.set()
-    end = time.monotonic() + 20
-    while worker.readiness(STILL, START) is not None:
-        assert time.monotonic() < end
-        time.sleep(0.005)
+    until(lambda: worker.readiness(STILL, START) is None)
     assert worker.state is None and worker.decision is None  # what it said too late is not taken
     worker.timeout = PATIENCE
     worker.start(STILL, START + 60)

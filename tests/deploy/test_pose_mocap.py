@@ -10,7 +10,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ import pytest
 from e2efly.deploy import child
 from e2efly.deploy.pose.relay import RelaySource
 from e2efly.deploy.pose.sources import open_source
+from tests.waiting import free_port, running, until
 
 CONNECT, SERVER_INFO, REQUEST_MODEL, MODEL, FRAME = 0, 1, 4, 5, 7
 BODY, NUMBER = b"quad", 7
@@ -61,9 +61,7 @@ class Server:
         self._command = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._command.bind((self.host, 1510))
         self._command.settimeout(0.01)
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
+        self.port = free_port(udp=True)
         self.make, self._stop = make, threading.Event()
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
@@ -96,13 +94,6 @@ def server() -> Iterator[Server]:
     server.stop()
 
 
-def until(condition: Callable[[], bool], source: RelaySource) -> None:
-    deadline = time.monotonic() + 20
-    while not condition():
-        assert time.monotonic() < deadline, source.problem
-        time.sleep(0.005)
-
-
 def opened(text: str) -> RelaySource:
     source = open_source(text)
     assert isinstance(source, RelaySource)
@@ -113,7 +104,7 @@ def test_a_rigid_body_of_optitrack_is_followed(server: Server) -> None:
     source = opened(f"mocap:optitrack:{server.host}:quad")
     assert source.describe().startswith(f"mocap:optitrack:{server.host}:quad (motioncapture of ")
     samples = []
-    until(lambda: samples.extend(source.read(time.monotonic())) or len(samples) >= 5, source)
+    until(lambda: samples.extend(source.read(time.monotonic())) or len(samples) >= 5, said=lambda: source.problem)
     source.close()
     assert source._child.process.returncode == 0
     for sample in samples:
@@ -128,19 +119,19 @@ def test_a_rigid_body_of_optitrack_is_followed(server: Server) -> None:
 
 def test_a_body_that_is_lost_from_sight_gives_nothing_and_a_reason(server: Server) -> None:
     source = opened(f"mocap:optitrack:{server.host}:quad")
-    until(lambda: bool(source.read(time.monotonic())), source)
+    until(lambda: bool(source.read(time.monotonic())), said=lambda: source.problem)
     server.make = lambda number: frame(number, (1.0, 2.0, 3.0), (0.0, 0.0, 0.6, 0.8), tracked=False)
-    until(lambda: source.read(time.monotonic()) == [] and source.problem is not None, source)
+    until(lambda: source.read(time.monotonic()) == [] and source.problem is not None, said=lambda: source.problem)
     assert source.problem is not None
     assert "rigid body 'quad' is not tracked; there are: none" in source.problem
     server.make = lambda number: frame(number, (4.0, 2.0, 3.0), (0.0, 0.0, 0.6, 0.8))
-    until(lambda: any(sample.position[0] == 4 for sample in source.read(time.monotonic())), source)
+    until(lambda: any(sample.position[0] == 4 for sample in source.read(time.monotonic())), said=lambda: source.problem)
     source.close()
 
 
 def test_a_body_of_another_name_is_named(server: Server) -> None:
     source = opened(f"mocap:optitrack:{server.host}:drone")
-    until(lambda: source.read(time.monotonic()) == [] and source.problem is not None, source)
+    until(lambda: source.read(time.monotonic()) == [] and source.problem is not None, said=lambda: source.problem)
     assert source.problem is not None
     assert "rigid body 'drone' is not tracked; there are: 'quad'" in source.problem
     source.close()
@@ -149,7 +140,10 @@ def test_a_body_of_another_name_is_named(server: Server) -> None:
 def test_a_client_that_dies_is_silent_and_says_so(server: Server) -> None:
     source = opened(f"mocap:optitrack:{server.host}:quad")
     os.kill(source._child.process.pid, signal.SIGKILL)
-    until(lambda: source.read(time.monotonic()) is not None and "process has ended" in str(source.problem), source)
+    until(
+        lambda: source.read(time.monotonic()) is not None and "process has ended" in str(source.problem),
+        said=lambda: source.problem,
+    )
     assert source.read(time.monotonic()) == []
     source.close()
     source.close()
@@ -170,7 +164,7 @@ def test_a_system_that_does_not_answer_is_given_up(monkeypatch: pytest.MonkeyPat
 
 def test_closing_ends_a_client_that_waits_for_a_frame(server: Server) -> None:
     source = opened(f"mocap:optitrack:{server.host}:quad")
-    until(lambda: bool(source.read(time.monotonic())), source)
+    until(lambda: bool(source.read(time.monotonic())), said=lambda: source.problem)
     server.stop()
     source.close()
     assert source._child.process.returncode == 0
@@ -185,11 +179,7 @@ def test_the_client_ends_with_the_bridge_however_that_ends() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == -signal.SIGKILL
-    stat = Path(f"/proc/{int(done.stdout)}/stat")
-    deadline = time.monotonic() + 10
-    while stat.exists() and stat.read_text().rpartition(")")[2].split()[0] != "Z":
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    until(lambda: not running(int(done.stdout)))
 
 
 def test_an_unknown_system_is_refused() -> None:

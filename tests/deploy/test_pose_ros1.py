@@ -1,6 +1,5 @@
 """Topics of ROS 1: a real roscore, a real rospy publisher in a process of its own."""
 
-import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,30 +9,17 @@ import pytest
 from e2efly.deploy.child import SYSTEM_PYTHON
 from e2efly.deploy.pose.relay import RelaySource
 from e2efly.deploy.pose.sources import open_source
+from tests.deploy.ros_domain import publisher
 from tests.deploy.ros_master import ros_master
-from tests.deploy.ros_poses import TOPICS, check_published, first, problem_of
+from tests.deploy.ros_poses import PUBLISHED, TOPICS, check_published, first, problem_of
 
-PUBLISHER = """
-import math, rospy
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
-from nav_msgs.msg import Odometry
-from std_msgs.msg import String
+PUBLISHER = f"""{PUBLISHED}
+import rospy
 rospy.init_node("publisher", disable_signals=True)
-topics = {"/odometry": Odometry, "/pose": PoseStamped, "/estimate": PoseWithCovarianceStamped, "/text": String}
-publishers = {topic: rospy.Publisher(topic, kind, queue_size=1) for topic, kind in topics.items()}
+publishers = {{topic: rospy.Publisher(topic, kind, queue_size=1) for topic, kind in KINDS.items()}}
 while True:
-    for topic, kind in topics.items():
-        message = kind()
-        if kind is not String:
-            message.header.frame_id = "map"
-            message.header.stamp = rospy.Time(1700000000, 500000000)
-            pose = message.pose if kind is PoseStamped else message.pose.pose
-            pose.position.x, pose.position.y, pose.position.z = 1.0, 2.0, 3.0
-            pose.orientation.w = pose.orientation.z = math.sqrt(0.5)  # a quarter turn to the left
-        if kind is Odometry:
-            message.twist.twist.linear.x = 0.5  # forward
-            message.twist.twist.angular.y = 0.25
-        publishers[topic].publish(message)
+    for topic in KINDS:
+        publishers[topic].publish(message_of(topic, rospy.Time(1700000000, 500000000)))
     rospy.sleep(0.02)
 """
 
@@ -41,15 +27,9 @@ while True:
 @pytest.fixture(scope="module")
 def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """A ROS master, and a publisher."""
-    with ros_master(tmp_path_factory.mktemp("ros1")) as said, said.open("a") as output:
-        publisher = subprocess.Popen(
-            [SYSTEM_PYTHON, "-c", PUBLISHER], stdout=output, stderr=output, start_new_session=True
-        )
-        try:
-            yield
-        finally:
-            publisher.terminate()
-            publisher.wait(10)
+    folder = tmp_path_factory.mktemp("ros1")
+    with ros_master(folder) as said, said.open("a") as output, publisher(PUBLISHER, SYSTEM_PYTHON, output):
+        yield
 
 
 @pytest.mark.parametrize("topic", TOPICS)

@@ -6,33 +6,21 @@ import pytest
 
 from e2efly.deploy.pose.sources import open_source
 from tests.deploy.ros_domain import publisher, ros_domain
-from tests.deploy.ros_poses import TOPICS, check_published, first, problem_of
+from tests.deploy.ros_poses import PUBLISHED, TOPICS, check_published, first, problem_of
 
-PUBLISHER = """
-import math, time, rclpy
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Vector3
-from nav_msgs.msg import Odometry
+PUBLISHER = f"""{PUBLISHED}
+import time, rclpy
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from builtin_interfaces.msg import Time
 rclpy.init()
 node = rclpy.create_node("publisher")
 best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-topics = {"/odometry": Odometry, "/pose": PoseStamped, "/estimate": PoseWithCovarianceStamped, "/text": Vector3}
-publishers = {
-    topic: node.create_publisher(kind, topic, best_effort if topic == "/pose" else 1) for topic, kind in topics.items()
-}
+publishers = {{
+    topic: node.create_publisher(kind, topic, best_effort if topic == "/pose" else 1) for topic, kind in KINDS.items()
+}}
 while True:
-    for topic, kind in topics.items():
-        message = kind()
-        if kind is not Vector3:
-            message.header.frame_id = "map"
-            message.header.stamp.sec, message.header.stamp.nanosec = 1700000000, 500000000
-            pose = message.pose if kind is PoseStamped else message.pose.pose
-            pose.position.x, pose.position.y, pose.position.z = 1.0, 2.0, 3.0
-            pose.orientation.w = pose.orientation.z = math.sqrt(0.5)  # a quarter turn to the left
-        if kind is Odometry:
-            message.twist.twist.linear.x = 0.5  # forward
-            message.twist.twist.angular.y = 0.25
-        publishers[topic].publish(message)
+    for topic in KINDS:
+        publishers[topic].publish(message_of(topic, Time(sec=1700000000, nanosec=500000000)))
     time.sleep(0.02)
 """
 
@@ -58,7 +46,7 @@ def test_a_topic_of_another_type_is_named(ros: None) -> None:
     source = open_source("ros2:/text")
     try:
         problem = problem_of(source)
-        assert "geometry_msgs/msg/Vector3" in problem
+        assert "std_msgs/msg/String" in problem
         assert "nav_msgs/msg/Odometry" in problem
     finally:
         source.close()

@@ -22,6 +22,7 @@ from e2efly.deploy.pose.source import LARGEST_BATCH, PlantSource, PoseSource
 from e2efly.deploy.pose.sources import open_source
 from e2efly.deploy.pose.sources.tcp import TcpSource
 from e2efly.deploy.pose.sources.udp import DRAIN, UdpSource
+from tests.waiting import until
 
 POSE = {"position": [1, 2.5, -3], "quaternion": [0.5, 0.5, -0.5, 0.5]}
 FULL = {**POSE, "velocity": [0, 1, 2], "body_rate": [3, 4, 5], "stamp": 12.25, "frame": "map"}
@@ -34,15 +35,8 @@ def encode(**changes: object) -> bytes:
 def gather(source: PoseSource, count: int) -> list[Sample]:
     """Read until `count` samples have come."""
     samples: list[Sample] = []
-    until(lambda: samples.extend(source.read(time.monotonic())) or len(samples) >= count, source)
+    until(lambda: samples.extend(source.read(time.monotonic())) or len(samples) >= count, said=lambda: source.problem)
     return samples
-
-
-def until(condition: Callable[[], bool], source: PoseSource) -> None:
-    deadline = time.monotonic() + 10
-    while not condition():
-        assert time.monotonic() < deadline, f"{source.describe()}: {source.problem}"
-        time.sleep(0.002)
 
 
 # Messages
@@ -256,11 +250,11 @@ def test_lines_over_tcp_and_a_new_link_after_each_loss(server: socket.socket) ->
     assert source.problem is not None
     assert "not connected yet" in source.problem
     for turn in range(2):
-        until(lambda: source.read(time.monotonic()) == [] and accepted(server), source)
+        until(lambda: source.read(time.monotonic()) == [] and accepted(server), said=lambda: source.problem)
         link = links.pop()
         message = encode(stamp=turn)
         link.sendall(message[:10])
-        until(lambda: source.read(time.monotonic()) == [], source)
+        until(lambda: source.read(time.monotonic()) == [], said=lambda: source.problem)
         link.sendall(message[10:] + b"\nnonsense\n")
         (sample,) = gather(source, 1)
         assert sample.stamp == turn
@@ -268,7 +262,10 @@ def test_lines_over_tcp_and_a_new_link_after_each_loss(server: socket.socket) ->
         assert "not JSON" in source.problem
         link.sendall(message[:10])  # half a line is forgotten with its link
         link.close()
-        until(lambda: source.read(time.monotonic()) == [] and "closed the link" in str(source.problem), source)
+        until(
+            lambda: source.read(time.monotonic()) == [] and "closed the link" in str(source.problem),
+            said=lambda: source.problem,
+        )
     source.close()
     assert source.read(time.monotonic()) == []
 
@@ -326,7 +323,7 @@ def test_a_server_that_is_not_there_is_tried_again_in_time(server: socket.socket
     server.close()
     source = TcpSource("127.0.0.1", port)
     source.read(100.0)
-    until(lambda: source.read(100.1) == [] and "refused" in str(source.problem), source)
+    until(lambda: source.read(100.1) == [] and "refused" in str(source.problem), said=lambda: source.problem)
     with socket.create_server(("127.0.0.1", port)) as listener:
         listener.settimeout(0.05)
         source.read(100.2)  # too early
@@ -359,7 +356,7 @@ def test_what_a_relay_says_is_shown_by_its_escapes(tmp_path: Path) -> None:
     relay.write_text("#!/bin/sh\nprintf 'ready \\033[1mfake\\nproblem \\033[2K\\rall is well\\n'\ncat\n")
     relay.chmod(0o755)
     source = RelaySource("mocap", str(relay))
-    until(lambda: source.read(time.monotonic()) == [] and source.problem is not None, source)
+    until(lambda: source.read(time.monotonic()) == [] and source.problem is not None, said=lambda: source.problem)
     source.close()
     assert source.describe() == r"mocap (\x1b[1mfake)"
     assert source.problem is not None and source.problem.isprintable()

@@ -17,10 +17,10 @@ from e2efly.deploy.betaflight.mode_slots import BoxIds
 from e2efly.deploy.betaflight.modes import ARM, OVERRIDE
 from e2efly.deploy.flight_loop import fly
 from e2efly.deploy.service import Service
-from tests.commands.test_fly import free_port
 from tests.deploy.msp_golden import REPLIES, payload
 from tests.deploy.test_flight_loop import Clock, Grounded
 from tests.deploy.test_msp_client import controller, recorded
+from tests.waiting import free_port, until
 
 
 @pytest.fixture
@@ -217,10 +217,7 @@ def test_the_first_process_hands_signals_on(tmp_path: Path) -> None:
     script = f"trap 'touch {tmp_path}/asked; exit 0' TERM; touch {tmp_path}/begun; while :; do sleep 0.05; done"
     process = subprocess.Popen([*first, script])
     try:
-        end = time.monotonic() + 30
-        while not (tmp_path / "begun").exists():
-            assert time.monotonic() < end
-            time.sleep(0.02)
+        until((tmp_path / "begun").exists, 30.0)
         process.send_signal(signal.SIGTERM)
         assert process.wait(30) == 0
         assert (tmp_path / "asked").exists()

@@ -8,12 +8,6 @@ import pytest
 
 from e2efly.deploy.settings import Fence, FlightSettings, PilotChannels, check
 
-POSITIVE = [
-    field.name
-    for field in dataclasses.fields(FlightSettings)
-    if isinstance(field.default, int | float) and field.name not in ("ground_height", "battery_unknown")
-]
-
 
 def refused(settings: FlightSettings, named: str) -> None:
     with pytest.raises(ValueError, match=f"^flight.{re.escape(named)}.*; accepted: "):
@@ -30,17 +24,7 @@ def test_what_a_user_may_well_want_is_accepted() -> None:
     check(FlightSettings(channels=no_copies, battery_unknown=True))
 
 
-@pytest.mark.parametrize("name", POSITIVE)
-@pytest.mark.parametrize("value", [0, -1.0, math.nan, math.inf, "1", None, True])
-def test_every_number_is_positive(name: str, value: object) -> None:
-    refused(dataclasses.replace(FlightSettings(), **{name: value}), f"{name} is {value!r}")
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("missed_deadlines", 2.5), ("stick_deadband", 1.0), ("ground_height", math.nan), ("ground_height", "0"),
-     ("takeoff_height", 5.0), ("takeoff_height", 0.1)],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "value"), [("stick_deadband", 1.0), ("takeoff_height", 5.0), ("takeoff_height", 0.1)])
 def test_numbers_that_make_no_sense(name: str, value: object) -> None:
     refused(dataclasses.replace(FlightSettings(), **{name: value}), f"{name} is {value!r}")
 
@@ -48,12 +32,7 @@ def test_numbers_that_make_no_sense(name: str, value: object) -> None:
 @pytest.mark.parametrize(
     ("fence", "named"),
     [
-        *((dataclasses.replace(Fence(), **{name: value}), f"fence.{name} is")
-          for name in ("speed", "tilt", "braking", "reaction") for value in (0, -1, math.nan, math.inf, None)),
-        (Fence(low=(0, 0)), "fence.low is"),  # type: ignore[arg-type]
         (Fence(high=(1, 2, math.nan)), "fence.high is"),
-        (Fence(high=(1, 2, "3")), "fence.high is"),  # type: ignore[arg-type]
-        (Fence(low=None), "fence.low is"),  # type: ignore[arg-type]
         (Fence(low=(3, 0, 0)), "fence.low and flight.fence.high are 3 and 3.0 in x"),
         (Fence(low=(0, 5, 0)), "fence.low and flight.fence.high are 5 and 3.0 in y"),
         (Fence(low=(0, 0, 4.2)), "fence.low and flight.fence.high are 4.2 and 4.5 in z"),

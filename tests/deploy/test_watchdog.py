@@ -28,6 +28,7 @@ from e2efly.deploy.betaflight.codec import REPLY, Decoder, Frame, encode
 from e2efly.deploy.betaflight.messages import SET_RAW_RC, AttitudeReply, StatusEx, set_raw_rc
 from e2efly.deploy.betaflight.watchdog import LEVEL_GAIN, LEVEL_RATE, STALE_S, Plan, WatchedLink, descent
 from tests.faults.virtual_watchdog import VirtualWatchdog
+from tests.waiting import running, until
 
 RATES = tuple(0.5 * i for i in range(-8, 9))
 PULSES = tuple(1500 + round(100 * rate) for rate in RATES)
@@ -183,20 +184,6 @@ def controller() -> Iterator[Controller]:
     held = Controller()
     yield held
     held.close()
-
-
-def until(done: Callable[[], object], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not done():
-        assert time.monotonic() < end, "it did not happen in time"
-        time.sleep(0.002)
-
-
-def running(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 BRIDGE = """

@@ -31,6 +31,10 @@ def script(name: str, folder: Path = DOCS) -> ModuleType:
     return module
 
 
+def test_the_page_of_the_command_line_is_what_the_commands_say() -> None:
+    assert (DOCS / "reference" / "command-line.md").read_text(encoding="utf-8") == script("command_line").page()
+
+
 def test_the_page_of_the_zoo_is_what_the_zoo_says() -> None:
     assert (DOCS / "zoo.md").read_text(encoding="utf-8") == script("zoo_cards").page()
 

@@ -68,10 +68,14 @@ def learned_value(state: TrainState) -> float:
 
 
 @pytest.mark.parametrize("delay", [0, 1])
-def test_bptt_finds_the_action_that_pays_best(delay: int) -> None:
-    probe = Probe(delay=delay, length=1000)
-    _, state, _ = learn(probe, BPTT_CONFIG, 300)
-    np.testing.assert_allclose(learned_action(state), probe.target, atol=0.01)
+@pytest.mark.parametrize(
+    ("config", "updates", "atol"),
+    [(BPTT_CONFIG, 300, 0.01), (ABPT_CONFIG, 200, 0.05), (FOPPO_CONFIG, 200, 0.05), (SHAC_CONFIG, 200, 0.02)],
+    ids=["bptt", "abpt", "foppo", "shac"],
+)
+def test_it_finds_the_action_that_pays_best(config: AlgorithmConfig, updates: int, atol: float, delay: int) -> None:
+    _, state, _ = learn(Probe(delay=delay, length=1000), config, updates)
+    np.testing.assert_allclose(learned_action(state), Probe.target, atol=atol)
 
 
 @pytest.mark.parametrize("delay", [0, 1])
@@ -81,18 +85,6 @@ def test_ppo_finds_the_action_that_pays_best(delay: int) -> None:
     np.testing.assert_allclose(learned_action(state), probe.target, atol=0.08)
 
 
-@pytest.mark.parametrize("delay", [0, 1])
-def test_abpt_finds_the_action_that_pays_best(delay: int) -> None:
-    _, state, _ = learn(Probe(delay=delay, length=1000), ABPT_CONFIG, 200)
-    np.testing.assert_allclose(learned_action(state), Probe.target, atol=0.05)
-
-
-@pytest.mark.parametrize("delay", [0, 1])
-def test_foppo_finds_the_action_that_pays_best(delay: int) -> None:
-    _, state, _ = learn(Probe(delay=delay, length=1000), FOPPO_CONFIG, 200)
-    np.testing.assert_allclose(learned_action(state), Probe.target, atol=0.05)
-
-
 def test_each_half_of_foppo_learns_alone() -> None:
     probe = Probe(length=1000)
     by_epochs = dataclasses.replace(FOPPO_CONFIG, exact_rate=0.0, epochs=4)
@@ -100,12 +92,6 @@ def test_each_half_of_foppo_learns_alone() -> None:
     for config in (by_epochs, by_gradient):
         _, state, _ = learn(probe, config, 200)
         np.testing.assert_allclose(learned_action(state), probe.target, atol=0.1)
-
-
-@pytest.mark.parametrize("delay", [0, 1])
-def test_shac_finds_the_action_that_pays_best(delay: int) -> None:
-    _, state, _ = learn(Probe(delay=delay, length=1000), SHAC_CONFIG, 200)
-    np.testing.assert_allclose(learned_action(state), Probe.target, atol=0.02)
 
 
 def test_the_critic_of_shac_sees_beyond_the_window() -> None:

@@ -44,7 +44,6 @@ def changed(path: str, value: Any) -> Any:
         ("env.cameras", {}, "env: cameras is {}; accepted: a list, of an object with angle_spread, "),
         ("env.cameras.0.sees", "all", "env: cameras[0]: sees is 'all'; accepted: 'depth', 'range', "),
         ("network.hidden", [64, None], "network: hidden[1] is None; accepted: a whole number"),
-        ("network.activation", "relux", "network: activation is 'relux'; accepted: 'relu', 'tanh', 'elu'"),
         ("reward.weights", ["near"], "reward: weights is ['near']; accepted: an object, with a number each"),
         ("reward.weights.vel", "1", "reward: weights.vel is '1'; accepted: a number"),
         ("curriculum.0.changes", None, "curriculum[0]: changes is None; accepted: an object, with a number or"),

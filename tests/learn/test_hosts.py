@@ -2,7 +2,6 @@
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +13,7 @@ from safetensors.numpy import load_file
 from e2efly.learn.rundir import RunDirectory
 from tests.conftest import QUICK
 from tests.learn.test_runner import MORE, SMALL, timeless, wait_for_update
+from tests.waiting import free_port
 
 Process = subprocess.Popen[bytes]
 PPO = [*SMALL, *MORE["ppo"], "--algo", "ppo"]
@@ -27,15 +27,9 @@ def start(cwd: Path, out: str, *flags: str, devices: int, told: str = "output.tx
         return subprocess.Popen(command, cwd=cwd, stdout=output, stderr=output, env=environment)
 
 
-def address() -> str:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return f"127.0.0.1:{free.getsockname()[1]}"
-
-
 def pair(cwd: Path, out: str, *flags: str) -> list[Process]:
     """Two processes of one run, with a device each; `output.txt` is of the first, `other.txt` of the second."""
-    hosts = ["--hosts.coordinator", address(), "--hosts.count", "2", "--hosts.index"]
+    hosts = ["--hosts.coordinator", f"127.0.0.1:{free_port()}", "--hosts.count", "2", "--hosts.index"]
     return [
         start(cwd, out, *flags, *hosts, str(i), devices=1, told=told)
         for i, told in enumerate(("output.txt", "other.txt"))
@@ -99,7 +93,7 @@ def test_a_run_that_lost_a_process_says_so_and_resumes(tmp_path: Path) -> None:
     ("flags", "said"), [(["--seed", "1"], "seed: 0 and 1"), (["--resume"], "resume: False and True")]
 )
 def test_processes_with_other_configurations_do_not_run(flags: list[str], said: str, tmp_path: Path) -> None:
-    hosts = ["--hosts.coordinator", address(), "--hosts.count", "2", "--devices", "2", "--hosts.index"]
+    hosts = ["--hosts.coordinator", f"127.0.0.1:{free_port()}", "--hosts.count", "2", "--devices", "2", "--hosts.index"]
     both = [
         start(tmp_path, "run", *PPO, *(flags if i else []), *hosts, str(i), devices=1, told=f"{i}.txt")
         for i in range(2)

@@ -48,12 +48,6 @@ def test_others_are_refused_by_name(task: str, algo: str, capsys: pytest.Capture
     assert f"not for {task} by {algo}" in said
 
 
-@pytest.mark.parametrize("spread", [(-0.1, 0.0), (0.0, 1.5), (0.0, float("nan"))])
-def test_a_spread_that_makes_no_sense_is_named(spread: tuple[float, float]) -> None:
-    with pytest.raises(ValueError, match=r"env.latency_spread is .*; accepted: 2 numbers, 0 to 1"):
-        e2efly.make_env("hover", latency_spread=spread)
-
-
 def test_robust_is_what_a_task_is_learned_by_where_it_can_be(tmp_path: Path) -> None:
     wanted = {("hover", "bptt"): "robust", ("hover", "ppo"): "robust", ("race", "ppo"): "nominal",
               ("gap", "bptt"): "robust", ("gap", "ppo"): "nominal", ("avoid", "bptt"): "robust",

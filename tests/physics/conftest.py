@@ -14,15 +14,10 @@ from e2efly.control.vectors import Vec3
 from e2efly.physics import INTEGRATORS, Physics, State, step
 from e2efly.physics.plant import Plant
 from e2efly.physics.state import Parts, split4
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import quantities
 
 Fly = Callable[..., State]
-
-
-@pytest.fixture(scope="session")
-def vis_r() -> Vehicle:
-    return load_vehicle("vis_r")
 
 
 @pytest.fixture(scope="session")

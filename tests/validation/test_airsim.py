@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import socket
 import socketserver
 import threading
 from collections.abc import Callable, Iterator
@@ -24,20 +23,16 @@ from e2efly.validation.plant import RigidState
 from e2efly.validation.plants import find_plant
 from e2efly.validation.plants.airsim import AirsimPlant
 from e2efly.validation.plants.mujoco import MujocoPlant
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 from tests.validation.airsim_client import Tap, published
 from tests.validation.airsim_server import FLIP, PERIOD, TURN, Server, World, settings
+from tests.waiting import free_port
 
 DRONE = "vis_r"
 TILTED = RigidState(
     np.array([1.0, 2.0, 5.0]), np.array([0.5, -1.0, 0.3]), np.array([0.9, 0.1, 0.3, 0.3]), np.array([0.5, -0.3, 0.8])
 )
-
-
-@pytest.fixture(scope="module")
-def vis_r() -> Vehicle:
-    return load_vehicle("vis_r")
 
 
 @pytest.fixture
@@ -310,9 +305,7 @@ def test_a_server_that_talks_nonsense_is_named(reply: Callable[[list[Any]], byte
 
 
 def test_nobody_there_is_named(capsys: pytest.CaptureFixture[str]) -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     assert run(["validate", "hover", "--plant", f"airsim:127.0.0.1:{port}", "--episodes", "1"]) == 2
     assert f"airsim:127.0.0.1:{port}: nobody answers" in " ".join(capsys.readouterr().err.split())
 

@@ -30,7 +30,7 @@ from e2efly.validation.plants.airsim import AirsimPlant
 from e2efly.validation.reality import Reality
 from e2efly.validation.sight import Sight
 from e2efly.validation.starts import draw_starts
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 from e2efly.zoo import policy_file
 from tests.validation.airsim_client import Tap, packed, published
@@ -40,11 +40,6 @@ from tests.validation.airsim_server import Server, World
 DRONE = "vis_r"
 PERIOD = 1 / 30
 SMALL = {"rtol": 0, "atol": 1e-5}
-
-
-@pytest.fixture(scope="module")
-def vis_r() -> Vehicle:
-    return load_vehicle("vis_r")
 
 
 @pytest.fixture(scope="module")

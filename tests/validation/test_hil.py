@@ -25,15 +25,10 @@ from e2efly.validation.plant import RigidState
 from e2efly.validation.room import flags
 from e2efly.validation.scenery import Scenery
 from e2efly.validation.sight import rendered
+from tests.waiting import free_port
 
 NAME = "e2efly_test_hil"
 ORIGIN = Origin((1.0, -2.0, 0.5), 0.4)
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as found:
-        found.bind(("127.0.0.1", 0))
-        return found.getsockname()[1]
 
 
 @contextmanager
@@ -47,7 +42,7 @@ def running(command: list[str]) -> Iterator[subprocess.Popen[str]]:
 
 
 def test_images_are_those_of_the_environment_at_the_pose_and_stop_with_the_poses() -> None:
-    found, port = candidate("avoid"), free_port()
+    found, port = candidate("avoid"), free_port(udp=True)
     scenery = Scenery.draw(found.environment(next(iter(found.task.criteria().values()))), 7)
     assert scenery is not None
     place(NAME).unlink(missing_ok=True)

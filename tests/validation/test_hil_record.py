@@ -18,6 +18,7 @@ from e2efly.deploy.sight.record import Recorder
 from e2efly.deploy.sight.shared import SharedImages, place
 from e2efly.view.latency import plot_latencies
 from e2efly.zoo import policy_file
+from tests.waiting import free_port
 
 CAMERA = load_policy(policy_file("avoid")).contract.images[0]
 NAME = "e2efly-test-record"
@@ -58,13 +59,8 @@ def test_images_and_messages_are_read_back(tmp_path: Path) -> None:
 
 
 def test_the_command_writes_a_recording_and_a_report(tmp_path: Path) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-        out.bind(("127.0.0.1", 0))
-        port = out.getsockname()[1]
+    port, tcp = free_port(udp=True), free_port()
     recording, report = tmp_path / "hil.mcap", tmp_path / "report"
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        tcp = found.getsockname()[1]
     command = [sys.executable, "-m", "e2efly", "hil", "avoid", "--pose", f"udp:{port}", "--seconds", "2"]
     command += ["--image", f"image_0=tcp:{tcp}", "--record", str(recording), "--report", str(report)]
     with (

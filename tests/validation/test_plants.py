@@ -26,11 +26,6 @@ LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 HOVER = np.array([GRAVITY, 0.0, 0.0, 0.0])
 
 
-@pytest.fixture(scope="module")
-def vis_r() -> Vehicle:
-    return load_vehicle("vis_r")
-
-
 def at(height: float = 3.0, **changes: list[float]) -> RigidState:
     state = RigidState(np.array([0.0, 0.0, height]), np.zeros(3), LEVEL, np.zeros(3))
     return dataclasses.replace(state, **{name: np.array(value) for name, value in changes.items()})

@@ -7,34 +7,39 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 import urllib.request
-from pathlib import Path
 
 import pytest
 
 from e2efly.watch.waiting import MARK, asked_for
+from tests.waiting import free_port, running, until
 
 
 @pytest.mark.parametrize(("arguments", "told"), [
+    ([], "WHAT is empty; accepted: one or more"),
     (["hover", "--count", "0"], "--count is 0; accepted: 1 to 1024"),
     (["hover", "--port", "70000"], "--port is 70000; accepted: 0 to 65535"),
     (["hover", "race"], "accepted: one policy or run, or several flight logs"),
-    (["nowhere.mcap"], "'nowhere.mcap' does not exist"),
-    (["runs/nothing"], "'runs/nothing' does not exist; accepted: a task, "),
-    (["nothing.onnx"], "'nothing.onnx' does not exist; accepted: a task, "),
+    (["nowhere.mcap"], "unknown policy 'nowhere.mcap'"),
+    (["runs/nothing"], "a run directory, or the path of a policy.onnx, a flight log, or a report of `e2efly validate"),
+    (["any/hovr"], "unknown policy 'any/hovr'; did you mean 'any/hover'?"),
+    (["hover", "--vehicle", "vis_x"], "unknown vehicle 'vis_x'"),
+    (["hover", "--video", "x.mp4"], "needs the program ffmpeg; accepted: that, or a name that ends in .webm or .gif"),
     (["hover", "--criterion", "x"], "--criterion is 'x'; accepted: hover"),
     (["hover", "--video", "x.avi"], "accepted: a name that ends in .gif, .mp4, .webm, .png"),
 ])  # fmt: skip
-def test_bad_input_is_named(arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_input_is_named_before_there_is_a_page(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     from e2efly.cli import run
+
+    monkeypatch.setenv("PATH", "")  # without ffmpeg
 
     port = [] if "--port" in arguments else ["--port", "0"]
     assert run(["watch", *arguments, *port]) == 2
     said = capsys.readouterr()
     assert told in said.err
-    if "does not exist" in told:  # told before there is a page that goes away at once
-        assert "Look at" not in said.out
+    assert "Look at" not in said.out
 
 
 def test_a_port_in_use_is_named(capsys: pytest.CaptureFixture[str]) -> None:
@@ -49,9 +54,7 @@ def test_a_port_in_use_is_named(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_nothing_is_computed_until_a_browser_asks_for_the_page() -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     asked: list[bool] = []
     over = threading.Event()
     waiting = threading.Thread(target=lambda: asked.append(asked_for("127.0.0.1", port, over.is_set)))
@@ -76,11 +79,7 @@ def test_a_viewer_beside_a_program_ends_with_it() -> None:
         viewer = int(program.stdout.readline())
         program.kill()
     try:
-        for _ in range(600):
-            if not Path(f"/proc/{viewer}").exists() or "Z" in Path(f"/proc/{viewer}/stat").read_text().split()[2]:
-                return
-            time.sleep(0.1)
-        raise AssertionError("the viewer goes on")
+        until(lambda: not running(viewer), 60.0)
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.kill(viewer, signal.SIGKILL)

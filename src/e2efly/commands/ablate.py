@@ -5,7 +5,7 @@ import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tyro
@@ -27,12 +27,14 @@ class Ablate:
     sparse.
     """
 
-    tasks: tyro.conf.Positional[tuple[str, ...]] = ("hover", "land", "track", "race")
+    tasks: tyro.conf.Positional[Annotated[tuple[str, ...], tyro.conf.arg(metavar="[TASK ...]")]] = (
+        "hover", "land", "track", "race",
+    )  # fmt: skip
     """Tasks to ablate (default: hover land track race)."""
     algos: tuple[str, ...] = ("ppo", "bptt")
     """Learning algorithms. One figure is drawn per algorithm."""
     preset: str = "nominal"
-    """Preset of the rewards and sizes; see `e2efly train --help`. Its curriculum is not used."""
+    """Preset of the rewards and sizes; see `e2efly list presets`. Its curriculum is not used."""
     seeds: int = 3
     """Number of runs per variant."""
     by: Literal["term", "group"] = "term"

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 from rich.table import Table
@@ -14,7 +15,7 @@ from e2efly.terminal import Terminal
 class AirsimSettings:
     """Write AirSim's settings.json for a vehicle, and list what these settings cannot express about the vehicle."""
 
-    vehicle: tyro.conf.Positional[str] = "vis_r"
+    vehicle: tyro.conf.Positional[Annotated[str, tyro.conf.arg(metavar="[VEHICLE]")]] = "vis_r"
     """Name of a vehicle, or a .toml file."""
     policy: Path | None = None
     """A run directory, a policy.onnx, or a task of the zoo. The cameras of this policy are written, too."""
@@ -46,9 +47,8 @@ def run(options: AirsimSettings) -> int:
     console.print(f"Settings: {options.out}")
     for option in named(images):
         console.print(f"Its camera in `e2efly validate --plant airsim`: {option}")
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in ("what settings.json cannot say", vehicle.name, "where AirSim has it"):
-        table.add_column(heading, overflow="fold")
+    headings = "what settings.json cannot say", vehicle.name, "where AirSim has it"
+    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
     for row in unsaid(vehicle, images):
         table.add_row(*row)
     console.print(table)

@@ -3,7 +3,7 @@
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import tyro
@@ -30,7 +30,7 @@ class Align:
     measured one, before and after the fit.
     """
 
-    logs: tyro.conf.Positional[tuple[Path, ...]]
+    logs: tyro.conf.Positional[Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE [FILE ...]")]]
     """Logs with commands (thrust over mass and body rates) and body rates: our .mcap, CSV, or a Betaflight blackbox
     log."""
     vehicle: str = "vis_r"

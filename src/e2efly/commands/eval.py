@@ -4,11 +4,12 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 from rich.table import Table
 
+from e2efly.commands.helping import asks_help
 from e2efly.commands.options import parse as parse_options
 from e2efly.commands.policies import named_first, values, with_task
 from e2efly.commands.rows import check_stress, report_stress
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 class Eval:
     """Fly a policy from unseen starts and report the results."""
 
-    policy: tyro.conf.Positional[Path]
+    policy: tyro.conf.Positional[Annotated[Path, tyro.conf.arg(metavar="POLICY")]]
     """A run directory, a policy.onnx, or a task. A task selects its policy in the zoo: the one for --vehicle if the zoo
     has that vehicle, otherwise the one for VIS-R. `any/hover` is the policy for any vehicle."""
     episodes: int = 1000
@@ -84,7 +85,7 @@ def parse(arguments: list[str]) -> Asked:
         ValueError: for unknown names, and for a policy that does not exist.
     """
     given = [argument for argument in arguments if argument.startswith(("--env.", "--task."))]
-    if not given or "--help" in arguments:
+    if not given or asks_help(arguments):
         return Asked(parse_options(Eval, "eval", arguments), {}, {})
     found = named_first("eval", arguments, given[0])
     from e2efly.evaluation import pinned

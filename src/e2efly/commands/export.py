@@ -3,7 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import tyro
 
@@ -11,18 +11,19 @@ from e2efly.c_policy.header import Precision
 from e2efly.device import prepare
 from e2efly.storage import write_atomically
 from e2efly.terminal import Terminal
-from e2efly.zoo import policy_file
+from e2efly.zoo import beside, policy_file
 
 
 @dataclass(frozen=True)
 class Export:
     """Write policy.onnx from the checkpoint of a run, or a web page in which a policy flies, or a policy as C code."""
 
-    run: tyro.conf.Positional[Path]
-    """A run directory. Or a policy.onnx from an older e2efly: it gets the digest that is checked on loading. With --web
-    and --c, also the name of a task, for the zoo's policy of this task."""
+    run: tyro.conf.Positional[Annotated[Path, tyro.conf.arg(metavar="RUN|POLICY")]]
+    """A run directory, or a policy's name in the zoo (hover, any/hover). Or a policy.onnx from an older e2efly: it gets
+    the digest that is checked on loading."""
     out: Path | None = None
-    """The file to write. If omitted, RUN/policy.onnx, or the older file itself."""
+    """The file to write. If omitted, RUN/policy.onnx, or the older file itself. For a policy of the zoo,
+    runs/zoo-TASK-VEHICLE/policy.onnx."""
     which: Literal["best", "last"] = "best"
     """The best policy by evaluation, or the last."""
     web: Path | None = None
@@ -54,6 +55,14 @@ def run(options: Export) -> int:
     if options.vehicle is not None:
         raise ValueError(f"--vehicle is {options.vehicle!r}; accepted: with --web alone: policy.onnx names its own")
     console, out = Terminal(), options.out
+    if not options.run.exists():
+        file = policy_file(options.run)
+        path = out or beside(file) / "policy.onnx"
+        _without_effect(options, ("which",), "has no effect on a policy of the zoo")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, file.read_bytes())
+        console.print(f"Wrote the zoo's policy {options.run} to {path}")
+        return 0
     if options.run.is_file():
         from e2efly.deploy.policy.loader import sealed_policy
 

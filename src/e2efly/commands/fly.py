@@ -8,7 +8,7 @@ import time
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -63,10 +63,10 @@ if TYPE_CHECKING:
 class Fly:
     """Fly a Betaflight quadrotor. The pilot's switches decide. See docs/flying.md before the first flight."""
 
-    policy: tyro.conf.Positional[Path | None] = None
+    policy: tyro.conf.Positional[Annotated[Path | None, tyro.conf.arg(metavar="[POLICY]")]] = None
     """A policy.onnx, a run directory, or a task (the zoo's policy). `excitation` flies the manoeuvres that
     identification needs, in place of a policy. If omitted: take-off, hover and landing only.
-    `e2efly fly POLICY --help` also lists the options of the policy's goal."""
+    `e2efly fly POLICY --help-all` also lists the options of the policy's goal."""
     link: str = "/dev/ttyACM0"
     """Connection to the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT."""
     pose: str = "udp:9870"
@@ -96,7 +96,7 @@ class Fly:
     throttle_map: Path | None = None
     """Throttle map that an earlier flight learned (.throttle.json)."""
     watchdog: bool = True
-    """Let a separate process hold the link, and land the vehicle if this process dies. Do not fly without it."""
+    """Let a separate process hold the link, and land the vehicle if this process dies; do not fly without it."""
     guard: Literal["switch", "filter"] = "switch"
     """What keeps a policy inside the fence. switch: ends the policy's flight just before the vehicle could no longer
     stop inside. filter: changes the policy's commands only as much as stopping inside requires, and lets it fly on.

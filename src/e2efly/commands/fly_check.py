@@ -40,9 +40,8 @@ def print_settings(console: Console, rows: tuple[Row, ...]) -> None:
     """Print each setting of the controller: its value and the required value. Below follow whole lines that can be
     pasted into the controller's command line, which ignores what begins with `#`.
     """
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in ("", "setting", "is", "needed"):
-        table.add_column(heading, overflow="fold")
+    headings = "", "setting", "is", "needed"
+    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
     for row in rows:
         mark = Text("ok", "green") if row.good else Text("no", "bold red")
         mark = mark if row.told else Text("look", "yellow")

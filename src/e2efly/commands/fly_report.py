@@ -3,7 +3,7 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import tyro
 from rich.console import Console
@@ -19,7 +19,7 @@ LONGEST = 20
 class FlyReport:
     """Draw a flight: tracks, response to commands, latency, timing, and the modes with the reason for each."""
 
-    log: tyro.conf.Positional[Path]
+    log: tyro.conf.Positional[Annotated[Path, tyro.conf.arg(metavar="FILE")]]
     """A flight log (.mcap)."""
     out: Path | None = None
     """Folder for the figures. If omitted, LOG_report."""

@@ -8,7 +8,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import tyro
@@ -45,7 +45,7 @@ class Hil:
     docs/hil.md.
     """
 
-    policy: tyro.conf.Positional[Path]
+    policy: tyro.conf.Positional[Annotated[Path, tyro.conf.arg(metavar="POLICY")]]
     """The policy whose cameras and world are rendered: a policy.onnx, a run directory, or a task of the zoo."""
     pose: str = "udp:9870"
     """Pose source, as in `e2efly fly`."""
@@ -216,11 +216,7 @@ def run(asked: Asked) -> int:
 
 
 def _where(o: Hil, scenery: "Scenery", task: str, radius: float, console: Terminal) -> "Scenery":
-    """The scenery in the world that the options name, with ground below its course.
-
-    Raises:
-        ValueError: naming the world, what is wrong with it and what is accepted.
-    """
+    """The scenery in the world that the options name, with ground below its course."""
     from e2efly.validation.scene_files import SceneFile, ground_of
 
     if o.scene is None:
@@ -302,11 +298,7 @@ def _reached(host: str) -> str:
 
 
 def _measured(path: Path) -> Origin:
-    """The origin from measured points.
-
-    Raises:
-        ValueError: naming the file and what is wrong with it.
-    """
+    """The origin from measured points."""
     try:
         rows = np.loadtxt(path, delimiter=",", ndmin=2)
     except (OSError, ValueError) as error:

@@ -122,10 +122,8 @@ def as_json(laps: "list[Lap]") -> dict[str, Any]:
 
 def laps_table(laps: "list[Lap]") -> Table:
     """A row for every flight."""
-    table = Table(box=None, header_style="bold", pad_edge=False)
     headings = "world", "", "policy", "top speed", "pose to image", "image age", "steps late", "room behind"
-    for heading in headings:
-        table.add_column(heading, overflow="fold")
+    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
     for lap in laps:
         mark = Text("ok", "green") if lap.good else Text("no", "bold red")
         spreads = lap.pose_to_image, lap.image_age, lap.lateness, lap.behind

@@ -4,7 +4,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import tyro
@@ -37,7 +37,7 @@ class Identify:
     Give each source as its kind, followed by its files: `e2efly identify parts my.toml flight a.csv b.csv`.
     """
 
-    sources: tyro.conf.Positional[tuple[str, ...]]
+    sources: tyro.conf.Positional[Annotated[tuple[str, ...], tyro.conf.arg(metavar="FILE ...")]]
     """parts FILE: a list of parts. pendulum FILE: periods of a bifilar pendulum. stand FILE: a record of a thrust
     stand. flight LOG...: flights. step LOG...: flights with steps of the body rate, for the delay and the rate loop
     only. LOG:BEGIN-END selects the part between two times, in s from the beginning of the log."""

@@ -1,13 +1,18 @@
 """How options of a command are read."""
 
+import io
+import sys
+from contextlib import redirect_stderr
+from dataclasses import MISSING, fields
 from decimal import Decimal
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import tyro
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
+from e2efly.commands.helping import accepted, asks_help, refuse_unknown, short_help
 from e2efly.vehicles.posterior import IDENTIFIED
 
 T = TypeVar("T")
@@ -36,6 +41,8 @@ def _whole(text: str) -> int:
 def parse(options: type[T], command: str, arguments: list[str], **default: Any) -> T:
     """The parsed options of a command. A path must lead to a file, to a folder, or to nothing.
 
+    `--help` prints one line for each option of the command itself; `--help-all` prints every option in full.
+
     Args:
         options: the dataclass of the options.
         command: the name of the command, for its help.
@@ -43,13 +50,31 @@ def parse(options: type[T], command: str, arguments: list[str], **default: Any) 
         default: an instance, if the defaults differ from those of the class.
 
     Raises:
-        ValueError: for the path of a device or a pipe. Reading it may never end, and a report would replace it.
+        ValueError: for an unknown option, with the most similar ones; and for the path of a device or a pipe. Reading
+            it may never end, and a report would replace it.
     """
-    config = (tyro.conf.AvoidSubcommands,)
-    found = tyro.cli(
-        options, args=_once(arguments), prog=f"e2efly {command}", config=config, registry=_TYPES, **default
-    )
+    given: dict[str, Any] = {"prog": f"e2efly {command}", "config": (tyro.conf.AvoidSubcommands,), "registry": _TYPES}
+    given |= default
+    if asks_help(arguments) and "--help-all" not in arguments:
+        print(short_help(options.__doc__ or "", command, accepted(options, given)))
+        raise SystemExit(0)
+    arguments = ["--help" if argument == "--help-all" else argument for argument in _once(arguments)]
+    told, left = io.StringIO(), [argument for argument in arguments if argument.startswith("--")]
+    try:
+        with redirect_stderr(told):
+            found, left = tyro.cli(options, args=arguments, return_unknown_args=True, **given)
+    except SystemExit as end:
+        if end.code:
+            refuse_unknown(left, command, accepted(options, given))
+        sys.stderr.write(told.getvalue())
+        raise
+    if left:
+        refuse_unknown(left, command, accepted(options, given))
+        raise ValueError(f"{left[0]!r} is one argument too many for `e2efly {command}`; accepted: see its --help")
+    required = {field.name for field in fields(cast(Any, options)) if field.default is MISSING}
     for name, value in vars(found).items():
+        if value == () and name in required:
+            raise ValueError(f"{name.upper()} is empty; accepted: one or more (see `e2efly {command} --help`)")
         if isinstance(value, Path) and value.exists() and not (value.is_file() or value.is_dir()):
             raise ValueError(f"{name} is {value}; accepted: the path of a file or of a folder")
     return found

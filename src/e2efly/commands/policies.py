@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from e2efly.commands.helping import asks_help
 from e2efly.commands.options import parse, peek
 from e2efly.config import TaskConfig
 from e2efly.config.changes import differing
@@ -36,7 +37,7 @@ def asked_of(options: type, command: str, arguments: list[str]) -> Asked:
         ValueError: for unknown names, and for a policy that does not exist.
     """
     given = [argument for argument in arguments if argument.startswith("--task.")]
-    if not given or "--help" in arguments:
+    if not given or asks_help(arguments):
         return Asked(parse(options, command, arguments), {})
     found = named_first(command, arguments, given[0])
     kind = with_task(options, found.task)

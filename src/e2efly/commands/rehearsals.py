@@ -40,9 +40,8 @@ def flights_table(flights: list[Rehearsal]) -> RenderableType:
 
     The table fits 80 columns. The modes of a complete flight are always the same and are only in its JSON.
     """
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in ("whole flight", "complete", "hover error", "policy", "top speed"):
-        table.add_column(heading, overflow="fold")
+    headings = "whole flight", "complete", "hover error", "policy", "top speed"
+    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
     for i, flight in enumerate(flights, 1):
         mark = Text("yes", "green") if flight.complete else Text("no", "bold red")
         error = "none" if math.isnan(flight.hover_error) else f"{100 * flight.hover_error:.1f} cm"

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tyro
@@ -13,6 +13,8 @@ from e2efly.control import Quat
 from e2efly.courses.references import read_csv, through_points
 from e2efly.device import prepare
 from e2efly.terminal import Terminal
+from e2efly.vehicles.names import unknown
+from e2efly.zoo import beside, is_policy, names, policy_file
 
 PERIOD = 0.05
 """Seconds between the frames of a video."""
@@ -24,13 +26,13 @@ PICTURE, PANEL = 640, 256
 class Render:
     """Draw what sensors see of a world: pictures, a contact sheet with every noise, and a video of a flight.
 
-    For a run or a policy.onnx: a GIF of the policy in flight, with the images of its cameras beside it, as
+    For a policy: a GIF of the policy in flight, with the images of its cameras beside it, as
     `e2efly watch --video` draws it.
     """
 
-    scene: tyro.conf.Positional[str]
+    scene: tyro.conf.Positional[Annotated[str, tyro.conf.arg(metavar="SCENE|POLICY")]]
     """forest, clutter, room, corridor, garage, terrain, warehouse, a race track, or a scene file (.toml, .glb, .obj,
-    .ply, .stl). Or a run directory or a policy.onnx."""
+    .ply, .stl). Or a policy: a run directory, a policy.onnx, or a name of the zoo (hover, any/hover)."""
     camera: Literal["d435i", "fpv", "down", "lidar"] = "d435i"
     """The sensor of the pictures and the video: a RealSense (d435i), an FPV camera, a downward camera, or a LiDAR."""
     width: int | None = None
@@ -70,18 +72,21 @@ def run(options: Render) -> int:
         value = getattr(options, name)
         if value is not None and not np.all(np.isfinite(value)):
             raise ValueError(f"--{name} is {value}; accepted: finite numbers")
-    if options.scene.endswith(".onnx") or (Path(options.scene) / "config.json").is_file():
+    if is_policy(options.scene):
         return _policy(options)
     prepare()
     from e2efly.env import random_key
     from e2efly.scenes.camera import PRESETS
     from e2efly.view.cloud import write_cloud
     from e2efly.view.images import look_around, sized, write_pictures
-    from e2efly.view.places import find_place
+    from e2efly.view.places import find_place, place_names
     from e2efly.view.sheet import write_sheet
     from e2efly.view.video import exposure_of, frames, write_video
 
     console = Terminal()
+    if options.scene not in place_names() and not Path(options.scene).suffix:
+        known = unknown("scene or policy", options.scene, [*place_names(), *names()])
+        raise ValueError(f"{known}, a run directory, or the path of a scene file or a policy.onnx")
     place = find_place(
         options.scene, random_key(options.seed), options.scene_unit, options.scene_up, options.scene_materials
     )
@@ -115,8 +120,7 @@ def _policy(options: Render) -> int:
     """A video of a policy in flight, with the images of its cameras."""
     from e2efly.commands.watch import Watch, run
 
-    path = Path(options.scene)
-    out = options.out or Path("runs/render") / (path.parent.name if path.suffix else path.name)
+    out = options.out or Path("runs/render") / beside(policy_file(options.scene)).name
     _make(out)
     return run(Watch(what=(options.scene,), seed=options.seed, video=out / "flight.gif"))
 

@@ -69,9 +69,8 @@ def _table(found: "Report") -> Table:
     from e2efly.episodes import summary
 
     count = next(len(e.success) for criteria in found.flown.values() for e in criteria.values())
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in (f"of {count} starts", "success", "95 % interval", "final error", "time"):
-        table.add_column(heading, no_wrap=True)
+    headings = f"of {count} starts", "success", "95 % interval", "final error", "time"
+    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
     for row, criteria in found.flown.items():
         for name, episodes in criteria.items():
             s = summary(episodes)

@@ -16,7 +16,7 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import tyro
@@ -49,7 +49,7 @@ _ALONE = {
 class Sweep:
     """Train a task over seeds and options, with many runs in parallel on Ray (pip install 'e2efly[ray]')."""
 
-    task: tyro.conf.Positional[str]
+    task: tyro.conf.Positional[Annotated[str, tyro.conf.arg(metavar="TASK")]]
     """The task to learn."""
     algo: str | None = None
     """Learning algorithm. If omitted, the one that learns the task best."""

@@ -13,6 +13,7 @@ import tyro
 from rich.console import Console
 
 from e2efly import presets
+from e2efly.commands.helping import asks_help
 from e2efly.commands.options import parse as parse_options
 from e2efly.commands.options import peek
 from e2efly.config import ALGORITHMS, EnvConfig, NetworkConfig, RewardConfig, TrainConfig
@@ -130,11 +131,7 @@ def _train(o: Train, again: str, console: Console) -> int:
 
 
 def _page(o: Train) -> "Beside | None":
-    """The page of `--watch`.
-
-    Raises:
-        ValueError: for a port that is invalid or in use, or when viser is not installed.
-    """
+    """The page of `--watch`."""
     if o.watch is None or o.hosts.index > 0:
         return None
     from e2efly.watch.beside import Beside
@@ -291,7 +288,7 @@ def _changed(preset: Mapping[str, float], given: Mapping[str, float]) -> dict[st
 def _parsed(arguments: list[str]) -> tuple[Any, TrainConfig]:
     """The options of `train`, and the configuration that they give."""
     arguments = _with_folder(arguments)
-    if "--resume" in arguments and (not arguments or arguments[0].startswith("-")) and "--help" not in arguments:
+    if "--resume" in arguments and (not arguments or arguments[0].startswith("-")) and not asks_help(arguments):
         return _parsed_of_run(arguments)
     task = next((a for a in arguments[:1] if not a.startswith("-")), "hover")
     algo = peek(arguments, "--algo", TASKS.find(task).best)
@@ -302,7 +299,7 @@ def _parsed(arguments: list[str]) -> tuple[Any, TrainConfig]:
         config = presets.for_vehicle(config, vehicle)
     if peek(arguments, "--from", ""):
         config = presets.gentle(config)
-    if arguments[:1] != [task] and not {"-h", "--help"} & set(arguments):
+    if arguments[:1] != [task] and not asks_help(arguments):
         raise ValueError(f"train needs a task first: {_join(TASKS)}")
     return _parsed_as(config, preset, arguments)
 
@@ -334,11 +331,7 @@ def _with_folder(arguments: list[str]) -> list[str]:
 
 
 def _parsed_of_run(arguments: list[str]) -> tuple[Any, TrainConfig]:
-    """The same as `_parsed`, for a run that continues and no named task: everything comes from the run.
-
-    Raises:
-        ValueError: when there is no such run, or when an option contradicts it.
-    """
+    """The same as `_parsed`, for a run that continues and no named task: everything comes from the run."""
     from e2efly.learn.rundir import RunDirectory
 
     out = peek(arguments, "--out", "")

@@ -3,6 +3,7 @@
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 
@@ -23,7 +24,7 @@ class Tune:
     It runs `identify flight LOG...`, `train TASK --preset identified` and `eval --stress`, one after the other.
     """
 
-    logs: tyro.conf.Positional[tuple[Path, ...]]
+    logs: tyro.conf.Positional[Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE [FILE ...]")]]
     """Logs of flights of the vehicle, as `e2efly identify flight` reads them."""
     task: str = "race"
     """The task to learn. It must have the preset `identified`."""

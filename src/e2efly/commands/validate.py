@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from rich.console import Console
@@ -33,7 +33,7 @@ WHOLE_S = 1.0
 class Validate:
     """Fly a policy on another plant, from the starts of `eval`. The exit status is 1 if success drops too far."""
 
-    policy: tyro.conf.Positional[Path]
+    policy: tyro.conf.Positional[Annotated[Path, tyro.conf.arg(metavar="POLICY")]]
     """A run directory, a policy.onnx, or a task. A task selects its policy in the zoo: the one for --vehicle if the zoo
     has that vehicle, otherwise the one for VIS-R. `any/hover` is the policy for any vehicle."""
     plant: str = "mujoco"
@@ -210,9 +210,7 @@ def _table(found: "Validation") -> Table:
     from e2efly.episodes import summary
 
     headings = "criterion", "flown in", "success", "95 %", "end error", "mean", "time", "drop"
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in headings:
-        table.add_column(heading, no_wrap=True)
+    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
     for name, v in found.criteria.items():
         for place, e, drop in (("training", v.trained, ""), (found.plant.name, v.flown, f"{v.drop:+.1f}")):
             s = summary(e)

@@ -5,17 +5,18 @@ import os
 import select
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import tyro
 
 from e2efly.process import be_idle
 from e2efly.terminal import Terminal
+from e2efly.zoo import policy_file
 
 if TYPE_CHECKING:
     from e2efly.watch.frames import Source
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
 
 MOST = 1024
 """Largest number of vehicles."""
-FILES = (".onnx", ".json", ".mcap", ".csv", ".txt", ".bbl", ".bfl", ".bf", ".ulg", ".bag", ".db3")
-"""Extensions of names that are meant as files: where there is none, nothing else is looked for."""
 WAIT_S = 600.0
 """How long to wait for the first policy of a run, s."""
 USUAL = "vis_r"
@@ -44,7 +43,7 @@ class Watch:
     docs/watch.md.
     """
 
-    what: tyro.conf.Positional[tuple[str, ...]]
+    what: tyro.conf.Positional[Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY|FILE ...")]]
     """One of: a task (the zoo's policy for it), a policy.onnx, or a run directory. One or more flight logs: the first
     is followed, the others are shown as its ghosts. A report of `e2efly validate --json`, or its folder: it shows the
     policy on the plant, with its flight in the training simulator as a ghost. A pose source, as in `e2efly fly`:
@@ -90,7 +89,7 @@ def run(options: Watch) -> int:
         raise ValueError(f"--port is {o.port}; accepted: 0 to 65535")
     if o.seconds is not None and not 0 < o.seconds < math.inf:
         raise ValueError(f"--seconds is {o.seconds}; accepted: more than 0")
-    logs = _logs(o.what)
+    logs = _logs(o.what, o.vehicle)
     if o.idle:
         be_idle()
     if o.video is not None:
@@ -103,9 +102,12 @@ def run(options: Watch) -> int:
     from e2efly.watch.viewer import serve
 
     server = serve(o.host, o.port, f"e2efly watch {' '.join(o.what)}")
-    console.print(f"Look at http://{server.get_host()}:{server.get_port()} (Ctrl-C ends it)")
+
+    def ready() -> None:
+        console.print(f"Look at http://{server.get_host()}:{server.get_port()} (Ctrl-C ends it)")
+
     try:
-        _serve(o, server, logs)
+        _serve(o, server, logs, ready)
     except KeyboardInterrupt:
         console.print("Ended.")
     finally:
@@ -113,27 +115,23 @@ def run(options: Watch) -> int:
     return 0
 
 
-def _logs(what: tuple[str, ...]) -> list[Path]:
-    """The flight logs, if flight logs are to be watched; otherwise none.
-
-    Raises:
-        ValueError: for several arguments that are not all logs, and for a path that does not exist.
-    """
+def _logs(what: Sequence[str], vehicle: str | None) -> list[Path]:
+    """The flight logs, if flight logs are to be watched; otherwise none."""
     from e2efly.identification.readers import is_log
 
     logs = [Path(text) for text in what if is_log(Path(text))]
     if len(what) > 1 and len(logs) < len(what):
         raise ValueError(f"WHAT is {' '.join(what)}; accepted: one policy or run, or several flight logs")
-    for text in what:
-        path = Path(text)
-        file = ":" not in text and (os.sep in text or path.suffix.lower() in FILES)
-        if file and not path.exists():
-            accepted = "a task, a policy.onnx, a run's folder, a flight log, a report of `e2efly validate --json`"
-            raise ValueError(f"{text!r} does not exist; accepted: {accepted}")
+    if not logs and not _is_source(first := what[0]):
+        try:
+            policy_file(first, vehicle)
+        except ValueError as error:
+            raise ValueError(f"{error}, a flight log, or a report of `e2efly validate --json`") from None
     return logs
 
 
-def _serve(o: Watch, server: Any, logs: list[Path]) -> None:
+def _serve(o: Watch, server: Any, logs: list[Path], ready: Callable[[], None]) -> None:
+    """Show what is asked for, and call `ready` once it is known to exist."""
     from e2efly.watch.loop import run as loop
     from e2efly.watch.panels import Panel, hands_on, policies_on, starts_on, times_on
     from e2efly.watch.viewer import Viewer
@@ -151,17 +149,23 @@ def _serve(o: Watch, server: Any, logs: list[Path]) -> None:
         if starts:
             starts_on(panel, recording, starts)
         between = times_on(panel, recording)
+        ready()
         loop(recording, panel.viewer, panel, over, between)
         return
     if _is_source(o.what[0]):
         with _poses(o) as poses:
+            ready()
             loop(poses, panel.viewer, panel, over)
         return
 
     def watched() -> bool:
         return not o.idle or bool(server.get_clients())
 
+    if may_wait := (Path(o.what[0]) / "config.json").is_file():
+        ready()
     simulation, progress = _flown(o, Terminal())
+    if not may_wait:
+        ready()
     hands_on(panel, simulation)
     between = (lambda: None) if progress is None else policies_on(panel, progress)
     loop(simulation, panel.viewer, panel, over, between, watched)
@@ -252,11 +256,7 @@ def _report(what: tuple[str, ...]) -> Path | None:
 
 
 def _reported(o: Watch, report: Path) -> "tuple[Recording, list[Shown]]":
-    """The first start of a report in the requested criterion, and all starts.
-
-    Raises:
-        ValueError: for a given vehicle, which the report determines, and for a criterion that the report does not have.
-    """
+    """The first start of a report in the requested criterion, and all starts."""
     if o.vehicle is not None:
         raise ValueError(f"--vehicle is {o.vehicle!r}; accepted: left out, as {report} says what flew")
     from e2efly.watch.recording import Recording
@@ -270,11 +270,7 @@ def _reported(o: Watch, report: Path) -> "tuple[Recording, list[Shown]]":
 
 
 def _flown(o: Watch, console: Terminal) -> "tuple[Simulation, Progress | None]":
-    """The simulation of a policy, and the progress of its run if it belongs to one.
-
-    Raises:
-        ValueError: for a policy or a criterion that does not exist, and for a run that has no policy within `WAIT_S`.
-    """
+    """The simulation of a policy, and the progress of its run if it belongs to one."""
     from e2efly.device import prepare
 
     prepare("cpu")
@@ -305,11 +301,7 @@ def _flown(o: Watch, console: Terminal) -> "tuple[Simulation, Progress | None]":
 
 
 def _criterion(asked: str | None, there: Any) -> str:
-    """The criterion that is flown.
-
-    Raises:
-        ValueError: for a criterion that the task does not have.
-    """
+    """The criterion that is flown."""
     if asked is not None and asked not in there:
         raise ValueError(f"--criterion is {asked!r}; accepted: {', '.join(there)}")
     return asked or next(iter(there))

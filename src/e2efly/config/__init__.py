@@ -32,7 +32,7 @@ from e2efly.config.vehicle import (
     NoiseConfig,
 )
 from e2efly.config.worlds import CLUTTER, ClutterConfig, ForestConfig
-from e2efly.numbers import check_numbers, number, shape
+from e2efly.numbers import check_fields, number, shape
 
 __all__ = [
     "ALGORITHMS",
@@ -59,7 +59,7 @@ __all__ = [
     "StageConfig",
     "TaskConfig",
     "TrainConfig",
-    "check_numbers",
+    "check_fields",
     "number",
     "shape",
 ]

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
-from e2efly.numbers import check_numbers, number
+from e2efly.numbers import check_fields, number
 from e2efly.registry import Registry
 
 
@@ -43,7 +43,7 @@ class AlgorithmConfig:
         Raises:
             ValueError: naming the field, the value and what is accepted.
         """
-        check_numbers("algo", self)
+        check_fields("algo", self)
 
     def kept(self) -> dict[str, tuple[int, str]]:
         """What it keeps of earlier steps. For each option: how many, and whether they are `transition` or `state`."""
@@ -67,15 +67,7 @@ def register(name: str) -> Callable[[C], C]:
     Raises:
         ValueError: for a name that is already used, or a class that is not an `AlgorithmConfig`.
     """
-
-    def registered(options: C) -> C:
-        if not (isinstance(options, type) and issubclass(options, AlgorithmConfig)):
-            raise ValueError(f"algorithm {name!r} is {options!r}; accepted: a dataclass that extends AlgorithmConfig")
-        options.name = name
-        ALGORITHMS.add(name, options)
-        return options
-
-    return registered
+    return ALGORITHMS.extending(AlgorithmConfig, name)
 
 
 def _check_minibatch(steps: int, minibatch: int) -> None:

@@ -9,6 +9,7 @@ from e2efly.config.vehicle import FILE, CameraConfig, EnvConfig
 from e2efly.courses.domain import Domain
 from e2efly.drawing import Thing
 from e2efly.numbers import number
+from e2efly.registry import absolute
 
 
 @dataclass(frozen=True)
@@ -16,10 +17,13 @@ class RewardConfig:
     """The reward: a weighted sum of the terms of the reward manual."""
 
     weights: dict[str, float] = field(default_factory=dict)
-    """Weight of each term by name; see `e2efly list`. On the command line, these are changes to the preset's weights,
-    and 0 removes a term."""
+    """Weight of each term: a name of `e2efly list rewards`, or your own term, path/to/file.py:Name. On the command
+    line, these are changes to the preset's weights, and 0 removes a term."""
     parameters: dict[str, float] = field(default_factory=dict)
     """Constants of the terms that differ from their defaults."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "weights", {absolute(name): weight for name, weight in self.weights.items()})
 
 
 @dataclass(frozen=True)

@@ -163,7 +163,7 @@ class EnvConfig:
     """Name of a shipped vehicle, `any`, or the path of a .toml file. The file describes one vehicle, or the parameter
     ranges of many (a family)."""
     command_mode: str = "ctbr"
-    """What the policy commands: a command mode of `e2efly list` (sets the program)."""
+    """What the policy commands: a command mode of `e2efly list rest` (sets the program)."""
     integrator: str = "rk3"
     """Integrator of the physics: euler, semi_implicit, rk3 or rk4 (sets the program)."""
     control_rate: float | None = number(None, low=0.1)
@@ -185,8 +185,8 @@ class EnvConfig:
     """Number of past actions that the policy sees; 0 as in the paper. If omitted, as many as the latency spans (sets
     shapes)."""
     randomize: dict[str, float] = field(default_factory=dict)
-    """Relative half-width of the uniform random factor on a vehicle parameter, per episode: {"mass": 0.1} means 0.9 to
-    1.1. {"identified": 1.0} draws from the standard deviations, multiplied by this number, and the correlations of the
+    """Relative half-width of the uniform random factor on a vehicle parameter, per episode: mass 0.1 means 0.9 to 1.1.
+    identified 1.0 draws from the standard deviations, multiplied by this number, and the correlations of the
     vehicle's file."""
     wind: float = number(0.0, high=SPEED)
     """Largest wind speed, m/s. The wind is constant in an episode and is drawn uniformly from a ball."""

@@ -19,7 +19,7 @@ from e2efly.deploy.pilot.hover import FlightMotion, flight_gains
 from e2efly.deploy.policy.contract import CONTRACT_VERSION, Action, Contract
 from e2efly.deploy.settings import FlightSettings
 from e2efly.goal import Course, Goal, Observed, Outcome
-from e2efly.numbers import SPEED, check_numbers, number
+from e2efly.numbers import SPEED, check_fields, number
 from e2efly.observation import ATTITUDE, VELOCITY, Field
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
@@ -139,7 +139,7 @@ def excitation(
     Raises:
         ValueError: naming the option, or the part of the fence that is too small, and what is needed.
     """
-    check_numbers(NAME, options)
+    check_fields(NAME, options)
     room, tilt = room_of(settings)
     late: float = vehicle.latency if latency is None else latency
     steer = softened(flight_gains(vehicle, late), tilt)

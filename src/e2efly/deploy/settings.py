@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from e2efly.numbers import ANGLE, SPEED, check_numbers, number
+from e2efly.numbers import ANGLE, SPEED, check_fields, number
 
 Point = tuple[float, float, float]
 Box = tuple[float, float, float, float, float, float]
@@ -112,7 +112,7 @@ def check(settings: FlightSettings) -> None:
         ValueError: naming the field, the value and what is accepted.
     """
     _check_channels(settings.channels)
-    check_numbers("flight", settings)
+    check_fields("flight", settings)
     _check_fence(settings.fence)
     low, high = settings.fence.low[2], settings.fence.high[2]
     if not low < settings.ground_height + settings.takeoff_height < high:

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from e2efly.config import EnvConfig, TaskConfig, check_numbers
+from e2efly.config import EnvConfig, TaskConfig, check_fields
 from e2efly.deploy.policy.contract_json import LATEST
 from e2efly.scenes.camera import check as check_camera
 from e2efly.sensors.image_noise import check as check_noise
@@ -31,8 +31,8 @@ def check(
     Raises:
         ValueError: naming the field, the value and what is accepted.
     """
-    check_numbers("env", config)
-    check_numbers("task", task)
+    check_fields("env", config)
+    check_fields("task", task)
     body = nominal_vehicle(config.vehicle) if flown is None else flown
     names = [f.name for f in quantities(body)]
     for name, width in config.randomize.items():

@@ -403,7 +403,7 @@ class Env:
 
     def _reads(self, *signals: str) -> bool:
         """Whether a reward term reads one of these signals."""
-        return any(signal in rewards.TERMS[name].inputs for name in self.weights for signal in signals)
+        return any(signal in rewards.TERMS.find(name).inputs for name in self.weights for signal in signals)
 
     def expert_action(self, state: EnvState) -> Float[Array, "n 4"]:
         """The action of an expert that knows the whole world and this vehicle. It has no gradient.

@@ -154,12 +154,7 @@ def ablate(
 
 
 def _programs(setup: Setup, devices: int) -> tuple[Callable, Callable, Callable]:
-    """Programs that run all members. The members are the leading axis of every value that differs between them.
-
-    Returns:
-        Three programs: (environment, weights, parameters, keys) -> states; (environment, weights, states, first update)
-        -> states after a chunk; (environment, policies) -> episodes.
-    """
+    """Programs that run all members. The members are the leading axis of every value that differs between them."""
     config, algorithm = setup.config, setup.algorithm
 
     def weighted(env: Env, weights: dict[str, Any]) -> Env:

@@ -163,11 +163,7 @@ class ABPT(Algorithm):
     def _collect(
         self, env: Env, config: ABPTConfig, policy: Stochastic, state: TrainState, key: PRNGKeyArray
     ) -> tuple[RolloutState, Transition, dict[str, Array]]:
-        """Steps without gradients.
-
-        Returns:
-            The state at the end, the transitions (steps * n, ...), and the metrics.
-        """
+        """Steps without gradients."""
 
         def step(at: RolloutState, z: Array) -> tuple[RolloutState, Any]:
             here = self._here(env, at)

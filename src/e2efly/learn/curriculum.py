@@ -7,7 +7,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from e2efly.config import StageConfig, TaskConfig, TrainConfig, check_numbers
+from e2efly.config import StageConfig, TaskConfig, TrainConfig, check_fields
 from e2efly.env import Env
 
 
@@ -47,7 +47,7 @@ def stages(config: TrainConfig) -> tuple[Stage, ...]:
         where = f"curriculum[{i}]"
         if stage.success is None and stage.steps is None:
             raise ValueError(f"{where} has neither success nor steps; accepted: at least one of them, to end it")
-        check_numbers(where, stage)
+        check_fields(where, stage)
         task: Any = config.task
         for path, value in stage.changes.items():
             task = changed(task, path, value, where)

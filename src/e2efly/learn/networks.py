@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from e2efly.config import CameraConfig, NetworkConfig, check_numbers
+from e2efly.config import CameraConfig, NetworkConfig, check_fields
 from e2efly.observation import Field
 from e2efly.physics.rotation import unrotate
 
@@ -274,7 +274,7 @@ class Actor:
         Raises:
             ValueError: naming the field, the value and what is accepted.
         """
-        check_numbers("network", network)
+        check_fields("network", network)
         if cameras and not network.encoder:
             raise ValueError("network.encoder is (); accepted: one size or more where there are cameras")
         return Actor(Features(fields, tuple(View.of(camera, network) for camera in cameras)), network)

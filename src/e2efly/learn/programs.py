@@ -87,7 +87,7 @@ class Programs:
 
 def traced_folder(config: TrainConfig) -> Path | None:
     """The folder for traced programs of a configuration. None: they contain code from outside the package."""
-    terms = (TERMS[name].function for name in config.reward.weights if name in TERMS)
+    terms = (TERMS.find(name).function for name in config.reward.weights)
     shipped = all(map(is_shipped, (type(config.task), type(config.algo), *terms)))
     own_noise = any(camera.noise.own for camera in config.env.cameras)
     return cache_folder() / "traced" if shipped and not own_noise else None

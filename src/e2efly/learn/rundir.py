@@ -1,7 +1,7 @@
 """The run directory: everything that is needed to reproduce a run and to fly its policy.
 
 config.json  versions.json  inputs.json  inputs/  metrics.csv  events/  checkpoint.safetensors  history/  plots/
-policy.onnx  summary.json  published/
+policy.onnx  summary.json
 """
 
 import csv
@@ -29,8 +29,8 @@ _FILES = (
     "config.json", "versions.json", "inputs.json", "metrics.csv", "checkpoint.safetensors", "policy.onnx",
     "policy.images.npz", "summary.json",
 )  # fmt: skip
-_FOLDERS = ("inputs", "events", "history", "plots", "published")
-"""Everything that a run, or `e2efly publish` for this run, writes into its folder."""
+_FOLDERS = ("inputs", "events", "history", "plots")
+"""Everything that a run writes into its folder."""
 _PACKAGES = ("e2efly", "jax", "jaxlib", "numpy", "optax", "onnx", "onnxruntime")
 
 

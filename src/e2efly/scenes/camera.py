@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from e2efly.config import CameraConfig, check_numbers
+from e2efly.config import CameraConfig, check_fields
 from e2efly.physics.rotation import from_euler, rotate, to_matrix
 from e2efly.scenes import cast as solids
 from e2efly.scenes.cast import Light, Pattern, usual_light
@@ -148,7 +148,7 @@ def check(config: CameraConfig) -> None:
     Raises:
         ValueError: naming the field, the value and what is accepted.
     """
-    check_numbers("camera", config)
+    check_fields("camera", config)
     most = math.pi if config.projection == "pinhole" else 2 * math.pi + 1e-6
     if max(config.fov) >= most:
         raise ValueError(f"camera.fov is {config.fov}; accepted: angles below {most:.4g} rad")

@@ -97,18 +97,7 @@ def _throwing(
     visible: Bool[Array, "n t k"],
     hollow: Bool[np.ndarray, " k"],
 ) -> Bool[Array, "n t k"]:
-    """Whether shadows of the solids' balls may fall on objects in the tiles: on the ground, or on another solid's ball.
-
-    Args:
-        pattern: the tiles.
-        matrix: map from the sensor's frame to the world.
-        away: vectors from the sensor to the balls' centres, world, components (n, k), m.
-        reach: the balls' radii, m.
-        height: height of the sensor above the ground, m.
-        sun: unit vectors to the sun, components (n, 1).
-        visible: solids in the cones of the tiles.
-        hollow: solids that cast shadows on themselves.
-    """
+    """Whether shadows of the solids' balls may fall on objects in the tiles: on the ground or another solid's ball."""
     steep = jnp.maximum(sun.z, 1e-3)
     on_ground = seen_by_tiles(pattern, matrix, away - sun * ((away.z + height) / steep), reach / steep)
     apart = Vec3(*(jnp.expand_dims(x, 1) - jnp.expand_dims(x, 2) for x in (away.x, away.y, away.z)))  # (n, onto, from)

@@ -18,12 +18,4 @@ def register(name: str) -> Callable[[C], C]:
     Raises:
         ValueError: for a name that is taken, or a class that is not a `TaskConfig`.
     """
-
-    def registered(options: C) -> C:
-        if not (isinstance(options, type) and issubclass(options, TaskConfig)):
-            raise ValueError(f"task {name!r} is {options!r}; accepted: a frozen dataclass that extends TaskConfig")
-        options.name = name
-        TASKS.add(name, options)
-        return options
-
-    return registered
+    return TASKS.extending(TaskConfig, name)

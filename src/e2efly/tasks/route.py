@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from e2efly.config import TaskConfig, check_numbers, number
+from e2efly.config import TaskConfig, check_fields, number
 from e2efly.control import COMMAND_MODES
 from e2efly.courses.domain import Domain
 from e2efly.courses.origin import Origin
@@ -144,7 +144,7 @@ def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None)
     route = kind() if route is None else route
     if not isinstance(route, kind):
         raise ValueError(f"goal is a {type(route).__name__}; accepted: a {kind.__name__}, for task {contract.task!r}")
-    check_numbers("goal", route)
+    check_fields("goal", route)
     _check_use(contract, route)
     shape = Shape(vehicle.feet_height, vehicle.radius)
     course = route.course_of(contract, shape)

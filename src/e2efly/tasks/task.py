@@ -13,7 +13,7 @@ from e2efly.goal import Outcome, Shape
 from e2efly.numbers import SHAPE
 from e2efly.observation import Field
 from e2efly.physics import State
-from e2efly.registry import load, origin
+from e2efly.registry import check_methods, load
 from e2efly.scenes.scene import Scene, gaps
 from e2efly.tasks.registry import TASKS
 
@@ -96,8 +96,7 @@ def make_task(config: TaskConfig, shape: Shape, control_period: float, substeps:
             task, naming its file and what it lacks.
     """
     world = world_of(type(config))
-    if lacking := [name for name in METHODS if not hasattr(world, name)]:
-        raise ValueError(f"{origin(world)} has no {', '.join(lacking)}; accepted: all of {', '.join(METHODS)}")
+    check_methods(world, METHODS)
     register_options(type(config))
     return world.of(config, shape, control_period, substeps)
 

@@ -309,11 +309,7 @@ def prepare(sitl: Sitl, settings: tuple[str, ...] = SETTINGS) -> None:
 
 
 def _type(sitl: Sitl, settings: tuple[str, ...]) -> None:
-    """Type lines into the firmware's command line, then `save`, which ends the firmware.
-
-    Raises:
-        ValueError: when it refuses a line, with its message.
-    """
+    """Type lines into the firmware's command line, then `save`, which ends the firmware."""
     sitl.idle(1.0)
     with socket.create_connection(("127.0.0.1", sitl.base + 4), timeout=5.0) as line:
         line.setblocking(False)

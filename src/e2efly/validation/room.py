@@ -151,12 +151,7 @@ class Program:
     def end(self, seconds: float, by: int = signal.SIGINT) -> int | None:
         """Ask it to end, as Ctrl-C does. Returns its exit status, or None if it had to be killed."""
         self.process.send_signal(by)
-        try:
-            return self.process.wait(seconds)
-        except subprocess.TimeoutExpired:
-            return None
-        finally:
-            self.close()
+        return self._status(seconds)
 
     def leave(self, seconds: float = 10.0) -> int | None:
         """Close its standard input, which ends the programs of a room.
@@ -166,6 +161,9 @@ class Program:
         assert self.process.stdin is not None
         with suppress(OSError):
             self.process.stdin.close()
+        return self._status(seconds)
+
+    def _status(self, seconds: float) -> int | None:
         try:
             return self.process.wait(seconds)
         except subprocess.TimeoutExpired:

@@ -251,11 +251,7 @@ class Sitl:
             os.write(pipe, b"\0")
 
     def _told(self) -> bool:
-        """Wait until the firmware has a message. False: it has ended.
-
-        Raises:
-            OSError: when it sends nothing for `BOOT_S`.
-        """
+        """Wait until the firmware has a message. False: it has ended."""
         if not select.select([self._done], [], [], BOOT_S)[0]:
             raise OSError(f"the Betaflight SITL in {self.folder} hangs: it said nothing for {BOOT_S:g} s")
         return bool(os.read(self._done, 64))

@@ -115,15 +115,11 @@ class Validation:
 
     def as_json(self) -> dict[str, Any]:
         """The report that `e2efly validate --json` writes."""
-        contract, plant, suites = self.candidate.policy.contract, self.plant.name, self.candidate.task.criteria()
+        plant, suites = self.plant.name, self.candidate.task.criteria()
         drop = "points of success: percent of the training simulator less percent of the plant"
         return {
-            "policy": str(self.candidate.file),
-            "task": contract.task,
-            "baseline": self.candidate.baseline,
-            "vehicle": self.candidate.vehicle,
-            "controller": self.candidate.controller,
-            "changed": {name: value for name, (_, value) in self.candidate.changes.items()},
+            **self.candidate.as_json(),
+            "changed": self.candidate.changed,
             "plant": plant,
             "latency_s": self.candidate.latency,
             "seed": self.seed,

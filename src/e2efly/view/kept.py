@@ -68,12 +68,7 @@ def read_flights(path: Path) -> dict[str, Pair]:
 
 
 def _flights(arrays: Mapping[str, np.ndarray], where: str, n: int) -> Flights:
-    """The flights of one place.
-
-    Raises:
-        KeyError: for a missing array.
-        ValueError: for an array with another shape.
-    """
+    """The flights of one place."""
     time, length, success = (arrays[f"{where}/{name}"] for name in ("time", "length", "success"))
     t = len(time)
     shapes = {name: (t, n, width) for name, width in _MOVED.items()} | {"length": (n,), "success": (n,)}

@@ -108,11 +108,7 @@ def read_report(path: Path) -> tuple[list[Shown], Vehicle]:
 
 
 def _check(path: Path, criteria: Mapping[str, Any], criterion: str, pair: Pair, starts: Starts) -> None:
-    """Refuse a report whose starts differ from those that are generated now.
-
-    Raises:
-        ValueError: naming the start.
-    """
+    """Refuse a report whose starts differ from those that are generated now."""
     for number in pair.starts.tolist():
         try:
             then = np.array(criteria[criterion]["starts"][number]["start"]["position"], float)

@@ -63,9 +63,6 @@ def _checked(host: str) -> Iterator[None]:
     """Have the server that viser starts within the block refuse what `refusal` refuses.
 
     viser leaves no room for a check of its requests, so the function that opens its server is replaced meanwhile.
-
-    Raises:
-        ValueError: when viser did not use that function, so that nothing would be checked.
     """
     from websockets.asyncio import server as opened
 

@@ -30,6 +30,22 @@ def contents() -> dict[str, dict[str, dict[str, Any]]]:
     return zoo
 
 
+def names() -> list[str]:
+    """Every name of a policy: a task, or a vehicle or family and a task, as in `any/hover`.
+
+    Raises:
+        ValueError: where the package's file is damaged.
+    """
+    zoo = contents()
+    return [*zoo[USUAL], *(f"{whose}/{task}" for whose, tasks in zoo.items() for task in tasks)]
+
+
+def is_policy(text: str | os.PathLike[str]) -> bool:
+    """Whether a text is meant as a policy: the name of one, a .onnx file, or the folder of a run."""
+    path = Path(text)
+    return path.suffix == ".onnx" or (path / "config.json").is_file() or _entry(path) is not None
+
+
 def policy_file(policy: str | os.PathLike[str], vehicle: str | Path | None = None) -> Path:
     """The file of a policy: every command and function that takes a policy finds it by this.
 
@@ -40,23 +56,17 @@ def policy_file(policy: str | os.PathLike[str], vehicle: str | Path | None = Non
             values, or else of the same name, and of `USUAL` for any other file, and when left out.
 
     Raises:
-        ValueError: for a name that the zoo has not, with what it has; when the zoo's file is not what zoo.json says.
+        ValueError: for what is no policy, with all names; when the zoo's file is not what zoo.json says.
     """
     path = Path(policy)
-    if path.is_dir():
-        return path / "policy.onnx"
-    if path.exists() or path.suffix or len(path.parts) > 2:
-        return path
-    if len(path.parts) == 2:
-        if path.parts[1] not in contents().get(path.parts[0], {}):
-            return path
-        path, vehicle = Path(path.parts[1]), path.parts[0]
-    zoo, task = contents(), str(path)
-    if not any(task in tasks for tasks in zoo.values()):
-        tasks = sorted({task for tasks in zoo.values() for task in tasks})
-        raise ValueError(unknown("policy", task, tasks) + ", a run directory, or the path of a policy.onnx")
+    if path.exists():
+        return path / "policy.onnx" if path.is_dir() else path
+    entry = _entry(path)
+    if entry is None:
+        raise ValueError(unknown("policy", str(policy), names()) + ", a run directory, or the path of a policy.onnx")
+    zoo, (whose, task) = contents(), entry
     having = [known for known, tasks in zoo.items() if task in tasks]
-    name = _whose(vehicle_file(vehicle or USUAL), having)
+    name = whose or _whose(vehicle_file(vehicle or USUAL), having)
     if name not in having:
         raise ValueError(f"the zoo has no policy {task!r} of vehicle {name!r}; accepted: {', '.join(having)}")
     file = FOLDER / name / f"{task}.onnx"
@@ -64,6 +74,14 @@ def policy_file(policy: str | os.PathLike[str], vehicle: str | Path | None = Non
     if found != zoo[name][task].get("sha256"):
         raise ValueError(f"{file}: SHA-256 is {found}, another than zoo.json says; install e2efly again")
     return file
+
+
+def _entry(path: Path) -> tuple[str, str] | None:
+    """The vehicle (empty: the one that flies) and the task of a policy's name. None: the zoo has no such policy."""
+    whose, _, task = path.as_posix().rpartition("/")
+    zoo = contents()
+    tasks = zoo.get(whose, {}) if whose else {task for tasks in zoo.values() for task in tasks}
+    return (whose, task) if task in tasks else None
 
 
 def is_shipped(content: bytes) -> bool:

@@ -211,9 +211,6 @@ class Client:
     def _strike_off(self, code: int, now: float) -> float:
         """Remove the request of a reply from the awaited ones. The controller answers in order, so the replies to
         earlier requests are lost. It is the first request of this code, or on a lossy line the latest that fits.
-
-        Returns:
-            When the code was requested, s. If it was not requested, `now`.
         """
         fitting = [k for k, (awaited, _) in enumerate(self._awaited) if awaited == code]
         if not fitting:

@@ -194,11 +194,11 @@ def _here(inputs: Inputs) -> Target | None:
 def _take_off(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
     if reasons := _must_land(settings, inputs):
         return land(settings, flight, inputs, *reasons)
-    assert flight.target is not None
     assert inputs.odometry is not None
     height = float(inputs.odometry.position[2]) - flight.home
     elapsed = flight.now - flight.since
     flight = looked(flight, inputs)
+    assert flight.target is not None
     if inputs.stands is not False and has_stood(settings, flight, inputs.odometry, LIFTS_S):
         return to(flight, Mode.DONE, f"{Reason.NOT_CLIMBING}: {height:.2f} m after {elapsed:.0f} s")
     if elapsed > settings.takeoff_height / settings.takeoff_speed + CLIMB_S:

@@ -145,7 +145,7 @@ def load_policy(
     """Load a policy. Check it against its contract, and against what it is going to fly.
 
     Args:
-        policy: a `policy.onnx`, a run directory, or the name of a task: the zoo's policy of it.
+        policy: a `policy.onnx`, a run directory, or a name of the zoo: a task, or as in `any/hover`.
         task: name of the task that will be flown.
         vehicle: the vehicle that will fly: its name, the path of its .toml file, or the loaded vehicle.
         control_rate_hz: the rate at which the policy will be called, Hz.

@@ -1,7 +1,10 @@
 """The conditions that a sample of a pose source must satisfy before it is used for flight."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Literal
+
+from e2efly.numbers import check_fields, number
 
 REASONS = {
     "malformed": "an array has the wrong shape",
@@ -26,62 +29,49 @@ class Checks:
 
     frame: str = ""
     """Name of the frame that samples must have. Empty: any frame."""
-    max_age: float = 0.1
+    max_age: float = number(0.1, above=0)
     """The longest delay from measurement to arrival, beyond the source's shortest delay, s."""
-    latency: float = 0.0
+    latency: float = number(0.0)
     """The shortest delay from measurement to arrival, s, from the source's data sheet. No clock mapping can measure
     it."""
-    clock_jump: float = 0.05
+    clock_jump: float = number(0.05, above=0)
     """Jumps of the source's clock that are larger than this are reported, s."""
-    out_of_order: str = "refuse"
+    out_of_order: Literal["refuse", "ignore"] = "refuse"
     """What to do with samples that are not later than the one before. "refuse" gives a reason, "ignore" gives none."""
-    quaternion_tolerance: float = 0.01
+    quaternion_tolerance: float = number(0.01, above=0)
     """The largest deviation of the quaternion's length from 1. Within this limit, the quaternion is normalised."""
-    jump_position: float = 0.05
+    jump_position: float = number(0.05)
     """Position step that is allowed between any two samples, m. `jump_speed` times their interval is added to it."""
-    jump_speed: float = 15.0
+    jump_speed: float = number(15.0, above=0)
     """Largest speed, m/s."""
-    jump_attitude: float = 0.2
+    jump_attitude: float = number(0.2)
     """Attitude step that is allowed between any two samples, rad. `jump_rate` times their interval is added to it."""
-    jump_rate: float = 35.0
+    jump_rate: float = number(35.0, above=0)
     """Largest body rate, rad/s."""
-    jump_count: int = 3
+    jump_count: int = number(3, low=1)
     """Number of successive samples at the place of a jump after which the jump becomes a lasting fault."""
-    frozen_after: float = 0.2
+    frozen_after: float = number(0.2, above=0, endless=True)
     """How long the pose may repeat bit for bit, s. Use infinity for a source without noise."""
-    velocity_cutoff: float = 15.0
+    velocity_cutoff: float = number(15.0, above=0)
     """Cut-off frequency of the low-pass filter of the estimated velocity, Hz."""
-    rate_cutoff: float = 30.0
+    rate_cutoff: float = number(30.0, above=0)
     """Cut-off frequency of the low-pass filter of the estimated body rate, Hz."""
-    velocity_mismatch: float = 2.0
+    velocity_mismatch: float = number(2.0, above=0)
     """The largest difference between the source's velocity and the velocity estimated from its positions, m/s. 0.3
     times the speed is added to it. The difference is larger if a source leaves its velocity at zero or gives it in
     another frame."""
-    velocity_drift: float = 0.08
+    velocity_drift: float = number(0.08, above=0)
     """The largest distance, m, between the path that the source's velocities give and its positions, within half a
     second. `velocity_share` of the path is added to it."""
-    velocity_share: float = 0.3
+    velocity_share: float = number(0.3, above=0)
     """The share of the path's length that is added to `velocity_drift`."""
-    gap: float = 0.5
+    gap: float = number(0.5, above=0)
     """After a pause longer than this, the estimates of velocity and body rate start again, s."""
 
     def __post_init__(self) -> None:
-        for name in (f.name for f in fields(self)):
-            value = getattr(self, name)
-            if name == "frame":
-                good, accepted = isinstance(value, str), "a text"
-            elif name == "out_of_order":
-                good, accepted = value in ("refuse", "ignore"), "'refuse' or 'ignore'"
-            elif name == "jump_count":
-                good, accepted = type(value) is int and value >= 1, "a whole number, 1 or more"
-            elif name in ("latency", "jump_position", "jump_attitude"):
-                good, accepted = _number(value) and 0 <= value < math.inf, "a finite number, 0 or more"
-            elif name == "frozen_after":
-                good, accepted = _number(value) and value > 0, "a positive number, or infinity"
-            else:
-                good, accepted = _number(value) and 0 < value < math.inf, "a positive finite number"
-            if not good:
-                raise ValueError(f"checks: {name} is {value!r}; accepted: {accepted}")
+        check_fields("checks", self)
+        if not isinstance(self.frame, str):
+            raise ValueError(f"checks.frame is {self.frame!r}; accepted: a text")
 
     @property
     def velocity_lag(self) -> float:
@@ -92,7 +82,3 @@ class Checks:
     def rate_lag(self) -> float:
         """How late the estimated body rate is, s: 11 ms at 30 Hz."""
         return 1 / (math.pi * self.rate_cutoff)
-
-
-def _number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and not math.isnan(value)

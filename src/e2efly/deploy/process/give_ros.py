@@ -59,17 +59,7 @@ def give_ros2(given: Any, topic: str, info_topic: str, frame: str) -> None:
 
 
 def _loop(given: Any, frame: str, messages: Any, data: Any, stamp: Any, names: tuple[str, ...], send: Any) -> None:
-    """Publish each new image.
-
-    Args:
-        given: the images.
-        frame: name of the camera's frame.
-        messages: module of the message types.
-        data: converts bytes to the type that the message needs.
-        stamp: converts seconds of the wall clock to the type that the header needs.
-        names: the names of the fields for distortion, intrinsics, rectification and projection.
-        send: publishes both messages.
-    """
+    """Publish each new image."""
     look, encoding = importlib.import_module("give").LOOK_S, ENCODINGS[given.sees]
     layout = given.images.layout
     kind = "float32" if encoding.startswith("32") else "uint8"

@@ -42,12 +42,7 @@ def register(name: str, form: str) -> Callable[[F], F]:
     Raises:
         ValueError: if the name is taken.
     """
-
-    def registered(opener: F) -> F:
-        SOURCES.add(name, Kind(opener, form))
-        return opener
-
-    return registered
+    return SOURCES.adding(name, lambda opener: Kind(opener, form))
 
 
 def opened(kind: Kind, where: str, image: Image) -> ImageSource:

@@ -8,12 +8,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.goal import Outcome, Shape
+from e2efly.goal import Outcome
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.generate import forest
 from e2efly.scenes.scene import Scene, Solids
-from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.avoid.goal import CLIMB, AvoidGoal, Memory
 from e2efly.tasks.avoid.pilot import best_heading
 from e2efly.tasks.task import at_rest, struck, uniform
@@ -34,11 +33,6 @@ class World(Memory):
 @dataclass(frozen=True)
 class Avoid(AvoidGoal):
     """Starts in front of a random forest."""
-
-    @classmethod
-    def of(cls, config: AvoidConfig, shape: Shape, control_period: float, substeps: int = 1) -> "Avoid":
-        """See `e2efly.tasks.task.make_task`."""
-        return cls(config, shape, control_period, substeps)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, World]:
         """At rest in front of the forest, facing it."""

@@ -33,8 +33,8 @@ class Gap(GapGoal):
     page: ClassVar = "gap"
     """Name of this world on the page of `e2efly export --web`, which simulates it."""
 
-    @staticmethod
-    def of(config: GapConfig, shape: Shape, control_period: float, checks: int) -> "Gap":
+    @classmethod
+    def of(cls, config: GapConfig, shape: Shape, control_period: float, checks: int = 1) -> "Gap":
         """Check that the vehicle fits.
 
         Raises:

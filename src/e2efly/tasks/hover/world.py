@@ -8,11 +8,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from e2efly.goal import Shape
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.scene import Scene
-from e2efly.tasks.hover import HoverConfig
 from e2efly.tasks.hover.goal import HoverGoal
 from e2efly.tasks.task import at_rest, uniform
 
@@ -24,12 +22,6 @@ class Hover(HoverGoal):
 
     page: ClassVar = "hover"
     """Name of this world on the page of `e2efly export --web`, which simulates it."""
-
-    @classmethod
-    def of(cls, config: HoverConfig, shape: Shape, control_period: float, substeps: int = 1) -> "Hover":
-        """See `e2efly.tasks.task.make_task`."""
-        del substeps
-        return cls(config, shape, control_period)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Float[Array, " n"]]:
         """Uniform around the target: position, velocity, roll, pitch, any yaw, body rates."""

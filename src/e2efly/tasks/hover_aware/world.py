@@ -9,11 +9,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.control.vectors import Quat, Vec3
-from e2efly.goal import Outcome, Shape
+from e2efly.goal import Outcome
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.scene import Scene, Solids
-from e2efly.tasks.hover_aware import HoverAwareConfig
 from e2efly.tasks.hover_aware.goal import HoverAwareGoal, Memory
 from e2efly.tasks.task import at_rest, uniform
 
@@ -27,12 +26,6 @@ class HoverAware(HoverAwareGoal):
 
     page: ClassVar = "hover_aware"
     """Name of this world on the page of `e2efly export --web`, which simulates it."""
-
-    @classmethod
-    def of(cls, config: HoverAwareConfig, shape: Shape, control_period: float, substeps: int = 1) -> "HoverAware":
-        """See `e2efly.tasks.task.make_task`."""
-        del substeps
-        return cls(config, shape, control_period)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Memory]:
         """Uniform around the target: position, velocity, roll, pitch, any yaw.

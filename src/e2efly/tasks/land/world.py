@@ -8,12 +8,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from e2efly.goal import Shape
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.scene import Scene, Solids
 from e2efly.solids import DISC
-from e2efly.tasks.land import LandConfig
 from e2efly.tasks.land.goal import LandGoal
 from e2efly.tasks.task import at_rest, uniform
 
@@ -25,12 +23,6 @@ class Land(LandGoal):
 
     page: ClassVar = "land"
     """Name of this world on the page of `e2efly export --web`, which simulates it."""
-
-    @classmethod
-    def of(cls, config: LandConfig, shape: Shape, control_period: float, substeps: int = 1) -> "Land":
-        """See `e2efly.tasks.task.make_task`."""
-        del control_period, substeps
-        return cls(config, shape)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Float[Array, "n 0"]]:
         """Level, any heading, above and beside the pad."""

@@ -7,12 +7,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.goal import Outcome, Shape
+from e2efly.goal import Outcome
 from e2efly.physics import State
 from e2efly.physics.rotation import from_euler
 from e2efly.scenes.scene import Scene, Solids, distances
 from e2efly.solids import DISC, TRIANGLE
-from e2efly.tasks.land_visual import LandVisualConfig
 from e2efly.tasks.land_visual.goal import LandVisualGoal
 from e2efly.tasks.task import at_rest, uniform
 
@@ -21,12 +20,6 @@ from e2efly.tasks.task import at_rest, uniform
 @dataclass(frozen=True)
 class LandVisual(LandVisualGoal):
     """Starts above and beside the pad. The pad is the task's state."""
-
-    @classmethod
-    def of(cls, config: LandVisualConfig, shape: Shape, control_period: float, substeps: int = 1) -> "LandVisual":
-        """See `e2efly.tasks.task.make_task`."""
-        del control_period, substeps
-        return cls(config, shape)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Solids]:
         """Level, any heading, above and beside the pad."""

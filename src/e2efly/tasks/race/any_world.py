@@ -38,8 +38,8 @@ class AnyRace(AnyRaceGoal):
     given: Tracks | None
     """The track of every episode (n = 1). None: each episode has another track."""
 
-    @staticmethod
-    def of(config: RaceConfig, shape: Shape) -> "AnyRace":
+    @classmethod
+    def of(cls, config: RaceConfig, shape: Shape, control_period: float = 0.0, checks: int = 1) -> "AnyRace":
         """Load the track, if one is named.
 
         Raises:

@@ -29,14 +29,14 @@ class Race(RaceGoal):
     page: ClassVar = "race"
     """Name of this world on the page of `e2efly export --web`, which simulates it."""
 
-    @staticmethod
-    def of(config: RaceConfig, shape: Shape, control_period: float = 0.0, substeps: int = 1) -> "Race | AnyRace":
+    @classmethod
+    def of(cls, config: RaceConfig, shape: Shape, control_period: float = 0.0, checks: int = 1) -> "Race | AnyRace":
         """Load the track. The result is `AnyRace` if the options ask for a fuller observation of the track.
 
         Raises:
             ValueError: for an unknown or broken track.
         """
-        del control_period, substeps
+        del control_period, checks
         if config.any_track:
             return AnyRace.of(config, shape)
         track = load_track(config.track)

@@ -54,8 +54,8 @@ class RaceClutter(RaceClutterGoal):
     given: Tracks
     """The tracks from which worlds are made, before gates are displaced."""
 
-    @staticmethod
-    def of(config: RaceClutterConfig, shape: Shape, control_period: float, checks: int) -> "RaceClutter":
+    @classmethod
+    def of(cls, config: RaceClutterConfig, shape: Shape, control_period: float, checks: int = 1) -> "RaceClutter":
         """Load the track.
 
         Raises:

@@ -35,14 +35,14 @@ class Track(TrackGoal):
     curve: Lissajous | Spline | None
     """The reference: a curve, the spline of the user's file, or None for random polynomials."""
 
-    @staticmethod
-    def of(config: TrackConfig, shape: Shape, control_period: float = 0.0, substeps: int = 1) -> "Track":
+    @classmethod
+    def of(cls, config: TrackConfig, shape: Shape, control_period: float = 0.0, checks: int = 1) -> "Track":
         """Check the kind of reference and read the user's file, if it is one.
 
         Raises:
             ValueError: for an unknown kind or a broken file.
         """
-        del control_period, substeps
+        del control_period, checks
         numbers = dataclasses.replace(config, reference="")  # resolved here: references share a compiled program
         kinds = ("polynomial", "circle", "lemniscate")
         m = knot_count(config.episode_s + POINTS * SPACING)

@@ -226,11 +226,7 @@ class Session:
                 raise RpcError(f"{self.rpc.where}: does not pause again after simContinueForTime({wall:g})")
 
     def _physics_step(self) -> float:
-        """Smallest change of the simulator's clock, s.
-
-        Raises:
-            RpcError: when the clock runs while the simulator is paused, or never.
-        """
+        """Smallest change of the simulator's clock, s."""
         before = self._now()
         time.sleep(_STEP_ENDS_S)
         if self._now() != before:
@@ -248,9 +244,6 @@ class Session:
         """Let the simulator run for about `seconds` of its time, and longer if its clock does not change.
 
         Returns the clock, ns.
-
-        Raises:
-            RpcError: when the clock does not advance.
         """
         for _ in range(_TRIES):
             self._go_on(seconds)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from e2efly.registry import Registry, origin
+from e2efly.registry import Registry
 from e2efly.validation.plant import Plant
 
 PLANTS: Registry[type[Plant]] = Registry("plant")
@@ -19,14 +19,4 @@ def register(name: str) -> Callable[[P], P]:
         ValueError: for a name that is taken, or for a class that is not a complete `Plant`, naming its origin and what
             it lacks.
     """
-
-    def registered(plant: P) -> P:
-        accepted = "accepted: a class that extends e2efly.Plant and has state, reset and step"
-        if not (isinstance(plant, type) and issubclass(plant, Plant)):
-            raise ValueError(f"plant {name!r} is {origin(plant)}, no e2efly.Plant; {accepted}")
-        if missing := sorted(plant.__abstractmethods__):
-            raise ValueError(f"plant {name!r} of {origin(plant)} lacks {', '.join(missing)}; {accepted}")
-        plant.name = name
-        return PLANTS.add(name, plant)  # type: ignore[return-value]
-
-    return registered
+    return PLANTS.extending(Plant, name)

@@ -103,15 +103,7 @@ class Mpc:
         return memory, steer(vehicle, motion, wanted + feed, goal, memory.slip)
 
     def _axis(self, plan: Plan, parts: tuple[Array, ...], limits: tuple[float, float]) -> Array:
-        """The acceleration to command along an axis, relative to that of the goal, m/s^2.
-
-        Args:
-            plan: the plan of the axis.
-            parts: position minus that of the goal, m; velocity minus that of the goal, m/s; acceleration minus that of
-                the goal, m/s^2; the acceleration of the goal, m/s^2; the velocity of the goal, m/s. Here the
-                acceleration of the goal is what the rotors must give for it, so `Observed.pushed` is subtracted.
-            limits: the largest acceleration, m/s^2, and the largest speed, m/s.
-        """
+        """The acceleration to command along an axis, relative to that of the goal, m/s^2."""
         rows = np.stack(np.broadcast_arrays(*map(np.atleast_1d, parts)), axis=-1)
         (most, fast), feed, moves = limits, rows[:, 3], rows[:, 4]
         speed = np.stack([-fast - moves, fast - moves], axis=-1)

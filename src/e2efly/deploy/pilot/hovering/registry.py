@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Protocol, Self, TypeVar
 from e2efly.control import Ctbr
 from e2efly.control.place import Place
 from e2efly.deploy.pilot.hovering.response import Seen, UnderWay
-from e2efly.registry import Registry, origin
+from e2efly.registry import Registry, check_methods
 from e2efly.vehicles.vehicle import Vehicle
 
 METHODS = ("needs", "of", "begin", "step")
@@ -74,10 +74,8 @@ def register(name: str) -> Callable[[T], T]:
         ValueError: the name is already used, or the class lacks an attribute of `METHODS`.
     """
 
-    def registered(kind: T) -> T:
-        if lacking := [method for method in METHODS if not hasattr(kind, method)]:
-            raise ValueError(f"{origin(kind)} has no {', '.join(lacking)}; accepted: all of {', '.join(METHODS)}")
-        HOVERS.add(name, kind)
+    def complete(kind: T) -> T:
+        check_methods(kind, METHODS)
         return kind
 
-    return registered
+    return HOVERS.adding(name, complete)
