@@ -65,10 +65,9 @@ def test_a_name_that_is_unknown_is_looked_for_in_installed_packages(installed: P
 
 
 def test_list_shows_what_installed_packages_register(installed: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["list"]) == 0
-    out = capsys.readouterr().out
-    assert "patrol" in out
-    assert "tunnel" in out
+    for catalogue, name in (("tasks", "patrol"), ("rest", "tunnel")):
+        assert run(["list", catalogue]) == 0
+        assert name in capsys.readouterr().out
     sys.modules.pop(installed.stem)
 
 

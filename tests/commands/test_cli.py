@@ -209,7 +209,10 @@ def test_help_imports_no_jax(arguments: list[str]) -> None:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_help_is_one_screen_and_names_its_arguments(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_is_one_screen_and_names_its_arguments(
+    command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "110")
     with pytest.raises(SystemExit):
         run([command, "--help"])
     said = capsys.readouterr().out

@@ -38,7 +38,7 @@ def test_a_terminal_that_knows_ascii_alone_is_told_everything() -> None:
 @pytest.mark.parametrize("name", ["[/]", "[red]", ":ok:"])
 def test_what_a_user_calls_a_folder_is_no_markup(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["export", f"runs/{name}"]) == 2
-    assert f"runs/{name} holds no run" in capsys.readouterr().err
+    assert f"unknown policy 'runs/{name}'" in capsys.readouterr().err
     table = Table("file")
     table.add_row(name)
     Terminal().print(table)

@@ -78,7 +78,7 @@ def test_what_is_no_report_is_named(folder: Path, tmp_path: Path, capsys: pytest
         assert run(["watch", str(report), "--port", "0", *options]) == 2
         return capsys.readouterr().err
 
-    assert f"'{report}' does not exist" in told()
+    assert f"unknown policy '{report}'" in told()
     report.write_text("{")
     assert "report.json cannot be read" in told()
     report.write_text("{}")

@@ -95,8 +95,8 @@ class Estimate:
         """How poses and sensors contradict each other, or how late the poses are. None: they agree."""
         if mode in GROUNDED:
             return self.opposed or delay_problem(self.delay, self.latest)
-        if mode is Mode.TAKEOFF and (otherwise := self.inertial.climbs_otherwise):
-            return otherwise
+        if mode is Mode.TAKEOFF and (faster := self.inertial.climbs_faster):
+            return faster
         velocity = self.refused if (self.refused or "").startswith("velocity") else None
         return self.inertial.watch.problem or velocity
 

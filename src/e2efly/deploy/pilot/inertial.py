@@ -33,9 +33,9 @@ QUIET = 1.0
 BELIEVED = 0.3
 """The share by which the force along the body's z axis may differ from the thrust. Beyond it, the accelerometer is
 broken."""
-OTHERWISE, OTHERWISE_SHARE = 0.5, 0.25
-"""In a take-off the poses climb otherwise than accelerometer and throttle, if both give a vertical speed that differs
-from theirs on the same side, by more than the first value, m/s, and the second, a share of this speed."""
+FASTER, FASTER_SHARE = 0.5, 0.25
+"""In a take-off the vehicle climbs faster than its poses say, if accelerometer and throttle both give a vertical speed
+that is larger than theirs by more than the first value, m/s, and the second, a share of this speed."""
 BURIED, BURIED_S = 1.5, 2.0
 """If the largest plausible height is this far under the ground, m, the vehicle surely stands. This counts only after
 this time since the last pose, s, because the first estimates may be wrong."""
@@ -124,19 +124,17 @@ class Inertial:
         return r is not None and ground - r.height > BURIED and now - r.since > BURIED_S
 
     @property
-    def climbs_otherwise(self) -> str | None:
-        """How the poses have climbed otherwise than accelerometer and throttle since the ground: they may be scaled.
-        None: they have not.
+    def climbs_faster(self) -> str | None:
+        """How much faster than its poses the vehicle has climbed since the ground, by accelerometer and throttle: the
+        poses may be scaled. None: it has not.
         """
         rest, newest = self.reckonings.rest, self.reckonings.newest
         if rest is None or newest is None:
             return None
-        seen = newest.velocity[2]
-        off = min(rest.velocity[2] - seen, rest.lifted - seen, key=abs)
-        alike = (rest.velocity[2] > seen) == (rest.lifted > seen)
-        if not alike or abs(off) < OTHERWISE + OTHERWISE_SHARE * abs(seen + off):
+        told, climb = newest.velocity[2], min(rest.velocity[2], rest.lifted)
+        if climb - told < FASTER + FASTER_SHARE * abs(climb):
             return None
-        return f"they climb at {seen:.1f} m/s, by accelerometer and throttle it is {seen + off:.1f} m/s"
+        return f"they climb at {told:.1f} m/s, by accelerometer and throttle it is {climb:.1f} m/s"
 
     @property
     def rest_problem(self) -> str | None:
