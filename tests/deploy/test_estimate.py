@@ -9,7 +9,7 @@ from e2efly.control import Ctbr, Quat, Vec3
 from e2efly.deploy.attitude import Attitude
 from e2efly.deploy.odometry import Odometry, Sample
 from e2efly.deploy.pilot import guidance
-from e2efly.deploy.pilot.estimate import OUTLIERS_S, RESTART_S, Estimate, see
+from e2efly.deploy.pilot.estimate import OUTLIERS_S, RESTART_S, Estimate, enter, see
 from e2efly.deploy.pilot.flight_state import Flight, Mode, Target
 from e2efly.deploy.pilot.hover import LIFTED, rates_of
 from e2efly.deploy.pilot.hovering import Seen, UnderWay, hover_controller
@@ -99,3 +99,11 @@ def test_a_steady_hover_sends_body_rates_of_zero() -> None:
     target = Target((0.001, 0.0, 1.0), 0.0)  # they are held for long should the link fall silent
     command, _ = hovered(HOVER, target, odometry(1.0), 0.0)
     assert rates_of(command) == (0.0, 0.0, 0.0)
+
+
+def test_what_was_propagated_from_the_ground_ends_with_the_take_off() -> None:
+    """After some seconds it would be worse than what the poses have said since."""
+    init, off, hover = (Flight(mode=mode) for mode in (Mode.INIT, Mode.TAKEOFF, Mode.HOVER))
+    flying = enter(good(flight=init), init, off)
+    assert flying.inertial.reckonings.rest is not None
+    assert enter(flying, off, hover).inertial.reckonings.rest is None

@@ -100,8 +100,8 @@ def test_the_reference_has_what_import_e2efly_offers(pages: dict[Path, Page]) ->
     ids = {anchor for path, page in pages.items() if path.parent.name == "reference" for anchor in page.ids}
     wanted = {
         "e2efly.api.train", "e2efly.evaluation.evaluate", "e2efly.validation.validate.validate", "e2efly.goal.Goal",
-        "e2efly.deploy.policy.loader.load_policy", "e2efly.validation.plant.Plant", "e2efly.commands.train.Train",
-        "e2efly.config.train.TrainConfig", "e2efly.physics.step.step", "e2efly.commands.eval.Eval.stress",
+        "e2efly.deploy.policy.loader.load_policy", "e2efly.validation.plant.Plant", "train", "eval",
+        "e2efly.config.train.TrainConfig", "e2efly.physics.step.step",
     }  # fmt: skip
     assert wanted <= ids
 

@@ -211,6 +211,7 @@ def enter(before: Estimate, flight_before: Flight, flight: Flight) -> Estimate:
     if flight.blind and not flight_before.blind and flight.turned is None:
         told = inertial.alone(told, wrong=flight.misled is not None)
     if flight.mode is not flight_before.mode:
-        told = told.at_rest() if flight.mode is Mode.TAKEOFF else replace(told, touch=told.touch.afresh())
+        flown = replace(told, touch=told.touch.afresh(), reckonings=replace(told.reckonings, rest=None))
+        told = told.at_rest() if flight.mode is Mode.TAKEOFF else flown
         delays = DelayWatch()
     return replace(before, inertial=told, delays=delays)
