@@ -58,6 +58,7 @@ def environment(**options: object) -> Env:
     return Env.of(config.task, config.reward, dataclasses.replace(config.env, vehicle="any", **options))
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("mode", ["ctbr", "rotor_share"])
 def test_every_episode_flies_as_a_simulation_of_its_vehicle_alone(mode: str) -> None:
     """Plant, mixer and rate loop of each are those of the vehicle that was drawn."""
@@ -152,6 +153,7 @@ def test_a_tumble_ends_a_hover() -> None:
     assert not np.asarray(out.terminated)[fast < 1.0].any()
 
 
+@pytest.mark.whole
 def test_an_episode_that_has_left_all_numbers_is_not_asked_about(trained: Path) -> None:
     policy = e2efly.load_policy(trained)
     seen = np.tile(level_and_still(policy.contract), (2, 1))

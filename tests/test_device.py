@@ -26,6 +26,7 @@ Programs.compile(setup, parameters)
 """
 
 
+@pytest.mark.whole
 def test_the_gradient_of_a_few_vehicles_compiles_in_little_memory(tmp_path: Path) -> None:
     file = tmp_path / "gradient.py"
     file.write_text(GRADIENT)

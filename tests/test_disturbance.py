@@ -65,6 +65,7 @@ def test_gusts_keep_their_strength_and_forget_within_their_time() -> None:
     assert np.mean(before * after) == pytest.approx(np.exp(-dt / 0.5), abs=0.02)
 
 
+@pytest.mark.whole
 def test_poses_drift_as_a_random_walk_and_the_vehicle_does_not() -> None:
     d = Disturbance.none(20_000)
     d = Disturbance(**{**vars(d), "drift_rate": jnp.full(20_000, 0.05)})
@@ -157,6 +158,7 @@ def jacobians() -> dict[str, tuple[np.ndarray, np.ndarray]]:
     return dict(zip(ACTS, zip(*split, strict=True), strict=True))
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("what", ACTS)
 def test_gradients_reach_through_each_disturbance(
     what: str, jacobians: dict[str, tuple[np.ndarray, np.ndarray]]

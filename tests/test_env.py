@@ -34,6 +34,7 @@ def make(task: TaskConfig | None = None, **config: Any) -> Env:
     return Env.of(task or HoverConfig(), REWARD, EnvConfig(**config))
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", list(TASKS))
 def test_starts_are_where_the_task_says(name: str) -> None:
     env = make(TASKS[name].training())
@@ -124,6 +125,7 @@ def test_only_ended_episodes_start_anew() -> None:
     assert not np.any(np.all(out.observation[::2] == out.final_observation[::2], axis=-1))
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", ["hover", "land_visual"])
 def test_what_a_critic_knows_is_of_what_was_reached_before_new_starts(name: str) -> None:
     env = make(TASKS[name].training(), cameras=presets.preset(name, "ppo").env.cameras)
@@ -190,6 +192,7 @@ def test_commands_are_late_by_real_seconds(late: float) -> None:
             np.testing.assert_allclose(acting[0], expected, atol=1e-6)
 
 
+@pytest.mark.whole
 @pytest.mark.usefixtures("x64")
 def test_the_gradient_flows_through_the_latency() -> None:
     env = Env.of(HoverConfig(), REWARD, EnvConfig(action_latency=(0.0, 0.1)), dtype=np.float64)
@@ -209,6 +212,7 @@ def test_the_gradient_flows_through_the_latency() -> None:
     assert abs(exact) > 1e-3
 
 
+@pytest.mark.whole
 @pytest.mark.usefixtures("x64")
 def test_gradient_of_a_rollout_against_differences() -> None:
     env = Env.of(HoverConfig(), REWARD, dtype=np.float64)
@@ -286,6 +290,7 @@ def test_a_run_and_what_is_flown_for_a_purpose_draw_from_different_keys() -> Non
         random_key(-1, 0)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     "task",
     [

@@ -42,6 +42,7 @@ def reset(env: Env, n: int = N, seed: int = 0) -> tuple[EnvState, jax.Array]:
 STATE_TASKS = ("hover", "land", "track", "race")
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     ("name", "mode"),
     [(name, mode) for name in TASKS for mode in (COMMAND_MODES if name in STATE_TASKS else ("ctbr",))],
@@ -234,6 +235,7 @@ def test_a_broken_task_or_reward() -> None:
         make(reward=RewardConfig({"vz": 1.0}, {"vzmin": 1.0}))
 
 
+@pytest.mark.whole
 def test_step_by_step_they_go_as_in_one_program_and_stop_when_all_have_ended() -> None:
     """Of a policy that is no function of JAX, and with what is to be altered at the start."""
     env, asked = make(TASKS["race"](laps=1)), []

@@ -21,6 +21,7 @@ from e2efly.evaluation import SEED, candidate
 from e2efly.validation.starts import draw_starts
 
 
+@pytest.mark.whole
 def test_what_is_asked_for_flies_and_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A wind of 12 m/s carries the hover away; the report says so, and the terminal."""
     report = tmp_path / "report.json"
@@ -106,6 +107,7 @@ def test_changes_by_dotted_name_name_what_is_wrong() -> None:
             changed(env, changes, "env")
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("flown", [e2efly.evaluate, partial(e2efly.validate, plant="simulator")], ids=["eval", "plant"])
 def test_the_reference_of_a_row_can_be_made_again(flown: Callable[..., Any]) -> None:
     """From the report's numbers alone: where the reference is at any time."""
@@ -129,6 +131,7 @@ def test_the_reference_of_a_row_can_be_made_again(flown: Callable[..., Any]) -> 
         assert len({row["course"]["phase_rad"] for row in said[criterion]["starts"]}) == 3
 
 
+@pytest.mark.whole
 def test_a_row_of_visual_landing_says_what_pad_it_had() -> None:
     found = e2efly.evaluate("land_visual", episodes=30, task={"pad_size": (0.3, 0.8)})
     (criterion,) = found.as_json()["criteria"].values()

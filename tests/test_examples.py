@@ -35,6 +35,7 @@ def started(arguments: list[str], cwd: Path) -> "subprocess.CompletedProcess[str
     return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_example(path: Path, tmp_path: Path) -> None:
     if path.stem in ("04_train", "06_own_task", "08_own_algorithm"):
@@ -49,6 +50,7 @@ def test_there_are_examples() -> None:
     assert len(EXAMPLES) >= 5
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("code", SNIPPETS)
 def test_snippet_of_the_docs(code: str, tmp_path: Path) -> None:
     if re.search(r"e2efly\.(train|validate)\(", code):  # briefly, that is

@@ -25,6 +25,7 @@ def begun(env: Env, seed: int, n: int) -> tuple[EnvState, jax.Array]:
     return jax.jit(env.reset, static_argnums=1)(random_key(seed), n)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("latency", [0.02, 0.06, 0.1])
 def test_it_knows_where_the_vehicle_will_be_when_its_action_acts(latency: float) -> None:
     env, n = forests(5.0, control_rate=100.0, action_latency=(latency, latency)), 40
@@ -49,6 +50,7 @@ def test_it_knows_where_the_vehicle_will_be_when_its_action_acts(latency: float)
         assert error.mean() < 0.25 * np.linalg.norm(was - truth, axis=1).mean()
 
 
+@pytest.mark.whole
 def test_flown_as_a_pilot_it_passes_forests_at_the_commanded_speed() -> None:
     env, n = forests(8.0), 60
     state, observation = begun(env, 1, n)

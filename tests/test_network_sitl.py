@@ -56,6 +56,7 @@ def test_the_trace_sees_what_would_leave_and_lets_pass_what_stays(network: Netwo
     ]  # fmt: skip
 
 
+@pytest.mark.whole
 def test_loading_and_validating_a_policy_reach_nobody_and_keep_no_identifier(
     home: Path, network: NetworkTrace, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -44,6 +44,7 @@ def _as_before(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(TASKS, "_known", dict(TASKS._known))
 
 
+@pytest.mark.whole
 def test_a_task_of_ones_own_goes_all_the_way(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -61,6 +61,7 @@ def run(*words: str, file: Path, runs: Path) -> str:
     return done.stdout
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("name", WITH_RUNS)
 def test_the_short_version_of_an_experiment_gives_rows_and_verdicts(name: str, folder: Path, tmp_path: Path) -> None:
     file = tmp_path / "paper.json"
@@ -83,6 +84,7 @@ def test_the_short_version_of_an_experiment_gives_rows_and_verdicts(name: str, f
             assert len(one["curve"]["reward"].split()) == len(one["curve"]["steps"].split()) > 1
 
 
+@pytest.mark.whole
 def test_what_was_killed_goes_on_where_it_was(folder: Path, tmp_path: Path) -> None:
     file = tmp_path / "paper.json"
     with subprocess.Popen(
@@ -104,6 +106,7 @@ def test_what_was_killed_goes_on_where_it_was(folder: Path, tmp_path: Path) -> N
     assert file.read_bytes() == whole
 
 
+@pytest.mark.whole
 def test_a_training_that_was_stopped_goes_on_from_its_checkpoint(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -212,6 +215,7 @@ def test_an_ablation_counts_where_the_full_reward_learns() -> None:
     assert missed(row("track", "ppo", 1.0, 0.0), "sparse")  # all crash before an error counts
 
 
+@pytest.mark.whole
 def test_the_seconds_of_a_process_that_was_killed_are_not_known(tmp_path: Path) -> None:
     times = tmp_path / "run.time"
     process(["list"], times)

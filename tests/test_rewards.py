@@ -106,6 +106,7 @@ def test_by_hand(name: str) -> None:
     np.testing.assert_allclose(TERMS[name].function(**inputs(name, SIGNALS)), [BY_HAND[name]], rtol=2e-6)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize("name", [n for n, t in TERMS.items() if t.kind != "sparse"])
 def test_gradient_against_differences(name: str) -> None:

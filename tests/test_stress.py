@@ -108,6 +108,7 @@ def test_rows_of_cameras_are_for_those_who_see() -> None:
         stress("land_visual", 10, rows=("noise of a D435i",))
 
 
+@pytest.mark.whole
 def test_images_are_as_old_and_as_rare_as_a_row_says() -> None:
     """A vehicle that climbs at 3 m/s over a ground that it looks at: its image tells where it was, and when."""
     down = CameraConfig("depth", width=16, height=16, fov=(0.9, 0.9), pitch=np.pi / 2, reach=(0.0, 50.0))
@@ -139,6 +140,7 @@ def test_images_are_as_old_and_as_rare_as_a_row_says() -> None:
     assert np.sum(np.abs(image[1:] - truth[:-1]) < 2e-3) >= 3
 
 
+@pytest.mark.whole
 def test_the_nominal_row_is_the_evaluation() -> None:
     plain, report = e2efly.evaluate("hover", 50), stress("hover", 50, rows=("nominal", "mass x1.25"))
     a, b = plain.flown["hover"], report.flown["nominal"]["hover"]
@@ -148,6 +150,7 @@ def test_the_nominal_row_is_the_evaluation() -> None:
     assert np.mean(heavy.final_error) > np.mean(b.final_error)
 
 
+@pytest.mark.whole
 def test_the_command_reports_and_judges(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, plots = tmp_path / "stress.json", tmp_path / "plots"
     asked = ["eval", "hover", "--stress", "--rows", "nominal", "delay +20 ms", "--episodes", "20"]
@@ -177,6 +180,7 @@ def forgetful(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("controller", ["policy", "plant"])
 def test_the_rows_change_the_vehicle_that_flies(controller: str, tmp_path: Path, forgetful: Path) -> None:
     """The nominal row is what `evaluate` flies of another vehicle; the mass of a row is about that vehicle's."""

@@ -42,6 +42,7 @@ def suite(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.whole
 def test_the_short_suite_leaves_out_what_is_marked_but_for_its_first_cases(suite: Path) -> None:
     every = ["test_long", "test_cases[first]", "test_cases[second]", "test_cases[third]", "test_short"]
     assert collected(suite) == ["test_cases[first]", "test_short"]

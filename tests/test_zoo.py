@@ -29,6 +29,7 @@ USUALLY = {"xla_backend_optimization_level": 3}
 POLICIES = [(vehicle, task) for vehicle, tasks in contents().items() for task in tasks]
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(("vehicle", "task"), POLICIES)
 def test_every_policy_succeeds_as_often_as_it_says(vehicle: str, task: str, monkeypatch: pytest.MonkeyPatch) -> None:
     found, about = evaluation.candidate(task, vehicle), contents()[vehicle][task]
@@ -51,6 +52,7 @@ def test_a_policy_is_of_the_configuration_beside_it(vehicle: str, task: str) -> 
     assert contract_of(Setup.of(config).env, config) == evaluation.load_policy(file).contract
 
 
+@pytest.mark.whole
 def test_robust_policies_fly_vehicles_that_are_not_theirs() -> None:
     """Rows that failed in every start of a policy without a memory, of all vehicles, and what zoo.json says of them."""
     robust = [(vehicle, task) for vehicle, task in POLICIES if "stress" in contents()[vehicle][task]]
@@ -129,6 +131,7 @@ def test_a_policy_is_loaded_by_what_the_command_line_takes(tmp_path: Path) -> No
         e2efly.load_policy(file, vehicle="crazyflie")
 
 
+@pytest.mark.whole
 def test_a_policy_of_the_zoo_flies_a_vehicle_of_ones_own(tmp_path: Path) -> None:
     heavy = tmp_path / "heavy.toml"
     heavy.write_text(vehicle_file("vis_r").read_text().replace("value = 0.75\n", "value = 0.8\n", 1))
@@ -143,6 +146,7 @@ def test_a_policy_of_the_zoo_flies_a_vehicle_of_ones_own(tmp_path: Path) -> None
     assert max(error.values()) < 0.005  # they feel the weight
 
 
+@pytest.mark.whole
 def test_eval_by_name_works_at_once_writes_nothing_into_the_package_and_reaches_nobody(
     tmp_path: Path, network: NetworkTrace
 ) -> None:

@@ -33,6 +33,7 @@ def agree(path: Path, adapter: Any, wanted: Any) -> None:
     assert np.std(action) > 1e-3
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     ("algorithm", "kind", "sde"),
     [
@@ -56,12 +57,14 @@ def test_models_of_stable_baselines3(algorithm: Any, kind: dict[str, Any], sde: 
     assert (contract.task, contract.vehicle, contract.control_rate_hz) == ("hover", "vis_r", 30.0)
 
 
+@pytest.mark.whole
 def test_the_contract_is_that_of_our_own_policies(tmp_path: Path) -> None:
     e2efly.train("hover", "ppo", preset_name="nominal", out=tmp_path / "own", steps=4096, chunk=1, eval_episodes=10)
     exported = e2efly.export(sequence(20), tmp_path / "policy.onnx", TorchEnv("hover", 2))
     assert e2efly.load_policy(exported).contract == e2efly.load_policy(tmp_path / "own").contract
 
 
+@pytest.mark.whole
 def test_a_normalised_environment_and_raw_observations(tmp_path: Path) -> None:
     env = VecMonitor(VecNormalize(SB3VecEnv("hover", 8, raw=True)))
     model = PPO("MlpPolicy", env, n_steps=16, batch_size=64, policy_kwargs=NETWORK, seed=0, device="cpu").learn(256)
@@ -73,6 +76,7 @@ def test_a_normalised_environment_and_raw_observations(tmp_path: Path) -> None:
     agree(path, adapter, lambda shown: network(torch.as_tensor(normalize.normalize_obs(shown))).detach().numpy())
 
 
+@pytest.mark.whole
 def test_a_lost_or_wrong_normalisation_is_refused(tmp_path: Path) -> None:
     env, file = SB3VecEnv("hover", 4), tmp_path / "model.zip"
 
@@ -145,6 +149,7 @@ def sequence(inputs: int, *last: torch.nn.Module) -> torch.nn.Sequential:
     return torch.nn.Sequential(torch.nn.Linear(inputs, 8), torch.nn.ReLU(), torch.nn.Linear(8, 4, bias=False), *last)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("last", [(), (torch.nn.Tanh(),), (torch.nn.Sequential(torch.nn.Dropout(), torch.nn.Tanh()),)])
 def test_a_network_of_pytorch(last: tuple[torch.nn.Module, ...], tmp_path: Path) -> None:
     env = TorchEnv("hover", 2)

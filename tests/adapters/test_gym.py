@@ -37,6 +37,7 @@ def vector(task: Any = "hover", n: int = 4, **given: Any) -> QuadrotorVectorEnv:
     return QuadrotorVectorEnv(task, n, **given)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.filterwarnings("ignore:.*Box observation space.*")
 @pytest.mark.parametrize("task", ["hover", "avoid"])
 def test_gymnasiums_checker_accepts_it(task: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -56,6 +57,7 @@ def test_every_task_is_registered_both_ways() -> None:
     assert envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
 
 
+@pytest.mark.whole
 def test_a_task_of_ones_own_is_made_by_its_reference(monkeypatch: pytest.MonkeyPatch) -> None:
     task = f"{Path(__file__).parents[2] / 'examples' / '06_own_task.py'}:OrbitConfig"
     env: Any = gymnasium.make("e2efly/task-v0", task=task, render_mode="rgb_array").unwrapped
@@ -72,6 +74,7 @@ def test_a_task_of_ones_own_is_made_by_its_reference(monkeypatch: pytest.MonkeyP
         gymnasium.make("e2efly/task-v0", task="orbitt")
 
 
+@pytest.mark.whole
 def test_it_steps_as_our_own_environment_does() -> None:
     config = presets.preset("hover", "ppo")
     envs, actions = vector(raw=True), np.random.default_rng(0).uniform(-1, 1, (5, 4, 4)).astype(np.float32)
@@ -119,6 +122,7 @@ def test_an_episode_that_ends_goes_on_with_a_new_one_and_tells_what_was_reached(
     assert truncated_one
 
 
+@pytest.mark.whole
 def test_images_come_beside_the_state() -> None:
     envs = vector("avoid", 2)
     observations, _ = envs.reset(seed=0)
@@ -148,6 +152,7 @@ def test_actions_of_another_shape_are_refused() -> None:
         envs.step(np.zeros((3, 4)))
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("task", ["race", "avoid"])
 def test_it_is_drawn_from_behind_with_its_goal(task: str) -> None:
     env = gymnasium.make(f"e2efly/{task}-v0", render_mode="rgb_array")
@@ -166,6 +171,7 @@ def test_it_is_drawn_from_behind_with_its_goal(task: str) -> None:
     assert env.metadata["render_fps"] == 30
 
 
+@pytest.mark.whole
 def test_all_of_a_batch_are_drawn_and_other_modes_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     envs = QuadrotorVectorEnv("hover", 3, render_mode="rgb_array")
     with pytest.raises(RuntimeError, match="render before the first reset"):

@@ -23,6 +23,7 @@ def flown(model: Any, n: int) -> float:
     return float(success.mean())
 
 
+@pytest.mark.whole
 def test_its_ppo_learns_to_hover() -> None:
     torch.set_num_threads(1)
     model = PPO(

@@ -26,6 +26,7 @@ def weights(size: int) -> np.ndarray:
     return np.random.default_rng(0).normal(scale=0.1, size=(size, 4)).astype(np.float32)
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("task", ["hover", "race"])
 def test_gradients_through_a_flight_are_those_of_jax(task: str, hover: TorchEnv) -> None:
     """Of race, too: its memory has whole numbers, which have no gradient."""
@@ -58,6 +59,7 @@ def test_gradients_through_a_flight_are_those_of_jax(task: str, hover: TorchEnv)
     assert np.abs(gradient).max() > 1e-3
 
 
+@pytest.mark.whole
 def test_a_torch_policy_learns_by_it(hover: TorchEnv) -> None:
     torch.manual_seed(0)
     env = hover

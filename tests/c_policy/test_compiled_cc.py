@@ -58,6 +58,7 @@ def without_past(contract: Contract, observation: np.ndarray) -> np.ndarray:
     return np.delete(observation, np.arange(past.start, past.stop), axis=-1)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", KINDS)
 def test_each_kind_of_policy_is_the_same_within_1e_6(name: str, tmp_path: Path) -> None:
     """Of its exact value: ONNX Runtime's own actions are up to 3e-6 from that."""
@@ -71,6 +72,7 @@ def test_each_kind_of_policy_is_the_same_within_1e_6(name: str, tmp_path: Path) 
         np.testing.assert_allclose(found[0], policy.act(*given)[0], rtol=0, atol=1e-6)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", KINDS)
 def test_in_single_precision_it_is_as_near_as_onnx_runtime(name: str, tmp_path: Path) -> None:
     file = policy_file(name)
@@ -81,6 +83,7 @@ def test_in_single_precision_it_is_as_near_as_onnx_runtime(name: str, tmp_path: 
     assert np.abs(both(made, *given)[0] - wanted).max() <= 2 * rounding < 1e-5
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", ["hover", "avoid"])
 def test_over_real_flights_it_acts_as_the_file_from_its_own_memory(name: str, tmp_path: Path) -> None:
     """Observations and images are those of a flight by the file; the memory goes on in the C itself."""
@@ -202,6 +205,7 @@ def test_what_a_network_must_not_see_changes_nothing(tmp_path: Path) -> None:
         np.testing.assert_array_equal(made.memory, before)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", [f"{v}/{t}" for v, tasks in contents().items() for t in tasks if v == "vis_r"])
 def test_every_policy_of_a_vehicle_checks_itself(name: str, tmp_path: Path) -> None:
     """By the program that comes with it; it sees a wrong weight."""

@@ -154,6 +154,7 @@ def test_runs_of_another_vehicle_have_a_folder_of_their_own(
     assert parse(arguments.split()).out == Path(folder)
 
 
+@pytest.mark.whole
 def test_a_run_is_deleted_only_when_that_is_asked_for(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -296,6 +297,7 @@ def test_a_policy_for_random_vehicles_is_learned_if_it_flies_them(success: float
     assert verdict(summary, None) == told
 
 
+@pytest.mark.whole
 def test_train_eval_export_and_plots_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "run"
     flags = ["--algo", "ppo", "--steps", "2048", "--chunk", "2", "--eval-episodes", "20", "--algo.envs", "16",

@@ -52,6 +52,7 @@ class Terminal:
                 return
 
 
+@pytest.mark.whole
 def test_hostile_datagrams_forge_no_line_and_a_hang_up_ends_it_with_a_closed_log(tmp_path: Path) -> None:
     port, terminal, log = free_port(udp=True), Terminal(), tmp_path / "flight.mcap"
     with controller(recorded) as client, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:

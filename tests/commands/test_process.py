@@ -70,6 +70,7 @@ def test_a_device_is_neither_read_nor_replaced(
     assert Path(arguments[-1]).is_char_device()
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
@@ -116,6 +117,7 @@ def test_an_ignored_interrupt_stays_ignored() -> None:
     assert (done.returncode, done.stdout) == (0, "went on\n")
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("seconds", [1.0, 3.0])
 def test_an_evaluation_can_be_interrupted(seconds: float, tmp_path: Path) -> None:
     """While it is imported, compiled or flown."""

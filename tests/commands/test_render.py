@@ -28,6 +28,7 @@ size = [0.3, 0.8, 1.0]
 FILES = ("rgb", "depth", "range", "label", "instance", "normal", "lidar", "sheet")
 
 
+@pytest.mark.whole
 def test_it_writes_pictures_and_a_video(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "one.toml").write_text(SCENE)
     (tmp_path / "way.csv").write_text("t,x,y,z\n0,0,0,1\n0.2,0.2,0.1,1\n0.4,0.5,0.1,1\n")
@@ -104,6 +105,7 @@ def test_ffmpeg_gets_every_frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         video.write_video(film, tmp_path / "flight", 0.05)
 
 
+@pytest.mark.whole
 def test_a_world_of_triangles_is_a_place_with_a_way_through_it() -> None:
     place = find_place("garage", random_key(0))
     tour = plan(place.clearance, place.route, place.straight, 0.05)

@@ -61,6 +61,7 @@ def test_what_cannot_be_varied_is_refused(vary: str) -> None:
         list(trials_of(request(vary)))
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
@@ -84,6 +85,7 @@ def test_too_little_is_refused(name: str, value: int) -> None:
         list(trials_of(dataclasses.replace(request(), **{name: value})))
 
 
+@pytest.mark.whole
 def test_a_sweep_trains_on_ray_on_this_machine_alone_and_nothing_twice(tmp_path: Path, network: NetworkTrace) -> None:
     flags = ["--seeds", "1", "--vary", *SMALL, "network.hidden=8,8 8"]
     first = sweep(tmp_path, *flags)
@@ -107,6 +109,7 @@ def test_a_sweep_trains_on_ray_on_this_machine_alone_and_nothing_twice(tmp_path:
     assert network.left() == []  # neither Ray's processes nor the trainings
 
 
+@pytest.mark.whole
 def test_a_run_that_was_cut_goes_on_and_a_lost_worker_is_replaced(tmp_path: Path) -> None:
     flags = [item if not item.startswith("steps") else "steps=40000" for item in SMALL]
     folder = tmp_path / "sweep/seed-0"
@@ -137,6 +140,7 @@ def test_a_run_that_was_cut_goes_on_and_a_lost_worker_is_replaced(tmp_path: Path
     assert updates == list(range(1, len(updates) + 1))
 
 
+@pytest.mark.whole
 def test_a_run_that_fails_is_told_and_the_others_end(tmp_path: Path) -> None:
     process = sweep(tmp_path, "--seeds", "1", "--vary", *SMALL, "env.vehicle=nowhere.toml,vis_r")
     told, _ = process.communicate()

@@ -17,6 +17,7 @@ from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.posterior import load_posterior
 
 
+@pytest.mark.whole
 def test_a_log_becomes_a_policy_for_the_vehicle_that_it_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("e2efly.view.style.DPI", 30)
     # every row of the stress, from one batch of starts instead of four

@@ -28,11 +28,13 @@ def commander(ros: None) -> Iterator[None]:  # noqa: F811
         yield
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("topic", TOPICS)
 def test_each_type_is_a_command_of_its_mode(commander: None, topic: str) -> None:
     TOPICS[topic](first(f"ros1:{topic}"))
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(("topic", "problem"), [*REFUSED.items(), ("/vector", "geometry_msgs/Vector3")])
 def test_what_is_no_command_is_refused_by_name(commander: None, topic: str, problem: str) -> None:
     assert problem in refused(f"ros1:{topic}")

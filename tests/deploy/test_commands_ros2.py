@@ -35,18 +35,21 @@ def ros() -> Iterator[None]:
         yield
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("topic", TOPICS)
 def test_each_type_is_a_command_of_its_mode(ros: None, topic: str) -> None:
     command = first(f"ros2:{topic}")
     TOPICS[topic](command)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(("topic", "problem"), [*REFUSED.items(), ("/vector", "geometry_msgs/msg/Vector3")])
 def test_what_is_no_command_is_refused_by_name(ros: None, topic: str, problem: str) -> None:
     said = refused(f"ros2:{topic}")
     assert problem in said
 
 
+@pytest.mark.whole
 def test_a_relay_that_ends_is_the_reason_of_the_silence(ros: None) -> None:
     source: Any = open_commands("ros2:/velocity")
     commander = Commander(source, load_vehicle("vis_r"), FlightSettings())

@@ -77,6 +77,7 @@ def flown(body: Vehicle, seconds: float, settings: FlightSettings = SETTINGS) ->
     return motions, np.array(commands)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_it_stays_inside_the_fence_with_a_vehicle_that_is_not_the_files(seed: int) -> None:
     motions, commands = flown(far_off(seed), 30.0)

@@ -127,6 +127,7 @@ def test_a_node_that_dies_is_looked_for_until_it_is_back(images: SharedImages) -
         giver.close()
 
 
+@pytest.mark.whole
 def test_a_node_that_is_silent_is_lost_and_one_with_other_images_is_named(images: SharedImages) -> None:
     port = free_port()
     giver = give(CAMERA, NAME, Output("tcp", str(port), True), "127.0.0.1")

@@ -18,6 +18,7 @@ print(json.dumps({"image": image, "info": [list(info.K), info.height, info.width
 """
 
 
+@pytest.mark.whole
 def test_depth_is_published_in_metres_with_its_camera(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("E2EFLY_ROS_PYTHON", SYSTEM_PYTHON)
     with ros_master(tmp_path):

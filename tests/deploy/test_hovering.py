@@ -53,6 +53,7 @@ def place_of(case: Case) -> np.ndarray:
     return np.array(case.to)
 
 
+@pytest.mark.whole(but=1)
 def test_a_step_settles_without_swinging_past_by_much(flown: tuple[str, HoverController, Flights]) -> None:
     way = flown[2].position[:, CASES.index(STEP)]
     assert way.max(axis=0) == pytest.approx([1.0, 0.0, 0.5], abs=0.08)
@@ -119,6 +120,7 @@ def circle(speed: float, radius: float = 2.0):  # noqa: ANN201
     return place
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", NAMES)
 def test_a_circle_is_followed(name: str) -> None:
     """Where the latency is predicted it does not fall behind by that: at 2 m/s by 12 cm, and by the loops besides."""
@@ -129,6 +131,7 @@ def test_a_circle_is_followed(name: str) -> None:
     assert np.linalg.norm(flights.position[late, 0] - wanted, axis=1).mean() < (0.4 if name == "pid" else 0.12)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("vehicle", ["crazyflie", "vis_h"])
 def test_other_vehicles_and_a_latency_that_is_not_the_told_one(name: str, vehicle: str) -> None:

@@ -30,6 +30,7 @@ def camera(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     return monkeypatch
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("kind", ["0.001 global_time", "0.0001 system_time", "0.001 hardware_clock"])
 def test_depth_comes_in_metres_with_its_time_until_it_is_unplugged(camera: pytest.MonkeyPatch, kind: str) -> None:
     camera.setenv("SOFTWARE_CAMERA", kind)

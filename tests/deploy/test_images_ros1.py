@@ -58,6 +58,7 @@ def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
             yield
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(("topic", "sees"), TOPICS)
 def test_a_topic_is_read_whatever_its_encoding(ros: None, topic: str, sees: str) -> None:
     check_topic("ros1", topic, sees)
@@ -67,6 +68,7 @@ def test_what_is_no_image_of_the_policy_is_named(ros: None) -> None:
     check_refusals("ros1")
 
 
+@pytest.mark.whole
 def test_what_does_not_come_is_named(ros: None, monkeypatch: pytest.MonkeyPatch) -> None:
     check_silence("ros1", monkeypatch)
 

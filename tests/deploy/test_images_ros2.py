@@ -58,23 +58,28 @@ def ros() -> Iterator[None]:
             yield
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(("topic", "sees"), TOPICS)
 def test_a_topic_is_read_whatever_its_encoding_and_reliability(ros: None, topic: str, sees: str) -> None:
     check_topic("ros2", topic, sees)
 
 
+@pytest.mark.whole
 def test_what_is_no_image_of_the_policy_is_named(ros: None) -> None:
     check_refusals("ros2")
 
 
+@pytest.mark.whole
 def test_what_does_not_come_is_named(ros: None, monkeypatch: pytest.MonkeyPatch) -> None:
     check_silence("ros2", monkeypatch)
 
 
+@pytest.mark.whole
 def test_stamps_of_another_clock_are_said(ros: None) -> None:
     check_stamps("ros2")
 
 
+@pytest.mark.whole
 def test_closing_ends_the_process(ros: None) -> None:
     source = open_image("ros2:/mm/image_raw", DEPTH)
     assert source.describe() == f"ros2:/mm/image_raw, 48 rows, 96 columns (rclpy of {sys.executable})"

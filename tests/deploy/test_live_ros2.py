@@ -42,6 +42,7 @@ def test_a_python_without_tf2_says_that_it_publishes_no_tf(ros: None) -> None:
     assert detail.endswith(", without /tf (no package tf2_msgs)") == without
 
 
+@pytest.mark.whole
 def test_who_comes_late_hears_the_mode(ros: None) -> None:
     command = [sys.executable, "-c", SUBSCRIBER.replace("set(kinds)", '{"mode"}')]
     assert latched("ros2", "/e2efly", command)["mode"][1] == "HOVER -> POLICY: switch"

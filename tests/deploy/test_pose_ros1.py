@@ -32,6 +32,7 @@ def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         yield
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("topic", TOPICS)
 def test_a_topic_is_read_whatever_its_type(ros: None, topic: str) -> None:
     source = open_source(f"ros1:{topic}")

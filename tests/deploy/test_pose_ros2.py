@@ -32,6 +32,7 @@ def ros() -> Iterator[None]:
         yield
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("topic", TOPICS)
 def test_a_topic_is_read_whatever_its_type_and_reliability(ros: None, topic: str) -> None:
     source = open_source(f"ros2:{topic}")

@@ -118,6 +118,7 @@ SUITES = {
 }
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(("name", "imu"), [*((name, False) for name in SUITES), ("hover", True)])
 def test_it_sees_in_flight_what_the_environment_shows(name: str, imu: bool, tmp_path: Path) -> None:
     """The policy flies the environment through the runtime, for a whole episode."""

@@ -182,6 +182,7 @@ def test_started_in_flight_it_takes_nothing_over(tmp_path: Path) -> None:
     assert not log.exists()
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("boxes", [(), (ARM,), (OVERRIDE,)], ids=["neither", "armed", "override"])
 def test_on_the_ground_or_beside_a_pilot_who_flies_it_begins(boxes: tuple[int, ...], tmp_path: Path) -> None:
     reply, began = Flying(*boxes), time.monotonic()

@@ -843,6 +843,7 @@ def begun(begin: Callable[[], Flight]) -> Flight:
     return begin()
 
 
+@pytest.mark.whole
 @hypothesis_settings(max_examples=600, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.sampled_from([*BEGUN, Flight]), st.lists(st.tuples(NEWS, PASSES), max_size=25))
 def test_no_sequence_of_inputs_breaks_the_rules(

@@ -336,6 +336,7 @@ def test_a_bridge_that_hangs_on_the_ground_is_waited_for(controller: Controller,
     assert {row for _, row in controller.sticks} == {STEADY}
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_no_signal_ends_it_in_flight(
     number: signal.Signals, controller: Controller, fly: Callable[..., Flying], capsys: pytest.CaptureFixture[str]
@@ -404,6 +405,7 @@ def test_a_link_that_is_cut_comes_back_in_the_same_flight(controller: Controller
     assert {row for _, row in controller.sticks} == {STEADY}
 
 
+@pytest.mark.whole
 def test_a_link_that_is_cut_during_the_landing_comes_back(controller: Controller, fly: Callable[..., Flying]) -> None:
     flight = fly(dataclasses.replace(PLAN, throttle=((0.0, 1400), (3.0, 1000))))
     flight.process.kill()

@@ -38,6 +38,7 @@ def test_the_page_of_the_command_line_is_what_the_commands_say() -> None:
     assert (DOCS / "reference" / "command-line.md").read_text(encoding="utf-8") == alone.stdout
 
 
+@pytest.mark.whole
 def test_the_page_of_the_zoo_is_what_the_zoo_says() -> None:
     assert (DOCS / "zoo.md").read_text(encoding="utf-8") == script("zoo_cards").page()
 

@@ -14,6 +14,7 @@ from tests.docs.pages import DOCS
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook(notebook: Path, tmp_path: Path) -> None:
     copy = tmp_path / notebook.name

@@ -66,6 +66,7 @@ def within(pages: dict[Path, Page]) -> Iterator[tuple[Path, str, Path, str]]:
             yield path, link, target / "index.html" if target.is_dir() else target, unquote(parts.fragment)
 
 
+@pytest.mark.whole
 def test_every_link_within_the_site_leads_to_a_file_and_an_anchor(pages: dict[Path, Page]) -> None:
     everywhere, broken = list(within(pages)), []
     for path, link, target, anchor in everywhere:

@@ -20,6 +20,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, Path]:
     return {page: tmp_path_factory.mktemp(page.stem) for page in TUTORIALS}
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(("page", "index"), BLOCKS)
 def test_block_of_a_tutorial(page: Path, index: int, folders: dict[Path, Path]) -> None:
     language, code = blocks(page)[index]

@@ -47,6 +47,7 @@ def found(record: Record) -> Alignment:
     return align(FILE, [record], POSES)
 
 
+@pytest.mark.whole
 def test_delay_and_rate_loop_are_found(found: Alignment) -> None:
     """Gains within 5 %, the delay within 2 ms; the vehicle's latency holds the poses' besides."""
     values = {e.name: e.value for e in found.estimates}
@@ -118,6 +119,7 @@ def test_responses_before_their_commands_are_refused(record: Record) -> None:
         align(FILE, [late])
 
 
+@pytest.mark.whole
 def test_the_command_writes_a_vehicle_and_shows_before_and_after(
     tmp_path: Path, record: Record, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

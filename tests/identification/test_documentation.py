@@ -106,6 +106,7 @@ def test_the_page_has_commands_for_every_kind_of_source() -> None:
     assert {"parts", "pendulum", "stand", "flight", "step", "--columns", "--mass"} <= words
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_of_the_page_writes_a_vehicle(
     command: str, bench: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -49,6 +49,7 @@ def found(record: Record) -> Found:
     return identify(dataclasses.replace(FILE, mass=BODY.mass), [record], believed=FILE)
 
 
+@pytest.mark.whole
 def test_the_vehicle_is_found_within_the_bounds(found: Found) -> None:
     """Thrust over mass 1 %, lag and delay 2 ms, inertia over torque 3 %, drag 10 %."""
     vehicle = merged(dataclasses.replace(FILE, mass=BODY.mass), {e.name: e for e in found.estimates})
@@ -92,6 +93,7 @@ def test_what_is_found_over_the_mass_goes_with_it(found: Found) -> None:
     assert abs(matrix[names.index("inertia[0]"), names.index("mass")]) < 0.01  # the pendulum did not weigh it
 
 
+@pytest.mark.whole
 def test_without_rotor_speeds_the_inertia_is_less_sure(record: Record, found: Found) -> None:
     """By commands alone, inertia and rate gain show mostly by their product."""
     streams = {k: s for k, s in record.streams.items() if k != "rotor_speed"}
@@ -106,6 +108,7 @@ def test_without_rotor_speeds_the_inertia_is_less_sure(record: Record, found: Fo
     assert np.isclose(thrust.value[0], ratio, rtol=0.01)
 
 
+@pytest.mark.whole
 def test_motor_outputs_give_the_motors_lag_and_the_thrust(record: Record) -> None:
     """Outputs of which the rotor speed is a fifth by their root, which the fit does not know at first."""
     curve = 0.2
@@ -132,6 +135,7 @@ def test_motor_outputs_give_the_motors_lag_and_the_thrust(record: Record) -> Non
     assert "without delay" in found.structures and off > 0.01
 
 
+@pytest.mark.whole
 def test_slow_motor_outputs_give_thrust_while_the_measured_rates_turn_the_vehicle(record: Record) -> None:
     rotors = record.streams["rotor_speed"]
     share = np.clip(FILE.thrust_map[0] * rotors.values**2 / FILE.thrust_range[1], 0.0, 1.0)
@@ -145,6 +149,7 @@ def test_slow_motor_outputs_give_thrust_while_the_measured_rates_turn_the_vehicl
     assert np.isclose(thrust.value[0], BODY.thrust_map[0], rtol=0.05)
 
 
+@pytest.mark.whole
 def test_poses_are_not_younger_because_slow_telemetry_is_late(record: Record) -> None:
     rotors, command = record.streams["rotor_speed"], record.streams["command"]
     late, link, age = 0.012, 0.02, 0.04  # of what the flight controller tells; of the commands; of the poses
@@ -165,6 +170,7 @@ def test_poses_are_not_younger_because_slow_telemetry_is_late(record: Record) ->
     assert abs(float(latency.value) - (link + age)) < 0.004 < 1.645 * float(latency.sigma)
 
 
+@pytest.mark.whole
 def test_hover_does_not_give_the_inertia() -> None:
     plant = find_plant("mujoco")(FILE)
     record = sensed(fly_excitation(plant, FILE, 0.05, seconds=6.0, speed=0.0, pulses=False), Sensors(), 1)
@@ -173,6 +179,7 @@ def test_hover_does_not_give_the_inertia() -> None:
     assert "fly: doublets of body rate about this axis" in refused["inertia_x"]
 
 
+@pytest.mark.whole
 def test_a_log_of_steps_gives_delay_and_rate_loop_alone(record: Record) -> None:
     found = identify(BODY, [record], believed=FILE, step=True)
     assert {e.name for e in found.estimates} == {"latency", "rate_gain"}
@@ -192,6 +199,7 @@ def test_logs_without_what_is_needed_are_refused_by_name(tmp_path: Path) -> None
         identify(FILE, [record])
 
 
+@pytest.mark.whole
 def test_the_command_writes_a_vehicle_that_loads_and_says_what_it_did(
     tmp_path: Path, record: Record, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

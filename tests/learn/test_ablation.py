@@ -28,6 +28,7 @@ def small(algo: str, steps: int = 4096) -> TrainConfig:
     )  # fmt: skip
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("algo", ["ppo", "bptt"])
 def test_a_member_learns_as_a_run_alone_does(algo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     config = small(algo)
@@ -46,6 +47,7 @@ def test_a_member_learns_as_a_run_alone_does(algo: str, tmp_path: Path, monkeypa
         np.testing.assert_array_equal(curves.steps, [row["steps"] for row in rows])
 
 
+@pytest.mark.whole
 def test_members_differ_and_an_ablation_that_was_stopped_ends_bit_for_bit_like_one_that_was_not(tmp_path: Path) -> None:
     config, path, shares = small("bptt"), tmp_path / "kept.safetensors", []
     kept = Kept(path, {"seeds": 2, "steps": config.steps}, period=0.0)
@@ -69,6 +71,7 @@ def test_members_differ_and_an_ablation_that_was_stopped_ends_bit_for_bit_like_o
         np.testing.assert_array_equal(resumed.success[name], whole.success[name])
 
 
+@pytest.mark.whole
 def test_the_papers_groups_are_left_out_whole() -> None:
     config = small("ppo")
     reward = dataclasses.replace(config.reward, weights={"prog2": 1.0, "near": 1.0, "v1": 0.1, "anglev_sq": 0.1})
@@ -90,6 +93,7 @@ def test_what_cannot_be_compared_is_refused() -> None:
         ablate(small("bptt"), 0)
 
 
+@pytest.mark.whole
 def test_the_command_draws_and_takes_what_is_there_already(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

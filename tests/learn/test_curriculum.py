@@ -45,6 +45,7 @@ def test_promotion(stage: StageConfig, success: float, steps: int, over: bool) -
     assert not last.is_over(1.0, 10**9)
 
 
+@pytest.mark.whole
 def test_a_run_goes_through_its_stages_and_compiles_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import jax
 

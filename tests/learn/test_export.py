@@ -65,6 +65,7 @@ def a_contract(fields: tuple[Field, ...]) -> Contract:
     return dataclasses.replace(contract_of(env, config), observation=fields)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("activation", list(ACTIVATIONS))
 @pytest.mark.parametrize("task", list(TASKS))
 def test_parity_on_ten_thousand_observations(tmp_path: Path, task: str, activation: str) -> None:

@@ -53,6 +53,7 @@ def same_learning(cwd: Path, one: str, other: str, rtol: float, flown: bool = Tr
         np.testing.assert_allclose(weights[0][name], weights[1][name], rtol=rtol, atol=rtol, err_msg=name)
 
 
+@pytest.mark.whole
 def test_two_processes_learn_as_one_with_two_devices(tmp_path: Path) -> None:
     ended(tmp_path, *pair(tmp_path, "two", *PPO, "--devices", "2"))
     ended(tmp_path, start(tmp_path, "one", *PPO, "--devices", "2", devices=2))
@@ -61,6 +62,7 @@ def test_two_processes_learn_as_one_with_two_devices(tmp_path: Path) -> None:
     assert (tmp_path / "other.txt").read_text().count("success") == 0  # process 0 alone reports
 
 
+@pytest.mark.whole
 def test_four_devices_learn_as_one(tmp_path: Path) -> None:
     """By a method without noise, far from what ends an episode: each device draws its new starts for itself."""
     flags = ["20" if BPTT[i - 1] == "--task.episode-s" else flag for i, flag in enumerate(BPTT)]
@@ -71,6 +73,7 @@ def test_four_devices_learn_as_one(tmp_path: Path) -> None:
     same_learning(tmp_path, "on4", "on1", 1e-3, flown=False)  # flights of 20 s tell every last bit
 
 
+@pytest.mark.whole
 def test_a_run_that_lost_a_process_says_so_and_resumes(tmp_path: Path) -> None:
     flags = [*PPO[2:], "--steps", "100000", "--devices", "2"]
     first, other = pair(tmp_path, "run", *flags)
@@ -89,6 +92,7 @@ def test_a_run_that_lost_a_process_says_so_and_resumes(tmp_path: Path) -> None:
     assert (tmp_path / "run/policy.onnx").exists()
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     ("flags", "said"), [(["--seed", "1"], "seed: 0 and 1"), (["--resume"], "resume: False and True")]
 )
@@ -103,6 +107,7 @@ def test_processes_with_other_configurations_do_not_run(flags: list[str], said: 
     assert both[0].wait(timeout=60) == 2
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     ("flags", "said"),
     [

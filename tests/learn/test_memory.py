@@ -75,6 +75,7 @@ def paid(recurrent: int) -> float:
     return float(jnp.mean(on_each(run, 1, (OWN,), OWN)(stacked(state))[0, -10:]))
 
 
+@pytest.mark.whole
 def test_ppo_learns_to_remember() -> None:
     """Without a memory three steps of four are guessed: 4 * 0.25 * 3 / 4 = 0.75 is lost."""
     assert paid(recurrent=8) > -0.25

@@ -56,6 +56,7 @@ def same(a: Any, b: Any) -> bool:
     return all(np.array_equal(x, y) for x, y in zip(jax.tree.leaves(a), jax.tree.leaves(b), strict=True))
 
 
+@pytest.mark.whole
 def test_a_traced_program_found_again_computes_the_same(tmp_path: Path) -> None:
     setup = Setup.of(small_ppo())
     fresh = run(setup, None)

@@ -66,6 +66,7 @@ def test_options_change_what_the_preset_draws_and_take_it_out() -> None:
     assert (drawn.wind, drawn.disturbance) == (1.0, robust.disturbance)
 
 
+@pytest.mark.whole
 def test_the_file_s_vehicle_flies_as_in_the_nominal_environment() -> None:
     """How a policy flies it, a run says: tests/learn/test_warm_start.py."""
     config = e2efly.preset("hover")

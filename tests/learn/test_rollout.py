@@ -6,6 +6,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from e2efly import presets
 from e2efly.config import SHACConfig
@@ -40,6 +41,7 @@ def test_what_follows_a_time_out_is_followed_and_nothing_follows_an_end() -> Non
         np.testing.assert_array_equal(follows, [0.25, 0.25])
 
 
+@pytest.mark.whole
 def test_the_decay_of_a_gradient_is_the_same_whether_others_start_anew() -> None:
     task = presets.preset("hover", "shac")
     env, action, memory = Env.of(task.task, task.reward, task.env), jnp.zeros((2, 4)), jnp.zeros((2, 0))

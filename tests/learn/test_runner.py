@@ -74,6 +74,7 @@ def small(task: str = "hover", algo: str = "ppo", **changes: Any) -> TrainConfig
     )
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize(
     ("task", "algo", "steps", "success"),
     [("hover", "ppo", 700_000, 0.98), ("land", "bptt", 700_000, 0.95), ("race", "ppo", 1_200_000, 0.9),
@@ -87,6 +88,7 @@ def test_a_short_training_learns(task: str, algo: str, steps: int, success: floa
     assert min(reached) >= success, summary
 
 
+@pytest.mark.whole
 def test_a_thrown_vehicle_is_caught(tmp_path: Path) -> None:
     """Learned in episodes of 3 s by the hybrid of exploration and exact gradients, judged in those of 10 s."""
     config = dataclasses.replace(presets.preset("hover", "foppo", "thrown"), steps=500_000, stop_at=0.99)
@@ -99,6 +101,7 @@ def test_a_thrown_vehicle_is_caught(tmp_path: Path) -> None:
     assert summary["shipped"]["hover"]["success"] >= 0.985  # of other starts than those that it was stopped by
 
 
+@pytest.mark.whole
 @pytest.mark.usefixtures("quick")
 def test_what_met_the_criterion_is_shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Though another policy had a better score before, and failed."""
@@ -146,6 +149,7 @@ def alike(folder: Path) -> None:
     assert timeless(rows_a) == timeless(rows_b)
 
 
+@pytest.mark.whole
 def test_a_killed_run_ends_bit_for_bit_like_one_that_was_not(tmp_path: Path) -> None:
     flags = ["train", "hover", "--algo", "ppo", "--preset", "nominal", *SMALL, "--devices", "2", *MORE["ppo"]]
     whole = cli(*flags, "--out", "whole", cwd=tmp_path)
@@ -163,6 +167,7 @@ class Killed(BaseException):
     """Ends a run where it is, as a signal does."""
 
 
+@pytest.mark.whole
 @pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize("algo", ["bptt", "abpt"])
 def test_what_other_algorithms_keep_is_enough_to_go_on_bit_for_bit(
@@ -193,6 +198,7 @@ def test_what_other_algorithms_keep_is_enough_to_go_on_bit_for_bit(
     alike(tmp_path)
 
 
+@pytest.mark.whole
 def test_a_run_is_one_process_s_and_ctrl_c_saves_and_stops_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -214,6 +220,7 @@ def test_a_run_is_one_process_s_and_ctrl_c_saves_and_stops_it(
     assert updates == list(range(1, len(updates) + 1))
 
 
+@pytest.mark.whole
 @pytest.mark.usefixtures("quick")
 def test_a_loss_that_is_not_finite_stops_the_run_and_keeps_the_checkpoint(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

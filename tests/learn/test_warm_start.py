@@ -44,6 +44,7 @@ def test_what_is_read_acts_as_the_file(task: str) -> None:
     np.testing.assert_allclose(found[1], wanted[1], atol=1e-5)
 
 
+@pytest.mark.whole
 def test_a_run_begins_where_the_policy_was_and_says_how_it_flies_the_file_s_vehicle(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -135,6 +136,7 @@ def test_a_camera_may_sit_elsewhere_but_must_be_encoded_alike() -> None:
         begun(encoding="linear")
 
 
+@pytest.mark.whole
 def test_a_run_hands_on_what_its_algorithm_has_beside_the_policy(tmp_path: Path) -> None:
     e2efly.train("hover", "ppo", out=tmp_path / "run", **SMALL)
     arrays = read_arrays(tmp_path / "run" / "checkpoint.safetensors")
@@ -147,6 +149,7 @@ def test_a_run_hands_on_what_its_algorithm_has_beside_the_policy(tmp_path: Path)
         assert np.array_equal(begun.critic[0][0], fresh.critic[0][0]) != handed
 
 
+@pytest.mark.whole
 def test_the_file_is_recorded_and_may_go_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     compile_once(monkeypatch)
     first, more = tmp_path / "run", tmp_path / "more"

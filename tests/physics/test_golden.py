@@ -129,6 +129,7 @@ def test_order_of_the_integrator(
     assert np.log2(coarse / fine) == pytest.approx(order, abs=0.15)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", vehicle_names())
 def test_the_default_physics_is_exact_to_a_millimetre_over_two_seconds(name: str) -> None:
     """As a policy flies it: float32, its sub-steps; against the same commands and rate loop, integrated finely."""

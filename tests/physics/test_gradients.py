@@ -127,6 +127,7 @@ def corners(mode: str) -> list[dict[str, Any]]:
     return points
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     ("mode", "integrator"),
     [(mode, "semi_implicit") for mode in COMMAND_MODES]

@@ -62,6 +62,7 @@ def test_every_term_is_tested() -> None:
     assert set(VALUES) == set(NOTHING) == {f.name for f in terms()}
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_terms_of_no_size_change_nothing(integrator: str, vis_r: Vehicle, random_state: Callable[..., State]) -> None:
     command = jnp.asarray([12.0, 2.0, -3.0, 1.0])
@@ -76,6 +77,7 @@ def test_terms_of_no_size_change_nothing(integrator: str, vis_r: Vehicle, random
         np.testing.assert_allclose(b, a, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("integrator", ["semi_implicit", "rk3"])
 @pytest.mark.parametrize("name", VALUES)
 def test_gradients_of_a_step_with_a_term(name: str, integrator: str, vis_r: Vehicle) -> None:
@@ -146,6 +148,7 @@ def test_a_rotor_that_speeds_up_turns_the_body_the_other_way(
     np.testing.assert_allclose(path.body_rate[-1, 0], [0, 0, expected], rtol=1e-5, atol=1e-12)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_rotors_slow_down_with_a_lag_of_their_own(
     integrator: str, vis_r: Vehicle, fly_open_loop: Callable[..., State]

@@ -60,6 +60,7 @@ def one(kind: str, centre: Any, size: Any, ground: float | None = None, **about:
     return Scene.of({kind: solids}, 1, ground)
 
 
+@pytest.mark.whole
 def test_a_wall_ahead_is_at_the_same_depth_everywhere() -> None:
     images = see(one("box", (5.0, 0.0, 2.0), (0.5, 50.0, 50.0)))
     np.testing.assert_allclose(images["depth"][0], 4.5, rtol=1e-5)
@@ -98,6 +99,7 @@ def test_through_the_opening_of_a_gate_one_sees_what_is_behind() -> None:
     np.testing.assert_array_equal(images["label"][0] == GATE, frame)
 
 
+@pytest.mark.whole
 def test_what_is_not_there_is_not_seen() -> None:
     scene = crowd()
     gone = {kind: dataclasses.replace(s, active=jnp.zeros_like(s.active)) for kind, s in scene.solids.items()}
@@ -106,6 +108,7 @@ def test_what_is_not_there_is_not_seen() -> None:
         np.testing.assert_array_equal(images[name], empty[name], err_msg=name)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("tile", [(1, 1), (32, 48), (4, 16)])
 def test_tiles_and_what_is_left_out_of_them_change_nothing(tile: tuple[int, int]) -> None:
     scene = crowd()
@@ -114,6 +117,7 @@ def test_tiles_and_what_is_left_out_of_them_change_nothing(tile: tuple[int, int]
         np.testing.assert_allclose(images[name], others[name], rtol=0, atol=1e-4, err_msg=name)
 
 
+@pytest.mark.whole
 def test_an_accelerators_way_gives_the_same_images(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = crowd()
     images = see(scene)
@@ -124,6 +128,7 @@ def test_an_accelerators_way_gives_the_same_images(monkeypatch: pytest.MonkeyPat
         assert np.mean(same) > 0.9995, name
 
 
+@pytest.mark.whole
 def test_turning_and_moving_the_world_with_the_camera_changes_nothing() -> None:
     scene = Scene(crowd().ground - FAR, crowd().solids)  # the ground stays level
     turn = from_euler(jnp.float32(0.4), jnp.float32(-0.7), jnp.float32(2.0))
@@ -149,6 +154,7 @@ def test_inside_a_solid_everything_is_at_hand() -> None:
         assert np.all(images["depth"] == 0.0) and np.all(np.isfinite(images["rgb"])), kind
 
 
+@pytest.mark.whole
 def test_instances_are_counted_kind_after_kind() -> None:
     scene = crowd()
     images = see(scene)
@@ -206,6 +212,7 @@ def test_depth_is_planar_range_is_along_the_ray_and_both_have_a_reach() -> None:
     assert np.all(at_two_metres(dataclasses.replace(WIDE, reach=(5.0, 9.0)), wall) == 0.0)
 
 
+@pytest.mark.whole
 def test_every_preset_sees() -> None:
     scene = one("gate", (0.8, 0.0, 1.6), (0.3, 0.3, 0.1, 0.05), 0.0)
     seen = {name: at_two_metres(config, scene) for name, config in camera.PRESETS.items()}

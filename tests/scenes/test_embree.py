@@ -2,6 +2,7 @@
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 import trimesh
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
@@ -31,6 +32,7 @@ def by_embree(scene: Scene, world: int, origin: np.ndarray, directions: np.ndarr
     return np.where(hit, found["tfar"], FAR), normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
 
 
+@pytest.mark.whole
 def test_embree_sees_the_same_depth_and_normals() -> None:
     scene = crowd(WORLDS, 7)
     position = jnp.tile(jnp.array([[0.0, 0.0, 2.0]]), (WORLDS, 1))

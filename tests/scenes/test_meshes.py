@@ -51,6 +51,7 @@ def see(
 
 
 class TestCast:
+    @pytest.mark.whole
     def test_a_world_looks_the_same_as_solids_and_as_triangles(self) -> None:
         kinds = ("box", "gate", "sphere")
         solids = Scene.of({kind: some for kind, some in crowd(1, 7).solids.items() if kind in kinds}, 1)

@@ -1,12 +1,14 @@
 """Another engine's word on triangles: the kernels that run on CUDA, on Warp's CPU device, beside Embree."""
 
 import numpy as np
+import pytest
 
 from e2efly.scenes.meshes.embree import Embree
 from e2efly.scenes.meshes.load import load_mesh_scene
 from e2efly.scenes.meshes.warp import Warp
 
 
+@pytest.mark.whole
 def test_warp_and_embree_meet_the_same() -> None:
     triangles = load_mesh_scene("garage").triangles
     embree, warp = Embree(triangles), Warp(triangles, "cpu")

@@ -100,6 +100,7 @@ class TestGenerators:
         assert 0.0 < xy[..., 0].min() < 1.0 and 39.0 < xy[..., 0].max() < 40.0 and np.abs(xy[..., 1]).max() < 6.0
         np.testing.assert_allclose(trees.centre[..., 2], trees.size[..., 1], rtol=1e-6)  # they stand on the ground
 
+    @pytest.mark.whole
     def test_clutter_is_of_all_kinds_and_clear_of_the_gates(self) -> None:
         gates = jnp.tile(jnp.array([[4.0, 0.0, 1.5], [8.0, 3.0, 2.0]]), (300, 1, 1))
         start = jnp.tile(jnp.array([[0.0, 0.0, 1.5]]), (300, 1, 1))

@@ -34,6 +34,7 @@ def enter(kind: str, size: jax.Array, o: np.ndarray, d: np.ndarray) -> np.ndarra
     return np.asarray(SHAPES[kind].enter(size, tuple(jnp.asarray(o).T), tuple(jnp.asarray(d).T)))
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(("kind", "size"), CASES)
 def test_a_ray_enters_where_marching_by_the_distance_ends(kind: str, size: tuple[float, ...]) -> None:
     rng = np.random.default_rng(1)
@@ -53,6 +54,7 @@ def test_a_ray_enters_where_marching_by_the_distance_ends(kind: str, size: tuple
     assert np.all(marched[hit] < t[hit] + 2e-3)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(("kind", "size"), CASES)
 def test_the_distance_is_that_of_the_nearest_point_that_rays_find(kind: str, size: tuple[float, ...]) -> None:
     rng = np.random.default_rng(2)
@@ -69,6 +71,7 @@ def test_the_distance_is_that_of_the_nearest_point_that_rays_find(kind: str, siz
     np.testing.assert_allclose(np.linalg.norm(gradient, axis=1)[outside], 1.0, atol=1e-3)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(("kind", "size"), CASES)
 def test_normals_are_the_gradient_of_the_distance(kind: str, size: tuple[float, ...]) -> None:
     rng = np.random.default_rng(3)
@@ -105,6 +108,7 @@ def test_everything_inside_is_within_reach(kind: str, size: tuple[float, ...]) -
     assert farthest <= reach < 1.4 * farthest + 0.05
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(("kind", "size"), CASES)
 def test_gradients_of_the_distance_against_differences_and_at_the_centre(kind: str, size: tuple[float, ...]) -> None:
     rng = np.random.default_rng(6)

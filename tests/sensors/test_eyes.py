@@ -86,6 +86,7 @@ def test_colours_differ_between_episodes_where_they_are_told_to() -> None:
     assert np.ptp(np.asarray(mixed[:, 4, 4]), axis=0).min() > 0.05
 
 
+@pytest.mark.whole
 def test_images_have_no_gradient_and_let_others_through() -> None:
     env = env_with(DOWN)
     state, _ = jax.jit(Env.reset, static_argnums=2)(env, random_key(0), N)
@@ -98,6 +99,7 @@ def test_images_have_no_gradient_and_let_others_through() -> None:
     assert np.all(np.asarray(by_image) == 0) and np.abs(np.asarray(by_reward)).max() > 0
 
 
+@pytest.mark.whole
 def test_noise_comes_on_in_a_share_of_the_episodes_and_stays() -> None:
     n = 400
     noisy = dataclasses.replace(DOWN, noise=ImageNoiseConfig(salt_and_pepper=0.5), noise_share=0.3)

@@ -100,6 +100,7 @@ def test_late_rows_do_not_move_at_first(env: Env) -> None:
     np.testing.assert_array_equal(np.argmax(moved, axis=0), [0, 0, 1, 1, 2])
 
 
+@pytest.mark.whole
 @pytest.mark.usefixtures("x64")
 def test_gradient_with_respect_to_the_latency() -> None:
     config = EnvConfig(command_mode="rotor_thrust", action_latency=(0.0, 2.7 * PERIOD))

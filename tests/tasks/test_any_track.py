@@ -121,6 +121,7 @@ def test_a_whole_race(track: str) -> None:
         np.testing.assert_array_equal(np.asarray(out.crashed)[live], False)
 
 
+@pytest.mark.whole
 def test_what_ends_a_race_badly() -> None:
     race = task()
     _, memory = race.start(random_key(4), 30)

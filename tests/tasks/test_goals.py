@@ -246,6 +246,7 @@ def test_what_to_look_at_circles_the_target(contracts: dict[str, Contract]) -> N
     np.testing.assert_allclose(flown.shown(np.pi)[1], [-3.0, 0.0, 2.5], atol=1e-12)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("task", list(TASKS))
 def test_what_training_shows_and_judges_flight_shows_and_judges(task: str) -> None:
     """The same code in NumPy and float64: fields, errors and verdicts of 64 vehicles that fly until they fail."""

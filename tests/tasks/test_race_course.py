@@ -26,6 +26,7 @@ def cross(race: Race, memory: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple
     return np.asarray(after), out
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", track_names())
 @pytest.mark.parametrize("laps", [1, 2])
 def test_a_whole_race(name: str, laps: int) -> None:
@@ -144,6 +145,7 @@ def test_hover_has_arrived_once_and_fails_on_the_ground() -> None:
     np.testing.assert_allclose(out.error, [0.2, 0.05, 0.0, 2.95, 2.949], atol=1e-6)
 
 
+@pytest.mark.whole
 def test_tracking_fails_beyond_its_fence_and_on_the_ground() -> None:
     task = Track.of(TrackConfig(reference="circle"), SHAPE)
     _, memory = task.start(random_key(0), 3)

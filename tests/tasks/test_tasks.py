@@ -228,6 +228,7 @@ def test_broken_references_are_named(text: str, message: str, tmp_path: Path) ->
         Track.of(TrackConfig(reference=str(path)), SHAPE)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", list(TASKS))
 def test_each_task_starts_in_a_process_that_knows_no_other(name: str) -> None:
     code = f"import jax, e2efly; jax.eval_shape(lambda k: e2efly.make_env({name!r}).reset(k, 2), jax.random.key(0))"

@@ -79,6 +79,7 @@ def test_pads_are_of_all_shapes_and_sizes_and_starts_over_them() -> None:
     assert feet.min() >= 1.0 and feet.max() <= 3.0 and np.abs(np.asarray(state.position[:, :2])).max() <= 1.0
 
 
+@pytest.mark.whole
 def test_a_collision_is_found_between_the_ends_of_a_control_step() -> None:
     trees = Solids.of("cylinder", jnp.array([[[0.0, 0.0, 2.0]]]), jnp.array([0.05, 2.0]))
     task = make_task(AvoidConfig(), Shape(0.05, 0.02), PERIOD, 7)
@@ -121,6 +122,7 @@ def test_a_forest_is_as_dense_as_asked_and_clear_of_the_start() -> None:
 TRACKS = RaceClutterConfig().track
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("only", [-1, 0, 1, 2])
 def test_clutter_leaves_gates_and_start_free(only: int) -> None:
     task = make_task(RaceClutterConfig(only=only), SHAPE, PERIOD, 7)
@@ -188,6 +190,7 @@ def test_no_track_is_chosen_or_judged_silently(changes: dict[str, Any], message:
         make_task(RaceClutterConfig(**changes), SHAPE, PERIOD, 7)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("only", [0, 1])
 def test_a_lap_in_clutter_is_the_gates_in_order_without_a_touch(only: int) -> None:
     empty = dataclasses.replace(RaceClutterConfig().clutter, obstacles=0.0)
@@ -220,6 +223,7 @@ def test_a_racer_is_to_look_at_its_gate_and_near_it_round_the_corner() -> None:
     assert np.isfinite(task.desired_yaw(last, at(np.asarray(memory.tracks.gates.position[0, 4])))).all()
 
 
+@pytest.mark.whole
 def test_the_expert_flies_through_a_forest_at_the_commanded_speed() -> None:
     task = make_task(AvoidConfig(), SHAPE, PERIOD, 7)
     state, memory = task.start(random_key(6), 50)

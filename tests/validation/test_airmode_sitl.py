@@ -76,6 +76,7 @@ def test_with_airmode_it_takes_off(on: Session) -> None:
     assert on.take_off()
 
 
+@pytest.mark.whole
 def test_without_airmode_it_is_refused_by_name_before_it_is_armed(off: Session) -> None:
     assert "AIRMODE" not in off.info.features
     refusal = "feature AIRMODE is off; needed: on: torque goes before thrust at any throttle (feature AIRMODE)"

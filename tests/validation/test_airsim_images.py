@@ -91,6 +91,7 @@ def hovering(session: Session, height: float = 2.0) -> RigidState:
     return state
 
 
+@pytest.mark.whole
 def test_requests_are_byte_for_byte_those_of_the_published_client(
     vis_r: Vehicle, landing: Contract, pad: Sight
 ) -> None:
@@ -166,6 +167,7 @@ def test_the_published_client_reads_the_same_pictures(
     assert {tuple(colour) for colour in seen[4, SEGMENTATION].image.reshape(-1, 3)} <= set(map(tuple, PALETTE))
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     ("changes", "camera"),
     [
@@ -228,6 +230,7 @@ def test_exposures_are_those_of_the_contract() -> None:
     assert [shutter.newest(now) for now in (0.0, 0.09, 3 * (0.1 / 3), 0.2)] == [0, 0, 1, 2]
 
 
+@pytest.mark.whole
 def test_a_policy_lands_by_airsims_own_images(
     vis_r: Vehicle, landing: Contract, pad: Sight, capsys: pytest.CaptureFixture[str], tmp_path: Any
 ) -> None:

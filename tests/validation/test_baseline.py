@@ -22,6 +22,7 @@ NAMES = "pid", "geometric", "indi", "mpc"
 STILL = {"randomize": {}, "action_latency": (0.06, 0.06)}
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("task", ["hover", "hover_aware", "land"])
 def test_it_does_the_task_of_the_policy(name: str, task: str) -> None:
@@ -37,6 +38,7 @@ def test_it_does_the_task_of_the_policy(name: str, task: str) -> None:
     assert any(f"hover controller {name}" in note for note in found.candidate.notes)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", NAMES)
 def test_it_follows_a_circle_on_vehicles_that_are_late(name: str) -> None:
     """By up to 50 ms, of which it is not told."""
@@ -50,6 +52,7 @@ def test_it_flies_through_gates(name: str) -> None:
     assert e2efly.evaluate("race", 20, baseline=name).success >= 0.9
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", NAMES)
 def test_a_plant_flies_it_as_eval_does(name: str) -> None:
     found = e2efly.validate("hover", "simulator", 3, baseline=name)

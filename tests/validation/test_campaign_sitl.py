@@ -29,6 +29,7 @@ def test_poses_that_end_in_a_take_off_break_no_rule(policy_of: Callable[..., Pat
     assert flown.changes[0][1] == "land"
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     "name",
     [
@@ -57,6 +58,7 @@ def test_what_ended_badly_once_breaks_no_rule(name: str, policy_of: Callable[...
     assert flown.ended
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("shift", [0.0, 0.13, 0.26, 0.52])
 def test_what_drifted_while_nothing_was_heard_stops_there_and_lands(
     shift: float, policy_of: Callable[..., Path], tmp_path: Path

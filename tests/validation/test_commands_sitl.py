@@ -47,6 +47,7 @@ def test_before_the_pilot_s_switch_nothing_is_commanded_and_without_commands_not
     assert reason.startswith("policy: no good command for 1.0")
 
 
+@pytest.mark.whole
 def test_positions_of_a_square_are_reached_with_their_heading(field: Field) -> None:
     field.hand_over(HOME)
     for x, y in ((0.6, 0.0), (0.6, 0.6), (0.0, 0.6), (0.0, 0.0)):
@@ -97,6 +98,7 @@ def test_body_rates_are_flown(field: Field) -> None:
     assert float(np.asarray(field.rig.state.body_rate)[0]) == pytest.approx(0.5, abs=0.2)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_faulty_commander_ends_in_hover_within_the_time_out_and_moves_nothing(field: Field, fault: str) -> None:
     commands, reason = FAULTS[fault]
@@ -115,6 +117,7 @@ def test_a_faulty_commander_ends_in_hover_within_the_time_out_and_moves_nothing(
     assert np.linalg.norm(field.position - place) < 0.3
 
 
+@pytest.mark.whole
 def test_the_fence_and_the_sticks_end_it_as_they_end_a_policy(field: Field) -> None:
     field.hand_over(HOME)
     field.rig.set(roll=0.5)

@@ -27,6 +27,7 @@ SETTINGS = dataclasses.replace(rehearsal_settings(1.2), fence=Fence(low=(-4.0, -
 SHORT = ExcitationOptions(seconds=10.0)
 
 
+@pytest.mark.whole
 def test_it_ends_by_itself_and_its_log_and_blackbox_are_read_together(tmp_path: Path) -> None:
     log = tmp_path / "flight.mcap"
     with Telemetry(log) as telemetry:
@@ -60,6 +61,7 @@ def test_it_ends_by_itself_and_its_log_and_blackbox_are_read_together(tmp_path: 
         assert late + record.pose_age == pytest.approx(link + age, abs=0.006)
 
 
+@pytest.mark.whole
 def test_the_pilots_switch_ends_it_at_once(tmp_path: Path) -> None:
     acts, course = excitation(FILE, SETTINGS, SHORT)
     with Rig(firmware.chosen(), tmp_path, FILE, latency=0.03) as rig:

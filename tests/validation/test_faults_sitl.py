@@ -56,6 +56,7 @@ def hangar(policy_of: Callable[..., Path], tmp_path_factory: pytest.TempPathFact
     hangar.close()
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name.replace(" ", "-"))
 def test_it_ends_as_documented(hangar: Hangar, fault: Fault) -> None:
     assert hangar.strike(fault).problems == ()

@@ -52,6 +52,7 @@ def field(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         yield flight, log
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize(
     "commands", [leaning(0.0, 0.6), leaning(-0.5, 0.0), falling], ids=["wall in x", "wall in y", "floor"]
 )
@@ -87,6 +88,7 @@ def test_a_commander_that_flies_at_a_wall_is_kept_inside(field: tuple[Field, Pat
     assert np.linalg.norm(flight.position - [0.0, 0.0, 1.5]) < 0.3
 
 
+@pytest.mark.whole
 def test_the_report_shows_where_it_stepped_in(
     field: tuple[Field, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

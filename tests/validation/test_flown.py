@@ -38,6 +38,7 @@ def heavy(tmp_path: Path) -> str:
     return str(file)
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("controller", ["policy", "plant"])
 def test_eval_and_the_plants_fly_a_heavier_vehicle_alike(
     controller: str, heavy: str, policy_of: Callable[..., Path]
@@ -145,6 +146,7 @@ def test_a_plant_that_cannot_change_the_body_says_so(
     assert "--controller plant" in said
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("command", [["eval", "--plots"], ["validate", "--plant", "simulator", "--out"]])
 def test_a_task_and_the_file_of_any_vehicle_are_accepted(
     command: list[str], heavy: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -179,6 +181,7 @@ class Weighed(PointMass):
 """
 
 
+@pytest.mark.whole
 def test_a_plant_of_ones_own_is_given_the_body(
     heavy: str, policy_of: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -41,6 +41,7 @@ def running(command: list[str]) -> Iterator[subprocess.Popen[str]]:
             node.kill()
 
 
+@pytest.mark.whole
 def test_images_are_those_of_the_environment_at_the_pose_and_stop_with_the_poses() -> None:
     found, port = candidate("avoid"), free_port(udp=True)
     scenery = Scenery.draw(found.environment(next(iter(found.task.criteria().values()))), 7)

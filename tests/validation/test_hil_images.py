@@ -55,6 +55,7 @@ class Scanned(Avoid):
         return SCAN
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("triangles", [False, True])
 @pytest.mark.parametrize("sees", ["depth", "rgb"])
 def test_an_image_is_that_of_the_environment_at_the_pose_bit_for_bit(sees: str, triangles: bool) -> None:

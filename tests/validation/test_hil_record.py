@@ -58,6 +58,7 @@ def test_images_and_messages_are_read_back(tmp_path: Path) -> None:
         Recorder(path, [CAMERA], [NAME])
 
 
+@pytest.mark.whole
 def test_the_command_writes_a_recording_and_a_report(tmp_path: Path) -> None:
     port, tcp = free_port(udp=True), free_port()
     recording, report = tmp_path / "hil.mcap", tmp_path / "report"

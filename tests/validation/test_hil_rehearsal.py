@@ -97,6 +97,7 @@ def race(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Drawn]:
     return plan, draw(plan, 4, tmp_path_factory.mktemp("drawn") / "track.toml")
 
 
+@pytest.mark.whole
 def test_the_bridge_is_told_the_gates_that_stand_in_the_world(race: tuple[Plan, Drawn]) -> None:
     _, drawn = race
     own, wanted = drawn.course.memory, drawn.scenery.course.memory

@@ -147,6 +147,7 @@ def test_a_collision_with_a_scan_stops_the_images_even_where_the_wall_is_thin(tm
     assert set(said) == {"images"}
 
 
+@pytest.mark.whole
 def test_worlds_that_nobody_can_fly_in_are_refused_before_anything_is_shown(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

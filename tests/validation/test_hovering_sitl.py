@@ -29,6 +29,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
         yield rig
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("name", ["pid", "geometric", "indi", "mpc"])
 def test_it_takes_off_holds_its_place_in_wind_and_lands(rig: Rig, name: str) -> None:
     rig.state, rig.wind = rig.world.at_rest(), np.zeros(3)

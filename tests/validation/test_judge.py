@@ -44,6 +44,7 @@ def flown(path: Path, env: Env, starts: Starts, seconds: float) -> list[Trajecto
     ]
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     ("name", "seconds", "sink", "good"),
     [("hover", 5.0, 0.0, N), ("land", 5.0, 0.08, 1), ("circle", 3.0, 0.0, N), ("race", 3.0, 0.0, 0)],

@@ -11,6 +11,7 @@ from e2efly.control import Quat, Vec3
 from e2efly.identification.csv_file import read_csv
 
 
+@pytest.mark.whole
 def test_each_flight_has_a_log_that_is_the_flight(tmp_path: Path) -> None:
     found = e2efly.validate("hover", "mujoco", 2, log=tmp_path / "logs")
     paths = sorted((tmp_path / "logs").iterdir())

@@ -55,6 +55,7 @@ def test_under_commands_that_saturate_the_mixer_it_is_the_training_simulator(see
     assert off[:3].max() < 1e-3 and off[3:6].max() < 3e-3 and off[6:10].max() < 1e-3 and off[10:].max() < 0.01
 
 
+@pytest.mark.whole
 def test_the_zoos_hover_does_there_what_eval_says() -> None:
     n = 200
     success, error = sys.modules[own().__module__].hover(e2efly.load_policy("hover"), n)

@@ -31,6 +31,7 @@ def _as_before(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(PLANTS, "_known", dict(PLANTS._known))
 
 
+@pytest.mark.whole
 def test_a_plant_of_ones_own_flies_as_those_of_the_package(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The zoo's hover, by a reference, in processes of their own, and by the class."""
     file, report = tmp_path / "point.py", tmp_path / "report.json"

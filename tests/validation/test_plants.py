@@ -155,6 +155,7 @@ def test_rate_loop_and_mixer_are_the_simulators(vis_r: Vehicle) -> None:
     assert saturated > 50
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     ("mode", "command"),
     [

@@ -54,6 +54,7 @@ def flown() -> Callable[[Vehicle, str], tuple[State, list[RigidState], np.ndarra
     return fly
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize(
     ("term", "mode"),

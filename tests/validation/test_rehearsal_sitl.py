@@ -13,6 +13,7 @@ from e2efly.validation.rehearsal import rehearse
 from e2efly.vehicles import load_vehicle
 
 
+@pytest.mark.whole
 def test_take_off_hover_policy_hover_land_by_switches_alone(policy_of: Callable[..., Path], tmp_path: Path) -> None:
     vehicle, policy = load_vehicle("vis_r"), load_policy(policy_of("hover"))
     with Telemetry(tmp_path / "flight.mcap") as log:

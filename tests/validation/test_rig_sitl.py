@@ -189,6 +189,7 @@ def test_it_hovers_where_thrust_equals_weight(bench: Bench) -> None:
     assert abs(rig.state.velocity[2] - before) / 0.2 < 1.0
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("override_failsafe", [False, True])
 def test_a_silent_msp_is_held_or_handed_back_as_the_version_is_said_to(tmp_path: Path, override_failsafe: bool) -> None:
     """Why the bridge has a watchdog: where the last sticks are held, only the override switch ends them."""

@@ -38,6 +38,7 @@ def flown(env: Env, actions: np.ndarray) -> tuple[list[RigidState], list[list[np
     return states, shown, first
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     ("task", "camera"),
     [
@@ -63,12 +64,14 @@ def test_images_are_those_of_the_environment_at_the_same_pose(task: str, camera:
     assert any((a[0] != b[0]).any() for a, b in zip(shown, shown[2:], strict=False))  # it did see something move
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("plant", ["simulator", "mujoco"])
 def test_a_policy_flies_by_what_the_plant_sees(plant: str) -> None:
     found = e2efly.validate("land_visual", plant, 8)
     assert found.criteria["land_visual"].flown.success.all()
 
 
+@pytest.mark.whole
 def test_a_policy_that_is_shown_nothing_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     def nothing(self: Watch, k: int, states: Any) -> list[np.ndarray]:
         del k, states
@@ -79,6 +82,7 @@ def test_a_policy_that_is_shown_nothing_fails(monkeypatch: pytest.MonkeyPatch) -
     assert not found.criteria["land_visual"].flown.success.any()
 
 
+@pytest.mark.whole
 def test_rows_of_cameras_change_what_the_plant_sees() -> None:
     found = candidate("avoid")
     suite = found.task.criteria()["avoid_5"]

@@ -40,6 +40,7 @@ class Published:
         return self.read_back.describe()
 
 
+@pytest.mark.whole
 def test_a_policy_lands_on_a_pad_that_it_only_sees(tmp_path: Path) -> None:
     found, path = candidate("land_visual"), tmp_path / "flight.mcap"
     camera = found.policy.contract.images[0]
@@ -60,6 +61,7 @@ def test_a_policy_lands_on_a_pad_that_it_only_sees(tmp_path: Path) -> None:
     assert max(ages) <= camera.latency_range_s[1] + 1 / camera.rate_hz + 0.011  # and a round of the bridge
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("fault", ["silent", "all holes", "capture killed"])
 def test_a_camera_that_breaks_in_flight_ends_in_hover_within_a_control_step(fault: str) -> None:
     ended = fly_with(firmware.chosen(), candidate("avoid"), VEHICLE, fault)
@@ -69,6 +71,7 @@ def test_a_camera_that_breaks_in_flight_ends_in_hover_within_a_control_step(faul
     assert ended.landed
 
 
+@pytest.mark.whole
 def test_a_camera_that_hangs_upside_down_is_never_flown_by() -> None:
     ended = fly_with(firmware.chosen(), candidate("avoid"), VEHICLE, UPSIDE_DOWN)
     assert ended.mode == "hover"

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from e2efly.identification.align import align
 from e2efly.identification.checks import checked
@@ -15,6 +16,7 @@ from e2efly.vehicles import load_vehicle
 VEHICLE = load_vehicle("vis_r")
 
 
+@pytest.mark.whole
 def test_the_simulator_is_aligned_with_the_firmware(tmp_path: Path) -> None:
     """Betaflight's rate loop is quicker than the file's, which held-out time shows."""
     with Rig(firmware.chosen(), tmp_path, VEHICLE) as rig:

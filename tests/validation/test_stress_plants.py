@@ -35,6 +35,7 @@ def wanted(policy_of: Callable[..., Path]) -> Report:
     return in_training(policy_of("hover"), 2, rows=DRAWN_ALIKE)
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize(("plant", "close"), [("simulator", 0.004), ("mujoco", 0.01)])
 def test_a_row_is_the_same_as_in_eval(plant: str, close: float, wanted: Report, policy_of: Callable[..., Path]) -> None:
     """Start by start: the same draw of the rotor that is weaker, of the wind's direction, of everything."""

@@ -16,6 +16,7 @@ CLOSE = 0.12
 """Largest difference of a mean final error, m: the bridge learns its throttle map in a take-off, to a hundredth."""
 
 
+@pytest.mark.whole
 def test_the_firmware_meets_the_rows(policy_of: Callable[..., Path]) -> None:
     policy = policy_of("hover")
     found, wanted = (
@@ -29,6 +30,7 @@ def test_the_firmware_meets_the_rows(policy_of: Callable[..., Path]) -> None:
     assert error["wind 3 m/s"] > error["nominal"] + 0.01
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize(("controller", "low", "high"), [("policy", 0.8, 1.1), ("plant", -0.1, 0.1)])
 def test_the_throttle_map_is_of_the_vehicle_that_the_controller_believes_in(
     controller: str, low: float, high: float, policy_of: Callable[..., Path], tmp_path: Path

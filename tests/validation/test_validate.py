@@ -14,6 +14,7 @@ from e2efly.validation.validate import validate
 from e2efly.vehicles import load_vehicle, vehicle
 
 
+@pytest.mark.whole
 def test_hover_in_mujoco_is_as_in_training(
     policy_of: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -47,6 +48,7 @@ def test_success_that_drops_too_far_is_told_by_the_exit_status(
     assert validate(policy_of("hover"), "mujoco", 3, vehicle=str(slow), max_drop=100.0).passed
 
 
+@pytest.mark.whole
 def test_a_policy_that_sees_an_imu_is_validated(policy_of: Callable[..., Path]) -> None:
     seeing = policy_of("hover", imu=ImuConfig(observed=True, gyro_noise=0.0, accel_noise=0.0))
     assert validate(seeing, "simulator", 3).passed

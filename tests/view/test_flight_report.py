@@ -208,6 +208,7 @@ def test_the_summary_says_what_was_flown(log: FlightLog) -> None:
     ]
 
 
+@pytest.mark.whole
 def test_the_command_draws_prints_and_exports(
     tmp_path: Path, log: FlightLog, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -227,6 +228,7 @@ def test_the_command_draws_prints_and_exports(
     assert bag1.is_file() and bag2.is_dir()
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(
     ("only", "figures"),
     [

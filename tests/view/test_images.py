@@ -43,6 +43,7 @@ def test_colours_of_each_sensor() -> None:
     assert len(np.unique(in_colours("instance", np.arange(12)[None], 6.0)[0], axis=0)) == 12
 
 
+@pytest.mark.whole
 def test_pictures_of_noise(tmp_path: Path, sight: Sight) -> None:
     plot_depth_noise(sight, random_key(0), tmp_path / "depth.png")
     plot_image_noise(sight, np.ones((16, 32), np.float32), random_key(0), tmp_path / "image.png")

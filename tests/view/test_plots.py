@@ -92,6 +92,7 @@ def test_learning_without_a_single_reward_term(tmp_path: Path) -> None:
     check_png(tmp_path / "a.png")
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", list(SUITES))
 def test_flights_of_every_task(tmp_path: Path, name: str) -> None:
     plots.plot_flights(SUITES[name], flights(), tmp_path / "flights.png", name)

@@ -40,6 +40,7 @@ def one(kind: str) -> Scene:
     return Scene.of({kind: solids}, 1)
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("kind", list(SIZES))
 def test_what_is_drawn_lies_on_the_solid_and_covers_its_area(kind: str) -> None:
     scene = one(kind)

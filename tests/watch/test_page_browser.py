@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import pytest
 from PIL import Image
 from playwright.sync_api import Page
 
@@ -70,6 +71,7 @@ def time_of(page: Page) -> float:
     return float(found[1])
 
 
+@pytest.mark.whole
 def test_a_policy_is_watched_disturbed_and_paused(tmp_path: Path) -> None:
     wrong: list[str] = []
     with served("hover") as (process, address), page_of(address, wrong) as page:
@@ -93,6 +95,7 @@ def test_a_policy_is_watched_disturbed_and_paused(tmp_path: Path) -> None:
     assert picture[:, :500].std() > 5  # something is drawn there
 
 
+@pytest.mark.whole
 def test_a_browser_that_goes_away_does_not_end_the_viewer() -> None:
     wrong: list[str] = []
     with served("hover") as (process, address):
@@ -104,6 +107,7 @@ def test_a_browser_that_goes_away_does_not_end_the_viewer() -> None:
     assert wrong == []
 
 
+@pytest.mark.whole
 def test_a_validation_is_watched(tmp_path: Path) -> None:
     report = str(tmp_path / "report.json")
     asked = ["--plant", "mujoco", "--episodes", "2", "--max-drop", "100", "--out", str(tmp_path), "--json", report]
@@ -120,6 +124,7 @@ def test_a_validation_is_watched(tmp_path: Path) -> None:
     assert picture[:, :500].std() > 5
 
 
+@pytest.mark.whole
 def test_what_a_log_says_is_shown_as_text_and_not_run(tmp_path: Path) -> None:
     frame = "<iframe srcdoc='<script>parent.ran = true<&#47;script>'>"
     said = [frame, "<img src=/x onerror='ran = true'>", "{globalThis.ran = true}", "![x](/y) **bold** &lt; a_b_c"]

@@ -22,6 +22,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.whole
 def test_the_plant_is_followed_and_the_simulator_is_its_ghost(folder: Path) -> None:
     starts, vehicle = read_report(folder / "report.json")
     told = json.loads((folder / "report.json").read_text())["criteria"]["race"]["starts"]

@@ -28,6 +28,7 @@ def after(source: Simulation, steps: int) -> np.ndarray:
     return [source.step(0) for _ in range(steps)][-1].position
 
 
+@pytest.mark.whole
 def test_untouched_vehicles_fly_as_in_the_environment() -> None:
     found = candidate("hover")
     env = found.environment(found.task.criteria()["hover"])

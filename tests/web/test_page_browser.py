@@ -75,6 +75,7 @@ def race_page(racing: tuple[Candidate, Path], browser: Browser) -> Opened:
     return opened(browser, racing[1])
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("name", POLICIES)
 def test_a_page_flies_as_python_does(name: str, browser: Browser, tmp_path: Path) -> None:
     found = candidate(name)
@@ -100,6 +101,7 @@ def test_a_page_flies_as_python_does(name: str, browser: Browser, tmp_path: Path
     open_page.page.close()
 
 
+@pytest.mark.whole
 def test_the_sliders_change_what_flies(racing: tuple[Candidate, Path], race_page: Opened) -> None:
     """To what the environment makes of the same wind, mass and delay."""
     found, open_page = racing[0], race_page
@@ -170,6 +172,7 @@ FLOWN = (
 )
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize(("mode", "integrator"), FLOWN)
 def test_the_page_has_the_physics_of_every_vehicle(
     mode: str, integrator: str, odd_vehicle: Path, race_page: Opened
@@ -195,6 +198,7 @@ def given(actions: np.ndarray) -> Act:
     return Act(lambda observation, images, memory: (np.tile(actions[int(memory[0])], (2, 1)), memory + 1), np.zeros)
 
 
+@pytest.mark.whole
 def test_a_page_is_flown_by_its_visitor(racing: tuple[Candidate, Path], browser: Browser) -> None:
     """Pause, throw, reset and another camera, by buttons and by keys; nothing is asked of the network."""
     page = (open_page := opened(browser, racing[1], "")).page
@@ -231,6 +235,7 @@ def test_a_page_is_flown_by_its_visitor(racing: tuple[Candidate, Path], browser:
     page.close()
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize(("width", "scheme"), [(380, "dark"), (1200, "light")])
 def test_a_page_fits_its_screen(width: int, scheme: Any, racing: tuple[Candidate, Path], browser: Browser) -> None:
     """A phone's, too: nothing is wider, everything that is there can be seen, and words stand out from their ground."""
