@@ -25,13 +25,8 @@ def helped(*arguments: str) -> str:
 
 def page() -> str:
     """The page."""
-    before, os.environ["COLUMNS"] = os.environ.get("COLUMNS"), "110"
-    try:
-        parts = [f"## {command}\n\n```text\n{helped(command)}\n```\n" for command in cli.COMMANDS]
-    finally:
-        os.environ.pop("COLUMNS")
-        if before is not None:
-            os.environ["COLUMNS"] = before
+    os.environ["COLUMNS"] = "110"
+    parts = [f"## {command}\n\n```text\n{helped(command)}\n```\n" for command in cli.COMMANDS]
     return "\n".join([ABOUT, *parts])
 
 

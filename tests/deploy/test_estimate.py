@@ -105,5 +105,5 @@ def test_what_was_propagated_from_the_ground_ends_with_the_take_off() -> None:
     """After some seconds it would be worse than what the poses have said since."""
     init, off, hover = (Flight(mode=mode) for mode in (Mode.INIT, Mode.TAKEOFF, Mode.HOVER))
     flying = enter(good(flight=init), init, off)
-    assert flying.inertial.reckonings.rest is not None
-    assert enter(flying, off, hover).inertial.reckonings.rest is None
+    assert flying.inertial.reckonings.grounded is not None
+    assert enter(flying, off, hover).inertial.reckonings.grounded is None

@@ -40,8 +40,6 @@ that of the thrust by this, too: m/s^2 at first, and m/s at most. It is less tha
 sinks."""
 SLOWER = 0.3
 """How much faster than estimated the height may rise, m/s."""
-UNDER = 0.1
-"""If the height is this far under the ground, m, the vehicle is weighed, unless it is felt to fly."""
 OVERDUE, WEIGHT, LIGHTER, LIGHTEST = 0.3, 0.97, 0.04, 0.6
 """If the height is this far under the ground, m, the thrust is at most the second value of the weight, less the third
 for each further metre, but at least the fourth."""
@@ -205,7 +203,7 @@ def move(before: Descent, sense: Sense, attitude: Attitude | None, now: float, *
 
 def command(before: Descent, attitude: Attitude | None, dt: float) -> tuple[Descent, float, tuple[float, float]]:
     """The descent after another `dt` s, the thrust to send, m/s^2, and the roll and pitch to turn to, rad."""
-    now, felt = before.now, before.touch.weigh(before.now, low=-before.height > UNDER)
+    now, felt = before.now, before.touch.weigh(before.now, low=-before.height > touch.UNDER)
     error = before.sink - before.climb
     trim = before.trim + TRIM_GAIN * max(-TRIM_ERROR, min(TRIM_ERROR, error)) * dt
     trim = max(-LARGEST_TRIM, min(LARGEST_TRIM, trim))

@@ -211,7 +211,7 @@ def enter(before: Estimate, flight_before: Flight, flight: Flight) -> Estimate:
     if flight.blind and not flight_before.blind and flight.turned is None:
         told = inertial.alone(told, wrong=flight.misled is not None)
     if flight.mode is not flight_before.mode:
-        flown = replace(told, touch=told.touch.afresh(), reckonings=replace(told.reckonings, rest=None))
+        flown = replace(told, touch=told.touch.afresh(), reckonings=replace(told.reckonings, grounded=None))
         told = told.at_rest() if flight.mode is Mode.TAKEOFF else flown
         delays = DelayWatch()
     return replace(before, inertial=told, delays=delays)

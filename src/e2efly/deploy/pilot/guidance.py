@@ -15,7 +15,7 @@ from e2efly.deploy.pilot.flight_state import Flight, Mode, Target
 from e2efly.deploy.pilot.hover import LIFTED, blind, rates_of
 from e2efly.deploy.pilot.hovering import HoverController, Seen, UnderWay
 from e2efly.deploy.pilot.inertial import Inertial
-from e2efly.deploy.pilot.touch import LOW, wave
+from e2efly.deploy.pilot.touch import LOW, UNDER, wave
 from e2efly.vehicles.vehicle import GRAVITY
 
 TRIM = (-3.0, 5.0)
@@ -30,9 +30,6 @@ TRIM_FADE = 1.0
 STEADY = 0.03
 """Body rates of a hover that are below this are sent as zero, rad/s. If the link falls silent now, they are held for a
 long time."""
-UNDER = 0.1
-"""A blind descent whose estimated height is this far under the ground, m, weighs the vehicle, unless it is felt to fly.
-"""
 OVERDUE = 0.3
 """A blind descent whose estimated height is this far under the ground, m, ..."""
 WEIGHT, LIGHTER, LIGHTEST = (0.985, 0.97), (0.015, 0.04), 0.6

@@ -115,7 +115,7 @@ class Inertial:
         rest is kept.
         """
         return Inertial(
-            rest=self.rest, reckonings=self.reckonings.from_rest(), force=self.force, gyro=self.gyro, time=self.time
+            rest=self.rest, reckonings=self.reckonings.from_ground(), force=self.force, gyro=self.gyro, time=self.time
         )
 
     def buried(self, ground: float, now: float) -> bool:
@@ -128,10 +128,10 @@ class Inertial:
         """How much faster than its poses the vehicle has climbed since the ground, by accelerometer and throttle: the
         poses may be scaled. None: it has not.
         """
-        rest, newest = self.reckonings.rest, self.reckonings.newest
-        if rest is None or newest is None:
+        grounded, newest = self.reckonings.grounded, self.reckonings.newest
+        if grounded is None or newest is None:
             return None
-        told, climb = newest.velocity[2], min(rest.velocity[2], rest.lifted)
+        told, climb = newest.velocity[2], min(grounded.velocity[2], grounded.lifted)
         if climb - told < FASTER + FASTER_SHARE * abs(climb):
             return None
         return f"they climb at {told:.1f} m/s, by accelerometer and throttle it is {climb:.1f} m/s"

@@ -185,10 +185,12 @@ def _sinking(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
         return to(flight, Mode.DONE, Reason.TOUCHED)
     if inputs.seen is None:
         flight = dataclasses.replace(flight, found_since=None)
+    if inputs.failsafe:
+        return flight
     at, height, climb = flight.lost or _last_seen(settings, flight, inputs)
     sinking, expected = flight.now - at, blind_time(height, climb)
-    overdue = inputs.stands is None and not inputs.failsafe and sinking > 2 * expected + BEYOND_S
-    if (inputs.deaf and not inputs.failsafe and (sinking > expected or inputs.buried)) or overdue:
+    overdue = inputs.stands is None and sinking > 2 * expected + BEYOND_S
+    if (inputs.deaf and (sinking > expected or inputs.buried)) or overdue:
         return to(flight, Mode.DONE, f"{Reason.LANDED}: without odometry, after {flight.now - at:.0f} s")
     return flight
 

@@ -85,25 +85,25 @@ class Reckonings:
     """Propagated from the newest pose."""
     anchors: tuple[Reckoning, ...] = ()
     """Propagated from older poses, oldest first."""
-    rest: Reckoning | None = None
+    grounded: Reckoning | None = None
     """In a take-off: propagated from the ground, where the velocity is zero, however the poses are scaled."""
 
     def seen(self, newest: Reckoning) -> "Reckonings":
         """These reckonings with another pose."""
         if self.anchors and newest.begun - self.anchors[-1].begun < ANCHOR_S:
             return replace(self, newest=newest)
-        return Reckonings(newest, (*self.anchors[-ANCHORS + 1 :], newest), self.rest)
+        return Reckonings(newest, (*self.anchors[-ANCHORS + 1 :], newest), self.grounded)
 
-    def from_rest(self) -> "Reckonings":
+    def from_ground(self) -> "Reckonings":
         """Begin a take-off: nothing moves yet."""
-        rest = self.newest and replace(self.newest, velocity=(0.0, 0.0, 0.0), lifted=0.0)
-        return Reckonings(self.newest, rest=rest)
+        grounded = self.newest and replace(self.newest, velocity=(0.0, 0.0, 0.0), lifted=0.0)
+        return Reckonings(self.newest, grounded=grounded)
 
     def on(self, step: Callable[[Reckoning], Reckoning | None]) -> "Reckonings":
         """All reckonings after a step. Those that cannot be propagated are left out."""
         anchors = tuple(after for anchor in self.anchors if (after := step(anchor)) is not None)
-        newest, rest = (None if r is None else step(r) for r in (self.newest, self.rest))
-        return Reckonings(newest, anchors, rest)
+        newest, grounded = (None if r is None else step(r) for r in (self.newest, self.grounded))
+        return Reckonings(newest, anchors, grounded)
 
     def alone(self, *, wrong: bool) -> "Reckonings":
         """Start a flight without poses, from the median of all reckonings.
@@ -112,8 +112,8 @@ class Reckonings:
             wrong: the poses were wrong, perhaps for a while, so only the older half is used, or in a take-off what
                 was propagated from the ground.
         """
-        if wrong and self.rest is not None:
-            return Reckonings(self.rest)
+        if wrong and self.grounded is not None:
+            return Reckonings(self.grounded)
         every = (*self.anchors, *([self.newest] if self.newest else []))
         if not every:
             return self

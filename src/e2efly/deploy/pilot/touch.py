@@ -33,6 +33,9 @@ STRUCK_S = 0.1
 LOW, LONGEST_S, AGAIN_S = 0.45, 0.5, 1.0
 """A weighing lowers the thrust to the first value, in units of gravity, for the second at most, s. The next one begins
 after the third, s."""
+UNDER = 0.1
+"""A blind descent whose estimated height is this far under the ground, m, weighs the vehicle, unless it is felt to fly.
+"""
 LIGHT, ENOUGH_S, MOST_S = 0.6, 0.07, 0.05
 """A vehicle is carried if it measures its weight for the second value, s, while its thrust is below the first, in units
 of gravity. A measurement counts for the time since the one before, but at most for the third value, s."""
